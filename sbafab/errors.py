@@ -1,0 +1,15 @@
+"""Errors a user can act on: each is one sentence that names the remedy."""
+
+from __future__ import annotations
+
+
+class SbafabError(Exception):
+    """Base of every error whose message is meant for the user."""
+
+
+class DesignError(SbafabError, ValueError):
+    """A design that cannot be built: field, value, what is allowed, what would fix it."""
+
+
+class OutputError(SbafabError, OSError):
+    """Files that could not be written or read back as they should be."""

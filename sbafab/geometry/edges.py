@@ -1,0 +1,219 @@
+"""Edges of a planar profile: straight lines and circular arcs, exact.
+
+Lengths are millimetres, angles radians. Every arc spans at most half a turn, so its bulge
+(tan of a quarter of its sweep, the DXF convention) is at most one in size.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+Point = tuple[float, float]
+Bounds = tuple[float, float, float, float]
+
+EPSILON = 2e-6
+"""Two points nearer than this are one point: 2 nm, far below the 1 um the cut files promise."""
+
+
+class Line(NamedTuple):
+    """A straight edge from ``start`` to ``end``."""
+
+    start: Point
+    end: Point
+
+    @property
+    def length(self) -> float:
+        return math.dist(self.start, self.end)
+
+    @property
+    def bulge(self) -> float:
+        return 0.0
+
+    @property
+    def segment_area(self) -> float:
+        """Area between the chord and the edge (none)."""
+        return 0.0
+
+    @property
+    def bounds(self) -> Bounds:
+        (x0, y0), (x1, y1) = self.start, self.end
+        return min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1)
+
+    def reversed(self) -> Line:
+        return Line(self.end, self.start)
+
+    def at(self, t: float) -> Point:
+        """Point at fraction ``t`` of the length."""
+        (x0, y0), (x1, y1) = self.start, self.end
+        return x0 + t * (x1 - x0), y0 + t * (y1 - y0)
+
+    def direction(self, p: Point) -> Point:
+        """Unit direction of travel (the same at every ``p``)."""
+        (x0, y0), (x1, y1) = self.start, self.end
+        length = math.hypot(x1 - x0, y1 - y0)
+        return (x1 - x0) / length, (y1 - y0) / length
+
+    def parameter(self, p: Point) -> float:
+        """Fraction of the length at the foot of ``p``."""
+        (x0, y0), (x1, y1) = self.start, self.end
+        dx, dy = x1 - x0, y1 - y0
+        return ((p[0] - x0) * dx + (p[1] - y0) * dy) / (dx * dx + dy * dy)
+
+    def nearest(self, p: Point) -> Point:
+        """Point of the edge nearest to ``p``."""
+        return self.at(min(1.0, max(0.0, self.parameter(p))))
+
+    def part(self, start: Point, end: Point) -> Line:
+        """The piece between two points of the edge, taken in the direction of travel."""
+        return Line(start, end)
+
+    def offset(self, distance: float) -> Line:
+        """The parallel edge ``distance`` to the right of the direction of travel."""
+        ux, uy = self.direction(self.start)
+        nx, ny = uy * distance, -ux * distance
+        (x0, y0), (x1, y1) = self.start, self.end
+        return Line((x0 + nx, y0 + ny), (x1 + nx, y1 + ny))
+
+
+class Arc(NamedTuple):
+    """A circular edge round ``centre``, counter-clockwise if ``ccw``; at most half a turn."""
+
+    start: Point
+    end: Point
+    centre: Point
+    radius: float
+    ccw: bool
+
+    @property
+    def start_angle(self) -> float:
+        return math.atan2(self.start[1] - self.centre[1], self.start[0] - self.centre[0])
+
+    @property
+    def sweep(self) -> float:
+        """Signed angle turned through: positive counter-clockwise."""
+        cx, cy = self.centre
+        ax, ay = self.start[0] - cx, self.start[1] - cy
+        bx, by = self.end[0] - cx, self.end[1] - cy
+        turn = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
+        if self.ccw:
+            return turn if turn > -1e-9 else turn + math.tau
+        return turn if turn < 1e-9 else turn - math.tau
+
+    @property
+    def length(self) -> float:
+        return self.radius * abs(self.sweep)
+
+    @property
+    def bulge(self) -> float:
+        return math.tan(self.sweep / 4)
+
+    @property
+    def segment_area(self) -> float:
+        """Signed area between the chord and the arc: positive when counter-clockwise."""
+        sweep = self.sweep
+        return 0.5 * self.radius**2 * (sweep - math.sin(sweep))
+
+    @property
+    def bounds(self) -> Bounds:
+        (x0, y0), (x1, y1), (cx, cy), r = self.start, self.end, self.centre, self.radius
+        low_x, low_y, high_x, high_y = min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1)
+        first, last = self._span()
+        quarter = math.ceil(first / (math.pi / 2))
+        while quarter * (math.pi / 2) <= last:
+            side = quarter % 4
+            if side == 0:
+                high_x = cx + r
+            elif side == 1:
+                high_y = cy + r
+            elif side == 2:
+                low_x = cx - r
+            else:
+                low_y = cy - r
+            quarter += 1
+        return low_x, low_y, high_x, high_y
+
+    def _span(self) -> tuple[float, float]:
+        first, sweep = self.start_angle, self.sweep
+        return (first, first + sweep) if sweep >= 0 else (first + sweep, first)
+
+    def reversed(self) -> Arc:
+        return Arc(self.end, self.start, self.centre, self.radius, not self.ccw)
+
+    def on_circle(self, angle: float) -> Point:
+        return (
+            self.centre[0] + self.radius * math.cos(angle),
+            self.centre[1] + self.radius * math.sin(angle),
+        )
+
+    def at(self, t: float) -> Point:
+        """Point at fraction ``t`` of the length."""
+        return self.on_circle(self.start_angle + t * self.sweep)
+
+    def direction(self, p: Point) -> Point:
+        """Unit direction of travel at ``p``, a point of the arc."""
+        x, y = p[0] - self.centre[0], p[1] - self.centre[1]
+        r = math.hypot(x, y) or 1.0
+        return (-y / r, x / r) if self.ccw else (y / r, -x / r)
+
+    def parameter(self, p: Point) -> float:
+        """Fraction of the sweep at the foot of ``p``; outside 0 to 1 where the foot misses."""
+        cx, cy = self.centre
+        ax, ay = self.start[0] - cx, self.start[1] - cy
+        bx, by = p[0] - cx, p[1] - cy
+        turn = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
+        sweep = self.sweep
+        half = sweep / 2
+        turn = half + math.remainder(turn - half, math.tau)
+        return turn / sweep
+
+    def nearest(self, p: Point) -> Point:
+        """Point of the edge nearest to ``p``."""
+        x, y = p[0] - self.centre[0], p[1] - self.centre[1]
+        distance = math.hypot(x, y)
+        if distance > EPSILON and 0.0 <= self.parameter(p) <= 1.0:
+            scale = self.radius / distance
+            return self.centre[0] + x * scale, self.centre[1] + y * scale
+        return min(self.start, self.end, key=lambda end: math.dist(p, end))
+
+    def part(self, start: Point, end: Point) -> Arc:
+        """The piece between two points of the edge, taken in the direction of travel."""
+        return Arc(start, end, self.centre, self.radius, self.ccw)
+
+    def offset(self, distance: float) -> Arc | None:
+        """The concentric edge ``distance`` to the right; None where it shrinks to nothing."""
+        radius = self.radius + distance if self.ccw else self.radius - distance
+        if radius < EPSILON:
+            return None
+        scale = radius / self.radius
+        cx, cy = self.centre
+
+        def moved(p: Point) -> Point:
+            return cx + (p[0] - cx) * scale, cy + (p[1] - cy) * scale
+
+        return Arc(moved(self.start), moved(self.end), self.centre, radius, self.ccw)
+
+
+Edge = Line | Arc
+
+
+def edge_from_bulge(start: Point, end: Point, bulge: float) -> Edge:
+    """The line (bulge 0) or arc that a polyline vertex with this bulge starts."""
+    if bulge == 0.0:
+        return Line(start, end)
+    (x0, y0), (x1, y1) = start, end
+    lean = (1 / bulge - bulge) / 4
+    cx = (x0 + x1) / 2 - lean * (y1 - y0)
+    cy = (y0 + y1) / 2 + lean * (x1 - x0)
+    return Arc(start, end, (cx, cy), math.hypot(x0 - cx, y0 - cy), bulge > 0)
+
+
+def left_normal(edge: Edge, p: Point) -> Point:
+    """Unit normal to the left of travel at ``p``: into the material of a region's contour."""
+    ux, uy = edge.direction(p)
+    return -uy, ux
+
+
+def distance_to(edge: Edge, p: Point) -> float:
+    """Least distance from ``p`` to the edge."""
+    return math.dist(p, edge.nearest(p))

@@ -1,0 +1,285 @@
+"""Planar regions bounded by exact lines and arcs.
+
+A contour keeps the material on its left: outer contours run counter-clockwise, holes clockwise.
+Contours of one region never cross. Everything here is immutable; operators return new regions.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+from sbafab.geometry.edges import (
+    EPSILON,
+    Arc,
+    Bounds,
+    Edge,
+    Line,
+    Point,
+    distance_to,
+)
+
+NOWHERE: Bounds = (math.inf, math.inf, -math.inf, -math.inf)
+
+
+def _join(bounds: Iterable[Bounds]) -> Bounds:
+    low_x, low_y, high_x, high_y = NOWHERE
+    for box in bounds:
+        low_x, low_y = min(low_x, box[0]), min(low_y, box[1])
+        high_x, high_y = max(high_x, box[2]), max(high_y, box[3])
+    return low_x, low_y, high_x, high_y
+
+
+@dataclass(frozen=True)
+class Contour:
+    """One closed chain of edges; each edge starts where the one before it ends."""
+
+    edges: tuple[Edge, ...]
+
+    @cached_property
+    def area(self) -> float:
+        """Enclosed area in mm2: positive counter-clockwise, negative for a hole."""
+        (ox, oy) = self.edges[0].start
+        twice = 0.0
+        bulges = 0.0
+        for edge in self.edges:
+            (x0, y0), (x1, y1) = edge.start, edge.end
+            twice += (x0 - ox) * (y1 - oy) - (x1 - ox) * (y0 - oy)
+            bulges += edge.segment_area
+        return twice / 2 + bulges
+
+    @cached_property
+    def length(self) -> float:
+        return sum(edge.length for edge in self.edges)
+
+    @cached_property
+    def bounds(self) -> Bounds:
+        return _join(edge.bounds for edge in self.edges)
+
+    @property
+    def is_hole(self) -> bool:
+        return self.area < 0
+
+    @cached_property
+    def circle(self) -> tuple[Point, float] | None:
+        """Centre and radius if the contour is one full circle."""
+        first = self.edges[0]
+        if not isinstance(first, Arc):
+            return None
+        for edge in self.edges[1:]:
+            if not isinstance(edge, Arc) or not same_support(first, edge):
+                return None
+        return first.centre, first.radius
+
+    @property
+    def vertices(self) -> tuple[tuple[float, float, float], ...]:
+        """x, y and bulge of each vertex, as a DXF polyline carries them."""
+        return tuple((*edge.start, edge.bulge) for edge in self.edges)
+
+    def reversed(self) -> Contour:
+        return Contour(tuple(edge.reversed() for edge in reversed(self.edges)))
+
+    def winding(self, p: Point) -> int:
+        """How many times the contour runs counter-clockwise round ``p`` (not on an edge)."""
+        px, py = p
+        turns = 0
+        for edge in self.edges:
+            (x0, y0), (x1, y1) = edge.start, edge.end
+            side = (x1 - x0) * (py - y0) - (px - x0) * (y1 - y0)
+            upward = y0 <= py < y1
+            if upward and side > 0:
+                turns += 1
+            elif y1 <= py < y0 and side < 0:
+                turns -= 1
+            if isinstance(edge, Arc):
+                cx, cy = edge.centre
+                if (px - cx) ** 2 + (py - cy) ** 2 < edge.radius**2:
+                    # A point exactly on the chord belongs to the side the count above gave it.
+                    left = side > 0 or (side == 0 and (y0 > y1 or (y0 == y1 and x1 > x0)))
+                    if edge.ccw and not left:
+                        turns += 1
+                    elif not edge.ccw and left:
+                        turns -= 1
+        return turns
+
+    def polygon(self, sagitta: float = 0.001) -> list[Point]:
+        """Vertices of a polygon whose chords stay within ``sagitta`` of the arcs.
+
+        Vertices on one circle stand at the same angles whichever contour asks, so shared arcs
+        give shared vertices.
+        """
+        points: list[Point] = []
+        for edge in self.edges:
+            points.append(edge.start)
+            if isinstance(edge, Arc):
+                points.extend(_chord_points(edge, sagitta))
+        return points
+
+
+def _chord_points(arc: Arc, sagitta: float) -> list[Point]:
+    ratio = min(1.0, sagitta / arc.radius)
+    count = max(8, math.ceil(math.pi / math.acos(1 - ratio)))
+    step = math.tau / (4 * math.ceil(count / 4))
+    first = arc.start_angle
+    last = first + arc.sweep
+    if arc.ccw:
+        ticks = range(math.floor(first / step + 1e-7) + 1, math.ceil(last / step - 1e-7))
+    else:
+        ticks = range(math.ceil(first / step - 1e-7) - 1, math.floor(last / step + 1e-7), -1)
+    return [arc.on_circle(math.remainder(tick * step, math.tau)) for tick in ticks]
+
+
+def same_support(a: Edge, b: Edge) -> bool:
+    """Whether two edges lie on one circle, or are lines of one direction, and turn alike."""
+    if isinstance(a, Arc) and isinstance(b, Arc):
+        return (
+            a.ccw == b.ccw
+            and abs(a.radius - b.radius) < EPSILON
+            and math.dist(a.centre, b.centre) < EPSILON
+        )
+    if isinstance(a, Line) and isinstance(b, Line):
+        (ux, uy), (vx, vy) = a.direction(a.start), b.direction(b.start)
+        return ux * vx + uy * vy > 0 and abs(ux * vy - uy * vx) * (a.length + b.length) < EPSILON
+    return False
+
+
+@dataclass(frozen=True)
+class Region:
+    """A planar region, possibly of several pieces, possibly empty."""
+
+    contours: tuple[Contour, ...] = ()
+
+    @cached_property
+    def area(self) -> float:
+        """Area in mm2."""
+        return sum(contour.area for contour in self.contours)
+
+    @cached_property
+    def bounds(self) -> Bounds:
+        """Least x, least y, largest x, largest y."""
+        return _join(contour.bounds for contour in self.contours)
+
+    @property
+    def is_empty(self) -> bool:
+        return not self.contours
+
+    @cached_property
+    def outers(self) -> tuple[Contour, ...]:
+        return tuple(contour for contour in self.contours if not contour.is_hole)
+
+    @cached_property
+    def holes(self) -> tuple[Contour, ...]:
+        return tuple(contour for contour in self.contours if contour.is_hole)
+
+    @cached_property
+    def edges(self) -> tuple[Edge, ...]:
+        return tuple(edge for contour in self.contours for edge in contour.edges)
+
+    @cached_property
+    def pieces(self) -> tuple[Region, ...]:
+        """The connected pieces, each an outer contour with its holes."""
+        if len(self.outers) == 1:
+            return (self,)
+        held: list[list[Contour]] = [[outer] for outer in self.outers]
+        for hole in self.holes:
+            inside = [
+                group
+                for group in held
+                if group[0].winding(hole.edges[0].at(0.5)) != 0 and group[0].area > -hole.area
+            ]
+            min(inside, key=lambda group: group[0].area).append(hole)
+        return tuple(Region(tuple(group)) for group in held)
+
+    @cached_property
+    def key(self) -> str:
+        """A name for the shape: equal for identical profiles (to 1 nm), on every machine."""
+        rings = []
+        for contour in self.contours:
+            # Adding 0.0 makes -0.0 and 0.0 one.
+            ring = [
+                (round(x, 6) + 0.0, round(y, 6) + 0.0, round(bulge, 6) + 0.0)
+                for x, y, bulge in contour.vertices
+            ]
+            first = ring.index(min(ring))
+            rings.append(ring[first:] + ring[:first])
+        return hashlib.sha256(repr(sorted(rings)).encode()).hexdigest()[:16]
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Region) and self.key == other.key
+
+    def contains(self, p: Point) -> bool:
+        """Whether ``p``, not on an edge, lies in the region."""
+        return sum(contour.winding(p) for contour in self.contours) > 0
+
+    def distance_to_edge(self, p: Point) -> float:
+        """Least distance from ``p`` to any edge."""
+        return min((distance_to(edge, p) for edge in self.edges), default=math.inf)
+
+    def __or__(self, other: Region) -> Region:
+        from sbafab.geometry.boolean import union
+
+        return union([self, other])
+
+    def __and__(self, other: Region) -> Region:
+        from sbafab.geometry.boolean import intersection
+
+        return intersection(self, other)
+
+    def __sub__(self, other: Region) -> Region:
+        from sbafab.geometry.boolean import difference
+
+        return difference(self, other)
+
+    def mapped(self, point: Callable[[Point], Point], scale: float, mirror: bool) -> Region:
+        """The region under a similarity given by its effect on points."""
+
+        def edge_of(edge: Edge) -> Edge:
+            start, end = point(edge.start), point(edge.end)
+            if isinstance(edge, Line):
+                return Line(start, end)
+            return Arc(start, end, point(edge.centre), edge.radius * scale, edge.ccw ^ mirror)
+
+        contours = (Contour(tuple(map(edge_of, contour.edges))) for contour in self.contours)
+        return Region(tuple(c.reversed() if mirror else c for c in contours))
+
+    def moved(self, dx: float, dy: float) -> Region:
+        return self.mapped(lambda p: (p[0] + dx, p[1] + dy), 1.0, False)
+
+    def turned(self, degrees: float, about: Point = (0.0, 0.0)) -> Region:
+        """The region turned counter-clockwise; quarter turns are exact."""
+        quarters = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}
+        angle = math.radians(degrees)
+        c, s = quarters.get(degrees % 360) or (math.cos(angle), math.sin(angle))  # type: ignore[call-overload]
+        ax, ay = about
+        return self.mapped(
+            lambda p: (
+                ax + (p[0] - ax) * c - (p[1] - ay) * s,
+                ay + (p[0] - ax) * s + (p[1] - ay) * c,
+            ),
+            1.0,
+            False,
+        )
+
+    def scaled(self, factor: float) -> Region:
+        return self.mapped(lambda p: (p[0] * factor, p[1] * factor), factor, False)
+
+    def mirrored(self) -> Region:
+        """The region flipped over: x becomes -x."""
+        return self.mapped(lambda p: (-p[0], p[1]), 1.0, True)
+
+    def polygons(self, sagitta: float = 0.001) -> list[list[list[Point]]]:
+        """Each piece as rings of points, outer first; chords within ``sagitta`` of the arcs."""
+        return [
+            [contour.polygon(sagitta) for contour in sorted(piece.contours, key=_outer_first)]
+            for piece in self.pieces
+        ]
+
+
+def _outer_first(contour: Contour) -> bool:
+    return contour.is_hole

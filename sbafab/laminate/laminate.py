@@ -1,0 +1,195 @@
+"""The laminate: layers bottom to top, and the interfaces between its TPE layers.
+
+The one model that rules, cut files, press schedule, meshes and pictures read. Lengths are mm,
+the origin lies on the actuator's axis, z points up from the press plate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.region import Region
+from sbafab.laminate.films import Film
+from sbafab.laminate.interfaces import Interface, InterfaceKind, interface_regions
+
+Role = Literal["base", "wall", "cap", "sheet", "chamber-mask", "separator-mask"]
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One film cut to one profile.
+
+    ``index`` counts from 1 at the bottom; ``balloon`` likewise (None for a sheet and its mask);
+    ``z`` is the height of the layer's lower face with every film at its nominal thickness.
+    ``pieces`` is how many separate parts the role asks for. ``pattern`` names the shape: equal
+    profiles of one material share it.
+    """
+
+    index: int
+    role: Role
+    film: Film
+    profile: Region
+    balloon: int | None
+    z: float
+    pieces: int
+    pattern: str
+
+    @property
+    def name(self) -> str:
+        """File stem, for example ``003_TPE_wall``."""
+        return f"{self.index:03d}_{self.film.material}_{self.role}"
+
+    @property
+    def is_mask(self) -> bool:
+        return self.film.material == "PTFE"
+
+    def _repr_svg_(self) -> str:
+        from sbafab.laminate.picture import layer_svg
+
+        return layer_svg(self)
+
+
+@dataclass(frozen=True)
+class Bore:
+    """A channel bore: the opening that joins the balloons of one chamber, held by a dowel pin."""
+
+    chamber: str
+    centre: Point
+    diameter: float
+
+
+@dataclass(frozen=True)
+class Chamber:
+    """A chamber: balloons that share one inlet.
+
+    ``centres`` holds a point inside the pocket of every stack the chamber feeds: one, or several
+    where pockets are joined by a manifold.
+    """
+
+    name: str
+    centres: tuple[Point, ...]
+
+
+@dataclass(frozen=True)
+class Inlet:
+    """Where the tube of a chamber goes in: the strip's mouth at the tab's end.
+
+    ``mouth`` is the middle of the tab's end, ``direction`` the unit vector outward, ``length``
+    the straight run of the strip inward from the mouth, ``width`` the strip's, ``tube_diameter``
+    the tube's outer diameter, all mm.
+    """
+
+    chamber: str
+    mouth: Point
+    direction: Point
+    width: float
+    length: float
+    tube_diameter: float
+
+
+@dataclass(frozen=True)
+class Pin:
+    """A dowel pin of the press fixture; it holds every layer with an opening at its place."""
+
+    name: str
+    centre: Point
+    diameter: float
+
+
+@dataclass(frozen=True)
+class Laminate:
+    """A stack of layers, bottom to top, with what the layers alone do not tell."""
+
+    name: str
+    family: str
+    layers: tuple[Layer, ...]
+    chambers: tuple[Chamber, ...]
+    bores: tuple[Bore, ...]
+    inlets: tuple[Inlet, ...]
+    pins: tuple[Pin, ...]
+    lumen: float | None
+    balloons: int
+    registration: str
+    notes: tuple[str, ...] = ()
+
+    @cached_property
+    def interfaces(self) -> tuple[Interface, ...]:
+        """One between every two consecutive TPE layers, bottom to top."""
+        known: dict[tuple[str, str, tuple[str, ...]], tuple[Region, Region, Region, Region]] = {}
+        found: list[Interface] = []
+        below: Layer | None = None
+        masks: list[Layer] = []
+        for layer in self.layers:
+            if layer.is_mask:
+                masks.append(layer)
+                continue
+            if below is not None:
+                key = below.pattern, layer.pattern, tuple(mask.pattern for mask in masks)
+                if key not in known:
+                    known[key] = interface_regions(
+                        below.profile, layer.profile, [mask.profile for mask in masks]
+                    )
+                found.append(Interface.between(len(found) + 1, below, layer, masks, known[key]))
+            below, masks = layer, []
+        return tuple(found)
+
+    @cached_property
+    def tpe_layers(self) -> tuple[Layer, ...]:
+        return tuple(layer for layer in self.layers if not layer.is_mask)
+
+    @cached_property
+    def patterns(self) -> dict[str, tuple[Layer, ...]]:
+        """The layers of every distinct pattern, in stacking order."""
+        groups: dict[str, list[Layer]] = {}
+        for layer in self.layers:
+            groups.setdefault(layer.pattern, []).append(layer)
+        return {pattern: tuple(layers) for pattern, layers in groups.items()}
+
+    @property
+    def thickness(self) -> float:
+        """Nominal thickness in mm: the plain sum of the films (paper Sec. 2 measures less)."""
+        top = self.layers[-1]
+        return top.z + top.film.thickness
+
+    @cached_property
+    def bounds(self) -> Bounds:
+        boxes = [layers[0].profile.bounds for layers in self.patterns.values()]
+        return (
+            min(box[0] for box in boxes),
+            min(box[1] for box in boxes),
+            max(box[2] for box in boxes),
+            max(box[3] for box in boxes),
+        )
+
+    def layer(self, index: int) -> Layer:
+        """The layer with this index, counted from 1 at the bottom."""
+        return self.layers[index - 1]
+
+    def pins_through(self, layer: Layer) -> tuple[Pin, ...]:
+        """The pins whose place is open in the layer."""
+        return tuple(
+            pin
+            for pin in self.pins
+            if any(hole.winding(pin.centre) != 0 for hole in layer.profile.holes)
+        )
+
+    def _repr_svg_(self) -> str:
+        from sbafab.laminate.picture import laminate_svg
+
+        return laminate_svg(self)
+
+
+__all__ = [
+    "Bore",
+    "Chamber",
+    "Inlet",
+    "Interface",
+    "InterfaceKind",
+    "Laminate",
+    "Layer",
+    "Pin",
+    "Role",
+]
