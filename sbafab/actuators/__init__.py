@@ -1,0 +1,35 @@
+"""Actuator families: each module holds a family's design record and builds its laminate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from sbafab.actuators import lobed, one_dof, radial
+from sbafab.design.reading import design_path, override, read_toml, validated
+from sbafab.design.records import Design
+from sbafab.laminate.laminate import Laminate
+
+FAMILIES: dict[str, tuple[type[Design], Callable[[Any], Laminate]]] = {
+    "1dof": (one_dof.OneDofDesign, one_dof.build),
+    "lobed": (lobed.LobedDesign, lobed.build),
+    "radial": (radial.RadialDesign, radial.build),
+}
+
+
+def load_design(source: str | Path, assignments: Iterable[str] = ()) -> Design:
+    """A design from a template's name or a TOML file, with ``key=value`` assignments applied.
+
+    Raises DesignError with one sentence where it cannot be built.
+    """
+    path = design_path(source)
+    data = override(read_toml(path), assignments)
+    data.setdefault("name", path.stem)
+    records = {family: record for family, (record, _) in FAMILIES.items()}
+    return validated(data, records, path.parent)
+
+
+def build(design: Design) -> Laminate:
+    """The laminate of a design of any family. Raises DesignError where parts do not fit."""
+    return FAMILIES[design.family][1](design)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import pairwise
 
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
 from sbafab.geometry.intersect import meeting_points
@@ -121,9 +122,7 @@ def split_edges(edges: Sequence[Edge], pool: PointPool) -> Iterator[list[Edge]]:
         stops = {pool.index(p) for p in points} - {pool.index(start), pool.index(end)}
         inner = sorted((pool.points[stop] for stop in stops), key=edge.parameter)
         corners = [start, *inner, end]
-        yield [
-            edge.part(a, b) for a, b in zip(corners, corners[1:], strict=False) if a is not b
-        ]
+        yield [edge.part(a, b) for a, b in pairwise(corners) if a is not b]
 
 
 def _close_pairs(edges: Sequence[Edge]) -> Iterator[tuple[int, int]]:
@@ -143,7 +142,7 @@ def _close_pairs(edges: Sequence[Edge]) -> Iterator[tuple[int, int]]:
 def chain(pieces: Sequence[Edge]) -> Region:
     """Closed contours from directed pieces that keep the material on their left.
 
-    Raises GeometryError where a piece has no successor.
+    Contours that touch at a point stay apart. Raises GeometryError where a piece has no successor.
     """
     leaving: dict[Point, list[Edge]] = defaultdict(list)
     for piece in pieces:
@@ -152,19 +151,22 @@ def chain(pieces: Sequence[Edge]) -> Region:
     for piece in pieces:
         if piece not in leaving[piece.start]:
             continue
-        loop = [piece]
         leaving[piece.start].remove(piece)
-        while loop[-1].end != piece.start:
-            here = loop[-1].end
+        path = [piece]
+        while path:
+            here = path[-1].end
+            back = next((i for i, edge in enumerate(path) if edge.start == here), None)
+            if back is not None:
+                contour = tidy(path[back:])
+                contours += [contour] if contour is not None else []
+                del path[back:]
+                continue
             options = leaving.get(here)
             if not options:
                 raise GeometryError(f"an edge ends in nothing at x {here[0]:.6f}, y {here[1]:.6f}")
-            follower = max(options, key=lambda option: _left_turn(loop[-1], option))
+            follower = leftmost(path[-1], options)
             options.remove(follower)
-            loop.append(follower)
-        contour = tidy(loop)
-        if contour is not None:
-            contours.append(contour)
+            path.append(follower)
     return Region(tuple(sorted(contours, key=_reading_order)))
 
 
@@ -173,18 +175,25 @@ def _reading_order(contour: Contour) -> tuple[bool, float, float, float]:
     return contour.is_hole, round(low_x, 6), round(low_y, 6), round(high_x, 6)
 
 
-def _left_turn(before: Edge, after: Edge) -> float:
-    """How far the path turns left from one edge into the next, curvature breaking ties."""
-    corner = before.end
-    ux, uy = before.direction(corner)
-    vx, vy = after.direction(corner)
-    turn = math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
-    if turn < -math.pi + 1e-6:
-        turn = math.pi
-    bend = 0.0
-    if isinstance(after, Arc):
-        bend = (1 if after.ccw else -1) / after.radius
-    return round(turn, 6) + 1e-7 * math.atan(bend)
+def leftmost(before: Edge, options: Sequence[Edge]) -> Edge:
+    """The edge that turns most to the left after ``before``; all options start where it ends."""
+    if len(options) == 1:
+        return options[0]
+    back = before.reversed()
+    # Edges that leave a point in one direction are told apart where the shortest of them ends.
+    reach = min(math.dist(edge.start, edge.end) for edge in (back, *options))
+    behind = _heading(back, reach)
+    return min(options, key=lambda option: (behind - _heading(option, reach)) % math.tau)
+
+
+def _heading(edge: Edge, reach: float) -> float:
+    """Angle from the edge's start to its point at distance ``reach``."""
+    ux, uy = edge.direction(edge.start)
+    angle = math.atan2(uy, ux)
+    if isinstance(edge, Arc):
+        bend = math.asin(min(1.0, reach / (2 * edge.radius)))
+        angle += bend if edge.ccw else -bend
+    return angle
 
 
 def tidy(loop: Sequence[Edge]) -> Contour | None:

@@ -16,6 +16,13 @@ EPSILON = 2e-6
 """Two points nearer than this are one point: 2 nm, far below the 1 um the cut files promise."""
 
 
+def unit(degrees: float) -> Point:
+    """The unit vector at an angle from the x axis; exact at quarter turns."""
+    quarters = {0.0: (1.0, 0.0), 90.0: (0.0, 1.0), 180.0: (-1.0, 0.0), 270.0: (0.0, -1.0)}
+    angle = math.radians(degrees)
+    return quarters.get(degrees % 360) or (math.cos(angle), math.sin(angle))
+
+
 class Line(NamedTuple):
     """A straight edge from ``start`` to ``end``."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
+from collections.abc import Callable, Sequence
 
 from sbafab.geometry.boolean import PointPool, chain, split_edges
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Point
@@ -16,7 +17,7 @@ def grow(region: Region, distance: float) -> Region:
         return shrink(region, -distance)
     if distance < EPSILON or region.is_empty:
         return region
-    return chain(_offset_pieces(region.contours, distance))
+    return chain(_offset_pieces(region.contours, distance, region.contains))
 
 
 def shrink(region: Region, distance: float) -> Region:
@@ -26,7 +27,8 @@ def shrink(region: Region, distance: float) -> Region:
     if distance < EPSILON or region.is_empty:
         return region
     outside = [contour.reversed() for contour in region.contours]
-    return chain([piece.reversed() for piece in _offset_pieces(outside, distance)])
+    pieces = _offset_pieces(outside, distance, lambda p: not region.contains(p))
+    return chain([piece.reversed() for piece in pieces])
 
 
 def fillet(region: Region, radius: float) -> Region:
@@ -34,8 +36,10 @@ def fillet(region: Region, radius: float) -> Region:
     return shrink(grow(region, radius), radius)
 
 
-def _offset_pieces(contours: list[Contour] | tuple[Contour, ...], distance: float) -> list[Edge]:
-    """Pieces of the curve at exactly ``distance`` to the right of the contours."""
+def _offset_pieces(
+    contours: Sequence[Contour], distance: float, covers: Callable[[Point], bool]
+) -> list[Edge]:
+    """Pieces of the curve at exactly ``distance`` outside the side that ``covers`` knows."""
     originals = [edge for contour in contours for edge in contour.edges]
     raw: list[Edge] = []
     for contour in contours:
@@ -51,7 +55,8 @@ def _offset_pieces(contours: list[Contour] | tuple[Contour, ...], distance: floa
     for pieces in split_edges(raw, pool):
         for piece in pieces:
             middle = piece.at(0.5)
-            if all(_clear(edge, middle, distance) for edge in originals):
+            # In a touch of two pieces the inside, too, can be as far as this from every edge.
+            if all(_clear(edge, middle, distance) for edge in originals) and not covers(middle):
                 _add(kept, piece)
     return [piece for pieces in kept.values() for piece in pieces]
 

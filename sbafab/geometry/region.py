@@ -20,6 +20,7 @@ from sbafab.geometry.edges import (
     Line,
     Point,
     distance_to,
+    unit,
 )
 
 NOWHERE: Bounds = (math.inf, math.inf, -math.inf, -math.inf)
@@ -253,9 +254,7 @@ class Region:
 
     def turned(self, degrees: float, about: Point = (0.0, 0.0)) -> Region:
         """The region turned counter-clockwise; quarter turns are exact."""
-        quarters = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}
-        angle = math.radians(degrees)
-        c, s = quarters.get(degrees % 360) or (math.cos(angle), math.sin(angle))  # type: ignore[call-overload]
+        c, s = unit(degrees)
         ax, ay = about
         return self.mapped(
             lambda p: (

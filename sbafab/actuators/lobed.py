@@ -1,0 +1,170 @@
+"""Lobed actuators: N chambers round a lumen; the paper's 3-DoF actuator is N = 3 (Sec. 2)."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from pydantic import Field
+
+from sbafab.actuators.pockets import (
+    RoundChamber,
+    bonded,
+    check_neck,
+    pocket_shapes,
+    reach,
+    tab_and_strip,
+)
+from sbafab.actuators.stacking import BalloonShape, Stack, balloon_cuts, layers
+from sbafab.design.records import Design, Section
+from sbafab.design.units import Length
+from sbafab.errors import DesignError
+from sbafab.geometry.boolean import union
+from sbafab.geometry.edges import unit
+from sbafab.geometry.offset import fillet, grow
+from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import disc
+from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Pin
+
+ROUNDING = 1e-9
+
+
+class LobedChamber(RoundChamber):
+    count: int = Field(default=3, ge=2, le=8)
+    """Chambers round the lumen."""
+    axis_radius: Length | None = None
+    """Distance of the chamber axes from the lumen's; by default as near as the bonds allow."""
+
+
+class Lumen(Section):
+    diameter: Length = 2.0
+    """The central channel, open in every layer."""
+
+
+class LobedDesign(Design):
+    """Two to eight chambers in parallel round a central lumen."""
+
+    family: Literal["lobed"]
+    chamber: LobedChamber = LobedChamber()
+    lumen: Lumen = Lumen()
+
+
+def axis_radius(design: LobedDesign, pockets: list[Region]) -> tuple[float, str | None]:
+    """Distance of the chamber axes from the lumen's axis, and a note where it was raised.
+
+    One bond width lies between lumen and pockets, and between neighbouring pockets, each of
+    which is kept within its own sector. Raises DesignError if a radius asked for is too small.
+    """
+    half = math.pi / design.chamber.count
+    bond = design.bond.width
+    inward = max(-pocket.bounds[0] for pocket in pockets)
+    by_lumen = design.lumen.diameter / 2 + bond + inward
+    # For a pocket point (x, y) off the axis the sector's edge is b/2 away when
+    # (R + x) sin(half) - |y| cos(half) = b/2; the farthest point rules. Exact for a disc.
+    spread = max(
+        reach(pocket, (-math.sin(half), sign * math.cos(half)))
+        for pocket in pockets
+        for sign in (1, -1)
+    )
+    by_neighbour = (bond / 2 + spread) / math.sin(half)
+    least = max(by_lumen, by_neighbour)
+    asked = design.chamber.axis_radius
+    if asked is not None:
+        if asked < least - ROUNDING:
+            other = "the lumen" if by_lumen >= by_neighbour else "each other"
+            raise DesignError(
+                f"chamber.axis_radius = {asked:g} brings the chambers nearer than bond.width = "
+                f"{bond:g} to {other}; it must be at least {least:.4f}"
+            )
+        return asked, None
+    if by_neighbour > by_lumen + ROUNDING:
+        return by_neighbour, (
+            f"axis radius raised from {by_lumen:.3f} to {by_neighbour:.3f} mm so that "
+            f"{bond:g} mm of bond separate neighbouring chambers"
+        )
+    return by_lumen, None
+
+
+def build(design: LobedDesign) -> Laminate:
+    """The laminate of a lobed design. Raises DesignError where parts do not fit."""
+    pockets, shape_of = pocket_shapes(design, design.chamber)
+    check_neck(design, pockets, [(0.0, 0.0)])
+    radius, note = axis_radius(design, pockets)
+    count = design.chamber.count
+    angles = [360 * i / count for i in range(count)]
+    directions = [unit(angle) for angle in angles]
+    axes = tuple((radius * x, radius * y) for x, y in directions)
+    names = [f"chamber{i + 1}" for i in range(count)]
+
+    hub = disc((0.0, 0.0), _hub_radius(design, pockets, radius))
+    lobes = [[p.moved(radius, 0.0).turned(angle) for angle in angles] for p in pockets]
+    shapes = tuple(_plate(design, hub, lobe) for lobe in lobes)
+
+    first = lobes[shape_of[0]]
+    outlines = [bonded(pocket, design.bond.width) for pocket in first]
+    edge = pockets[shape_of[0]].bounds[2] + design.bond.width
+    inlets = [
+        tab_and_strip(design, name, axis, direction, edge)
+        for name, axis, direction in zip(names, axes, directions, strict=True)
+    ]
+    _check_tabs(design, outlines, inlets)
+    bottom = BalloonShape(
+        fillet(union([hub, *outlines, *(tab for tab, _, _ in inlets)]), design.fillet.radius),
+        union([*first, *(strip for _, strip, _ in inlets)]),
+        1,
+        count,
+    )
+    stack = Stack(bottom, shapes, shape_of, axes, design.lumen.diameter)
+    has_bores = design.stack.balloons > 1
+    bore = design.bore.diameter
+    pins = [Pin(f"pin-{n}", axis, bore) for n, axis in zip(names, axes, strict=True)]
+    return Laminate(
+        name=design.name,
+        family=design.family,
+        layers=layers(balloon_cuts(stack, design), design),
+        chambers=tuple(Chamber(n, (axis,)) for n, axis in zip(names, axes, strict=True)),
+        bores=tuple(Bore(n, axis, bore) for n, axis in zip(names, axes, strict=True))
+        if has_bores
+        else (),
+        inlets=tuple(inlet for _, _, inlet in inlets),
+        pins=(*(pins if has_bores else ()), Pin("pin-lumen", (0.0, 0.0), design.lumen.diameter)),
+        lumen=design.lumen.diameter,
+        balloons=design.stack.balloons,
+        registration=design.registration.method,
+        notes=(note,) if note else (),
+    )
+
+
+def _hub_radius(design: LobedDesign, pockets: list[Region], axis: float) -> float:
+    """One bond round the lumen; more where the chambers stand farther out, to stay one piece.
+
+    The hub then reaches every pocket's inner edge, and the middle between two neighbours.
+    """
+    inward = min(-pocket.bounds[0] for pocket in pockets)
+    return max(
+        design.lumen.diameter / 2 + design.bond.width,
+        axis - inward,
+        axis * math.cos(math.pi / design.chamber.count),
+    )
+
+
+def _plate(design: LobedDesign, hub: Region, pockets: list[Region]) -> BalloonShape:
+    lobes = [bonded(pocket, design.bond.width) for pocket in pockets]
+    outline = fillet(union([hub, *lobes]), design.fillet.radius)
+    return BalloonShape(Region(outline.outers), union(pockets), 1, len(pockets))
+
+
+def _check_tabs(
+    design: LobedDesign, outlines: list[Region], inlets: list[tuple[Region, Region, Inlet]]
+) -> None:
+    """Raises DesignError where a tab comes nearer than one overhang to another lobe or tab."""
+    room = design.mask.overhang
+    for i, (tab, _, inlet) in enumerate(inlets):
+        free = grow(tab - outlines[i], room)
+        for j, other in enumerate(outlines):
+            if j != i and not (free & (other | inlets[j][0])).is_empty:
+                raise DesignError(
+                    f"the inlet tab of {inlet.chamber} ({inlet.width + 2 * design.bond.width:g} "
+                    f"wide) meets the lobe or tab of {inlets[j][2].chamber}; make inlet.width "
+                    "smaller, chamber.axis_radius larger or chamber.count smaller"
+                )

@@ -1,0 +1,57 @@
+"""The 1-DoF actuator: one chamber, its balloons stacked on one axis (paper Sec. 2)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from sbafab.actuators.pockets import (
+    RoundChamber,
+    bonded,
+    check_neck,
+    pocket_shapes,
+    tab_and_strip,
+)
+from sbafab.actuators.stacking import BalloonShape, Stack, balloon_cuts, layers
+from sbafab.design.records import Design
+from sbafab.geometry.offset import fillet
+from sbafab.laminate.laminate import Bore, Chamber, Laminate, Pin
+
+AXIS = (0.0, 0.0)
+
+
+class OneDofDesign(Design):
+    """A stack of round balloons on one axis."""
+
+    family: Literal["1dof"]
+    chamber: RoundChamber = RoundChamber()
+
+
+def build(design: OneDofDesign) -> Laminate:
+    """The laminate of a 1-DoF design. Raises DesignError where parts do not fit."""
+    pockets, shape_of = pocket_shapes(design, design.chamber)
+    check_neck(design, pockets, [AXIS])
+    shapes = tuple(
+        BalloonShape(bonded(pocket, design.bond.width), pocket, 1, 1) for pocket in pockets
+    )
+    first = shapes[shape_of[0]]
+    tab, strip, inlet = tab_and_strip(
+        design, "chamber1", AXIS, (1.0, 0.0), first.outline.bounds[2]
+    )
+    bottom = BalloonShape(
+        fillet(first.outline | tab, design.fillet.radius), first.pockets | strip, 1, 1
+    )
+    stack = Stack(bottom, shapes, shape_of, (AXIS,))
+    balloons = design.stack.balloons
+    has_bore = balloons > 1
+    return Laminate(
+        name=design.name,
+        family=design.family,
+        layers=layers(balloon_cuts(stack, design), design),
+        chambers=(Chamber("chamber1", (AXIS,)),),
+        bores=(Bore("chamber1", AXIS, design.bore.diameter),) if has_bore else (),
+        inlets=(inlet,),
+        pins=(Pin("pin-chamber1", AXIS, design.bore.diameter),) if has_bore else (),
+        lumen=None,
+        balloons=balloons,
+        registration=design.registration.method,
+    )

@@ -1,0 +1,113 @@
+"""Pockets of discs or of a drawn outline, tapered or not, and their inlet strips and tabs."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from pydantic import Field
+
+from sbafab.design.records import Design, Section
+from sbafab.design.units import Length
+from sbafab.errors import DesignError
+from sbafab.geometry.edges import Point
+from sbafab.geometry.offset import grow
+from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import disc, strip
+from sbafab.laminate.laminate import Inlet
+
+
+class RoundChamber(Section):
+    """The chamber of a family whose pockets are discs, or one drawn outline."""
+
+    diameter: Length | Annotated[tuple[Length, ...], Field(strict=False, min_length=1)] = 5.0
+    """Pocket diameter; a list gives one a balloon, bottom to top (a tapered stack)."""
+    outline: str | None = Field(default=None, max_length=1000)
+    """DXF or SVG file with one closed path, drawn round (0, 0), in place of the disc."""
+
+
+def diameters(design: Design, chamber: RoundChamber) -> tuple[float, ...]:
+    """The pocket diameter of every balloon, bottom to top."""
+    if isinstance(chamber.diameter, float):
+        return (chamber.diameter,) * design.stack.balloons
+    if len(chamber.diameter) != design.stack.balloons:
+        raise DesignError(
+            f"chamber.diameter lists {len(chamber.diameter)} balloons but stack.balloons = "
+            f"{design.stack.balloons}; give one diameter a balloon, bottom to top"
+        )
+    return chamber.diameter
+
+
+def pocket_shapes(design: Design, chamber: RoundChamber) -> tuple[list[Region], tuple[int, ...]]:
+    """The distinct pockets round (0, 0), and the index of each balloon's own."""
+    if chamber.outline is not None:
+        if not isinstance(chamber.diameter, float):
+            raise DesignError(
+                "chamber.outline and a list in chamber.diameter exclude each other; remove one"
+            )
+        from sbafab.design.outline import read_outline
+
+        drawn = read_outline(design.folder / chamber.outline)
+        return [drawn], (0,) * design.stack.balloons
+    sizes = diameters(design, chamber)
+    distinct = list(dict.fromkeys(sizes))
+    return (
+        [disc((0.0, 0.0), size / 2) for size in distinct],
+        tuple(distinct.index(size) for size in sizes),
+    )
+
+
+def check_neck(design: Design, pockets: list[Region], centres: list[Point]) -> None:
+    """Raises DesignError where bore and neck ring leave no free film in the smallest pocket."""
+    if design.stack.balloons == 1:
+        return
+    ring = design.bore.diameter / 2 + design.bond.width
+    room = min(
+        pocket.distance_to_edge(centre) for pocket in pockets for centre in centres
+    )
+    if ring >= room:
+        largest = 2 * (room - design.bond.width)
+        remedy = f"make the bore less than {largest:.3f}" if largest > 0 else "widen the pocket"
+        raise DesignError(
+            f"bore.diameter = {design.bore.diameter:g} with a neck ring of bond.width = "
+            f"{design.bond.width:g} round it does not fit a pocket that leaves {room:.3f} round "
+            f"the channel; {remedy}"
+        )
+
+
+def reach(region: Region, direction: Point) -> float:
+    """How far the region extends from (0, 0) along a unit direction."""
+    turn = -math.degrees(math.atan2(direction[1], direction[0]))
+    return region.turned(turn).bounds[2]
+
+
+def tab_and_strip(
+    design: Design, chamber: str, start: Point, direction: Point, edge: float
+) -> tuple[Region, Region, Inlet]:
+    """Inlet tab, mask strip and inlet of a chamber.
+
+    The strip starts at ``start`` inside the pocket and runs along ``direction``; the outline ends
+    ``edge`` mm from there. The strip reaches one overhang past the tab's end.
+    """
+    width = design.inlet.strip_width
+    length = edge + design.inlet.tab_length
+
+    def along(distance: float) -> Point:
+        return start[0] + direction[0] * distance, start[1] + direction[1] * distance
+
+    tab = strip(start, along(length), width + 2 * design.bond.width)
+    mask = strip(start, along(length + design.mask.overhang), width)
+    inlet = Inlet(
+        chamber,
+        along(length),
+        direction,
+        width,
+        design.inlet.tab_length,
+        design.inlet.tube_outer_diameter,
+    )
+    return tab, mask, inlet
+
+
+def bonded(pockets: Region, width: float) -> Region:
+    """The outline of pockets with a bonded ring round them; filled inside."""
+    return Region(grow(pockets, width).outers)

@@ -1,0 +1,212 @@
+"""Radial expansion: oblong balloons side by side on a sheet that is wrapped round a tube.
+
+Laid flat for cutting: x runs round the tube, y along it (paper Sec. 2.1).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from pydantic import Field
+
+from sbafab.actuators.pockets import bonded, check_neck, tab_and_strip
+from sbafab.actuators.stacking import BalloonShape, Cut, Stack, balloon_cuts, layers
+from sbafab.design.records import Design, Inlet, Section
+from sbafab.design.records import Stack as StackSection
+from sbafab.design.units import Length, LengthOrZero
+from sbafab.errors import DesignError
+from sbafab.geometry.boolean import union
+from sbafab.geometry.edges import Point
+from sbafab.geometry.offset import fillet, grow
+from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import rectangle, stadium, strip
+from sbafab.laminate.laminate import Bore, Chamber, Laminate, Pin
+from sbafab.laminate.laminate import Inlet as LaminateInlet
+
+
+class OblongChamber(Section):
+    count: int = Field(default=3, ge=1, le=12)
+    """Oblong SBAs round the tube, at equal pitch."""
+    width: Length = 11.5
+    """Outline of one SBA round the tube, bonds included."""
+    length: Length = 20.0
+    """Outline of one SBA along the tube, bonds included."""
+    outline: str | None = Field(default=None, max_length=1000)
+    """DXF or SVG file with one closed path, drawn round (0, 0): the pocket, not the outline."""
+
+
+class Tube(Section):
+    outer_diameter: Length = 15.0
+    """The tube that the sheet is wrapped round."""
+
+
+class SheetSection(Section):
+    overlap: LengthOrZero = 0.0
+    """Extra length at one end of the sheet, to close it round the tube."""
+    margin: Length = 1.0
+    """Sheet past the SBAs at both ends, along the tube (the paper gives none)."""
+
+
+class Window(Section):
+    width: Length | None = None
+    """Bond between sheet and SBA, round the tube; by default two bond widths."""
+    length: Length | None = None
+    """The same along the tube; by default the pocket's straight run plus two bond widths."""
+
+
+class RadialInlet(Inlet):
+    manifold: bool = False
+    """One shared inlet: the bottom pockets joined by strips."""
+
+
+class RadialStack(StackSection):
+    balloons: int = Field(default=1, ge=1, le=1000)
+    """Balloons in each SBA."""
+
+
+class RadialDesign(Design):
+    """Oblong SBAs bonded to one sheet that is wrapped round a tube."""
+
+    family: Literal["radial"]
+    stack: RadialStack = RadialStack()
+    inlet: RadialInlet = RadialInlet()
+    chamber: OblongChamber = OblongChamber()
+    tube: Tube = Tube()
+    sheet: SheetSection = SheetSection()
+    window: Window = Window()
+
+    @property
+    def pitch(self) -> float:
+        """Distance between neighbouring SBAs round the tube."""
+        return math.pi * self.tube.outer_diameter / self.chamber.count
+
+
+def build(design: RadialDesign) -> Laminate:
+    """The flat laminate of a radial design. Raises DesignError where parts do not fit."""
+    bond, overhang = design.bond.width, design.mask.overhang
+    pocket = _pocket(design)
+    check_neck(design, [pocket], [(0.0, 0.0)])
+    outline = bonded(pocket, bond)
+    count = design.chamber.count
+    centres = tuple(((i - (count - 1) / 2) * design.pitch, 0.0) for i in range(count))
+    _check_pitch(design, outline)
+
+    outlines = union(outline.moved(*centre) for centre in centres)
+    pockets = union(pocket.moved(*centre) for centre in centres)
+    shape = BalloonShape(outlines, pockets, count, count)
+    bottom, inlets = _bottom(design, shape, outline, centres)
+    stack = Stack(bottom, (shape,), (0,) * design.stack.balloons, centres)
+    window = _window(design, pocket, outline)
+    windows = union(window.moved(*centre) for centre in centres)
+    carrier = [
+        Cut("sheet", _sheet(design, outline), None, 1),
+        Cut(
+            "separator-mask",
+            grow(bottom.outline, overhang) - windows,
+            None,
+            bottom.outline_pieces,
+        ),
+    ]
+    manifold = design.inlet.manifold
+    names = ["chamber1"] * count if manifold else [f"chamber{i + 1}" for i in range(count)]
+    bored = zip(names, centres, strict=True) if design.stack.balloons > 1 else ()
+    bores = tuple(Bore(name, centre, design.bore.diameter) for name, centre in bored)
+    return Laminate(
+        name=design.name,
+        family=design.family,
+        layers=layers([*carrier, *balloon_cuts(stack, design)], design),
+        chambers=(Chamber("chamber1", centres),)
+        if manifold
+        else tuple(Chamber(n, (centre,)) for n, centre in zip(names, centres, strict=True)),
+        bores=bores,
+        inlets=inlets,
+        pins=tuple(
+            Pin(f"pin-{number}", bore.centre, bore.diameter)
+            for number, bore in enumerate(bores, start=1)
+        ),
+        lumen=None,
+        balloons=design.stack.balloons,
+        registration=design.registration.method,
+    )
+
+
+def _pocket(design: RadialDesign) -> Region:
+    if design.chamber.outline is not None:
+        from sbafab.design.outline import read_outline
+
+        return read_outline(design.folder / design.chamber.outline)
+    bond = design.bond.width
+    width, length = design.chamber.width - 2 * bond, design.chamber.length - 2 * bond
+    if min(width, length) <= 0:
+        raise DesignError(
+            f"chamber.width = {design.chamber.width:g} and chamber.length = "
+            f"{design.chamber.length:g} must both exceed two bond widths, {2 * bond:g}"
+        )
+    pocket = stadium((0.0, 0.0), min(width, length), max(width, length))
+    return pocket if width <= length else pocket.turned(90)
+
+
+def _check_pitch(design: RadialDesign, outline: Region) -> None:
+    low_x, _, high_x, _ = outline.bounds
+    needed = high_x - low_x + 2 * design.mask.overhang + design.laser.least_feature
+    if design.chamber.count > 1 and design.pitch < needed:
+        raise DesignError(
+            f"chamber.count = {design.chamber.count} SBAs {high_x - low_x:g} wide do not fit round "
+            f"tube.outer_diameter = {design.tube.outer_diameter:g}: the pitch is "
+            f"{design.pitch:.3f} and must be at least {needed:.3f}; use fewer, narrower or a "
+            "thicker tube"
+        )
+
+
+def _window(design: RadialDesign, pocket: Region, outline: Region) -> Region:
+    low_x, low_y, high_x, high_y = pocket.bounds
+    width = design.window.width or 2 * design.bond.width
+    straight = max(0.0, (high_y - low_y) - (high_x - low_x))
+    length = design.window.length or straight + 2 * design.bond.width
+    window = stadium((0.0, 0.0), min(width, length), max(width, length))
+    if width > length:
+        window = window.turned(90)
+    if not (window - outline).is_empty:
+        raise DesignError(
+            f"window.width = {width:g} and window.length = {length:g} reach past the outline of "
+            "the SBA; make them smaller"
+        )
+    return window
+
+
+def _sheet(design: RadialDesign, outline: Region) -> Region:
+    half = math.pi * design.tube.outer_diameter / 2
+    _, low_y, _, high_y = outline.bounds
+    margin = design.sheet.margin
+    return rectangle(
+        (-half, low_y - margin), (half + design.sheet.overlap, high_y + margin)
+    )
+
+
+def _bottom(
+    design: RadialDesign, shape: BalloonShape, outline: Region, centres: tuple[Point, ...]
+) -> tuple[BalloonShape, tuple[LaminateInlet, ...]]:
+    """The bottom balloons with tabs, strips and, for a manifold, the bridges between them."""
+    count, manifold = len(centres), design.inlet.manifold
+    fed = [centres[(count - 1) // 2]] if manifold else centres
+    made = [
+        tab_and_strip(design, f"chamber{number}", centre, (0.0, 1.0), outline.bounds[3])
+        for number, centre in enumerate(fed, start=1)
+    ]
+    tabs = [tab for tab, _, _ in made]
+    strips = [mask for _, mask, _ in made]
+    if manifold and count > 1:
+        width = design.inlet.strip_width
+        tabs.append(strip(centres[0], centres[-1], width + 2 * design.bond.width))
+        strips.append(strip(centres[0], centres[-1], width))
+    pieces = 1 if manifold else count
+    return (
+        BalloonShape(
+            fillet(union([shape.outline, *tabs]), design.fillet.radius),
+            union([shape.pockets, *strips]),
+            pieces,
+            pieces,
+        ),
+        tuple(inlet for _, _, inlet in made),
+    )

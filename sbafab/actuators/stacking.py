@@ -1,0 +1,157 @@
+"""What every family shares: balloons of given outlines and pockets become a stack of layers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+from sbafab.design.records import Design
+from sbafab.errors import DesignError
+from sbafab.geometry.boolean import union
+from sbafab.geometry.edges import Point
+from sbafab.geometry.offset import grow
+from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import disc
+from sbafab.laminate.films import Film
+from sbafab.laminate.laminate import Layer, Role
+
+
+@dataclass(frozen=True)
+class BalloonShape:
+    """One balloon seen from above, before bores and lumen are cut: its outline and pockets.
+
+    The counts say how many separate parts outline and pockets are meant to have.
+    """
+
+    outline: Region
+    pockets: Region
+    outline_pieces: int
+    pocket_pieces: int
+
+
+@dataclass(frozen=True)
+class Stack:
+    """Balloons bottom to top, and what runs through them.
+
+    ``shapes`` holds the distinct balloons and ``shape_of`` the index of each balloon's own;
+    ``bottom`` is the first balloon with its inlet tabs and strips. ``axes`` are the channel axes.
+    """
+
+    bottom: BalloonShape
+    shapes: tuple[BalloonShape, ...]
+    shape_of: tuple[int, ...]
+    axes: tuple[Point, ...]
+    lumen: float | None = None
+
+
+@dataclass(frozen=True)
+class Cut:
+    """One film with its profile, not yet placed in a laminate."""
+
+    role: Role
+    profile: Region
+    balloon: int | None
+    pieces: int
+
+
+def balloon_cuts(stack: Stack, design: Design) -> list[Cut]:
+    """The films of a stack of balloons, base to cap (geometry of the laminate table)."""
+    count = len(stack.shape_of)
+    radius = design.bore.diameter / 2
+    lumen = disc((0.0, 0.0), stack.lumen / 2) if stack.lumen else Region()
+    bores = union(disc(axis, radius) for axis in stack.axes) if count > 1 else Region()
+    rings = union(disc(axis, radius + design.bond.width) for axis in stack.axes)
+
+    # Shape 0 stands for the bottom balloon, shape i + 1 for stack.shapes[i].
+    shapes = (stack.bottom, *stack.shapes)
+
+    @cache
+    def plate(shape: int) -> Region:
+        return shapes[shape].outline - lumen
+
+    @cache
+    def wall(shape: int) -> Region:
+        return plate(shape) - bores
+
+    @cache
+    def chamber_mask(shape: int) -> Region:
+        return shapes[shape].pockets - bores
+
+    @cache
+    def separator_mask(below: int, above: int) -> Region:
+        smaller = stack.shapes[below].outline
+        if below != above:
+            smaller = smaller & stack.shapes[above].outline
+        return grow(smaller, design.mask.overhang) - lumen - rings
+
+    cuts: list[Cut] = []
+    for number in range(1, count + 1):
+        shape = 0 if number == 1 else stack.shape_of[number - 1] + 1
+        parts = shapes[shape].outline_pieces
+        if number == 1:
+            cuts.append(Cut("base", plate(shape), number, parts))
+        else:
+            cuts.append(Cut("wall", wall(shape), number, parts))
+        cuts.append(Cut("chamber-mask", chamber_mask(shape), number, shapes[shape].pocket_pieces))
+        if number == count:
+            cuts.append(Cut("cap", plate(shape), number, parts))
+        else:
+            cuts.append(Cut("wall", wall(shape), number, parts))
+            mask = separator_mask(*stack.shape_of[number - 1 : number + 1])
+            cuts.append(Cut("separator-mask", mask, number, stack.shapes[0].outline_pieces))
+    return cuts
+
+
+def films(design: Design) -> dict[str, Film]:
+    """The two films of a design by material."""
+    tpe, ptfe = design.films.tpe, design.films.ptfe
+    return {
+        "TPE": Film(
+            "TPE",
+            tpe.product,
+            tpe.thickness,
+            tpe.density,
+            tpe.melting_point,
+            ptfe.temperature_limit,
+        ),
+        "PTFE": Film(
+            "PTFE",
+            ptfe.product,
+            ptfe.thickness,
+            ptfe.density,
+            ptfe.temperature_limit,
+            ptfe.temperature_limit,
+        ),
+    }
+
+
+def layers(cuts: Iterable[Cut], design: Design) -> tuple[Layer, ...]:
+    """The films in their order, with heights and pattern names."""
+    stock = films(design)
+    patterns: dict[tuple[str, str], str] = {}
+    placed: list[Layer] = []
+    z = 0.0
+    for index, cut in enumerate(cuts, start=1):
+        film = stock["PTFE" if cut.role.endswith("-mask") else "TPE"]
+        shape = (film.material, cut.profile.key)
+        pattern = patterns.setdefault(shape, f"P{len(patterns) + 1:02d}")
+        placed.append(
+            Layer(
+                index, cut.role, film, cut.profile, cut.balloon, round(z, 9), cut.pieces, pattern
+            )
+        )
+        z += film.thickness
+    return tuple(placed)
+
+
+def check_neck(design: Design, half_widths: Sequence[float], what: str) -> None:
+    """Raises DesignError where bore and neck ring leave no free film in the smallest pocket."""
+    ring = design.bore.diameter / 2 + design.bond.width
+    if design.stack.balloons > 1 and ring >= min(half_widths):
+        room = 2 * (min(half_widths) - design.bond.width)
+        remedy = f"the bore must be under {room:.3f} mm" if room > 0 else f"enlarge {what}"
+        raise DesignError(
+            f"bore.diameter = {design.bore.diameter:g} with its neck ring of {design.bond.width:g} "
+            f"is wider than the pocket of {2 * min(half_widths):g}; {remedy}"
+        )

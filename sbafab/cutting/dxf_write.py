@@ -1,0 +1,205 @@
+"""Cut files: ASCII DXF R2010 with true arcs, written by filling the packaged empty document."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cache
+from typing import Literal, NamedTuple
+
+from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER, REFERENCE
+from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point
+from sbafab.geometry.region import Contour
+
+DxfProfile = Literal["bulges", "arcs", "chords"]
+"""How curves are written: polylines with bulges, LINE and ARC, or polylines of short chords."""
+
+DATUM_ARM = 1.0
+"""Half the length in mm of the datum cross at the origin."""
+
+
+class _Entity(NamedTuple):
+    """One DXF entity: its type, layer, subclass marker and group codes."""
+
+    kind: str
+    layer: str
+    subclass: str
+    body: str
+
+
+class _Skeleton(NamedTuple):
+    """The empty document, cut open where a file differs from another."""
+
+    before_properties: str
+    before_extents: str
+    before_seed: str
+    before_entities: str
+    tail: str
+    model_space: str
+    first_handle: int
+
+
+def dxf_text(
+    contours: Sequence[Contour],
+    properties: Mapping[str, str],
+    profile: DxfProfile = "bulges",
+    chord_error: float = 0.005,
+    datum: bool = True,
+) -> str:
+    """A DXF document of the contours, cut in the order given.
+
+    Holes (clockwise) go on CUT_INNER, outlines on CUT_OUTER. ``properties`` become the
+    document's custom properties; ``chord_error`` is the largest sagitta in mm of the chords
+    profile; ``datum`` draws a cross at the origin on REFERENCE, after all that is cut.
+    """
+    skeleton = _skeleton()
+    entities = [*_cuts(contours, profile, chord_error), *(_datum_cross() if datum else ())]
+    seed = skeleton.first_handle + len(entities)
+    drawn = "".join(
+        f"  0\n{entity.kind}\n  5\n{handle:X}\n330\n{skeleton.model_space}\n100\nAcDbEntity\n"
+        f"  8\n{entity.layer}\n100\n{entity.subclass}\n{entity.body}"
+        for handle, entity in enumerate(entities, skeleton.first_handle)
+    )
+    return "".join(
+        (
+            skeleton.before_properties,
+            _custom_properties(properties),
+            skeleton.before_extents,
+            _extents(contours, datum),
+            skeleton.before_seed,
+            f"{seed:X}",
+            skeleton.before_entities,
+            drawn,
+            skeleton.tail,
+        )
+    )
+
+
+def _cuts(
+    contours: Iterable[Contour], profile: DxfProfile, chord_error: float
+) -> Iterator[_Entity]:
+    for contour in contours:
+        layer = CUT_INNER if contour.is_hole else CUT_OUTER
+        if profile == "chords":
+            yield _polyline(layer, [(x, y, 0.0) for x, y in contour.polygon(chord_error)])
+        elif contour.circle is not None:
+            centre, radius = contour.circle
+            yield _Entity("CIRCLE", layer, "AcDbCircle", _round(centre, radius))
+        else:
+            edges = [part for edge in contour.edges for part in _quarters(edge)]
+            if profile == "arcs":
+                yield from (_edge_entity(layer, edge) for edge in edges)
+            else:
+                yield _polyline(layer, [(*edge.start, edge.bulge) for edge in edges])
+
+
+def _quarters(edge: Edge) -> list[Edge]:
+    """The edge in arcs of at most a quarter turn."""
+    count = 1
+    if isinstance(edge, Arc):
+        count = max(1, math.ceil(abs(edge.sweep) / (math.pi / 2) - 1e-6))
+    if count == 1:
+        return [edge]
+    stops = [edge.start, *(edge.at(i / count) for i in range(1, count)), edge.end]
+    return [edge.part(stops[i], stops[i + 1]) for i in range(count)]
+
+
+def _polyline(layer: str, vertices: Sequence[tuple[float, float, float]]) -> _Entity:
+    rows = [f" 90\n{len(vertices)}\n 70\n1\n"]
+    for x, y, bulge in vertices:
+        rows.append(f" 10\n{number(x)}\n 20\n{number(y)}\n")
+        if bulge:
+            rows.append(f" 42\n{number(bulge)}\n")
+    return _Entity("LWPOLYLINE", layer, "AcDbPolyline", "".join(rows))
+
+
+def _edge_entity(layer: str, edge: Edge) -> _Entity:
+    if isinstance(edge, Line):
+        return _line(layer, edge.start, edge.end)
+    first, last = (edge.start, edge.end) if edge.ccw else (edge.end, edge.start)
+    span = (
+        f"100\nAcDbArc\n 50\n{number(_degrees(edge.centre, first))}\n"
+        f" 51\n{number(_degrees(edge.centre, last))}\n"
+    )
+    return _Entity("ARC", layer, "AcDbCircle", _round(edge.centre, edge.radius) + span)
+
+
+def _line(layer: str, start: Point, end: Point) -> _Entity:
+    body = (
+        f" 10\n{number(start[0])}\n 20\n{number(start[1])}\n 30\n0.0\n"
+        f" 11\n{number(end[0])}\n 21\n{number(end[1])}\n 31\n0.0\n"
+    )
+    return _Entity("LINE", layer, "AcDbLine", body)
+
+
+def _round(centre: Point, radius: float) -> str:
+    x, y = centre
+    return f" 10\n{number(x)}\n 20\n{number(y)}\n 30\n0.0\n 40\n{number(radius)}\n"
+
+
+def _degrees(centre: Point, p: Point) -> float:
+    return math.degrees(math.atan2(p[1] - centre[1], p[0] - centre[0])) % 360.0
+
+
+def _datum_cross() -> tuple[_Entity, _Entity]:
+    return (
+        _line(REFERENCE, (-DATUM_ARM, 0.0), (DATUM_ARM, 0.0)),
+        _line(REFERENCE, (0.0, -DATUM_ARM), (0.0, DATUM_ARM)),
+    )
+
+
+def number(value: float) -> str:
+    """A decimal to a picometre, without exponent or negative zero."""
+    text = f"{value:.9f}".rstrip("0")
+    if text.endswith("."):
+        text += "0"
+    return "0.0" if text == "-0.0" else text
+
+
+def _custom_properties(properties: Mapping[str, str]) -> str:
+    return "".join(
+        f"  9\n$CUSTOMPROPERTYTAG\n  1\n{_one_line(name)}\n"
+        f"  9\n$CUSTOMPROPERTY\n  1\n{_one_line(value)}\n"
+        for name, value in properties.items()
+    )
+
+
+def _one_line(text: str) -> str:
+    """A line break inside a value would shift every group code after it."""
+    return " ".join(text.split())
+
+
+def _extents(contours: Sequence[Contour], datum: bool) -> str:
+    boxes: list[Bounds] = [contour.bounds for contour in contours]
+    if datum or not boxes:
+        boxes.append((-DATUM_ARM, -DATUM_ARM, DATUM_ARM, DATUM_ARM))
+    low = f" 10\n{number(min(b[0] for b in boxes))}\n 20\n{number(min(b[1] for b in boxes))}\n"
+    high = f" 10\n{number(max(b[2] for b in boxes))}\n 20\n{number(max(b[3] for b in boxes))}\n"
+    return (
+        f"  9\n$EXTMIN\n{low} 30\n0.0\n  9\n$EXTMAX\n{high} 30\n0.0\n"
+        f"  9\n$LIMMIN\n{low}  9\n$LIMMAX\n{high}"
+    )
+
+
+@cache
+def _skeleton() -> _Skeleton:
+    from sbafab.cutting.skeleton import SKELETON
+
+    text = SKELETON.read_text(encoding="utf-8")
+    before_properties, base, text = text.partition("  9\n$INSBASE\n")
+    before_extents, _, text = text.partition("  9\n$EXTMIN\n")
+    _, after_extents, text = text.partition("  9\n$ORTHOMODE\n")
+    before_seed, seed_tag, text = text.partition("  9\n$HANDSEED\n  5\n")
+    seed, line_end, text = text.partition("\n")
+    before_entities, entities_tag, tail = text.partition("  2\nENTITIES\n")
+    record = before_entities.partition("\nBLOCK_RECORD\n  5\n")[2].partition("  0\nBLOCK_RECORD\n")
+    model_space = record[2].partition("  5\n")[2].partition("\n")[0]
+    return _Skeleton(
+        before_properties,
+        base + before_extents,
+        after_extents + before_seed + seed_tag,
+        line_end + before_entities + entities_tag,
+        tail,
+        model_space,
+        int(seed, 16),
+    )

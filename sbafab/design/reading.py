@@ -1,0 +1,218 @@
+"""Design files and templates in: TOML to validated records, and one clear sentence if not."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from sbafab.design.records import Design
+from sbafab.errors import DesignError
+
+MOST_BYTES = 1_000_000
+
+
+def templates_folder() -> Path:
+    """The designs that ship: in the installed package, or beside it in a source checkout."""
+    packaged = Path(str(resources.files("sbafab"))) / "templates"
+    return packaged if packaged.is_dir() else packaged.parents[1] / "templates"
+
+
+def template_names() -> list[str]:
+    return sorted(path.stem for path in templates_folder().glob("*.toml"))
+
+
+def design_path(source: str | Path) -> Path:
+    """The file behind a template's name or a path. Raises DesignError if there is none."""
+    names = template_names()
+    if str(source) in names:
+        return templates_folder() / f"{source}.toml"
+    path = Path(source)
+    try:
+        if path.is_file():
+            return path
+        is_folder = path.is_dir()
+    except (OSError, ValueError):
+        is_folder = False
+    if is_folder:
+        raise DesignError(f"{shown(source)} is a folder; give a design file (.toml) or a template")
+    near = difflib.get_close_matches(str(source), names, 1)
+    hint = f"did you mean {near[0]}?" if near else f"the templates are {', '.join(names)}"
+    raise DesignError(f"{shown(source)} is neither a template nor a design file; {hint}")
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a design file. Raises DesignError where it cannot be read."""
+    try:
+        size = path.stat().st_size
+        if size > MOST_BYTES:
+            raise DesignError(
+                f"{path} has {size:,} bytes; a design file has at most {MOST_BYTES:,}"
+            )
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise DesignError(f"{path} is not a text file in UTF-8; save it as UTF-8") from None
+    except OSError as error:
+        raise DesignError(f"{path} cannot be read: {error.strerror or error}") from None
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        reason = str(error) or "nested too deeply"
+        raise DesignError(f"{path} is not valid TOML: {reason[:1].lower()}{reason[1:]}") from None
+
+
+def override(data: Mapping[str, Any], assignments: Iterable[str]) -> dict[str, Any]:
+    """``data`` with every ``key.path=value`` set; the value is TOML, or else plain text."""
+    changed = _copied(data)
+    for assignment in assignments:
+        key, equals, text = assignment.partition("=")
+        parts = [part.strip() for part in key.split(".")]
+        if not equals or not all(parts):
+            raise DesignError(
+                f"--set {shown(assignment)} is not KEY=VALUE; write for example "
+                "--set chamber.diameter=6"
+            )
+        table = changed
+        for part in parts[:-1]:
+            inner = table.setdefault(part, {})
+            if not isinstance(inner, dict):
+                raise DesignError(f"--set {key}: {part} is a value, not a table")
+            table = inner
+        table[parts[-1]] = _value(text.strip())
+    return changed
+
+
+def _copied(data: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        key: _copied(value) if isinstance(value, dict) else value for key, value in data.items()
+    }
+
+
+def _value(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError):
+        return text
+
+
+def validated(
+    data: Mapping[str, Any], families: Mapping[str, type[Design]], folder: Path
+) -> Design:
+    """The design record of the family that ``data`` names.
+
+    Raises DesignError with one sentence: field, value, what is allowed, what would fix it.
+    """
+    family = data.get("family")
+    if family is None:
+        raise DesignError(f"family is missing; add family = one of {listed(families)}")
+    if not isinstance(family, str) or family not in families:
+        near = difflib.get_close_matches(str(family), families, 1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise DesignError(f"family = {shown(family)} must be one of {listed(families)}{hint}")
+    record = families[family]
+    try:
+        return record.model_validate(data).placed(folder)
+    except ValidationError as error:
+        raise DesignError(_sentence(error, record, families)) from None
+
+
+def listed(values: Iterable[object]) -> str:
+    return ", ".join(f'"{value}"' for value in values)
+
+
+def shown(value: object) -> str:
+    """A value as it may appear in a message: short, on one line."""
+    text = repr(str(value)) if isinstance(value, str | Path) else str(value)
+    text = " ".join(text.split())
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _sentence(
+    error: ValidationError, record: type[Design], families: Mapping[str, type[Design]]
+) -> str:
+    problems = error.errors(include_url=False)
+    unknown = [problem for problem in problems if problem["type"] == "extra_forbidden"]
+    first = (unknown or problems)[0]
+    # Alternatives of a union put their own name in the location; a key is what the file holds.
+    where = [str(part) for part in first["loc"] if not _is_alternative(part)]
+    field = ".".join(where)
+    count = len({tuple(problem["loc"][:2]) for problem in problems}) - 1
+    more = f" (and {count} more problem{'s' if count > 1 else ''} like it)" if count > 0 else ""
+    if first["type"] == "extra_forbidden":
+        return _unknown_key(where, record, families) + more
+    if first["type"] == "missing":
+        return f"{field} is missing; add it to the design file{more}"
+    return f"{field} = {shown(first['input'])} {_allowed(first)}{more}"
+
+
+def _is_alternative(part: int | str) -> bool:
+    text = str(part)
+    return text in {"float", "int", "str"} or "[" in text or "(" in text
+
+
+def _allowed(problem: Any) -> str:
+    kind, context = problem["type"], problem.get("ctx", {})
+    if kind == "value_error":
+        return str(context["error"])
+    limits = {
+        "greater_than": "must be greater than {gt}",
+        "greater_than_equal": "must be at least {ge}",
+        "less_than": "must be less than {lt}",
+        "less_than_equal": "must be at most {le}",
+        "literal_error": "must be {expected}",
+        "string_too_long": "must have at most {max_length} letters",
+        "too_long": "must have at most {max_length} entries",
+        "too_short": "must have at least {min_length} entries",
+    }
+    if kind in limits:
+        return limits[kind].format(**context)
+    plain = {
+        "string_pattern_mismatch": "must be 1 to 64 letters, digits, dots, dashes or underscores, "
+        "beginning with a letter or digit",
+        "finite_number": "must be a finite number",
+        "int_type": "must be a whole number",
+        "int_from_float": "must be a whole number",
+        "int_parsing_size": "is out of range",
+        "float_type": "must be a number",
+        "string_type": "must be a text in quotes",
+        "bool_type": "must be true or false",
+        "model_type": "must be a table of keys",
+        "model_attributes_type": "must be a table of keys",
+        "tuple_type": "must be a list in brackets",
+        "list_type": "must be a list in brackets",
+    }
+    return plain.get(kind, f"is not allowed: {problem['msg'].lower()}")
+
+
+def _unknown_key(
+    where: Sequence[str], record: type[Design], families: Mapping[str, type[Design]]
+) -> str:
+    field = ".".join(where)
+    other = [name for name, model in families.items() if field in key_paths(model)]
+    if other:
+        return f"{field} is not a key of this family; it belongs to {listed(other)}"
+    paths = list(key_paths(record))
+    near = difflib.get_close_matches(field, paths, 1, 0.6)
+    same_leaf = [path for path in paths if path.split(".")[-1] == where[-1]]
+    if not near and same_leaf:
+        near = same_leaf[:1]
+    if near:
+        return f"{field} is not a key of a design file; did you mean {near[0]}?"
+    siblings = [path for path in paths if path.count(".") == len(where) - 1]
+    inside = [path for path in siblings if path.split(".")[:-1] == list(where[:-1])]
+    return f"{field} is not a key of a design file; known here: {', '.join(inside or siblings)}"
+
+
+def key_paths(record: type[BaseModel], prefix: str = "") -> dict[str, object]:
+    """Every dotted key a record knows, with its annotation."""
+    found: dict[str, object] = {}
+    for key, info in record.model_fields.items():
+        found[prefix + key] = info.annotation
+        if isinstance(info.annotation, type) and issubclass(info.annotation, BaseModel):
+            found.update(key_paths(info.annotation, f"{prefix}{key}."))
+    return found

@@ -1,0 +1,200 @@
+"""What a user can ask for: the sections that every family's design file shares.
+
+Every field has the paper's value as default (paper Sec. 2) or, where the paper is silent, ours,
+and says so. Lengths are mm.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator
+
+from sbafab.design.units import Length, LengthOrZero, millimetres
+
+NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
+UNCALIBRATED = "uncalibrated"
+RULE_NAMES = (
+    "bond-width",
+    "mask-overhang",
+    "sealing",
+    "channel-clear",
+    "tube-fit",
+    "piece-count",
+    "film-limits",
+    "press-fit",
+    "registration-nominal",
+)
+RuleName = Literal[
+    "bond-width",
+    "mask-overhang",
+    "sealing",
+    "channel-clear",
+    "tube-fit",
+    "piece-count",
+    "film-limits",
+    "press-fit",
+    "registration-nominal",
+]
+
+
+class Section(BaseModel):
+    """A frozen table of a design file that knows all its keys."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
+
+
+class TpeFilm(Section):
+    product: str = Field(default="Stretchlon 200", max_length=80)
+    """What to order."""
+    thickness: Annotated[Length, Field(le=1)] = 0.038
+    """Thickness of the structural film."""
+    density: float = Field(default=1122.0, gt=0, le=20000)
+    """kg/m3, measured (paper Sec. 3.2.1)."""
+    melting_point: float = Field(default=120.0, gt=0, le=400)
+    """C; the press must be hotter."""
+
+
+class PtfeFilm(Section):
+    product: str = Field(default="PTFE film", max_length=80)
+    """What to order."""
+    thickness: Annotated[Length, Field(le=1)] = 0.025
+    """Thickness of the mask film."""
+    density: float = Field(default=2200.0, gt=0, le=20000)
+    """kg/m3, handbook value."""
+    temperature_limit: float = Field(default=260.0, gt=0, le=400)
+    """C; the usual limit for PTFE in lasting use."""
+
+
+class Films(Section):
+    tpe: TpeFilm = TpeFilm()
+    ptfe: PtfeFilm = PtfeFilm()
+
+
+class Bond(Section):
+    width: Length = 0.75
+    """Width of every bonded ring, web and strip edge."""
+
+
+class Mask(Section):
+    overhang: Length = 0.5
+    """How far a mask reaches past the edges of the TPE layers it keeps apart."""
+
+
+class Bore(Section):
+    diameter: Length = 1.0
+    """Channel between the balloons of a chamber, and its dowel pin (the paper gives none)."""
+
+
+class Fillet(Section):
+    radius: LengthOrZero = 1.0
+    """Rounding of the concave corners of outlines (the paper gives none); 0 leaves them sharp."""
+
+
+class Inlet(Section):
+    tube: str = Field(default="Braintree RPT040", max_length=80)
+    """The tubing to order."""
+    tube_outer_diameter: Length = 1.016
+    """Outer diameter of the tubing."""
+    width: Length | None = None
+    """Width of the inlet strip; by default half the tube's perimeter, rounded up to 0.05."""
+    tab_length: Length = 5.0
+    """How far the inlet tab reaches past the outline (the paper gives none)."""
+
+    @property
+    def strip_width(self) -> float:
+        """The strip's width: as given, or the least that opens to the tube, up to 0.05 mm."""
+        if self.width is not None:
+            return self.width
+        return round(math.ceil(math.pi * self.tube_outer_diameter / 2 / 0.05 - 1e-9) * 0.05, 4)
+
+
+class Registration(Section):
+    method: Literal["channel-pin"] = "channel-pin"
+    """Dowel pins in the channel bores, and in the lumen if there is one."""
+
+
+class Press(Section):
+    temperature_c: float = Field(default=135.0, gt=0, le=500)
+    pressure_kpa: float = Field(default=110.0, gt=0, le=10000)
+    platen_width: Length = 152.4
+    platen_length: Length = 152.4
+    flash_bottom_minutes: float = Field(default=3.0, gt=0, le=600)
+    """Step 1: the bottom balloon's upper two layers."""
+    bond_bottom_minutes: float = Field(default=12.0, gt=0, le=600)
+    """Step 2: the bottom balloon, full bond."""
+    flash_middle_minutes: float = Field(default=10.0, gt=0, le=600)
+    """Step 3: all layers between the bottom balloon and the top layer."""
+    bond_all_minutes: float = Field(default=20.0, gt=0, le=600)
+    """Step 4: the whole laminate, full bond."""
+
+
+class Laser(Section):
+    least_feature: Length = 0.2
+    """The narrowest slot or web the laser cuts well."""
+    kerf_tpe: LengthOrZero | Literal["uncalibrated"] = UNCALIBRATED
+    """Full kerf width in TPE, measured; "uncalibrated" writes nominal edges and says so."""
+    kerf_ptfe: LengthOrZero | Literal["uncalibrated"] = UNCALIBRATED
+    """Full kerf width in PTFE, measured; "uncalibrated" writes nominal edges and says so."""
+
+    @field_validator("kerf_tpe", "kerf_ptfe", mode="before")
+    @classmethod
+    def _kerf(cls, value: object) -> float | str:
+        if value == UNCALIBRATED:
+            return UNCALIBRATED
+        kerf = millimetres(value)
+        if not 0 <= kerf <= 1:
+            raise ValueError('must be between 0 and 1 mm, or "uncalibrated"')
+        return kerf
+
+
+class Rules(Section):
+    bond_width: Length = 0.75
+    """Every bond must be at least this wide."""
+    mask_overhang: Length = 0.5
+    """Every mask must reach at least this far past the edges it keeps apart."""
+    validated_balloons: int = Field(default=20, ge=1, le=1000)
+    """More balloons than this draw a warning (paper Sec. 6)."""
+    waive: tuple[RuleName, ...] = Field(default=(), strict=False)
+    """Rules whose failure shall not stop the cut files; every file then says so."""
+
+
+class Stack(Section):
+    balloons: int = Field(default=6, ge=1, le=1000)
+    """Balloons in each chamber, bottom to top."""
+
+
+class Design(Section):
+    """The sections that all families share; a family adds its own and sets ``family``."""
+
+    name: str = Field(pattern=NAME_PATTERN)
+    """Names the output folder: letters, digits, dot, dash, underscore."""
+    family: str
+    stack: Stack = Stack()
+    bond: Bond = Bond()
+    mask: Mask = Mask()
+    bore: Bore = Bore()
+    fillet: Fillet = Fillet()
+    inlet: Inlet = Inlet()
+    films: Films = Films()
+    registration: Registration = Registration()
+    press: Press = Press()
+    laser: Laser = Laser()
+    rules: Rules = Rules()
+
+    _folder: Path = PrivateAttr(default=Path())
+
+    @property
+    def folder(self) -> Path:
+        """Where relative paths of the design start: the folder of its file."""
+        return self._folder
+
+    def placed(self, folder: Path) -> Self:
+        """The same design with relative paths starting at ``folder``."""
+        copy = self.model_copy()
+        copy._folder = folder
+        return copy

@@ -1,0 +1,51 @@
+"""Lengths as people write them: ``0.75``, ``"0.75 mm"``, ``"6 in"``, ``"38 um"``."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Annotated
+
+from pydantic import BeforeValidator, Field
+
+MILLIMETRES = {
+    "um": 0.001,
+    "µm": 0.001,
+    "μm": 0.001,
+    "mm": 1.0,
+    "cm": 10.0,
+    "m": 1000.0,
+    "in": 25.4,
+    "inch": 25.4,
+    '"': 25.4,
+    "mil": 0.0254,
+}
+_WRITTEN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s]*)\s*")
+
+
+def millimetres(value: object) -> float:
+    """A length in mm from a number (mm) or a text with a unit.
+
+    Raises ValueError with a sentence that says what is allowed.
+    """
+    if isinstance(value, str):
+        written = _WRITTEN.fullmatch(value)
+        if written is None or (written[2] and written[2] not in MILLIMETRES):
+            raise ValueError('must be a length such as 0.75, "0.75 mm", "38 um" or "6 in"')
+        return round(float(written[1]) * MILLIMETRES[written[2] or "mm"], 9)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError('must be a length such as 0.75, "0.75 mm", "38 um" or "6 in"')
+    try:
+        length = float(value)
+    except OverflowError:
+        length = math.inf
+    if not math.isfinite(length):
+        raise ValueError("must be a finite length")
+    return length
+
+
+Length = Annotated[float, BeforeValidator(millimetres), Field(gt=0, le=1000)]
+"""A positive length in mm, at most 1 m."""
+
+LengthOrZero = Annotated[float, BeforeValidator(millimetres), Field(ge=0, le=1000)]
+"""A length in mm that may be 0."""

@@ -1,0 +1,40 @@
+"""Designs out: resolved TOML, design hash, JSON schema."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import Any
+
+from sbafab.design.records import Design
+
+
+def resolved(design: Design) -> dict[str, Any]:
+    """The design with every default written out, as plain TOML values."""
+    return _without_none(design.model_dump(mode="json"))
+
+
+def _without_none(table: dict[str, Any]) -> dict[str, Any]:
+    return {
+        key: _without_none(value) if isinstance(value, dict) else value
+        for key, value in table.items()
+        if value is not None
+    }
+
+
+def design_toml(design: Design) -> str:
+    """``design.toml`` of an output folder."""
+    import tomli_w
+
+    return tomli_w.dumps(resolved(design))
+
+
+def design_sha256(design: Design, outline_key: str | None = None) -> str:
+    """Hash of all that decides the output; a drawn outline counts by its shape, not its path."""
+    table = resolved(design)
+    if outline_key is not None:
+        for section in table.values():
+            if isinstance(section, dict) and "outline" in section:
+                section["outline"] = outline_key
+    text = json.dumps(table, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()

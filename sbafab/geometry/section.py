@@ -1,0 +1,41 @@
+"""Where a straight line runs inside a region."""
+
+from __future__ import annotations
+
+import math
+
+from sbafab.geometry.edges import EPSILON, Line, Point
+from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.region import Region
+
+Interval = tuple[float, float]
+
+
+def section(region: Region, origin: Point, direction: Point) -> list[Interval]:
+    """The stretches of a line inside the region, as distances in mm from ``origin``.
+
+    ``direction`` is a unit vector. The line may touch an edge but must not run along one.
+    """
+    if region.is_empty:
+        return []
+    (ox, oy), (ux, uy) = origin, direction
+    low_x, low_y, high_x, high_y = region.bounds
+    reach = max(math.dist(origin, (x, y)) for x in (low_x, high_x) for y in (low_y, high_y)) + 1.0
+    line = Line((ox - reach * ux, oy - reach * uy), (ox + reach * ux, oy + reach * uy))
+    stops = sorted(
+        (x - ox) * ux + (y - oy) * uy
+        for edge in region.edges
+        for x, y in meeting_points(edge, line)
+    )
+    inside: list[Interval] = []
+    for start, end in zip(stops, stops[1:], strict=False):
+        middle = (start + end) / 2
+        if end - start < 2 * EPSILON:
+            continue
+        if not region.contains((ox + middle * ux, oy + middle * uy)):
+            continue
+        if inside and start - inside[-1][1] < 2 * EPSILON:
+            inside[-1] = (inside[-1][0], end)
+        else:
+            inside.append((start, end))
+    return inside

@@ -1,0 +1,48 @@
+"""All checks and tests: ``python -m tests [arguments for pytest]``."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+LINT_IMPORTS = "import sys; from importlinter.cli import lint_imports_command as run; sys.exit(run())"
+CHECKS = {
+    "ruff check": ["-m", "ruff", "check", "."],
+    "ruff format": ["-m", "ruff", "format", "--check", "."],
+    "mypy": ["-m", "mypy"],
+    "import contracts": ["-c", LINT_IMPORTS],
+}
+
+
+def passes(name: str, arguments: list[str]) -> bool:
+    """Runs one check and prints its row; what it said is shown only where it failed."""
+    began = time.perf_counter()
+    run = subprocess.run(
+        [sys.executable, *arguments], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    ok = run.returncode == 0
+    seconds = time.perf_counter() - began
+    print(f"{name:<18}{'passed' if ok else 'FAILED':<8}{seconds:6.1f} s", flush=True)
+    if not ok:
+        print(run.stdout + run.stderr, flush=True)
+    return ok
+
+
+def main() -> int:
+    """Every check runs; pytest comes last, so that its counts close the output."""
+    failed = [name for name, arguments in CHECKS.items() if not passes(name, arguments)]
+    workers = ["-n", str(os.cpu_count() or 1)]
+    tests = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", *workers, *sys.argv[1:]], cwd=ROOT, check=False
+    )
+    if failed:
+        print(f"failed: {', '.join(failed)}")
+    return 1 if failed or tests.returncode else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
