@@ -1,3 +1,25 @@
-"""Fabrication CAD for soft Stacked Balloon Actuators."""
+"""Fabrication CAD for soft Stacked Balloon Actuators.
+
+>>> import sbafab
+>>> laminate = sbafab.build("3dof-15mm", "stack.balloons=6")
+>>> run = sbafab.generate("3dof-15mm", out="out")
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sbafab.api import build, check, generate, load, schema, templates
 
 __version__ = "0.1.0"
+__all__ = ["build", "check", "generate", "load", "schema", "templates"]
+
+
+def __getattr__(name: str) -> Any:
+    # The functions are fetched when first asked for, so that `sbafab --help` loads no geometry.
+    if name in __all__:
+        from sbafab import api
+
+        return getattr(api, name)
+    raise AttributeError(f"module 'sbafab' has no attribute '{name}'")

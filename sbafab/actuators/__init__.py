@@ -33,3 +33,17 @@ def load_design(source: str | Path, assignments: Iterable[str] = ()) -> Design:
 def build(design: Design) -> Laminate:
     """The laminate of a design of any family. Raises DesignError where parts do not fit."""
     return FAMILIES[design.family][1](design)
+
+
+def schema() -> dict[str, Any]:
+    """JSON schema of a design file of any family (draft 2020-12)."""
+    from pydantic.json_schema import models_json_schema
+
+    records = [record for record, _ in FAMILIES.values()]
+    _, definitions = models_json_schema([(record, "validation") for record in records])
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "sbafab design",
+        "oneOf": [{"$ref": f"#/$defs/{record.__name__}"} for record in records],
+        **definitions,
+    }

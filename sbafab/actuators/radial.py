@@ -6,7 +6,7 @@ Laid flat for cutting: x runs round the tube, y along it (paper Sec. 2.1).
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import Field
 
@@ -80,6 +80,15 @@ class RadialDesign(Design):
     def pitch(self) -> float:
         """Distance between neighbouring SBAs round the tube."""
         return math.pi * self.tube.outer_diameter / self.chamber.count
+
+    def completed(self) -> Self:
+        """The same design with inlet and window sizes filled in."""
+        completed = super().completed()
+        if self.chamber.outline is not None:
+            return completed
+        width, length = _window_size(self, _pocket(self))
+        window = Window(width=width, length=length)
+        return completed.model_copy(update={"window": window})
 
 
 def build(design: RadialDesign) -> Laminate:
@@ -159,11 +168,15 @@ def _check_pitch(design: RadialDesign, outline: Region) -> None:
         )
 
 
-def _window(design: RadialDesign, pocket: Region, outline: Region) -> Region:
+def _window_size(design: RadialDesign, pocket: Region) -> tuple[float, float]:
     low_x, low_y, high_x, high_y = pocket.bounds
-    width = design.window.width or 2 * design.bond.width
     straight = max(0.0, (high_y - low_y) - (high_x - low_x))
-    length = design.window.length or straight + 2 * design.bond.width
+    width = design.window.width or 2 * design.bond.width
+    return width, design.window.length or round(straight + 2 * design.bond.width, 6)
+
+
+def _window(design: RadialDesign, pocket: Region, outline: Region) -> Region:
+    width, length = _window_size(design, pocket)
     window = stadium((0.0, 0.0), min(width, length), max(width, length))
     if width > length:
         window = window.turned(90)

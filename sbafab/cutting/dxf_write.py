@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import Literal, NamedTuple
@@ -192,14 +193,17 @@ def _skeleton() -> _Skeleton:
     before_seed, seed_tag, text = text.partition("  9\n$HANDSEED\n  5\n")
     seed, line_end, text = text.partition("\n")
     before_entities, entities_tag, tail = text.partition("  2\nENTITIES\n")
-    record = before_entities.partition("\nBLOCK_RECORD\n  5\n")[2].partition("  0\nBLOCK_RECORD\n")
-    model_space = record[2].partition("  5\n")[2].partition("\n")[0]
+    record = re.search(
+        r"\nBLOCK_RECORD\n  5\n(\w+)\n(?:(?!  0\n).*\n)*?\*Model_Space\n", before_entities
+    )
+    if record is None:
+        raise ValueError("skeleton.dxf has no model space: write it anew.")
     return _Skeleton(
         before_properties,
         base + before_extents,
         after_extents + before_seed + seed_tag,
         line_end + before_entities + entities_tag,
         tail,
-        model_space,
+        record[1],
         int(seed, 16),
     )

@@ -27,7 +27,7 @@ class CutSettings:
 
     design: str
     design_sha256: str
-    kerf_widths: Mapping[Material, float | None] = field(default_factory=dict)
+    kerf_widths: Mapping[str, float | None] = field(default_factory=dict)
     waived: tuple[str, ...] = ()
     profile: DxfProfile = "bulges"
     chord_error: float = 0.005

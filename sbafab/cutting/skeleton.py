@@ -16,20 +16,24 @@ SKELETON = Path(__file__).with_name("skeleton.dxf")
 
 def skeleton_text() -> str:
     """An empty R2010 document in millimetres with the cut layers and fixed metadata."""
-    import ezdxf
+    from ezdxf import options  # type: ignore[attr-defined]
+    from ezdxf.filemanagement import new
 
     # The switch holds for the whole process, so it goes back to what it was.
-    before = ezdxf.options.write_fixed_meta_data_for_testing
-    ezdxf.options.write_fixed_meta_data_for_testing = True
+    before = options.write_fixed_meta_data_for_testing
+    options.write_fixed_meta_data_for_testing = True
     try:
-        document = ezdxf.new("R2010", units=4)
+        document = new("R2010", units=4)
         document.header["$MEASUREMENT"] = 1
         for name, colour in COLOURS.items():
             document.layers.add(name, color=colour, plot=name != REFERENCE)
+        # ezdxf adds classes in the order of a set; those that are there it leaves in place.
+        document.classes.add_required_classes(document.dxfversion)
+        document.classes.classes = dict(sorted(document.classes.classes.items()))
         stream = StringIO()
         document.write(stream)
     finally:
-        ezdxf.options.write_fixed_meta_data_for_testing = before
+        options.write_fixed_meta_data_for_testing = before
     return stream.getvalue()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
@@ -196,16 +197,19 @@ def _unknown_key(
     other = [name for name, model in families.items() if field in key_paths(model)]
     if other:
         return f"{field} is not a key of this family; it belongs to {listed(other)}"
-    paths = list(key_paths(record))
-    near = difflib.get_close_matches(field, paths, 1, 0.6)
-    same_leaf = [path for path in paths if path.split(".")[-1] == where[-1]]
-    if not near and same_leaf:
-        near = same_leaf[:1]
+    known = key_paths(record)
+    siblings = [path for path in known if path.split(".")[:-1] == list(where[:-1])]
+    near = _nearest(where[-1], siblings, 0.6) or _nearest(where[-1], known, 0.75)
     if near:
-        return f"{field} is not a key of a design file; did you mean {near[0]}?"
-    siblings = [path for path in paths if path.count(".") == len(where) - 1]
-    inside = [path for path in siblings if path.split(".")[:-1] == list(where[:-1])]
-    return f"{field} is not a key of a design file; known here: {', '.join(inside or siblings)}"
+        return f"{field} is not a key of a design file; did you mean {near}?"
+    return f"{field} is not a key of a design file; known here: {', '.join(siblings)}"
+
+
+def _nearest(key: str, paths: Iterable[str], cutoff: float) -> str | None:
+    """The path whose last part is most like ``key``."""
+    leaves = {path.split(".")[-1]: path for path in paths}
+    near = difflib.get_close_matches(key, leaves, 1, cutoff)
+    return leaves[near[0]] if near else None
 
 
 def key_paths(record: type[BaseModel], prefix: str = "") -> dict[str, object]:
@@ -216,3 +220,35 @@ def key_paths(record: type[BaseModel], prefix: str = "") -> dict[str, object]:
         if isinstance(info.annotation, type) and issubclass(info.annotation, BaseModel):
             found.update(key_paths(info.annotation, f"{prefix}{key}."))
     return found
+
+
+def template_summaries() -> dict[str, str]:
+    """Template names with the first comment line of each."""
+    return {
+        name: (templates_folder() / f"{name}.toml")
+        .read_text(encoding="utf-8")
+        .partition("\n")[0]
+        .lstrip("# ")
+        for name in template_names()
+    }
+
+
+def write_new(template: str, file: Path | None) -> Path:
+    """Copies a template's commented file, named after the new file; never over an old one."""
+    names = template_names()
+    if template not in names:
+        near = difflib.get_close_matches(template, names, 1)
+        hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
+        raise DesignError(f"{shown(template)} is not a template; {hint}")
+    target = file or Path(f"{template}.toml")
+    text = (templates_folder() / f"{template}.toml").read_text(encoding="utf-8")
+    name = re.sub(r"[^A-Za-z0-9._-]+", "-", target.stem).strip("-._") or template
+    text = text.replace(f'name = "{template}"', f'name = "{name}"', 1)
+    try:
+        with target.open("x", encoding="utf-8", newline="\n") as opened:
+            opened.write(text)
+    except FileExistsError:
+        raise DesignError(f"{target} exists; choose another name or remove it first") from None
+    except OSError as error:
+        raise DesignError(f"{target} cannot be written: {error.strerror or error}") from None
+    return target

@@ -146,9 +146,12 @@ class Laser(Section):
     def _kerf(cls, value: object) -> float | str:
         if value == UNCALIBRATED:
             return UNCALIBRATED
-        kerf = millimetres(value)
+        try:
+            kerf = millimetres(value)
+        except ValueError:
+            kerf = -1.0
         if not 0 <= kerf <= 1:
-            raise ValueError('must be between 0 and 1 mm, or "uncalibrated"')
+            raise ValueError('must be a length from 0 to 1 mm, or "uncalibrated"')
         return kerf
 
 
@@ -192,6 +195,11 @@ class Design(Section):
     def folder(self) -> Path:
         """Where relative paths of the design start: the folder of its file."""
         return self._folder
+
+    def completed(self) -> Self:
+        """The same design with every default that depends on another value filled in."""
+        inlet = self.inlet.model_copy(update={"width": self.inlet.strip_width})
+        return self.model_copy(update={"inlet": inlet})
 
     def placed(self, folder: Path) -> Self:
         """The same design with relative paths starting at ``folder``."""

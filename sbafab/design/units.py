@@ -6,7 +6,7 @@ import math
 import re
 from typing import Annotated
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
 MILLIMETRES = {
     "um": 0.001,
@@ -44,8 +44,23 @@ def millimetres(value: object) -> float:
     return length
 
 
-Length = Annotated[float, BeforeValidator(millimetres), Field(gt=0, le=1000)]
-"""A positive length in mm, at most 1 m."""
+SHORTEST, LONGEST = 0.001, 1000.0
 
-LengthOrZero = Annotated[float, BeforeValidator(millimetres), Field(ge=0, le=1000)]
+
+def _json_schema(number: dict[str, float]) -> WithJsonSchema:
+    text = {"type": "string", "pattern": r"^\s*\+?[0-9.]+([eE][-+]?\d+)?\s*(um|µm|mm|cm|m|in|inch|mil)?\s*$"}
+    return WithJsonSchema({"anyOf": [{"type": "number", **number, "maximum": LONGEST}, text]})
+
+
+Length = Annotated[
+    float,
+    BeforeValidator(millimetres),
+    Field(ge=SHORTEST, le=LONGEST),
+    _json_schema({"minimum": SHORTEST}),
+]
+"""A length in mm between 1 um and 1 m."""
+
+LengthOrZero = Annotated[
+    float, BeforeValidator(millimetres), Field(ge=0, le=LONGEST), _json_schema({"minimum": 0})
+]
 """A length in mm that may be 0."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from pathlib import Path
 from typing import Any
 
 from sbafab.design.records import Design
@@ -11,7 +12,7 @@ from sbafab.design.records import Design
 
 def resolved(design: Design) -> dict[str, Any]:
     """The design with every default written out, as plain TOML values."""
-    return _without_none(design.model_dump(mode="json"))
+    return _without_none(design.completed().model_dump(mode="json"))
 
 
 def _without_none(table: dict[str, Any]) -> dict[str, Any]:
@@ -29,12 +30,17 @@ def design_toml(design: Design) -> str:
     return tomli_w.dumps(resolved(design))
 
 
-def design_sha256(design: Design, outline_key: str | None = None) -> str:
-    """Hash of all that decides the output; a drawn outline counts by its shape, not its path."""
+def outline_file(design: Design) -> Path | None:
+    """The drawn outline that the design names, if any."""
+    name = getattr(getattr(design, "chamber", None), "outline", None)
+    return None if name is None else design.folder / name
+
+
+def design_sha256(design: Design) -> str:
+    """Hash of all that decides the output; a drawn outline counts by its content, not its path."""
     table = resolved(design)
-    if outline_key is not None:
-        for section in table.values():
-            if isinstance(section, dict) and "outline" in section:
-                section["outline"] = outline_key
+    drawn = outline_file(design)
+    if drawn is not None:
+        table["chamber"]["outline"] = hashlib.sha256(drawn.read_bytes()).hexdigest()
     text = json.dumps(table, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
-from sbafab.geometry.edges import EPSILON, Edge, Line, Point, distance_to, edge_from_bulge
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, distance_to, edge_from_bulge
 
 Curve = Callable[[float], tuple[Point, Point]]
 
@@ -23,44 +24,148 @@ LARGEST_TURN = math.radians(80)
 
 
 class FitError(ArithmeticError):
-    """A curve that arcs do not follow: it has a cusp or runs wild; the message says where."""
+    """A curve that arcs cannot follow; the message names the place."""
+
+
+def bezier(controls: Sequence[Point]) -> Curve:
+    """The Bézier curve of three or four control points, parameter 0 to 1."""
+
+    def between(a: Point, b: Point, t: float) -> Point:
+        return a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])
+
+    def curve(t: float) -> tuple[Point, Point]:
+        points = list(controls)
+        while len(points) > 2:
+            points = [between(a, b, t) for a, b in pairwise(points)]
+        a, b = points
+        return between(a, b, t), (b[0] - a[0], b[1] - a[1])
+
+    return curve
+
+
+def ellipse(centre: Point, major: Point, minor: Point) -> Curve:
+    """Centre + major cos t + minor sin t: the half axes are vectors (conjugate ones will do)."""
+
+    def curve(t: float) -> tuple[Point, Point]:
+        c, s = math.cos(t), math.sin(t)
+        return (
+            (centre[0] + c * major[0] + s * minor[0], centre[1] + c * major[1] + s * minor[1]),
+            (c * minor[0] - s * major[0], c * minor[1] - s * major[1]),
+        )
+
+    return curve
+
+
+def elliptical_arc(
+    centre: Point, major: Point, minor: Point, first: float, last: float
+) -> tuple[Edge, ...]:
+    """Edges along centre + major cos t + minor sin t; exact where the half axes are a circle's."""
+    if last < first:
+        forward = elliptical_arc(centre, major, minor, last, first)
+        return tuple(edge.reversed() for edge in reversed(forward))
+    curve = ellipse(centre, major, minor)
+    radius = math.hypot(*major)
+    skew = major[0] * minor[0] + major[1] * minor[1]
+    if abs(radius - math.hypot(*minor)) > EPSILON or abs(skew) > EPSILON * radius:
+        return fit_arcs(curve, first, last)
+    count = max(1, math.ceil((last - first) / (math.pi / 2) - 1e-9))
+    corners = [curve(first + (last - first) * k / count)[0] for k in range(count + 1)]
+    if last - first > math.tau - 1e-9:
+        corners[-1] = corners[0]
+    ccw = major[0] * minor[1] > major[1] * minor[0]
+    return tuple(Arc(a, b, centre, radius, ccw) for a, b in pairwise(corners))
 
 
 def fit_arcs(
     curve: Curve, first: float, last: float, tolerance: float = TOLERANCE
 ) -> tuple[Edge, ...]:
-    """Arcs and lines within ``tolerance`` mm of the curve between two parameters.
+    """Arcs and lines within ``tolerance`` mm of the curve from parameter ``first`` to ``last``.
 
-    Neighbours share a tangent; each pair of arcs reaches as far along the curve as the tolerance
-    lets it. Raises FitError where the curve has no tangent or turns back on itself.
+    Neighbours share a tangent, and each biarc reaches as far as the tolerance lets it. Raises
+    FitError where the curve has a cusp.
     """
     edges: list[Edge] = []
-    least = (last - first) * 1e-7
     at, step = first, (last - first) / 4
     while at < last:
-        reach, fitted = _longest_span(curve, at, last, step, tolerance, least)
+        reach, fitted = _longest_span(curve, at, last, step, tolerance)
+        if reach < last and last - reach < (reach - at) / 2:
+            # Two even spans in place of a long one and a sliver.
+            middle = (at + last) / 2
+            even = _biarc(curve, at, middle, tolerance)
+            reach, fitted = (middle, even) if even else (reach, fitted)
         edges += fitted
-        at, step = reach, max(reach - at, least)
-        if last - at < least:
-            break
+        at, step = reach, reach - at
     return tuple(edge for edge in edges if edge.length > EPSILON)
 
 
 def _longest_span(
-    curve: Curve, at: float, last: float, step: float, tolerance: float, least: float
+    curve: Curve, at: float, last: float, step: float, tolerance: float
 ) -> tuple[float, list[Edge]]:
-    """The farthest parameter one biarc from ``at`` reaches, by doubling and then bisection."""
-    good, fitted, bad = at, list[Edge](), math.inf
-    while good < last and (bad == math.inf or bad - good > 0.01 * step):
-        end = min(last, good + 2 * step if good > at else at + step) if bad == math.inf else 0.0
-        if bad != math.inf:
-            end = (good + bad) / 2
-        if end - at < least:
-            (x, y), _ = curve(at)
-            raise FitError(f"the curve has a cusp near x {x:.4f}, y {y:.4f}")
-        edges = _span(curve, at, end, tolerance)
+    """The farthest parameter that one biarc from ``at`` reaches, by doubling, then bisection."""
+    good, bad, end = at, math.inf, min(last, at + step)
+    fitted: list[Edge] = []
+    while True:
+        edges = _biarc(curve, at, end, tolerance)
         if edges:
             good, fitted = end, edges
         else:
-            bad, step = end, min(step, end - at)
-    return good, fitted
+            bad = end
+        if good == last or bad - good < 0.02 * (good - at):
+            return good, fitted
+        if bad - at < 1e-9 * (1 + abs(at)):
+            (x, y), _ = curve(at)
+            raise FitError(f"cusp near x {x:.4f}, y {y:.4f}")
+        end = min(last, 2 * end - at) if bad == math.inf else (good + bad) / 2
+
+
+def _biarc(curve: Curve, first: float, last: float, tolerance: float) -> list[Edge]:
+    """Two edges that touch the curve at both parameters; none if they stray from it between."""
+    start, u = curve(first)[0], _unit_tangent(curve, first, last)
+    end, v = curve(last)[0], _unit_tangent(curve, last, first)
+    # One tangent length d on both sides: |end - start - d (u + v)| = 2 d, solved so that it
+    # keeps its digits where the tangents are parallel.
+    chord = end[0] - start[0], end[1] - start[1]
+    along = chord[0] * (u[0] + v[0]) + chord[1] * (u[1] + v[1])
+    square = chord[0] ** 2 + chord[1] ** 2
+    if along <= 0 or square < EPSILON**2:
+        return []
+    open_angle = 2 * (1 - u[0] * v[0] - u[1] * v[1])
+    d = square / (along + math.sqrt(along**2 + open_angle * square))
+    joint = (
+        (start[0] + end[0] + d * (u[0] - v[0])) / 2,
+        (start[1] + end[1] + d * (u[1] - v[1])) / 2,
+    )
+    turn = _angle(u, (joint[0] - start[0], joint[1] - start[1]))
+    other = _angle((end[0] - joint[0], end[1] - joint[1]), v)
+    if max(abs(turn), abs(other)) > LARGEST_TURN / 2:
+        return []
+    edges = [_edge(start, joint, turn), _edge(joint, end, other)]
+    for k in range(1, SAMPLES):
+        p = curve(first + (last - first) * k / SAMPLES)[0]
+        if min(distance_to(edge, p) for edge in edges) > 0.99 * tolerance:
+            return []
+    return edges
+
+
+def _edge(start: Point, end: Point, turn: float) -> Edge:
+    """The arc from start to end whose tangent at the start is ``turn`` right of the chord."""
+    bulge = math.tan(turn / 2)
+    if abs(bulge) * math.dist(start, end) / 2 < STRAIGHT:
+        return Line(start, end)
+    return edge_from_bulge(start, end, bulge)
+
+
+def _unit_tangent(curve: Curve, at: float, towards: float) -> Point:
+    """Unit derivative at a parameter, or just beside it where it vanishes."""
+    for nudge in (0.0, 1e-6, 1e-4):
+        dx, dy = curve(at + nudge * (towards - at))[1]
+        size = math.hypot(dx, dy)
+        if size > 1e-9:
+            return dx / size, dy / size
+    (x, y), _ = curve(at)
+    raise FitError(f"cusp near x {x:.4f}, y {y:.4f}")
+
+
+def _angle(u: Point, v: Point) -> float:
+    """Angle that turns u into v, counter-clockwise positive."""
+    return math.atan2(u[0] * v[1] - u[1] * v[0], u[0] * v[0] + u[1] * v[1])

@@ -90,9 +90,16 @@ class PointPool:
 
     def __init__(self) -> None:
         self.points: list[Point] = []
+        self._seen: dict[Point, int] = {}
         self._cells: dict[tuple[int, int], list[int]] = {}
 
     def index(self, p: Point) -> int:
+        known = self._seen.get(p)
+        if known is None:
+            known = self._seen[p] = self._search(p)
+        return known
+
+    def _search(self, p: Point) -> int:
         x, y = round(p[0] / (4 * EPSILON)), round(p[1] / (4 * EPSILON))
         for i in (x, x - 1, x + 1):
             for j in (y, y - 1, y + 1):
@@ -179,11 +186,18 @@ def leftmost(before: Edge, options: Sequence[Edge]) -> Edge:
     """The edge that turns most to the left after ``before``; all options start where it ends."""
     if len(options) == 1:
         return options[0]
-    back = before.reversed()
     # Edges that leave a point in one direction are told apart where the shortest of them ends.
-    reach = min(math.dist(edge.start, edge.end) for edge in (back, *options))
-    behind = _heading(back, reach)
-    return min(options, key=lambda option: (behind - _heading(option, reach)) % math.tau)
+    reach = min(math.dist(edge.start, edge.end) for edge in (before, *options))
+    return max(options, key=lambda option: left_turn(before, option, reach))
+
+
+def left_turn(before: Edge, after: Edge, reach: float = 0.0) -> float:
+    """Angle between -pi and pi turned to the left, from edge to edge or from chord to chord.
+
+    The chords run from the common corner to the points at distance ``reach``.
+    """
+    back = _heading(before.reversed(), reach)
+    return math.pi - (back - _heading(after, reach)) % math.tau
 
 
 def _heading(edge: Edge, reach: float) -> float:

@@ -71,6 +71,10 @@ class Line(NamedTuple):
         """Point of the edge nearest to ``p``."""
         return self.at(min(1.0, max(0.0, self.parameter(p))))
 
+    def farthest_from(self, p: Point) -> float:
+        """Greatest distance from ``p`` to a point of the edge."""
+        return max(math.dist(p, self.start), math.dist(p, self.end))
+
     def part(self, start: Point, end: Point) -> Line:
         """The piece between two points of the edge, taken in the direction of travel."""
         return Line(start, end)
@@ -123,26 +127,14 @@ class Arc(NamedTuple):
 
     @property
     def bounds(self) -> Bounds:
-        (x0, y0), (x1, y1), (cx, cy), r = self.start, self.end, self.centre, self.radius
-        low_x, low_y, high_x, high_y = min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1)
-        first, last = self._span()
-        quarter = math.ceil(first / (math.pi / 2))
-        while quarter * (math.pi / 2) <= last:
-            side = quarter % 4
-            if side == 0:
-                high_x = cx + r
-            elif side == 1:
-                high_y = cy + r
-            elif side == 2:
-                low_x = cx - r
-            else:
-                low_y = cy - r
-            quarter += 1
-        return low_x, low_y, high_x, high_y
-
-    def _span(self) -> tuple[float, float]:
-        first, sweep = self.start_angle, self.sweep
-        return (first, first + sweep) if sweep >= 0 else (first + sweep, first)
+        (cx, cy), r = self.centre, self.radius
+        (x0, y0), (x1, y1) = (self.start, self.end) if self.ccw else (self.end, self.start)
+        return (
+            cx - r if y0 >= cy >= y1 else min(x0, x1),
+            cy - r if x0 <= cx <= x1 else min(y0, y1),
+            cx + r if y0 <= cy <= y1 else max(x0, x1),
+            cy + r if x0 >= cx >= x1 else max(y0, y1),
+        )
 
     def reversed(self) -> Arc:
         return Arc(self.end, self.start, self.centre, self.radius, not self.ccw)
@@ -176,12 +168,23 @@ class Arc(NamedTuple):
 
     def nearest(self, p: Point) -> Point:
         """Point of the edge nearest to ``p``."""
-        x, y = p[0] - self.centre[0], p[1] - self.centre[1]
+        (cx, cy), (x0, y0), (x1, y1) = self.centre, self.start, self.end
+        x, y = p[0] - cx, p[1] - cy
+        after_start = (x0 - cx) * y - (y0 - cy) * x
+        before_end = x * (y1 - cy) - y * (x1 - cx)
+        faces = min(after_start, before_end) >= 0 if self.ccw else max(after_start, before_end) <= 0
         distance = math.hypot(x, y)
-        if distance > EPSILON and 0.0 <= self.parameter(p) <= 1.0:
+        if faces and distance > EPSILON:
             scale = self.radius / distance
-            return self.centre[0] + x * scale, self.centre[1] + y * scale
-        return min(self.start, self.end, key=lambda end: math.dist(p, end))
+            return cx + x * scale, cy + y * scale
+        return self.start if math.dist(p, self.start) <= math.dist(p, self.end) else self.end
+
+    def farthest_from(self, p: Point) -> float:
+        """Greatest distance from ``p`` to a point of the edge."""
+        opposite = (2 * self.centre[0] - p[0], 2 * self.centre[1] - p[1])
+        if math.dist(p, self.centre) > EPSILON and 0.0 <= self.parameter(opposite) <= 1.0:
+            return math.dist(p, self.centre) + self.radius
+        return max(math.dist(p, self.start), math.dist(p, self.end))
 
     def part(self, start: Point, end: Point) -> Arc:
         """The piece between two points of the edge, taken in the direction of travel."""

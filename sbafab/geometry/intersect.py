@@ -15,10 +15,11 @@ def meeting_points(a: Edge, b: Edge) -> list[Point]:
     found = [p for p in (a.start, a.end) if distance_to(b, p) < EPSILON]
     found += [p for p in (b.start, b.end) if distance_to(a, p) < EPSILON]
     for p in _support_crossings(a, b):
+        # A known end wins over a computed point: at a touch the computed one is less exact.
+        if any(math.dist(p, known) <= 2 * EPSILON for known in found):
+            continue
         if distance_to(a, p) < EPSILON and distance_to(b, p) < EPSILON:
-            # A known end wins over a computed point: at a touch the computed one is less exact.
-            if all(math.dist(p, known) > 2 * EPSILON for known in found):
-                found.append(p)
+            found.append(p)
     return found
 
 

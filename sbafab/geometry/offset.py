@@ -6,8 +6,8 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 
-from sbafab.geometry.boolean import PointPool, chain, split_edges
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Point
+from sbafab.geometry.boolean import PointPool, chain, left_turn, split_edges
+from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Point, distance_to
 from sbafab.geometry.region import Contour, Region
 
 
@@ -40,7 +40,9 @@ def _offset_pieces(
     contours: Sequence[Contour], distance: float, covers: Callable[[Point], bool]
 ) -> list[Edge]:
     """Pieces of the curve at exactly ``distance`` outside the side that ``covers`` knows."""
-    originals = [edge for contour in contours for edge in contour.edges]
+    near = [
+        (_widened(edge.bounds, distance), edge) for contour in contours for edge in contour.edges
+    ]
     raw: list[Edge] = []
     for contour in contours:
         for before, edge in zip((contour.edges[-1], *contour.edges), contour.edges, strict=False):
@@ -50,15 +52,15 @@ def _offset_pieces(
             moved = edge.offset(distance)
             if moved is not None:
                 raw.append(moved)
-    pool = PointPool()
-    kept: dict[tuple[Point, Point], list[Edge]] = defaultdict(list)
-    for pieces in split_edges(raw, pool):
+    kept: list[tuple[float, Edge]] = []
+    for pieces in split_edges(raw, PointPool()):
         for piece in pieces:
             middle = piece.at(0.5)
+            depth = _depth(near, middle, distance)
             # In a touch of two pieces the inside, too, can be as far as this from every edge.
-            if all(_clear(edge, middle, distance) for edge in originals) and not covers(middle):
-                _add(kept, piece)
-    return [piece for pieces in kept.values() for piece in pieces]
+            if depth < 2 * EPSILON and not covers(middle):
+                _add(kept, depth, piece)
+    return _balanced(kept)
 
 
 def _corner_arc(before: Edge, after: Edge, distance: float) -> Arc | None:
@@ -66,7 +68,11 @@ def _corner_arc(before: Edge, after: Edge, distance: float) -> Arc | None:
     corner = after.start
     ux, uy = before.direction(corner)
     vx, vy = after.direction(corner)
-    turn = math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
+    turn = left_turn(before, after)
+    if abs(turn) > 3:
+        # At the tip of a cusp the curvature tells a spike from a notch.
+        reach = min(math.dist(edge.start, edge.end) for edge in (before, after))
+        turn = left_turn(before, after, reach)
     if turn * distance < EPSILON:
         return None
     x, y = corner
@@ -79,27 +85,55 @@ def _corner_arc(before: Edge, after: Edge, distance: float) -> Arc | None:
     )
 
 
-def _clear(edge: Edge, p: Point, distance: float) -> bool:
-    low_x, low_y, high_x, high_y = edge.bounds
-    if (
-        p[0] < low_x - distance
-        or p[0] > high_x + distance
-        or p[1] < low_y - distance
-        or p[1] > high_y + distance
-    ):
-        return True
-    return math.dist(p, edge.nearest(p)) > distance - 2 * EPSILON
+def _widened(box: Bounds, margin: float) -> Bounds:
+    return box[0] - margin, box[1] - margin, box[2] + margin, box[3] + margin
 
 
-def _add(kept: dict[tuple[Point, Point], list[Edge]], piece: Edge) -> None:
+def _depth(near: Sequence[tuple[Bounds, Edge]], p: Point, distance: float) -> float:
+    """How far ``p`` lies within ``distance`` of the edges; negative where it does not.
+
+    Each edge comes with its bounds widened by the distance; the search ends at the first that
+    is clearly too near.
+    """
+    x, y = p
+    depth = -math.inf
+    for (low_x, low_y, high_x, high_y), edge in near:
+        if low_x <= x <= high_x and low_y <= y <= high_y:
+            depth = max(depth, distance - distance_to(edge, p))
+            if depth > 2 * EPSILON:
+                break
+    return depth
+
+
+def _add(kept: list[tuple[float, Edge]], depth: float, piece: Edge) -> None:
     """Keeps one of equal pieces, and neither of two that run opposite ways (a closed gap)."""
     middle = piece.at(0.5)
-    for same in kept[piece.start, piece.end]:
-        if math.dist(middle, same.at(0.5)) < 4 * EPSILON:
+    for index, (_, other) in enumerate(kept):
+        if {other.start, other.end} == {piece.start, piece.end} and (
+            math.dist(middle, other.at(0.5)) < 4 * EPSILON
+        ):
+            if other.start != piece.start:
+                del kept[index]
             return
-    opposite = kept[piece.end, piece.start]
-    for other in opposite:
-        if math.dist(middle, other.at(0.5)) < 4 * EPSILON:
-            opposite.remove(other)
-            return
-    kept[piece.start, piece.end].append(piece)
+    kept.append((depth, piece))
+
+
+def _balanced(kept: Sequence[tuple[float, Edge]]) -> list[Edge]:
+    """The pieces without those, deepest first, that leave a point that too few arrive at.
+
+    Where two curves graze each other within EPSILON, both are kept at first.
+    """
+    pieces = sorted(kept, key=lambda entry: entry[0])
+    while True:
+        surplus: dict[Point, int] = defaultdict(int)
+        for _, piece in pieces:
+            surplus[piece.start] += 1
+            surplus[piece.end] -= 1
+        doubtful = [
+            index
+            for index, (depth, piece) in enumerate(pieces)
+            if depth > 0 and (surplus[piece.start] > 0 or surplus[piece.end] < 0)
+        ]
+        if not doubtful:
+            return [piece for _, piece in pieces]
+        del pieces[doubtful[-1]]

@@ -86,6 +86,9 @@ class Contour:
     def winding(self, p: Point) -> int:
         """How many times the contour runs counter-clockwise round ``p`` (not on an edge)."""
         px, py = p
+        low_x, low_y, high_x, high_y = self.bounds
+        if not (low_x <= px <= high_x and low_y <= py <= high_y):
+            return 0
         turns = 0
         for edge in self.edges:
             (x0, y0), (x1, y1) = edge.start, edge.end
@@ -117,6 +120,8 @@ class Contour:
             points.append(edge.start)
             if isinstance(edge, Arc):
                 points.extend(_chord_points(edge, sagitta))
+        if len(points) < 3:
+            return [edge.at(t) for edge in self.edges for t in (0.0, 0.5)]
         return points
 
 

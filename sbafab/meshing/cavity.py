@@ -9,7 +9,8 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Contour, Region
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Chamber, Laminate
-from sbafab.meshing.prisms import SAGITTA, Slab, Surface, fuse
+from sbafab.meshing.prisms import SAGITTA, Slab, closed_surface
+from sbafab.meshing.surface import Surface
 
 
 def cavity_slabs(laminate: Laminate, chamber: Chamber) -> list[Slab]:
@@ -38,9 +39,11 @@ def cavity_slabs(laminate: Laminate, chamber: Chamber) -> list[Slab]:
 def cavity(laminate: Laminate, chamber: Chamber, sagitta: float = SAGITTA) -> Surface:
     """The closed surface of a chamber's cavity, normals out of the air.
 
-    Its volume is that of :func:`cavity_slabs`. Raises OutputError if it cannot be built.
+    Its volume is that of :func:`cavity_slabs`. Raises OutputError if it does not close.
     """
-    return fuse(cavity_slabs(laminate, chamber), sagitta)
+    return closed_surface(
+        f"the cavity of chamber {chamber.name}", cavity_slabs(laminate, chamber), sagitta
+    )
 
 
 def _pocket(

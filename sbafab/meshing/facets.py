@@ -63,6 +63,8 @@ def _ticks(arc: Arc, sweep: float, sagitta: float, whole: bool) -> list[Point]:
         # Half a step from the ends: nearer, a vertex outside the circle would make a dent.
         low, high = sorted((arc.start_angle, arc.start_angle + sweep))
         ticks = list(range(math.ceil(low / step + 0.5), math.floor(high / step - 0.5) + 1))
+    if not ticks:
+        return [arc.on_circle(arc.start_angle + sweep / 2)]
     circle = Arc(arc.start, arc.end, arc.centre, radius, True)
     points = [circle.on_circle(math.remainder(tick * step, math.tau)) for tick in ticks]
     return points if arc.ccw else points[::-1]

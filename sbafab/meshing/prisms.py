@@ -7,15 +7,18 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
-from sbafab.meshing.facets import facets
+from sbafab.meshing.partition import Partition, partition
+from sbafab.meshing.surface import Surface, open_edges
 
 if TYPE_CHECKING:
     import numpy as np
-    from manifold3d import CrossSection
     from numpy.typing import NDArray
 
 SAGITTA = 0.002
 """Default height in mm of an arc over its chord."""
+
+VOLUME_TOLERANCE = 0.002
+"""Largest relative difference between a surface's volume and its sum of area x thickness."""
 
 
 class Slab(NamedTuple):
@@ -31,63 +34,91 @@ class Slab(NamedTuple):
         return self.region.area * (self.top - self.bottom)
 
 
-class Surface(NamedTuple):
-    """A triangulated closed surface, normals outward.
+def fuse(slabs: Sequence[Slab], sagitta: float) -> Surface:
+    """The surface of the union of the slabs, built film by film from one partition of the plane.
 
-    ``points`` (n, 3) float64 in mm; ``faces`` (m, 3) indices of points, counter-clockwise from
-    outside.
-    """
-
-    points: NDArray[np.float64]
-    faces: NDArray[np.int64]
-
-    @property
-    def volume(self) -> float:
-        """Enclosed volume in mm3."""
-        import numpy as np
-
-        a, b, c = (self.points[self.faces[:, corner]] for corner in range(3))
-        return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
-
-
-def fuse(slabs: Sequence[Slab], sagitta: float = SAGITTA) -> Surface:
-    """The surface of the union of slabs that lie on each other, bottom to top.
-
-    Arcs become chords within ``sagitta`` mm of them, of equal area.
+    Arcs become chords within ``sagitta`` mm of them, of equal area. No boolean of solids is
+    needed: walls stand on the outline of a level, and what differs from the level above it or
+    below it is a face.
     """
     import numpy as np
-    from manifold3d import Error, Manifold, OpType
 
-    extrusions: dict[tuple[Region, float], Manifold] = {}
-    prisms: list[Manifold] = []
-    for slab in slabs:
-        bottom = _exact(slab.bottom)
-        height = _exact(slab.top) - bottom
-        key = slab.region, height
-        if key not in extrusions:
-            extrusions[key] = Manifold.extrude(_section(slab.region, sagitta), height)
-        prisms.append(extrusions[key].translate((0.0, 0.0, bottom)))
-    union = Manifold.batch_boolean(prisms, OpType.Add)
-    if union.status() != Error.NoError or union.is_empty():
+    regions = list(dict.fromkeys(slab.region for slab in slabs))
+    plane = partition(regions, sagitta)
+    heights, levels = _levels(slabs, regions, plane)
+    faces = _faces(plane, levels)
+    count = len(plane.points)
+    used, faces = np.unique(faces, return_inverse=True)
+    points = np.column_stack([plane.points[used % count], heights[used // count]])
+    return Surface(points, faces.reshape(-1, 3))
+
+
+def closed_surface(what: str, slabs: Sequence[Slab], sagitta: float) -> Surface:
+    """The verified surface of the slabs; ``what`` names it in errors.
+
+    Raises OutputError if an edge does not join two triangles, or the volume is off.
+    """
+    surface = fuse(slabs, sagitta)
+    gaps = open_edges(surface)
+    if len(gaps):
+        x, y, z = gaps[0]
         raise OutputError(
-            f"The solid could not be built from its {len(slabs)} films ({union.status().name}); "
-            "run the rule deck to find the profile that is at fault."
+            f"The mesh of {what} is not closed at {len(gaps)} edges, the first at x {x:.3f}, "
+            f"y {y:.3f}, z {z:.3f}; move profiles apart that touch in one point there."
         )
-    mesh = union.to_mesh64()
-    points = np.ascontiguousarray(mesh.vert_properties[:, :3], dtype=np.float64)
-    return Surface(points, mesh.tri_verts.astype(np.int64))
+    expected = sum(slab.volume for slab in slabs)
+    if not abs(surface.volume - expected) <= VOLUME_TOLERANCE * expected:
+        raise OutputError(
+            f"The mesh of {what} holds {surface.volume:.4f} mm3 where its films add up to "
+            f"{expected:.4f} mm3; ask for a smaller sagitta than {sagitta:g} mm."
+        )
+    return surface
 
 
-def _exact(height: float) -> float:
-    """The height to a billionth of a mm, in a binary fraction.
-
-    Sums of such numbers are exact, so faces that touch lie at one number.
-    """
-    return round(height * 2**30) / 2**30
-
-
-def _section(region: Region, sagitta: float) -> CrossSection:
+def _levels(
+    slabs: Sequence[Slab], regions: Sequence[Region], plane: Partition
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """The heights where something starts or ends, and the filled cells between each two."""
     import numpy as np
-    from manifold3d import CrossSection
 
-    return CrossSection([np.array(facets(contour, sagitta)) for contour in region.contours])
+    # To 1e-9 mm, so that faces that touch lie at one number.
+    spans = [(round(slab.bottom, 9), round(slab.top, 9)) for slab in slabs]
+    heights = sorted({height for span in spans for height in span})
+    number = {height: index for index, height in enumerate(heights)}
+    row = {region: index for index, region in enumerate(regions)}
+    filled = np.zeros((len(heights) - 1, plane.inside.shape[1]), dtype=bool)
+    for slab, (bottom, top) in zip(slabs, spans, strict=True):
+        filled[number[bottom] : number[top]] |= plane.inside[row[slab.region]]
+    return np.array(heights), filled
+
+
+def _faces(plane: Partition, levels: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Triangles (k, 3) of point + height x number of points, heights counted from the lowest."""
+    import numpy as np
+
+    walls: dict[bytes, NDArray[np.int64]] = {}
+    lids: dict[bytes, NDArray[np.int64]] = {}
+    count = len(plane.points)
+    empty = np.zeros((1, levels.shape[1]), dtype=bool)
+    faces = []
+    for index, (below, here) in enumerate(
+        zip(np.vstack([empty, levels]), np.vstack([levels, empty]), strict=True)
+    ):
+        for chosen, order in ((below & ~here, (0, 1, 2)), (here & ~below, (0, 2, 1))):
+            if (key := chosen.tobytes()) not in lids:
+                lids[key] = plane.triangles(chosen)
+            faces.append(lids[key][:, order] + index * count)
+        if (key := here.tobytes()) not in walls:
+            walls[key] = _walls(plane.boundary(here), count)
+        faces.append(walls[key] + index * count)
+    return np.concatenate(faces)
+
+
+def _walls(edges: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Two triangles an edge, from one height to the next."""
+    import numpy as np
+
+    tails, heads = edges.T
+    lower = np.column_stack([tails, heads, heads + count])
+    upper = np.column_stack([tails, heads + count, tails + count])
+    return np.concatenate([lower, upper])

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.prisms import SAGITTA, Slab, Surface, fuse
+from sbafab.meshing.prisms import SAGITTA, Slab, closed_surface
+from sbafab.meshing.surface import Surface
 
 
 def solid_slabs(laminate: Laminate) -> list[Slab]:
@@ -23,6 +24,6 @@ def solid_slabs(laminate: Laminate) -> list[Slab]:
 def solid(laminate: Laminate, sagitta: float = SAGITTA) -> Surface:
     """The surface of the flat actuator, pockets, bores, inlet channels and lumen open.
 
-    Its volume is that of :func:`solid_slabs`. Raises OutputError if it cannot be built.
+    Its volume is that of :func:`solid_slabs`. Raises OutputError if it does not close.
     """
-    return fuse(solid_slabs(laminate), sagitta)
+    return closed_surface("the solid", solid_slabs(laminate), sagitta)

@@ -16,10 +16,11 @@ from sbafab.laminate.picture import INK
 
 Anchor = Literal["start", "middle", "end"]
 
-TEXT = 2.6
-SMALL = 2.2
-THIN = 0.13
-ARROW = 1.4
+TEXT = 3.0
+SMALL = 2.6
+THIN = 0.15
+ARROW = 1.7
+TIMES = "\u00d7"
 DARK = "#1a1a1a"
 GREY = "#5a5a5a"
 FONT = "Helvetica, Arial, 'Liberation Sans', sans-serif"
@@ -142,6 +143,13 @@ def leader(feature: Point, elbow: Point, label: Point, *, dot: bool = True) -> l
         else arrow(feature, _unit(elbow, feature))
     )
     return [line([feature, elbow, label], colour=GREY), end]
+
+
+def across(a: Point, b: Point) -> list[str]:
+    """Arrows on a width too narrow for words: on both its ends, pointing inward from outside."""
+    (u, v) = _unit(a, b)
+    tails = _shifted(a, (-u, -v), 2 * ARROW), _shifted(b, (u, v), 2 * ARROW)
+    return [line(tails, colour=GREY), arrow(a, (u, v)), arrow(b, (-u, -v))]
 
 
 def spread(wanted: Sequence[float], gap: float, low: float, high: float) -> list[float]:

@@ -1,43 +1,73 @@
-"""Laminates put together by hand, so that their volumes can be worked out on paper."""
+"""Stacks put together by hand, so that their volumes can be worked out on paper."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import pytest
 
 from sbafab.geometry.boolean import union
-from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, strip
 from sbafab.laminate.films import Film
-from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Layer, Role
+from sbafab.laminate.laminate import Bore, Chamber, Laminate, Layer, Role
 
-TPE = Film("TPE", "TPE film", 0.038, 900.0, 125.0, 200.0)
-PTFE = Film("PTFE", "PTFE film", 0.025, 2200.0, 327.0, 260.0)
+Profiles = list[tuple[Role, Region]]
+Stack = Callable[[Profiles], Laminate]
+
+TPE = Film("TPE", "sheet", 0.038, 900.0, 125.0, 200.0)
+PTFE = Film("PTFE", "sheet", 0.025, 2200.0, 327.0, 260.0)
 
 
-def stack(
-    profiles: list[tuple[Role, Region]], centres: list[Point], balloons: int, bore: float
-) -> Laminate:
+def stacked(profiles: Profiles) -> Laminate:
+    """A laminate of these layers with one chamber and one bore of 1.0, both on the axis."""
     layers: list[Layer] = []
     z = 0.0
-    patterns: dict[Region, str] = {}
     for index, (role, profile) in enumerate(profiles, start=1):
         film = PTFE if role.endswith("mask") else TPE
-        pattern = patterns.setdefault(profile, f"P{len(patterns) + 1:02d}")
-        layers.append(
-            Layer(index, role, film, profile, (index + 3) // 4, z, len(profile.outers), pattern)
-        )
+        layers.append(Layer(index, role, film, profile, (index + 3) // 4, z, 1, profile.key))
         z += film.thickness
-    names = [chr(ord("a") + i) for i in range(len(centres))]
     return Laminate(
         name="by-hand",
         family="1dof",
         layers=tuple(layers),
-        chambers=tuple(Chamber(n, (c,)) for n, c in zip(names, centres, strict=True)),
-        bores=tuple(Bore(n, c, 2 * bore) for n, c in zip(names, centres, strict=True)),
+        chambers=(Chamber("A", ((0.0, 0.0),)),),
+        bores=(Bore("A", (0.0, 0.0), 1.0),),
         inlets=(),
         pins=(),
         lumen=None,
-        balloons=balloons,
+        balloons=(len(layers) + 1) // 4,
         registration="channel-pin",
     )
+
+
+def two_balloon_profiles() -> Profiles:
+    """Two balloons with pockets of radius 2.5, bonds of 0.75, bore radius 0.5, an inlet tab."""
+    axis = (0.0, 0.0)
+    plate, bore, pocket = disc(axis, 3.25), disc(axis, 0.5), disc(axis, 2.5)
+    tabbed = plate | strip(axis, (8.25, 0.0), 3.1)
+    return [
+        ("base", tabbed),
+        ("chamber-mask", union([pocket, strip(axis, (8.75, 0.0), 1.6)]) - bore),
+        ("wall", tabbed - bore),
+        ("separator-mask", disc(axis, 3.75) - disc(axis, 1.25)),
+        ("wall", plate - bore),
+        ("chamber-mask", pocket - bore),
+        ("cap", plate),
+    ]
+
+
+@pytest.fixture
+def stack() -> Stack:
+    return stacked
+
+
+@pytest.fixture
+def profiles() -> Profiles:
+    """Bottom to top, to be changed by the test and stacked."""
+    return two_balloon_profiles()
+
+
+@pytest.fixture(scope="session")
+def two_balloons() -> Laminate:
+    return stacked(two_balloon_profiles())

@@ -1,0 +1,100 @@
+"""Arguments and options that several commands share."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+Command = Callable[..., Any]
+
+design_argument = click.argument("design", metavar="DESIGN")
+
+set_option = click.option(
+    "--set",
+    "assignments",
+    metavar="KEY=VALUE",
+    multiple=True,
+    help="Override a key of the design, e.g. --set chamber.diameter=6. Repeatable.",
+)
+
+waive_option = click.option(
+    "--waive",
+    "waivers",
+    metavar="RULE",
+    multiple=True,
+    help="Let cut files be written although this rule fails; they will say so. Repeatable.",
+)
+
+out_option = click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path),
+    default=Path("out"),
+    show_default=True,
+    metavar="OUT",
+    help="Folder that receives OUT/<name>/.",
+)
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print results for programs.")
+
+
+@dataclass(frozen=True)
+class Request:
+    """What every command that writes a folder is asked for."""
+
+    design: str
+    out: Path
+    assignments: tuple[str, ...]
+    waivers: tuple[str, ...]
+    as_json: bool
+
+
+def run_options(command: Command) -> Command:
+    """DESIGN and the options of a writing command, handed over as one Request."""
+
+    @functools.wraps(command)
+    def gathered(
+        design: str,
+        out: Path,
+        assignments: tuple[str, ...],
+        waivers: tuple[str, ...],
+        as_json: bool,
+        **others: Any,
+    ) -> Any:
+        return command(Request(design, out, assignments, waivers, as_json), **others)
+
+    options: tuple[Callable[[Command], Command], ...] = (
+        design_argument,
+        out_option,
+        set_option,
+        waive_option,
+        json_option,
+    )
+    for option in reversed(options):
+        gathered = option(gathered)
+    return gathered
+
+
+def dxf_options(command: Command) -> Command:
+    """How arcs are written, for readers that do not know bulges."""
+    chord = click.option(
+        "--chord-error",
+        type=click.FloatRange(0.0001, 0.1),
+        default=0.005,
+        show_default=True,
+        metavar="MM",
+        help="Farthest a chord may leave its arc, with --dxf-profile chords.",
+    )
+    profile = click.option(
+        "--dxf-profile",
+        type=click.Choice(["bulges", "arcs", "chords"]),
+        default="bulges",
+        show_default=True,
+        help="Arcs as polyline bulges, as ARC entities, or as chords.",
+    )
+    return profile(chord(command))

@@ -1,0 +1,15 @@
+"""``sbafab press``: the heat-press schedule only."""
+
+from __future__ import annotations
+
+import click
+
+from sbafab.cli.options import Request, run_options
+from sbafab.cli.working import run_parts
+
+
+@click.command()
+@run_options
+def press(request: Request) -> None:
+    """Write the heat-press schedule."""
+    run_parts(request, ("press",))

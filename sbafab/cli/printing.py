@@ -1,0 +1,144 @@
+"""What commands print: progress, findings, the closing table."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from sbafab.output.run import Progress, Run
+    from sbafab.rules.finding import Finding
+
+COLOURS = {"pass": "green", "fail": "bold red", "waived": "yellow", "warn": "yellow"}
+
+
+def print_json(value: object) -> None:
+    click.echo(json.dumps(value, indent=1, ensure_ascii=False))
+
+
+def console() -> Console:
+    """A console on standard output; 100 columns where there is no terminal."""
+    from rich.console import Console
+
+    return Console(highlight=False, soft_wrap=False, width=None if sys.stdout.isatty() else 100)
+
+
+@contextmanager
+def shown_progress(quiet: bool) -> Iterator[Progress]:
+    """A progress line on standard error, where that is a terminal."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda what, done, total: None
+        return
+    from rich.console import Console
+    from rich.status import Status
+
+    with Status("starting", console=Console(stderr=True)) as status:
+        yield lambda what, done, total: status.update(f"{what}: {done} of {total}")
+
+
+def findings_table(findings: Sequence[Finding]) -> Table:
+    """The rule deck's findings, a row each."""
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("rule", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    table.add_column("measured", justify="right", no_wrap=True)
+    table.add_column("limit", justify="right", no_wrap=True)
+    table.add_column("", ratio=1)
+    for finding in findings:
+        table.add_row(
+            finding.rule,
+            Text(finding.verdict, style=COLOURS[finding.verdict]),
+            _figure(finding.measured, finding.unit),
+            _figure(finding.limit, finding.unit),
+            Text(finding.message),
+        )
+    return table
+
+
+def _figure(value: float | None, unit: str) -> str:
+    if value is None:
+        return ""
+    digits = f"{value:.3f}" if unit == "mm" else f"{value:g}"
+    return f"{digits} {unit}".strip()
+
+
+def print_run(run: Run) -> None:
+    """The closing table of a run: sizes, what was made, what the rules found."""
+    from rich.table import Table
+    from rich.text import Text
+
+    out = console()
+    made = Table(box=None, pad_edge=False, show_header=False)
+    made.add_column(no_wrap=True, style="bold")
+    made.add_column(ratio=1)
+    for label, text in _made(run):
+        made.add_row(label, Text(text))
+    out.print(made)
+    out.print()
+    out.print(findings_table(run.findings))
+    if run.failed:
+        failed = sorted({f.rule for f in run.findings if f.verdict == "fail"})
+        out.print()
+        out.print(
+            Text(
+                f"No cut files were written: {', '.join(failed)} failed. Change the design, or "
+                f"waive by name: {' '.join(f'--waive {name}' for name in failed)}",
+                style="bold red",
+            )
+        )
+
+
+def _made(run: Run) -> Iterator[tuple[str, str]]:
+    index = run.manifest
+    lam = run.laminate
+    counts: dict[str, int] = {}
+    for layer in lam.layers:
+        kind = f"{layer.film.material} {layer.role}"
+        counts[kind] = counts.get(kind, 0) + 1
+    sizes = index["sizes"]
+    yield "design", f"{lam.name} ({lam.family}, {lam.balloons} balloons), {index['design_sha256'][:12]}"
+    yield "sizes", ", ".join(f"{k.replace('_', ' ')} {v:.3f}" for k, v in sizes.items()) + " mm"
+    yield (
+        "layers",
+        f"{len(lam.layers)} in {len(lam.patterns)} patterns: "
+        + ", ".join(f"{count} {kind}" for kind, count in counts.items()),
+    )
+    cut = [layer["file"] for layer in index["layers"] if layer["file"]]
+    if cut:
+        yield "cut files", f"{len(cut)} in layers/, each read back and compared with its profile"
+    if run.schedule is not None:
+        force = run.schedule.steps[0].force_n / 1000
+        yield (
+            "press",
+            f"{len(run.schedule.steps)} steps, {run.schedule.total_press_minutes:g} min at "
+            f"{run.schedule.steps[0].temperature_c:g} C, {force:.3f} kN; press.json, press.csv",
+        )
+    if index["meshes"]:
+        names = ", ".join(mesh["file"] for mesh in index["meshes"])
+        yield "meshes", names
+    for note in lam.notes:
+        yield "note", note
+    for warning in run.schedule.warnings if run.schedule is not None else ():
+        yield "warning", warning
+    yield "folder", str(run.folder)
+
+
+def run_json(run: Run) -> dict[str, object]:
+    """The result of a run for programs."""
+    return {
+        "folder": str(run.folder),
+        "failed": run.failed,
+        "findings": [finding.as_dict() for finding in run.findings],
+        "files": sorted(run.manifest["files"]),
+    }

@@ -1,0 +1,23 @@
+"""``sbafab templates``: the designs that ship."""
+
+from __future__ import annotations
+
+import click
+
+from sbafab.cli.options import json_option
+
+
+@click.command()
+@json_option
+def templates(as_json: bool) -> None:
+    """List the designs that ship, a line each."""
+    from sbafab.cli.printing import print_json
+    from sbafab.design.reading import template_summaries
+
+    summaries = template_summaries()
+    if as_json:
+        print_json([{"name": name, "summary": summary} for name, summary in summaries.items()])
+        return
+    width = max(map(len, summaries))
+    for name, summary in summaries.items():
+        click.echo(f"{name:<{width}}  {summary}")

@@ -1,0 +1,46 @@
+"""What the commands that write a folder do alike: load, run, print, choose the exit code."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import TYPE_CHECKING
+
+import click
+
+from sbafab.cli.options import Request
+
+if TYPE_CHECKING:
+    from sbafab.cutting.dxf_write import DxfProfile
+    from sbafab.output.run import Part
+
+RULE_FAILED = 1
+
+
+def with_waivers(assignments: Sequence[str], waivers: Sequence[str]) -> list[str]:
+    """The assignments, with ``--waive`` names added as one more."""
+    if not waivers:
+        return list(assignments)
+    names = ", ".join(f'"{name}"' for name in waivers)
+    return [*assignments, f"rules.waive=[{names}]"]
+
+
+def run_parts(
+    request: Request,
+    parts: Collection[Part],
+    dxf_profile: DxfProfile = "bulges",
+    chord_error: float = 0.005,
+) -> None:
+    """Generates the parts of a design and exits with 1 if a rule failed."""
+    from sbafab.actuators import load_design
+    from sbafab.cli.printing import print_json, print_run, run_json, shown_progress
+    from sbafab.output.run import generate
+
+    design = load_design(request.design, with_waivers(request.assignments, request.waivers))
+    with shown_progress(request.as_json) as progress:
+        run = generate(design, request.out, parts, progress, dxf_profile, chord_error)
+    if request.as_json:
+        print_json(run_json(run))
+    else:
+        print_run(run)
+    if run.failed:
+        click.get_current_context().exit(RULE_FAILED)

@@ -1,0 +1,205 @@
+"""Cut files read back with ezdxf, into exact contours, and refused where they could not be cut."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sbafab.cutting.chaining import check_clear, closed_loops, nested_region
+from sbafab.cutting.cut_layers import COLOURS, CUT_INNER, CUT_OUTER
+from sbafab.errors import OutputError
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
+from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.shapes import circle
+
+if TYPE_CHECKING:
+    from ezdxf.document import Drawing
+    from ezdxf.entities.dxfentity import DXFEntity
+    from ezdxf.entities.lwpolyline import LWPolyline
+
+FLAT = 1e-9
+"""Heights and widths up to this, in mm, are none."""
+
+
+@dataclass(frozen=True)
+class ReadBack:
+    """What a cut file holds.
+
+    ``region``: the contours on CUT_INNER and CUT_OUTER; ``properties``: the custom properties;
+    ``layers``: the layer of every entity in file order; ``other``: types of the entities that
+    are not part of the region (datum, engraving, sheet).
+    """
+
+    region: Region
+    properties: dict[str, str]
+    units: str
+    layers: tuple[str, ...]
+    other: tuple[str, ...]
+
+
+def read_profile(source: Path | str) -> ReadBack:
+    """The cut file at a path, or given as text.
+
+    Raises OutputError for what is no whole DXF in millimetres of closed, separate contours of
+    lines and arcs at z = 0, holes on CUT_INNER and outlines on CUT_OUTER.
+    """
+    name = source.name if isinstance(source, Path) else "the DXF text"
+    try:
+        return _read(_parsed(source))
+    except OutputError as error:
+        raise OutputError(f"{name}: {error}") from error
+
+
+def _parsed(source: Path | str) -> Drawing:
+    from ezdxf.filemanagement import read
+    from ezdxf.lldxf.const import DXFError
+
+    text = source
+    if isinstance(source, Path):
+        try:
+            text = source.read_text(encoding="utf-8", errors="surrogateescape")
+        except OSError as error:
+            raise OutputError(f"cannot be read ({error.strerror}); write it anew.") from error
+    lines = str(text).split()
+    if lines[:2] != ["0", "SECTION"]:
+        raise OutputError("not an ASCII DXF document; write it anew.")
+    if lines[-2:] != ["0", "EOF"]:
+        raise OutputError("the document ends early; write it anew.")
+    try:
+        return read(StringIO(str(text)))
+    except (DXFError, ValueError, LookupError, TypeError, AttributeError) as error:
+        raise OutputError(f"not a sound DXF document ({error}); write it anew.") from error
+
+
+def _read(document: Drawing) -> ReadBack:
+    units = document.header.get("$INSUNITS"), document.header.get("$MEASUREMENT")
+    if units != (4, 1):
+        raise OutputError(
+            f"not in millimetres: $INSUNITS is {units[0]} and $MEASUREMENT {units[1]}; "
+            "set them to 4 and 1."
+        )
+    model = document.modelspace()
+    for layout in document.layouts:
+        if layout is not model and any(entity.dxftype() != "VIEWPORT" for entity in layout):
+            raise OutputError(f"layout {layout.name} is not empty; draw in model space only.")
+    closed: dict[str, list[Contour]] = {CUT_INNER: [], CUT_OUTER: []}
+    loose: dict[str, list[Edge]] = {CUT_INNER: [], CUT_OUTER: []}
+    other = []
+    for entity in model:
+        layer = entity.dxf.layer
+        contour, edges = _geometry(entity)
+        if layer in closed:
+            closed[layer] += contour
+            loose[layer] += edges
+        elif layer in COLOURS:
+            other.append(entity.dxftype())
+        else:
+            x, y = (contour[0].edges if contour else edges)[0].start
+            raise OutputError(
+                f"{entity.dxftype()} at x {x:.3f}, y {y:.3f} is on layer {layer}; "
+                f"use {', '.join(COLOURS)}."
+            )
+    contours = {layer: [*closed[layer], *closed_loops(loose[layer])] for layer in closed}
+    check_clear([*contours[CUT_INNER], *contours[CUT_OUTER]])
+    return ReadBack(
+        nested_region(contours[CUT_INNER], contours[CUT_OUTER]),
+        dict(document.header.custom_vars.properties),
+        "mm",
+        tuple(entity.dxf.layer for entity in model),
+        tuple(other),
+    )
+
+
+def _geometry(entity: DXFEntity) -> tuple[list[Contour], list[Edge]]:
+    """The closed contour, or else the loose edges, that an entity draws."""
+    from ezdxf.entities.lwpolyline import LWPolyline
+
+    kind, dxf = entity.dxftype(), entity.dxf
+    if kind not in ("LWPOLYLINE", "CIRCLE", "LINE", "ARC"):
+        raise OutputError(
+            f"{kind} (handle {dxf.handle}) cannot be cut; use LWPOLYLINE, CIRCLE, LINE and ARC."
+        )
+    if not all(math.isfinite(value) for value in _numbers(entity)):
+        raise OutputError(f"{kind} (handle {dxf.handle}) has a coordinate that is no number.")
+    if isinstance(entity, LWPolyline):
+        _check_flat(entity, dxf.elevation)
+        return [_polyline(entity)], []
+    if kind == "LINE":
+        _check_flat(entity, dxf.start.z, dxf.end.z)
+        return [], [Line((dxf.start.x, dxf.start.y), (dxf.end.x, dxf.end.y))]
+    _check_flat(entity, dxf.center.z)
+    centre = dxf.center.x, dxf.center.y
+    if not dxf.radius > EPSILON:
+        raise OutputError(
+            f"{kind} at x {centre[0]:.3f}, y {centre[1]:.3f} has no radius; remove it."
+        )
+    if kind == "CIRCLE":
+        return [circle(centre, dxf.radius)], []
+    first = math.radians(dxf.start_angle)
+    sweep = math.radians((dxf.end_angle - dxf.start_angle) % 360.0)
+    return [], _arcs(centre, dxf.radius, first, sweep)
+
+
+def _numbers(entity: DXFEntity) -> Iterator[float]:
+    """Every real number an entity is drawn with."""
+    for value in entity.dxfattribs().values():
+        if isinstance(value, float):
+            yield value
+        elif hasattr(value, "xyz"):
+            yield from value.xyz
+    for row in getattr(entity, "lwpoints", ()):
+        yield from row
+
+
+def _check_flat(entity: DXFEntity, *heights: float) -> None:
+    upright = entity.dxf.get("extrusion", (0.0, 0.0, 1.0))
+    if max(map(abs, heights)) > FLAT or math.dist(upright, (0.0, 0.0, 1.0)) > FLAT:
+        raise OutputError(
+            f"{entity.dxftype()} (handle {entity.dxf.handle}) is not at z = 0; move it there."
+        )
+
+
+def _polyline(entity: LWPolyline) -> Contour:
+    rows = [tuple(map(float, row)) for row in entity.lwpoints]
+    x, y = rows[0][:2] if rows else (0.0, 0.0)
+    place = f"polyline at x {x:.3f}, y {y:.3f}"
+    if not entity.closed or len(rows) < 2:
+        raise OutputError(f"{place} is open; close it.")
+    if entity.dxf.get("const_width", 0.0) or any(row[2] or row[3] for row in rows):
+        raise OutputError(f"{place} has a width; draw the cut's middle without width.")
+    edges: list[Edge] = []
+    for row, following in zip(rows, [*rows[1:], rows[0]], strict=True):
+        start, end = (row[0], row[1]), (following[0], following[1])
+        if start == end:
+            raise OutputError(
+                f"{place} repeats its vertex x {row[0]:.3f}, y {row[1]:.3f}; remove one."
+            )
+        edges += _bulge_edges(start, end, row[4])
+    return Contour(tuple(edges))
+
+
+def _bulge_edges(start: Point, end: Point, bulge: float) -> list[Edge]:
+    """What a polyline draws from a vertex to the next; arcs of more than half a turn in parts."""
+    if bulge == 0.0:
+        return [Line(start, end)]
+    (x0, y0), (x1, y1) = start, end
+    lean = (1 / bulge - bulge) / 4
+    centre = (x0 + x1) / 2 - lean * (y1 - y0), (y0 + y1) / 2 + lean * (x1 - x0)
+    first = math.atan2(y0 - centre[1], x0 - centre[0])
+    arcs = _arcs(centre, math.dist(centre, start), first, 4 * math.atan(bulge))
+    stops = [start, *(arc.end for arc in arcs[:-1]), end]
+    return [arc.part(stops[i], stops[i + 1]) for i, arc in enumerate(arcs)]
+
+
+def _arcs(centre: Point, radius: float, first: float, sweep: float) -> list[Edge]:
+    """Arcs of at most a quarter turn from the angle ``first``, together turning ``sweep``."""
+    count = max(1, math.ceil(abs(sweep) / (math.pi / 2) - 1e-6))
+    stops = [
+        (centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle))
+        for angle in (first + sweep * i / count for i in range(count + 1))
+    ]
+    return [Arc(stops[i], stops[i + 1], centre, radius, sweep > 0) for i in range(count)]

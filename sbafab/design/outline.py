@@ -1,0 +1,130 @@
+"""Pocket outlines drawn by the user: one closed path of a DXF or SVG file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from sbafab.design.strands import JOIN, Strand, counted, joined, sealed, widest_gap
+from sbafab.errors import DesignError
+from sbafab.geometry.biarc import FitError
+from sbafab.geometry.boolean import PointPool, split_edges, tidy
+from sbafab.geometry.edges import EPSILON
+from sbafab.geometry.region import Contour, Region
+
+MOST_BYTES = 5_000_000
+LARGEST = 150.0
+SMALLEST = 1.0
+"""Bounds of the outline's extent, in mm."""
+
+
+def read_outline(path: Path) -> Region:
+    """The one closed path of a DXF or SVG file as lines and arcs, in mm, counter-clockwise.
+
+    The file's origin becomes the chamber's axis and must lie inside. DXF units follow $INSUNITS,
+    none meaning mm; an SVG without width and height in physical units is read as 1 unit = 1 mm,
+    and its y axis is turned upward, so that the outline looks as it is drawn. Ellipses, Béziers
+    and splines become arcs within 0.5 um. Raises DesignError.
+    """
+    try:
+        loop = _one_loop(list(counted(_strands(path))))
+        return _checked(sealed(loop))
+    except FitError as error:
+        raise DesignError(f"outline {path} has a {error}; round it off") from None
+    except DesignError as error:
+        raise DesignError(f"outline {path} {error}") from None
+
+
+def _strands(path: Path) -> Iterator[Strand]:
+    try:
+        is_file = path.is_file()
+        size = path.stat().st_size if is_file else 0
+        if is_file:
+            path.open("rb").close()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise DesignError(f"cannot be read ({reason}); check its path") from None
+    if not is_file:
+        raise DesignError("does not exist as a file; check its path")
+    if size > MOST_BYTES:
+        raise DesignError(f"has {size:,} bytes, where at most {MOST_BYTES:,} are allowed")
+    # Each reader brings its own library, loaded for the format at hand only.
+    if path.suffix.lower() == ".dxf":
+        from sbafab.design.outline_dxf import dxf_strands
+
+        return dxf_strands(path)
+    if path.suffix.lower() == ".svg":
+        from sbafab.design.outline_svg import svg_strands
+
+        return svg_strands(path)
+    raise DesignError("is neither .dxf nor .svg; export it as one of them")
+
+
+def _one_loop(strands: list[Strand]) -> Strand:
+    _refuse_doubles(strands)
+    loops, opens = joined(strands)
+    if opens:
+        gap, (x, y) = widest_gap(opens)
+        raise DesignError(
+            f"is open: a gap of {gap:.4f} mm at x {x:.4f}, y {y:.4f}, where {JOIN} is allowed; "
+            "join the ends, or delete what is not the outline"
+        )
+    if not loops:
+        raise DesignError(
+            "holds no closed path; draw one of lines, arcs or curves, and explode blocks"
+        )
+    if len(loops) > 1:
+        raise DesignError(f"holds {len(loops)} closed paths; keep only the pocket's outline")
+    return loops[0]
+
+
+def _refuse_doubles(strands: list[Strand]) -> None:
+    seen = set()
+    for strand in strands:
+        for edge in strand:
+            x, y = edge.at(0.5)
+            ends = sorted((round(px, 4), round(py, 4)) for px, py in (edge.start, edge.end))
+            key = (*ends, round(x, 4), round(y, 4))
+            if key in seen:
+                raise DesignError(
+                    f"draws an edge twice, at x {x:.4f}, y {y:.4f}; delete one of the two"
+                )
+            seen.add(key)
+
+
+def _checked(loop: Strand) -> Region:
+    """The region inside a loop, if it is a simple one of sensible size round the origin."""
+    if not loop:
+        raise DesignError("encloses no area; draw the outline of a pocket")
+    low_x, low_y, high_x, high_y = Contour(loop).bounds
+    width, height = high_x - low_x, high_y - low_y
+    if max(width, height) > LARGEST or min(width, height) < SMALLEST:
+        raise DesignError(
+            f"measures {width:.4g} x {height:.4g} mm, where {SMALLEST:g} to {LARGEST:g} is "
+            "allowed; check its units"
+        )
+    _refuse_crossings(loop)
+    contour = tidy(loop)
+    if contour is None:
+        raise DesignError("encloses no area; draw the outline of a pocket")
+    region = Region((contour.reversed() if contour.is_hole else contour,))
+    if region.distance_to_edge((0.0, 0.0)) < EPSILON or not region.contains((0.0, 0.0)):
+        raise DesignError(
+            "does not contain the origin, where the chamber's axis is; move it by "
+            f"x {0.0 - (low_x + high_x) / 2:.4g}, y {0.0 - (low_y + high_y) / 2:.4g} mm to "
+            "centre it there"
+        )
+    return region
+
+
+def _refuse_crossings(loop: Strand) -> None:
+    pool = PointPool()
+    corners: set[int] = set()
+    for edge, pieces in zip(loop, split_edges(loop, pool), strict=True):
+        start = pool.index(edge.start)
+        if len(pieces) != 1 or start in corners:
+            x, y = pieces[0].end if len(pieces) > 1 else edge.start
+            raise DesignError(
+                f"crosses or touches itself at x {x:.4f}, y {y:.4f}; draw it without the loop"
+            )
+        corners.add(start)

@@ -1,0 +1,169 @@
+"""The strands of a DXF drawing: what its model space holds, in mm."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sbafab.design.strands import Strand, place, polyline, refuse_more_than_limit
+from sbafab.errors import DesignError
+from sbafab.geometry.biarc import elliptical_arc, fit_arcs
+from sbafab.geometry.edges import Edge, Line, Point
+
+if TYPE_CHECKING:
+    from ezdxf.document import Drawing
+    from ezdxf.math import BSpline
+
+MM_PER_UNIT = {0: 1.0, 1: 25.4, 4: 1.0, 5: 10.0, 6: 1000.0}
+"""By $INSUNITS: none (taken as mm), inch, mm, cm, m."""
+LEVEL = 1e-6
+
+
+def dxf_strands(path: Path) -> Iterator[Strand]:
+    """Every line, arc, circle, polyline, ellipse and spline of the model space, in its order.
+
+    Block references are left alone, whatever they hold. Raises DesignError.
+    """
+    drawing = _drawing(path)
+    unit = drawing.header.get("$INSUNITS", 0)
+    if unit not in MM_PER_UNIT:
+        raise DesignError(
+            f"has $INSUNITS {unit}; save it in millimetres (4), centimetres (5), metres (6) or "
+            "inches (1)"
+        )
+    factor = MM_PER_UNIT[unit]
+    for entity in drawing.modelspace():
+        read = READERS.get(entity.dxftype())
+        if read is not None:
+            yield read(entity, factor)
+
+
+def _drawing(path: Path) -> Drawing:
+    from ezdxf.filemanagement import readfile
+
+    try:
+        return readfile(path)
+    except Exception as error:
+        # A damaged file fails anywhere in the parser, with any of the built-in errors.
+        kind = type(error).__name__
+        raise DesignError(
+            f"is not a DXF file that can be read ({kind}); save it anew as DXF R2010"
+        ) from None
+
+
+def _side(entity: Any) -> float:
+    """1, or -1 for an entity drawn on the back of the plane (its x runs the other way)."""
+    x, y, z = entity.dxf.extrusion
+    if abs(x) > LEVEL or abs(y) > LEVEL or abs(abs(z) - 1) > LEVEL:
+        raise DesignError(
+            f"holds a {entity.dxftype()} that is tilted out of the xy plane; lay it flat"
+        )
+    return 1.0 if z > 0 else -1.0
+
+
+def _line(entity: Any, factor: float) -> Strand:
+    start, end = entity.dxf.start, entity.dxf.end
+    edge = Line(place(start.x * factor, start.y * factor), place(end.x * factor, end.y * factor))
+    return (edge,) if edge.start != edge.end else ()
+
+
+def _arc(entity: Any, factor: float) -> Strand:
+    first = math.radians(entity.dxf.get("start_angle", 0.0))
+    last = math.radians(entity.dxf.get("end_angle", 360.0))
+    place(first, last)
+    turn = (last - first) % math.tau or math.tau
+    return _turn(entity, factor, first, first + turn)
+
+
+def _circle(entity: Any, factor: float) -> Strand:
+    return _turn(entity, factor, 0.0, math.tau)
+
+
+def _turn(entity: Any, factor: float, first: float, last: float) -> Strand:
+    side, radius = _side(entity), entity.dxf.radius * factor
+    place(radius, 0.0)
+    if radius <= 0:
+        raise DesignError(f"holds a {entity.dxftype()} of radius {radius:g}; delete it")
+    centre = place(side * entity.dxf.center.x * factor, entity.dxf.center.y * factor)
+    return elliptical_arc(centre, (side * radius, 0.0), (0.0, radius), first, last)
+
+
+def _light_polyline(entity: Any, factor: float) -> Strand:
+    return _through(entity.get_points("xyb"), _side(entity), factor, entity.closed)
+
+
+def _heavy_polyline(entity: Any, factor: float) -> Strand:
+    if not (entity.is_2d_polyline or entity.is_3d_polyline):
+        return ()
+    # Flag 16 marks the frame points of a curve-fitted polyline, which it does not pass through.
+    points = [
+        (vertex.dxf.location.x, vertex.dxf.location.y, vertex.dxf.get("bulge", 0.0))
+        for vertex in entity.vertices
+        if not vertex.dxf.flags & 16
+    ]
+    side = _side(entity) if entity.is_2d_polyline else 1.0
+    return _through(points, side, factor, entity.is_closed)
+
+
+def _through(points: Any, side: float, factor: float, closed: bool) -> Strand:
+    vertices = []
+    for x, y, bulge in points:
+        place(bulge, 0.0)
+        vertices.append((*place(side * x * factor, y * factor), float(side * bulge)))
+    refuse_more_than_limit(len(vertices))
+    return polyline(vertices, closed)
+
+
+def _ellipse(entity: Any, factor: float) -> Strand:
+    _side(entity)
+    tool = entity.construction_tool()
+    place(tool.start_param, tool.end_param)
+    first = tool.start_param
+    turn = (tool.end_param - first) % math.tau or math.tau
+    centre, major, minor = (
+        place(v.x * factor, v.y * factor) for v in (tool.center, tool.major_axis, tool.minor_axis)
+    )
+    if min(math.hypot(*major), math.hypot(*minor)) == 0:
+        raise DesignError("holds an ELLIPSE without width; delete it")
+    return elliptical_arc(centre, major, minor, first, first + turn)
+
+
+def _spline(entity: Any, factor: float) -> Strand:
+    refuse_more_than_limit(max(len(entity.control_points), len(entity.fit_points)))
+    try:
+        tool: BSpline = entity.construction_tool()
+    except Exception as error:
+        raise DesignError(f"holds a SPLINE that is not sound ({error}); draw it anew") from None
+    for point in tool.control_points:
+        place(point.x * factor, point.y * factor)
+
+    def curve(t: float) -> tuple[Point, Point]:
+        at, rate = tool.derivative(t, 1)
+        return (at.x * factor, at.y * factor), (rate.x * factor, rate.y * factor)
+
+    knots = list(tool.knots())
+    first, last = knots[tool.degree], knots[tool.count]
+    # A knot as often repeated as the degree lets the curve turn a corner there.
+    corners = sorted(
+        {knot for knot in knots if first < knot < last and knots.count(knot) >= tool.degree}
+    )
+    stops = [first, *corners, last]
+    edges: list[Edge] = []
+    for a, b in pairwise(stops):
+        edges += fit_arcs(curve, a, b)
+        refuse_more_than_limit(len(edges))
+    return tuple(edges)
+
+
+READERS = {
+    "LINE": _line,
+    "ARC": _arc,
+    "CIRCLE": _circle,
+    "LWPOLYLINE": _light_polyline,
+    "POLYLINE": _heavy_polyline,
+    "ELLIPSE": _ellipse,
+    "SPLINE": _spline,
+}

@@ -1,0 +1,143 @@
+"""Strands: chains of edges as a drawing holds them, and the loops that their ends make.
+
+All coordinates are mm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+
+from sbafab.errors import DesignError
+from sbafab.geometry.edges import Edge, Line, Point, edge_from_bulge
+
+Strand = tuple[Edge, ...]
+
+JOIN = 0.001
+"""Ends at most this far apart, in mm, are joined."""
+MOST_EDGES = 2000
+FARTHEST = 10_000.0
+"""No coordinate of a drawing may be larger, in mm."""
+
+
+def place(x: float, y: float) -> Point:
+    """A point of a drawing. Raises DesignError unless it is finite and of a sane size."""
+    if not abs(x) <= FARTHEST or not abs(y) <= FARTHEST:
+        raise DesignError(
+            f"has a coordinate of x {x:g}, y {y:g} mm, where at most {FARTHEST:g} is allowed; "
+            "check its units"
+        )
+    return float(x), float(y)
+
+
+def counted(strands: Iterable[Strand]) -> Iterator[Strand]:
+    """The strands as they come, until they have too many edges: then DesignError."""
+    total = 0
+    for strand in strands:
+        total += len(strand)
+        refuse_more_than_limit(total)
+        yield strand
+
+
+def refuse_more_than_limit(edges: int) -> None:
+    if edges > MOST_EDGES:
+        raise DesignError(
+            f"has more than {MOST_EDGES} edges; draw the outline with fewer, longer curves"
+        )
+
+
+def polyline(vertices: Sequence[tuple[float, float, float]], closed: bool) -> Strand:
+    """Lines and arcs through vertices of x, y and bulge."""
+    points = [(x, y) for x, y, _ in vertices]
+    ends = [*points[1:], *points[:1]] if closed else points[1:]
+    edges: list[Edge] = []
+    for start, end, (_, _, bulge) in zip(points, ends, vertices, strict=False):
+        if start != end:
+            edges += _bulged(start, end, bulge)
+    return tuple(edges)
+
+
+def _bulged(start: Point, end: Point, bulge: float) -> list[Edge]:
+    """One edge, or two where the arc turns by more than half a turn."""
+    if abs(bulge) <= 1:
+        return [edge_from_bulge(start, end, bulge)]
+    half = math.tan(math.atan(bulge) / 2)
+    # The apex stands off the chord's middle, to the right of an arc that runs counter-clockwise.
+    apex = (
+        (start[0] + end[0] + bulge * (end[1] - start[1])) / 2,
+        (start[1] + end[1] - bulge * (end[0] - start[0])) / 2,
+    )
+    return [edge_from_bulge(start, apex, half), edge_from_bulge(apex, end, half)]
+
+
+def reverse(strand: Strand) -> Strand:
+    return tuple(edge.reversed() for edge in reversed(strand))
+
+
+def is_closed(strand: Strand) -> bool:
+    return _near(strand[0].start, strand[-1].end)
+
+
+def joined(strands: Iterable[Strand]) -> tuple[list[Strand], list[Strand]]:
+    """Closed loops, and the open strands that are left, after joining ends that meet."""
+    whole = [strand for strand in strands if sum(edge.length for edge in strand) > JOIN]
+    loops = [strand for strand in whole if is_closed(strand)]
+    rest = [strand for strand in whole if not is_closed(strand)]
+    opens: list[Strand] = []
+    while rest:
+        strand = _extended(rest.pop(0), rest)
+        if not is_closed(strand):
+            strand = _extended(reverse(strand), rest)
+        (loops if is_closed(strand) else opens).append(strand)
+    return loops, opens
+
+
+def _extended(strand: Strand, rest: list[Strand]) -> Strand:
+    """The strand with every strand of ``rest`` that continues it; those are taken out."""
+    while not is_closed(strand):
+        for other in rest:
+            if _near(strand[-1].end, other[0].start):
+                follower = other
+            elif _near(strand[-1].end, other[-1].end):
+                follower = reverse(other)
+            else:
+                continue
+            rest.remove(other)
+            strand += follower
+            break
+        else:
+            return strand
+    return strand
+
+
+def _near(a: Point, b: Point) -> bool:
+    return math.dist(a, b) <= JOIN
+
+
+def sealed(loop: Strand) -> Strand:
+    """The loop with ends that meet exactly and no edge shorter than JOIN."""
+    kept: list[Edge] = []
+    here = loop[-1].end
+    for edge in loop:
+        if edge.length > 2 * JOIN or not _near(here, edge.end):
+            kept.append(_from(here, edge))
+            here = edge.end
+    if kept:
+        kept[0] = _from(here, kept[0])
+    return tuple(kept)
+
+
+def _from(start: Point, edge: Edge) -> Edge:
+    if edge.start == start:
+        return edge
+    if isinstance(edge, Line):
+        return Line(start, edge.end)
+    return edge_from_bulge(start, edge.end, edge.bulge)
+
+
+def widest_gap(opens: Sequence[Strand]) -> tuple[float, Point]:
+    """The least distance from the first strand's last end to another loose end, and that end."""
+    here = opens[0][-1].end
+    others = [opens[0][0].start]
+    others += [end for strand in opens[1:] for end in (strand[0].start, strand[-1].end)]
+    return min(math.dist(here, other) for other in others), here

@@ -1,0 +1,303 @@
+"""The least width of a region, and of the gaps in it, between edges that face each other.
+
+A width is the length of a segment inside the material that stands square on the edge at both of
+its ends (a reflex corner counts as an edge turned into a point). Offsets would miss what lies
+between corners; these are exact for lines and arcs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, left_normal
+from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.region import Contour, Region
+
+SMOOTH = 1e-4
+"""Corners that turn by less, in radians, are none."""
+ALONGSIDE = 1e-3
+"""Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
+TAPER = -math.cos(math.radians(30))
+"""Normals more opposed than this make the end of an arm a flat end."""
+TOUCH = 1e-6
+
+
+class Width(NamedTuple):
+    """A least distance in mm and the two facing points it lies between."""
+
+    value: float
+    start: Point
+    end: Point
+
+    @property
+    def middle(self) -> Point:
+        return (self.start[0] + self.end[0]) / 2, (self.start[1] + self.end[1]) / 2
+
+
+def least_width(region: Region, sharp: float = 90.0) -> Width | None:
+    """The narrowest place of the material; None if no edge faces another.
+
+    A corner with an interior angle below ``sharp`` degrees has width 0.
+    """
+    return _least(region.contours, sharp)
+
+
+def least_gap(region: Region, sharp: float = 90.0) -> Width | None:
+    """The narrowest slot, hole or gap between pieces; None if there is none."""
+    return _least([contour.reversed() for contour in region.contours], sharp)
+
+
+class _Foot(NamedTuple):
+    point: Point
+    normal: Point
+
+
+class _Side(NamedTuple):
+    """An edge with what the search asks of it again and again."""
+
+    edge: Edge
+    box: Bounds
+    middle: Point
+    half_cosine: float
+
+    def feet(self, p: Point) -> list[_Foot]:
+        """Points of the edge where its normal passes through ``p``."""
+        edge = self.edge
+        if isinstance(edge, Line):
+            (x0, y0), (x1, y1) = edge
+            dx, dy = x1 - x0, y1 - y0
+            square = dx * dx + dy * dy
+            t = ((p[0] - x0) * dx + (p[1] - y0) * dy) / square
+            if not -1e-9 <= t <= 1 + 1e-9:
+                return []
+            length = math.sqrt(square)
+            return [_Foot((x0 + t * dx, y0 + t * dy), (-dy / length, dx / length))]
+        (cx, cy), r = edge.centre, edge.radius
+        ux, uy = p[0] - cx, p[1] - cy
+        distance = math.hypot(ux, uy)
+        if distance < 1e-12:
+            return [_Foot(self.middle, left_normal(edge, self.middle))]
+        inward = -1.0 if edge.ccw else 1.0
+        mx, my = self.middle[0] - cx, self.middle[1] - cy
+        found = []
+        for sign in (1.0, -1.0):
+            vx, vy = sign * ux / distance, sign * uy / distance
+            if vx * mx + vy * my >= r * (self.half_cosine - 1e-9):
+                found.append(_Foot((cx + r * vx, cy + r * vy), (inward * vx, inward * vy)))
+        return found
+
+
+class _Corner(NamedTuple):
+    """A vertex with the directions of travel into and out of it; ``turn`` > 0 is convex."""
+
+    point: Point
+    arriving: Point
+    leaving: Point
+    turn: float
+
+    def squarely(self, d: Point) -> bool:
+        """Whether a reflex corner lies nearest, among its neighbours, to what ``d`` points at."""
+        room = 1e-9 * math.hypot(*d)
+        return _dot(d, self.arriving) >= -room and _dot(d, self.leaving) <= room
+
+    def normals(self) -> tuple[Point, Point]:
+        return _left(self.arriving), _left(self.leaving)
+
+
+class _Narrowest:
+    """Keeps the shortest segment offered that no edge crosses."""
+
+    def __init__(self, sides: Sequence[_Side]) -> None:
+        self.sides = sides
+        self.best: Width | None = None
+        self.value = math.inf
+
+    def offer(self, p: Point, q: Point) -> None:
+        value = math.dist(p, q)
+        if value < self.value - 1e-9 and self._clear(p, q):
+            self.value, self.best = value, Width(value, p, q)
+
+    def offer_facing(self, a: _Foot, b: _Foot) -> None:
+        (px, py), (nx, ny) = a
+        (qx, qy), (mx, my) = b
+        dx, dy = qx - px, qy - py
+        if dx * nx + dy * ny > TOUCH and dx * mx + dy * my < -TOUCH:
+            self.offer((px, py), (qx, qy))
+
+    def within_reach(self, a: Bounds, b: Bounds) -> bool:
+        dx = max(a[0] - b[2], b[0] - a[2], 0.0)
+        dy = max(a[1] - b[3], b[1] - a[3], 0.0)
+        return dx < self.value and dy < self.value
+
+    def _clear(self, p: Point, q: Point) -> bool:
+        segment = Line(p, q)
+        box = segment.bounds
+        for side in self.sides:
+            other = side.box
+            if (
+                other[0] > box[2] + TOUCH
+                or other[2] < box[0] - TOUCH
+                or other[1] > box[3] + TOUCH
+                or other[3] < box[1] - TOUCH
+            ):
+                continue
+            for m in meeting_points(segment, side.edge):
+                if math.dist(m, p) > 10 * TOUCH and math.dist(m, q) > 10 * TOUCH:
+                    return False
+        return True
+
+
+def _least(contours: Sequence[Contour], sharp: float) -> Width | None:
+    corners = [corner for contour in contours for corner in _corners(contour)]
+    pinch = _pinch(contours, corners, sharp)
+    if pinch is not None:
+        return Width(0.0, pinch, pinch)
+    sides = [_side(edge) for contour in contours for edge in contour.edges]
+    narrowest = _Narrowest(sides)
+    for i, a in enumerate(sides):
+        for b in sides[i + 1 :]:
+            if narrowest.within_reach(a.box, b.box):
+                _between_edges(a, b, narrowest)
+    _at_corners(corners, sides, narrowest)
+    for contour in contours:
+        _flat_ends(contour, narrowest)
+    return narrowest.best
+
+
+def _side(edge: Edge) -> _Side:
+    cosine = math.cos(edge.sweep / 2) if isinstance(edge, Arc) else 0.0
+    return _Side(edge, edge.bounds, edge.at(0.5), cosine)
+
+
+def _corners(contour: Contour) -> Iterator[_Corner]:
+    edges = contour.edges
+    for before, after in zip((edges[-1], *edges), edges, strict=False):
+        u, v = before.direction(after.start), after.direction(after.start)
+        turn = math.atan2(u[0] * v[1] - u[1] * v[0], _dot(u, v))
+        if abs(turn) > math.pi - SMOOTH:
+            # At a cusp only the curvatures tell which side the material is on.
+            turn = math.pi if _curvature(before) + _curvature(after) < 0 else -math.pi
+        if abs(turn) > SMOOTH:
+            yield _Corner(after.start, u, v, turn)
+
+
+def _curvature(edge: Edge) -> float:
+    if isinstance(edge, Line):
+        return 0.0
+    return (1.0 if edge.ccw else -1.0) / edge.radius
+
+
+def _pinch(
+    contours: Iterable[Contour], corners: Iterable[_Corner], sharp: float
+) -> Point | None:
+    """A corner sharper than allowed, or a point where the boundary meets itself."""
+    for corner in corners:
+        if math.degrees(math.pi - corner.turn) < sharp - 1e-4:
+            return corner.point
+    seen: set[Point] = set()
+    for contour in contours:
+        for edge in contour.edges:
+            if edge.start in seen:
+                return edge.start
+            seen.add(edge.start)
+    return None
+
+
+def _between_edges(a: _Side, b: _Side, narrowest: _Narrowest) -> None:
+    if isinstance(a.edge, Arc):
+        if _alongside(a.edge, b.edge):
+            _along_each_other(a, b, narrowest)
+        # The centre line of a line and an arc, or of two arcs, is square on both.
+        origin = b.edge.centre if isinstance(b.edge, Arc) else None
+        if origin is None:
+            for foot in b.feet(a.edge.centre):
+                for other in _feet_along(a, foot):
+                    narrowest.offer_facing(foot, other)
+        elif math.dist(origin, a.edge.centre) > 1e-9:
+            for foot in a.feet(origin):
+                for other in b.feet(a.edge.centre):
+                    narrowest.offer_facing(foot, other)
+    elif isinstance(b.edge, Arc):
+        _between_edges(b, a, narrowest)
+    elif _alongside(a.edge, b.edge):
+        _along_each_other(a, b, narrowest)
+
+
+def _feet_along(arc: _Side, foot: _Foot) -> list[_Foot]:
+    """Feet on the arc of the line through ``foot`` along its normal."""
+    (x, y), (nx, ny) = foot
+    reach = 2 * (abs(arc.box[2] - x) + abs(arc.box[3] - y) + 1.0)
+    return arc.feet((x + reach * nx, y + reach * ny))
+
+
+def _alongside(a: Edge, b: Edge) -> bool:
+    if isinstance(a, Arc) and isinstance(b, Arc):
+        return math.dist(a.centre, b.centre) < ALONGSIDE
+    if isinstance(a, Line) and isinstance(b, Line):
+        u, v = a.direction(a.start), b.direction(b.start)
+        return _dot(u, v) < 0 and abs(u[0] * v[1] - u[1] * v[0]) < ALONGSIDE
+    return False
+
+
+def _along_each_other(a: _Side, b: _Side, narrowest: _Narrowest) -> None:
+    for one, other in ((a, b), (b, a)):
+        for p in (one.middle, one.edge.start, one.edge.end):
+            here = _Foot(p, left_normal(one.edge, p))
+            for foot in other.feet(p):
+                narrowest.offer_facing(here, foot)
+
+
+def _at_corners(
+    corners: Sequence[_Corner], sides: Sequence[_Side], narrowest: _Narrowest
+) -> None:
+    for corner in corners:
+        x, y = corner.point
+        for side in sides:
+            if narrowest.within_reach((x, y, x, y), side.box):
+                for foot in side.feet(corner.point):
+                    _corner_to_edge(corner, side, foot, narrowest)
+    reflex = [corner for corner in corners if corner.turn < 0]
+    for i, a in enumerate(reflex):
+        for b in reflex[i + 1 :]:
+            d = (b.point[0] - a.point[0], b.point[1] - a.point[1])
+            if a.squarely(d) and b.squarely((-d[0], -d[1])):
+                narrowest.offer(a.point, b.point)
+
+
+def _corner_to_edge(
+    corner: _Corner, side: _Side, foot: _Foot, narrowest: _Narrowest
+) -> None:
+    d = (foot.point[0] - corner.point[0], foot.point[1] - corner.point[1])
+    if _dot(d, foot.normal) > -TOUCH:
+        return
+    if corner.turn < 0:
+        if corner.squarely(d):
+            narrowest.offer(corner.point, foot.point)
+        return
+    ends = math.dist(foot.point, side.edge.start), math.dist(foot.point, side.edge.end)
+    if min(ends) > 10 * TOUCH and any(
+        _dot(normal, foot.normal) < 0 < _dot(normal, d) for normal in corner.normals()
+    ):
+        narrowest.offer(corner.point, foot.point)
+
+
+def _flat_ends(contour: Contour, narrowest: _Narrowest) -> None:
+    """The ends of arms that taper: an edge between two convex corners whose neighbours face."""
+    edges = contour.edges
+    for i, edge in enumerate(edges):
+        before, after = edges[i - 1], edges[(i + 1) % len(edges)]
+        u, v = before.direction(edge.start), edge.direction(edge.start)
+        w, x = edge.direction(edge.end), after.direction(edge.end)
+        convex = u[0] * v[1] - u[1] * v[0] > SMOOTH and w[0] * x[1] - w[1] * x[0] > SMOOTH
+        if convex and _dot(u, x) < TAPER:
+            narrowest.offer(edge.start, edge.end)
+
+
+def _dot(a: Point, b: Point) -> float:
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def _left(u: Point) -> Point:
+    return -u[1], u[0]

@@ -1,0 +1,79 @@
+"""The mesh folder: every file written, each surface verified first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.cavity import cavity
+from sbafab.meshing.prisms import SAGITTA
+from sbafab.meshing.solid import solid
+from sbafab.meshing.surface import Surface
+from sbafab.meshing.write_3mf import write_3mf
+from sbafab.meshing.write_glb import write_glb
+from sbafab.meshing.write_stl import write_stl
+
+Kind = Literal["solid", "cavity"]
+Writer = Callable[[Surface, Path], None]
+
+SOLID_WRITERS: dict[str, Writer] = {
+    "stl": write_stl,
+    "3mf": write_3mf,
+    "glb": write_glb,
+}
+
+
+@dataclass(frozen=True)
+class MeshFile:
+    """A mesh as the manifest lists it.
+
+    ``file`` is relative to the output folder; ``chamber`` is None for the solid; ``elements``
+    counts triangles. ``fill_ul`` is the volume of air in a balloon that the shape is for.
+    """
+
+    file: str
+    kind: Kind
+    chamber: str | None
+    fill_ul: float
+    volume_mm3: float
+    elements: int
+
+
+def write_meshes(
+    laminate: Laminate,
+    folder: Path,
+    sagitta: float = SAGITTA,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[MeshFile]:
+    """Write ``mesh/solid.stl``, ``.3mf``, ``.glb`` and ``mesh/cavity_<chamber>.stl``.
+
+    ``folder`` is the output folder, ``sagitta`` the height in mm of an arc over its chord.
+    ``progress`` is told how many of how many files are done. Raises OutputError if a surface is
+    open or its volume is not the sum of area x thickness.
+    """
+    (folder / "mesh").mkdir(parents=True, exist_ok=True)
+    total = len(SOLID_WRITERS) + len(laminate.chambers)
+    written: list[MeshFile] = []
+    for mesh, surface, write in _meshes(laminate, sagitta):
+        write(surface, folder / mesh.file)
+        written.append(mesh)
+        if progress is not None:
+            progress(len(written), total)
+    return written
+
+
+def _meshes(laminate: Laminate, sagitta: float) -> Iterator[tuple[MeshFile, Surface, Writer]]:
+    surface = solid(laminate, sagitta)
+    for suffix, write in SOLID_WRITERS.items():
+        yield _described(f"mesh/solid.{suffix}", "solid", None, surface), surface, write
+    for chamber in laminate.chambers:
+        file = f"mesh/cavity_{chamber.name}.stl"
+        surface = cavity(laminate, chamber, sagitta)
+        yield _described(file, "cavity", chamber.name, surface), surface, write_stl
+
+
+def _described(file: str, kind: Kind, chamber: str | None, surface: Surface) -> MeshFile:
+    return MeshFile(file, kind, chamber, 0.0, surface.volume, len(surface.faces))

@@ -1,0 +1,23 @@
+"""Binary STL in millimetres."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sbafab.meshing.surface import Surface
+
+
+def write_stl(surface: Surface, path: Path) -> None:
+    """Write the surface in mm; the format itself carries no unit."""
+    import numpy as np
+
+    corners = surface.points[surface.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
+    records = np.zeros(len(corners), dtype=record)
+    records["normal"] = normals / np.where(lengths == 0, 1.0, lengths)
+    records["corners"] = corners
+    # "solid" at the start would make readers take it for the text format.
+    header = b"binary STL, millimetres".ljust(80)
+    path.write_bytes(header + np.uint32(len(records)).tobytes() + records.tobytes())

@@ -1,0 +1,53 @@
+"""Overall sizes in closed form, each with the paper's figure it answers to."""
+
+from __future__ import annotations
+
+import math
+
+from sbafab.actuators.radial import RadialDesign
+from sbafab.design.records import Design
+from sbafab.laminate.laminate import Laminate
+
+
+def sizes(design: Design, laminate: Laminate) -> dict[str, float]:
+    """Sizes in mm by name: of the flat laminate and, for radial designs, round the tube."""
+    low_x, low_y, high_x, high_y = laminate.bounds
+    found = {
+        "thickness": laminate.thickness,
+        "width": high_x - low_x,
+        "length": high_y - low_y,
+    }
+    if isinstance(design, RadialDesign):
+        found |= {
+            "pitch": design.pitch,
+            "deflated_diameter": deflated_diameter(design, laminate),
+        }
+        if design.chamber.outline is None:
+            found["inflated_diameter"] = inflated_diameter(design, laminate)
+    elif laminate.balloons > 1:
+        found["outline_diameter"] = outline_diameter(laminate)
+    return found
+
+
+def outline_diameter(laminate: Laminate) -> float:
+    """Diameter of the circle round the axis that holds the second balloon, which has no tabs.
+
+    The paper's 3-DoF actuator fits 15 (Sec. 2).
+    """
+    walls = [layer for layer in laminate.tpe_layers if layer.balloon == 2]
+    return 2 * max(edge.farthest_from((0.0, 0.0)) for wall in walls for edge in wall.profile.edges)
+
+
+def deflated_diameter(design: RadialDesign, laminate: Laminate) -> float:
+    """Tube plus the flat laminate on both sides; the paper gives 15.33 (Sec. 2.1)."""
+    return design.tube.outer_diameter + 2 * laminate.thickness
+
+
+def inflated_diameter(design: RadialDesign, laminate: Laminate) -> float:
+    """Tube plus fully inflated SBAs; the paper gives about 28 (Sec. 2.1).
+
+    A flat pocket of width w whose films do not stretch becomes a cylinder of diameter 2 w / pi.
+    """
+    pocket = design.chamber.width - 2 * design.bond.width
+    height = design.stack.balloons * 2 * pocket / math.pi
+    return design.tube.outer_diameter + 2 * (height + laminate.thickness)

@@ -1,0 +1,162 @@
+"""``manifest.json`` and ``checks.json``: what a program reads of an output folder."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from sbafab import __version__
+from sbafab.cutting.files import CutFile
+from sbafab.design.records import Design
+from sbafab.design.writing import design_sha256
+from sbafab.laminate.interfaces import Interface
+from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.meshing.files import MeshFile
+from sbafab.models.sizes import sizes
+from sbafab.output.settings import kerf_widths
+from sbafab.output.swap import SCHEMA
+from sbafab.rules.finding import Finding
+
+
+def as_json(value: object) -> str:
+    """Text of a JSON file: readable, and the same for the same value."""
+    return json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def checks(findings: Sequence[Finding], source: str) -> dict[str, Any]:
+    """``checks.json``; ``source`` is "design" or "as-built"."""
+    return {"source": source, "findings": [finding.as_dict() for finding in findings]}
+
+
+def manifest(
+    design: Design,
+    laminate: Laminate,
+    waived: Sequence[str],
+    cut_files: Sequence[CutFile],
+    meshes: Sequence[MeshFile],
+) -> dict[str, Any]:
+    """The index of an output folder, but for the hashes of its files."""
+    paths = {file.layer: file.path for file in cut_files}
+    return {
+        "schema": SCHEMA,
+        "name": laminate.name,
+        "family": laminate.family,
+        "units": "mm",
+        "design_sha256": design_sha256(design),
+        "generator": f"sbafab {__version__}",
+        "registration": {
+            "method": laminate.registration,
+            "pins": [
+                {"name": pin.name, **_place(pin.centre), "diameter": pin.diameter}
+                for pin in laminate.pins
+            ],
+        },
+        "kerf": {
+            material: {"state": "uncalibrated" if width is None else "compensated", "width": width}
+            for material, width in kerf_widths(design).items()
+        },
+        "waived": list(waived),
+        "sizes": {name: round(value, 6) for name, value in sizes(design, laminate).items()},
+        "notes": list(laminate.notes),
+        "films": _films(laminate),
+        "layers": [_layer(laminate, layer, paths.get(layer.index)) for layer in laminate.layers],
+        "interfaces": [_interface(interface) for interface in laminate.interfaces],
+        "bores": [
+            {"chamber": bore.chamber, **_place(bore.centre), "diameter": bore.diameter}
+            for bore in laminate.bores
+        ],
+        "inlets": [
+            {
+                "chamber": inlet.chamber,
+                **_place(inlet.mouth),
+                "width": inlet.width,
+                "tube_outer_diameter": inlet.tube_diameter,
+            }
+            for inlet in laminate.inlets
+        ],
+        "lumen": laminate.lumen,
+        "meshes": [
+            {
+                "file": mesh.file,
+                "kind": mesh.kind,
+                "chamber": mesh.chamber,
+                "fill_ul": mesh.fill_ul,
+                "volume_mm3": round(mesh.volume_mm3, 6),
+                "elements": mesh.elements,
+            }
+            for mesh in meshes
+        ],
+    }
+
+
+def _place(point: tuple[float, float]) -> dict[str, float]:
+    # Adding 0.0 turns a rounded -0.0 into 0.0.
+    return {"x": round(point[0], 6) + 0.0, "y": round(point[1], 6) + 0.0}
+
+
+def _films(laminate: Laminate) -> list[dict[str, Any]]:
+    used: dict[str, dict[str, Any]] = {}
+    for layer in laminate.layers:
+        film = layer.film
+        entry = used.setdefault(
+            film.material,
+            {
+                "material": film.material,
+                "product": film.product,
+                "thickness": film.thickness,
+                "layers": 0,
+                "area": 0.0,
+            },
+        )
+        entry["layers"] += 1
+        entry["area"] += layer.profile.area
+    return [{**entry, "area": round(entry["area"], 6)} for entry in used.values()]
+
+
+def _layer(laminate: Laminate, layer: Layer, path: str | None) -> dict[str, Any]:
+    return {
+        "index": layer.index,
+        "name": layer.name,
+        "material": layer.film.material,
+        "role": layer.role,
+        "balloon": layer.balloon,
+        "thickness": layer.film.thickness,
+        "z": layer.z,
+        "file": path,
+        "pattern": layer.pattern,
+        "area": round(layer.profile.area, 6),
+        "pieces": len(layer.profile.pieces),
+        "bores": [bore.chamber for bore in laminate.bores if _is_open(layer, bore.centre)],
+    }
+
+
+def _is_open(layer: Layer, place: tuple[float, float]) -> bool:
+    return any(hole.winding(place) != 0 for hole in layer.profile.holes)
+
+
+def _interface(interface: Interface) -> dict[str, Any]:
+    return {
+        "below": interface.below.index,
+        "above": interface.above.index,
+        "masks": [mask.index for mask in interface.masks],
+        "kind": interface.kind,
+        "contact_area": round(interface.contact.area, 6),
+        "bond_area": round(interface.bond.area, 6),
+    }
+
+
+def file_hashes(folder: Path) -> dict[str, str]:
+    """sha256 of every file of a folder, by relative path."""
+    return {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+def carried_over(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
+    """Whether files of the old run still belong to the new one's design and version."""
+    return all(old.get(key) == new.get(key) for key in ("design_sha256", "generator", "waived"))

@@ -1,0 +1,166 @@
+"""One run: a design becomes a folder with all that was asked for, written whole or not at all."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from sbafab.actuators import build
+from sbafab.cutting.dxf_write import DxfProfile
+from sbafab.cutting.files import CutFile, write_layer_files
+from sbafab.design.records import Design
+from sbafab.design.writing import design_toml, outline_file
+from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.files import MeshFile, write_meshes
+from sbafab.output.manifest import as_json, carried_over, checks, file_hashes, manifest
+from sbafab.output.settings import cut_settings, limits, press_settings
+from sbafab.output.swap import read_manifest, replaced_folder
+from sbafab.pressing.schedule import Schedule, press_csv, press_json, schedule
+from sbafab.rules.deck import has_failed, run_deck
+from sbafab.rules.finding import Finding
+
+Part = Literal["cut", "press", "mesh", "preview"]
+EVERYTHING: tuple[Part, ...] = ("cut", "press", "mesh", "preview")
+Progress = Callable[[str, int, int], None]
+"""Told what is being done, and how much of how much is done."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a run made. ``findings`` tell whether the design holds; without cut files if not."""
+
+    design: Design
+    laminate: Laminate
+    findings: tuple[Finding, ...]
+    folder: Path
+    manifest: dict[str, Any]
+    schedule: Schedule | None
+
+    @property
+    def failed(self) -> bool:
+        """Whether a rule failed that the design does not waive; no cut file was written then."""
+        return has_failed(self.findings)
+
+
+def check(design: Design) -> tuple[Laminate, tuple[Finding, ...]]:
+    """The laminate of a design and what the rule deck finds in it."""
+    laminate = build(design)
+    return laminate, run_deck(laminate, limits(design))
+
+
+def waived_rules(findings: Collection[Finding], design: Design) -> tuple[str, ...]:
+    """The rules that fail and that the design waives by name."""
+    asked = set(design.rules.waive)
+    return tuple(
+        dict.fromkeys(
+            finding.rule
+            for finding in findings
+            if finding.verdict == "waived" and finding.rule in asked
+        )
+    )
+
+
+def generate(
+    design: Design,
+    out: Path = Path("out"),
+    parts: Collection[Part] = EVERYTHING,
+    progress: Progress | None = None,
+    dxf_profile: DxfProfile = "bulges",
+    chord_error: float = 0.005,
+) -> Run:
+    """Writes ``out/<design name>/`` and returns what was made.
+
+    A design that breaks a rule gets its findings and pictures, but no cut files, schedule or
+    meshes. With some of the ``parts`` only, the others stay if they are of the same design.
+    Raises DesignError or OutputError; the old folder is then whole.
+    """
+    tell = progress or (lambda what, done, total: None)
+    tell("rules", 0, 1)
+    laminate, findings = check(design)
+    tell("rules", 1, 1)
+    waived = waived_rules(findings, design)
+    wanted = set(parts)
+    if has_failed(findings):
+        wanted &= {"preview"}
+    # The schedule is made before anything is written: it may refuse the design.
+    pressing = schedule(laminate, press_settings(design)) if "press" in wanted else None
+    target = out / design.name
+    with replaced_folder(target) as folder:
+        cut_files: list[CutFile] = []
+        meshes: list[MeshFile] = []
+        if "cut" in wanted:
+            cut_files = write_layer_files(
+                laminate,
+                folder,
+                cut_settings(design, waived, dxf_profile, chord_error),
+                lambda done, total: tell("cut files", done, total),
+            )
+        if pressing is not None:
+            _write(folder / "press.json", as_json(press_json(pressing)))
+            _write(folder / "press.csv", press_csv(pressing))
+        if "mesh" in wanted:
+            meshes = write_meshes(
+                laminate, folder, progress=lambda done, total: tell("meshes", done, total)
+            )
+        if "preview" in wanted:
+            _write_pictures(laminate, folder, tell)
+        _write(folder / "checks.json", as_json(checks(findings, "design")))
+        _write_design(design, folder)
+        index = manifest(design, laminate, waived, cut_files, meshes)
+        if not has_failed(findings):
+            _carry_over(target, folder, index)
+        index["files"] = file_hashes(folder)
+        _write(folder / "manifest.json", as_json(index))
+    return Run(design, laminate, findings, target, index, pressing)
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _write_pictures(laminate: Laminate, folder: Path, tell: Progress) -> None:
+    from sbafab.reports.layers_svg import layers_svg
+    from sbafab.reports.solid_png import solid_png
+    from sbafab.reports.stack_svg import stack_svg
+
+    preview = folder / "preview"
+    preview.mkdir()
+    _write(preview / "layers.svg", layers_svg(laminate))
+    tell("pictures", 1, 3)
+    _write(preview / "stack.svg", stack_svg(laminate))
+    tell("pictures", 2, 3)
+    (preview / "solid.png").write_bytes(solid_png(laminate))
+    tell("pictures", 3, 3)
+
+
+def _write_design(design: Design, folder: Path) -> None:
+    drawn = outline_file(design)
+    if drawn is not None:
+        name = f"outline{drawn.suffix.lower()}"
+        shutil.copyfile(drawn, folder / name)
+        chamber = design.chamber.model_copy(update={"outline": name})  # type: ignore[attr-defined]
+        design = design.model_copy(update={"chamber": chamber})
+    _write(folder / "design.toml", design_toml(design))
+
+
+def _carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
+    """Keeps files of the old run that this one did not make, if they are of the same design."""
+    old = read_manifest(old_folder)
+    if old is None or not carried_over(old, index):
+        return
+    made = file_hashes(folder)
+    files = old.get("files")
+    kept = file_hashes(old_folder)
+    for path, digest in (files if isinstance(files, dict) else {}).items():
+        if path not in made and kept.get(path) == digest:
+            target = folder / path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(old_folder / path, target)
+    if not any(layer["file"] for layer in index["layers"]):
+        index["layers"] = old["layers"]
+    if not index["meshes"]:
+        index["meshes"] = old["meshes"]
+

@@ -1,0 +1,56 @@
+"""A design's sections as the settings that rules, cutting and pressing take."""
+
+from __future__ import annotations
+
+from sbafab.cutting.dxf_write import DxfProfile
+from sbafab.cutting.properties import CutSettings
+from sbafab.design.records import Design
+from sbafab.design.writing import design_sha256
+from sbafab.pressing.schedule import PressSettings
+from sbafab.rules.deck import Limits
+
+
+def kerf_widths(design: Design) -> dict[str, float | None]:
+    """Full kerf width by material, None where it was not measured."""
+    widths = {"TPE": design.laser.kerf_tpe, "PTFE": design.laser.kerf_ptfe}
+    return {name: None if isinstance(kerf, str) else kerf for name, kerf in widths.items()}
+
+
+def limits(design: Design) -> Limits:
+    return Limits(
+        bond_width=design.rules.bond_width,
+        mask_overhang=design.rules.mask_overhang,
+        least_feature=design.laser.least_feature,
+        kerf={name: kerf for name, kerf in kerf_widths(design).items() if kerf is not None},
+        heated_width=design.press.platen_width,
+        heated_length=design.press.platen_length,
+        validated_balloons=design.rules.validated_balloons,
+        waive=frozenset(design.rules.waive),
+    )
+
+
+def cut_settings(
+    design: Design, waived: tuple[str, ...], profile: DxfProfile, chord_error: float
+) -> CutSettings:
+    return CutSettings(
+        design=design.name,
+        design_sha256=design_sha256(design),
+        kerf_widths=kerf_widths(design),
+        waived=waived,
+        profile=profile,
+        chord_error=chord_error,
+    )
+
+
+def press_settings(design: Design) -> PressSettings:
+    press = design.press
+    return PressSettings(
+        temperature_c=press.temperature_c,
+        pressure_kpa=press.pressure_kpa,
+        platen=(press.platen_width, press.platen_length),
+        flash_bottom=press.flash_bottom_minutes,
+        bond_bottom=press.bond_bottom_minutes,
+        flash_middle=press.flash_middle_minutes,
+        bond_all=press.bond_all_minutes,
+        validated_balloons=design.rules.validated_balloons,
+    )

@@ -1,0 +1,299 @@
+"""The heat-press schedule: which layers are pressed together, in what order (paper Sec. 2).
+
+Temperatures are C, pressures kPa, forces N, times minutes, lengths mm.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, NamedTuple
+
+from sbafab.errors import DesignError
+from sbafab.laminate.laminate import Laminate, Layer
+
+Bond = Literal["flash", "full"]
+
+HOTTEST_TRIED = 150.0
+PRESSURES_TRIED = (70.0, 200.0)
+HANDLING_MINUTES = 60.0
+"""The paper's total build time of 1.75 h less its 45 minutes in the press."""
+
+COLUMNS = (
+    "step",
+    "title",
+    "bond",
+    "layers",
+    "adds",
+    "pins",
+    "temperature_c",
+    "pressure_kpa",
+    "force_n",
+    "platen_width_mm",
+    "platen_length_mm",
+    "minutes",
+    "instructions",
+)
+
+
+@dataclass(frozen=True)
+class PressSettings:
+    """What the press is set to; the defaults are the paper's (Sec. 2)."""
+
+    temperature_c: float = 135.0
+    pressure_kpa: float = 110.0
+    platen: tuple[float, float] = (152.4, 152.4)
+    flash_bottom: float = 3.0
+    bond_bottom: float = 12.0
+    flash_middle: float = 10.0
+    bond_all: float = 20.0
+    validated_balloons: int = 20
+
+    @property
+    def force_n(self) -> float:
+        """Force on the whole platen."""
+        return self.pressure_kpa * self.platen[0] * self.platen[1] / 1000
+
+
+@dataclass(frozen=True)
+class Step:
+    """One closing of the press.
+
+    ``layers`` are pressed together, ``adds`` those of them that join in this step, both by layer
+    index; ``pins`` names the dowel pins that are in.
+    """
+
+    step: int
+    title: str
+    bond: Bond
+    layers: tuple[int, ...]
+    adds: tuple[int, ...]
+    pins: tuple[str, ...]
+    temperature_c: float
+    pressure_kpa: float
+    force_n: float
+    platen_mm: tuple[float, float]
+    minutes: float
+    instructions: str
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """All steps, the time they take, and what the technician should know beforehand."""
+
+    steps: tuple[Step, ...]
+    total_press_minutes: float
+    estimated_build_minutes: float
+    estimate_basis: str
+    warnings: tuple[str, ...]
+
+
+def schedule(laminate: Laminate, press: PressSettings) -> Schedule:
+    """The press steps of a laminate, bottom balloon first.
+
+    Flash bonds hold layers in place on their pins; full bonds are pressed without pins, because
+    base and cap have no bore for a channel pin. Raises DesignError at a temperature that would
+    not bond TPE or that PTFE does not stand.
+    """
+    _refuse_temperature(laminate, press)
+    steps = _steps(laminate, press)
+    total = sum(step.minutes for step in steps)
+    return Schedule(
+        steps,
+        total,
+        total + HANDLING_MINUTES,
+        f"{total:g} min in the press and {HANDLING_MINUTES:g} min to cut, lay up, pin and fit the "
+        "tubing; the latter is assumed the same for every design (paper: 1.75 h in all)",
+        tuple(_warnings(laminate, press, steps)),
+    )
+
+
+def _steps(laminate: Laminate, press: PressSettings) -> tuple[Step, ...]:
+    """The paper's four steps, less those that have nothing to press."""
+    indices = tuple(layer.index for layer in laminate.layers)
+    base = next(layer.index for layer in laminate.layers if layer.role == "base")
+    upper = (base + 1, base + 2)
+    bottom = (base, *upper)
+    under = tuple(index for index in indices if index < base)
+    over = tuple(index for index in indices if index > base + 2)
+    middle, cap = over[:-1], over[-1:]
+    plan = [
+        _Plan("Bottom balloon, upper two layers", "flash", (upper,), upper, press.flash_bottom),
+        _Plan(
+            "Bottom balloon, with its base", "full", ((base,), upper), (base,), press.bond_bottom
+        ),
+        _Plan("Middle layers", "flash", (middle,), middle, press.flash_middle),
+        _Plan("Whole laminate", "full", (under, bottom, middle, cap), under + cap, press.bond_all),
+    ]
+    return tuple(
+        _step(number, part, laminate, press)
+        for number, part in enumerate((part for part in plan if part.adds), 1)
+    )
+
+
+class _Plan(NamedTuple):
+    """A step before it has its number and pins; ``stacks`` lie on each other, lowest first."""
+
+    title: str
+    bond: Bond
+    stacks: tuple[tuple[int, ...], ...]
+    adds: tuple[int, ...]
+    minutes: float
+
+
+def _step(number: int, part: _Plan, laminate: Laminate, press: PressSettings) -> Step:
+    layers = tuple(index for stack in part.stacks for index in stack)
+    pins = _pins_in(laminate, layers) if part.bond == "flash" else ()
+    return Step(
+        step=number,
+        title=part.title,
+        bond=part.bond,
+        layers=layers,
+        adds=part.adds,
+        pins=pins,
+        temperature_c=press.temperature_c,
+        pressure_kpa=press.pressure_kpa,
+        force_n=round(press.force_n, 1),
+        platen_mm=press.platen,
+        minutes=part.minutes,
+        instructions=_instructions(part, pins),
+    )
+
+
+def _pins_in(laminate: Laminate, layers: Sequence[int]) -> tuple[str, ...]:
+    """The pins that hold at least one of the layers and meet no film in any of them."""
+    shapes = _shapes(laminate, layers)
+    return tuple(
+        pin.name
+        for pin in laminate.pins
+        if any(pin in laminate.pins_through(layer) for layer in shapes)
+        and not any(layer.profile.contains(pin.centre) for layer in shapes)
+    )
+
+
+def _shapes(laminate: Laminate, layers: Sequence[int]) -> tuple[Layer, ...]:
+    """One layer of each pattern among the layers."""
+    return tuple({laminate.layer(i).pattern: laminate.layer(i) for i in layers}.values())
+
+
+def _instructions(part: _Plan, pins: Sequence[str]) -> str:
+    stacks = [_named(stack) for stack in part.stacks if stack]
+    if part.bond == "full":
+        return (
+            f"Lay {_listed(stacks)} on each other, lowest first, outline on outline, with every "
+            "pin out. Press to the full bond and let the laminate cool flat."
+        )
+    held = f"on {_listed([f'pin {pin}' for pin in pins])}" if pins else "outline on outline by hand"
+    after = "Press to the flash bond" + (" and draw the pins." if pins else ".")
+    return f"Lay {stacks[0]} {held}, lowest first, as a stack of their own. {after}"
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def _named(layers: Sequence[int]) -> str:
+    """Layer indices in words; never 2-3, which a spreadsheet takes for a date."""
+    runs: list[list[int]] = []
+    for index in layers:
+        if runs and index == runs[-1][1] + 1:
+            runs[-1][1] = index
+        else:
+            runs.append([index, index])
+    words = [
+        word
+        for first, last in runs
+        for word in (
+            [f"{first} to {last}"] if last > first + 1 else map(str, range(first, last + 1))
+        )
+    ]
+    return f"layer{'s' if len(layers) > 1 else ''} {_listed(words)}"
+
+
+def _refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
+    for film in dict.fromkeys(layer.film for layer in laminate.layers):
+        if film.material == "TPE" and press.temperature_c <= film.softens_above:
+            raise DesignError(
+                f"press.temperature_c = {press.temperature_c:g} does not bond {film.product}, "
+                f"which melts at {film.softens_above:g} C; raise it (the paper presses at 135 C)"
+            )
+        if film.material == "PTFE" and press.temperature_c >= film.limit:
+            raise DesignError(
+                f"press.temperature_c = {press.temperature_c:g} reaches the limit of the masks, "
+                f"{film.limit:g} C for {film.product}; lower it, for hotter PTFE gives off toxic "
+                "fumes"
+            )
+
+
+def _warnings(laminate: Laminate, press: PressSettings, steps: Sequence[Step]) -> Iterator[str]:
+    if press.temperature_c > HOTTEST_TRIED:
+        yield (
+            f"{press.temperature_c:g} C is hotter than the {HOTTEST_TRIED:g} C of earlier work, "
+            "which already over-melted more than 135 C does"
+        )
+    low, high = PRESSURES_TRIED
+    if not low <= press.pressure_kpa <= high:
+        yield (
+            f"{press.pressure_kpa:g} kPa lies outside {low:g} to {high:g} kPa; 110 kPa is "
+            "validated, and earlier work pressed at 70 kPa"
+        )
+    if laminate.balloons > press.validated_balloons:
+        yield (
+            f"{laminate.balloons} balloons are more than the {press.validated_balloons} validated; "
+            "heat must pass the whole laminate, so try the bond on a sample first"
+        )
+    for step in steps:
+        if step.bond == "flash":
+            held = {pin for pin in laminate.pins if pin.name in step.pins}
+            loose = [
+                layer.pattern
+                for layer in _shapes(laminate, step.layers)
+                if held.isdisjoint(laminate.pins_through(layer))
+            ]
+            layers = [i for i in step.layers if laminate.layer(i).pattern in loose]
+            if layers:
+                yield f"step {step.step}: no pin holds {_named(layers)}; align by hand"
+
+
+def press_json(plan: Schedule) -> dict[str, Any]:
+    """The schedule as ``press.json`` holds it."""
+    return {
+        "steps": [
+            {
+                key: list(value) if isinstance(value, tuple) else value
+                for key, value in asdict(step).items()
+            }
+            for step in plan.steps
+        ],
+        "total_press_minutes": plan.total_press_minutes,
+        "estimated_build_minutes": plan.estimated_build_minutes,
+        "estimate_basis": plan.estimate_basis,
+        "warnings": list(plan.warnings),
+    }
+
+
+def press_csv(plan: Schedule) -> str:
+    """The steps as a table, one row each, with units in the column names."""
+    table = io.StringIO()
+    writer = csv.writer(table, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for step in plan.steps:
+        writer.writerow(
+            [
+                step.step,
+                step.title,
+                step.bond,
+                _named(step.layers),
+                _named(step.adds),
+                ", ".join(step.pins),
+                f"{step.temperature_c:g}",
+                f"{step.pressure_kpa:g}",
+                f"{step.force_n:.1f}",
+                *(f"{size:g}" for size in step.platen_mm),
+                f"{step.minutes:g}",
+                step.instructions,
+            ]
+        )
+    return table.getvalue()

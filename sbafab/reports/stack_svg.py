@@ -1,0 +1,262 @@
+"""preview/stack.svg: the section through one chamber, its height exaggerated."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+from sbafab.geometry.edges import Point
+from sbafab.geometry.section import Interval
+from sbafab.geometry.svg import number
+from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.picture import INK
+from sbafab.reports import drawing as draw
+from sbafab.reports.features import length
+from sbafab.reports.stack_labels import Label, feature_labels, layer_labels
+from sbafab.reports.stack_section import Joint, Section, Slab, chamber_section, opening
+
+PAGE_WIDTH = 297.0
+LEFT, RIGHT = 58.0, 47.0
+HEAD, FOOT = 42.0, 36.0
+TALLEST = 120.0
+TALLEST_FILM = 8.0
+BREAK = 13.0
+SLIT = 0.18
+"""Share of the gap drawn open above and below a mask, so that one sees what does not bond."""
+EXAGGERATIONS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30, 40, 50, 60, 80, 100)
+BOND = "#2a7ab9"
+
+
+@dataclass(frozen=True)
+class View:
+    """Where the section lands on the page."""
+
+    section: Section
+    across: float
+    factor: int
+    height: float
+
+    @property
+    def up(self) -> float:
+        """Page mm per mm of laminate height."""
+        return self.across * self.factor
+
+    def x(self, s: float) -> float:
+        return LEFT + (s - self.section.low) * self.across
+
+    def y(self, z: float, index: int) -> float:
+        """Page height of ``z`` in the layer with this index."""
+        return HEAD + self.height - (z - self._left_out(index)) * self.up - self._lift(index)
+
+    def _left_out(self, index: int) -> float:
+        """Height of the layers the break leaves out below a layer."""
+        if not self.section.hidden or index <= self.section.break_above:
+            return 0.0
+        below = [
+            slab for slab in self.section.slabs if slab.layer.index <= self.section.break_above
+        ]
+        above = self.section.slabs[len(below)].layer
+        last = below[-1].layer
+        return above.z - last.z - last.film.thickness
+
+    def _lift(self, index: int) -> float:
+        return BREAK if self.section.hidden and index > self.section.break_above else 0.0
+
+
+def stack_svg(laminate: Laminate) -> str:
+    """The section through the first chamber in the plane of its inlet, labelled, on A4."""
+    view = _view(chamber_section(laminate))
+    page = view.height + HEAD + FOOT
+    elements = [
+        *_heading(laminate, view),
+        *(part for joint in view.section.joints for part in _joint(joint, view)),
+        *(part for slab in view.section.slabs for part in _slab(slab, view)),
+        *_breaks(view),
+        *_dimensions_above(view),
+        *_dimensions_below(view),
+        *_labels(view),
+        *_legend(view, page),
+    ]
+    return draw.document(PAGE_WIDTH, page, f"{laminate.name}: section", elements)
+
+
+def _view(section: Section) -> View:
+    across = (PAGE_WIDTH - LEFT - RIGHT) / (section.high - section.low)
+    thickness = sum(slab.layer.film.thickness for slab in section.slabs)
+    thickest = max(slab.layer.film.thickness for slab in section.slabs)
+    most = min(TALLEST / thickness, TALLEST_FILM / thickest) / across
+    factor = max(step for step in EXAGGERATIONS if step <= max(most, 1.0))
+    height = thickness * across * factor + (BREAK if section.hidden else 0.0)
+    return View(section, across, factor, height)
+
+
+def _slab(slab: Slab, view: View) -> list[str]:
+    layer = slab.layer
+    ink = INK[layer.film.material]
+    inset = SLIT * layer.film.thickness if layer.is_mask else 0.0
+    bottom = view.y(layer.z + inset, layer.index)
+    top = view.y(layer.z + layer.film.thickness - inset, layer.index)
+    fill = "url(#PTFE)" if layer.is_mask else ink.fill
+    return [
+        draw.box((view.x(start), top), (view.x(end), bottom), fill=fill, stroke=ink.line)
+        for start, end in slab.spans
+    ]
+
+
+def _joint(joint: Joint, view: View) -> list[str]:
+    interface = joint.interface
+    index = interface.masks[0].index
+    bottom, top = view.y(interface.z, index), view.y(interface.z + interface.gap, index)
+    return [
+        draw.box((view.x(start), top), (view.x(end), bottom), fill=BOND)
+        for start, end in joint.spans
+    ]
+
+
+def _heading(laminate: Laminate, view: View) -> list[str]:
+    what = (
+        f"section through chamber {view.section.chamber} along its inlet; "
+        f"height exaggerated {view.factor}{draw.TIMES}; all dimensions in mm"
+    )
+    return [
+        draw.text((10.0, 13.0), laminate.name, size=4.6, bold=True),
+        draw.text((10.0, 18.6), what),
+    ]
+
+
+def _breaks(view: View) -> list[str]:
+    section = view.section
+    parts: list[str] = []
+    if section.hidden:
+        last = next(s.layer for s in section.slabs if s.layer.index == section.break_above)
+        base = view.y(last.z + last.film.thickness, last.index)
+        left, right = view.x(section.low) - 3.0, view.x(_reach(section)) + 3.0
+        for y in (base - 1.6, base - BREAK + 1.6):
+            parts.append(_wave((left, y), (right, y)))
+        noun = "balloon" if section.hidden == 1 else "balloons"
+        words = f"\u2026 {section.hidden} more {noun} \u2026"
+        middle = ((left + right) / 2, base - BREAK / 2 + 1.0)
+        parts.append(draw.text(middle, words, anchor="middle"))
+    if section.cropped:
+        x = view.x(section.low)
+        parts.append(_wave((x, HEAD - 2.0), (x, HEAD + view.height + 2.0)))
+    return parts
+
+
+def _reach(section: Section) -> float:
+    """How far the layers above the break go toward the inlet."""
+    above = [s for s in section.slabs if s.layer.index > section.break_above]
+    return max(end for slab in above for _, end in slab.spans)
+
+
+def _wave(start: Point, end: Point) -> str:
+    """A break line: a gentle wave over a white band."""
+    steps = max(8, round(math.dist(start, end) / 1.0))
+    (x0, y0), (x1, y1) = start, end
+    nx, ny = (y1 - y0) / math.dist(start, end), -(x1 - x0) / math.dist(start, end)
+    points = []
+    for i in range(steps + 1):
+        sway = 0.5 * math.sin(math.tau * i / 8)
+        points.append(
+            (x0 + (x1 - x0) * i / steps + sway * nx, y0 + (y1 - y0) * i / steps + sway * ny)
+        )
+    return draw.line(points, colour=draw.GREY, width=0.2)
+
+
+def _dimensions_above(view: View) -> list[str]:
+    """Over the top balloon: chamber, the bonds beside it, the lumen, and the whole width."""
+    cap = view.section.slabs[-1]
+    chambers = [j for j in view.section.joints if j.interface.kind == "chamber"]
+    if not chambers:
+        return []
+    spans = chambers[-1].spans
+    top = view.y(cap.layer.z + cap.layer.film.thickness, cap.layer.index)
+    measured: list[Interval] = []
+    pocket = opening(spans, 0.0)
+    if pocket is not None:
+        measured = [span for span in spans if span[1] == pocket[0] or span[0] == pocket[1]]
+        measured.append(pocket)
+    if view.section.lumen is not None:
+        through = opening(cap.spans, view.section.lumen)
+        measured += [through] if through else []
+    parts: list[str] = []
+    for start, end in measured:
+        if start <= view.section.low and view.section.cropped:
+            continue
+        parts += _level(view, (start, end), top, (0.0, -1.0), 6.0)
+    whole = cap.spans[0][0], cap.spans[-1][1]
+    if not view.section.cropped:
+        parts += _level(view, whole, top, (0.0, -1.0), 13.0)
+    return parts
+
+
+def _dimensions_below(view: View) -> list[str]:
+    """Under the bottom balloon: how far tab and mask reach past what lies above."""
+    section = view.section
+    ends = sorted({round(slab.spans[-1][1], 4) for slab in section.slabs if slab.spans})
+    base = next(slab for slab in section.slabs if slab.layer.role in ("sheet", "base"))
+    cap_end, base_end = section.slabs[-1].spans[-1][1], base.spans[-1][1]
+    bottom = view.y(base.layer.z, base.layer.index)
+    stops = [cap_end, base_end] if base_end - cap_end > 0.05 else []
+    if stops and ends[-1] - base_end > 0.05:
+        stops.append(ends[-1])
+    parts: list[str] = []
+    for start, end in pairwise(stops):
+        parts += _level(view, (start, end), bottom, (0.0, 1.0), 6.0)
+    return parts
+
+
+def _level(view: View, span: Interval, y: float, away: Point, distance: float) -> list[str]:
+    start, end = span
+    words = length(end - start)
+    return draw.dimension((view.x(start), y), (view.x(end), y), words, away, distance)
+
+
+def _labels(view: View) -> list[str]:
+    """Layer names at the right, features at the left, each with a leader."""
+    low, high = HEAD - 4.0, HEAD + view.height + 6.0
+    right = view.x(view.section.high) + 5.0
+    parts: list[str] = []
+    for labels, x, side in (
+        (layer_labels(view.section), right, 1),
+        (feature_labels(view.section), LEFT - 6.0, -1),
+    ):
+        placed = sorted((view.y(label.z, label.index), label) for label in labels)
+        rows = draw.spread([y for y, _ in placed], 5.2, low, high)
+        for (y, label), row in zip(placed, rows, strict=True):
+            parts += _label(label, (view.x(label.s), y), (x, row), side)
+    return parts
+
+
+def _label(label: Label, feature: Point, at: Point, side: int) -> list[str]:
+    x, row = at
+    elbow = (x - 2.2 * side, row)
+    anchor: draw.Anchor = "start" if side > 0 else "end"
+    colour = INK[label.material].line if label.material else draw.DARK
+    return [
+        *draw.leader(feature, elbow, (x - 0.6 * side, row)),
+        draw.text((x + 0.4 * side, row + 1.05), label.words, anchor=anchor, colour=colour),
+    ]
+
+
+def _legend(view: View, page: float) -> list[str]:
+    y = page - 10.0
+    films = dict.fromkeys(slab.layer.film for slab in view.section.slabs)
+    entries = [
+        (f"{film.material} film, {number(film.thickness)}", _swatch(film.material))
+        for film in films
+    ]
+    entries.append(("bond: the gap filled with TPE", BOND))
+    entries.append(("unbonded: drawn as a slit beside the mask", "#ffffff"))
+    parts: list[str] = []
+    x = 10.0
+    for words, fill in entries:
+        parts.append(draw.box((x, y - 2.6), (x + 6.0, y + 0.6), fill=fill, stroke=draw.GREY))
+        parts.append(draw.text((x + 7.6, y), words))
+        x += 7.6 + draw.text_width(words) + 7.0
+    return parts
+
+
+def _swatch(material: str) -> str:
+    return "url(#PTFE)" if material == "PTFE" else INK["TPE"].fill

@@ -1,0 +1,141 @@
+"""What the families build, against areas and distances by closed formulas."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from sbafab.actuators import build, load_design
+from sbafab.errors import DesignError
+from sbafab.geometry.edges import distance_to
+from sbafab.laminate.laminate import Laminate
+
+TEMPLATES = ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"]
+
+
+def laminate(name: str, *assignments: str) -> Laminate:
+    return build(load_design(name, assignments))
+
+
+@pytest.mark.parametrize("name", TEMPLATES)
+@pytest.mark.parametrize("balloons", [1, 2, 3, 7])
+def test_n_balloons_are_2n_tpe_n_chamber_masks_and_n_minus_1_separators(
+    name: str, balloons: int
+) -> None:
+    lam = laminate(name, f"stack.balloons={balloons}")
+    stack = [layer for layer in lam.layers if layer.balloon is not None]
+    roles = [layer.role for layer in stack]
+    assert len([layer for layer in stack if not layer.is_mask]) == 2 * balloons
+    assert roles.count("chamber-mask") == balloons
+    assert roles.count("separator-mask") == balloons - 1
+    assert (roles[0], roles[-1]) == ("base", "cap")
+    assert [layer.index for layer in lam.layers] == list(range(1, len(lam.layers) + 1))
+
+
+@pytest.mark.parametrize("name", TEMPLATES)
+def test_layers_rest_on_each_other(name: str) -> None:
+    layers = laminate(name, "stack.balloons=4").layers
+    assert layers[0].z == 0
+    for below, above in zip(layers, layers[1:], strict=False):
+        assert above.z == pytest.approx(below.z + below.film.thickness)
+
+
+@pytest.mark.parametrize("name", TEMPLATES)
+@pytest.mark.parametrize("balloons", [1, 3])
+def test_every_layer_has_the_pieces_its_role_asks_for(name: str, balloons: int) -> None:
+    for layer in laminate(name, f"stack.balloons={balloons}").layers:
+        assert len(layer.profile.pieces) == layer.pieces, layer.name
+
+
+def test_1dof_interfaces_by_closed_formulas() -> None:
+    lam = laminate("1dof-5mm")
+    chamber, separator = lam.interfaces[2], lam.interfaces[1]
+    assert (chamber.kind, separator.kind) == ("chamber", "separator")
+    # Ring wall 2.5 to 3.25; pocket 2.5 less the bore 0.5; neck ring 0.5 to 1.25.
+    assert chamber.bond.area == pytest.approx(math.pi * (3.25**2 - 2.5**2))
+    assert chamber.unbonded.area == pytest.approx(math.pi * (2.5**2 - 0.5**2))
+    assert separator.bond.area == pytest.approx(math.pi * (1.25**2 - 0.5**2))
+
+
+def test_inlet_strip_reaches_one_overhang_past_the_tab() -> None:
+    lam = laminate("1dof-5mm")
+    base, mask = lam.layers[0].profile, lam.layers[1].profile
+    assert base.bounds[2] == pytest.approx(3.25 + 5.0)
+    assert mask.bounds[2] == pytest.approx(3.25 + 5.0 + 0.5)
+    assert lam.inlets[0].mouth == pytest.approx((8.25, 0.0))
+
+
+def test_only_base_and_cap_have_no_bore() -> None:
+    for layer in laminate("3dof-15mm", "stack.balloons=3").layers:
+        open_at = [pin.name for pin in laminate("3dof-15mm").pins_through(layer)]
+        bored = [name for name in open_at if name != "pin-lumen"]
+        assert len(bored) == (0 if layer.role in ("base", "cap") else 3), layer.name
+
+
+@pytest.mark.parametrize("count", range(2, 9))
+def test_lobes_keep_one_bond_from_lumen_and_from_each_other(count: int) -> None:
+    lam = laminate("3dof-15mm", f"chamber.count={count}", "stack.balloons=2")
+    mask = lam.layer(6).profile
+    assert len(mask.pieces) == count
+    from_lumen = min(distance_to(edge, (0.0, 0.0)) for edge in mask.edges) - 1.0
+    centres = [chamber.centres[0] for chamber in lam.chambers]
+    between = min(math.dist(a, b) for a in centres for b in centres if a != b) - 5.0
+    assert min(from_lumen, between) == pytest.approx(0.75)
+    assert from_lumen >= 0.75 - 1e-9
+    assert between >= 0.75 - 1e-9
+    # The axes leave 4.25 once neighbouring pockets would come nearer than one bond: N >= 5.
+    raised = (2.5 + 0.375) / math.sin(math.pi / count) > 4.25
+    assert bool(lam.notes) is raised
+
+
+def test_one_plate_from_two_to_eight_lobes_far_from_the_lumen() -> None:
+    for count in range(2, 9):
+        lam = laminate("3dof-15mm", f"chamber.count={count}", "chamber.axis_radius=12")
+        assert all(len(layer.profile.pieces) == 1 for layer in lam.tpe_layers)
+
+
+def test_tapered_stack_separates_by_the_smaller_neighbour() -> None:
+    lam = laminate("1dof-5mm", "stack.balloons=3", "chamber.diameter=[10, 5, 6]")
+    separators = [layer.profile for layer in lam.layers if layer.role == "separator-mask"]
+    assert [round(profile.bounds[2], 6) for profile in separators] == [3.75, 3.75]
+    caps = [layer.profile for layer in lam.layers if layer.role == "cap"]
+    assert caps[0].bounds[2] == pytest.approx(3.75)
+
+
+def test_manifold_joins_the_bottom_pockets_and_has_one_inlet() -> None:
+    lam = laminate("radial-15mm", "inlet.manifold=true", "stack.balloons=2")
+    assert len(lam.inlets) == 1
+    assert len(lam.chambers) == 1
+    bottom, top = [layer.profile for layer in lam.layers if layer.role == "chamber-mask"]
+    assert len(bottom.pieces) == 1
+    assert len(top.pieces) == 3
+
+
+def test_sheet_overlap_lengthens_one_end() -> None:
+    sheet = laminate("radial-15mm", "sheet.overlap=4").layer(1).profile
+    assert sheet.bounds[2] + sheet.bounds[0] == pytest.approx(4.0)
+
+
+def test_equal_profiles_share_a_pattern() -> None:
+    short, tall = laminate("3dof-15mm"), laminate("3dof-15mm", "stack.balloons=150")
+    assert len(short.patterns) == len(tall.patterns) == 7
+
+
+@pytest.mark.parametrize(
+    ("name", "assignments", "says"),
+    [
+        ("3dof-15mm", ["bore.diameter=4"], "bore.diameter"),
+        ("3dof-15mm", ["chamber.axis_radius=4.2"], "at least 4.2500"),
+        ("3dof-15mm", ["chamber.count=6", "inlet.width=12"], "tab of chamber1"),
+        ("3dof-15mm", ["chamber.diameter=[5, 6]"], "stack.balloons = 15"),
+        ("radial-15mm", ["chamber.count=4"], "must be at least 12.700"),
+        ("radial-15mm", ["chamber.width=1.5"], "two bond widths"),
+        ("radial-15mm", ["window.length=30"], "window.length = 30"),
+    ],
+)
+def test_impossible_combinations_are_refused(
+    name: str, assignments: list[str], says: str
+) -> None:
+    with pytest.raises(DesignError, match=says):
+        laminate(name, *assignments)

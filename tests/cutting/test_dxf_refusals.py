@@ -1,0 +1,163 @@
+"""A cut file that cannot be cut is refused with one sentence that says why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from io import StringIO
+from pathlib import Path
+
+import ezdxf
+import pytest
+from ezdxf.layouts import Modelspace
+
+from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.dxf_write import dxf_text
+from sbafab.cutting.order import cutting_order
+from sbafab.errors import OutputError
+from sbafab.geometry.region import Region
+
+OUTER = {"layer": "CUT_OUTER"}
+SQUARE = [(20.0, 0.0), (24.0, 0.0), (24.0, 4.0), (20.0, 4.0)]
+
+
+def drawn(text: str, draw: Callable[[Modelspace], object]) -> str:
+    """The document with something added by ezdxf."""
+    document = ezdxf.read(StringIO(text))
+    draw(document.modelspace())
+    stream = StringIO()
+    document.write(stream)
+    return stream.getvalue()
+
+
+def entity(text: str, kind: str) -> str:
+    """The first entity of a kind, with its group codes."""
+    start = text.index(f"  0\n{kind}\n", text.index("\nENTITIES\n"))
+    return text[start : text.index("\n  0\n", start + 4) + 1]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        (" 70\n1\n 10\n", " 70\n0\n 10\n", "is open"),
+        ("$INSUNITS\n 70\n4", "$INSUNITS\n 70\n1", "not in millimetres"),
+        ("$INSUNITS\n 70\n4", "$INSUNITS\n 70\n6", "not in millimetres"),
+        ("$MEASUREMENT\n 70\n1", "$MEASUREMENT\n 70\n0", "not in millimetres"),
+        ("  8\nCUT_OUTER\n100\nAcDbPolyline", "  8\nOUTLINE\n100\nAcDbPolyline", "layer OUTLINE"),
+        ("  8\nCUT_OUTER\n100", "  8\n0\n100", "on layer 0"),
+        ("  8\nCUT_OUTER\n100", "  8\nCUT_INNER\n100", "is an outline but on CUT_INNER"),
+        ("  8\nCUT_INNER\n100", "  8\nCUT_OUTER\n100", "is a hole but on CUT_OUTER"),
+        ("AcDbPolyline\n", "AcDbPolyline\n 38\n0.5\n", "not at z = 0"),
+        ("AcDbPolyline\n", "AcDbPolyline\n 43\n0.2\n", "has a width"),
+        ("AcDbPolyline\n", "AcDbPolyline\n210\n0.0\n220\n0.0\n230\n-1.0\n", "not at z = 0"),
+        ("\n 30\n0.0\n 40\n1.0\n", "\n 30\n0.1\n 40\n1.0\n", "not at z = 0"),
+        ("\n 30\n0.0\n 40\n1.0\n", "\n 30\n0.0\n 40\n0.0\n", "has no radius"),
+        ("\n 30\n0.0\n 40\n1.0\n", "\n 30\n0.0\n 40\nnan\n", "is no number"),
+        ("\n 30\n0.0\n 40\n1.0\n", "\n 30\n0.0\n 40\n3.8\n", "touch or cross"),
+        ("\n 40\n1.0\n", "\n 40\nwide\n", "not a sound DXF"),
+        ("  0\nSECTION\n  2\nHEADER", "hello", "not an ASCII DXF"),
+    ],
+)
+def test_doctored_file_is_refused(
+    old: str, new: str, says: str, plate_text: str, write: Callable[[str], Path]
+) -> None:
+    head, found, tail = plate_text.partition(old)
+    assert found
+    with pytest.raises(OutputError, match=says) as caught:
+        read_profile(write(head + new + tail))
+    assert str(caught.value).startswith("001_TPE_base.dxf: ")
+
+
+@pytest.mark.parametrize("kind", ["LWPOLYLINE", "CIRCLE"])
+def test_contour_drawn_twice_is_refused(kind: str, plate_text: str) -> None:
+    original = entity(plate_text, kind)
+    handle = original.split("\n")[3]
+    copy = original.replace(f"  5\n{handle}\n", "  5\nFFF\n")
+    with pytest.raises(OutputError, match="twice"):
+        read_profile(plate_text.replace(original, original + copy))
+
+
+def test_circle_drawn_again_as_a_polyline_is_refused(plate_text: str) -> None:
+    bent = [(0.0, 1.0, 1.0), (0.0, -1.0, 1.0)]
+    text = drawn(
+        plate_text,
+        lambda model: model.add_lwpolyline(
+            bent, format="xyb", close=True, dxfattribs={"layer": "CUT_INNER"}
+        ),
+    )
+    with pytest.raises(OutputError, match="twice"):
+        read_profile(text)
+
+
+def test_side_shared_in_part_by_two_squares_is_refused(plate_text: str) -> None:
+    def squares(model: Modelspace) -> None:
+        model.add_lwpolyline(SQUARE, close=True, dxfattribs=OUTER)
+        shifted = [(x + 4.0, y + 3.0) for x, y in SQUARE]
+        model.add_lwpolyline(shifted, close=True, dxfattribs=OUTER)
+
+    with pytest.raises(OutputError, match=r"twice|touch or cross"):
+        read_profile(drawn(plate_text, squares))
+
+
+def test_contour_that_crosses_itself_is_refused(plate_text: str) -> None:
+    bow = [SQUARE[0], SQUARE[2], SQUARE[1], (20.0, 3.0)]
+    text = drawn(plate_text, lambda model: model.add_lwpolyline(bow, close=True, dxfattribs=OUTER))
+    with pytest.raises(OutputError, match="touch or cross"):
+        read_profile(text)
+
+
+def test_repeated_first_vertex_is_refused(plate_text: str) -> None:
+    closed_twice = [*SQUARE, SQUARE[0]]
+    text = drawn(
+        plate_text,
+        lambda model: model.add_lwpolyline(closed_twice, close=True, dxfattribs=OUTER),
+    )
+    with pytest.raises(OutputError, match="repeats its vertex"):
+        read_profile(text)
+
+
+def test_missing_and_doubled_edges_of_a_chain_are_refused(plate: Region) -> None:
+    text = dxf_text(cutting_order(plate), {}, "arcs")
+    for kind in ("LINE", "ARC"):
+        edge = entity(text, kind)
+        with pytest.raises(OutputError, match="contour open at x"):
+            read_profile(text.replace(edge, ""))
+        handle = edge.split("\n")[3]
+        copy = edge.replace(f"  5\n{handle}\n", "  5\nFFF\n")
+        with pytest.raises(OutputError, match="twice"):
+            read_profile(text.replace(edge, edge + copy))
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda model: model.add_spline([(0, 0), (1, 1), (2, 0)], dxfattribs=OUTER),
+        lambda model: model.add_ellipse((0, 0), (3, 0), 0.5, dxfattribs=OUTER),
+        lambda model: model.add_text("P01", dxfattribs=OUTER),
+        lambda model: model.add_hatch(dxfattribs=OUTER),
+        lambda model: model.add_point((0, 0), dxfattribs=OUTER),
+        lambda model: model.add_polyline2d(SQUARE, close=True, dxfattribs=OUTER),
+        lambda model: model.add_blockref(model.doc.blocks.new("PART").name, (0, 0)),
+    ],
+)
+def test_other_entities_are_refused(draw: Callable[[Modelspace], object], plate_text: str) -> None:
+    with pytest.raises(OutputError, match="cannot be cut"):
+        read_profile(drawn(plate_text, draw))
+
+
+def test_paper_space_must_be_empty(plate_text: str) -> None:
+    text = drawn(plate_text, lambda model: model.doc.paperspace().add_circle((0, 0), 1.0))
+    with pytest.raises(OutputError, match="model space only"):
+        read_profile(text)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.05, 0.2, 0.5, 0.8, 0.9, 0.99, 0.9999])
+def test_truncated_file_is_refused(
+    share: float, plate_text: str, write: Callable[[str], Path]
+) -> None:
+    with pytest.raises(OutputError, match=r"DXF document|ends early"):
+        read_profile(write(plate_text[: int(share * len(plate_text))]))
+
+
+def test_missing_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match=r"gone\.dxf: cannot be read"):
+        read_profile(tmp_path / "gone.dxf")

@@ -1,0 +1,172 @@
+"""One cut file a layer: verified, copied where patterns are equal, the same in every run."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import ezdxf
+import pytest
+
+import sbafab
+from sbafab.cutting import files
+from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.files import write_layer_files
+from sbafab.cutting.properties import CutSettings
+from sbafab.errors import DesignError, OutputError
+from sbafab.laminate.laminate import Laminate
+
+SETTINGS = CutSettings("two-plates", "ab" * 32)
+CALIBRATED = CutSettings("two-plates", "ab" * 32, {"TPE": 0.1, "PTFE": None}, ("bond-width",))
+
+
+def test_every_layer_has_its_file_bottom_to_top(laminate: Laminate, tmp_path: Path) -> None:
+    written = write_layer_files(laminate, tmp_path, SETTINGS)
+    assert [file.path for file in written] == [
+        "layers/001_TPE_base.dxf",
+        "layers/002_PTFE_chamber-mask.dxf",
+        "layers/003_TPE_cap.dxf",
+    ]
+    assert sorted(p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*.dxf")) == [
+        file.path for file in written
+    ]
+    for file, layer in zip(written, laminate.layers, strict=True):
+        data = (tmp_path / file.path).read_bytes()
+        assert hashlib.sha256(data).hexdigest() == file.sha256
+        assert file.layer == layer.index
+        assert file.contours == len(layer.profile.contours)
+        assert file.cut_length == pytest.approx(sum(c.length for c in layer.profile.contours))
+        assert read_profile(tmp_path / file.path).region.key == layer.profile.key
+
+
+def test_equal_patterns_are_equal_files_and_separate_ones(
+    laminate: Laminate, tmp_path: Path
+) -> None:
+    base, _, cap = write_layer_files(laminate, tmp_path, SETTINGS)
+    assert base.sha256 == cap.sha256
+    assert not (tmp_path / base.path).samefile(tmp_path / cap.path)
+
+
+def test_kerf_is_stated_and_done_for_each_material(laminate: Laminate, tmp_path: Path) -> None:
+    base, mask, _ = write_layer_files(laminate, tmp_path, CALIBRATED)
+    found = read_profile(tmp_path / base.path)
+    assert found.properties == {
+        "DESIGN": "two-plates",
+        "DESIGN_SHA256": "ab" * 32,
+        "PATTERN": "P01",
+        "MATERIAL": "TPE",
+        "UNITS": "mm",
+        "KERF_STATE": "compensated",
+        "KERF_WIDTH": "0.1",
+        "WAIVED": "bond-width",
+        "GENERATOR": f"sbafab {sbafab.__version__}",
+    }
+    radii = [contour.circle[1] for contour in found.region.holes if contour.circle]
+    assert sorted(radii) == pytest.approx([0.45, 0.45, 0.45, 0.95], abs=1e-6)
+    nominal = read_profile(tmp_path / mask.path)
+    assert nominal.properties["KERF_STATE"] == "uncalibrated: nominal edges"
+    assert nominal.properties["KERF_WIDTH"] == "none"
+    assert nominal.region.key == laminate.layer(2).profile.key
+
+
+def test_ptfe_carries_the_fume_warning(laminate: Laminate, tmp_path: Path) -> None:
+    base, mask, _ = write_layer_files(laminate, tmp_path, SETTINGS)
+    properties = read_profile(tmp_path / mask.path).properties
+    assert properties["WAIVED"] == "none"
+    for word in ("COF2", "HF", "permits", "drag knife"):
+        assert word in properties["WARNING"]
+    assert "safe" not in properties["WARNING"].lower()
+    assert "WARNING" not in read_profile(tmp_path / base.path).properties
+
+
+@pytest.mark.parametrize(
+    ("profile", "kinds"), [("arcs", {"LINE", "ARC", "CIRCLE"}), ("chords", {"LWPOLYLINE"})]
+)
+def test_other_ways_of_writing_curves(
+    profile: str, kinds: set[str], laminate: Laminate, tmp_path: Path
+) -> None:
+    settings = CutSettings("two-plates", "", profile=profile, chord_error=0.01)  # type: ignore[arg-type]
+    base, *_ = write_layer_files(laminate, tmp_path, settings)
+    model = ezdxf.readfile(tmp_path / base.path).modelspace()
+    assert {entity.dxftype() for entity in model.query('*[layer!="REFERENCE"]')} == kinds
+
+
+def test_progress_counts_the_layers(laminate: Laminate, tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+    write_layer_files(laminate, tmp_path, SETTINGS, lambda done, of: told.append((done, of)))
+    assert told[-1] == (3, 3)
+    assert [done for done, _ in told] == sorted(done for done, _ in told)
+
+
+def test_kerf_too_wide_names_the_layer(laminate: Laminate, tmp_path: Path) -> None:
+    settings = CutSettings("two-plates", "", {"TPE": 1.1})
+    with pytest.raises(DesignError, match=r"layer 001_TPE_base: .* hole at x .* vanishes"):
+        write_layer_files(laminate, tmp_path, settings)
+
+
+def test_a_copy_that_differs_is_found(
+    laminate: Laminate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def cut_short(source: Path, target: Path) -> None:
+        target.write_bytes(source.read_bytes()[:-1])
+
+    monkeypatch.setattr(files.shutil, "copyfile", cut_short)
+    with pytest.raises(OutputError, match=r"003_TPE_cap\.dxf: differs"):
+        write_layer_files(laminate, tmp_path, SETTINGS)
+
+
+def test_a_wrong_write_is_found(
+    laminate: Laminate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write = files.dxf_text
+    monkeypatch.setattr(files, "dxf_text", lambda contours, *rest: write(contours[1:], *rest))
+    with pytest.raises(OutputError, match=r"001_TPE_base\.dxf: it has 3 holes, not 4"):
+        write_layer_files(laminate, tmp_path, SETTINGS)
+
+
+def test_a_folder_that_cannot_be_written_is_one_sentence(
+    laminate: Laminate, tmp_path: Path
+) -> None:
+    (tmp_path / "layers").write_text("in the way")
+    with pytest.raises(OutputError, match="cannot be written"):
+        write_layer_files(laminate, tmp_path, SETTINGS)
+
+
+SCRIPT = """
+import hashlib, math
+from sbafab.cutting.dxf_write import dxf_text
+from sbafab.cutting.kerf import compensate
+from sbafab.cutting.order import cutting_order
+from sbafab.cutting.properties import CutSettings, file_properties
+from sbafab.cutting.skeleton import skeleton_text
+from sbafab.geometry.boolean import union
+from sbafab.geometry.shapes import disc
+axes = [(4.25 * math.cos(turn), 4.25 * math.sin(turn)) for turn in (0.0, 2.1, 4.2)]
+plate = union([disc(axis, 3.25) for axis in axes]) | disc((0, 0), 1.75)
+plate = plate - union([disc(axis, 0.5) for axis in axes])
+properties = file_properties(CutSettings("d", "", {"PTFE": 0.1}), "PTFE", "P01")
+for profile in ("bulges", "arcs", "chords"):
+    text = dxf_text(cutting_order(compensate(plate, 0.1)), properties, profile)
+    print(hashlib.sha256(text.encode()).hexdigest())
+print(hashlib.sha256(skeleton_text().encode()).hexdigest())
+"""
+
+
+def test_same_bytes_under_another_hash_seed_and_time_zone() -> None:
+    printed = []
+    for seed, zone in (("1", "UTC"), ("2", "Pacific/Auckland")):
+        root = str(Path(sbafab.__file__).parents[1])
+        environment = {**os.environ, "PYTHONHASHSEED": seed, "TZ": zone, "PYTHONPATH": root}
+        run = subprocess.run(
+            [sys.executable, "-c", SCRIPT],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        printed.append(run.stdout)
+    assert printed[0] == printed[1]
+    assert len(set(printed[0].split())) == 4

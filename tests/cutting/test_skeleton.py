@@ -1,0 +1,42 @@
+"""The packaged empty document is what ezdxf writes."""
+
+from __future__ import annotations
+
+import re
+
+import ezdxf
+
+from sbafab.cutting.cut_layers import COLOURS
+from sbafab.cutting.skeleton import SKELETON, skeleton_text
+
+
+def test_packaged_document_is_the_one_ezdxf_writes() -> None:
+    assert SKELETON.read_text(encoding="utf-8") == skeleton_text()
+
+
+def test_making_it_leaves_the_switch_of_ezdxf_as_it_was() -> None:
+    for state in (True, False):
+        ezdxf.options.write_fixed_meta_data_for_testing = state
+        skeleton_text()
+        assert ezdxf.options.write_fixed_meta_data_for_testing is state
+
+
+def test_it_is_an_empty_document_in_millimetres_with_the_cut_layers() -> None:
+    document = ezdxf.readfile(SKELETON)
+    assert document.dxfversion == "AC1024"
+    assert (document.header["$INSUNITS"], document.header["$MEASUREMENT"]) == (4, 1)
+    assert len(document.modelspace()) == 0
+    colours = {layer.dxf.name: layer.dxf.color for layer in document.layers}
+    assert colours.items() >= COLOURS.items()
+    assert document.layers.get("REFERENCE").dxf.plot == 0
+    assert document.layers.get("CUT_OUTER").dxf.plot == 1
+
+
+def test_next_handle_is_above_every_handle() -> None:
+    text = SKELETON.read_text(encoding="utf-8")
+    seed = re.search(r"\$HANDSEED\n  5\n(\w+)", text)
+    assert seed is not None
+    used = [int(handle, 16) for handle in re.findall(r"\n(?:  5|105)\n(\w+)\n", text)]
+    used.remove(int(seed[1], 16))
+    assert len(set(used)) == len(used)
+    assert max(used) < int(seed[1], 16)

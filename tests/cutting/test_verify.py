@@ -1,0 +1,96 @@
+"""Verification tells a file that differs from its profile, and names the place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from sbafab.cutting.dxf_write import DxfProfile, dxf_text
+from sbafab.cutting.order import cutting_order
+from sbafab.cutting.verify import verify_file
+from sbafab.errors import OutputError
+from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import disc
+
+Write = Callable[[str], Path]
+
+
+def ring(hole_x: float = 1.0, hole_radius: float = 0.5, radius: float = 5.0) -> Region:
+    return disc((0.0, 0.0), radius) - disc((hole_x, 0.0), hole_radius)
+
+
+def check(found: Region, expected: Region, write: Write) -> None:
+    verify_file(write(dxf_text(cutting_order(found), {"A": "b"})), expected, {"A": "b"})
+
+
+@pytest.mark.parametrize("name", ["disc", "discs", "stadium", "tab", "plate", "island"])
+@pytest.mark.parametrize(
+    ("profile", "chord_error"), [("bulges", 0.0), ("arcs", 0.0), ("chords", 0.005)]
+)
+def test_what_was_written_passes(
+    name: str,
+    profile: DxfProfile,
+    chord_error: float,
+    profiles: dict[str, Region],
+    write: Write,
+) -> None:
+    region = profiles[name]
+    path = write(dxf_text(cutting_order(region), {}, profile, chord_error or 0.005))
+    verify_file(path, region, {}, chord_error)
+
+
+def test_half_a_micrometre_passes_and_two_do_not(write: Write) -> None:
+    check(ring(hole_x=1.0005), ring(), write)
+    with pytest.raises(
+        OutputError, match=r"001_TPE_base\.dxf: .* 0\.002000 mm off at x (0\.5|1\.5)"
+    ):
+        check(ring(hole_x=1.002), ring(), write)
+
+
+def test_chords_need_their_own_tolerance(plate: Region, write: Write) -> None:
+    path = write(dxf_text(cutting_order(plate), {}, "chords", 0.005))
+    with pytest.raises(OutputError, match="mm off at x"):
+        verify_file(path, plate, {})
+    with pytest.raises(OutputError, match="mm off at x"):
+        verify_file(path, plate, {}, chord_error=0.002)
+
+
+def test_a_bulge_lost_on_the_way_is_found(plate: Region, plate_text: str, write: Write) -> None:
+    start = plate_text.index(" 42\n", plate_text.index("\nLWPOLYLINE\n"))
+    end = plate_text.index("\n 10\n", start) + 1
+    path = write(plate_text[:start] + plate_text[end:])
+    with pytest.raises(OutputError, match="mm off at x"):
+        verify_file(path, plate, {"DESIGN": "plate"})
+
+
+def test_area_is_held_to_a_ten_thousandth(write: Write) -> None:
+    """0.9 um on the radius of 5 mm is inside a micrometre and 3.6e-4 of the area."""
+    with pytest.raises(OutputError, match="its area is"):
+        check(disc((0.0, 0.0), 5.0009), disc((0.0, 0.0), 5.0), write)
+
+
+def test_missing_and_added_holes_are_found(write: Write) -> None:
+    with pytest.raises(OutputError, match="has 0 holes, not 1"):
+        check(disc((0.0, 0.0), 5.0), ring(), write)
+    with pytest.raises(OutputError, match="has 2 holes, not 1"):
+        check(ring() - disc((-2.0, 0.0), 0.5), ring(), write)
+
+
+def test_missing_piece_is_found(write: Write, profiles: dict[str, Region]) -> None:
+    with pytest.raises(OutputError, match="has 1 outlines, not 3"):
+        check(disc((0.0, 0.0), 2.5), profiles["discs"], write)
+
+
+def test_outline_before_its_hole_is_found(write: Write) -> None:
+    backwards = cutting_order(ring())[::-1]
+    with pytest.raises(OutputError, match="CUT_OUTER is cut before CUT_INNER"):
+        verify_file(write(dxf_text(backwards, {})), ring(), {})
+
+
+@pytest.mark.parametrize("expected", [{}, {"A": "c"}, {"A": "b", "C": "d"}])
+def test_other_properties_are_found(expected: dict[str, str], write: Write) -> None:
+    path = write(dxf_text(cutting_order(ring()), {"A": "b"}))
+    with pytest.raises(OutputError, match=r"custom property [AC] is"):
+        verify_file(path, ring(), expected)

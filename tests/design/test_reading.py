@@ -1,0 +1,149 @@
+"""Design files in: every kind of bad input is one sentence that names field and remedy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from sbafab.actuators import FAMILIES, build, load_design
+from sbafab.design.reading import template_names, template_summaries, write_new
+from sbafab.design.records import Design
+from sbafab.design.units import millimetres
+from sbafab.design.writing import design_sha256, design_toml, resolved
+from sbafab.errors import DesignError
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (0.75, 0.75),
+        (3, 3.0),
+        ("0.75", 0.75),
+        ("0.75 mm", 0.75),
+        ("38um", 0.038),
+        ("38 µm", 0.038),
+        ("1.5 cm", 15.0),
+        ("6 in", 152.4),
+        ('6"', 152.4),
+        ("1 mil", 0.0254),
+    ],
+)
+def test_lengths(text: object, expected: float) -> None:
+    assert millimetres(text) == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("text", ["", "five", "5 furlong", "1,5", "nan", True, None, [5]])
+def test_not_a_length(text: object) -> None:
+    with pytest.raises(ValueError, match="must be a length such as"):
+        millimetres(text)
+
+
+@pytest.mark.parametrize(
+    ("assignments", "says"),
+    [
+        (["chamber.diametr=5"], "did you mean chamber.diameter?"),
+        (["stack.ballons=5"], "did you mean stack.balloons?"),
+        (["balloons=5"], "did you mean stack.balloons?"),
+        (["films.tpe.xyzzy=1"], "known here: films.tpe.product"),
+        (["tube.outer_diameter=15"], 'it belongs to "radial"'),
+        (["chamber.diameter=-5"], "chamber.diameter = -5 must be at least 0.001"),
+        (["chamber.diameter=2000"], "must be at most 1000"),
+        (["chamber.diameter=nan"], "must be a finite length"),
+        (["chamber.diameter=inf"], "must be a finite length"),
+        (["press.temperature_c=inf"], "must be a finite number"),
+        (["chamber.diameter=5 furlong"], '"0.75 mm"'),
+        (["chamber.diameter=true"], "must be a length"),
+        (["stack.balloons=2.5"], "must be a whole number"),
+        (["stack.balloons=0"], "must be at least 1"),
+        (["stack.balloons=1000000000"], "must be at most 1000"),
+        (["chamber=5"], "must be a table of keys"),
+        (["chamber.count=9"], "must be at most 8"),
+        (["family=lobbed"], "did you mean lobed?"),
+        (["name=../up"], "must be 1 to 64 letters"),
+        (['rules.waive=["bond"]'], "'bond-width'"),
+        (["laser.kerf_tpe=abc"], '"uncalibrated"'),
+        (["laser.kerf_tpe=7"], "from 0 to 1 mm"),
+        (["chamber.diameter.x=5"], "is a value, not a table"),
+        (["chamber"], "is not KEY=VALUE"),
+        (["chamber.diameter=-5", "bond.width=-1"], "and 1 more problem"),
+    ],
+)
+def test_bad_values_are_one_sentence(assignments: list[str], says: str) -> None:
+    with pytest.raises(DesignError) as caught:
+        load_design("3dof-15mm", assignments)
+    assert says in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"a = [", "is not valid TOML"),
+        (b"\xff\xfe", "UTF-8"),
+        (b"", "family is missing"),
+        (b'family = "lobed"\nname = ""', "name = ''"),
+        (b"a = " + b"[" * 5000, "is not valid TOML"),
+        (b"#" * 1_100_000, "at most 1,000,000"),
+    ],
+)
+def test_bad_files_are_one_sentence(tmp_path: Path, content: bytes, says: str) -> None:
+    path = tmp_path / "design.toml"
+    path.write_bytes(content)
+    with pytest.raises(DesignError, match=says.replace("(", r"\(")):
+        load_design(path)
+
+
+def test_unknown_sources(tmp_path: Path) -> None:
+    with pytest.raises(DesignError, match="did you mean 3dof-15mm"):
+        load_design("3dof-15")
+    with pytest.raises(DesignError, match="is a folder"):
+        load_design(tmp_path)
+    with pytest.raises(DesignError, match="neither a template nor a design file"):
+        load_design("a\0b")
+
+
+@pytest.mark.parametrize("name", template_names())
+def test_resolved_design_reads_back_as_the_same(name: str, tmp_path: Path) -> None:
+    design = load_design(name)
+    path = tmp_path / "design.toml"
+    path.write_text(design_toml(design), encoding="utf-8")
+    again = load_design(path)
+    assert resolved(again) == resolved(design)
+    assert design_sha256(again) == design_sha256(design)
+
+
+def test_hash_changes_with_any_value() -> None:
+    design = load_design("3dof-15mm")
+    assert design_sha256(design) != design_sha256(load_design("3dof-15mm", ["bond.width=0.8"]))
+
+
+def test_name_defaults_to_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "gripper.toml"
+    path.write_text('family = "1dof"\n', encoding="utf-8")
+    assert load_design(path).name == "gripper"
+
+
+def test_every_template_builds_and_says_what_it_is() -> None:
+    assert {"1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"} <= set(template_summaries())
+    for name, summary in template_summaries().items():
+        assert len(summary) > 20
+        assert build(load_design(name)).name == name
+
+
+def test_new_writes_a_design_that_builds_and_never_overwrites(tmp_path: Path) -> None:
+    path = tmp_path / "my gripper.toml"
+    write_new("3dof-15mm", path)
+    assert load_design(path).name == "my-gripper"
+    with pytest.raises(DesignError, match="exists"):
+        write_new("3dof-15mm", path)
+    with pytest.raises(DesignError, match="did you mean 1dof-5mm"):
+        write_new("1dof-5", tmp_path / "x.toml")
+    with pytest.raises(DesignError, match="cannot be written"):
+        write_new("1dof-5mm", tmp_path / "nowhere" / "x.toml")
+
+
+def test_families_are_distinct_records() -> None:
+    records = [record for record, _ in FAMILIES.values()]
+    assert len(set(records)) == len(records)
+    assert all(issubclass(record, Design) for record in records)
