@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from sbafab.actuators import lobed, one_dof, radial
-from sbafab.design.reading import design_path, override, read_toml, validated
+from sbafab.design.reading import add_waivers, design_path, override, read_toml, validated
 from sbafab.design.records import Design
 from sbafab.laminate.laminate import Laminate
 
@@ -18,13 +18,15 @@ FAMILIES: dict[str, tuple[type[Design], Callable[[Any], Laminate]]] = {
 }
 
 
-def load_design(source: str | Path, assignments: Iterable[str] = ()) -> Design:
+def load_design(
+    source: str | Path, assignments: Iterable[str] = (), waivers: Sequence[str] = ()
+) -> Design:
     """A design from a template's name or a TOML file, with ``key=value`` assignments applied.
 
-    Raises DesignError with one sentence where it cannot be built.
+    ``waivers`` are rule names added to those that the file waives. Raises DesignError with one sentence where it cannot be built.
     """
     path = design_path(source)
-    data = override(read_toml(path), assignments)
+    data = add_waivers(override(read_toml(path), assignments), waivers)
     data.setdefault("name", path.stem)
     records = {family: record for family, (record, _) in FAMILIES.items()}
     return validated(data, records, path.parent)

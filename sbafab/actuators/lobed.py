@@ -117,7 +117,7 @@ def build(design: LobedDesign) -> Laminate:
     stack = Stack(bottom, shapes, shape_of, axes, design.lumen.diameter)
     has_bores = design.stack.balloons > 1
     bore = design.bore.diameter
-    pins = [Pin(f"pin-{n}", axis, bore) for n, axis in zip(names, axes, strict=True)]
+    pins = [Pin(n, axis, bore) for n, axis in zip(names, axes, strict=True)]
     return Laminate(
         name=design.name,
         family=design.family,
@@ -127,7 +127,7 @@ def build(design: LobedDesign) -> Laminate:
         if has_bores
         else (),
         inlets=tuple(inlet for _, _, inlet in inlets),
-        pins=(*(pins if has_bores else ()), Pin("pin-lumen", (0.0, 0.0), design.lumen.diameter)),
+        pins=(*(pins if has_bores else ()), Pin("lumen", (0.0, 0.0), design.lumen.diameter)),
         lumen=design.lumen.diameter,
         balloons=design.stack.balloons,
         registration=design.registration.method,

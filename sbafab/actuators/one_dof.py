@@ -50,7 +50,7 @@ def build(design: OneDofDesign) -> Laminate:
         chambers=(Chamber("chamber1", (AXIS,)),),
         bores=(Bore("chamber1", AXIS, design.bore.diameter),) if has_bore else (),
         inlets=(inlet,),
-        pins=(Pin("pin-chamber1", AXIS, design.bore.diameter),) if has_bore else (),
+        pins=(Pin("chamber1", AXIS, design.bore.diameter),) if has_bore else (),
         lumen=None,
         balloons=balloons,
         registration=design.registration.method,

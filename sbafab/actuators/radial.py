@@ -131,7 +131,7 @@ def build(design: RadialDesign) -> Laminate:
         bores=bores,
         inlets=inlets,
         pins=tuple(
-            Pin(f"pin-{number}", bore.centre, bore.diameter)
+            Pin(f"channel{number}", bore.centre, bore.diameter)
             for number, bore in enumerate(bores, start=1)
         ),
         lumen=None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from sbafab.cli.options import design_argument, json_option, set_option, waive_option
-from sbafab.cli.working import RULE_FAILED, with_waivers
+from sbafab.cli.working import RULE_FAILED
 
 
 @click.command()
@@ -23,7 +23,7 @@ def check(
     from sbafab.output.run import check as run_check
     from sbafab.rules.deck import has_failed
 
-    record = load_design(design, with_waivers(assignments, waivers))
+    record = load_design(design, assignments, waivers)
     _, findings = run_check(record)
     if as_json:
         print_json(checks(findings, "design"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 import click
@@ -16,14 +16,6 @@ if TYPE_CHECKING:
 RULE_FAILED = 1
 
 
-def with_waivers(assignments: Sequence[str], waivers: Sequence[str]) -> list[str]:
-    """The assignments, with ``--waive`` names added as one more."""
-    if not waivers:
-        return list(assignments)
-    names = ", ".join(f'"{name}"' for name in waivers)
-    return [*assignments, f"rules.waive=[{names}]"]
-
-
 def run_parts(
     request: Request,
     parts: Collection[Part],
@@ -35,7 +27,7 @@ def run_parts(
     from sbafab.cli.printing import print_json, print_run, run_json, shown_progress
     from sbafab.output.run import generate
 
-    design = load_design(request.design, with_waivers(request.assignments, request.waivers))
+    design = load_design(request.design, request.assignments, request.waivers)
     with shown_progress(request.as_json) as progress:
         run = generate(design, request.out, parts, progress, dxf_profile, chord_error)
     if request.as_json:

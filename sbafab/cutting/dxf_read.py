@@ -58,21 +58,23 @@ def _parsed(source: Path | str) -> Drawing:
     from ezdxf.filemanagement import read
     from ezdxf.lldxf.const import DXFError
 
-    text = source
-    if isinstance(source, Path):
-        try:
-            text = source.read_text(encoding="utf-8", errors="surrogateescape")
-        except OSError as error:
-            raise OutputError(f"cannot be read ({error.strerror}); write it anew.") from error
-    lines = str(text).split()
-    if lines[:2] != ["0", "SECTION"]:
+    text = _text(source) if isinstance(source, Path) else source
+    words = text.split()
+    if words[:2] != ["0", "SECTION"]:
         raise OutputError("not an ASCII DXF document; write it anew.")
-    if lines[-2:] != ["0", "EOF"]:
+    if words[-2:] != ["0", "EOF"]:
         raise OutputError("the document ends early; write it anew.")
     try:
-        return read(StringIO(str(text)))
+        return read(StringIO(text))
     except (DXFError, ValueError, LookupError, TypeError, AttributeError) as error:
         raise OutputError(f"not a sound DXF document ({error}); write it anew.") from error
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8", errors="surrogateescape")
+    except OSError as error:
+        raise OutputError(f"cannot be read ({error.strerror}); write it anew.") from error
 
 
 def _read(document: Drawing) -> ReadBack:
@@ -92,17 +94,19 @@ def _read(document: Drawing) -> ReadBack:
     for entity in model:
         layer = entity.dxf.layer
         contour, edges = _geometry(entity)
-        if layer in closed:
-            closed[layer] += contour
-            loose[layer] += edges
-        elif layer in COLOURS:
+        drawn = contour.edges if contour else edges
+        x, y = drawn[0].start
+        place = f"{entity.dxftype()} at x {x:.3f}, y {y:.3f}"
+        if min(edge.length for edge in drawn) < EPSILON:
+            raise OutputError(f"{place} has an edge of no length; remove it.")
+        if layer not in COLOURS:
+            raise OutputError(f"{place} is on layer {layer}; use {', '.join(COLOURS)}.")
+        if layer not in closed:
             other.append(entity.dxftype())
+        elif contour:
+            closed[layer].append(contour)
         else:
-            x, y = (contour[0].edges if contour else edges)[0].start
-            raise OutputError(
-                f"{entity.dxftype()} at x {x:.3f}, y {y:.3f} is on layer {layer}; "
-                f"use {', '.join(COLOURS)}."
-            )
+            loose[layer] += edges
     contours = {layer: [*closed[layer], *closed_loops(loose[layer])] for layer in closed}
     check_clear([*contours[CUT_INNER], *contours[CUT_OUTER]])
     return ReadBack(
@@ -114,7 +118,7 @@ def _read(document: Drawing) -> ReadBack:
     )
 
 
-def _geometry(entity: DXFEntity) -> tuple[list[Contour], list[Edge]]:
+def _geometry(entity: DXFEntity) -> tuple[Contour | None, list[Edge]]:
     """The closed contour, or else the loose edges, that an entity draws."""
     from ezdxf.entities.lwpolyline import LWPolyline
 
@@ -127,21 +131,17 @@ def _geometry(entity: DXFEntity) -> tuple[list[Contour], list[Edge]]:
         raise OutputError(f"{kind} (handle {dxf.handle}) has a coordinate that is no number.")
     if isinstance(entity, LWPolyline):
         _check_flat(entity, dxf.elevation)
-        return [_polyline(entity)], []
+        return _polyline(entity), []
     if kind == "LINE":
         _check_flat(entity, dxf.start.z, dxf.end.z)
-        return [], [Line((dxf.start.x, dxf.start.y), (dxf.end.x, dxf.end.y))]
+        return None, [Line((dxf.start.x, dxf.start.y), (dxf.end.x, dxf.end.y))]
     _check_flat(entity, dxf.center.z)
     centre = dxf.center.x, dxf.center.y
-    if not dxf.radius > EPSILON:
-        raise OutputError(
-            f"{kind} at x {centre[0]:.3f}, y {centre[1]:.3f} has no radius; remove it."
-        )
     if kind == "CIRCLE":
-        return [circle(centre, dxf.radius)], []
+        return circle(centre, dxf.radius), []
     first = math.radians(dxf.start_angle)
     sweep = math.radians((dxf.end_angle - dxf.start_angle) % 360.0)
-    return [], _arcs(centre, dxf.radius, first, sweep)
+    return None, _arcs(centre, dxf.radius, first, sweep)
 
 
 def _numbers(entity: DXFEntity) -> Iterator[float]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from sbafab import __version__
 from sbafab.cutting.dxf_write import DxfProfile
 from sbafab.laminate.films import Material
 
@@ -23,6 +22,7 @@ class CutSettings:
 
     ``kerf_widths``: full width in mm by material, None or absent where it was not measured.
     ``waived``: names of the waived rules. ``chord_error`` in mm counts for profile "chords" only.
+    ``generator``: program and version, for example ``sbafab 1.0.0``.
     """
 
     design: str
@@ -31,6 +31,7 @@ class CutSettings:
     waived: tuple[str, ...] = ()
     profile: DxfProfile = "bulges"
     chord_error: float = 0.005
+    generator: str = "sbafab"
 
     def kerf_width(self, material: Material) -> float | None:
         return self.kerf_widths.get(material)
@@ -48,7 +49,7 @@ def file_properties(settings: CutSettings, material: Material, pattern: str) -> 
         "KERF_STATE": UNCALIBRATED if kerf is None else COMPENSATED,
         "KERF_WIDTH": "none" if kerf is None else f"{kerf:g}",
         "WAIVED": ", ".join(settings.waived) or "none",
-        "GENERATOR": f"sbafab {__version__}",
+        "GENERATOR": settings.generator,
     }
     if material == "PTFE":
         properties["WARNING"] = PTFE_WARNING

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 MM_PER_UNIT = {0: 1.0, 1: 25.4, 4: 1.0, 5: 10.0, 6: 1000.0}
 """By $INSUNITS: none (taken as mm), inch, mm, cm, m."""
 LEVEL = 1e-6
+HIGHEST_DEGREE = 10
 
 
 def dxf_strands(path: Path) -> Iterator[Strand]:
@@ -133,6 +134,11 @@ def _ellipse(entity: Any, factor: float) -> Strand:
 
 def _spline(entity: Any, factor: float) -> Strand:
     refuse_more_than_limit(max(len(entity.control_points), len(entity.fit_points)))
+    if entity.dxf.degree > HIGHEST_DEGREE:
+        raise DesignError(
+            f"holds a SPLINE of degree {entity.dxf.degree}, where at most {HIGHEST_DEGREE} is "
+            "allowed; draw it with degree 3"
+        )
     try:
         tool: BSpline = entity.construction_tool()
     except Exception as error:

@@ -88,6 +88,14 @@ def override(data: Mapping[str, Any], assignments: Iterable[str]) -> dict[str, A
     return changed
 
 
+def add_waivers(data: dict[str, Any], waivers: Sequence[str]) -> dict[str, Any]:
+    """``data`` with rule names added to ``rules.waive``."""
+    rules = data.get("rules", {})
+    if not waivers or not isinstance(rules, dict) or not isinstance(rules.get("waive", []), list):
+        return data
+    return {**data, "rules": {**rules, "waive": [*rules.get("waive", []), *waivers]}}
+
+
 def _copied(data: Mapping[str, Any]) -> dict[str, Any]:
     return {
         key: _copied(value) if isinstance(value, dict) else value for key, value in data.items()

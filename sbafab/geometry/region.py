@@ -116,19 +116,30 @@ class Contour:
         give shared vertices.
         """
         points: list[Point] = []
-        for edge in self.edges:
-            points.append(edge.start)
-            if isinstance(edge, Arc):
-                points.extend(_chord_points(edge, sagitta))
+        for before, edge in zip((self.edges[-1], *self.edges), self.edges, strict=False):
+            if not isinstance(edge, Arc):
+                points.append(edge.start)
+                continue
+            step = _chord_step(edge.radius, sagitta)
+            place = edge.start_angle / step
+            # Where an arc was only split, another contour along it need not be.
+            if not same_support(before, edge) or abs(place - round(place)) < 1e-7:
+                points.append(edge.start)
+            points.extend(_chord_points(edge, step))
         if len(points) < 3:
             return [edge.at(t) for edge in self.edges for t in (0.0, 0.5)]
         return points
 
 
-def _chord_points(arc: Arc, sagitta: float) -> list[Point]:
-    ratio = min(1.0, sagitta / arc.radius)
+def _chord_step(radius: float, sagitta: float) -> float:
+    """Angle of a chord; a whole number of them makes a quarter turn."""
+    ratio = min(1.0, sagitta / radius)
     count = max(8, math.ceil(math.pi / math.acos(1 - ratio)))
-    step = math.tau / (4 * math.ceil(count / 4))
+    return math.tau / (4 * math.ceil(count / 4))
+
+
+def _chord_points(arc: Arc, step: float) -> list[Point]:
+    """Points of the arc between its ends at whole multiples of the step."""
     first = arc.start_angle
     last = first + arc.sweep
     if arc.ccw:
@@ -204,11 +215,14 @@ class Region:
         """A name for the shape: equal for identical profiles (to 1 nm), on every machine."""
         rings = []
         for contour in self.contours:
+            if contour.circle is not None:
+                # A circle may be split anywhere.
+                centre, radius = contour.circle
+                marks = [(*centre, -radius if contour.is_hole else radius)]
+            else:
+                marks = list(contour.vertices)
             # Adding 0.0 makes -0.0 and 0.0 one.
-            ring = [
-                (round(x, 6) + 0.0, round(y, 6) + 0.0, round(bulge, 6) + 0.0)
-                for x, y, bulge in contour.vertices
-            ]
+            ring = [tuple(round(value, 6) + 0.0 for value in mark) for mark in marks]
             first = ring.index(min(ring))
             rings.append(ring[first:] + ring[:first])
         return hashlib.sha256(repr(sorted(rings)).encode()).hexdigest()[:16]

@@ -189,9 +189,7 @@ def _curvature(edge: Edge) -> float:
     return (1.0 if edge.ccw else -1.0) / edge.radius
 
 
-def _pinch(
-    contours: Iterable[Contour], corners: Iterable[_Corner], sharp: float
-) -> Point | None:
+def _pinch(contours: Iterable[Contour], corners: Iterable[_Corner], sharp: float) -> Point | None:
     """A corner sharper than allowed, or a point where the boundary meets itself."""
     for corner in corners:
         if math.degrees(math.pi - corner.turn) < sharp - 1e-4:
@@ -249,9 +247,7 @@ def _along_each_other(a: _Side, b: _Side, narrowest: _Narrowest) -> None:
                 narrowest.offer_facing(here, foot)
 
 
-def _at_corners(
-    corners: Sequence[_Corner], sides: Sequence[_Side], narrowest: _Narrowest
-) -> None:
+def _at_corners(corners: Sequence[_Corner], sides: Sequence[_Side], narrowest: _Narrowest) -> None:
     for corner in corners:
         x, y = corner.point
         for side in sides:
@@ -266,9 +262,7 @@ def _at_corners(
                 narrowest.offer(a.point, b.point)
 
 
-def _corner_to_edge(
-    corner: _Corner, side: _Side, foot: _Foot, narrowest: _Narrowest
-) -> None:
+def _corner_to_edge(corner: _Corner, side: _Side, foot: _Foot, narrowest: _Narrowest) -> None:
     d = (foot.point[0] - corner.point[0], foot.point[1] - corner.point[1])
     if _dot(d, foot.normal) > -TOUCH:
         return

@@ -13,8 +13,8 @@ def facets(contour: Contour, sagitta: float) -> list[Point]:
     """Vertices in mm of a polygon that stands in for the contour.
 
     The height of an arc over its chord is ``sagitta`` mm at most. Vertices on one circle stand
-    at the same angles whichever contour asks, and a little outside it, so that chords and arcs
-    enclose equal areas; where arcs meet other edges, the corner itself is a vertex.
+    at the same angles whichever contour asks, and two thirds of the sagitta outside it, so that
+    chords and arcs enclose equal areas; where arcs meet other edges, the corner is a vertex.
     """
     points: list[Point] = []
     runs = list(_runs(contour))

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-SAGITTA = 0.002
-"""Default height in mm of an arc over its chord."""
+SAGITTA = 0.0015
+"""Default height in mm of an arc over its chord: no point is farther than 1 um from the arc."""
 
 VOLUME_TOLERANCE = 0.002
 """Largest relative difference between a surface's volume and its sum of area x thickness."""
@@ -48,9 +48,11 @@ def fuse(slabs: Sequence[Slab], sagitta: float) -> Surface:
     heights, levels = _levels(slabs, regions, plane)
     faces = _faces(plane, levels)
     count = len(plane.points)
-    used, faces = np.unique(faces, return_inverse=True)
-    points = np.column_stack([plane.points[used % count], heights[used // count]])
-    return Surface(points, faces.reshape(-1, 3))
+    used = np.zeros(count * len(heights), dtype=bool)
+    used[faces] = True
+    (corners,) = np.nonzero(used)
+    points = np.column_stack([plane.points[corners % count], heights[corners // count]])
+    return Surface(points, np.cumsum(used)[faces] - 1)
 
 
 def closed_surface(what: str, slabs: Sequence[Slab], sagitta: float) -> Surface:

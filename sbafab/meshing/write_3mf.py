@@ -24,14 +24,12 @@ MODEL = """<?xml version="1.0" encoding="UTF-8"?>
 <model unit="millimeter" xml:lang="en-US" \
 xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
 <resources>
-<basematerials id="1"><base name="TPE" displaycolor="{colour}"/></basematerials>
+<basematerials id="1"><base name="TPE" displaycolor="#E4DFD2"/></basematerials>
 <object id="2" type="model" pid="1" pindex="0"><mesh>
 <vertices>
-{vertices}
-</vertices>
+{vertices}</vertices>
 <triangles>
-{triangles}
-</triangles>
+{triangles}</triangles>
 </mesh></object>
 </resources>
 <build><item objectid="2"/></build>
@@ -39,14 +37,14 @@ xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
 """
 
 
-def write_3mf(surface: Surface, path: Path, colour: str = "#E4DFD2") -> None:
-    """Write the surface in mm, one object of one material, with an sRGB colour."""
-    points = surface.points.round(6).tolist()
-    vertices = [f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in points]
-    triangles = [f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in surface.faces.tolist()]
-    model = MODEL.format(
-        colour=colour, vertices="\n".join(vertices), triangles="\n".join(triangles)
-    )
+def write_3mf(surface: Surface, path: Path) -> None:
+    """Write the surface in mm, as one object of one material."""
+    # One format for the whole table is several times faster than one a row.
+    vertex = '<vertex x="%.6f" y="%.6f" z="%.6f"/>\n'
+    triangle = '<triangle v1="%d" v2="%d" v3="%d"/>\n'
+    vertices = vertex * len(surface.points) % tuple(surface.points.ravel().tolist())
+    triangles = triangle * len(surface.faces) % tuple(surface.faces.ravel().tolist())
+    model = MODEL.format(vertices=vertices, triangles=triangles)
     _write_zip(
         path,
         {
@@ -62,8 +60,8 @@ def _write_zip(path: Path, parts: dict[str, str]) -> None:
 
     with ZipFile(path, "w") as archive:
         for name, text in parts.items():
-            # ZipInfo's own date is fixed, the clock's would change the bytes; so would the
-            # system's default for the maker.
+            # ZipInfo's date is fixed where a bare name would take the clock's; the maker must
+            # not depend on the system either.
             entry = ZipInfo(name)
             entry.compress_type = ZIP_DEFLATED
             entry.create_system = 3

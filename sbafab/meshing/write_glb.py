@@ -7,7 +7,8 @@ from typing import Any
 
 from sbafab.meshing.surface import Surface
 
-RGBA = tuple[float, float, float, float]
+COLOUR = [0.78, 0.74, 0.65, 1.0]
+"""Linear red, green, blue and opacity: the off-white of TPE film."""
 
 FLOAT, UNSIGNED_INT = 5126, 5125
 VERTICES, INDICES = 34962, 34963
@@ -15,8 +16,8 @@ UPRIGHT = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
 """Quaternion of the quarter turn about x that brings our z to the format's y."""
 
 
-def write_glb(surface: Surface, path: Path, colour: RGBA = (0.78, 0.74, 0.65, 1.0)) -> None:
-    """Write the surface at true size, with a linear colour.
+def write_glb(surface: Surface, path: Path) -> None:
+    """Write the surface at true size.
 
     The stored coordinates are mm; the node scales them to the metres the format asks for.
     """
@@ -25,7 +26,7 @@ def write_glb(surface: Surface, path: Path, colour: RGBA = (0.78, 0.74, 0.65, 1.
     points = surface.points.astype("<f4")
     faces = surface.faces.astype("<u4")
     buffers = [points.tobytes(), faces.tobytes()]
-    document = _document(len(buffers[0]), len(buffers[1]), colour)
+    document = _document(len(buffers[0]), len(buffers[1]))
     document["accessors"] = [
         {
             "bufferView": 0,
@@ -42,7 +43,7 @@ def write_glb(surface: Surface, path: Path, colour: RGBA = (0.78, 0.74, 0.65, 1.
     path.write_bytes(b"glTF" + _number(2) + _number(12 + len(chunks)) + chunks)
 
 
-def _document(points_size: int, faces_size: int, colour: RGBA) -> dict[str, Any]:
+def _document(points_size: int, faces_size: int) -> dict[str, Any]:
     """The scene of one node; sizes in bytes."""
     return {
         "asset": {"version": "2.0", "generator": "sbafab"},
@@ -54,7 +55,7 @@ def _document(points_size: int, faces_size: int, colour: RGBA) -> dict[str, Any]
             {
                 "name": "TPE",
                 "pbrMetallicRoughness": {
-                    "baseColorFactor": list(colour),
+                    "baseColorFactor": COLOUR,
                     "metallicFactor": 0.0,
                     "roughnessFactor": 0.55,
                 },

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -86,7 +86,7 @@ def generate(
     if has_failed(findings):
         wanted &= {"preview"}
     # The schedule is made before anything is written: it may refuse the design.
-    pressing = schedule(laminate, press_settings(design)) if "press" in wanted else None
+    pressing = _schedule(design, laminate, waived) if "press" in wanted else None
     target = out / design.name
     with replaced_folder(target) as folder:
         cut_files: list[CutFile] = []
@@ -115,6 +115,14 @@ def generate(
         index["files"] = file_hashes(folder)
         _write(folder / "manifest.json", as_json(index))
     return Run(design, laminate, findings, target, index, pressing)
+
+
+def _schedule(design: Design, laminate: Laminate, waived: tuple[str, ...]) -> Schedule:
+    made = schedule(laminate, press_settings(design))
+    if not waived:
+        return made
+    said = f"made although it breaks rules that the design waives: {', '.join(waived)}"
+    return replace(made, warnings=(said, *made.warnings))
 
 
 def _write(path: Path, text: str) -> None:

@@ -7,7 +7,7 @@ from sbafab.cutting.properties import CutSettings
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
 from sbafab.pressing.schedule import PressSettings
-from sbafab.rules.deck import Limits
+from sbafab.rules.limits import Limits
 
 
 def kerf_widths(design: Design) -> dict[str, float | None]:

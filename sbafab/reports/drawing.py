@@ -125,7 +125,8 @@ def dimension(a: Point, b: Point, words: str, away: Point, distance: float) -> l
         parts += [line(tails, colour=GREY), arrow(start, along), arrow(end, back)]
     middle = (start[0] + end[0]) / 2, (start[1] + end[1]) / 2
     if abs(v) > abs(u):
-        rise = -0.8 if v < 0 else TEXT + 0.3
+        clear = 0.8 if math.dist(start, end) > text_width(words) else 1.5
+        rise = -clear if v < 0 else TEXT - 0.5 + clear
         return [*parts, text((middle[0], middle[1] + rise), words, anchor="middle")]
     if math.dist(start, end) >= text_width(words) + 1.0:
         lean = -0.8 if u < 0 else TEXT + 0.3

@@ -108,6 +108,8 @@ def circumscribed(profile: Region) -> Circle | None:
 
 def inlet_width(laminate: Laminate, layer: Layer) -> Width | None:
     """The width of the inlet strip or tab, if any, at the inlet farthest right."""
+    if layer.role == "separator-mask":
+        return None
     found = [(inlet, span) for inlet in laminate.inlets if (span := _across(layer, inlet))]
     if not found:
         return None

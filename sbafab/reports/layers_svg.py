@@ -98,8 +98,9 @@ def _films(laminate: Laminate, at: Point) -> list[str]:
         ink = INK[film.material]
         fill = ink.fill if film.material == "TPE" else "url(#PTFE)"
         parts.append(draw.box((x, y), (x + 6.0, y + 3.6), fill=fill, stroke=ink.line))
-        names = dict.fromkeys((film.material, film.product))
-        words = f"{', '.join(names)}, {number(film.thickness)} thick"
+        known = film.product.startswith(film.material)
+        name = film.product if known else f"{film.material}, {film.product}"
+        words = f"{name}, {number(film.thickness)} thick"
         parts.append(draw.text((x + 8.0, y + 2.8), words))
     return parts
 

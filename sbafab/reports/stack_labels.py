@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
-from sbafab.geometry.section import Interval
 from sbafab.laminate.films import Material
 from sbafab.reports.features import length
 from sbafab.reports.stack_section import Joint, Section, Slab, opening
@@ -22,21 +22,22 @@ class Label(NamedTuple):
 
 def layer_labels(section: Section) -> list[Label]:
     """Number and role of every layer shown, pointing near its end at the inlet's side."""
-    return [
-        Label(
-            f"{slab.layer.index} {slab.layer.role.replace('-', ' ')}",
-            slab.spans[-1][1] - 0.12,
-            slab.layer.z + slab.layer.film.thickness / 2,
-            slab.layer.index,
-            slab.layer.film.material,
-        )
-        for slab in section.slabs
-        if slab.spans
-    ]
+    base_end = max(slab.spans[-1][1] for slab in section.slabs if not slab.layer.is_mask)
+    labels = []
+    for slab in section.slabs:
+        if not slab.spans:
+            continue
+        end = slab.spans[-1][1]
+        words = f"{slab.layer.index} {slab.layer.role.replace('-', ' ')}"
+        if slab.layer.role == "chamber-mask" and end > base_end:
+            words += ", inlet strip"
+        found = _in_slab(words, end - min(0.2, 0.25 * (end - slab.spans[-1][0])), slab)
+        labels.append(found._replace(material=slab.layer.film.material))
+    return labels
 
 
 def feature_labels(section: Section) -> list[Label]:
-    """Bond, neck ring, overhang, bore, pocket, lumen and inlet, where the section has them."""
+    """Bond, neck ring, overhang, bore, pocket and lumen, where the section has them."""
     found = [
         _bond(section),
         _pocket(section),
@@ -44,7 +45,6 @@ def feature_labels(section: Section) -> list[Label]:
         _overhang(section),
         _bore(section),
         _lumen(section),
-        _inlet(section),
     ]
     return [label for label in found if label is not None]
 
@@ -69,18 +69,25 @@ def _bond(section: Section) -> Label | None:
 
 
 def _pocket(section: Section) -> Label | None:
-    """The pocket of the second balloon, or of the only one."""
+    """The pocket of the second balloon, or of the only one (open toward its inlet)."""
     joints = _joints(section, "chamber")[:2]
     for joint in reversed(joints):
         pocket = opening(joint.spans, 0.0)
         if pocket is not None:
             words = f"chamber pocket {length(pocket[1] - pocket[0])}"
             return _in_gap(words, 0.6 * pocket[0], joint)
+        before = [end for _, end in joint.spans if end < 0]
+        if before:
+            return _in_gap("chamber pocket", 0.6 * max(before), joint)
     return None
 
 
 def _neck_ring(section: Section) -> Label | None:
+    """The bond beside the bore that carries one balloon on the next, or a sheet's window."""
     for joint in _joints(section, "separator"):
+        for start, end in joint.spans:
+            if start < 0 < end:
+                return _in_gap(f"window, bond {length(end - start)}", (start + end) / 2, joint)
         beside = [span for span in joint.spans if span[1] <= 0]
         if beside:
             start, end = max(beside)
@@ -89,20 +96,16 @@ def _neck_ring(section: Section) -> Label | None:
 
 
 def _overhang(section: Section) -> Label | None:
-    """The lowest separator mask past the wall above it, on the side away from the inlet."""
-    for below, above in zip(section.slabs, section.slabs[1:], strict=False):
-        if below.layer.role != "separator-mask" or not below.spans or not above.spans:
+    """The lowest separator mask past the wall above it, away from the inlet if that shows."""
+    for mask, wall in pairwise(section.slabs):
+        if mask.layer.role != "separator-mask" or not mask.spans or not wall.spans:
             continue
-        span = _past(below, above)
-        if span is not None and not section.cropped:
-            s = (span[0] + span[1]) / 2
-            return _in_slab(f"overhang {length(span[1] - span[0])}", s, below)
+        start, end = mask.spans[0][0], wall.spans[0][0]
+        if section.cropped:
+            start, end = wall.spans[-1][1], mask.spans[-1][1]
+        if end - start > 1e-3:
+            return _in_slab(f"overhang {length(end - start)}", (start + end) / 2, mask)
     return None
-
-
-def _past(mask: Slab, wall: Slab) -> Interval | None:
-    start, end = mask.spans[0][0], wall.spans[0][0]
-    return (start, end) if end - start > 1e-3 else None
 
 
 def _bore(section: Section) -> Label | None:
@@ -121,19 +124,6 @@ def _lumen(section: Section) -> Label | None:
     if through is None:
         return None
     return _in_slab(f"lumen ⌀{length(through[1] - through[0])}", section.lumen, cap)
-
-
-def _inlet(section: Section) -> Label | None:
-    """The strip that keeps the tab open for the tube: a mask that reaches past every film."""
-    mask = max(
-        (slab for slab in section.slabs if slab.layer.role == "chamber-mask" and slab.spans),
-        key=lambda slab: slab.spans[-1][1],
-        default=None,
-    )
-    base = section.slabs[0]
-    if mask is None or mask.spans[-1][1] < base.spans[-1][1]:
-        return None
-    return _in_slab("inlet strip", mask.spans[-1][1] - 2.0, mask)
 
 
 def _in_slab(words: str, s: float, slab: Slab) -> Label:

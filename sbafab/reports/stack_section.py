@@ -11,7 +11,7 @@ from sbafab.laminate.laminate import Laminate, Layer
 
 MOST_BALLOONS = 4
 """Up to so many balloons are shown in full."""
-BEYOND_LUMEN = 1.5
+BEYOND_LUMEN = 3.25
 
 
 @dataclass(frozen=True)

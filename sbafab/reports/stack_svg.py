@@ -17,7 +17,7 @@ from sbafab.reports.stack_labels import Label, feature_labels, layer_labels
 from sbafab.reports.stack_section import Joint, Section, Slab, chamber_section, opening
 
 PAGE_WIDTH = 297.0
-LEFT, RIGHT = 58.0, 47.0
+LEFT, RIGHT = 56.0, 56.0
 HEAD, FOOT = 42.0, 36.0
 TALLEST = 120.0
 TALLEST_FILM = 8.0
@@ -116,8 +116,9 @@ def _joint(joint: Joint, view: View) -> list[str]:
 
 def _heading(laminate: Laminate, view: View) -> list[str]:
     what = (
-        f"section through chamber {view.section.chamber} along its inlet; "
-        f"height exaggerated {view.factor}{draw.TIMES}; all dimensions in mm"
+        f"Section through {view.section.chamber} along its inlet. "
+        f"Height exaggerated {view.factor}{draw.TIMES}, {number(laminate.thickness)} in all "
+        "(nominal). All dimensions in mm."
     )
     return [
         draw.text((10.0, 13.0), laminate.name, size=4.6, bold=True),
@@ -140,7 +141,7 @@ def _breaks(view: View) -> list[str]:
         parts.append(draw.text(middle, words, anchor="middle"))
     if section.cropped:
         x = view.x(section.low)
-        parts.append(_wave((x, HEAD - 2.0), (x, HEAD + view.height + 2.0)))
+        parts.append(_wave((x, HEAD - 2.0), (x, HEAD + view.height + 2.0), white=1.5))
     return parts
 
 
@@ -150,18 +151,19 @@ def _reach(section: Section) -> float:
     return max(end for slab in above for _, end in slab.spans)
 
 
-def _wave(start: Point, end: Point) -> str:
-    """A break line: a gentle wave over a white band."""
-    steps = max(8, round(math.dist(start, end) / 1.0))
-    (x0, y0), (x1, y1) = start, end
-    nx, ny = (y1 - y0) / math.dist(start, end), -(x1 - x0) / math.dist(start, end)
+def _wave(start: Point, end: Point, white: float = 0.0) -> str:
+    """A wavy break line, with a white band beside it that hides straight edges."""
+    away = math.dist(start, end)
+    steps = max(8, round(away))
+    (x0, y0), (u, v) = start, ((end[0] - start[0]) / away, (end[1] - start[1]) / away)
     points = []
     for i in range(steps + 1):
-        sway = 0.5 * math.sin(math.tau * i / 8)
-        points.append(
-            (x0 + (x1 - x0) * i / steps + sway * nx, y0 + (y1 - y0) * i / steps + sway * ny)
-        )
-    return draw.line(points, colour=draw.GREY, width=0.2)
+        along, sway = away * i / steps, 0.5 * math.sin(math.tau * i / 8)
+        points.append((x0 + along * u + sway * v, y0 + along * v - sway * u))
+    curve = draw.line(points, colour=draw.GREY, width=0.2)
+    if not white:
+        return curve
+    return draw.box((x0 - white, y0), (x0, end[1]), fill="#ffffff") + curve
 
 
 def _dimensions_above(view: View) -> list[str]:
@@ -203,13 +205,16 @@ def _dimensions_below(view: View) -> list[str]:
         stops.append(ends[-1])
     parts: list[str] = []
     for start, end in pairwise(stops):
-        parts += _level(view, (start, end), bottom, (0.0, 1.0), 6.0)
+        name = "tab" if start == cap_end else "overhang"
+        parts += _level(view, (start, end), bottom, (0.0, 1.0), 6.0, name)
     return parts
 
 
-def _level(view: View, span: Interval, y: float, away: Point, distance: float) -> list[str]:
+def _level(
+    view: View, span: Interval, y: float, away: Point, distance: float, name: str = ""
+) -> list[str]:
     start, end = span
-    words = length(end - start)
+    words = f"{name} {length(end - start)}".strip()
     return draw.dimension((view.x(start), y), (view.x(end), y), words, away, distance)
 
 

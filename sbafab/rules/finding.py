@@ -10,7 +10,7 @@ Verdict = Literal["pass", "fail", "waived", "warn"]
 
 @dataclass(frozen=True)
 class Place:
-    """Where a worst value occurs: interface (counted from 1, or None), layer indices, x, y in mm."""
+    """Where a worst value occurs: interface (from 1, or None), layer indices, x and y in mm."""
 
     interface: int | None = None
     layers: tuple[int, ...] = ()

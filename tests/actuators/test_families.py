@@ -69,7 +69,7 @@ def test_inlet_strip_reaches_one_overhang_past_the_tab() -> None:
 def test_only_base_and_cap_have_no_bore() -> None:
     for layer in laminate("3dof-15mm", "stack.balloons=3").layers:
         open_at = [pin.name for pin in laminate("3dof-15mm").pins_through(layer)]
-        bored = [name for name in open_at if name != "pin-lumen"]
+        bored = [name for name in open_at if name != "lumen"]
         assert len(bored) == (0 if layer.role in ("base", "cap") else 3), layer.name
 
 

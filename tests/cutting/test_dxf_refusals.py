@@ -50,7 +50,7 @@ def entity(text: str, kind: str) -> str:
         ("AcDbPolyline\n", "AcDbPolyline\n 43\n0.2\n", "has a width"),
         ("AcDbPolyline\n", "AcDbPolyline\n210\n0.0\n220\n0.0\n230\n-1.0\n", "not at z = 0"),
         ("\n 30\n0.0\n 40\n1.0\n", "\n 30\n0.1\n 40\n1.0\n", "not at z = 0"),
-        ("\n 30\n0.0\n 40\n1.0\n", "\n 30\n0.0\n 40\n0.0\n", "has no radius"),
+        ("\n 30\n0.0\n 40\n1.0\n", "\n 30\n0.0\n 40\n0.0\n", "an edge of no length"),
         ("\n 30\n0.0\n 40\n1.0\n", "\n 30\n0.0\n 40\nnan\n", "is no number"),
         ("\n 30\n0.0\n 40\n1.0\n", "\n 30\n0.0\n 40\n3.8\n", "touch or cross"),
         ("\n 40\n1.0\n", "\n 40\nwide\n", "not a sound DXF"),
@@ -161,3 +161,29 @@ def test_truncated_file_is_refused(
 def test_missing_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"gone\.dxf: cannot be read"):
         read_profile(tmp_path / "gone.dxf")
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda model: model.add_line((20, 0), (20, 0), dxfattribs=OUTER),
+        lambda model: model.add_arc((20, 0), 1.0, 45.0, 45.0, dxfattribs=OUTER),
+        lambda model: model.add_circle((20, 0), -1.0, dxfattribs=OUTER),
+    ],
+)
+def test_edges_of_no_length_are_refused(
+    draw: Callable[[Modelspace], object], plate_text: str
+) -> None:
+    with pytest.raises(OutputError, match="edge of no length"):
+        read_profile(drawn(plate_text, draw))
+
+
+@pytest.mark.parametrize("layer", ["ENGRAVE", "CUT_SHEET", "REFERENCE"])
+def test_what_is_not_of_the_part_is_counted_apart(layer: str, plate_text: str) -> None:
+    text = drawn(
+        plate_text,
+        lambda model: model.add_lwpolyline(SQUARE, close=True, dxfattribs={"layer": layer}),
+    )
+    found = read_profile(text)
+    assert found.region == read_profile(plate_text).region
+    assert found.other == ("LINE", "LINE", "LWPOLYLINE")

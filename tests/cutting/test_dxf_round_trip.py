@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import dxf_text, number
+from sbafab.cutting.dxf_write import DxfProfile, dxf_text, number
 from sbafab.cutting.order import cutting_order
 from sbafab.geometry.edges import Arc, Line, Point
 from sbafab.geometry.region import Contour, Region
@@ -27,10 +27,10 @@ def outlines(region: Region) -> list[shapely.LinearRing]:
     ("profile", "allowed"), [("bulges", 1e-3), ("arcs", 1e-3), ("chords", 6e-3)]
 )
 def test_contours_come_back_within_a_micrometre(
-    name: str, profile: str, allowed: float, profiles: dict[str, Region]
+    name: str, profile: DxfProfile, allowed: float, profiles: dict[str, Region]
 ) -> None:
     region = profiles[name]
-    found = read_profile(dxf_text(cutting_order(region), {}, profile)).region  # type: ignore[arg-type]
+    found = read_profile(dxf_text(cutting_order(region), {}, profile)).region
     assert (len(found.outers), len(found.holes)) == (len(region.outers), len(region.holes))
     expected = outlines(region)
     for ring in outlines(found):
@@ -38,8 +38,8 @@ def test_contours_come_back_within_a_micrometre(
 
 
 @pytest.mark.parametrize("profile", ["bulges", "arcs"])
-def test_arcs_stay_the_same_arcs(profile: str, plate: Region) -> None:
-    found = read_profile(dxf_text(cutting_order(plate), {}, profile)).region  # type: ignore[arg-type]
+def test_arcs_stay_the_same_arcs(profile: DxfProfile, plate: Region) -> None:
+    found = read_profile(dxf_text(cutting_order(plate), {}, profile)).region
     radii = sorted(round(edge.radius, 5) for edge in found.edges if isinstance(edge, Arc))
     assert radii == sorted(round(edge.radius, 5) for edge in plate.edges if isinstance(edge, Arc))
     assert math.isclose(found.area, plate.area, rel_tol=1e-8)

@@ -14,13 +14,20 @@ import pytest
 import sbafab
 from sbafab.cutting import files
 from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.dxf_write import DxfProfile
 from sbafab.cutting.files import write_layer_files
 from sbafab.cutting.properties import CutSettings
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
 
 SETTINGS = CutSettings("two-plates", "ab" * 32)
-CALIBRATED = CutSettings("two-plates", "ab" * 32, {"TPE": 0.1, "PTFE": None}, ("bond-width",))
+CALIBRATED = CutSettings(
+    "two-plates",
+    "ab" * 32,
+    {"TPE": 0.1, "PTFE": None},
+    ("bond-width", "tube-fit"),
+    generator="sbafab 1.2.3",
+)
 
 
 def test_every_layer_has_its_file_bottom_to_top(laminate: Laminate, tmp_path: Path) -> None:
@@ -61,8 +68,8 @@ def test_kerf_is_stated_and_done_for_each_material(laminate: Laminate, tmp_path:
         "UNITS": "mm",
         "KERF_STATE": "compensated",
         "KERF_WIDTH": "0.1",
-        "WAIVED": "bond-width",
-        "GENERATOR": f"sbafab {sbafab.__version__}",
+        "WAIVED": "bond-width, tube-fit",
+        "GENERATOR": "sbafab 1.2.3",
     }
     radii = [contour.circle[1] for contour in found.region.holes if contour.circle]
     assert sorted(radii) == pytest.approx([0.45, 0.45, 0.45, 0.95], abs=1e-6)
@@ -86,9 +93,9 @@ def test_ptfe_carries_the_fume_warning(laminate: Laminate, tmp_path: Path) -> No
     ("profile", "kinds"), [("arcs", {"LINE", "ARC", "CIRCLE"}), ("chords", {"LWPOLYLINE"})]
 )
 def test_other_ways_of_writing_curves(
-    profile: str, kinds: set[str], laminate: Laminate, tmp_path: Path
+    profile: DxfProfile, kinds: set[str], laminate: Laminate, tmp_path: Path
 ) -> None:
-    settings = CutSettings("two-plates", "", profile=profile, chord_error=0.01)  # type: ignore[arg-type]
+    settings = CutSettings("two-plates", "", profile=profile, chord_error=0.01)
     base, *_ = write_layer_files(laminate, tmp_path, settings)
     model = ezdxf.readfile(tmp_path / base.path).modelspace()
     assert {entity.dxftype() for entity in model.query('*[layer!="REFERENCE"]')} == kinds

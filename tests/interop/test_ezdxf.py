@@ -67,9 +67,10 @@ def test_entities_lie_flat_in_model_space(profile: DxfProfile, kinds: set[str]) 
     assert {entity.dxftype() for entity in model} == kinds
     assert len(drawing.paperspace()) == 0
     for entity in model:
+        attributes = entity.dxfattribs()
         for name in ("start", "end", "center"):
-            assert entity.dxf.get(name, (0, 0, 0))[2] == 0.0
-        assert entity.dxf.get("elevation", 0.0) == 0.0
+            assert attributes.get(name, (0, 0, 0))[2] == 0.0
+        assert not {"elevation", "extrusion", "thickness", "const_width"} & attributes.keys()
     reference = model.query('*[layer=="REFERENCE"]')
     assert len(reference) == 2
     assert [entity.dxf.handle for entity in reference] == [

@@ -1,0 +1,202 @@
+"""preview/solid.png: the flat actuator in shaded 3D, cut open at one chamber.
+
+A laminate is a stack of prisms seen from above, so painting it from the bottom up hides exactly
+what is hidden; within one prism the walls go far to near, then its top face.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from sbafab.geometry.edges import Line, Point
+from sbafab.geometry.region import Region
+from sbafab.laminate.laminate import Laminate
+from sbafab.reports.canvas import Canvas, Tone, keyhole
+from sbafab.reports.cutaway import Cut, cutaway
+
+ELEVATION = math.radians(36.0)
+TURN = math.radians(62.0)
+"""How far the eye stands round from the face of the cut that runs through the inlet."""
+LIGHT = math.radians(-50.0)
+FACTORS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30)
+HEIGHT_SHARE = 0.6
+SUPERSAMPLE = 2
+MARGIN, FOOT = 0.05, 0.09
+SAGITTA_PX = 0.4
+
+
+class Prism(NamedTuple):
+    """A region from ``z`` up by ``thickness`` (true mm); ``covered`` of its top is in shade."""
+
+    name: str
+    region: Region
+    covered: Region
+    z: float
+    thickness: float
+    bond: bool
+
+
+class Camera(NamedTuple):
+    """A parallel projection: plan and true height in mm to pixels, x right and y down."""
+
+    right: Point
+    toward: Point
+    scale: float
+    rise: float
+    centre: Point
+
+    def flat(self, p: Point) -> Point:
+        """A point of the press plate."""
+        along = p[0] * self.toward[0] + p[1] * self.toward[1]
+        across = p[0] * self.right[0] + p[1] * self.right[1]
+        return (
+            self.centre[0] + self.scale * across,
+            self.centre[1] + self.scale * along * math.sin(ELEVATION),
+        )
+
+    def lift(self, z: float) -> float:
+        """Pixels up the picture for a true height."""
+        return z * self.rise
+
+
+class Wall(NamedTuple):
+    """One facet of a prism's side that faces the eye, on the press plate, in pixels."""
+
+    start: Point
+    end: Point
+    tone: Tone
+    level: float
+
+
+class Shape(NamedTuple):
+    """A prism's region seen by the camera at z = 0: walls far to near, and pieces with holes."""
+
+    walls: list[Wall]
+    faces: list[list[list[Point]]]
+    shade: list[list[list[Point]]]
+
+
+def solid_png(laminate: Laminate, width: int = 1600, height: int = 1200) -> bytes:
+    """The TPE solid, cut open at one chamber, as PNG; height exaggerated as its caption says."""
+    cut = cutaway(laminate)
+    factor = _factor(laminate)
+    camera = _camera(laminate, cut, factor, width * SUPERSAMPLE, height * SUPERSAMPLE)
+    canvas = Canvas(width, height, SUPERSAMPLE)
+    shapes: dict[str, Shape] = {}
+    for prism in _prisms(laminate):
+        if prism.name not in shapes:
+            shapes[prism.name] = _shape(prism, cut, camera)
+        _paint(prism, shapes[prism.name], camera, canvas)
+    base = next(iter(shapes.values()))
+    what = f"{laminate.balloons} balloons" if laminate.balloons > 1 else "one balloon"
+    caption = (
+        f"{laminate.name}: TPE solid of {what} before inflation, cut open at {cut.chamber}; "
+        f"height exaggerated {factor} times"
+    )
+    return canvas.png([rings[0] for rings in base.faces], caption)
+
+
+def _factor(laminate: Laminate) -> int:
+    """A round exaggeration that gives a pleasing height."""
+    breadth = math.sqrt(laminate.layers[-1].profile.area)
+    most = HEIGHT_SHARE * breadth / laminate.thickness
+    return max(step for step in FACTORS if step <= max(most, 1.0))
+
+
+def _camera(laminate: Laminate, cut: Cut, factor: int, width: int, height: int) -> Camera:
+    """The camera that looks into the cut and fills the picture."""
+    angle = cut.last - TURN
+    toward = math.cos(angle), math.sin(angle)
+    right = -toward[1], toward[0]
+    plain = Camera(right, toward, 1.0, factor * math.cos(ELEVATION), (0.0, 0.0))
+    points = [
+        plain.flat(p)
+        for layers in laminate.patterns.values()
+        if not layers[0].is_mask
+        for contour in layers[0].profile.outers
+        for p in contour.polygon(0.05)
+    ]
+    low_x, high_x = min(p[0] for p in points), max(p[0] for p in points)
+    low_y, high_y = min(p[1] for p in points), max(p[1] for p in points)
+    low_y -= plain.lift(laminate.thickness)
+    room_x, room_y = width * (1 - 2 * MARGIN), height * (1 - 2 * MARGIN - FOOT)
+    scale = min(room_x / (high_x - low_x), room_y / (high_y - low_y))
+    centre = (
+        width / 2 - scale * (low_x + high_x) / 2,
+        height * (1 - FOOT) / 2 - scale * (low_y + high_y) / 2,
+    )
+    return Camera(right, toward, scale, plain.rise * scale, centre)
+
+
+def _prisms(laminate: Laminate) -> Iterator[Prism]:
+    """Films and the bonds in the gaps between them, bottom to top."""
+    above = {interface.below.index: interface for interface in laminate.interfaces}
+    for layer in laminate.tpe_layers:
+        interface = above.get(layer.index)
+        thickness = layer.film.thickness
+        if interface is None or not interface.gap:
+            yield Prism(layer.pattern, layer.profile, Region(), layer.z, thickness, False)
+            continue
+        name = " ".join(interface.pattern)
+        yield Prism(name, layer.profile, interface.unbonded, layer.z, thickness, False)
+        yield Prism(f"bond {name}", interface.bond, Region(), interface.z, interface.gap, True)
+
+
+def _shape(prism: Prism, cut: Cut, camera: Camera) -> Shape:
+    region = prism.region - cut.removed
+    sagitta = SAGITTA_PX / camera.scale
+    walls = sorted(_walls(region, prism.bond, cut, camera, sagitta), key=lambda w: _depth(w))
+    return Shape(
+        walls,
+        [] if prism.bond else _on_page(region, camera, sagitta),
+        _on_page(prism.covered - cut.removed, camera, sagitta),
+    )
+
+
+def _depth(wall: Wall) -> float:
+    return wall.start[1] + wall.end[1]
+
+
+def _walls(region: Region, bond: bool, cut: Cut, camera: Camera, sagitta: float) -> Iterator[Wall]:
+    """The facets that face the eye; material lies on the left of each, so right is outward."""
+    light = cut.last - TURN + LIGHT
+    for contour in region.contours:
+        points = contour.polygon(sagitta)
+        for start, end in zip(points, points[1:] + points[:1], strict=True):
+            nx, ny = end[1] - start[1], start[0] - end[0]
+            length = math.hypot(nx, ny)
+            if nx * camera.toward[0] + ny * camera.toward[1] <= 1e-6 * length:
+                continue
+            on_cut = cut.on_face(Line(start, end))
+            tone: Tone = "bond" if bond else "film"
+            if on_cut:
+                tone = "cut bond" if bond else "cut film"
+            lit = (nx * math.cos(light) + ny * math.sin(light)) / length
+            level = 0.92 + 0.08 * lit if on_cut else 0.74 + 0.22 * lit
+            yield Wall(camera.flat(start), camera.flat(end), tone, level)
+
+
+def _on_page(region: Region, camera: Camera, sagitta: float) -> list[list[list[Point]]]:
+    return [
+        [[camera.flat(p) for p in ring] for ring in piece] for piece in region.polygons(sagitta)
+    ]
+
+
+def _paint(prism: Prism, shape: Shape, camera: Camera, canvas: Canvas) -> None:
+    low, high = camera.lift(prism.z), camera.lift(prism.z + prism.thickness)
+    for (x0, y0), (x1, y1), tone, level in shape.walls:
+        quad = [(x0, y0 - low), (x1, y1 - low), (x1, y1 - high), (x0, y0 - high)]
+        canvas.fill(quad, tone, level)
+    for rings in shape.faces:
+        canvas.fill(_raised(keyhole(rings), high), "film", 1.0)
+    for rings in shape.shade:
+        canvas.fill(_raised(keyhole(rings), high), "shade", 1.0)
+    for rings in shape.faces:
+        for ring in rings:
+            canvas.outline(_raised(ring, high))
+
+
+def _raised(points: list[Point], lift: float) -> list[Point]:
+    return [(x, y - lift) for x, y in points]

@@ -1,0 +1,46 @@
+"""bond-width: every bond is wide enough everywhere (paper Sec. 2: narrower ones leak)."""
+
+from __future__ import annotations
+
+from sbafab.geometry.width import Width, least_width
+from sbafab.laminate.laminate import Laminate
+from sbafab.rules.alike import Alike, distinct_interfaces, interface_name
+from sbafab.rules.finding import Finding, Place
+from sbafab.rules.limits import Limits, at, holds
+
+NAME = "bond-width"
+
+
+def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+    """The least width of any bond, measured between facing edges."""
+    worst: tuple[float, Width | None, Alike] | None = None
+    for alike in distinct_interfaces(laminate):
+        bond = alike.interface.bond
+        width = None if bond.is_empty else least_width(bond)
+        if width is None and not bond.is_empty:
+            continue
+        value = width.value if width else 0.0
+        if worst is None or value < worst[0]:
+            worst = value, width, alike
+    if worst is None:
+        return [_finding(None, limits, Place(), "the laminate has no bond to measure")]
+    value, width, alike = worst
+    interface = alike.interface
+    x, y = width.middle if width else (None, None)
+    place = Place(interface.index, interface.layer_indices, x, y)
+    return [_finding(value, limits, place, _message(value, width, alike, limits))]
+
+
+def _finding(value: float | None, limits: Limits, place: Place, message: str) -> Finding:
+    good = value is not None and holds(value, limits.bond_width)
+    return Finding(NAME, "pass" if good else "fail", limits.bond_width, value, "mm", place, message)
+
+
+def _message(value: float, width: Width | None, alike: Alike, limits: Limits) -> str:
+    where = interface_name(alike.interface) + alike.others
+    if width is None:
+        return f"nothing bonds at {where}: the mask covers all of it; make the mask smaller"
+    narrowest = f"the narrowest bond is {value:.3f} mm, at {where}, {at(width.middle)}"
+    if holds(value, limits.bond_width):
+        return narrowest
+    return f"{narrowest}; it needs {limits.bond_width:g}: move the edges on either side apart there"

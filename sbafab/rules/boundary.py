@@ -1,0 +1,151 @@
+"""Edges of one region that run on another's boundary, and how far off the next edge lies."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+from sbafab.geometry.boolean import PointPool, split_edges
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, left_normal
+from sbafab.geometry.intersect import line_circle
+from sbafab.geometry.region import Region
+
+END_ROOM = 1e-5
+"""mm left out at both ends of an edge: what starts at a corner does not lie beside the edge."""
+
+
+def edges_along(region: Region, other: Region) -> list[Edge]:
+    """The stretches of ``region``'s edges that run along edges of ``other``, the same way."""
+    edges = [*region.edges, *other.edges]
+    own = len(region.edges)
+    pool = PointPool()
+    middles: dict[tuple[Point, Point], list[Point]] = {}
+    stretches: list[Edge] = []
+    for index, pieces in enumerate(split_edges(edges, pool)):
+        if index < own:
+            stretches += pieces
+        else:
+            for piece in pieces:
+                middles.setdefault((piece.start, piece.end), []).append(piece.at(0.5))
+    return [
+        piece
+        for piece in stretches
+        if any(
+            math.dist(piece.at(0.5), middle) < 4 * EPSILON
+            for middle in middles.get((piece.start, piece.end), ())
+        )
+    ]
+
+
+def beside(edge: Edge, distance: float) -> Point:
+    """The point ``distance`` to the left of the edge's middle (right where negative)."""
+    middle = edge.at(0.5)
+    nx, ny = left_normal(edge, middle)
+    return middle[0] + nx * distance, middle[1] + ny * distance
+
+
+class Reach(NamedTuple):
+    """Distance along an edge's right-hand normal to the first other edge, and where that is."""
+
+    value: float
+    at: Point
+
+
+def outward_reach(edge: Edge, others: Iterable[Edge]) -> Reach | None:
+    """The least distance from ``edge``, along its right-hand normal, to any of ``others``.
+
+    Measured in the band that the edge sweeps along its normals; None if nothing lies in it.
+    """
+    within = _line_band(edge) if isinstance(edge, Line) else _arc_band(edge)
+    best: Reach | None = None
+    for other in others:
+        for p in within.nearest_candidates(other):
+            height = within.height(p)
+            if (
+                height is not None
+                and height > -EPSILON
+                and (best is None or height < best.value - 1e-9)
+            ):
+                best = Reach(max(0.0, height), p)
+    return best
+
+
+class _Band(NamedTuple):
+    """The band beside an edge: its two side rays, and the edge itself."""
+
+    edge: Edge
+    rays: tuple[tuple[Point, Point], tuple[Point, Point]]
+
+    def height(self, p: Point) -> float | None:
+        """Distance of ``p`` from the edge along the normal; None beside the band."""
+        edge = self.edge
+        room = 0.5 * END_ROOM / edge.length
+        if not room <= edge.parameter(p) <= 1 - room:
+            return None
+        if isinstance(edge, Arc):
+            outward = math.dist(p, edge.centre) - edge.radius
+            return outward if edge.ccw else -outward
+        nx, ny = left_normal(edge, p)
+        return -((p[0] - edge.start[0]) * nx + (p[1] - edge.start[1]) * ny)
+
+    def nearest_candidates(self, other: Edge) -> Iterator[Point]:
+        """Points of ``other`` of which one is the nearest within the band."""
+        yield other.start
+        yield other.end
+        yield from _extremes(self.edge, other)
+        for origin, unit in self.rays:
+            yield from _on_ray(origin, unit, other)
+
+
+def _line_band(line: Line) -> _Band:
+    ux, uy = line.direction(line.start)
+    (x0, y0), (x1, y1) = line.start, line.end
+    first = (x0 + ux * END_ROOM, y0 + uy * END_ROOM)
+    last = (x1 - ux * END_ROOM, y1 - uy * END_ROOM)
+    return _Band(line, ((first, (uy, -ux)), (last, (uy, -ux))))
+
+
+def _arc_band(arc: Arc) -> _Band:
+    room = END_ROOM / arc.length
+    cx, cy = arc.centre
+    first, last = (
+        ((p[0] - cx) / arc.radius, (p[1] - cy) / arc.radius)
+        for p in (arc.at(room), arc.at(1 - room))
+    )
+    return _Band(arc, ((arc.centre, first), (arc.centre, last)))
+
+
+def _extremes(edge: Edge, other: Edge) -> Sequence[Point]:
+    """Where ``other`` runs parallel to ``edge``: there its distance has a least value."""
+    if isinstance(other, Line):
+        if isinstance(edge, Line):
+            return ()
+        foot = other.nearest(edge.centre)
+        return (foot,)
+    if isinstance(edge, Line):
+        nx, ny = left_normal(edge, edge.start)
+    else:
+        dx, dy = edge.centre[0] - other.centre[0], edge.centre[1] - other.centre[1]
+        gap = math.hypot(dx, dy)
+        if gap < EPSILON:
+            return ()
+        nx, ny = dx / gap, dy / gap
+    (cx, cy), r = other.centre, other.radius
+    feet = ((cx + r * nx, cy + r * ny), (cx - r * nx, cy - r * ny))
+    return [foot for foot in feet if 0 <= other.parameter(foot) <= 1]
+
+
+def _on_ray(origin: Point, unit: Point, edge: Edge) -> list[Point]:
+    """Where the line through ``origin`` crosses the edge."""
+    if isinstance(edge, Arc):
+        found = line_circle(origin, unit, edge.centre, edge.radius)
+    else:
+        ux, uy = edge.direction(edge.start)
+        cross = unit[0] * uy - unit[1] * ux
+        if abs(cross) < 1e-12:
+            return []
+        (x, y), (ox, oy) = edge.start, origin
+        t = ((x - ox) * uy - (y - oy) * ux) / cross
+        found = [(ox + t * unit[0], oy + t * unit[1])]
+    return [p for p in found if -1e-12 <= edge.parameter(p) <= 1 + 1e-12]

@@ -1,0 +1,108 @@
+"""channel-clear: what is open through all layers of a channel still passes its diameter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from sbafab.geometry.edges import Point
+from sbafab.geometry.region import Contour
+from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.rules.channels import Channel, channels
+from sbafab.rules.finding import Finding, Place
+from sbafab.rules.limits import Limits, at, holds
+
+NAME = "channel-clear"
+
+GOLDEN = (math.sqrt(5) - 1) / 2
+FINE = 2e-5
+"""mm: how near the place of the best clearance is found; the clearance itself is far nearer."""
+
+
+class _Clear(NamedTuple):
+    channel: Channel
+    diameter: float
+    at: Point
+    layer: Layer
+
+
+def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+    """The diameter that passes through each channel, worst against what the design states."""
+    del limits
+    found = [_clear(channel) for channel in channels(laminate)]
+    if not found:
+        message = "no balloon is joined to another, so there is no channel to keep clear"
+        return [Finding(NAME, "pass", None, None, "mm", Place(), message)]
+    worst = min(found, key=lambda clear: clear.diameter - clear.channel.diameter)
+    stated = worst.channel.diameter
+    good = holds(worst.diameter, stated)
+    message = f"the {worst.channel.name} passes {worst.diameter:.3f} mm, {at(worst.at)}"
+    if not good:
+        message += (
+            f", and should pass {stated:g}; layer {worst.layer.index} ({worst.layer.name}) stands "
+            "in the way: open or align its hole"
+        )
+    place = Place(None, (worst.layer.index,), *worst.at)
+    return [Finding(NAME, "pass" if good else "fail", stated, worst.diameter, "mm", place, message)]
+
+
+def _clear(channel: Channel) -> _Clear:
+    closed = next((a for a in channel.layers if a.profile.contains(channel.centre)), None)
+    if closed is not None:
+        return _Clear(channel, 0.0, channel.centre, closed)
+    room = {layer.index: layer.profile.distance_to_edge(channel.centre) for layer in channel.layers}
+    tightest = min(channel.layers, key=lambda layer: room[layer.index])
+    radius = room[tightest.index]
+    # A circle round the axis cannot be beaten from any other place.
+    if any(_is_round_about(hole, channel.centre, radius) for hole in tightest.profile.holes):
+        return _Clear(channel, 2 * radius, channel.centre, tightest)
+    near = [layer for layer in channel.layers if room[layer.index] < 2 * channel.diameter]
+
+    def clearance(p: Point) -> float:
+        return min(_signed_room(layer, p) for layer in near)
+
+    best = _highest(clearance, channel.centre, channel.diameter / 2)
+    tightest = min(near, key=lambda layer: _signed_room(layer, best))
+    return _Clear(channel, max(0.0, 2 * clearance(best)), best, tightest)
+
+
+def _is_round_about(hole: Contour, centre: Point, radius: float) -> bool:
+    circle = hole.circle
+    return (
+        circle is not None
+        and math.dist(circle[0], centre) < 1e-6
+        and abs(circle[1] - radius) < 1e-6
+    )
+
+
+def _signed_room(layer: Layer, p: Point) -> float:
+    """Distance to the nearest edge, negative inside the film."""
+    room = layer.profile.distance_to_edge(p)
+    return -room if layer.profile.contains(p) else room
+
+
+def _highest(value: Callable[[Point], float], start: Point, reach: float) -> Point:
+    """Where a concave function is highest, by golden section along y within one along x."""
+
+    def best_y(x: float) -> float:
+        return _golden(lambda y: value((x, y)), start[1] - reach, start[1] + reach)
+
+    x = _golden(lambda x: value((x, best_y(x))), start[0] - reach, start[0] + reach)
+    return x, best_y(x)
+
+
+def _golden(value: Callable[[float], float], low: float, high: float) -> float:
+    points: Sequence[float] = (high - GOLDEN * (high - low), low + GOLDEN * (high - low))
+    a, b = points
+    at_a, at_b = value(a), value(b)
+    while high - low > FINE:
+        if at_a > at_b:
+            high, b, at_b = b, a, at_a
+            a = high - GOLDEN * (high - low)
+            at_a = value(a)
+        else:
+            low, a, at_a = a, b, at_b
+            b = low + GOLDEN * (high - low)
+            at_b = value(b)
+    return (low + high) / 2

@@ -1,0 +1,67 @@
+"""The rule deck: all rules in the order they are reported."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import NamedTuple
+
+from sbafab.laminate.laminate import Laminate
+from sbafab.rules import (
+    bond_width,
+    channel_clear,
+    film_limits,
+    mask_overhang,
+    piece_count,
+    press_fit,
+    registration_nominal,
+    sealing,
+    tube_fit,
+)
+from sbafab.rules.finding import Finding
+from sbafab.rules.limits import Limits
+
+
+class Rule(NamedTuple):
+    """A rule's stable name and the function that measures it."""
+
+    name: str
+    check: Callable[[Laminate, Limits], list[Finding]]
+
+
+RULES = (
+    Rule(bond_width.NAME, bond_width.check),
+    Rule(mask_overhang.NAME, mask_overhang.check),
+    Rule(sealing.NAME, sealing.check),
+    Rule(channel_clear.NAME, channel_clear.check),
+    Rule(tube_fit.NAME, tube_fit.check),
+    Rule(piece_count.NAME, piece_count.check),
+    Rule(film_limits.NAME, film_limits.check),
+    Rule(press_fit.NAME, press_fit.check),
+    Rule(registration_nominal.NAME, registration_nominal.check),
+)
+
+
+def run_deck(laminate: Laminate, limits: Limits) -> tuple[Finding, ...]:
+    """What every rule finds, in the deck's order; failures the user waived say so."""
+    return tuple(
+        _waived(finding) if rule.name in limits.waive and finding.verdict == "fail" else finding
+        for rule in RULES
+        for finding in rule.check(laminate, limits)
+    )
+
+
+def has_failed(findings: Iterable[Finding]) -> bool:
+    """Whether a rule failed that nobody waived: then nothing may be cut."""
+    return any(finding.verdict == "fail" for finding in findings)
+
+
+def rule_names() -> tuple[str, ...]:
+    return tuple(rule.name for rule in RULES)
+
+
+def _waived(finding: Finding) -> Finding:
+    return replace(finding, verdict="waived", message=f"waived by the design: {finding.message}")
+
+
+__all__ = ["RULES", "Limits", "Rule", "has_failed", "rule_names", "run_deck"]

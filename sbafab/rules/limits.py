@@ -1,0 +1,40 @@
+"""What the rules measure against."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from sbafab.geometry.edges import Point
+
+TOLERANCE = 0.001
+"""mm by which a value may miss its limit and still hold it: what the cut files promise."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """A design's limits, mm; the defaults are the paper's (Sec. 2).
+
+    ``least_feature`` is the laser's, ``kerf`` the full kerf width by material (none given: not
+    calibrated), ``waive`` the rules whose failure the user accepts by name.
+    """
+
+    bond_width: float = 0.75
+    mask_overhang: float = 0.5
+    least_feature: float = 0.2
+    kerf: Mapping[str, float] = field(default_factory=dict)
+    heated_width: float = 152.4
+    heated_length: float = 152.4
+    validated_balloons: int = 20
+    registration_tolerance: float = 0.001
+    waive: frozenset[str] = frozenset()
+
+
+def holds(measured: float, limit: float) -> bool:
+    """Whether a value reaches a least limit, to within TOLERANCE (with room for rounding)."""
+    return measured >= limit - TOLERANCE - 1e-9
+
+
+def at(p: Point) -> str:
+    """A point as messages print it."""
+    return f"x {p[0] + 0.0:.3f}, y {p[1] + 0.0:.3f}"

@@ -1,0 +1,122 @@
+"""mask-overhang: the masks reach past every film edge they keep apart (paper Sec. 2).
+
+Short of that, film over-melts at the edge. Where a dowel pin stands in a bore a flush mask is
+meant (the pin holds all layers by it); it is reported as waived, by the pin's name.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sbafab.geometry.edges import Arc, Edge, Point
+from sbafab.laminate.interfaces import Interface
+from sbafab.laminate.laminate import Laminate, Pin
+from sbafab.rules.alike import Alike, distinct_interfaces, interface_name
+from sbafab.rules.boundary import edges_along, outward_reach
+from sbafab.rules.finding import Finding, Place
+from sbafab.rules.limits import TOLERANCE, Limits, at, holds
+
+NAME = "mask-overhang"
+
+
+class _Overhang(NamedTuple):
+    value: float
+    at: Point
+    alike: Alike
+
+
+def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+    """The least reach of any mask past an edge that bounds unbonded film, and pins' waivers."""
+    free: list[_Overhang] = []
+    pinned: dict[str, list[_Overhang]] = {}
+    bare: list[Alike] = []
+    for alike in distinct_interfaces(laminate):
+        if alike.interface.kind != "bond" and alike.interface.unbonded.is_empty:
+            bare.append(alike)
+        for edge, overhang in _overhangs(alike):
+            pin = _pin_at(edge, laminate.pins)
+            if pin is not None and not holds(overhang.value, limits.mask_overhang):
+                pinned.setdefault(pin.name, []).append(overhang)
+            else:
+                free.append(overhang)
+    waived = [_waived(pin, pinned[pin.name], limits) for pin in laminate.pins if pin.name in pinned]
+    return [_main(free, bare, limits), *waived]
+
+
+def _overhangs(alike: Alike) -> list[tuple[Edge, _Overhang]]:
+    interface = alike.interface
+    found = []
+    for edge in edges_along(interface.unbonded, interface.contact):
+        reach = outward_reach(edge, interface.mask.edges)
+        if reach is not None:
+            found.append((edge, _Overhang(reach.value, edge.nearest(reach.at), alike)))
+    return found
+
+
+def _pin_at(edge: Edge, pins: tuple[Pin, ...]) -> Pin | None:
+    if not isinstance(edge, Arc) or edge.ccw:
+        return None
+    for pin in pins:
+        if (
+            math.dist(edge.centre, pin.centre) <= TOLERANCE
+            and abs(edge.radius - pin.diameter / 2) <= TOLERANCE
+        ):
+            return pin
+    return None
+
+
+def _main(free: list[_Overhang], bare: list[Alike], limits: Limits) -> Finding:
+    limit = limits.mask_overhang
+    if bare:
+        interface = bare[0].interface
+        message = (
+            f"the mask at {interface_name(interface)}{bare[0].others} lies outside the film, so "
+            "all of it bonds; put the mask where the film is"
+        )
+        return Finding(NAME, "fail", limit, 0.0, "mm", _place(interface), message)
+    if not free:
+        message = "no free film edge lies on a mask"
+        return Finding(NAME, "pass", limit, None, "mm", Place(), message)
+    worst = min(free, key=lambda overhang: overhang.value)
+    interface = worst.alike.interface
+    where = f"{interface_name(interface)}{worst.alike.others}, {at(worst.at)}"
+    good = holds(worst.value, limit)
+    message = f"the least overhang of a mask past a film edge is {worst.value:.3f} mm, at {where}"
+    if not good:
+        message += f"; it needs {limit:g}: let the mask reach further past the edge there"
+    return Finding(
+        NAME,
+        "pass" if good else "fail",
+        limit,
+        worst.value,
+        "mm",
+        _place(interface, worst.at),
+        message,
+    )
+
+
+def _waived(pin: Pin, overhangs: list[_Overhang], limits: Limits) -> Finding:
+    worst = min(overhangs, key=lambda overhang: overhang.value)
+    interface = worst.alike.interface
+    patterns = {overhang.alike.interface.index: overhang.alike.number for overhang in overhangs}
+    count = sum(patterns.values())
+    interfaces = "1 interface" if count == 1 else f"{count} interfaces"
+    message = (
+        f"{pin.name} holds the layers by this opening, so at {interfaces} the mask reaches only "
+        f"{worst.value:.3f} mm past its edge"
+    )
+    return Finding(
+        NAME,
+        "waived",
+        limits.mask_overhang,
+        worst.value,
+        "mm",
+        Place(interface.index, interface.layer_indices, *pin.centre),
+        message,
+    )
+
+
+def _place(interface: Interface, p: Point | None = None) -> Place:
+    x, y = p if p else (None, None)
+    return Place(interface.index, interface.layer_indices, x, y)

@@ -1,0 +1,52 @@
+"""press-fit: the laminate lies within the heated area; few enough balloons to be validated."""
+
+from __future__ import annotations
+
+from sbafab.laminate.laminate import Laminate
+from sbafab.rules.finding import Finding, Place
+from sbafab.rules.limits import TOLERANCE, Limits
+
+NAME = "press-fit"
+
+
+def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+    """How far the laminate, laid either way round, fills the platen; a warning on many balloons."""
+    low_x, low_y, high_x, high_y = laminate.bounds
+    short, long = sorted((high_x - low_x, high_y - low_y))
+    narrow, wide = sorted((limits.heated_width, limits.heated_length))
+    # The side with less room to spare decides.
+    measured, limit = min(((short, narrow), (long, wide)), key=lambda side: side[1] - side[0])
+    good = measured <= limit + TOLERANCE
+    size = f"the laminate measures {high_x - low_x:.3f} x {high_y - low_y:.3f} mm"
+    platen = f"{limits.heated_width:g} x {limits.heated_length:g} mm"
+    message = f"{size} and lies within the heated area of {platen}"
+    place = Place()
+    if not good:
+        message = f"{size} and does not fit the heated area of {platen}; make it smaller"
+        largest = max(
+            (layers[0] for layers in laminate.patterns.values()),
+            key=lambda layer: _extent(layer.profile.bounds),
+        )
+        place = Place(None, (largest.index,), high_x, high_y)
+    found = [Finding(NAME, "pass" if good else "fail", limit, measured, "mm", place, message)]
+    if laminate.balloons > limits.validated_balloons:
+        message = (
+            f"{laminate.balloons} balloons are more than the {limits.validated_balloons} that have "
+            "been built and tested; heat may not reach the middle of the stack"
+        )
+        found.append(
+            Finding(
+                NAME,
+                "warn",
+                float(limits.validated_balloons),
+                float(laminate.balloons),
+                "balloons",
+                Place(),
+                message,
+            )
+        )
+    return found
+
+
+def _extent(box: tuple[float, float, float, float]) -> float:
+    return max(box[2] - box[0], box[3] - box[1])

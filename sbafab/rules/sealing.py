@@ -1,0 +1,185 @@
+"""sealing: every inlet feeds the pockets of its own chamber, all of them, and nothing else."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sbafab.geometry.edges import Point
+from sbafab.geometry.region import Region
+from sbafab.laminate.laminate import Chamber, Laminate
+from sbafab.rules.finding import Finding, Place
+from sbafab.rules.limits import Limits, at
+from sbafab.rules.voids import OUTSIDE, Void, VoidGraph, void_graph
+
+NAME = "sealing"
+
+
+class _Offence(NamedTuple):
+    """What is wrong with one void."""
+
+    message: str
+    interface: int | None
+    at: Point | None
+
+
+def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+    """How many pockets leak, reach a foreign one, are cut off or missing."""
+    del limits
+    graph = void_graph(laminate)
+    owners = _owners(laminate, graph)
+    offences = [
+        *_missing_pockets(laminate, graph, owners),
+        *_wrong_reaches(laminate, graph, owners),
+    ]
+    if not offences:
+        pockets = "1 pocket" if len(owners) == 1 else f"{len(owners)} pockets"
+        message = f"{pockets} sealed, each reached from the inlet of its own chamber alone"
+        return [Finding(NAME, "pass", 0.0, 0.0, "voids", Place(), message)]
+    first = offences[0]
+    layers: tuple[int, ...] = ()
+    if first.interface is not None:
+        layers = laminate.interfaces[first.interface - 1].layer_indices
+    x, y = first.at or (None, None)
+    message = first.message
+    if len(offences) > 1:
+        message += f" (and {len(offences) - 1} more)"
+    place = Place(first.interface, layers, x, y)
+    return [Finding(NAME, "fail", 0.0, float(len(offences)), "voids", place, message)]
+
+
+def _owners(laminate: Laminate, graph: VoidGraph) -> dict[Void, frozenset[str]]:
+    """The chambers whose centres each pocket holds; equal pockets are looked at once."""
+    known: dict[Region, frozenset[str]] = {}
+    owners = {}
+    for void, piece in graph.pieces.items():
+        if void.kind == "pocket":
+            if piece not in known:
+                known[piece] = frozenset(
+                    chamber.name
+                    for chamber in laminate.chambers
+                    if any(_holds(piece, centre) for centre in chamber.centres)
+                )
+            owners[void] = known[piece]
+    return owners
+
+
+def _holds(piece: Region, p: Point) -> bool:
+    """Whether ``p`` lies in the piece with its holes filled."""
+    return any(outer.winding(p) != 0 for outer in piece.outers)
+
+
+def _missing_pockets(
+    laminate: Laminate, graph: VoidGraph, owners: dict[Void, frozenset[str]]
+) -> list[_Offence]:
+    """Centres of a chamber over which a balloon has no pocket."""
+    held: dict[tuple[int, str], list[Region]] = {}
+    for void, names in owners.items():
+        for name in names:
+            held.setdefault((void.level, name), []).append(graph.pieces[void])
+    offences = []
+    levels = [interface for interface in laminate.interfaces if interface.kind == "chamber"]
+    for interface in levels:
+        for chamber in laminate.chambers:
+            pieces = held.get((interface.index, chamber.name), [])
+            for centre in chamber.centres:
+                if not any(_holds(piece, centre) for piece in pieces):
+                    message = (
+                        f"{chamber.name} has no pocket at chamber interface {interface.index} "
+                        f"({at(centre)}); add its disc to the mask there"
+                    )
+                    offences.append(_Offence(message, interface.index, centre))
+    if len(levels) != laminate.balloons:
+        message = (
+            f"the laminate has {len(levels)} chamber interfaces for {laminate.balloons} balloons; "
+            "each balloon needs one chamber mask between two films"
+        )
+        offences.append(_Offence(message, None, None))
+    return offences
+
+
+def _wrong_reaches(
+    laminate: Laminate, graph: VoidGraph, owners: dict[Void, frozenset[str]]
+) -> list[_Offence]:
+    offences: dict[Void, _Offence] = {}
+    fed: dict[Void, str] = {}
+    for number, inlet in enumerate(laminate.inlets):
+        came = graph.reached(graph.mouths.get(number, ()))
+        for void in came:
+            if void in owners:
+                fed[void] = inlet.chamber
+                if owners[void] != {inlet.chamber} and void not in offences:
+                    offences[void] = _foreign(void, inlet.chamber, owners[void], graph, came)
+    for chamber in laminate.chambers:
+        own = [void for void, names in owners.items() if names == {chamber.name}]
+        came = graph.reached(void for void in own if void in fed)
+        if OUTSIDE in came:
+            leak = _leak(chamber, graph, came)
+            offences.setdefault(leak[0], leak[1])
+    for void, names in owners.items():
+        if void not in fed and void not in offences:
+            came = graph.reached([void])
+            if OUTSIDE in came and len(names) == 1:
+                chamber = next(c for c in laminate.chambers if c.name in names)
+                offences[void] = _leak(chamber, graph, came)[1]
+            else:
+                offences[void] = _cut_off(void, names, graph)
+    return [offences[void] for void in sorted(offences, key=lambda void: void[1:])]
+
+
+def _foreign(
+    void: Void,
+    inlet: str,
+    names: frozenset[str],
+    graph: VoidGraph,
+    came: dict[Void, Void | None],
+) -> _Offence:
+    whose = " and ".join(sorted(names)) or "no chamber"
+    before = came[void]
+    p = graph.joins[before][void] if before is not None else _somewhere(graph.pieces[void])
+    message = (
+        f"the inlet of {inlet} feeds a pocket of {whose} at chamber interface {void.level} "
+        f"({at(p)}); separate them by a bond there"
+    )
+    return _Offence(message, void.level, p)
+
+
+def _leak(
+    chamber: Chamber, graph: VoidGraph, came: dict[Void, Void | None]
+) -> tuple[Void, _Offence]:
+    """The pocket from which the way out starts, and where that way leaves the chamber."""
+    path = [OUTSIDE]
+    while (before := came[path[-1]]) is not None:
+        path.append(before)
+    path.reverse()
+    # The way leaves the chamber where it enters the outside or the slit between two balloons.
+    step = next(i for i, void in enumerate(path) if void.kind in ("outside", "separator"))
+    last, foreign = path[step - 1], path[step]
+    p = graph.joins[last][foreign]
+    pocket = next(void for void in reversed(path[:step]) if void.kind == "pocket")
+    interface = last.level if last.kind in ("pocket", "gap") else pocket.level
+    where = f"layer {last.level}" if last.kind == "opening" else f"interface {interface}"
+    if foreign.kind == "separator":
+        what = f"into the slit between two balloons at interface {foreign.level}"
+    else:
+        what = f"to the outside at {where}"
+    message = (
+        f"{chamber.name} leaks {what} ({at(p)}), from its pocket at chamber interface "
+        f"{pocket.level}; close the opening or bond round it"
+    )
+    return pocket, _Offence(message, interface, p)
+
+
+def _cut_off(void: Void, names: frozenset[str], graph: VoidGraph) -> _Offence:
+    p = _somewhere(graph.pieces[void])
+    where = f"at chamber interface {void.level} ({at(p)})"
+    if names:
+        whose = f"the pocket of {' and '.join(sorted(names))}"
+        message = f"{whose} {where} is reached from no inlet; open a bore or a strip to it"
+    else:
+        message = f"a pocket of no chamber lies {where}; remove that part of the mask"
+    return _Offence(message, void.level, p)
+
+
+def _somewhere(piece: Region) -> Point:
+    low_x, low_y, high_x, high_y = piece.bounds
+    return (low_x + high_x) / 2, (low_y + high_y) / 2

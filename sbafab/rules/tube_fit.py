@@ -1,0 +1,118 @@
+"""tube-fit: the flat inlet strip opens to the tube (half its perimeter), inside bonded film."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sbafab.geometry.edges import Edge, Point
+from sbafab.geometry.shapes import strip
+from sbafab.laminate.interfaces import Interface
+from sbafab.laminate.laminate import Inlet, Laminate
+from sbafab.rules.alike import distinct_interfaces
+from sbafab.rules.boundary import edges_along, outward_reach
+from sbafab.rules.finding import Finding, Place
+from sbafab.rules.limits import TOLERANCE, Limits, at, holds
+
+NAME = "tube-fit"
+BOND = "the bond beside the strip"
+
+
+class _Fit(NamedTuple):
+    """One measure of an inlet: what it is, its value and the least it may have."""
+
+    inlet: Inlet
+    interface: Interface | None
+    what: str
+    value: float
+    limit: float
+    at: Point
+    remedy: str
+
+
+def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+    """The strip's width at the mouth and along its straight run, and the bond on both sides."""
+    fits = [fit for inlet in laminate.inlets for fit in _fits(inlet, laminate, limits)]
+    if not fits:
+        message = "the laminate has no inlet, so no tube can be fitted; give every chamber one"
+        return [Finding(NAME, "fail", None, None, "mm", Place(), message)]
+    short = [fit for fit in fits if not holds(fit.value, fit.limit)]
+    worst = min(short or [fit for fit in fits if fit.what != BOND], key=_margin)
+    good = not short
+    message = (
+        f"{worst.what} of {worst.inlet.chamber} is {worst.value:.3f} mm wide, {at(worst.at)}; "
+        f"a tube of {worst.inlet.tube_diameter:g} needs {worst.limit:.3f}"
+    )
+    if not good:
+        message += f": {worst.remedy}"
+    place = Place(None, (), *worst.at)
+    if worst.interface is not None:
+        place = Place(worst.interface.index, worst.interface.layer_indices, *worst.at)
+    return [
+        Finding(NAME, "pass" if good else "fail", worst.limit, worst.value, "mm", place, message)
+    ]
+
+
+def _fits(inlet: Inlet, laminate: Laminate, limits: Limits) -> list[_Fit]:
+    needed = math.pi * inlet.tube_diameter / 2
+    for alike in distinct_interfaces(laminate):
+        interface = alike.interface
+        if interface.kind != "chamber":
+            continue
+        mouth = [
+            edge
+            for edge in edges_along(interface.unbonded, interface.contact)
+            if _depth(inlet, edge.start) ** 2 + _depth(inlet, edge.end) ** 2 < TOLERANCE**2
+            and abs(_offset(inlet, edge.at(0.5))) < inlet.width / 2
+        ]
+        if mouth:
+            width = sum(edge.length for edge in mouth)
+            opening = _Fit(
+                inlet, interface, "the mouth", width, needed, inlet.mouth, "widen inlet.width"
+            )
+            return [opening, *_along_run(inlet, interface, needed, limits)]
+    message = "open a mask strip to the tab's end"
+    return [_Fit(inlet, None, "the mouth", 0.0, needed, inlet.mouth, message)]
+
+
+def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits) -> list[_Fit]:
+    x, y = inlet.mouth
+    dx, dy = inlet.direction
+    inner = (x - dx * inlet.length, y - dy * inlet.length)
+    run = interface.unbonded & strip(inner, inlet.mouth, 2 * inlet.width)
+    sides = [edge for edge in run.edges if _is_side(edge, inlet)]
+    widths = [
+        outward_reach(edge.reversed(), [other for other in run.edges if other is not edge])
+        for edge in sides
+    ]
+    bonds = [outward_reach(edge, interface.contact.edges) for edge in sides]
+    found = []
+    for reaches, what, limit, remedy in (
+        (widths, "the strip", needed, "widen inlet.width"),
+        (bonds, BOND, limits.bond_width, "widen the tab"),
+    ):
+        least = min((r for r in reaches if r), key=lambda r: r.value, default=None)
+        if least is not None:
+            found.append(_Fit(inlet, interface, what, least.value, limit, least.at, remedy))
+    return found
+
+
+def _margin(fit: _Fit) -> float:
+    return fit.value - fit.limit
+
+
+def _is_side(edge: Edge, inlet: Inlet) -> bool:
+    """Whether an edge of the run is one of the strip's sides, not an end of the run."""
+    depth = _depth(inlet, edge.at(0.5))
+    return TOLERANCE < depth < inlet.length - TOLERANCE
+
+
+def _depth(inlet: Inlet, p: Point) -> float:
+    """How far inside the mouth ``p`` lies."""
+    dx, dy = inlet.direction
+    return (inlet.mouth[0] - p[0]) * dx + (inlet.mouth[1] - p[1]) * dy
+
+
+def _offset(inlet: Inlet, p: Point) -> float:
+    dx, dy = inlet.direction
+    return (p[0] - inlet.mouth[0]) * dy - (p[1] - inlet.mouth[1]) * dx

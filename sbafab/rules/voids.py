@@ -1,0 +1,176 @@
+"""The voids of a laminate as a graph: where air would go from one to the next.
+
+Nodes are the connected pieces of unbonded film in each interface, the places in each interface
+where one of the films is missing, the openings of each film, and the outside. The masks seal
+nothing and are not in it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import rectangle
+from sbafab.laminate.interfaces import Interface
+from sbafab.laminate.laminate import Inlet, Laminate
+from sbafab.rules.boundary import beside, edges_along
+from sbafab.rules.limits import TOLERANCE
+
+INSET = 1e-5
+"""mm from an edge at which a point surely lies on one side of it."""
+
+
+class Void(NamedTuple):
+    """A node: ``level`` is an interface's index, or a layer's for an opening."""
+
+    kind: Literal["outside", "pocket", "separator", "gap", "opening"]
+    level: int = 0
+    piece: int = 0
+
+
+OUTSIDE = Void("outside")
+
+
+@dataclass
+class VoidGraph:
+    """Voids, the places where they join, and where inlets open into them."""
+
+    pieces: dict[Void, Region] = field(default_factory=dict)
+    joins: dict[Void, dict[Void, Point]] = field(default_factory=dict)
+    mouths: dict[int, list[Void]] = field(default_factory=dict)
+    """By the inlet's place in ``laminate.inlets``."""
+
+    def join(self, a: Void, b: Void, p: Point) -> None:
+        self.joins.setdefault(a, {}).setdefault(b, p)
+        self.joins.setdefault(b, {}).setdefault(a, p)
+
+    def reached(self, starts: Iterable[Void]) -> dict[Void, Void | None]:
+        """Every void joined to ``starts`` with the one it was reached from, nearest first.
+
+        The outside is entered but not passed through.
+        """
+        came: dict[Void, Void | None] = dict.fromkeys(starts)
+        queue = deque(came)
+        while queue:
+            here = queue.popleft()
+            if here == OUTSIDE:
+                continue
+            for there in self.joins.get(here, {}):
+                if there not in came:
+                    came[there] = here
+                    queue.append(there)
+        return came
+
+
+class _Gap(NamedTuple):
+    """What an interface contributes, by its pattern: pieces by number, joins between them."""
+
+    unbonded: tuple[Region, ...]
+    missing: tuple[Region, ...]
+    touching: tuple[tuple[int, int, Point], ...]
+    outside: int
+
+
+def void_graph(laminate: Laminate) -> VoidGraph:
+    """The graph of all voids; equal interfaces and films are cut into pieces once."""
+    graph = VoidGraph()
+    low_x, low_y, high_x, high_y = laminate.bounds
+    frame = rectangle((low_x - 10, low_y - 10), (high_x + 10, high_y + 10))
+    openings = {
+        pattern: (frame - layers[0].profile).pieces
+        for pattern, layers in laminate.patterns.items()
+        if not layers[0].is_mask
+    }
+    gaps: dict[tuple[str, ...], _Gap] = {}
+    homes: dict[tuple[tuple[str, ...], str], list[tuple[int, Point]]] = {}
+    for interface in laminate.interfaces:
+        gap = gaps.get(interface.pattern)
+        if gap is None:
+            gap = gaps[interface.pattern] = _gap(interface, frame)
+        _add_gap(graph, interface, gap, laminate.inlets)
+        for layer in (interface.below, interface.above):
+            key = interface.pattern, layer.pattern
+            if key not in homes:
+                homes[key] = [_home(piece, gap.missing) for piece in openings[layer.pattern]]
+            for number, (home, p) in enumerate(homes[key]):
+                opening = _opening(layer.index, number, openings[layer.pattern], frame)
+                graph.join(opening, _missing(interface, home, gap), p)
+    for layer in (laminate.tpe_layers[0], laminate.tpe_layers[-1]):
+        for number, piece in enumerate(openings[layer.pattern]):
+            opening = _opening(layer.index, number, openings[layer.pattern], frame)
+            if opening != OUTSIDE:
+                graph.join(opening, OUTSIDE, _middle(piece.bounds))
+    return graph
+
+
+def _gap(interface: Interface, frame: Region) -> _Gap:
+    unbonded = interface.unbonded.pieces if not interface.unbonded.is_empty else ()
+    missing = (frame - interface.contact).pieces
+    touching = []
+    for number, piece in enumerate(unbonded):
+        for edge in edges_along(piece, interface.contact):
+            home = _holding(missing, beside(edge, -INSET))
+            touching.append((number, home, edge.at(0.5)))
+    return _Gap(unbonded, missing, tuple(touching), _outside(missing, frame))
+
+
+def _add_gap(graph: VoidGraph, interface: Interface, gap: _Gap, inlets: tuple[Inlet, ...]) -> None:
+    voids = [_unbonded(interface, number) for number in range(len(gap.unbonded))]
+    graph.pieces.update(zip(voids, gap.unbonded, strict=True))
+    for number, home, p in gap.touching:
+        inlet = None
+        if interface.kind == "chamber" and home == gap.outside:
+            inlet = _inlet_at(p, inlets)
+        if inlet is None:
+            graph.join(voids[number], _missing(interface, home, gap), p)
+        else:
+            graph.mouths.setdefault(inlet, []).append(voids[number])
+
+
+def _inlet_at(p: Point, inlets: tuple[Inlet, ...]) -> int | None:
+    for number, inlet in enumerate(inlets):
+        dx, dy = p[0] - inlet.mouth[0], p[1] - inlet.mouth[1]
+        along = dx * inlet.direction[0] + dy * inlet.direction[1]
+        across = dx * inlet.direction[1] - dy * inlet.direction[0]
+        if abs(along) <= TOLERANCE and abs(across) <= inlet.width / 2 + TOLERANCE:
+            return number
+    return None
+
+
+def _unbonded(interface: Interface, number: int) -> Void:
+    kind: Literal["pocket", "separator"] = "pocket" if interface.kind == "chamber" else "separator"
+    return Void(kind, interface.index, number)
+
+
+def _missing(interface: Interface, number: int, gap: _Gap) -> Void:
+    return OUTSIDE if number == gap.outside else Void("gap", interface.index, number)
+
+
+def _opening(layer: int, number: int, pieces: tuple[Region, ...], frame: Region) -> Void:
+    return OUTSIDE if number == _outside(pieces, frame) else Void("opening", layer, number)
+
+
+def _outside(pieces: tuple[Region, ...], frame: Region) -> int:
+    """The number of the piece that reaches the frame."""
+    return next(n for n, piece in enumerate(pieces) if piece.bounds[0] == frame.bounds[0])
+
+
+def _home(opening: Region, missing: tuple[Region, ...]) -> tuple[int, Point]:
+    """Which piece of a gap an opening lies over: just one, as film is missing all over it."""
+    edge = max(opening.edges, key=lambda edge: edge.length)
+    return _holding(missing, beside(edge, INSET)), _middle(opening.bounds)
+
+
+def _holding(pieces: tuple[Region, ...], p: Point) -> int:
+    for number, piece in enumerate(pieces):
+        if piece.contains(p):
+            return number
+    return min(range(len(pieces)), key=lambda number: pieces[number].distance_to_edge(p))
+
+
+def _middle(box: Bounds) -> Point:
+    return (box[0] + box[2]) / 2, (box[1] + box[3]) / 2

@@ -1,0 +1,129 @@
+"""The commands: exit codes, one sentence for bad input, JSON for programs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from sbafab.cli import COMMANDS, main
+
+
+def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    out, err = capsys.readouterr()
+    return int(ended.value.code or 0), out, err
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: str(command.name))
+def test_every_command_has_help(command: object, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run([str(command.name), "--help"], capsys)  # type: ignore[attr-defined]
+    assert code == 0
+    assert "Usage: sbafab" in out
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["check", "nosuch"],
+        ["check", "3dof-15mm", "--set", "bond.widht=1"],
+        ["check", "3dof-15mm", "--set", "bond.width=-1"],
+        ["generate", "3dof-15mm", "--set", "name=../x"],
+        ["generate", "3dof-15mm", "--waive", "nonsense"],
+        ["cut", "1dof-5mm", "--set", "bore.diameter=9"],
+        ["press", "1dof-5mm", "--set", "press.temperature_c=110"],
+        ["new", "nosuch"],
+    ],
+)
+def test_bad_input_is_one_sentence_and_exit_2(
+    arguments: list[str],
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(arguments, capsys)
+    assert code == 2
+    assert out == ""
+    assert err.startswith("sbafab: ")
+    assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("arguments", [[], ["frobnicate"], ["check"], ["check", "x", "--bogus"]])
+def test_bad_usage_is_exit_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(arguments, capsys)
+    assert code == 2
+    assert "Usage: sbafab" in out + err
+
+
+def test_generate_says_what_it_made(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    code, out, _ = run(["generate", "1dof-5mm", "-o", str(tmp_path)], capsys)
+    assert code == 0
+    for text in ("23 in 7 patterns", "read back", "45 min", "2.555 kN", "bond-width", "pass"):
+        assert text in out, text
+    assert (tmp_path / "1dof-5mm" / "manifest.json").is_file()
+
+
+def test_a_failed_rule_is_exit_1_and_names_the_waiver(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    arguments = ["cut", "1dof-5mm", "-o", str(tmp_path), "--set", "mask.overhang=0.4"]
+    code, out, _ = run(arguments, capsys)
+    assert code == 1
+    assert "No cut files were written" in out
+    assert "--waive mask-overhang" in out
+    assert not (tmp_path / "1dof-5mm" / "layers").exists()
+    code, out, _ = run([*arguments, "--waive", "mask-overhang"], capsys)
+    assert code == 0
+    assert (tmp_path / "1dof-5mm" / "layers").is_dir()
+
+
+def test_waivers_of_the_file_and_of_the_command_add_up(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    arguments = [
+        *("check", "1dof-5mm", "--set", "bond.width=0.7", "--set", 'rules.waive=["bond-width"]'),
+        *("--waive", "tube-fit"),
+    ]
+    code, _, _ = run(arguments, capsys)
+    assert code == 0
+
+
+def test_check_prints_json(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(["check", "3dof-15mm", "--json"], capsys)
+    assert code == 0
+    checks = json.loads(out)
+    assert checks["source"] == "design"
+    worst = {f["rule"]: f for f in checks["findings"] if f["verdict"] == "pass"}
+    assert worst["bond-width"]["measured"] == pytest.approx(0.75, abs=1e-6)
+    assert worst["mask-overhang"]["measured"] == pytest.approx(0.5, abs=1e-6)
+    waived = [f for f in checks["findings"] if f["verdict"] == "waived"]
+    assert waived
+    assert all("pin" in finding["message"] for finding in waived)
+
+
+def test_generate_prints_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    code, out, _ = run(["press", "1dof-5mm", "--json", "-o", str(tmp_path)], capsys)
+    assert code == 0
+    result = json.loads(out)
+    assert result["failed"] is False
+    assert "press.json" in result["files"]
+
+
+def test_templates_schema_and_new(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = run(["templates"], capsys)
+    assert code == 0
+    assert len(out.splitlines()) == 4
+    code, out, _ = run(["schema"], capsys)
+    assert code == 0
+    assert {"OneDofDesign", "LobedDesign", "RadialDesign"} <= set(json.loads(out)["$defs"])
+    code, out, _ = run(["new", "1dof-5mm"], capsys)
+    assert code == 0
+    code, _, _ = run(["check", "1dof-5mm.toml"], capsys)
+    assert code == 0

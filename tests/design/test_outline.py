@@ -1,0 +1,374 @@
+"""Drawn pocket outlines, against closed formulas and the drawing libraries' own flattening."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import ezdxf
+import pytest
+import shapely
+
+from sbafab.design.outline import read_outline
+from sbafab.errors import DesignError
+from sbafab.geometry.edges import Arc, Line
+from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import disc, stadium
+
+SLOT = stadium((0, 0), 4, 10).turned(90)
+PAGE = 'width="40mm" height="40mm" viewBox="-20 -20 40 40"'
+ARROW = [(6, 0), (6, 5), (0, 2), (-5, 5), (-6, 0), (-5, -5), (0, -3), (5, -5)]
+
+
+def dxf(
+    folder: Path, draw: Callable[[Any], object], units: int = 4, version: str = "R2010"
+) -> Path:
+    document = ezdxf.new(version)
+    if version != "R12":
+        document.header["$INSUNITS"] = units
+    draw(document.modelspace())
+    path = folder / "outline.dxf"
+    document.saveas(path)
+    return path
+
+
+def svg(folder: Path, body: str, page: str = PAGE) -> Path:
+    path = folder / "outline.svg"
+    path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" {page}>{body}</svg>')
+    return path
+
+
+def same_shape(region: Region, other: Region) -> bool:
+    return (region - other).area + (other - region).area < 1e-6
+
+
+def slot_of_pieces(space: Any) -> None:
+    """Lines and arcs out of order and direction, one joint 0.4 um open."""
+    space.add_line((-3, -2), (3, -2))
+    space.add_arc((3, 0), 2, -90, 90)
+    space.add_line((-3, 2), (3, 2.0004))
+    space.add_arc((-3, 0), 2, 90, 270)
+
+
+SLOTS: dict[str, Callable[[Any], object]] = {
+    "counter-clockwise": lambda m: m.add_lwpolyline(
+        [(-3, -2, 0), (3, -2, 1), (3, 2, 0), (-3, 2, 1)], format="xyb", close=True
+    ),
+    "clockwise": lambda m: m.add_lwpolyline(
+        [(3, -2, 0), (-3, -2, -1), (-3, 2, 0), (3, 2, -1)], format="xyb", close=True
+    ),
+    "first vertex repeated": lambda m: m.add_lwpolyline(
+        [(-3, -2, 0), (3, -2, 1), (3, 2, 0), (-3, 2, 1), (-3, -2, 0)], format="xyb"
+    ),
+    "seen from behind": lambda m: m.add_lwpolyline(
+        [(-3, -2, 0), (3, -2, 1), (3, 2, 0), (-3, 2, 1)],
+        format="xyb",
+        close=True,
+        dxfattribs={"extrusion": (0, 0, -1)},
+    ),
+    "heavy polyline": lambda m: m.add_polyline2d(
+        [(-3, -2, 0), (3, -2, 1), (3, 2, 0), (-3, 2, 1)], format="xyb", close=True
+    ),
+    "lines and arcs": slot_of_pieces,
+}
+
+
+@pytest.mark.parametrize("name", SLOTS)
+def test_a_slot_is_read_exactly_however_it_is_drawn(tmp_path: Path, name: str) -> None:
+    region = read_outline(dxf(tmp_path, SLOTS[name]))
+    assert region.area == pytest.approx(24 + 4 * math.pi, abs=2e-3)
+    assert (region - SLOT).area + (SLOT - region).area < 2e-3
+    assert region.contours[0].area > 0
+    kinds = [type(edge) for edge in region.edges]
+    assert (kinds.count(Line), kinds.count(Arc)) == (2, 4)
+    for edge, after in zip(region.edges, (*region.edges[1:], region.edges[0]), strict=True):
+        assert edge.end == after.start
+
+
+def test_r12_without_units_is_millimetres(tmp_path: Path) -> None:
+    region = read_outline(dxf(tmp_path, SLOTS["heavy polyline"], version="R12"))
+    assert same_shape(region, SLOT)
+
+
+@pytest.mark.parametrize(("unit", "mm"), [(0, 1), (1, 25.4), (4, 1), (5, 10), (6, 1000)])
+def test_dxf_units_are_honoured(tmp_path: Path, unit: int, mm: float) -> None:
+    region = read_outline(dxf(tmp_path, lambda m: m.add_circle((0, 0.1 / mm), 2.5 / mm), unit))
+    assert region == disc((0, 0.1), 2.5)
+    assert region.contours[0].circle is not None
+
+
+def test_an_arc_of_more_than_half_a_turn(tmp_path: Path) -> None:
+    bulge = math.tan(math.radians(270) / 4)
+    half = 2 * math.sin(math.radians(45))
+    region = read_outline(
+        dxf(
+            tmp_path,
+            lambda m: m.add_lwpolyline(
+                [(-half, -half, 0), (half, -half, bulge)], format="xyb", close=True
+            ),
+        )
+    )
+    # Three quarters of a disc of radius 2 and the triangle that closes them.
+    assert region.area == pytest.approx(0.75 * 4 * math.pi + 2)
+    assert region.bounds == pytest.approx((-2, -half, 2, 2))
+
+
+CURVED: dict[str, Callable[[Any], Any]] = {
+    "ellipse": lambda m: m.add_ellipse((0.5, 0), (5, 1), 0.4),
+    "ellipse from behind": lambda m: m.add_ellipse(
+        (0.5, 0), (5, 1), 0.4, dxfattribs={"extrusion": (0, 0, -1)}
+    ),
+    "fit points": lambda m: m.add_spline([(5, 0, 0), (0, 5, 0), (-5, 0, 0), (0, -5, 0), (5, 0, 0)]),
+    "clamped": lambda m: m.add_open_spline([(*p, 0) for p in [*ARROW, ARROW[0]]]),
+}
+
+
+@pytest.mark.parametrize("name", CURVED)
+def test_dxf_curves_agree_with_the_flattening_of_ezdxf(tmp_path: Path, name: str) -> None:
+    drawn = CURVED[name](ezdxf.new().modelspace())
+    ring = shapely.Polygon([(p.x, p.y) for p in drawn.flattening(1e-5, 64)])
+    region = read_outline(dxf(tmp_path, CURVED[name]))
+    ours = shapely.Polygon(region.polygons(1e-5)[0][0])
+    assert ours.exterior.hausdorff_distance(ring.exterior) < 0.0006
+
+
+def test_a_closed_periodic_spline(tmp_path: Path) -> None:
+    def draw(space: Any) -> Any:
+        spline = space.add_spline()
+        spline.set_closed([(*p, 0) for p in ARROW])
+        return spline
+
+    ring = shapely.Polygon([(p.x, p.y) for p in _points(draw(ezdxf.new().modelspace()))])
+    ours = shapely.Polygon(read_outline(dxf(tmp_path, draw)).polygons(1e-5)[0][0])
+    assert ours.exterior.hausdorff_distance(ring.exterior) < 0.0006
+
+
+def _points(spline: Any) -> Any:
+    """Uniform cubic B-spline through its own control points, by the textbook matrix."""
+    from ezdxf.math import Vec3
+
+    for k in range(8):
+        a, b, c, d = (Vec3(*ARROW[(k + i) % 8]) for i in range(4))
+        for n in range(500):
+            t = n / 500
+            yield (
+                a * (1 - t) ** 3
+                + b * (3 * t**3 - 6 * t**2 + 4)
+                + c * (-3 * t**3 + 3 * t**2 + 3 * t + 1)
+                + d * t**3
+            ) / 6
+
+
+def test_a_rational_spline_that_is_a_circle_becomes_a_disc(tmp_path: Path) -> None:
+    corners = [(5, 0), (5, 5), (0, 5), (-5, 5), (-5, 0), (-5, -5), (0, -5), (5, -5), (5, 0)]
+    region = read_outline(
+        dxf(
+            tmp_path,
+            lambda m: m.add_rational_spline(
+                [(*p, 0) for p in corners],
+                [1, math.sqrt(0.5)] * 4 + [1],
+                degree=2,
+                knots=[0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4],
+            ),
+        )
+    )
+    assert same_shape(region, disc((0, 0), 5))
+    assert region.contours[0].circle is not None
+
+
+ROUNDED = 60 - (4 - math.pi)
+SVG_AREAS = {
+    "circle": ('<circle r="2.5"/>', PAGE, math.pi * 6.25),
+    "no page size": ('<circle r="2.5"/>', "", math.pi * 6.25),
+    "page size without unit": ('<circle r="2.5"/>', 'width="9" viewBox="0 0 3 3"', math.pi * 6.25),
+    "inches": (
+        '<circle r="0.1"/>',
+        'width="1in" height="1in" viewBox="0 0 1 1"',
+        math.pi * 2.54**2,
+    ),
+    "pixels of a page in mm": ('<circle r="96"/>', 'width="9mm" height="9mm"', math.pi * 25.4**2),
+    "narrower page": (
+        '<circle r="1"/>',
+        'width="4cm" height="9cm" viewBox="0 0 8 8"',
+        math.pi * 25,
+    ),
+    "rounded rect": ('<rect x="-5" y="-3" width="10" height="6" rx="1"/>', PAGE, ROUNDED),
+    "turned and doubled": (
+        '<g transform="scale(2)"><rect x="-5" y="-3" width="10" height="6" rx="1" '
+        'transform="rotate(30)"/></g>',
+        PAGE,
+        4 * ROUNDED,
+    ),
+    "polygon": ('<polygon points="-5,-1 5,-1 0,5"/>', PAGE, 30.0),
+    "path of arcs": ('<path d="M-3-2h6a2,2 0 0 1 0,4h-6a2,2 0 0 1 0-4z"/>', PAGE, 24 + 4 * math.pi),
+    "lines joined": (
+        '<line x1="-2" y1="-2" x2="2" y2="-2"/><line x1="2" y1="-2" x2="0" y2="2"/>'
+        '<polyline points="0 2 -2 -2"/>',
+        PAGE,
+        8.0,
+    ),
+    "definitions and hidden shapes": (
+        '<defs><circle r="1"/></defs><circle r="2" display="none"/><circle r="3"/>',
+        PAGE,
+        9 * math.pi,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SVG_AREAS)
+def test_svg_shapes_of_lines_and_arcs_are_exact(tmp_path: Path, name: str) -> None:
+    body, page, area = SVG_AREAS[name]
+    assert read_outline(svg(tmp_path, body, page)).area == pytest.approx(area, rel=1e-7)
+
+
+def test_svg_looks_as_it_is_drawn(tmp_path: Path) -> None:
+    region = read_outline(svg(tmp_path, '<polygon points="-5,-1 5,-1 0,5"/>'))
+    # The tip points down on the screen, where y grows downward, and must do so in the cut file.
+    assert region.bounds == pytest.approx((-5, -5, 5, 1))
+
+
+def test_svg_ellipses_and_beziers_are_fitted(tmp_path: Path) -> None:
+    squeezed = '<g transform="scale(2,1)"><circle r="2.5" transform="rotate(30)"/></g>'
+    region = read_outline(svg(tmp_path, squeezed))
+    ring = shapely.affinity.scale(shapely.Point(0, 0).buffer(1, 4096), 5, 2.5)
+    ours = shapely.Polygon(region.polygons(1e-5)[0][0])
+    assert ours.exterior.hausdorff_distance(ring.exterior) < 0.0006
+    assert len(region.edges) < 60
+
+    drop = read_outline(svg(tmp_path, '<path d="M0-4 C3-4 6 3 0 3 Q-5 3 -5 0 T0-4z"/>'))
+    # Area under each Bezier by Green's theorem, from its control points.
+    assert drop.area == pytest.approx(_bezier_area(), abs=0.0005 * drop.contours[0].length)
+
+
+def _bezier_area() -> float:
+    cubic = [(0, -4), (3, -4), (6, 3), (0, 3)]
+    first = [(0, 3), (-5, 3), (-5, 0)]
+    second = [(-5, 0), (-5, -3), (0, -4)]
+
+    def cross(a: tuple[int, int], b: tuple[int, int]) -> int:
+        return a[0] * b[1] - b[0] * a[1]
+
+    p = cubic
+    area = (
+        6 * cross(p[0], p[1])
+        + 3 * cross(p[0], p[2])
+        + cross(p[0], p[3])
+        + 3 * cross(p[1], p[2])
+        + 3 * cross(p[1], p[3])
+        + 6 * cross(p[2], p[3])
+    ) / 20
+    for q in (first, second):
+        area += (2 * cross(q[0], q[1]) + cross(q[0], q[2]) + 2 * cross(q[1], q[2])) / 6
+    return abs(area)
+
+
+BAD_DXF: dict[str, tuple[Callable[[Any], object], str]] = {
+    "nothing": (lambda m: m.add_text("pocket"), "no closed path"),
+    "two": (lambda m: (m.add_circle((0, 0), 2), m.add_circle((0, 0), 1)), "2 closed paths"),
+    "open": (
+        lambda m: m.add_lwpolyline([(-3, -2), (3, -2), (3, 2), (-3, 2), (-3, -1.98)]),
+        r"gap of 0\.0200 mm at x -3\.0000, y -\d\.",
+    ),
+    "loose line": (
+        lambda m: (m.add_circle((0, 0), 3), m.add_line((0, 0), (1, 0))),
+        r"is open: a gap of 1\.0000 mm",
+    ),
+    "drawn twice": (
+        lambda m: (m.add_circle((0, 0), 2), m.add_circle((0, 0), 2)),
+        r"twice, at x 1\.4142, y 1\.4142",
+    ),
+    "bow tie": (
+        lambda m: m.add_lwpolyline([(-3, -2), (3, 2), (3, -2), (-3, 2)], close=True),
+        r"crosses or touches itself at x 0\.0000, y 0\.0000",
+    ),
+    "corner on an edge": (
+        lambda m: m.add_lwpolyline([(-3, -2), (3, -2), (3, 2), (1, -2), (-3, 2)], close=True),
+        r"crosses or touches itself at x 1\.0000, y -2\.0000",
+    ),
+    "corner on a corner": (
+        lambda m: m.add_lwpolyline(
+            [(0, -1), (3, -2), (3, 2), (0, -1), (-3, 2), (-3, -2)], close=True
+        ),
+        r"crosses or touches itself at x 0\.0000, y -1\.0000",
+    ),
+    "off the axis": (lambda m: m.add_circle((10, 1), 2), r"origin.*move it by x -10, y -1 mm"),
+    "through the axis": (lambda m: m.add_circle((2, 0), 2), "does not contain the origin"),
+    "too large": (lambda m: m.add_circle((0, 0), 75.1), r"150\.2 x 150\.2 mm"),
+    "too small": (lambda m: m.add_circle((0, 0), 0.4), r"0\.8 x 0\.8 mm"),
+    "NaN": (lambda m: m.add_circle((0, math.nan), 4), "coordinate of x 0, y nan"),
+    "infinite": (lambda m: m.add_line((0, 0), (math.inf, 0)), "coordinate of x inf"),
+    "tilted": (
+        lambda m: m.add_circle((0, 0), 4, dxfattribs={"extrusion": (0, 1, 0)}),
+        "CIRCLE that is tilted",
+    ),
+    "too many edges": (
+        lambda m: m.add_lwpolyline([(math.cos(k), math.sin(k)) for k in range(2001)]),
+        "more than 2000 edges",
+    ),
+    "blocks are not followed": (lambda m: m.add_blockref("POCKET", (0, 0)), "no closed path"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_DXF)
+def test_a_drawing_that_is_no_outline_is_refused(tmp_path: Path, name: str) -> None:
+    draw, message = BAD_DXF[name]
+    with pytest.raises(DesignError, match=message) as caught:
+        read_outline(dxf(tmp_path, draw))
+    assert "outline.dxf" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_other_units_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(DesignError, match=r"\$INSUNITS 2"):
+        read_outline(dxf(tmp_path, lambda m: m.add_circle((0, 0), 2), 2))
+
+
+BAD_SVG = {
+    "doctype": ("<circle r='2'/><!DOCTYPE svg>", PAGE, "DOCTYPE"),
+    "clone": ('<defs><circle id="a" r="2"/></defs><use href="#a"/>', PAGE, "clone"),
+    "two subpaths": ('<path d="M-3-2h6v6h-6z m1 1h1v1h-1z"/>', PAGE, "2 closed paths"),
+    "open": ('<path d="M-3-2h6v6h-6"/>', PAGE, r"gap of 6\.0000 mm"),
+    "cusp": ('<path d="M-2.5-2C2.5 3-2.5 3 2.5-2z"/>', PAGE, r"cusp near x -?0\.0000, y -1\.7500"),
+    "overflow": ('<circle r="1e400"/>', PAGE, "coordinate"),
+    "garbage": ('<path d="garbage"/>', PAGE, "no closed path"),
+    "no view": ('<circle r="2"/>', 'width="4mm" viewBox="0 0 0 1"', "viewBox"),
+    "no width": ('<circle r="2"/>', 'width="0mm" viewBox="0 0 1 1"', "width or height"),
+    "many elements": ("<g/>" * 2001, PAGE, "more than 2000 elements"),
+    "nested deeply": ("<g>" * 1500 + "</g>" * 1500, PAGE, "RecursionError"),
+    "long path": (f'<path d="M0 0{"c1 1 2 2 3 3" * 3000}"/>', PAGE, "more than 2000 edges"),
+    "broken": ("<circle", PAGE, "not valid SVG"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_SVG)
+def test_an_svg_that_is_no_outline_is_refused(tmp_path: Path, name: str) -> None:
+    body, page, message = BAD_SVG[name]
+    with pytest.raises(DesignError, match=message) as caught:
+        read_outline(svg(tmp_path, body, page))
+    assert "outline.svg" in str(caught.value)
+
+
+BAD_FILES = {
+    "text.dxf": (b"not a drawing", "not a DXF file"),
+    "cut_short.dxf": (b"0\nSECTION\n2\nENTITIES\n0\nCIRCLE\n", "not a DXF file"),
+    "large.dxf": (b"0" * 5_000_001, "5,000,001 bytes"),
+    "picture.png": (b"", r"neither \.dxf nor \.svg"),
+    "page.svg": (b"<html/>", "not an SVG"),
+    "utf16.svg": ("<svg/>".encode("utf-16"), "UTF-8"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_a_file_of_another_kind_is_refused(tmp_path: Path, name: str) -> None:
+    content, message = BAD_FILES[name]
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(DesignError, match=message):
+        read_outline(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", ["missing.dxf", ".", "nul\0.dxf", "n" * 5000])
+def test_a_path_without_a_file_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(DesignError, match="check its path"):
+        read_outline(tmp_path / name)

@@ -1,0 +1,187 @@
+"""Growing, shrinking and filleting against closed formulas."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from sbafab.geometry.boolean import union
+from sbafab.geometry.edges import Arc, Point
+from sbafab.geometry.offset import fillet, grow, shrink
+from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import disc, polygon, rectangle, stadium, strip
+
+CONVEX = [
+    disc((1, 2), 3.25),
+    rectangle((0, 0), (7, 3)),
+    stadium((0, 0), 11.5, 20).turned(17.3),
+    polygon([(0, 0), (5, 1), (2, 4)]),
+    disc((0, 0), 2) & disc((1.5, 0.3), 2),
+]
+FULL_CORNER = 1 - math.pi / 4
+"""Area between a right-angled corner and the unit arc that rounds it."""
+
+
+def perimeter(region: Region) -> float:
+    return sum(contour.length for contour in region.contours)
+
+
+@pytest.mark.parametrize("shape", CONVEX)
+@pytest.mark.parametrize("distance", [0.05, 0.5, 2.0])
+def test_growing_a_convex_shape_adds_a_band(shape: Region, distance: float) -> None:
+    """Steiner: A + P d + pi d^2."""
+    grown = grow(shape, distance)
+    expected = shape.area + perimeter(shape) * distance + math.pi * distance**2
+    assert grown.area == pytest.approx(expected)
+    assert perimeter(grown) == pytest.approx(perimeter(shape) + math.tau * distance)
+
+
+@pytest.mark.parametrize("shape", CONVEX)
+@pytest.mark.parametrize("distance", [0.05, 0.5, 2.0])
+def test_shrinking_undoes_growing_a_convex_shape(shape: Region, distance: float) -> None:
+    back = shrink(grow(shape, distance), distance)
+    assert back.area == pytest.approx(shape.area, abs=1e-7)
+    assert back.bounds == pytest.approx(shape.bounds, abs=1e-5)
+    assert len(back.edges) == len(shape.edges)
+
+
+def test_negative_distances_turn_the_operations_round() -> None:
+    shape = stadium((0, 0), 4, 9)
+    assert grow(shape, -0.5) == shrink(shape, 0.5) == stadium((0, 0), 3, 8)
+    assert shrink(shape, -0.5) == grow(shape, 0.5) == stadium((0, 0), 5, 10)
+    assert grow(shape, 0) == shape
+
+
+def test_circles_stay_circles() -> None:
+    ring = disc((1, 1), 3) - disc((1, 1), 1)
+    assert grow(ring, 0.25) == disc((1, 1), 3.25) - disc((1, 1), 0.75)
+    assert shrink(ring, 0.25) == disc((1, 1), 2.75) - disc((1, 1), 1.25)
+    assert [c.circle for c in grow(ring, 0.25).contours] == [((1, 1), 3.25), ((1, 1), 0.75)]
+
+
+def test_shrinking_past_the_inner_radius_leaves_nothing() -> None:
+    assert shrink(disc((0, 0), 1), 1.1).is_empty
+    assert shrink(disc((0, 0), 1), 1.0).is_empty
+    assert shrink(rectangle((0, 0), (9, 2)), 1.0).is_empty
+    assert shrink(stadium((0, 0), 2, 9), 1.0).is_empty
+    assert shrink(disc((0, 0), 3) - disc((0, 0), 1), 1.0).is_empty
+
+
+def test_growing_closes_holes_it_reaches_across() -> None:
+    plate = rectangle((-5, -5), (5, 5))
+    for radius in (0.3, 0.5):
+        assert grow(plate - disc((1, 1), radius), 0.5) == grow(plate, 0.5)
+
+
+def test_gaps_of_exactly_twice_the_distance_close() -> None:
+    pair = rectangle((0, 0), (2, 4)) | rectangle((3, 0), (5, 4))
+    grown = grow(pair, 0.5)
+    assert len(grown.pieces) == 1
+    # Two notches remain above and below the seam, between the corner arcs.
+    assert grown.area == pytest.approx(6 * 5 - 4 * FULL_CORNER / 4 - 4 * FULL_CORNER / 4)
+    apart = grow(pair, 0.499)
+    assert len(apart.pieces) == 2
+    slot = rectangle((0, 0), (9, 4)) - rectangle((4, 1), (5, 4))
+    assert grow(slot, 0.5).area == pytest.approx(10 * 5 - FULL_CORNER - 2 * FULL_CORNER / 4)
+
+
+def test_necks_of_exactly_twice_the_distance_part() -> None:
+    bell = union([rectangle((0, 0), (4, 4)), rectangle((4, 1.5), (8, 2.5))])
+    bell |= rectangle((8, 0), (12, 4))
+    assert len(shrink(bell, 0.5).pieces) == 2
+    # Each half runs out in a cusp between the two quarter circles of the neck's corners.
+    assert shrink(bell, 0.5).area == pytest.approx(2 * (9 + 0.5 - math.pi / 8))
+    assert len(shrink(bell, 0.49).pieces) == 1
+
+
+@pytest.mark.parametrize("radius", [0.3, 1.0, 1.999])
+@pytest.mark.parametrize("angle", [0, 17.3, 45])
+def test_the_fillet_of_a_corner_adds_its_area(radius: float, angle: float) -> None:
+    corner = rectangle((0, 0), (6, 2)) | rectangle((0, 0), (2, 6))
+    rounded = fillet(corner.turned(angle), radius)
+    assert rounded.area == pytest.approx(corner.area + radius**2 * FULL_CORNER)
+    (arc,) = [edge for edge in rounded.edges if isinstance(edge, Arc)]
+    assert arc.radius == pytest.approx(radius)
+    assert not arc.ccw
+    assert len(rounded.edges) == 7
+
+
+def test_a_fillet_leaves_convex_shapes_alone() -> None:
+    for shape in (rectangle((0, 0), (3, 4)), disc((0, 0), 2), stadium((0, 0), 2, 5)):
+        assert fillet(shape, 0.7) == shape
+
+
+def test_a_fillet_where_a_strip_leaves_a_rectangle() -> None:
+    tee = rectangle((0, 0), (10, 3)) | strip((5, 0), (5, 9), 2)
+    assert fillet(tee, 1).area == pytest.approx(30 + 12 + 2 * FULL_CORNER)
+
+
+def test_the_fillet_between_two_discs_touches_both() -> None:
+    """Centre of the fillet: at r + f from both centres; the area follows from that triangle."""
+    r, gap, f = 3.25, 6.0, 1.0
+    pair = disc((-gap / 2, 0), r) | disc((gap / 2, 0), r)
+    height = math.sqrt((r + f) ** 2 - (gap / 2) ** 2)
+    lean = math.atan2(height, gap / 2)
+    rhomb = gap * height / 2
+    outside = rhomb - r**2 * lean - f**2 * (math.pi - 2 * lean) / 2
+    meeting = math.sqrt(r**2 - (gap / 2) ** 2)
+    wedge = math.atan2(meeting, gap / 2)
+    overlap = 2 * (r**2 * wedge - gap / 2 * meeting)
+    filled = outside + overlap / 2
+    assert fillet(pair, f).area == pytest.approx(pair.area + 2 * filled)
+
+
+def lobed(count: int, radius: float) -> tuple[Region, list[Point]]:
+    axis = max(1 + 0.75 + 2.5, (2.5 + 0.375) / math.sin(math.pi / count))
+    centres = [
+        (axis * math.cos(math.tau * i / count), axis * math.sin(math.tau * i / count))
+        for i in range(count)
+    ]
+    hub = max(1.75, axis - 2.5)
+    body = union([*(disc(centre, 3.25) for centre in centres), disc((0, 0), hub)])
+    return fillet(body, radius), centres
+
+
+@pytest.mark.parametrize("count", range(2, 9))
+@pytest.mark.parametrize("radius", [0.3, 1.0, 3.0])
+def test_filleted_lobed_plates(count: int, radius: float) -> None:
+    plate, centres = lobed(count, radius)
+    concave = {round(e.radius, 6) for e in plate.edges if isinstance(e, Arc) and not e.ccw}
+    assert concave == {radius}
+    assert len(plate.outers) == 1
+    assert all(plate.contains(centre) for centre in centres)
+    # A fillet of the same radius finds nothing more to fill.
+    assert fillet(plate, radius).area == pytest.approx(plate.area, abs=1e-5)
+    # Convex lobes come back from a growth by the fillet's radius, and by half of it.
+    for distance in (radius, radius / 2):
+        assert shrink(grow(plate, distance), distance).area == pytest.approx(plate.area, abs=1e-5)
+
+
+@pytest.mark.parametrize("gap", [0, 1e-9, 1e-7, 1e-6, 4e-6, 1e-5, 1e-4])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_discs_that_all_but_touch_grow_as_touching_ones_do(gap: float, sign: int) -> None:
+    def grown(space: float) -> float:
+        pair = disc((0.3, 0.7), 2) | disc((0.3 + 2.5 + space, 0.7), 0.5)
+        return grow(pair, 0.25).area
+
+    r, s = 2.25, 0.75
+    a = math.acos((2.5**2 + r**2 - s**2) / (2 * 2.5 * r))
+    b = math.acos((2.5**2 + s**2 - r**2) / (2 * 2.5 * s))
+    touching = math.pi * (r**2 + s**2) - r**2 * a - s**2 * b + 2.5 * r * math.sin(a)
+    assert grown(sign * gap) == pytest.approx(touching, abs=4 * gap + 1e-6)
+
+
+def test_spikes_and_closed_notches_are_offset_on_the_right_side() -> None:
+    """A sharp tip between a line and the circle it touches: convex outside, no corner inside."""
+    horn = rectangle((2, 0), (6, 3)) - disc((2, 2), 2)
+    tip = (2.0, 0.0)
+    grown = grow(horn, 0.5)
+    assert grown.bounds[0] == pytest.approx(1.5)
+    assert grown.contains((tip[0] - 0.49, 0))
+    assert not grown.contains((tip[0] - 0.49, 0.49))
+    notch = (rectangle((-4, -4), (4, 0)) | disc((0, 2), 2)) | rectangle((0, 0), (4, 4))
+    shrunk = shrink(notch, 0.5)
+    assert min(math.dist(tip, corner.start) for tip in [(0, 0)] for corner in shrunk.edges) >= 0.499
+    assert not shrunk.contains((0.3, -0.3))
+    assert shrunk.contains((0.4, -0.4))

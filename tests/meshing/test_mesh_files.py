@@ -1,0 +1,101 @@
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sbafab.actuators import build, load_design
+from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.cavity import cavity_slabs
+from sbafab.meshing.files import write_meshes
+from sbafab.meshing.solid import solid, solid_slabs
+
+TEMPLATES = ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"]
+
+
+@pytest.fixture(scope="module")
+def lobed() -> Laminate:
+    return build(load_design("3dof-15mm", ["stack.balloons=3"]))
+
+
+def digests(folder: Path) -> dict[str, str]:
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def test_a_lobed_design_gives_a_solid_in_three_formats_and_a_cavity_a_chamber(
+    lobed: Laminate, tmp_path: Path
+) -> None:
+    told: list[tuple[int, int]] = []
+    meshes = write_meshes(lobed, tmp_path, progress=lambda *counts: told.append(counts))
+    names = ["solid.stl", "solid.3mf", "solid.glb"]
+    names += [f"cavity_{chamber.name}.stl" for chamber in lobed.chambers]
+    assert [mesh.file for mesh in meshes] == [f"mesh/{name}" for name in names]
+    assert sorted(digests(tmp_path)) == sorted(names)
+    assert told == [(done, 6) for done in range(1, 7)]
+    assert [mesh.kind for mesh in meshes] == ["solid"] * 3 + ["cavity"] * 3
+    assert [mesh.chamber for mesh in meshes[3:]] == [c.name for c in lobed.chambers]
+
+
+@pytest.mark.parametrize("template", TEMPLATES)
+def test_volumes_are_the_sums_of_area_times_thickness(template: str, tmp_path: Path) -> None:
+    laminate = build(load_design(template))
+    meshes = write_meshes(laminate, tmp_path)
+    expected = [sum(slab.volume for slab in solid_slabs(laminate))] * 3
+    for chamber in laminate.chambers:
+        expected.append(sum(slab.volume for slab in cavity_slabs(laminate, chamber)))
+    assert [mesh.volume_mm3 for mesh in meshes] == pytest.approx(expected, rel=5e-4)
+
+
+def test_the_lumen_and_three_necks_a_joint_are_the_only_handles(lobed: Laminate) -> None:
+    surface = solid(lobed)
+    # Lumen: one. Each of the two joints between balloons adds three neck rings round a lumen
+    # that opens between them.
+    handles = 1 + 3 * (lobed.balloons - 1)
+    assert len(surface.points) - len(surface.faces) // 2 == 2 - 2 * handles
+
+
+def test_the_stl_holds_what_the_list_says(lobed: Laminate, tmp_path: Path) -> None:
+    for mesh in write_meshes(lobed, tmp_path):
+        if mesh.file.endswith(".stl"):
+            data = (tmp_path / mesh.file).read_bytes()
+            assert not data.startswith(b"solid")
+            assert int.from_bytes(data[80:84], "little") == mesh.elements
+            assert len(data) == 84 + 50 * mesh.elements
+
+
+def test_same_bytes_again_under_another_hash_seed_and_time_zone(
+    lobed: Laminate, tmp_path: Path
+) -> None:
+    here, there = tmp_path / "here", tmp_path / "there"
+    write_meshes(lobed, here)
+    script = (
+        "import sys; from pathlib import Path\n"
+        "from sbafab.actuators import build, load_design\n"
+        "from sbafab.meshing.files import write_meshes\n"
+        "laminate = build(load_design('3dof-15mm', ['stack.balloons=3']))\n"
+        "write_meshes(laminate, Path(sys.argv[1]))\n"
+    )
+    environment = {**os.environ, "PYTHONHASHSEED": "4711", "TZ": "Asia/Tokyo"}
+    root = Path(__file__).parents[2]
+    subprocess.run([sys.executable, "-c", script, there], check=True, env=environment, cwd=root)
+    assert digests(here) == digests(there)
+
+
+def test_the_3mf_carries_no_date_of_the_day(lobed: Laminate, tmp_path: Path) -> None:
+    write_meshes(lobed, tmp_path)
+    with zipfile.ZipFile(tmp_path / "mesh" / "solid.3mf") as archive:
+        assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+
+
+def test_the_outline_stays_within_a_micrometre(lobed: Laminate) -> None:
+    points = solid(lobed).points
+    # Above the tabs of the bottom balloon the plates fit a circle of 15 mm.
+    reach = np.hypot(*points[points[:, 2] > 0.2, :2].T).max()
+    assert reach == pytest.approx(7.5, abs=0.00101)

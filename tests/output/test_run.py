@@ -1,0 +1,153 @@
+"""Whole runs: what lies in the folder, what failing designs leave out, same input same bytes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from sbafab.actuators import build, load_design
+from sbafab.design.writing import design_sha256
+from sbafab.output import run as run_module
+from sbafab.output.run import generate
+
+TEMPLATES = ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"]
+
+
+def hashes(folder: Path) -> dict[str, str]:
+    return {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+def manifest_of(folder: Path) -> dict[str, object]:
+    manifest: dict[str, object] = json.loads((folder / "manifest.json").read_text())
+    return manifest
+
+
+@pytest.mark.parametrize("name", TEMPLATES)
+def test_everything_is_there_and_hashed(name: str, tmp_path: Path) -> None:
+    design = load_design(name)
+    run = generate(design, tmp_path)
+    assert not run.failed
+    manifest = manifest_of(run.folder)
+    on_disk = hashes(run.folder)
+    assert on_disk.pop("manifest.json")
+    assert manifest["files"] == on_disk
+    laminate = build(design)
+    layers = [f"layers/{layer.name}.dxf" for layer in laminate.layers]
+    assert [path for path in on_disk if path.startswith("layers/")] == sorted(layers)
+    cavities = [f"mesh/cavity_{chamber.name}.stl" for chamber in laminate.chambers]
+    for path in [
+        "checks.json",
+        "design.toml",
+        "press.json",
+        "press.csv",
+        "mesh/solid.stl",
+        "mesh/solid.3mf",
+        "mesh/solid.glb",
+        "preview/layers.svg",
+        "preview/stack.svg",
+        "preview/solid.png",
+        *cavities,
+    ]:
+        assert path in on_disk, path
+    assert manifest["design_sha256"] == design_sha256(design)
+    again = load_design(run.folder / "design.toml")
+    assert design_sha256(again) == design_sha256(design)
+
+
+def test_a_failing_design_writes_no_cut_files(tmp_path: Path) -> None:
+    design = load_design("1dof-5mm", ["bond.width=0.7"])
+    run = generate(design, tmp_path)
+    assert run.failed
+    written = hashes(run.folder)
+    assert not [path for path in written if path.startswith(("layers/", "mesh/", "press"))]
+    findings = json.loads((run.folder / "checks.json").read_text())["findings"]
+    assert "fail" in {finding["verdict"] for finding in findings}
+
+
+def test_a_failing_run_leaves_no_older_cut_files(tmp_path: Path) -> None:
+    generate(load_design("1dof-5mm"), tmp_path)
+    run = generate(load_design("1dof-5mm", ["bond.width=0.7"]), tmp_path)
+    assert not (run.folder / "layers").exists()
+
+
+def test_waivers_stand_in_every_file(tmp_path: Path) -> None:
+    waive = 'rules.waive=["bond-width", "tube-fit"]'
+    run = generate(load_design("1dof-5mm", ["bond.width=0.7", waive]), tmp_path)
+    assert not run.failed
+    cut = sorted((run.folder / "layers").iterdir())
+    assert len(cut) == 23
+    for path in cut:
+        assert "bond-width, tube-fit" in path.read_text(), path.name
+    assert manifest_of(run.folder)["waived"] == ["bond-width", "tube-fit"]
+    assert "bond-width" in (run.folder / "press.json").read_text()
+
+
+def test_a_waiver_that_was_not_needed_is_not_claimed(tmp_path: Path) -> None:
+    run = generate(load_design("1dof-5mm", ['rules.waive=["bond-width"]']), tmp_path, ["cut"])
+    assert manifest_of(run.folder)["waived"] == []
+
+
+def test_parts_keep_what_is_of_the_same_design(tmp_path: Path) -> None:
+    whole = generate(load_design("1dof-5mm"), tmp_path)
+    before = hashes(whole.folder)
+    generate(load_design("1dof-5mm"), tmp_path, ["press"])
+    assert hashes(whole.folder) == before
+    generate(load_design("1dof-5mm", ["bond.width=0.8"]), tmp_path, ["press"])
+    assert not (whole.folder / "layers").exists()
+
+
+def test_a_run_that_dies_half_way_leaves_the_old_output(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = generate(load_design("1dof-5mm"), tmp_path)
+    before = hashes(run.folder)
+
+    def dies(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run_module, "write_meshes", dies)
+    with pytest.raises(KeyboardInterrupt):
+        generate(load_design("1dof-5mm", ["bond.width=0.8"]), tmp_path)
+    assert hashes(run.folder) == before
+    assert os.listdir(tmp_path) == [".1dof-5mm.lock", "1dof-5mm"] or sorted(
+        os.listdir(tmp_path)
+    ) == [".1dof-5mm.lock", "1dof-5mm"]
+
+
+@pytest.mark.parametrize("name", ["3dof-15mm", "radial-15mm"])
+def test_same_input_same_bytes(name: str, tmp_path: Path) -> None:
+    here = hashes(generate(load_design(name), tmp_path / "here").folder)
+    script = (
+        "import sys; from pathlib import Path; import sbafab\n"
+        "sbafab.generate(sys.argv[1], out=sys.argv[2])\n"
+    )
+    environment = {**os.environ, "PYTHONHASHSEED": "4711", "TZ": "Pacific/Kiritimati"}
+    subprocess.run(
+        [sys.executable, "-c", script, name, str(tmp_path / "there")], check=True, env=environment
+    )
+    assert hashes(tmp_path / "there" / name) == here
+
+
+def test_a_drawn_outline_travels_with_the_output(tmp_path: Path) -> None:
+    drawing = tmp_path / "drop.svg"
+    drawing.write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg">'
+        '<path d="M 4 0 A 4 4 0 0 1 -4 0 A 4 4 0 0 1 4 0 Z"/></svg>'
+    )
+    toml = tmp_path / "drop.toml"
+    toml.write_text('family = "1dof"\n[chamber]\noutline = "drop.svg"\n[stack]\nballoons = 2\n')
+    design = load_design(toml)
+    run = generate(design, tmp_path / "out", ["cut"])
+    again = load_design(run.folder / "design.toml")
+    assert design_sha256(again) == design_sha256(design)
+    assert run.manifest["sizes"]["outline_diameter"] == pytest.approx(9.5)

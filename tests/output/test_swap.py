@@ -1,0 +1,112 @@
+"""A folder is replaced whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from filelock import FileLock
+
+from sbafab.errors import OutputError
+from sbafab.output import swap
+from sbafab.output.swap import SCHEMA, replaced_folder
+
+
+def write_run(folder: Path, text: str) -> None:
+    (folder / "manifest.json").write_text(json.dumps({"schema": SCHEMA, "text": text}))
+
+
+def text_in(folder: Path) -> object:
+    return json.loads((folder / "manifest.json").read_text())["text"]
+
+
+def leftovers(folder: Path) -> list[str]:
+    return [name for name in os.listdir(folder) if name.endswith(".part")]
+
+
+def test_a_new_folder_takes_the_place_of_the_old(tmp_path: Path) -> None:
+    target = tmp_path / "a" / "run"
+    for text in ("one", "two"):
+        with replaced_folder(target) as folder:
+            write_run(folder, text)
+        assert text_in(target) == text
+    assert leftovers(target.parent) == []
+
+
+def test_the_old_folder_stays_when_the_run_fails(tmp_path: Path) -> None:
+    target = tmp_path / "run"
+    with replaced_folder(target) as folder:
+        write_run(folder, "one")
+    with pytest.raises(RuntimeError), replaced_folder(target) as folder:
+        write_run(folder, "half")
+        raise RuntimeError
+    assert text_in(target) == "one"
+    assert leftovers(tmp_path) == []
+
+
+def test_the_fallback_swaps_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(swap, "_exchange", lambda a, b: False)
+    target = tmp_path / "run"
+    for text in ("one", "two"):
+        with replaced_folder(target) as folder:
+            write_run(folder, text)
+    assert text_in(target) == "two"
+    assert leftovers(tmp_path) == []
+
+
+def test_a_killed_run_leaves_the_old_folder_whole(tmp_path: Path) -> None:
+    target = tmp_path / "run"
+    with replaced_folder(target) as folder:
+        write_run(folder, "one")
+    script = (
+        "import os, sys; from pathlib import Path; from sbafab.output.swap import replaced_folder\n"
+        "with replaced_folder(Path(sys.argv[1])) as folder:\n"
+        "    (folder / 'manifest.json').write_text('half')\n"
+        "    os.kill(os.getpid(), 9)\n"
+    )
+    killed = subprocess.run([sys.executable, "-c", script, str(target)], check=False)
+    assert killed.returncode == -9
+    assert text_in(target) == "one"
+    assert len(leftovers(tmp_path)) == 1
+    with replaced_folder(target) as folder:
+        write_run(folder, "two")
+    assert text_in(target) == "two"
+    assert leftovers(tmp_path) == []
+
+
+def test_files_of_others_are_not_replaced(tmp_path: Path) -> None:
+    target = tmp_path / "run"
+    target.mkdir()
+    (target / "thesis.txt").write_text("mine")
+    with pytest.raises(OutputError, match="did not write"), replaced_folder(target):
+        pass
+    assert (target / "thesis.txt").read_text() == "mine"
+
+
+def test_links_files_and_running_twice_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    with pytest.raises(OutputError, match="is a link"), replaced_folder(tmp_path / "link"):
+        pass
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="is a file"), replaced_folder(tmp_path / "file"):
+        pass
+    with (
+        FileLock(tmp_path / ".run.lock"),
+        pytest.raises(OutputError, match="another run"),
+        replaced_folder(tmp_path / "run"),
+    ):
+        pass
+
+
+def test_a_place_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with (
+        pytest.raises(OutputError, match="cannot be written"),
+        replaced_folder(tmp_path / "file" / "run"),
+    ):
+        pass

@@ -1,0 +1,202 @@
+"""The heat-press schedule against the paper's four steps (Sec. 2)."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from sbafab.errors import DesignError
+from sbafab.laminate.laminate import Laminate
+from sbafab.pressing.schedule import PressSettings, press_csv, press_json, schedule
+
+Stack = Callable[..., Laminate]
+PAPER = PressSettings()
+CASES = [
+    {"balloons": 1},
+    {"balloons": 1, "lumen": True},
+    {"balloons": 2},
+    {"balloons": 15, "lumen": True},
+    {"balloons": 1, "sheet": True},
+    {"balloons": 3, "sheet": True},
+]
+
+
+def test_fifteen_balloons_take_the_papers_steps(stack: Stack) -> None:
+    plan = schedule(stack(15, lumen=True), PAPER)
+    assert [step.adds for step in plan.steps] == [(2, 3), (1,), tuple(range(4, 59)), (59,)]
+    assert [set(step.layers) for step in plan.steps] == [
+        {2, 3},
+        {1, 2, 3},
+        set(range(4, 59)),
+        set(range(1, 60)),
+    ]
+    assert [step.bond for step in plan.steps] == ["flash", "full", "flash", "full"]
+    assert [step.minutes for step in plan.steps] == [3, 12, 10, 20]
+    assert [step.step for step in plan.steps] == [1, 2, 3, 4]
+    assert plan.total_press_minutes == 45
+    # "about 1.75 h" from film to actuator.
+    assert plan.estimated_build_minutes == 105
+    assert "assumed" in plan.estimate_basis
+    assert plan.warnings == ()
+
+
+def test_press_settings_are_the_papers(stack: Stack) -> None:
+    for step in schedule(stack(6), PAPER).steps:
+        assert (step.temperature_c, step.pressure_kpa, step.platen_mm) == (135, 110, (152.4, 152.4))
+        # 110 kPa on a square of 6 inches.
+        assert step.force_n / 1000 == pytest.approx(2.555, abs=0.001)
+
+
+def test_pins_are_in_for_flash_bonds_and_out_for_full_bonds(stack: Stack) -> None:
+    plan = schedule(stack(15, lumen=True), PAPER)
+    assert [step.pins for step in plan.steps] == [
+        ("chamber_1", "lumen"),
+        (),
+        ("chamber_1", "lumen"),
+        (),
+    ]
+    assert "on pin chamber_1 and pin lumen" in plan.steps[0].instructions
+    assert "every pin out" in plan.steps[1].instructions
+
+
+def test_a_pin_that_would_meet_film_stays_out(stack: Stack) -> None:
+    laminate = stack(2)
+    covered = replace(
+        laminate,
+        layers=tuple(
+            replace(layer, profile=laminate.layer(1).profile, pattern="covered")
+            if layer.index == 5
+            else layer
+            for layer in laminate.layers
+        ),
+    )
+    plan = schedule(covered, PAPER)
+    assert [step.pins for step in plan.steps] == [("chamber_1",), (), (), ()]
+    assert plan.warnings == ("step 3: no pin holds layers 4 to 6; align by hand",)
+
+
+def test_two_balloons_have_a_middle_of_three_layers(stack: Stack) -> None:
+    plan = schedule(stack(2), PAPER)
+    assert [step.adds for step in plan.steps] == [(2, 3), (1,), (4, 5, 6), (7,)]
+
+
+def test_one_balloon_is_done_after_its_base(stack: Stack) -> None:
+    plan = schedule(stack(1), PAPER)
+    assert [(step.adds, step.bond, step.pins) for step in plan.steps] == [
+        ((2, 3), "flash", ()),
+        ((1,), "full", ()),
+    ]
+    assert plan.total_press_minutes == 15
+    assert plan.warnings == ("step 1: no pin holds layers 2 and 3; align by hand",)
+
+
+def test_one_balloon_with_a_lumen_leaves_its_mask_to_the_hand(stack: Stack) -> None:
+    plan = schedule(stack(1, lumen=True), PAPER)
+    assert plan.steps[0].pins == ("lumen",)
+    assert plan.warnings == ("step 1: no pin holds layer 2; align by hand",)
+
+
+def test_radial_with_one_balloon_ends_on_its_sheet(stack: Stack) -> None:
+    plan = schedule(stack(1, sheet=True), PAPER)
+    assert [step.adds for step in plan.steps] == [(4, 5), (3,), (1, 2)]
+    assert [step.bond for step in plan.steps] == ["flash", "full", "full"]
+    assert plan.steps[-1].layers == (1, 2, 3, 4, 5)
+    assert plan.total_press_minutes == 3 + 12 + 20
+
+
+def test_radial_with_more_balloons_adds_sheet_and_cap_last(stack: Stack) -> None:
+    plan = schedule(stack(3, sheet=True), PAPER)
+    assert [step.adds for step in plan.steps] == [(4, 5), (3,), tuple(range(6, 13)), (1, 2, 13)]
+    assert plan.total_press_minutes == 45
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_layer_joins_exactly_once(stack: Stack, case: dict[str, int]) -> None:
+    laminate = stack(**case)
+    plan = schedule(laminate, PAPER)
+    added = [index for step in plan.steps for index in step.adds]
+    assert sorted(added) == [layer.index for layer in laminate.layers]
+    assert set(plan.steps[-1].layers) == set(added)
+    for step in plan.steps:
+        assert set(step.adds) <= set(step.layers)
+        assert list(step.layers) == sorted(step.layers)
+
+
+def test_the_tpe_must_melt(stack: Stack) -> None:
+    for temperature in (20, 120):
+        with pytest.raises(DesignError, match="does not bond Stretchlon 200, which melts at 120"):
+            schedule(stack(2), replace(PAPER, temperature_c=temperature))
+    assert schedule(stack(2), replace(PAPER, temperature_c=121)).warnings == ()
+
+
+def test_the_masks_must_stand_the_heat(stack: Stack) -> None:
+    for temperature in (260, 300):
+        with pytest.raises(DesignError, match=r"limit of the masks, 260 C .* fumes"):
+            schedule(stack(2), replace(PAPER, temperature_c=temperature))
+
+
+@pytest.mark.parametrize(
+    ("change", "warning"),
+    [
+        ({"temperature_c": 151}, "151 C is hotter than the 150 C"),
+        ({"pressure_kpa": 69}, "69 kPa lies outside 70 to 200"),
+        ({"pressure_kpa": 201}, "201 kPa lies outside 70 to 200"),
+        ({"validated_balloons": 5}, "6 balloons are more than the 5 validated"),
+    ],
+)
+def test_what_was_never_tried_is_warned_about(
+    stack: Stack, change: dict[str, float], warning: str
+) -> None:
+    (found,) = schedule(stack(6), replace(PAPER, **change)).warnings
+    assert found.startswith(warning)
+
+
+def test_twenty_balloons_are_validated_and_one_more_is_not(stack: Stack) -> None:
+    assert schedule(stack(20), PAPER).warnings == ()
+    assert "21 balloons" in schedule(stack(21), PAPER).warnings[0]
+
+
+def test_json_holds_the_whole_schedule(stack: Stack) -> None:
+    plan = schedule(stack(15), PAPER)
+    held = press_json(plan)
+    assert json.loads(json.dumps(held)) == held
+    assert held["steps"][3]["adds"] == [59]
+    assert held["steps"][0]["platen_mm"] == [152.4, 152.4]
+    assert set(held["steps"][0]) >= {
+        "step",
+        "title",
+        "bond",
+        "layers",
+        "adds",
+        "pins",
+        "temperature_c",
+        "pressure_kpa",
+        "force_n",
+        "platen_mm",
+        "minutes",
+    }
+    assert (held["total_press_minutes"], held["estimated_build_minutes"]) == (45, 105)
+
+
+def test_csv_reads_back(stack: Stack) -> None:
+    rows = list(csv.DictReader(io.StringIO(press_csv(schedule(stack(15, lumen=True), PAPER)))))
+    assert [float(row["minutes"]) for row in rows] == [3, 12, 10, 20]
+    assert [row["adds"] for row in rows] == [
+        "layers 2 and 3",
+        "layer 1",
+        "layers 4 to 58",
+        "layer 59",
+    ]
+    assert rows[0]["pins"] == "chamber_1, lumen"
+    assert float(rows[0]["force_n"]) == pytest.approx(2554.8, abs=0.05)
+    assert all(None not in row and "" not in row for row in rows)
+
+
+def test_instructions_name_the_stacks_in_their_order(stack: Stack) -> None:
+    last = schedule(stack(3, sheet=True), PAPER).steps[-1].instructions
+    assert "layers 1 and 2, layers 3 to 5, layers 6 to 12 and layer 13" in last
