@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 from sbafab.design.strands import Strand, place, polyline, refuse_more_than_limit
 from sbafab.errors import DesignError
-from sbafab.geometry.biarc import elliptical_arc, fit_arcs
-from sbafab.geometry.edges import Edge, Line, Point
+from sbafab.geometry.biarc import FitError, elliptical_arc, fit_arcs
+from sbafab.geometry.edges import EPSILON, Edge, Line, Point
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
+    from ezdxf.layouts.layout import Modelspace
     from ezdxf.math import BSpline
 
 MM_PER_UNIT = {0: 1.0, 1: 25.4, 4: 1.0, 5: 10.0, 6: 1000.0}
@@ -28,7 +29,7 @@ def dxf_strands(path: Path) -> Iterator[Strand]:
 
     Block references are left alone, whatever they hold. Raises DesignError.
     """
-    drawing = _drawing(path)
+    drawing, space = _drawing(path)
     unit = drawing.header.get("$INSUNITS", 0)
     if unit not in MM_PER_UNIT:
         raise DesignError(
@@ -36,23 +37,33 @@ def dxf_strands(path: Path) -> Iterator[Strand]:
             "inches (1)"
         )
     factor = MM_PER_UNIT[unit]
-    for entity in drawing.modelspace():
-        read = READERS.get(entity.dxftype())
-        if read is not None:
-            yield read(entity, factor)
+    for entity in space:
+        if entity.dxftype() in READERS:
+            yield _read(entity, factor)
 
 
-def _drawing(path: Path) -> Drawing:
+def _drawing(path: Path) -> tuple[Drawing, Modelspace]:
     from ezdxf.filemanagement import readfile
 
     try:
-        return readfile(path)
+        drawing = readfile(path)
+        return drawing, drawing.modelspace()
     except Exception as error:
         # A damaged file fails anywhere in the parser, with any of the built-in errors.
         kind = type(error).__name__
         raise DesignError(
             f"is not a DXF file that can be read ({kind}); save it anew as DXF R2010"
         ) from None
+
+
+def _read(entity: Any, factor: float) -> Strand:
+    try:
+        return READERS[entity.dxftype()](entity, factor)
+    except (DesignError, FitError):
+        raise
+    except Exception:
+        # As above: what a damaged entity lacks shows itself anywhere.
+        raise DesignError(f"holds a damaged {entity.dxftype()}; draw it anew") from None
 
 
 def _side(entity: Any) -> float:
@@ -68,7 +79,7 @@ def _side(entity: Any) -> float:
 def _line(entity: Any, factor: float) -> Strand:
     start, end = entity.dxf.start, entity.dxf.end
     edge = Line(place(start.x * factor, start.y * factor), place(end.x * factor, end.y * factor))
-    return (edge,) if edge.start != edge.end else ()
+    return (edge,) if edge.length > EPSILON else ()
 
 
 def _arc(entity: Any, factor: float) -> Strand:
@@ -111,9 +122,9 @@ def _heavy_polyline(entity: Any, factor: float) -> Strand:
 
 def _through(points: Any, side: float, factor: float, closed: bool) -> Strand:
     vertices = []
-    for x, y, bulge in points:
+    for x, y, bulge in (map(float, point) for point in points):
         place(bulge, 0.0)
-        vertices.append((*place(side * x * factor, y * factor), float(side * bulge)))
+        vertices.append((*place(side * x * factor, y * factor), side * bulge))
     refuse_more_than_limit(len(vertices))
     return polyline(vertices, closed)
 
@@ -139,15 +150,14 @@ def _spline(entity: Any, factor: float) -> Strand:
             f"holds a SPLINE of degree {entity.dxf.degree}, where at most {HIGHEST_DEGREE} is "
             "allowed; draw it with degree 3"
         )
-    try:
-        tool: BSpline = entity.construction_tool()
-    except Exception as error:
-        raise DesignError(f"holds a SPLINE that is not sound ({error}); draw it anew") from None
+    tool: BSpline = entity.construction_tool()
     for point in tool.control_points:
         place(point.x * factor, point.y * factor)
 
+    evaluator = tool.evaluator
+
     def curve(t: float) -> tuple[Point, Point]:
-        at, rate = tool.derivative(t, 1)
+        at, rate = evaluator.derivative(t, 1)
         return (at.x * factor, at.y * factor), (rate.x * factor, rate.y * factor)
 
     knots = list(tool.knots())

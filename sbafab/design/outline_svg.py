@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -12,7 +13,7 @@ from xml.etree import ElementTree
 from sbafab.design.strands import MOST_EDGES, Strand, place, refuse_more_than_limit
 from sbafab.errors import DesignError
 from sbafab.geometry.biarc import bezier, elliptical_arc, fit_arcs
-from sbafab.geometry.edges import Edge, Line, Point
+from sbafab.geometry.edges import EPSILON, Edge, Line, Point
 
 MM_PER_UNIT = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6, "q": 0.25}
 MM_PER_PIXEL = 25.4 / 96
@@ -153,4 +154,4 @@ def _edges(segment: Any, point: Placement) -> tuple[Edge, ...]:
         if all(p == start for p in (*inner, end)):
             return ()
         return fit_arcs(bezier([start, *inner, end]), 0.0, 1.0)
-    return (Line(start, end),) if start != end else ()
+    return (Line(start, end),) if math.dist(start, end) > EPSILON else ()

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 
 from sbafab.errors import DesignError
-from sbafab.geometry.edges import Edge, Line, Point, edge_from_bulge
+from sbafab.geometry.edges import EPSILON, Edge, Line, Point, edge_from_bulge
 
 Strand = tuple[Edge, ...]
 
@@ -52,7 +52,7 @@ def polyline(vertices: Sequence[tuple[float, float, float]], closed: bool) -> St
     ends = [*points[1:], *points[:1]] if closed else points[1:]
     edges: list[Edge] = []
     for start, end, (_, _, bulge) in zip(points, ends, vertices, strict=False):
-        if start != end:
+        if math.dist(start, end) > EPSILON:
             edges += _bulged(start, end, bulge)
     return tuple(edges)
 

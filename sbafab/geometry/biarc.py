@@ -19,6 +19,7 @@ SAMPLES = 24
 """Points of a span that are compared with its two arcs."""
 STRAIGHT = 1e-6
 """An arc that bulges less than this, in mm, is written as a line."""
+MOST_ARCS = 2000
 LARGEST_TURN = math.radians(80)
 """Farthest the tangent may turn along one arc."""
 
@@ -82,7 +83,7 @@ def fit_arcs(
     """Arcs and lines within ``tolerance`` mm of the curve from parameter ``first`` to ``last``.
 
     Neighbours share a tangent, and each biarc reaches as far as the tolerance lets it. Raises
-    FitError where the curve has a cusp.
+    FitError where the curve has a cusp, or is far too long or rugged.
     """
     edges: list[Edge] = []
     at, step = first, (last - first) / 4
@@ -95,6 +96,9 @@ def fit_arcs(
             reach, fitted = (middle, even) if even else (reach, fitted)
         edges += fitted
         at, step = reach, reach - at
+        if len(edges) > MOST_ARCS:
+            (x, y), _ = curve(at)
+            raise FitError(f"curve that {MOST_ARCS} arcs do not follow past x {x:.4f}, y {y:.4f}")
     return tuple(edge for edge in edges if edge.length > EPSILON)
 
 
@@ -103,6 +107,7 @@ def _longest_span(
 ) -> tuple[float, list[Edge]]:
     """The farthest parameter that one biarc from ``at`` reaches, by doubling, then bisection."""
     good, bad, end = at, math.inf, min(last, at + step)
+    least = 1e-9 * (last - at)
     fitted: list[Edge] = []
     while True:
         edges = _biarc(curve, at, end, tolerance)
@@ -112,7 +117,7 @@ def _longest_span(
             bad = end
         if good == last or bad - good < 0.02 * (good - at):
             return good, fitted
-        if bad - at < 1e-9 * (1 + abs(at)):
+        if bad - at < least:
             (x, y), _ = curve(at)
             raise FitError(f"cusp near x {x:.4f}, y {y:.4f}")
         end = min(last, 2 * end - at) if bad == math.inf else (good + bad) / 2

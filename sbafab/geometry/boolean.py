@@ -18,7 +18,7 @@ from sbafab.geometry.shapes import circle
 
 Keep = Callable[[Sequence[bool]], bool]
 LEAST_AREA = 1e-7
-"""Contours that enclose less, in mm2, are rounding dust."""
+"""Contours that enclose less, in mm2, are rounding dust; so are those thinner than EPSILON."""
 
 
 class GeometryError(ArithmeticError):
@@ -213,7 +213,7 @@ def _heading(edge: Edge, reach: float) -> float:
 def tidy(loop: Sequence[Edge]) -> Contour | None:
     """One contour with edges of one support joined and arcs of at most a quarter turn."""
     contour = Contour(tuple(loop))
-    if abs(contour.area) < LEAST_AREA:
+    if abs(contour.area) < max(LEAST_AREA, 2 * EPSILON * contour.length):
         return None
     if contour.circle is not None:
         whole = circle(*contour.circle)

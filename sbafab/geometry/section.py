@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 from sbafab.geometry.edges import EPSILON, Line, Point
 from sbafab.geometry.intersect import meeting_points
@@ -28,7 +29,7 @@ def section(region: Region, origin: Point, direction: Point) -> list[Interval]:
         for x, y in meeting_points(edge, line)
     )
     inside: list[Interval] = []
-    for start, end in zip(stops, stops[1:], strict=False):
+    for start, end in pairwise(stops):
         middle = (start + end) / 2
         if end - start < 2 * EPSILON:
             continue

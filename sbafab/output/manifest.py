@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sbafab import __version__
 from sbafab.cutting.files import CutFile
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
@@ -16,7 +15,7 @@ from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.meshing.files import MeshFile
 from sbafab.models.sizes import sizes
-from sbafab.output.settings import kerf_widths
+from sbafab.output.settings import GENERATOR, kerf_widths
 from sbafab.output.swap import SCHEMA
 from sbafab.rules.finding import Finding
 
@@ -46,7 +45,7 @@ def manifest(
         "family": laminate.family,
         "units": "mm",
         "design_sha256": design_sha256(design),
-        "generator": f"sbafab {__version__}",
+        "generator": GENERATOR,
         "registration": {
             "method": laminate.registration,
             "pins": [

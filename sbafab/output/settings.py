@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from sbafab import __version__
 from sbafab.cutting.dxf_write import DxfProfile
 from sbafab.cutting.properties import CutSettings
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
 from sbafab.pressing.schedule import PressSettings
 from sbafab.rules.limits import Limits
+
+GENERATOR = f"sbafab {__version__}"
 
 
 def kerf_widths(design: Design) -> dict[str, float | None]:
@@ -39,6 +42,7 @@ def cut_settings(
         waived=waived,
         profile=profile,
         chord_error=chord_error,
+        generator=GENERATOR,
     )
 
 

@@ -17,9 +17,9 @@ Colour = tuple[int, int, int]
 COLOURS: dict[Tone, Colour] = {
     "film": (164, 206, 235),
     "bond": (118, 174, 216),
-    "cut film": (238, 245, 250),
-    "cut bond": (32, 104, 172),
-    "shade": (66, 76, 88),
+    "cut film": (224, 238, 248),
+    "cut bond": (24, 96, 168),
+    "shade": (72, 84, 98),
     "line": (58, 104, 142),
 }
 LEVELS = 60

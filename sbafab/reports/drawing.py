@@ -147,8 +147,10 @@ def leader(feature: Point, elbow: Point, label: Point, *, dot: bool = True) -> l
 
 
 def across(a: Point, b: Point) -> list[str]:
-    """Arrows on a width too narrow for words: on both its ends, pointing inward from outside."""
+    """A width marked on the part itself, its words elsewhere; arrows outside where it is narrow."""
     (u, v) = _unit(a, b)
+    if math.dist(a, b) >= 6 * ARROW:
+        return [line([a, b], colour=GREY), arrow(a, (-u, -v)), arrow(b, (u, v))]
     tails = _shifted(a, (-u, -v), 2 * ARROW), _shifted(b, (u, v), 2 * ARROW)
     return [line(tails, colour=GREY), arrow(a, (u, v)), arrow(b, (-u, -v))]
 

@@ -106,6 +106,18 @@ def circumscribed(profile: Region) -> Circle | None:
     return Circle(f"fits ⌀{length(2 * radius)}", axis, radius, phantom=True)
 
 
+def piece_width(profile: Region) -> Width | None:
+    """The width of one of several equal pieces that are not discs (oblong chambers)."""
+    boxes = [outer.bounds for outer in profile.outers]
+    sizes = {(round(b[2] - b[0], 4), round(b[3] - b[1], 4)) for b in boxes}
+    if len(boxes) < 2 or len(sizes) != 1 or profile.outers[0].circle is not None:
+        return None
+    low_x, low_y, high_x, high_y = max(boxes)
+    y = low_y + 0.3 * (high_y - low_y)
+    words = _counted(len(boxes), f"{length(high_x - low_x)} wide")
+    return Width(words, (low_x, y), (high_x, y))
+
+
 def inlet_width(laminate: Laminate, layer: Layer) -> Width | None:
     """The width of the inlet strip or tab, if any, at the inlet farthest right."""
     if layer.role == "separator-mask":

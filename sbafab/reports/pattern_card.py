@@ -21,6 +21,7 @@ from sbafab.reports.features import (
     is_disc,
     layer_numbers,
     length,
+    piece_width,
     radii,
 )
 
@@ -92,9 +93,8 @@ def pattern_card(laminate: Laminate, layers: tuple[Layer, ...]) -> Card:
             max(high_x, r),
             max(high_y, r),
         )
-    width = inlet_width(laminate, layers[0])
-    if width is not None:
-        marks.append(width)
+    widths = inlet_width(laminate, layers[0]), piece_width(profile)
+    marks += [width for width in widths if width is not None]
     return Card(layers, tuple(marks), (low_x, low_y, high_x, high_y))
 
 

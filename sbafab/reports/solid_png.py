@@ -147,7 +147,7 @@ def _prisms(laminate: Laminate) -> Iterator[Prism]:
 def _shape(prism: Prism, cut: Cut, camera: Camera) -> Shape:
     region = prism.region - cut.removed
     sagitta = SAGITTA_PX / camera.scale
-    walls = sorted(_walls(region, prism.bond, cut, camera, sagitta), key=lambda w: _depth(w))
+    walls = sorted(_walls(region, prism.bond, cut, camera, sagitta), key=_depth)
     return Shape(
         walls,
         [] if prism.bond else _on_page(region, camera, sagitta),

@@ -11,12 +11,12 @@ from sbafab.reports.stack_section import Joint, Section, Slab, opening
 
 
 class Label(NamedTuple):
-    """Words for the place ``s`` along the section, ``z`` high in the layer ``index``."""
+    """Words for the place ``s`` along the section, ``z`` high in or beside a layer (its index)."""
 
     words: str
     s: float
     z: float
-    index: int
+    layer: int
     material: Material | None = None
 
 

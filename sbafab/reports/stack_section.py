@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from sbafab.geometry.edges import Point
 from sbafab.geometry.section import Interval, section
 from sbafab.laminate.interfaces import Interface
-from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.laminate import Inlet, Laminate, Layer
 
 MOST_BALLOONS = 4
 """Up to so many balloons are shown in full."""
@@ -36,7 +37,7 @@ class Section:
 
     ``hidden`` balloons are left out above the layer ``break_above`` (an index; 0 for none).
     ``lumen`` is the axis of the actuator along the plane, where there is a lumen. ``cropped``
-    says that what lies beyond ``low`` is not shown.
+    says that what lies beyond ``low`` is not shown. ``tab`` runs from the outline to its mouth.
     """
 
     chamber: str
@@ -46,6 +47,7 @@ class Section:
     high: float
     cropped: bool
     lumen: float | None
+    tab: Interval | None
     hidden: int
     break_above: int
 
@@ -57,10 +59,8 @@ def chamber_section(laminate: Laminate) -> Section:
         (bore.centre for bore in laminate.bores if bore.chamber == chamber.name),
         chamber.centres[0],
     )
-    direction = next(
-        (inlet.direction for inlet in laminate.inlets if inlet.chamber == chamber.name),
-        (1.0, 0.0),
-    )
+    inlet = next((found for found in laminate.inlets if found.chamber == chamber.name), None)
+    direction = inlet.direction if inlet else (1.0, 0.0)
     layers, hidden, break_above = _shown(laminate)
     lumen = -(origin[0] * direction[0] + origin[1] * direction[1]) if laminate.lumen else None
     patterns = {layer.pattern: layer.profile for layer in layers}
@@ -83,9 +83,16 @@ def chamber_section(laminate: Laminate) -> Section:
         high,
         crop > low,
         lumen,
+        _tab(inlet, origin) if inlet else None,
         hidden,
         break_above,
     )
+
+
+def _tab(inlet: Inlet, origin: Point) -> Interval:
+    (x, y), (u, v) = inlet.mouth, inlet.direction
+    mouth = (x - origin[0]) * u + (y - origin[1]) * v
+    return mouth - inlet.length, mouth
 
 
 def _shown(laminate: Laminate) -> tuple[tuple[Layer, ...], int, int]:

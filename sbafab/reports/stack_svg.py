@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 
 from sbafab.geometry.edges import Point
 from sbafab.geometry.section import Interval
@@ -194,19 +193,18 @@ def _dimensions_above(view: View) -> list[str]:
 
 
 def _dimensions_below(view: View) -> list[str]:
-    """Under the bottom balloon: how far tab and mask reach past what lies above."""
+    """Under the stack: the tab, and how far the inlet strip reaches past its mouth."""
     section = view.section
-    ends = sorted({round(slab.spans[-1][1], 4) for slab in section.slabs if slab.spans})
-    base = next(slab for slab in section.slabs if slab.layer.role in ("sheet", "base"))
-    cap_end, base_end = section.slabs[-1].spans[-1][1], base.spans[-1][1]
-    bottom = view.y(base.layer.z, base.layer.index)
-    stops = [cap_end, base_end] if base_end - cap_end > 0.05 else []
-    if stops and ends[-1] - base_end > 0.05:
-        stops.append(ends[-1])
-    parts: list[str] = []
-    for start, end in pairwise(stops):
-        name = "tab" if start == cap_end else "overhang"
-        parts += _level(view, (start, end), bottom, (0.0, 1.0), 6.0, name)
+    if section.tab is None:
+        return []
+    lowest = section.slabs[0].layer
+    bottom = view.y(lowest.z, lowest.index)
+    mouth = section.tab[1]
+    parts = _level(view, section.tab, bottom, (0.0, 1.0), 6.0, "tab")
+    masks = [slab for slab in section.slabs if slab.layer.role == "chamber-mask" and slab.spans]
+    reach = max((slab.spans[-1][1] for slab in masks), default=mouth)
+    if reach - mouth > 1e-3:
+        parts += _level(view, (mouth, reach), bottom, (0.0, 1.0), 6.0, "overhang")
     return parts
 
 
@@ -227,7 +225,7 @@ def _labels(view: View) -> list[str]:
         (layer_labels(view.section), right, 1),
         (feature_labels(view.section), LEFT - 6.0, -1),
     ):
-        placed = sorted((view.y(label.z, label.index), label) for label in labels)
+        placed = sorted((view.y(label.z, label.layer), label) for label in labels)
         rows = draw.spread([y for y, _ in placed], 5.2, low, high)
         for (y, label), row in zip(placed, rows, strict=True):
             parts += _label(label, (view.x(label.s), y), (x, row), side)

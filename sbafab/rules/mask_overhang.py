@@ -103,8 +103,8 @@ def _waived(pin: Pin, overhangs: list[_Overhang], limits: Limits) -> Finding:
     count = sum(patterns.values())
     interfaces = "1 interface" if count == 1 else f"{count} interfaces"
     message = (
-        f"{pin.name} holds the layers by this opening, so at {interfaces} the mask reaches only "
-        f"{worst.value:.3f} mm past its edge"
+        f"the dowel pin {pin.name} holds the layers by this opening, so at {interfaces} the mask "
+        f"may end {worst.value:.3f} mm past its edge"
     )
     return Finding(
         NAME,

@@ -187,3 +187,22 @@ def test_what_is_not_of_the_part_is_counted_apart(layer: str, plate_text: str) -
     found = read_profile(text)
     assert found.region == read_profile(plate_text).region
     assert found.other == ("LINE", "LINE", "LWPOLYLINE")
+
+
+def test_width_at_a_vertex_is_refused(plate_text: str) -> None:
+    wide = [(x, y, 0.0, 0.2) for x, y in SQUARE]
+    text = drawn(
+        plate_text,
+        lambda model: model.add_lwpolyline(wide, format="xyse", close=True, dxfattribs=OUTER),
+    )
+    with pytest.raises(OutputError, match="has a width"):
+        read_profile(text)
+
+
+def test_contour_that_encloses_nothing_is_refused(plate_text: str) -> None:
+    speck = [(20.0 + x * 1e-4, y * 1e-4) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    text = drawn(
+        plate_text, lambda model: model.add_lwpolyline(speck, close=True, dxfattribs=OUTER)
+    )
+    with pytest.raises(OutputError, match="encloses nothing"):
+        read_profile(text)

@@ -116,3 +116,9 @@ def test_a_travel_order_visits_the_nearest_next() -> None:
         sheet = sheet - disc(place, 0.25)
     order = [contour.circle for contour in cutting_order(sheet)]
     assert [round(circle[0][0], 6) for circle in order if circle] == [1.0, 3.0, 4.0, 5.0, -2.5, 0.0]
+
+
+def test_outlines_go_on_from_the_last_hole() -> None:
+    ring = disc((10.0, 0.0), 2.0) - disc((10.0, 0.0), 1.0)
+    order = [contour.circle for contour in cutting_order(ring | disc((3.0, 0.0), 1.0))]
+    assert [circle[0][0] for circle in order if circle] == pytest.approx([10.0, 10.0, 3.0])

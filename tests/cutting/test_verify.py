@@ -12,7 +12,7 @@ from sbafab.cutting.order import cutting_order
 from sbafab.cutting.verify import verify_file
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.shapes import disc, rectangle
 
 Write = Callable[[str], Path]
 
@@ -94,3 +94,12 @@ def test_other_properties_are_found(expected: dict[str, str], write: Write) -> N
     path = write(dxf_text(cutting_order(ring()), {"A": "b"}))
     with pytest.raises(OutputError, match=r"custom property [AC] is"):
         verify_file(path, ring(), expected)
+
+
+def test_a_notch_that_misses_every_sample_is_found_either_way(write: Write) -> None:
+    """A slit of 0.05 mm2 in a sheet of 10000 mm2 is too small for the area to tell."""
+    sheet = rectangle((0.0, 0.0), (100.0, 100.0))
+    slit = sheet - rectangle((20.0, -1.0), (20.05, 1.0))
+    for found, expected in ((slit, sheet), (sheet, slit)):
+        with pytest.raises(OutputError, match=r"1\.000000 mm off at x 20\.[05]"):
+            check(found, expected, write)

@@ -1,0 +1,161 @@
+"""Least widths against closed formulas and against shapely's distances between rings."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import pytest
+import shapely
+
+from sbafab.geometry.boolean import union
+from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.shapes import disc, polygon, rectangle, stadium, strip
+from sbafab.geometry.width import least_gap, least_width
+
+AXIS = (0.0, 0.0)
+EXACT = 1e-9
+
+
+def rounded_arm(taper: float) -> Region:
+    """An arm 4 long and 1 wide at its flat end, one side leaning outward by ``taper`` degrees."""
+    rise = 4 * math.tan(math.radians(taper))
+    arm = polygon([(0, 0), (4, 0), (4, 1), (0, 1 + rise)])
+    return arm | disc((-1.0, 0.5), 3.0)
+
+
+WIDTHS = {
+    "ring": (disc(AXIS, 3.25) - disc(AXIS, 2.5), 0.75),
+    "thin ring": (disc((0.1, 1 / 3), 1.25) - disc((0.1, 1 / 3), 0.5), 0.75),
+    "eccentric ring": (disc(AXIS, 3) - disc((0.3, 0.4), 2), 0.5),
+    "disc": (disc((1.0, 2.0), 2.5), 5.0),
+    "rectangle": (rectangle(AXIS, (4.0, 1.0)), 1.0),
+    "turned rectangle": (rectangle(AXIS, (4.0, 1.0)).turned(33.0), 1.0),
+    "stadium": (stadium(AXIS, 2.0, 6.0), 2.0),
+    "slot near edge": (rectangle((-5, -5), (5, 5)) - stadium((3.0, 0.0), 2.0, 6.0), 1.0),
+    "web between holes": (disc(AXIS, 9) - disc((-2.0, 0.0), 1.5) - disc((2, 1), 1.5), 17**0.5 - 3),
+    "hole near line": (rectangle((-5, -5), (5, 5)) - disc((0.0, 3.0), 1.25), 0.75),
+    "reflex corner": (polygon([AXIS, (5, 0), (5, 2), (1.5, 2), (1.5, 5), (0, 5)]), 1.5),
+    "two reflex corners": (
+        rectangle((-5, -5), (5, 5)) - rectangle((-3, -3), (0, 0)) - rectangle((0.3, 0.4), (3, 3)),
+        0.5,
+    ),
+    "reflex corner near arc": (disc(AXIS, 5) - rectangle((-1, -1), (3, 3)), 5 - 18**0.5),
+    "tapering strip": (polygon([AXIS, (6, 0), (6, 1), (0, 1.003)]) | disc(AXIS, 2), 1.0),
+    "flat end of a taper": (rounded_arm(10.0), 1.0),
+    "arc facing a line": (rectangle((-5, 0), (5, 3.4)) - disc((0.0, 3.4), 3.0), 0.4),
+    "crescent tip": (disc(AXIS, 2) - disc((0.5, 0.0), 1.5), 0.0),
+    "triangle tip": (polygon([AXIS, (4, 0), (0, 3)]), 0.0),
+    "pieces that touch": (rectangle(AXIS, (1, 1)) | rectangle((1, 1), (2, 2)), 0.0),
+    "lobes in a plate": (union([disc((x, 0.0), 2.0) for x in (-1.5, 1.5)]), 2 * (4 - 2.25) ** 0.5),
+}
+GAPS = {
+    "hole": (disc(AXIS, 3.25) - disc(AXIS, 0.5), 1.0),
+    "between discs": (disc((-2.0, 0.0), 1.5) | disc((2.0, 1.0), 1.5), 17**0.5 - 3),
+    "slit": (rectangle((-5, -5), (5, 5)) - rectangle((0.0, -1.0), (0.15, 1.0)), 0.15),
+    "notch from outside": (disc(AXIS, 5.0) - strip((2.0, 0.0), (6.0, 0.0), 0.3), 0.3),
+    "disc beside strip": (disc((0.0, 2.0), 1.5) | rectangle((-4, -1), (4, 0)), 0.5),
+    "island": ((disc(AXIS, 5) - disc(AXIS, 3)) | disc((0.5, 0.0), 1.0), 1.5),
+}
+
+
+@pytest.mark.parametrize("name", WIDTHS)
+def test_width_is_the_closed_formula(name: str) -> None:
+    region, expected = WIDTHS[name]
+    width = least_width(region)
+    assert width is not None
+    assert width.value == pytest.approx(expected, abs=EXACT)
+    assert math.dist(width.start, width.end) == pytest.approx(expected, abs=EXACT)
+
+
+@pytest.mark.parametrize("name", GAPS)
+def test_gap_is_the_closed_formula(name: str) -> None:
+    region, expected = GAPS[name]
+    gap = least_gap(region)
+    assert gap is not None
+    assert gap.value == pytest.approx(expected, abs=EXACT)
+
+
+@pytest.mark.parametrize("region", [disc(AXIS, 1.0), rectangle(AXIS, (2.0, 1.0)), Region()])
+def test_a_convex_piece_alone_has_no_gap(region: Region) -> None:
+    assert least_gap(region) is None
+
+
+def test_nothing_has_no_width() -> None:
+    assert least_width(Region()) is None
+
+
+def test_a_right_angle_is_not_sharp_but_less_is() -> None:
+    leaning = polygon([AXIS, (4, 0), (4, 1), (0.01, 1)])
+    assert least_width(leaning).value == 0.0
+    blunt = least_width(leaning, sharp=15.0)
+    assert blunt is not None
+    assert blunt.value == pytest.approx(1.0, abs=EXACT)
+
+
+def test_a_triangle_allowed_its_tips_measures_its_least_altitude() -> None:
+    width = least_width(polygon([AXIS, (4, 0), (0, 3)]), sharp=15.0)
+    assert width is not None
+    assert width.value == pytest.approx(2.4, abs=EXACT)
+
+
+def test_the_place_is_where_the_ring_is_thinnest() -> None:
+    width = least_width(disc(AXIS, 3) - disc((0.6, 0.8), 1.5))
+    assert width is not None
+    assert width.middle == pytest.approx((2.75 * 0.6, 2.75 * 0.8), abs=EXACT)
+
+
+def holes_in_a_plate(seed: int) -> Region:
+    """A 24 mm disc with twelve or fewer holes, discs and turned rectangles, that keep apart."""
+    draw = random.Random(seed)
+    region = disc((0.0, 0.0), 12.0)
+    taken: list[tuple[float, float, float]] = []
+    for _ in range(12):
+        radius, distance = draw.uniform(0.6, 1.5), draw.uniform(0, 10)
+        angle = draw.uniform(0, math.tau)
+        x, y = distance * math.cos(angle), distance * math.sin(angle)
+        if any(math.hypot(x - u, y - v) < radius + r + 0.02 for u, v, r in taken):
+            continue
+        if distance + radius > 11.98:
+            continue
+        taken.append((x, y, radius))
+        if draw.random() < 0.5:
+            hole = disc((x, y), radius)
+        else:
+            half, tall = radius * math.cos(0.6), radius * math.sin(0.6)
+            turn = draw.uniform(0, 180)
+            hole = rectangle((-half, -tall), (half, tall)).turned(turn).moved(x, y)
+        region = region - hole
+    return region
+
+
+def ring_of(contour: Contour) -> shapely.LinearRing:
+    return shapely.LinearRing(contour.polygon(sagitta=1e-5))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_webs_agree_with_shapely(seed: int) -> None:
+    region = holes_in_a_plate(seed)
+    rings = [ring_of(contour) for contour in region.contours]
+    apart = min(a.distance(b) for i, a in enumerate(rings) for b in rings[:i])
+    width = least_width(region)
+    assert width is not None
+    assert width.value == pytest.approx(apart, abs=2.1e-5)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_erosion_by_half_the_width_breaks_the_plate(seed: int) -> None:
+    region = holes_in_a_plate(seed)
+    width = least_width(region)
+    assert width is not None
+    (rings,) = region.polygons(sagitta=1e-4)
+    plate = shapely.Polygon(rings[0], rings[1:])
+
+    def boundaries(share: float) -> int:
+        eroded = plate.buffer(-share * width.value / 2, quad_segs=16)
+        return len(shapely.get_parts(eroded)) + sum(
+            len(part.interiors) for part in shapely.get_parts(eroded)
+        )
+
+    assert boundaries(0.99) == len(region.contours)
+    assert boundaries(1.01) != len(region.contours)

@@ -1,0 +1,204 @@
+"""Every rule has faulty laminates that it alone catches; good laminates pass every rule."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import pytest
+
+from sbafab.geometry.offset import grow
+from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import disc, rectangle, strip
+from sbafab.laminate.laminate import Laminate
+from sbafab.rules.deck import Limits, has_failed, rule_names, run_deck
+
+AXIS = (0.0, 0.0)
+# Layers of one chamber of three balloons: 1 base, 2 chamber mask, 3 wall, 4 separator mask, 5 wall,
+# 6 chamber mask, 7 wall, 8 separator mask, 9 wall, 10 chamber mask, 11 cap.
+ONE = ("1dof-5mm", "stack.balloons=3")
+LOBED = ("3dof-15mm", "stack.balloons=3")
+RADIAL = ("radial-15mm", "stack.balloons=2")
+
+
+class Fault(NamedTuple):
+    rule: str
+    design: tuple[str, ...]
+    layer: int
+    change: Callable[[Region], Region]
+    measured: float
+    pieces: int | None = None
+
+
+def between_axes(start: int, end: int, width: float) -> Region:
+    """A strip from one chamber's axis to another's (3-DoF: axes 4.25 from the lumen's)."""
+    a, b = (
+        (4.25 * math.cos(math.tau * i / 3), 4.25 * math.sin(math.tau * i / 3)) for i in (start, end)
+    )
+    return strip(a, b, width)
+
+
+SEPARATOR = disc(AXIS, 3.75) - disc(AXIS, 1.25)
+FAULTS = {
+    "narrow neck ring": Fault(
+        "bond-width", ONE, 4, lambda mask: disc(AXIS, 3.75) - disc(AXIS, 1.2), 0.70
+    ),
+    "wide pocket": Fault(
+        "bond-width", ONE, 10, lambda mask: disc(AXIS, 2.55) - disc(AXIS, 0.5), 0.70
+    ),
+    "pocket off its axis": Fault(
+        "bond-width", ONE, 6, lambda mask: disc((0.1, 0.0), 2.5) - disc(AXIS, 0.5), 0.65
+    ),
+    "separator grown too little": Fault(
+        "mask-overhang", ONE, 8, lambda mask: disc(AXIS, 3.65) - disc(AXIS, 1.25), 0.40
+    ),
+    # The outline ends 5.75 past the third axis, the mask 0.5 further.
+    "bite out of the sheet's separator": Fault(
+        "mask-overhang",
+        RADIAL,
+        2,
+        lambda mask: mask - rectangle((5 * math.pi + 6.05, -3), (30, 3)),
+        0.3,
+    ),
+    "strip flush with the tab's end": Fault(
+        "mask-overhang", ONE, 2, lambda mask: mask - rectangle((8.25, -1), (10, 1)), 0.0
+    ),
+    "hole in the base": Fault("sealing", ONE, 1, lambda base: base - disc((1.5, 0.0), 0.5), 1.0),
+    "hole in a wall between two balloons": Fault(
+        "sealing", ONE, 7, lambda wall: wall - disc((0.0, 1.7), 0.3), 1.0
+    ),
+    "hole in the cap": Fault("sealing", ONE, 11, lambda cap: cap - disc((-1.5, 0.0), 0.2), 1.0),
+    # Three pockets of each chamber, two of which have become one.
+    "strip between two chambers": Fault(
+        "sealing", LOBED, 6, lambda mask: mask | (between_axes(0, 1, 0.7) - bores()), 5.0, 2
+    ),
+    "pocket left out": Fault(
+        "sealing", LOBED, 10, lambda mask: mask - disc((4.25, 0.0), 2.6), 1.0, 2
+    ),
+    "narrow bore in a mask": Fault(
+        "channel-clear", ONE, 6, lambda mask: disc(AXIS, 2.5) - disc(AXIS, 0.4), 0.8
+    ),
+    "no bore in a mask": Fault("channel-clear", ONE, 6, lambda mask: disc(AXIS, 2.5), 0.0),
+    "mask over the lumen": Fault(
+        "channel-clear", LOBED, 8, lambda mask: mask | disc(AXIS, 1.1), 0.0
+    ),
+    "narrow strip": Fault(
+        "tube-fit",
+        ONE,
+        2,
+        lambda mask: (disc(AXIS, 2.5) | strip(AXIS, (8.75, 0.0), 1.4)) - disc(AXIS, 0.5),
+        1.4,
+    ),
+    "strip with a narrow place": Fault(
+        "tube-fit", ONE, 2, lambda mask: mask - rectangle((5.0, 0.65), (6.0, 1.0)), 1.45
+    ),
+    "mask island in the waste": Fault(
+        "piece-count", ONE, 6, lambda mask: mask | disc((6.0, 0.0), 0.5), 1.0
+    ),
+    "slit in a mask": Fault(
+        "film-limits",
+        ONE,
+        4,
+        lambda mask: grow(mask, 1.5) - rectangle((3.95, -0.05), (4.45, 0.05)) - disc(AXIS, 1.25),
+        0.1,
+    ),
+    "cap off its place": Fault(
+        "registration-nominal",
+        ("1dof-5mm", "stack.balloons=3", "bond.width=1.0", "mask.overhang=0.7"),
+        11,
+        lambda cap: cap.moved(0.01, 0.0),
+        0.01,
+    ),
+    "neck ring off its axis": Fault(
+        "registration-nominal",
+        ("1dof-5mm", "stack.balloons=3", "bond.width=1.0", "mask.overhang=0.7"),
+        4,
+        lambda mask: (mask | disc(AXIS, 2.0)) - disc((0.0, 0.02), 1.5),
+        0.02,
+    ),
+}
+
+
+def bores() -> Region:
+    a, b = ((4.25 * math.cos(math.tau * i / 3), 4.25 * math.sin(math.tau * i / 3)) for i in (0, 1))
+    return disc(a, 0.5) | disc(b, 0.5)
+
+
+def failing(laminate: Laminate, limits: Limits | None = None) -> set[str]:
+    findings = run_deck(laminate, limits or Limits())
+    return {finding.rule for finding in findings if finding.verdict == "fail"}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_caught_by_its_rule_alone(
+    name: str, good: Callable[..., Laminate], spoil: Callable[..., Laminate]
+) -> None:
+    fault = FAULTS[name]
+    laminate = good(*fault.design)
+    assert failing(laminate) == set()
+    faulty = spoil(
+        laminate, fault.layer, fault.change(laminate.layer(fault.layer).profile), fault.pieces
+    )
+    assert failing(faulty) == {fault.rule}
+    found = next(f for f in run_deck(faulty, Limits()) if f.verdict == "fail")
+    assert found.measured == pytest.approx(fault.measured, abs=1e-5)
+    assert fault.layer in found.where.layers or fault.rule == "sealing"
+    assert found.where.x is not None
+
+
+def test_a_laminate_past_the_platen_fails_press_fit_alone(good: Callable[..., Laminate]) -> None:
+    laminate = good("1dof-5mm", "chamber.diameter=150")
+    assert failing(laminate) == {"press-fit"}
+    assert failing(good("1dof-5mm", "chamber.diameter=140")) == set()
+
+
+def test_kerf_that_closes_a_bore_fails_film_limits_alone(good: Callable[..., Laminate]) -> None:
+    laminate = good(*ONE)
+    assert failing(laminate, Limits(kerf={"TPE": 0.1, "PTFE": 0.1})) == set()
+    assert failing(laminate, Limits(kerf={"PTFE": 1.01})) == {"film-limits"}
+
+
+def test_every_rule_has_a_fault_of_its_own() -> None:
+    tested_apart = {"press-fit"}
+    assert {fault.rule for fault in FAULTS.values()} | tested_apart == set(rule_names())
+
+
+@pytest.mark.parametrize("template", ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"])
+def test_templates_pass(template: str, good: Callable[..., Laminate]) -> None:
+    assert failing(good(template)) == set()
+
+
+@pytest.mark.parametrize("count", range(2, 9))
+def test_every_number_of_lobes_passes(count: int, good: Callable[..., Laminate]) -> None:
+    assert failing(good("3dof-15mm", f"chamber.count={count}", "stack.balloons=2")) == set()
+
+
+@pytest.mark.parametrize(
+    "design",
+    [
+        ("1dof-5mm", "stack.balloons=1"),
+        ("1dof-5mm", "stack.balloons=3", "chamber.diameter=[7, 6, 5]"),
+        RADIAL,
+        ("radial-15mm", "stack.balloons=2", "inlet.manifold=true"),
+    ],
+)
+def test_variants_pass(design: tuple[str, ...], good: Callable[..., Laminate]) -> None:
+    assert failing(good(*design)) == set()
+
+
+def test_a_waived_failure_stops_nothing_and_says_so(
+    good: Callable[..., Laminate], spoil: Callable[..., Laminate]
+) -> None:
+    narrow = spoil(good(*ONE), 4, disc(AXIS, 3.75) - disc(AXIS, 1.2))
+    findings = run_deck(narrow, Limits(waive=frozenset({"bond-width"})))
+    assert not has_failed(findings)
+    waived = next(finding for finding in findings if finding.rule == "bond-width")
+    assert waived.verdict == "waived"
+    assert waived.message.startswith("waived by the design: ")
+    assert has_failed(run_deck(narrow, Limits(waive=frozenset({"sealing"}))))
+
+
+def test_findings_come_in_the_decks_order(good: Callable[..., Laminate]) -> None:
+    found = list(dict.fromkeys(finding.rule for finding in run_deck(good(*LOBED), Limits())))
+    assert tuple(found) == rule_names()
