@@ -95,7 +95,8 @@ def print_run(run: Run) -> None:
                 f"No cut files were written: {', '.join(failed)} failed. Change the design, or "
                 f"waive by name: {' '.join(f'--waive {name}' for name in failed)}",
                 style="bold red",
-            )
+            ),
+            soft_wrap=True,
         )
 
 

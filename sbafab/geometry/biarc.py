@@ -20,6 +20,8 @@ SAMPLES = 24
 STRAIGHT = 1e-6
 """An arc that bulges less than this, in mm, is written as a line."""
 MOST_ARCS = 2000
+MOST_TRIALS = 40
+"""Doublings and halvings of one span: more than these leave nothing of any curve."""
 LARGEST_TURN = math.radians(80)
 """Farthest the tangent may turn along one arc."""
 
@@ -107,9 +109,8 @@ def _longest_span(
 ) -> tuple[float, list[Edge]]:
     """The farthest parameter that one biarc from ``at`` reaches, by doubling, then bisection."""
     good, bad, end = at, math.inf, min(last, at + step)
-    least = 1e-9 * (last - at)
     fitted: list[Edge] = []
-    while True:
+    for _ in range(MOST_TRIALS):
         edges = _biarc(curve, at, end, tolerance)
         if edges:
             good, fitted = end, edges
@@ -117,10 +118,9 @@ def _longest_span(
             bad = end
         if good == last or bad - good < 0.02 * (good - at):
             return good, fitted
-        if bad - at < least:
-            (x, y), _ = curve(at)
-            raise FitError(f"cusp near x {x:.4f}, y {y:.4f}")
         end = min(last, 2 * end - at) if bad == math.inf else (good + bad) / 2
+    (x, y), _ = curve(at)
+    raise FitError(f"cusp near x {x:.4f}, y {y:.4f}")
 
 
 def _biarc(curve: Curve, first: float, last: float, tolerance: float) -> list[Edge]:

@@ -21,7 +21,10 @@ ALONGSIDE = 1e-3
 """Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
 TAPER = -math.cos(math.radians(30))
 """Normals more opposed than this make the end of an arm a flat end."""
+ROUNDED = 0.1
+"""Degrees a corner may miss its angle by: coordinates read from a file are rounded."""
 TOUCH = 1e-6
+"""mm within which two points are one."""
 
 
 class Width(NamedTuple):
@@ -192,7 +195,7 @@ def _curvature(edge: Edge) -> float:
 def _pinch(contours: Iterable[Contour], corners: Iterable[_Corner], sharp: float) -> Point | None:
     """A corner sharper than allowed, or a point where the boundary meets itself."""
     for corner in corners:
-        if math.degrees(math.pi - corner.turn) < sharp - 1e-4:
+        if math.degrees(math.pi - corner.turn) < sharp - ROUNDED:
             return corner.point
     seen: set[Point] = set()
     for contour in contours:

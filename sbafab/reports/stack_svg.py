@@ -131,7 +131,8 @@ def _breaks(view: View) -> list[str]:
     if section.hidden:
         last = next(s.layer for s in section.slabs if s.layer.index == section.break_above)
         base = view.y(last.z + last.film.thickness, last.index)
-        left, right = view.x(section.low) - 3.0, view.x(_reach(section)) + 3.0
+        left = view.x(section.low) - (0.0 if section.cropped else 3.0)
+        right = view.x(_reach(section)) + 3.0
         for y in (base - 1.6, base - BREAK + 1.6):
             parts.append(_wave((left, y), (right, y)))
         noun = "balloon" if section.hidden == 1 else "balloons"

@@ -1,0 +1,89 @@
+"""Pictures of layers and laminates for notebooks."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import pytest
+from shapely.geometry import Polygon
+from svgelements import Arc, Move, Path
+
+from sbafab.actuators import build, load_design
+from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.picture import laminate_svg, layer_svg
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture(scope="module")
+def laminate() -> Laminate:
+    return build(load_design("3dof-15mm", ["stack.balloons=2"]))
+
+
+def signed_area(data: str) -> float:
+    area = 0.0
+    for piece in Path(data).as_subpaths():
+        points = []
+        for segment in Path(piece):
+            if not isinstance(segment, Move):
+                steps = 150 if isinstance(segment, Arc) else 1
+                points += [segment.point(i / steps) for i in range(steps)]
+        ring = Polygon([(p.x, p.y) for p in points])
+        area += ring.area if ring.exterior.is_ccw else -ring.area
+    return area
+
+
+def test_every_pattern_is_drawn_with_its_exact_area(laminate: Laminate) -> None:
+    for layers in laminate.patterns.values():
+        layer = layers[0]
+        root = ElementTree.fromstring(layer_svg(layer))
+        [path] = root.iter(f"{SVG}path")
+        data = path.attrib["d"]
+        assert signed_area(data) == pytest.approx(layer.profile.area, rel=1e-4)
+        assert "A" in data
+
+
+def test_the_longer_side_measures_eighty_millimetres(laminate: Laminate) -> None:
+    root = ElementTree.fromstring(layer_svg(laminate.layer(1)))
+    sides = [float(root.attrib[key].removesuffix("mm")) for key in ("width", "height")]
+    box = [float(part) for part in root.attrib["viewBox"].split()]
+    assert max(sides) == pytest.approx(80.0, abs=1e-5)
+    assert sides[0] / sides[1] == pytest.approx(box[2] / box[3], rel=1e-5)
+
+
+def test_the_profile_lies_inside_the_view(laminate: Laminate) -> None:
+    layer = laminate.layer(1)
+    low_x, low_y, high_x, high_y = layer.profile.bounds
+    root = ElementTree.fromstring(layer_svg(layer))
+    x, y, width, height = (float(part) for part in root.attrib["viewBox"].split())
+    assert x < low_x
+    assert high_x < x + width
+    # The picture is flipped: y up becomes y down.
+    assert y < -high_y
+    assert -low_y < y + height
+
+
+def test_a_laminate_shows_each_pattern_once(laminate: Laminate) -> None:
+    root = ElementTree.fromstring(laminate_svg(laminate))
+    assert len(list(root.iter(f"{SVG}path"))) == len(laminate.patterns)
+
+
+def test_a_name_with_markup_is_escaped(laminate: Laminate) -> None:
+    named = replace(laminate, name="<b> & co")
+    title = ElementTree.fromstring(laminate_svg(named)).find(f"{SVG}title")
+    assert title is not None
+    assert str(title.text).startswith("<b> & co: 7 layers")
+
+
+def test_notebooks_get_the_same_pictures(laminate: Laminate) -> None:
+    assert laminate._repr_svg_() == laminate_svg(laminate)
+    assert laminate.layer(2)._repr_svg_() == layer_svg(laminate.layer(2))
+
+
+def test_tpe_and_ptfe_have_different_fills(laminate: Laminate) -> None:
+    fills = [
+        re.findall(r'fill="(#\w+)"', layer_svg(laminate.layer(index)))[0] for index in (1, 2, 3)
+    ]
+    assert fills[0] == fills[2] != fills[1]

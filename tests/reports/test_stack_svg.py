@@ -1,0 +1,108 @@
+"""preview/stack.svg: the section through one chamber."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import pytest
+
+from sbafab.actuators import build, load_design
+from sbafab.laminate.laminate import Laminate
+from sbafab.reports.stack_section import chamber_section, opening
+from sbafab.reports.stack_svg import BOND, stack_svg
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def laminate_of(template: str, *assignments: str) -> Laminate:
+    return build(load_design(template, assignments))
+
+
+def words_of(svg: str) -> list[str]:
+    return [str(text.text) for text in ElementTree.fromstring(svg.encode()).iter(f"{SVG}text")]
+
+
+def test_the_section_of_one_dof_cuts_where_the_formulas_say() -> None:
+    section = chamber_section(laminate_of("1dof-5mm"))
+    spans = {slab.layer.index: slab.spans for slab in section.slabs}
+    near = {"abs": 1e-9}
+    assert spans[1] == (pytest.approx((-3.25, 8.25), **near),)
+    assert spans[2] == (pytest.approx((-2.5, -0.5), **near), pytest.approx((0.5, 8.75), **near))
+    assert spans[4] == (pytest.approx((-3.75, -1.25), **near), pytest.approx((1.25, 3.75), **near))
+    assert spans[23] == (pytest.approx((-3.25, 3.25), **near),)
+    bonds = {joint.interface.index: joint.spans for joint in section.joints}
+    assert bonds[1] == (pytest.approx((-3.25, -2.5), **near),)
+    assert bonds[2] == (pytest.approx((-1.25, -0.5), **near), pytest.approx((0.5, 1.25), **near))
+
+
+def test_the_lumen_lies_where_the_chamber_axis_radius_says() -> None:
+    section = chamber_section(laminate_of("3dof-15mm"))
+    assert section.lumen == pytest.approx(-4.25, abs=1e-9)
+    cap = section.slabs[-1].spans
+    assert opening(cap, -4.25) == pytest.approx((-5.25, -3.25), abs=1e-9)
+
+
+@pytest.mark.parametrize(("balloons", "hidden"), [(1, 0), (2, 0), (4, 0), (5, 2), (6, 3), (15, 12)])
+def test_many_balloons_are_broken_short(balloons: int, hidden: int) -> None:
+    laminate = laminate_of("1dof-5mm", f"stack.balloons={balloons}")
+    section = chamber_section(laminate)
+    assert section.hidden == hidden
+    drawn = {slab.layer.balloon for slab in section.slabs if not slab.layer.is_mask}
+    assert len(drawn) == balloons - hidden
+    assert any(f"{hidden} more balloons" in words for words in words_of(stack_svg(laminate))) == (
+        hidden > 0
+    )
+
+
+@pytest.mark.parametrize(
+    ("template", "labels"),
+    [
+        ("1dof-5mm", {"bore ⌀1.00", "bond 0.75", "overhang 0.50", "23 cap", "6.50", "5.00"}),
+        (
+            "3dof-15mm",
+            {"lumen ⌀2.00", "neck ring, bond 0.75", "chamber pocket 5.00", "59 cap", "tab 5.00"},
+        ),
+        ("radial-15mm", {"1 sheet", "3 base", "5 cap", "bond 0.75", "tab 5.00"}),
+    ],
+)
+def test_labels_and_dimensions(template: str, labels: set[str]) -> None:
+    found = words_of(stack_svg(laminate_of(template)))
+    assert labels <= set(found)
+    assert any(words.endswith("inlet strip") for words in found)
+    assert any(re.search(r"Height exaggerated \d+\u00d7", words) for words in found)
+
+
+def rectangles(svg: str) -> list[tuple[str, float, float]]:
+    root = ElementTree.fromstring(svg.encode())
+    return [
+        (box.attrib["fill"], float(box.attrib["width"]), float(box.attrib["height"]))
+        for box in root.iter(f"{SVG}rect")
+    ]
+
+
+def test_widths_and_heights_are_to_their_two_scales() -> None:
+    svg = stack_svg(laminate_of("1dof-5mm", "stack.balloons=2"))
+    stated = re.search(r"exaggerated (\d+)\u00d7", svg)
+    assert stated is not None
+    factor = int(stated[1])
+    across = (297 - 2 * 56) / (8.75 + 3.75)
+    found = {
+        (fill, round(width / across, 3), round(height / across / factor, 4))
+        for fill, width, height in rectangles(svg)
+    }
+    assert (BOND, 0.75, 0.025) in found
+    assert ("#a9cfea", 6.5, 0.038) in found
+    assert ("#a9cfea", 11.5, 0.038) in found
+
+
+def test_eight_lobes_are_cropped_beyond_the_lumen_and_keep_all_labels() -> None:
+    laminate = laminate_of("3dof-15mm", "chamber.count=8")
+    assert chamber_section(laminate).cropped
+    assert {"overhang 0.50", "bore ⌀1.00", "lumen ⌀2.00"} <= set(words_of(stack_svg(laminate)))
+
+
+def test_a_name_with_markup_is_escaped() -> None:
+    laminate = replace(laminate_of("1dof-5mm"), name="a<b & c")
+    assert "a<b & c" in words_of(stack_svg(laminate))
