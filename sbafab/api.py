@@ -1,8 +1,8 @@
 """The program from Python: the commands' names, a line each.
 
-    >>> import sbafab
-    >>> laminate = sbafab.build("3dof-15mm", "stack.balloons=6")
-    >>> run = sbafab.generate("3dof-15mm", out="out")
+>>> import sbafab
+>>> laminate = sbafab.build("3dof-15mm", "stack.balloons=6")
+>>> run = sbafab.generate("3dof-15mm", out="out")
 """
 
 from __future__ import annotations

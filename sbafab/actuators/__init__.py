@@ -17,17 +17,25 @@ FAMILIES: dict[str, tuple[type[Design], Callable[[Any], Laminate]]] = {
     "radial": (radial.RadialDesign, radial.build),
 }
 
+OUTLINE = "chamber.outline"
+
 
 def load_design(
     source: str | Path, assignments: Iterable[str] = (), waivers: Sequence[str] = ()
 ) -> Design:
     """A design from a template's name or a TOML file, with ``key=value`` assignments applied.
 
-    ``waivers`` are rule names added to those that the file waives. Raises DesignError with one sentence where it cannot be built.
+    ``waivers`` are rule names added to those that the file waives. Raises DesignError with one
+    sentence where it cannot be built.
     """
     path = design_path(source)
+    assignments = list(assignments)
     data = add_waivers(override(read_toml(path), assignments), waivers)
     data.setdefault("name", path.stem)
+    if any(assignment.partition("=")[0].strip() == OUTLINE for assignment in assignments):
+        # A path typed on the command line starts where the user stands, not at the design file.
+        chamber = data["chamber"]
+        chamber["outline"] = str(Path(str(chamber["outline"])).absolute())
     records = {family: record for family, (record, _) in FAMILIES.items()}
     return validated(data, records, path.parent)
 

@@ -34,9 +34,7 @@ def build(design: OneDofDesign) -> Laminate:
         BalloonShape(bonded(pocket, design.bond.width), pocket, 1, 1) for pocket in pockets
     )
     first = shapes[shape_of[0]]
-    tab, strip, inlet = tab_and_strip(
-        design, "chamber1", AXIS, (1.0, 0.0), first.outline.bounds[2]
-    )
+    tab, strip, inlet = tab_and_strip(design, "chamber1", AXIS, (1.0, 0.0), first.outline.bounds[2])
     bottom = BalloonShape(
         fillet(first.outline | tab, design.fillet.radius), first.pockets | strip, 1, 1
     )

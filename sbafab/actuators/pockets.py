@@ -62,9 +62,7 @@ def check_neck(design: Design, pockets: list[Region], centres: list[Point]) -> N
     if design.stack.balloons == 1:
         return
     ring = design.bore.diameter / 2 + design.bond.width
-    room = min(
-        pocket.distance_to_edge(centre) for pocket in pockets for centre in centres
-    )
+    room = min(pocket.distance_to_edge(centre) for pocket in pockets for centre in centres)
     if ring >= room:
         largest = 2 * (room - design.bond.width)
         remedy = f"make the bore less than {largest:.3f}" if largest > 0 else "widen the pocket"

@@ -192,9 +192,7 @@ def _sheet(design: RadialDesign, outline: Region) -> Region:
     half = math.pi * design.tube.outer_diameter / 2
     _, low_y, _, high_y = outline.bounds
     margin = design.sheet.margin
-    return rectangle(
-        (-half, low_y - margin), (half + design.sheet.overlap, high_y + margin)
-    )
+    return rectangle((-half, low_y - margin), (half + design.sheet.overlap, high_y + margin))
 
 
 def _bottom(

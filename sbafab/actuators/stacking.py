@@ -137,9 +137,7 @@ def layers(cuts: Iterable[Cut], design: Design) -> tuple[Layer, ...]:
         shape = (film.material, cut.profile.key)
         pattern = patterns.setdefault(shape, f"P{len(patterns) + 1:02d}")
         placed.append(
-            Layer(
-                index, cut.role, film, cut.profile, cut.balloon, round(z, 9), cut.pieces, pattern
-            )
+            Layer(index, cut.role, film, cut.profile, cut.balloon, round(z, 9), cut.pieces, pattern)
         )
         z += film.thickness
     return tuple(placed)

@@ -75,9 +75,10 @@ def run_options(command: Command) -> Command:
         waive_option,
         json_option,
     )
+    decorated: Command = gathered
     for option in reversed(options):
-        gathered = option(gathered)
-    return gathered
+        decorated = option(decorated)
+    return decorated
 
 
 def dxf_options(command: Command) -> Command:

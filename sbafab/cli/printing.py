@@ -108,7 +108,10 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
         kind = f"{layer.film.material} {layer.role}"
         counts[kind] = counts.get(kind, 0) + 1
     sizes = index["sizes"]
-    yield "design", f"{lam.name} ({lam.family}, {lam.balloons} balloons), {index['design_sha256'][:12]}"
+    yield (
+        "design",
+        f"{lam.name} ({lam.family}, {lam.balloons} balloons), {index['design_sha256'][:12]}",
+    )
     yield "sizes", ", ".join(f"{k.replace('_', ' ')} {v:.3f}" for k, v in sizes.items()) + " mm"
     yield (
         "layers",

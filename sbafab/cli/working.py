@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import click
@@ -18,7 +18,7 @@ RULE_FAILED = 1
 
 def run_parts(
     request: Request,
-    parts: Collection[Part],
+    parts: Sequence[Part],
     dxf_profile: DxfProfile = "bulges",
     chord_error: float = 0.005,
 ) -> None:

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator
 from sbafab.design.units import Length, LengthOrZero, millimetres
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
-UNCALIBRATED = "uncalibrated"
+UNCALIBRATED: Literal["uncalibrated"] = "uncalibrated"
 RULE_NAMES = (
     "bond-width",
     "mask-overhang",

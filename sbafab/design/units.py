@@ -10,8 +10,8 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 
 MILLIMETRES = {
     "um": 0.001,
-    "µm": 0.001,
-    "μm": 0.001,
+    "\u00b5m": 0.001,
+    "\u03bcm": 0.001,
     "mm": 1.0,
     "cm": 10.0,
     "m": 1000.0,
@@ -20,7 +20,8 @@ MILLIMETRES = {
     '"': 25.4,
     "mil": 0.0254,
 }
-_WRITTEN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s]*)\s*")
+_NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_WRITTEN = re.compile(rf"\s*([-+]?{_NUMBER})\s*([^\d\s]*)\s*")
 
 
 def millimetres(value: object) -> float:
@@ -48,7 +49,8 @@ SHORTEST, LONGEST = 0.001, 1000.0
 
 
 def _json_schema(number: dict[str, float]) -> WithJsonSchema:
-    text = {"type": "string", "pattern": r"^\s*\+?[0-9.]+([eE][-+]?\d+)?\s*(um|µm|mm|cm|m|in|inch|mil)?\s*$"}
+    units = "|".join(MILLIMETRES)
+    text = {"type": "string", "pattern": rf"^\s*\+?{_NUMBER}\s*({units})?\s*$"}
     return WithJsonSchema({"anyOf": [{"type": "number", **number, "maximum": LONGEST}, text]})
 
 

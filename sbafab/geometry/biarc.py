@@ -140,6 +140,8 @@ def _biarc(curve: Curve, first: float, last: float, tolerance: float) -> list[Ed
         (start[0] + end[0] + d * (u[0] - v[0])) / 2,
         (start[1] + end[1] + d * (u[1] - v[1])) / 2,
     )
+    if min(math.dist(start, joint), math.dist(joint, end)) ** 2 < square / 100:
+        return []
     turn = _angle(u, (joint[0] - start[0], joint[1] - start[1]))
     other = _angle((end[0] - joint[0], end[1] - joint[1]), v)
     if max(abs(turn), abs(other)) > LARGEST_TURN / 2:

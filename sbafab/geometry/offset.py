@@ -10,7 +10,6 @@ from sbafab.geometry.boolean import GeometryError, PointPool, chain, left_turn, 
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Point, distance_to
 from sbafab.geometry.region import Contour, Region
 
-
 NUDGE = 4 * EPSILON
 """By how much a distance may be off, in mm, where gaps of just that width will not resolve."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -66,7 +66,7 @@ def waived_rules(findings: Collection[Finding], design: Design) -> tuple[str, ..
 def generate(
     design: Design,
     out: Path = Path("out"),
-    parts: Collection[Part] = EVERYTHING,
+    parts: Sequence[Part] = EVERYTHING,
     progress: Progress | None = None,
     dxf_profile: DxfProfile = "bulges",
     chord_error: float = 0.005,
@@ -106,7 +106,7 @@ def generate(
                 laminate, folder, progress=lambda done, total: tell("meshes", done, total)
             )
         if "preview" in wanted:
-            _write_pictures(laminate, folder, tell)
+            _write_pictures(_marked(laminate, findings, waived), folder, tell)
         _write(folder / "checks.json", as_json(checks(findings, "design")))
         _write_design(design, folder)
         index = manifest(design, laminate, waived, cut_files, meshes)
@@ -127,6 +127,14 @@ def _schedule(design: Design, laminate: Laminate, waived: tuple[str, ...]) -> Sc
 
 def _write(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _marked(laminate: Laminate, findings: Sequence[Finding], waived: Sequence[str]) -> Laminate:
+    """The laminate with a note for its pictures where a rule failed or is waived."""
+    failed = dict.fromkeys(finding.rule for finding in findings if finding.verdict == "fail")
+    notes = [f"not to be built, failed: {', '.join(failed)}"] if failed else []
+    notes += [f"waived: {', '.join(waived)}"] if waived else []
+    return replace(laminate, notes=(*laminate.notes, *notes)) if notes else laminate
 
 
 def _write_pictures(laminate: Laminate, folder: Path, tell: Progress) -> None:
@@ -171,4 +179,3 @@ def _carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
         index["layers"] = old["layers"]
     if not index["meshes"]:
         index["meshes"] = old["meshes"]
-

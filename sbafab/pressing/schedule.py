@@ -93,9 +93,9 @@ class Schedule:
 def schedule(laminate: Laminate, press: PressSettings) -> Schedule:
     """The press steps of a laminate, bottom balloon first.
 
-    Flash bonds hold layers in place on their pins; full bonds are pressed without pins, because
-    base and cap have no bore for a channel pin. Raises DesignError at a temperature that would
-    not bond TPE or that PTFE does not stand.
+    Flash bonds hold layers in place on their pins. Full bonds are pressed without any: base and
+    cap have no bore for a channel pin, and a lumen pin, though it would pass, stays out as in the
+    paper. Raises DesignError at a temperature that would not bond TPE or that PTFE does not stand.
     """
     _refuse_temperature(laminate, press)
     steps = _steps(laminate, press)
@@ -179,15 +179,15 @@ def _shapes(laminate: Laminate, layers: Sequence[int]) -> tuple[Layer, ...]:
 
 
 def _instructions(part: _Plan, pins: Sequence[str]) -> str:
-    stacks = [_named(stack) for stack in part.stacks if stack]
+    stacks = ", then ".join(_named(stack) for stack in part.stacks if stack)
     if part.bond == "full":
         return (
-            f"Lay {_listed(stacks)} on each other, lowest first, outline on outline, with every "
-            "pin out. Press to the full bond and let the laminate cool flat."
+            f"Lay down {stacks}, outline on outline, with no pin. Press to the full bond and let "
+            "the laminate cool flat."
         )
-    held = f"on {_listed([f'pin {pin}' for pin in pins])}" if pins else "outline on outline by hand"
+    by = f"on the pin{'s' if len(pins) > 1 else ''} {_listed(pins)}" if pins else "by hand"
     after = "Press to the flash bond" + (" and draw the pins." if pins else ".")
-    return f"Lay {stacks[0]} {held}, lowest first, as a stack of their own. {after}"
+    return f"Lay {stacks} on each other {by}, lowest first, as a stack of their own. {after}"
 
 
 def _listed(words: Sequence[str]) -> str:

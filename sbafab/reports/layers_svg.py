@@ -80,7 +80,8 @@ def _title_block(laminate: Laminate, grid: Grid) -> list[str]:
     return [
         draw.box(low, (width - MARGIN, height - MARGIN), fill="none", stroke=draw.DARK, width=0.25),
         draw.text((x + 3.0, y + 7.2), laminate.name, size=4.6, bold=True),
-        draw.text((x + 3.0, y + 12.6), facts),
+        draw.text((x + 3.0, y + 12.0), facts),
+        draw.text((x + 3.0, y + 16.2), "; ".join(laminate.notes), bold=True),
         *_films(laminate, (width / 2 + 18.0, y)),
         *_scale_bar(grid.scale, (width - MARGIN - 4.0, y)),
     ]

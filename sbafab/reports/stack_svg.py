@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sbafab.geometry.edges import Point
@@ -21,10 +22,14 @@ HEAD, FOOT = 42.0, 36.0
 TALLEST = 120.0
 TALLEST_FILM = 8.0
 BREAK = 13.0
+ROW_STEP = 6.0
 SLIT = 0.18
 """Share of the gap drawn open above and below a mask, so that one sees what does not bond."""
 EXAGGERATIONS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30, 40, 50, 60, 80, 100)
 BOND = "#2a7ab9"
+
+Dimension = tuple[Interval, str]
+"""A stretch of the section to give the length of, and its name (may be empty)."""
 
 
 @dataclass(frozen=True)
@@ -182,14 +187,11 @@ def _dimensions_above(view: View) -> list[str]:
     if view.section.lumen is not None:
         through = opening(cap.spans, view.section.lumen)
         measured += [through] if through else []
-    parts: list[str] = []
-    for start, end in measured:
-        if start <= view.section.low and view.section.cropped:
-            continue
-        parts += _level(view, (start, end), top, (0.0, -1.0), 6.0)
-    whole = cap.spans[0][0], cap.spans[-1][1]
+    shown = [span for span in measured if span[0] > view.section.low or not view.section.cropped]
+    parts, rows = _levels(view, [(span, "") for span in shown], top, (0.0, -1.0))
     if not view.section.cropped:
-        parts += _level(view, whole, top, (0.0, -1.0), 13.0)
+        whole = cap.spans[0][0], cap.spans[-1][1]
+        parts += _level(view, (whole, ""), top, (0.0, -1.0), ROW_STEP * (rows + 1) + 1.0)
     return parts
 
 
@@ -201,20 +203,41 @@ def _dimensions_below(view: View) -> list[str]:
     lowest = section.slabs[0].layer
     bottom = view.y(lowest.z, lowest.index)
     mouth = section.tab[1]
-    parts = _level(view, section.tab, bottom, (0.0, 1.0), 6.0, "tab")
+    measured: list[Dimension] = [(section.tab, "tab")]
     masks = [slab for slab in section.slabs if slab.layer.role == "chamber-mask" and slab.spans]
     reach = max((slab.spans[-1][1] for slab in masks), default=mouth)
     if reach - mouth > 1e-3:
-        parts += _level(view, (mouth, reach), bottom, (0.0, 1.0), 6.0, "overhang")
-    return parts
+        measured.append(((mouth, reach), "overhang"))
+    return _levels(view, measured, bottom, (0.0, 1.0))[0]
 
 
-def _level(
-    view: View, span: Interval, y: float, away: Point, distance: float, name: str = ""
-) -> list[str]:
-    start, end = span
-    words = f"{name} {length(end - start)}".strip()
+def _levels(
+    view: View, measured: Sequence[Dimension], y: float, away: Point
+) -> tuple[list[str], int]:
+    """Dimensions in as few rows as keep their words apart, and how many rows that took."""
+    rows: list[list[Interval]] = []
+    parts: list[str] = []
+    for span, name in measured:
+        middle = view.x((span[0] + span[1]) / 2)
+        half = draw.text_width(_words(span, name)) / 2 + 0.5
+        taken = middle - half, middle + half
+        free = [not any(a < taken[1] and taken[0] < b for a, b in row) for row in rows]
+        row = free.index(True) if True in free else len(rows)
+        if row == len(rows):
+            rows.append([])
+        rows[row].append(taken)
+        parts += _level(view, (span, name), y, away, ROW_STEP * (row + 1))
+    return parts, len(rows)
+
+
+def _level(view: View, measured: Dimension, y: float, away: Point, distance: float) -> list[str]:
+    (start, end), name = measured
+    words = _words((start, end), name)
     return draw.dimension((view.x(start), y), (view.x(end), y), words, away, distance)
+
+
+def _words(span: Interval, name: str) -> str:
+    return f"{name} {length(span[1] - span[0])}".strip()
 
 
 def _labels(view: View) -> list[str]:

@@ -10,13 +10,17 @@ from sbafab.rules.limits import Limits, at, holds
 
 NAME = "bond-width"
 
+SHARP = 30.0
+"""Degrees: a sharper corner is a bond that tapers to nothing. Blunter ones are where a strip leaves
+its pocket aslant, between two edges of one void, and no way for a leak."""
+
 
 def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     """The least width of any bond, measured between facing edges."""
     worst: tuple[float, Width | None, Alike] | None = None
     for alike in distinct_interfaces(laminate):
         bond = alike.interface.bond
-        width = None if bond.is_empty else least_width(bond)
+        width = None if bond.is_empty else least_width(bond, SHARP)
         if width is None and not bond.is_empty:
             continue
         value = width.value if width else 0.0
@@ -43,4 +47,7 @@ def _message(value: float, width: Width | None, alike: Alike, limits: Limits) ->
     narrowest = f"the narrowest bond is {value:.3f} mm, at {where}, {at(width.middle)}"
     if holds(value, limits.bond_width):
         return narrowest
-    return f"{narrowest}; it needs {limits.bond_width:g}: move the edges on either side apart there"
+    remedy = (
+        "move the edges on either side apart there" if value else "round the sharp corner there"
+    )
+    return f"{narrowest}; it needs {limits.bond_width:g}: {remedy}"

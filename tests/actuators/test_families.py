@@ -134,8 +134,6 @@ def test_equal_profiles_share_a_pattern() -> None:
         ("radial-15mm", ["window.length=30"], "window.length = 30"),
     ],
 )
-def test_impossible_combinations_are_refused(
-    name: str, assignments: list[str], says: str
-) -> None:
+def test_impossible_combinations_are_refused(name: str, assignments: list[str], says: str) -> None:
     with pytest.raises(DesignError, match=says):
         laminate(name, *assignments)

@@ -264,6 +264,13 @@ def _bezier_area() -> float:
     return abs(area)
 
 
+def _endless_spline(space: Any) -> None:
+    spline = space.add_open_spline([(*p, 0) for p in [*ARROW, ARROW[0]]])
+    knots = list(spline.knots)
+    knots[-4:] = [1e308] * 4
+    spline.knots = knots
+
+
 BAD_DXF: dict[str, tuple[Callable[[Any], object], str]] = {
     "nothing": (lambda m: m.add_text("pocket"), "no closed path"),
     "two": (lambda m: (m.add_circle((0, 0), 2), m.add_circle((0, 0), 1)), "2 closed paths"),
@@ -303,6 +310,11 @@ BAD_DXF: dict[str, tuple[Callable[[Any], object], str]] = {
         lambda m: m.add_circle((0, 0), 4, dxfattribs={"extrusion": (0, 1, 0)}),
         "CIRCLE that is tilted",
     ),
+    "degree": (
+        lambda m: m.add_open_spline([(*p, 0) for p in [*ARROW, *ARROW]], degree=12),
+        "SPLINE of degree 12",
+    ),
+    "endless spline": (_endless_spline, "cusp near"),
     "too many edges": (
         lambda m: m.add_lwpolyline([(math.cos(k), math.sin(k)) for k in range(2001)]),
         "more than 2000 edges",
@@ -331,6 +343,7 @@ BAD_SVG = {
     "two subpaths": ('<path d="M-3-2h6v6h-6z m1 1h1v1h-1z"/>', PAGE, "2 closed paths"),
     "open": ('<path d="M-3-2h6v6h-6"/>', PAGE, r"gap of 6\.0000 mm"),
     "cusp": ('<path d="M-2.5-2C2.5 3-2.5 3 2.5-2z"/>', PAGE, r"cusp near x -?0\.0000, y -1\.7500"),
+    "flattened": ('<ellipse rx="2" ry="3" transform="scale(2 1e-9)"/>', PAGE, "cusp near"),
     "overflow": ('<circle r="1e400"/>', PAGE, "coordinate"),
     "garbage": ('<path d="garbage"/>', PAGE, "no closed path"),
     "no view": ('<circle r="2"/>', 'width="4mm" viewBox="0 0 0 1"', "viewBox"),

@@ -93,6 +93,17 @@ def test_a_right_angle_is_not_sharp_but_less_is() -> None:
     assert blunt.value == pytest.approx(1.0, abs=EXACT)
 
 
+def test_a_cusp_belongs_to_the_side_it_points_into() -> None:
+    sliver = rectangle(AXIS, (3.0, 1.0)) - disc((0.0, 1.0), 1.0)
+    assert least_width(sliver).value == 0.0
+    # A disc resting on a bar, filled on its left: the notch on its right ends in nothing.
+    notched = union(
+        [rectangle((-1, -1), (3, 0)), rectangle((-1, -1), (0, 2)), disc((0.0, 1.0), 1.0)]
+    )
+    assert least_gap(notched).value == 0.0
+    assert least_width(notched).value == pytest.approx(1.0, abs=EXACT)
+
+
 def test_a_triangle_allowed_its_tips_measures_its_least_altitude() -> None:
     width = least_width(polygon([AXIS, (4, 0), (0, 3)]), sharp=15.0)
     assert width is not None

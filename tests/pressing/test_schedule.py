@@ -60,8 +60,8 @@ def test_pins_are_in_for_flash_bonds_and_out_for_full_bonds(stack: Stack) -> Non
         ("chamber_1", "lumen"),
         (),
     ]
-    assert "on pin chamber_1 and pin lumen" in plan.steps[0].instructions
-    assert "every pin out" in plan.steps[1].instructions
+    assert "on the pins chamber_1 and lumen," in plan.steps[0].instructions
+    assert "with no pin" in plan.steps[1].instructions
 
 
 def test_a_pin_that_would_meet_film_stays_out(stack: Stack) -> None:
@@ -199,4 +199,4 @@ def test_csv_reads_back(stack: Stack) -> None:
 
 def test_instructions_name_the_stacks_in_their_order(stack: Stack) -> None:
     last = schedule(stack(3, sheet=True), PAPER).steps[-1].instructions
-    assert "layers 1 and 2, layers 3 to 5, layers 6 to 12 and layer 13" in last
+    assert "layers 1 and 2, then layers 3 to 5, then layers 6 to 12, then layer 13," in last

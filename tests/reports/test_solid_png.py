@@ -95,7 +95,8 @@ def test_a_keyhole_is_painted_with_its_holes_open() -> None:
     ]
     image = Image.new("L", (100, 100))
     ImageDraw.Draw(image).polygon(keyhole([square, *holes]), fill=255)
-    assert [image.getpixel((x, 50)) for x in (30, 50, 70)] == [0, 0, 0]
+    # A slit led through another hole would leave a line of film across it.
+    assert {image.getpixel((x, y)) for x in (30, 50, 70) for y in range(46, 55)} == {0}
     assert [image.getpixel((x, 30)) for x in (30, 50, 70)] == [255, 255, 255]
     assert image.getpixel((5, 50)) == 0
     assert image.getpixel((95, 50)) == 0

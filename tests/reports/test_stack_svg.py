@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from itertools import combinations
 from xml.etree import ElementTree
 
 import pytest
+from PIL import ImageFont
 
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
@@ -101,6 +103,34 @@ def test_eight_lobes_are_cropped_beyond_the_lumen_and_keep_all_labels() -> None:
     laminate = laminate_of("3dof-15mm", "chamber.count=8")
     assert chamber_section(laminate).cropped
     assert {"overhang 0.50", "bore ⌀1.00", "lumen ⌀2.00"} <= set(words_of(stack_svg(laminate)))
+
+
+def box_of(text: ElementTree.Element) -> tuple[float, float, float, float]:
+    size = float(text.attrib.get("font-size", "3"))
+    width = ImageFont.load_default(100).getlength(str(text.text)) * size / 100
+    shift = {"start": 0.0, "middle": 0.5, "end": 1.0}[text.attrib.get("text-anchor", "start")]
+    x, y = float(text.attrib["x"]) - shift * width, float(text.attrib["y"])
+    return x, y - 0.7 * size, x + width, y
+
+
+@pytest.mark.parametrize(
+    ("template", "assignments"),
+    [
+        ("1dof-5mm", []),
+        ("3dof-15mm", []),
+        ("3dof-15mm", ["chamber.count=8"]),
+        ("3dof-15mm", ["chamber.diameter=20", "stack.balloons=1"]),
+        ("1dof-10mm", ["chamber.diameter=100", "stack.balloons=1"]),
+        ("radial-15mm", ["stack.balloons=3"]),
+    ],
+)
+def test_no_words_on_other_words_or_off_the_page(template: str, assignments: list[str]) -> None:
+    root = ElementTree.fromstring(stack_svg(laminate_of(template, *assignments)).encode())
+    page = [float(part) for part in root.attrib["viewBox"].split()]
+    boxes = [box_of(text) for text in root.iter(f"{SVG}text")]
+    for a, b in combinations(boxes, 2):
+        assert not (a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]), (a, b)
+    assert all(min(box) > 0 and box[2] < page[2] and box[3] < page[3] for box in boxes)
 
 
 def test_a_name_with_markup_is_escaped() -> None:

@@ -55,6 +55,26 @@ def test_bond_width_names_layers_place_and_remedy(good: Good, spoil: Spoil) -> N
     assert "it needs 0.75" in found.message
 
 
+def test_a_bond_that_tapers_to_nothing_fails(good: Good, spoil: Spoil) -> None:
+    # The pocket's circle touches the outline from within: between them the ring ends in cusps.
+    (found,) = bond_width.check(
+        spoil(good(*ONE), 6, disc((1.0, 0.0), 2.25) - disc(AXIS, 0.5)), LIMITS
+    )
+    assert (found.verdict, found.measured) == ("fail", 0.0)
+    assert (found.where.x, found.where.y) == pytest.approx((3.25, 0.0), abs=1e-5)
+
+
+@pytest.mark.parametrize("turn", [10.0, 25.0, 40.0])
+def test_a_strip_that_leaves_aslant_is_no_narrow_bond(
+    turn: float, good: Good, spoil: Spoil
+) -> None:
+    # A square pocket turned under the strip: their edges meet at 90 degrees less ``turn``.
+    pocket = rectangle((-1.7, -1.7), (1.7, 1.7)).turned(turn)
+    mask = (pocket | strip(AXIS, (8.75, 0.0), 1.6)) - disc(AXIS, 0.5)
+    (found,) = bond_width.check(spoil(good(*ONE), 2, mask), LIMITS)
+    assert (found.verdict, found.measured) == ("pass", pytest.approx(0.75, abs=1e-9))
+
+
 def test_a_mask_that_covers_all_leaves_no_bond(good: Good, spoil: Spoil) -> None:
     (found,) = bond_width.check(spoil(good(*ONE), 6, disc(AXIS, 4.0) - disc(AXIS, 0.5)), LIMITS)
     assert (found.verdict, found.measured) == ("fail", 0.0)

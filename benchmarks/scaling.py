@@ -1,0 +1,39 @@
+"""Time of rules and cut files for stacks of some numbers of balloons, copying files aside."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import tempfile
+import time
+from pathlib import Path
+
+DESIGN = "3dof-15mm"
+
+
+def rules_and_cut_files(balloons: int) -> float:
+    """Seconds from the design to its findings and cut files, without the copies' share."""
+    from sbafab.actuators import build, load_design
+    from sbafab.cutting.files import write_layer_files
+    from sbafab.output.settings import cut_settings, limits
+    from sbafab.rules.deck import run_deck
+
+    design = load_design(DESIGN, [f"stack.balloons={balloons}"])
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        began = time.perf_counter()
+        laminate = build(design)
+        run_deck(laminate, limits(design))
+        files = write_layer_files(laminate, folder, cut_settings(design, (), "bulges", 0.005))
+        taken = time.perf_counter() - began
+        copies = len(files) - len(laminate.patterns)
+        return taken - copies * _copy_time(folder / files[0].path)
+
+
+def _copy_time(path: Path, times: int = 20) -> float:
+    """Seconds to copy a cut file and to hash the copy."""
+    began = time.perf_counter()
+    for _ in range(times):
+        copy = shutil.copyfile(path, path.with_suffix(".copy"))
+        hashlib.sha256(copy.read_bytes()).hexdigest()
+    return (time.perf_counter() - began) / times
