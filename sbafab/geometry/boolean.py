@@ -18,7 +18,7 @@ from sbafab.geometry.shapes import circle
 
 Keep = Callable[[Sequence[bool]], bool]
 LEAST_AREA = 1e-7
-"""Contours that enclose less, in mm2, are rounding dust; so are those thinner than EPSILON."""
+"""Contours that enclose less, in mm2, are rounding dust; so are those thinner than 4 EPSILON."""
 
 
 class GeometryError(ArithmeticError):

@@ -51,16 +51,9 @@ def check(design: Design) -> tuple[Laminate, tuple[Finding, ...]]:
     return laminate, run_deck(laminate, limits(design))
 
 
-def waived_rules(findings: Collection[Finding], design: Design) -> tuple[str, ...]:
+def waived_rules(findings: Collection[Finding]) -> tuple[str, ...]:
     """The rules that fail and that the design waives by name."""
-    asked = set(design.rules.waive)
-    return tuple(
-        dict.fromkeys(
-            finding.rule
-            for finding in findings
-            if finding.verdict == "waived" and finding.rule in asked
-        )
-    )
+    return tuple(dict.fromkeys(finding.rule for finding in findings if finding.by_user))
 
 
 def generate(
@@ -81,7 +74,7 @@ def generate(
     tell("rules", 0, 1)
     laminate, findings = check(design)
     tell("rules", 1, 1)
-    waived = waived_rules(findings, design)
+    waived = waived_rules(findings)
     wanted = set(parts)
     if has_failed(findings):
         wanted &= {"preview"}

@@ -61,7 +61,8 @@ def rule_names() -> tuple[str, ...]:
 
 
 def _waived(finding: Finding) -> Finding:
-    return replace(finding, verdict="waived", message=f"waived by the design: {finding.message}")
+    message = f"waived by the design: {finding.message}"
+    return replace(finding, verdict="waived", by_user=True, message=message)
 
 
 __all__ = ["RULES", "Limits", "Rule", "has_failed", "rule_names", "run_deck"]

@@ -20,7 +20,11 @@ class Place:
 
 @dataclass(frozen=True)
 class Finding:
-    """A verdict with the measured worst value, its limit, unit and place."""
+    """A verdict with the measured worst value, its limit, unit and place.
+
+    ``by_user`` tells a failure that the design waives by name from a waiver that the rule itself
+    grants (a flush mask at a pinned bore).
+    """
 
     rule: str
     verdict: Verdict
@@ -29,6 +33,7 @@ class Finding:
     unit: str
     where: Place
     message: str
+    by_user: bool = False
 
     def as_dict(self) -> dict[str, object]:
         """The finding as ``checks.json`` holds it."""

@@ -95,7 +95,8 @@ def test_waivers_stand_in_every_file(tmp_path: Path) -> None:
 
 
 def test_a_waiver_that_was_not_needed_is_not_claimed(tmp_path: Path) -> None:
-    run = generate(load_design("1dof-5mm", ['rules.waive=["bond-width"]']), tmp_path, ["cut"])
+    waive = 'rules.waive=["bond-width", "mask-overhang"]'
+    run = generate(load_design("1dof-5mm", [waive]), tmp_path, ["cut"])
     assert manifest_of(run.folder)["waived"] == []
 
 
