@@ -6,12 +6,9 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 
-from sbafab.geometry.boolean import GeometryError, PointPool, chain, left_turn, split_edges
+from sbafab.geometry.boolean import PointPool, chain, left_turn, split_edges
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Point, distance_to
 from sbafab.geometry.region import Contour, Region
-
-NUDGE = 4 * EPSILON
-"""By how much a distance may be off, in mm, where gaps of just that width will not resolve."""
 
 
 def grow(region: Region, distance: float) -> Region:
@@ -20,9 +17,7 @@ def grow(region: Region, distance: float) -> Region:
         return shrink(region, -distance)
     if distance < EPSILON or region.is_empty:
         return region
-    return _first_sound(
-        lambda d: chain(_offset_pieces(region.contours, d, region.contains)), distance
-    )
+    return chain(_offset_pieces(region.contours, distance, region.contains))
 
 
 def shrink(region: Region, distance: float) -> Region:
@@ -32,22 +27,8 @@ def shrink(region: Region, distance: float) -> Region:
     if distance < EPSILON or region.is_empty:
         return region
     outside = [contour.reversed() for contour in region.contours]
-
-    def shrunk(by: float) -> Region:
-        pieces = _offset_pieces(outside, by, lambda p: not region.contains(p))
-        return chain([piece.reversed() for piece in pieces])
-
-    return _first_sound(shrunk, distance)
-
-
-def _first_sound(offset: Callable[[float], Region], distance: float) -> Region:
-    """The offset, taken a few nanometres wider or narrower only where it will not chain."""
-    for nudge in (0.0, NUDGE, -NUDGE, 3 * NUDGE):
-        try:
-            return offset(distance + nudge)
-        except GeometryError:
-            continue
-    return offset(distance - 3 * NUDGE)
+    pieces = _offset_pieces(outside, distance, lambda p: not region.contains(p))
+    return chain([piece.reversed() for piece in pieces])
 
 
 def fillet(region: Region, radius: float) -> Region:

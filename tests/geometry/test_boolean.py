@@ -9,7 +9,7 @@ import pytest
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Arc, Line
 from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle, stadium, strip
+from sbafab.geometry.shapes import disc, polygon, rectangle, stadium, strip
 
 
 def lens(r: float, s: float, gap: float) -> float:
@@ -131,6 +131,14 @@ def test_a_checkerboard_keeps_its_holes() -> None:
     board = board - rectangle((2, 1), (3, 2))
     assert board.area == pytest.approx(5)
     assert len(board.pieces) == 5
+
+
+def test_a_hole_that_touches_the_rim_cuts_the_disc_apart() -> None:
+    diamond = polygon([(2, 0), (0, 2), (-2, 0), (0, -2)])
+    segments = disc((0, 0), 2) - diamond
+    assert segments.area == pytest.approx(4 * math.pi - 8)
+    assert len(segments.pieces) == 4
+    assert not segments.holes
 
 
 def test_a_mask_flush_with_its_bore_leaves_nothing_between() -> None:

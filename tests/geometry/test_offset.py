@@ -158,30 +158,62 @@ def test_filleted_lobed_plates(count: int, radius: float) -> None:
         assert shrink(grow(plate, distance), distance).area == pytest.approx(plate.area, abs=1e-5)
 
 
-@pytest.mark.parametrize("gap", [0, 1e-9, 1e-7, 1e-6, 4e-6, 1e-5, 1e-4])
-@pytest.mark.parametrize("sign", [-1, 1])
-def test_discs_that_all_but_touch_grow_as_touching_ones_do(gap: float, sign: int) -> None:
-    def grown(space: float) -> float:
-        pair = disc((0.3, 0.7), 2) | disc((0.3 + 2.5 + space, 0.7), 0.5)
-        return grow(pair, 0.25).area
-
-    r, s = 2.25, 0.75
-    a = math.acos((2.5**2 + r**2 - s**2) / (2 * 2.5 * r))
-    b = math.acos((2.5**2 + s**2 - r**2) / (2 * 2.5 * s))
-    touching = math.pi * (r**2 + s**2) - r**2 * a - s**2 * b + 2.5 * r * math.sin(a)
-    assert grown(sign * gap) == pytest.approx(touching, abs=4 * gap + 1e-6)
+def two_discs(r: float, s: float, gap: float) -> float:
+    """Area of the union of two discs with their centres ``gap`` apart."""
+    a = math.acos((gap**2 + r**2 - s**2) / (2 * gap * r))
+    b = math.acos((gap**2 + s**2 - r**2) / (2 * gap * s))
+    return math.pi * (r**2 + s**2) - r**2 * a - s**2 * b + gap * r * math.sin(a)
 
 
-def test_spikes_and_closed_notches_are_offset_on_the_right_side() -> None:
+NEARLY = [0, 1e-9, -1e-9, 1e-6, -1e-6, 4e-6, -4e-6, 1e-5, -1e-5, 1e-4, -1e-4]
+
+
+@pytest.mark.parametrize("space", NEARLY)
+@pytest.mark.parametrize("angle", [0, 45, 211.123])
+def test_discs_that_all_but_touch_grow_as_touching_ones_do(space: float, angle: float) -> None:
+    for distance in (0.1, 0.25):
+        pair = disc((0.3, 0.7), 2) | disc((2.8 + space, 0.7), 0.5).turned(angle, (0.3, 0.7))
+        touching = two_discs(2 + distance, 0.5 + distance, 2.5)
+        grown = grow(pair, distance)
+        assert grown.area == pytest.approx(touching, abs=4 * abs(space) + 1e-5)
+        # The gap is filled whole, and nothing else but the two notches beside it.
+        assert len(fillet(pair, distance).contours) == 1
+
+
+@pytest.mark.parametrize("space", NEARLY)
+@pytest.mark.parametrize("angle", [0, 45, 211.123])
+def test_a_disc_that_all_but_touches_from_inside(space: float, angle: float) -> None:
+    """Just within, just touching or just poking out: grown, it is the large disc grown."""
+    for radius in (0.5, 2.0):
+        inner = disc((0.3 + 3 - radius + space, 0.7), radius).turned(angle, (0.3, 0.7))
+        grown = grow(disc((0.3, 0.7), 3) | inner, 0.25)
+        assert grown.area == pytest.approx(math.pi * 3.25**2, abs=10 * abs(space) + 1e-5)
+        moon = disc((0.3, 0.7), 3) - inner
+        thin = shrink(moon, 0.25)
+        # What is left: the disc shrunk, less the inner disc grown, that reaches out of it.
+        expected = two_discs(2.75, radius + 0.25, 3 - radius) - math.pi * (radius + 0.25) ** 2
+        assert thin.area == pytest.approx(expected, abs=20 * abs(space) + 1e-5)
+
+
+@pytest.mark.parametrize("angle", [0, 30, 77.7, 180, 270])
+def test_spikes_and_closed_notches_are_offset_on_the_right_side(angle: float) -> None:
     """A sharp tip between a line and the circle it touches: convex outside, no corner inside."""
-    horn = rectangle((2, 0), (6, 3)) - disc((2, 2), 2)
-    tip = (2.0, 0.0)
+
+    def place(x: float, y: float) -> Point:
+        c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+        return x * c - y * s, x * s + y * c
+
+    horn = (rectangle((2, 0), (6, 3)) - disc((2, 2), 2)).turned(angle)
     grown = grow(horn, 0.5)
-    assert grown.bounds[0] == pytest.approx(1.5)
-    assert grown.contains((tip[0] - 0.49, 0))
-    assert not grown.contains((tip[0] - 0.49, 0.49))
-    notch = (rectangle((-4, -4), (4, 0)) | disc((0, 2), 2)) | rectangle((0, 0), (4, 4))
-    shrunk = shrink(notch, 0.5)
-    assert min(math.dist(tip, corner.start) for tip in [(0, 0)] for corner in shrunk.edges) >= 0.499
-    assert not shrunk.contains((0.3, -0.3))
-    assert shrunk.contains((0.4, -0.4))
+    assert grown.contains(place(1.51, 0))
+    assert not grown.contains(place(1.49, 0))
+    assert not grown.contains(place(1.51, 0.49))
+    notch = rectangle((-4, -4), (4, 0)) | disc((0, 2), 2) | rectangle((0, 0), (4, 4))
+    shrunk = shrink(notch.turned(angle), 0.5)
+    assert min(math.dist(place(0, 0), edge.start) for edge in shrunk.edges) >= 0.499
+    assert not shrunk.contains(place(0.3, -0.3))
+    assert shrunk.contains(place(0.4, -0.4))
+    slot = rectangle((-3, 0), (-1, 4)) | rectangle((0, 0), (2, 4))
+    filled = fillet(slot.turned(angle), 0.5)
+    assert filled.contains(place(-0.5, 2))
+    assert not filled.contains(place(-0.5, 0.01))

@@ -1,0 +1,43 @@
+"""What the package imports is what ``pyproject.toml`` says it needs."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+INSTALLED_AS = {"PIL": "pillow", "tomli_w": "tomli-w"}
+
+
+def imported_modules(folder: Path) -> Iterator[str]:
+    """Top-level names of all modules imported below the folder, at any place in a file."""
+    for path in folder.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                yield from (alias.name.partition(".")[0] for alias in node.names)
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                yield node.module.partition(".")[0]
+
+
+def names(requirements: list[str]) -> set[str]:
+    return {re.split(r"[<>=~!\[; ]", requirement)[0].lower() for requirement in requirements}
+
+
+def third_party(folder: Path) -> set[str]:
+    modules = set(imported_modules(folder)) - sys.stdlib_module_names
+    return {INSTALLED_AS.get(name, name) for name in modules} - {"sbafab", "benchmarks"}
+
+
+def test_the_package_needs_what_it_imports_and_no_more() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert third_party(ROOT / "sbafab") == names(project["dependencies"])
+
+
+def test_the_tests_need_nothing_undeclared() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    declared = names(project["dependencies"]) | names(project["optional-dependencies"]["dev"])
+    assert third_party(ROOT / "tests") <= declared
