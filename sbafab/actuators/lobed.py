@@ -7,6 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from sbafab.actuators.ears import NOTE, Ear, Holder, Ray, film_setback, placed
 from sbafab.actuators.pockets import (
     RoundChamber,
     bonded,
@@ -20,7 +21,7 @@ from sbafab.design.records import Design, Section
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import union
-from sbafab.geometry.edges import unit
+from sbafab.geometry.edges import Point, unit
 from sbafab.geometry.offset import fillet, grow
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc
@@ -58,7 +59,7 @@ def axis_radius(design: LobedDesign, pockets: list[Region]) -> tuple[float, str 
     half = math.pi / design.chamber.count
     bond = design.bond.width
     inward = max(-pocket.bounds[0] for pocket in pockets)
-    by_lumen = design.lumen.diameter / 2 + bond + inward
+    by_lumen = design.lumen.diameter / 2 + film_setback(design) + bond + inward
     # For a pocket point (x, y) off the axis the sector's edge is b/2 away when
     # (R + x) sin(half) - |y| cos(half) = b/2; the farthest point rules. Exact for a disc.
     spread = max(
@@ -102,22 +103,25 @@ def build(design: LobedDesign) -> Laminate:
 
     first = lobes[shape_of[0]]
     outlines = [bonded(pocket, design.bond.width) for pocket in first]
+    near = max((lobes[shape] for shape in shape_of[:2]), key=lambda pockets: pockets[0].area)
     edge = pockets[shape_of[0]].bounds[2] + design.bond.width
     inlets = [
         tab_and_strip(design, name, axis, direction, edge)
         for name, axis, direction in zip(names, axes, directions, strict=True)
     ]
-    _check_tabs(design, outlines, inlets)
+    _check_tabs(design, outlines, [bonded(p, design.bond.width) for p in near], inlets)
     bottom = BalloonShape(
         fillet(union([hub, *outlines, *(tab for tab, _, _ in inlets)]), design.fillet.radius),
         union([*first, *(strip for _, strip, _ in inlets)]),
         1,
         count,
     )
-    stack = Stack(bottom, shapes, shape_of, axes, design.lumen.diameter)
+    ears = _ears(design, union([bottom.outline, *(shape.outline for shape in shapes)]), axes)
+    stack = Stack(bottom, shapes, shape_of, axes, design.lumen.diameter, ears)
     has_bores = design.stack.balloons > 1
     bore = design.bore.diameter
-    pins = [Pin(n, axis, bore) for n, axis in zip(names, axes, strict=True)]
+    pins = [Pin(n, axis, bore) for n, axis in zip(names, axes, strict=True) if has_bores]
+    lumen_pin = Pin("lumen", (0.0, 0.0), design.lumen.diameter)
     return Laminate(
         name=design.name,
         family=design.family,
@@ -127,11 +131,11 @@ def build(design: LobedDesign) -> Laminate:
         if has_bores
         else (),
         inlets=tuple(inlet for _, _, inlet in inlets),
-        pins=(*(pins if has_bores else ()), Pin("lumen", (0.0, 0.0), design.lumen.diameter)),
+        pins=(*pins, *(ear.pin for ear in ears)) if ears else (*pins, lumen_pin),
         lumen=design.lumen.diameter,
         balloons=design.stack.balloons,
         registration=design.registration.method,
-        notes=(note,) if note else (),
+        notes=(*((note,) if note else ()), *((NOTE,) if ears else ())),
     )
 
 
@@ -142,7 +146,7 @@ def _hub_radius(design: LobedDesign, pockets: list[Region], axis: float) -> floa
     """
     inward = min(-pocket.bounds[0] for pocket in pockets)
     return max(
-        design.lumen.diameter / 2 + design.bond.width,
+        design.lumen.diameter / 2 + film_setback(design) + design.bond.width,
         axis - inward,
         axis * math.cos(math.pi / design.chamber.count),
     )
@@ -155,16 +159,54 @@ def _plate(design: LobedDesign, hub: Region, pockets: list[Region]) -> BalloonSh
 
 
 def _check_tabs(
-    design: LobedDesign, outlines: list[Region], inlets: list[tuple[Region, Region, Inlet]]
+    design: LobedDesign,
+    outlines: list[Region],
+    near: list[Region],
+    inlets: list[tuple[Region, Region, Inlet]],
 ) -> None:
-    """Raises DesignError where a tab comes nearer than one overhang to another lobe or tab."""
+    """Raises DesignError where a tab comes nearer than one overhang to another lobe or tab.
+
+    ``near`` are the larger lobes of the first two balloons: what lies on the tabs.
+    """
     room = design.mask.overhang
     for i, (tab, _, inlet) in enumerate(inlets):
         free = grow(tab - outlines[i], room)
-        for j, other in enumerate(outlines):
+        for j, other in enumerate(near):
             if j != i and not (free & (other | inlets[j][0])).is_empty:
                 raise DesignError(
                     f"the inlet tab of {inlet.chamber} ({inlet.width + 2 * design.bond.width:g} "
                     f"wide) meets the lobe or tab of {inlets[j][2].chamber}; make inlet.width "
                     "smaller, chamber.axis_radius larger or chamber.count smaller"
                 )
+
+
+def _ears(design: LobedDesign, body: Region, axes: tuple[Point, ...]) -> tuple[Ear, ...]:
+    """Two film and two mask ears between the inlet tabs.
+
+    Up to four lobes have them on their flanks, 60 degrees off the tab; more lobes leave too
+    little room there, and the ears stand in the middle between two lobes.
+    """
+    if design.registration.method != "ears":
+        return ()
+    count = design.chamber.count
+    step = 360 / count
+    if count <= 4:
+        places = [
+            (axes[0], 60.0),
+            (axes[1], step + 60.0),
+            (axes[0], -60.0),
+            (axes[-1], -step - 60.0),
+        ]
+    else:
+        places = [((0.0, 0.0), step * (k + 0.5)) for k in (0, 2, 1, 3)]
+    names: tuple[tuple[str, Holder], ...] = (
+        ("film1", "film"),
+        ("film2", "film"),
+        ("mask1", "mask"),
+        ("mask2", "mask"),
+    )
+    rays = [
+        Ray(name, holder, start, unit(angle), name.endswith("2"))
+        for (name, holder), (start, angle) in zip(names, places, strict=True)
+    ]
+    return placed(rays, body, design)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
+from sbafab.actuators.ears import NOTE, Ear, Ray, placed
 from sbafab.actuators.pockets import (
     RoundChamber,
     bonded,
@@ -13,6 +14,8 @@ from sbafab.actuators.pockets import (
 )
 from sbafab.actuators.stacking import BalloonShape, Stack, balloon_cuts, layers
 from sbafab.design.records import Design
+from sbafab.geometry.boolean import union
+from sbafab.geometry.edges import unit
 from sbafab.geometry.offset import fillet
 from sbafab.laminate.laminate import Bore, Chamber, Laminate, Pin
 
@@ -38,7 +41,8 @@ def build(design: OneDofDesign) -> Laminate:
     bottom = BalloonShape(
         fillet(first.outline | tab, design.fillet.radius), first.pockets | strip, 1, 1
     )
-    stack = Stack(bottom, shapes, shape_of, (AXIS,))
+    ears = _ears(design, shapes, bottom)
+    stack = Stack(bottom, shapes, shape_of, (AXIS,), ears=ears)
     balloons = design.stack.balloons
     has_bore = balloons > 1
     return Laminate(
@@ -48,8 +52,28 @@ def build(design: OneDofDesign) -> Laminate:
         chambers=(Chamber("chamber1", (AXIS,)),),
         bores=(Bore("chamber1", AXIS, design.bore.diameter),) if has_bore else (),
         inlets=(inlet,),
-        pins=(Pin("chamber1", AXIS, design.bore.diameter),) if has_bore else (),
+        pins=(
+            *((Pin("chamber1", AXIS, design.bore.diameter),) if has_bore else ()),
+            *(ear.pin for ear in ears),
+        ),
         lumen=None,
         balloons=balloons,
         registration=design.registration.method,
+        notes=(NOTE,) if ears else (),
     )
+
+
+def _ears(
+    design: OneDofDesign, shapes: tuple[BalloonShape, ...], bottom: BalloonShape
+) -> tuple[Ear, ...]:
+    """Two film and two mask ears in the five sixths of the circle that the tab leaves free."""
+    if design.registration.method != "ears":
+        return ()
+    rays = [
+        Ray("film1", "film", AXIS, unit(90.0), False),
+        Ray("film2", "film", AXIS, unit(210.0), True),
+        Ray("mask1", "mask", AXIS, unit(150.0), False),
+        Ray("mask2", "mask", AXIS, unit(270.0), True),
+    ]
+    body = union([bottom.outline, *(shape.outline for shape in shapes)])
+    return placed(rays, body, design)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from sbafab.actuators.ears import film_setback
 from sbafab.design.records import Design, Section
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
@@ -61,15 +62,15 @@ def check_neck(design: Design, pockets: list[Region], centres: list[Point]) -> N
     """Raises DesignError where bore and neck ring leave no free film in the smallest pocket."""
     if design.stack.balloons == 1:
         return
-    ring = design.bore.diameter / 2 + design.bond.width
+    ring = design.bore.diameter / 2 + film_setback(design) + design.bond.width
     room = min(pocket.distance_to_edge(centre) for pocket in pockets for centre in centres)
     if ring >= room:
-        largest = 2 * (room - design.bond.width)
+        largest = design.bore.diameter - 2 * (ring - room)
         remedy = f"make the bore less than {largest:.3f}" if largest > 0 else "widen the pocket"
         raise DesignError(
             f"bore.diameter = {design.bore.diameter:g} with a neck ring of bond.width = "
-            f"{design.bond.width:g} round it does not fit a pocket that leaves {room:.3f} round "
-            f"the channel; {remedy}"
+            f"{design.bond.width:g} round it (outer radius {ring:.3f}) does not fit a pocket that "
+            f"leaves {room:.3f} round the channel; {remedy}"
         )
 
 

@@ -10,6 +10,16 @@ from typing import Literal, Self
 
 from pydantic import Field
 
+from sbafab.actuators.ears import (
+    NOTE,
+    Ear,
+    Ray,
+    meeting,
+    placed,
+    with_film_ears,
+    with_mask_ears,
+    with_sheet_ears,
+)
 from sbafab.actuators.pockets import bonded, check_neck, tab_and_strip
 from sbafab.actuators.stacking import BalloonShape, Cut, Stack, balloon_cuts, layers
 from sbafab.design.records import Design, Inlet, Section
@@ -105,17 +115,16 @@ def build(design: RadialDesign) -> Laminate:
     pockets = union(pocket.moved(*centre) for centre in centres)
     shape = BalloonShape(outlines, pockets, count, count)
     bottom, inlets = _bottom(design, shape, outline, centres)
-    stack = Stack(bottom, (shape,), (0,) * design.stack.balloons, centres)
+    ears = _ears(design, bottom, _sheet(design, outline), centres)
+    stack = Stack(bottom, (shape,), (0,) * design.stack.balloons, centres, ears=ears)
     window = _window(design, pocket, outline)
     windows = union(window.moved(*centre) for centre in centres)
+    fillet_radius = design.fillet.radius
+    eared = with_film_ears(bottom.outline, ears, fillet_radius)
+    carrier_mask = with_mask_ears(grow(eared, overhang), ears, overhang) - windows
     carrier = [
-        Cut("sheet", _sheet(design, outline), None, 1),
-        Cut(
-            "separator-mask",
-            grow(bottom.outline, overhang) - windows,
-            None,
-            bottom.outline_pieces,
-        ),
+        Cut("sheet", with_sheet_ears(_sheet(design, outline), ears, fillet_radius), None, 1),
+        Cut("separator-mask", carrier_mask, None, bottom.outline_pieces),
     ]
     manifold = design.inlet.manifold
     names = ["chamber1"] * count if manifold else [f"chamber{i + 1}" for i in range(count)]
@@ -130,13 +139,17 @@ def build(design: RadialDesign) -> Laminate:
         else tuple(Chamber(n, (centre,)) for n, centre in zip(names, centres, strict=True)),
         bores=bores,
         inlets=inlets,
-        pins=tuple(
-            Pin(f"channel{number}", bore.centre, bore.diameter)
-            for number, bore in enumerate(bores, start=1)
+        pins=(
+            *(
+                Pin(f"channel{number}", bore.centre, bore.diameter)
+                for number, bore in enumerate(bores, start=1)
+            ),
+            *(ear.pin for ear in ears),
         ),
         lumen=None,
         balloons=design.stack.balloons,
         registration=design.registration.method,
+        notes=(NOTE,) if ears else (),
     )
 
 
@@ -211,13 +224,61 @@ def _bottom(
         width = design.inlet.strip_width
         tabs.append(strip(centres[0], centres[-1], width + 2 * design.bond.width))
         strips.append(strip(centres[0], centres[-1], width))
+    if manifold:
+        bottom = fillet(union([shape.outline, *tabs]), design.fillet.radius)
+    else:
+        # One by one: a fillet of all would also fill narrow gaps between neighbours.
+        bottom = union(
+            fillet(outline.moved(*centre) | tab, design.fillet.radius)
+            for centre, tab in zip(centres, tabs, strict=True)
+        )
     pieces = 1 if manifold else count
     return (
-        BalloonShape(
-            fillet(union([shape.outline, *tabs]), design.fillet.radius),
-            union([shape.pockets, *strips]),
-            pieces,
-            pieces,
-        ),
+        BalloonShape(bottom, union([shape.pockets, *strips]), pieces, pieces),
         tuple(inlet for _, _, inlet in made),
     )
+
+
+def _ears(
+    design: RadialDesign, bottom: BalloonShape, sheet: Region, centres: tuple[Point, ...]
+) -> tuple[Ear, ...]:
+    """Two film ears at the lower end of each SBA, two mask ears beside its tab, two of the sheet.
+
+    A manifold makes one part of all SBAs in the bottom balloon, but not above it.
+    """
+    if design.registration.method != "ears":
+        return ()
+    low_x, low_y, high_x, high_y = sheet.bounds
+    beside_film = design.chamber.width / 4
+    tab = design.inlet.strip_width / 2 + design.bond.width
+    ear = design.registration.pin_diameter / 2 + design.bond.width
+    beside_mask = tab + 2 * design.mask.overhang + ear
+    rays = []
+    for number, (x, _) in enumerate(centres, start=1):
+        y = design.chamber.length / 4
+        for end, side in ((1, -1), (2, 1)):
+            rays += [
+                Ray(
+                    f"film{number}.{end}",
+                    "film",
+                    (x + side * beside_film, -y),
+                    (0.0, -1.0),
+                    end == 2,
+                ),
+                Ray(
+                    f"mask{number}.{end}", "mask", (x + side * beside_mask, y), (0.0, 1.0), end == 2
+                ),
+            ]
+    middle, off = (low_y + high_y) / 2, (high_y - low_y) / 6
+    rays += [
+        Ray("sheet1", "sheet", (high_x - 1.0, middle + off), (1.0, 0.0), False),
+        Ray("sheet2", "sheet", (low_x + 1.0, middle), (-1.0, 0.0), True),
+    ]
+    ears = placed(rays, bottom.outline | sheet, design)
+    close = meeting(ears, design.mask.overhang)
+    if close is not None:
+        raise DesignError(
+            f"the ears {close[0].ray.name} and {close[1].ray.name} meet; make chamber.width larger "
+            'or registration.pin_diameter smaller, or use registration.method = "channel-pin"'
+        )
+    return ears

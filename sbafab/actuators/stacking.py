@@ -6,6 +6,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
+from sbafab.actuators.ears import (
+    Ear,
+    film_holes,
+    film_setback,
+    with_film_ears,
+    with_mask_ears,
+)
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import union
@@ -43,6 +50,7 @@ class Stack:
     shape_of: tuple[int, ...]
     axes: tuple[Point, ...]
     lumen: float | None = None
+    ears: tuple[Ear, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -58,32 +66,43 @@ class Cut:
 def balloon_cuts(stack: Stack, design: Design) -> list[Cut]:
     """The films of a stack of balloons, base to cap (geometry of the laminate table)."""
     count = len(stack.shape_of)
+    back, ears = film_setback(design), stack.ears
     radius = design.bore.diameter / 2
-    lumen = disc((0.0, 0.0), stack.lumen / 2) if stack.lumen else Region()
-    bores = union(disc(axis, radius) for axis in stack.axes) if count > 1 else Region()
-    rings = union(disc(axis, radius + design.bond.width) for axis in stack.axes)
+
+    def round_axes(r: float) -> Region:
+        return union(disc(axis, r) for axis in stack.axes) if count > 1 else Region()
+
+    def lumen(r: float) -> Region:
+        return disc((0.0, 0.0), stack.lumen / 2 + r) if stack.lumen else Region()
 
     # Shape 0 stands for the bottom balloon, shape i + 1 for stack.shapes[i].
     shapes = (stack.bottom, *stack.shapes)
 
     @cache
+    def eared(shape: int) -> Region:
+        return with_film_ears(shapes[shape].outline, ears, design.fillet.radius)
+
+    @cache
     def plate(shape: int) -> Region:
-        return shapes[shape].outline - lumen
+        return eared(shape) - union([lumen(back), film_holes(ears)])
 
     @cache
     def wall(shape: int) -> Region:
-        return plate(shape) - bores
+        return plate(shape) - round_axes(radius + back)
 
     @cache
     def chamber_mask(shape: int) -> Region:
-        return shapes[shape].pockets - bores
+        return shapes[shape].pockets - round_axes(radius)
 
     @cache
     def separator_mask(below: int, above: int) -> Region:
-        smaller = stack.shapes[below].outline
-        if below != above:
-            smaller = smaller & stack.shapes[above].outline
-        return grow(smaller, design.mask.overhang) - lumen - rings
+        shared = eared(above)
+        # The bottom balloon covers a plain one of its size; a larger one would cross its tabs.
+        if below != above and (below > 0 or above != stack.shape_of[0] + 1):
+            shared = shared & eared(below)
+        rings = round_axes(radius + back + design.bond.width)
+        grown = grow(shared, design.mask.overhang)
+        return with_mask_ears(grown, ears, design.mask.overhang) - union([lumen(0.0), rings])
 
     cuts: list[Cut] = []
     for number in range(1, count + 1):
@@ -98,7 +117,7 @@ def balloon_cuts(stack: Stack, design: Design) -> list[Cut]:
             cuts.append(Cut("cap", plate(shape), number, parts))
         else:
             cuts.append(Cut("wall", wall(shape), number, parts))
-            mask = separator_mask(*stack.shape_of[number - 1 : number + 1])
+            mask = separator_mask(shape, stack.shape_of[number] + 1)
             cuts.append(Cut("separator-mask", mask, number, stack.shapes[0].outline_pieces))
     return cuts
 

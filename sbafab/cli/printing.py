@@ -108,9 +108,10 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
         kind = f"{layer.film.material} {layer.role}"
         counts[kind] = counts.get(kind, 0) + 1
     sizes = index["sizes"]
+    balloons = "1 balloon" if lam.balloons == 1 else f"{lam.balloons} balloons"
     yield (
         "design",
-        f"{lam.name} ({lam.family}, {lam.balloons} balloons), {index['design_sha256'][:12]}",
+        f"{lam.name} ({lam.family}, {balloons}), {index['design_sha256'][:12]}",
     )
     yield "sizes", ", ".join(f"{k.replace('_', ' ')} {v:.3f}" for k, v in sizes.items()) + " mm"
     yield (
@@ -120,7 +121,11 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
     )
     cut = [layer["file"] for layer in index["layers"] if layer["file"]]
     if cut:
-        yield "cut files", f"{len(cut)} in layers/, each read back and compared with its profile"
+        plate = f", and the pin plate {index['fixture']}" if index["fixture"] else ""
+        yield (
+            "cut files",
+            f"{len(cut)} in layers/{plate}, each read back and compared with its profile",
+        )
     if run.schedule is not None:
         force = run.schedule.steps[0].force_n / 1000
         yield (

@@ -114,8 +114,11 @@ class Inlet(Section):
 
 
 class Registration(Section):
-    method: Literal["channel-pin"] = "channel-pin"
-    """Dowel pins in the channel bores, and in the lumen if there is one."""
+    method: Literal["channel-pin", "ears"] = "channel-pin"
+    """"channel-pin": dowel pins in the channel bores, and in the lumen if there is one (the
+    paper's). "ears": tooling holes outside the outline, pinned in every press step."""
+    pin_diameter: Length = 1.5
+    """Dowel pins of the ears."""
 
 
 class Press(Section):

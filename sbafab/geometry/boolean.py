@@ -11,6 +11,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 
+from sbafab.errors import SbafabError
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.region import Contour, Region, same_support
@@ -21,7 +22,7 @@ LEAST_AREA = 1e-7
 """Contours that enclose less, in mm2, are rounding dust; so are those thinner than 4 EPSILON."""
 
 
-class GeometryError(ArithmeticError):
+class GeometryError(SbafabError, ArithmeticError):
     """An operation on regions came out inconsistent; the message says where."""
 
 
@@ -170,7 +171,10 @@ def chain(pieces: Sequence[Edge]) -> Region:
                 continue
             options = leaving.get(here)
             if not options:
-                raise GeometryError(f"an edge ends in nothing at x {here[0]:.6f}, y {here[1]:.6f}")
+                raise GeometryError(
+                    f"edges that nearly meet at x {here[0]:.6f}, y {here[1]:.6f} cannot be told "
+                    "apart; change a size there by 0.001 mm"
+                )
             follower = leftmost(path[-1], options)
             options.remove(follower)
             path.append(follower)

@@ -23,6 +23,10 @@ def unit(degrees: float) -> Point:
     return quarters.get(degrees % 360) or (math.cos(angle), math.sin(angle))
 
 
+def _along(p: Point, origin: Point, unit: Point) -> float:
+    return (p[0] - origin[0]) * unit[0] + (p[1] - origin[1]) * unit[1]
+
+
 class Line(NamedTuple):
     """A straight edge from ``start`` to ``end``."""
 
@@ -74,6 +78,10 @@ class Line(NamedTuple):
     def farthest_from(self, p: Point) -> float:
         """Greatest distance from ``p`` to a point of the edge."""
         return max(math.dist(p, self.start), math.dist(p, self.end))
+
+    def farthest_along(self, origin: Point, unit: Point) -> float:
+        """How far the edge reaches from ``origin`` along a unit direction."""
+        return max(_along(self.start, origin, unit), _along(self.end, origin, unit))
 
     def part(self, start: Point, end: Point) -> Line:
         """The piece between two points of the edge, taken in the direction of travel."""
@@ -185,6 +193,13 @@ class Arc(NamedTuple):
         if math.dist(p, self.centre) > EPSILON and 0.0 <= self.parameter(opposite) <= 1.0:
             return math.dist(p, self.centre) + self.radius
         return max(math.dist(p, self.start), math.dist(p, self.end))
+
+    def farthest_along(self, origin: Point, unit: Point) -> float:
+        """How far the edge reaches from ``origin`` along a unit direction."""
+        (cx, cy), r = self.centre, self.radius
+        top = (cx + unit[0] * r, cy + unit[1] * r)
+        ends = max(_along(self.start, origin, unit), _along(self.end, origin, unit))
+        return _along(top, origin, unit) if 0.0 <= self.parameter(top) <= 1.0 else ends
 
     def part(self, start: Point, end: Point) -> Arc:
         """The piece between two points of the edge, taken in the direction of travel."""

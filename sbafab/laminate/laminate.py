@@ -6,6 +6,7 @@ the origin lies on the actuator's axis, z points up from the press plate.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -16,6 +17,9 @@ from sbafab.laminate.films import Film
 from sbafab.laminate.interfaces import Interface, InterfaceKind, interface_regions
 
 Role = Literal["base", "wall", "cap", "sheet", "chamber-mask", "separator-mask"]
+
+LOOSE = 0.2
+"""mm by which a hole may miss its pin in place or diameter and still be the pin's."""
 
 
 @dataclass(frozen=True)
@@ -168,12 +172,16 @@ class Laminate:
         """The layer with this index, counted from 1 at the bottom."""
         return self.layers[index - 1]
 
-    def pins_through(self, layer: Layer) -> tuple[Pin, ...]:
-        """The pins whose place is open in the layer."""
+    def pins_holding(self, layer: Layer) -> tuple[Pin, ...]:
+        """The pins on which the layer has a hole that fits; a wider opening does not hold it."""
+        circles = [hole.circle for hole in layer.profile.holes if hole.circle is not None]
         return tuple(
             pin
             for pin in self.pins
-            if any(hole.winding(pin.centre) != 0 for hole in layer.profile.holes)
+            if any(
+                math.dist(centre, pin.centre) < LOOSE and abs(2 * radius - pin.diameter) < LOOSE
+                for centre, radius in circles
+            )
         )
 
     def _repr_svg_(self) -> str:

@@ -10,7 +10,10 @@ from sbafab.laminate.laminate import Laminate
 
 
 def sizes(design: Design, laminate: Laminate) -> dict[str, float]:
-    """Sizes in mm by name: of the flat laminate and, for radial designs, round the tube."""
+    """Sizes in mm by name: of the flat laminate and, for radial designs, round the tube.
+
+    Width and length are those of all that is cut: inlet tabs and ears belong to them.
+    """
     low_x, low_y, high_x, high_y = laminate.bounds
     found = {
         "thickness": laminate.thickness,
@@ -24,7 +27,7 @@ def sizes(design: Design, laminate: Laminate) -> dict[str, float]:
         }
         if design.chamber.outline is None:
             found["inflated_diameter"] = inflated_diameter(design, laminate)
-    elif laminate.balloons > 1:
+    elif laminate.balloons > 1 and laminate.registration != "ears":
         found["outline_diameter"] = outline_diameter(laminate)
     return found
 

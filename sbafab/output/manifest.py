@@ -35,6 +35,7 @@ def manifest(
     laminate: Laminate,
     waived: Sequence[str],
     cut_files: Sequence[CutFile],
+    fixture: str | None,
     meshes: Sequence[MeshFile],
 ) -> dict[str, Any]:
     """The index of an output folder, but for the hashes of its files."""
@@ -77,6 +78,7 @@ def manifest(
             for inlet in laminate.inlets
         ],
         "lumen": laminate.lumen,
+        "fixture": fixture,
         "meshes": [
             {
                 "file": mesh.file,

@@ -11,6 +11,7 @@ from typing import Any, Literal
 from sbafab.actuators import build
 from sbafab.cutting.dxf_write import DxfProfile
 from sbafab.cutting.files import CutFile, write_layer_files
+from sbafab.cutting.fixture import write_fixture
 from sbafab.design.records import Design
 from sbafab.design.writing import design_toml, outline_file
 from sbafab.laminate.laminate import Laminate
@@ -84,13 +85,16 @@ def generate(
     with replaced_folder(target) as folder:
         cut_files: list[CutFile] = []
         meshes: list[MeshFile] = []
+        plate: str | None = None
         if "cut" in wanted:
+            settings = cut_settings(design, waived, dxf_profile, chord_error)
             cut_files = write_layer_files(
                 laminate,
                 folder,
-                cut_settings(design, waived, dxf_profile, chord_error),
+                settings,
                 lambda done, total: tell("cut files", done, total),
             )
+            plate = write_fixture(laminate, folder, settings)
         if pressing is not None:
             _write(folder / "press.json", as_json(press_json(pressing)))
             _write(folder / "press.csv", press_csv(pressing))
@@ -102,7 +106,7 @@ def generate(
             _write_pictures(_marked(laminate, findings, waived), folder, tell)
         _write(folder / "checks.json", as_json(checks(findings, "design")))
         _write_design(design, folder)
-        index = manifest(design, laminate, waived, cut_files, meshes)
+        index = manifest(design, laminate, waived, cut_files, plate, meshes)
         if not has_failed(findings):
             _carry_over(target, folder, index)
         index["files"] = file_hashes(folder)
@@ -170,5 +174,6 @@ def _carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
             shutil.copyfile(old_folder / path, target)
     if not any(layer["file"] for layer in index["layers"]):
         index["layers"] = old["layers"]
+        index["fixture"] = old["fixture"]
     if not index["meshes"]:
         index["meshes"] = old["meshes"]

@@ -14,9 +14,12 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from sbafab.errors import OutputError
+from sbafab.errors import OutputError, SbafabError
 
 SCHEMA = "sbafab/manifest@1"
+BEGUN, ASIDE = ".part", ".old.part"
+"""Endings of a folder that is being written, and of an old one that is moved out of its way."""
+LONGEST_SHOWN = 120
 
 
 @contextlib.contextmanager
@@ -30,10 +33,9 @@ def replaced_folder(target: Path) -> Iterator[Path]:
         target.parent.mkdir(parents=True, exist_ok=True)
         _refuse_foreign(target)
         with FileLock(target.parent / f".{target.name}.lock", timeout=0):
-            for stale in target.parent.glob(f".{target.name}.*.part"):
-                shutil.rmtree(stale, ignore_errors=True)
+            _tidy_up(target)
             fresh = Path(
-                tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
+                tempfile.mkdtemp(prefix=f".{target.name}.", suffix=BEGUN, dir=target.parent)
             )
             try:
                 fresh.chmod(0o755)
@@ -45,12 +47,37 @@ def replaced_folder(target: Path) -> Iterator[Path]:
         raise OutputError(
             f"another run is writing {target}; wait for it to end or choose another folder with -o"
         ) from None
+    except OutputError:
+        raise
     except OSError as error:
-        if isinstance(error, OutputError):
+        raise _unwritten(target, error.strerror or str(error)) from None
+    except (ValueError, NotImplementedError) as error:
+        # A path with a NUL; a file system without locks.
+        if isinstance(error, SbafabError):
             raise
-        raise OutputError(
-            f"{target} cannot be written: {error.strerror or error}; what was there is unchanged"
-        ) from None
+        raise _unwritten(target, str(error)) from None
+
+
+def _unwritten(target: Path, reason: str) -> OutputError:
+    shown = str(target)
+    if len(shown) > LONGEST_SHOWN:
+        shown = f"{shown[:LONGEST_SHOWN]}..."
+    return OutputError(
+        f"{shown} cannot be written: {reason[:1].lower()}{reason[1:]}; what was there is "
+        "unchanged; make room there, or choose another folder with -o"
+    )
+
+
+def _tidy_up(target: Path) -> None:
+    """Removes what a killed run left, and puts a folder back that it had only moved aside."""
+    # Eight characters, as mkdtemp makes them: a longer match belongs to another design's run.
+    begun = f".{target.name}.{'?' * 8}"
+    for aside in sorted(target.parent.glob(f"{begun}{ASIDE}")):
+        if not target.exists():
+            aside.rename(target)
+        shutil.rmtree(aside, ignore_errors=True)
+    for stale in target.parent.glob(f"{begun}{BEGUN}"):
+        shutil.rmtree(stale, ignore_errors=True)
 
 
 def _refuse_foreign(target: Path) -> None:
@@ -84,11 +111,11 @@ def _swap(fresh: Path, target: Path) -> None:
     if _exchange(fresh, target):
         return
     # Where the system cannot exchange two names in one step, a moment without target remains.
-    aside = fresh.with_suffix(".old.part")
+    aside = fresh.with_suffix(ASIDE)
     target.rename(aside)
     try:
         fresh.rename(target)
-    except OSError:
+    except BaseException:
         aside.rename(target)
         raise
     shutil.rmtree(aside, ignore_errors=True)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, NamedTuple
@@ -145,7 +146,8 @@ class _Plan(NamedTuple):
 
 def _step(number: int, part: _Plan, laminate: Laminate, press: PressSettings) -> Step:
     layers = tuple(index for stack in part.stacks for index in stack)
-    pins = _pins_in(laminate, layers) if part.bond == "flash" else ()
+    pinned = part.bond == "flash" or laminate.registration == "ears"
+    pins = _pins_in(laminate, layers) if pinned else ()
     return Step(
         step=number,
         title=part.title,
@@ -168,7 +170,7 @@ def _pins_in(laminate: Laminate, layers: Sequence[int]) -> tuple[str, ...]:
     return tuple(
         pin.name
         for pin in laminate.pins
-        if any(pin in laminate.pins_through(layer) for layer in shapes)
+        if any(pin in laminate.pins_holding(layer) for layer in shapes)
         and not any(layer.profile.contains(pin.centre) for layer in shapes)
     )
 
@@ -180,12 +182,14 @@ def _shapes(laminate: Laminate, layers: Sequence[int]) -> tuple[Layer, ...]:
 
 def _instructions(part: _Plan, pins: Sequence[str]) -> str:
     stacks = ", then ".join(_named(stack) for stack in part.stacks if stack)
+    on_pins = f"on the pin{'s' if len(pins) > 1 else ''} {_listed(pins)}"
     if part.bond == "full":
+        how = on_pins if pins else "outline on outline, with no pin"
         return (
-            f"Lay down {stacks}, outline on outline, with no pin. Press to the full bond and let "
-            "the laminate cool flat."
+            f"Lay down {stacks}, {how}. Press to the full bond and let the laminate cool flat"
+            + (", then draw the pins." if pins else ".")
         )
-    by = f"on the pin{'s' if len(pins) > 1 else ''} {_listed(pins)}" if pins else "by hand"
+    by = on_pins if pins else "by hand"
     after = "Press to the flash bond" + (" and draw the pins." if pins else ".")
     return f"Lay {stacks} on each other {by}, lowest first, as a stack of their own. {after}"
 
@@ -250,11 +254,17 @@ def _warnings(laminate: Laminate, press: PressSettings, steps: Sequence[Step]) -
             loose = [
                 layer.pattern
                 for layer in _shapes(laminate, step.layers)
-                if held.isdisjoint(laminate.pins_through(layer))
+                if held.isdisjoint(laminate.pins_holding(layer))
             ]
             layers = [i for i in step.layers if laminate.layer(i).pattern in loose]
             if layers:
-                yield f"step {step.step}: no pin holds {_named(layers)}; align by hand"
+                which = _named(layers) if len(layers) < 4 else _by_role(laminate, layers)
+                yield f"step {step.step}: no pin holds {which}; align by hand"
+
+
+def _by_role(laminate: Laminate, layers: Sequence[int]) -> str:
+    counts = Counter(laminate.layer(index).role for index in layers)
+    return _listed([f"the {count} {role}s" for role, count in counts.items()])
 
 
 def press_json(plan: Schedule) -> dict[str, Any]:

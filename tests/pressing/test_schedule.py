@@ -127,11 +127,27 @@ def test_every_layer_joins_exactly_once(stack: Stack, case: dict[str, int]) -> N
         assert list(step.layers) == sorted(step.layers)
 
 
+BY_HAND = "no pin holds"
+
+
+def beside_hand_placing(warnings: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(warning for warning in warnings if BY_HAND not in warning)
+
+
+def test_what_no_pin_holds_is_named(stack: Stack) -> None:
+    # The openings of separators are the neck rings, wider than the channel pin.
+    assert schedule(stack(2), PAPER).warnings == ("step 3: no pin holds layer 4; align by hand",)
+    assert schedule(stack(15), PAPER).warnings == (
+        "step 3: no pin holds the 14 separator-masks; align by hand",
+    )
+
+
 def test_the_tpe_must_melt(stack: Stack) -> None:
     for temperature in (20, 120):
         with pytest.raises(DesignError, match="does not bond Stretchlon 200, which melts at 120"):
             schedule(stack(2), replace(PAPER, temperature_c=temperature))
-    assert schedule(stack(2), replace(PAPER, temperature_c=121)).warnings == ()
+    warm = schedule(stack(2), replace(PAPER, temperature_c=121))
+    assert beside_hand_placing(warm.warnings) == ()
 
 
 def test_the_masks_must_stand_the_heat(stack: Stack) -> None:
@@ -152,12 +168,12 @@ def test_the_masks_must_stand_the_heat(stack: Stack) -> None:
 def test_what_was_never_tried_is_warned_about(
     stack: Stack, change: dict[str, float], warning: str
 ) -> None:
-    (found,) = schedule(stack(6), replace(PAPER, **change)).warnings
+    (found,) = beside_hand_placing(schedule(stack(6), replace(PAPER, **change)).warnings)
     assert found.startswith(warning)
 
 
 def test_twenty_balloons_are_validated_and_one_more_is_not(stack: Stack) -> None:
-    assert schedule(stack(20), PAPER).warnings == ()
+    assert beside_hand_placing(schedule(stack(20), PAPER).warnings) == ()
     assert "21 balloons" in schedule(stack(21), PAPER).warnings[0]
 
 
