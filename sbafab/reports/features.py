@@ -71,7 +71,9 @@ def _circle_name(laminate: Laminate, layer: Layer, contour: Contour) -> str:
         return ""
     if any(math.dist(centre, bore.centre) < SAME for bore in laminate.bores):
         return "neck ring" if layer.role == "separator-mask" else "bore"
-    return "lumen" if laminate.lumen and math.hypot(*centre) < SAME else ""
+    if laminate.lumen and math.hypot(*centre) < SAME:
+        return "lumen"
+    return "ear" if any(math.dist(centre, pin.centre) < SAME for pin in laminate.pins) else ""
 
 
 def radii(profile: Region) -> list[Circle]:

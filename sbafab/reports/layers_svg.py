@@ -11,7 +11,7 @@ from sbafab.geometry.svg import number
 from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.picture import INK
 from sbafab.reports import drawing as draw
-from sbafab.reports.pattern_card import Card, cells, drawn, pattern_card
+from sbafab.reports.pattern_card import Card, cells, drawn, pattern_card, pin_mark
 
 PAGE = (420.0, 297.0)  # A3: the most a drawing may fill
 MARGIN = 10.0
@@ -103,6 +103,10 @@ def _films(laminate: Laminate, at: Point) -> list[str]:
         name = film.product if known else f"{film.material}, {film.product}"
         words = f"{name}, {number(film.thickness)} thick"
         parts.append(draw.text((x + 8.0, y + 2.8), words))
+    if laminate.pins:
+        x, y = at[0] + 3.0, at[1] + 3.4 + 5.4 * len(films) + 1.4
+        parts.append(pin_mark((x, y), 2.0))
+        parts.append(draw.text((x + 5.0, y + 1.0), "dowel pin that holds the layer"))
     return parts
 
 

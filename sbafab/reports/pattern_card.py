@@ -9,7 +9,7 @@ from functools import cached_property
 
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.svg import number, path_data
-from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.laminate.picture import INK
 from sbafab.reports import drawing as draw
 from sbafab.reports.features import (
@@ -44,9 +44,13 @@ class Frame:
 
 @dataclass(frozen=True)
 class Card:
-    """One pattern with all that its drawing says; ``bounds`` holds phantom circles too."""
+    """One pattern with all that its drawing says; ``bounds`` holds phantom circles too.
+
+    ``pins`` are the dowel pins that hold the pattern.
+    """
 
     layers: tuple[Layer, ...]
+    pins: tuple[Pin, ...]
     marks: tuple[Circle | Width, ...]
     bounds: Bounds
 
@@ -95,7 +99,8 @@ def pattern_card(laminate: Laminate, layers: tuple[Layer, ...]) -> Card:
         )
     widths = inlet_width(laminate, layers[0]), piece_width(profile)
     marks += [width for width in widths if width is not None]
-    return Card(layers, tuple(marks), (low_x, low_y, high_x, high_y))
+    pins = laminate.pins_holding(layers[0])
+    return Card(layers, pins, tuple(marks), (low_x, low_y, high_x, high_y))
 
 
 def drawn(card: Card, scale: float, corner: Point, cell: Point) -> list[str]:
@@ -158,7 +163,17 @@ def _outline(card: Card, frame: Frame) -> list[str]:
     for contour in layer.profile.holes:
         if contour.circle is not None:
             parts += _centre_mark(frame.at(contour.circle[0]), contour.circle[1] * frame.scale)
+    parts += [pin_mark(frame.at(pin.centre), pin.diameter * frame.scale / 2) for pin in card.pins]
     return parts
+
+
+def pin_mark(centre: Point, radius: float) -> str:
+    """A dowel pin in its hole, seen from above."""
+    x, y = centre
+    return (
+        f'<circle cx="{number(x)}" cy="{number(y)}" r="{number(0.62 * radius)}" '
+        f'fill="{draw.DARK}"/>'
+    )
 
 
 def _centre_mark(centre: Point, radius: float) -> list[str]:
