@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import sys
+from typing import Any
 
 import click
 
 from sbafab import __version__
 from sbafab.cli.check import check
 from sbafab.cli.cut import cut
+from sbafab.cli.ending import BAD_INPUT, ended_plainly, prepared_streams, say, stopped_by_signals
 from sbafab.cli.generate import generate
 from sbafab.cli.mesh import mesh
 from sbafab.cli.new import new
 from sbafab.cli.press import press
 from sbafab.cli.schema import schema
 from sbafab.cli.templates import templates
-from sbafab.errors import SbafabError
 
-BAD_INPUT = 2
 COMMANDS = (templates, new, generate, check, cut, press, mesh, schema)
 
 
@@ -26,6 +26,10 @@ class InOrder(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(self.commands)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        with ended_plainly():
+            return super().invoke(ctx)
 
 
 @click.group(
@@ -39,15 +43,15 @@ def app() -> None:
 
     DESIGN is a template's name or a TOML file. Start with: sbafab generate 3dof-15mm
 
-    Exit codes: 0 done, 1 a rule failed, 2 bad input or usage.
+    Exit codes: 0 done, 1 a rule failed, 2 bad input or usage, 130 stopped by Ctrl-C.
     """
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Runs the command line; bad input ends in one sentence and exit code 2."""
-    try:
-        app(arguments, prog_name="sbafab")
-    except SbafabError as error:
-        sentence = " ".join(str(error).split())
-        click.echo(f"sbafab: {sentence}", err=True)
+    prepared_streams()
+    if any("\0" in argument for argument in arguments or ()):
+        say("an argument holds a NUL character; no path or value can")
         sys.exit(BAD_INPUT)
+    with stopped_by_signals():
+        app(arguments, prog_name="sbafab")

@@ -1,33 +1,92 @@
-"""``sbafab check``: the rule deck on a design; nothing is written."""
+"""``sbafab check``: the rule deck on a design or on an output folder; nothing is written."""
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import click
 
-from sbafab.cli.options import design_argument, json_option, set_option, waive_option
+from sbafab.cli.options import json_option, set_option, waive_option
 from sbafab.cli.working import RULE_FAILED
+
+if TYPE_CHECKING:
+    from sbafab.output.advice import Advice
+    from sbafab.rules.finding import Finding
 
 
 @click.command()
-@design_argument
+@click.argument("source", metavar="DESIGN|FOLDER")
 @set_option
 @waive_option
+@click.option(
+    "--target-yield",
+    type=click.FloatRange(0, 1, min_open=True, max_open=True),
+    metavar="SHARE",
+    help="Fail below this share of good random builds, and advise the least bond and overhang "
+    "that reach it, e.g. 0.99.",
+)
 @json_option
 def check(
-    design: str, assignments: tuple[str, ...], waivers: tuple[str, ...], as_json: bool
+    source: str,
+    assignments: tuple[str, ...],
+    waivers: tuple[str, ...],
+    target_yield: float | None,
+    as_json: bool,
 ) -> None:
-    """Run the rule deck on a design; write nothing."""
-    from sbafab.actuators import load_design
+    """Run the rule deck on a design, or on the cut files of a folder; write nothing.
+
+    FOLDER is one that sbafab generate has written: its files are read back as they lie on disk.
+    """
     from sbafab.cli.printing import console, findings_table, print_json
     from sbafab.output.manifest import checks
-    from sbafab.output.run import check as run_check
     from sbafab.rules.deck import has_failed
 
-    record = load_design(design, assignments, waivers)
-    _, findings = run_check(record)
+    if target_yield is not None:
+        assignments = (*assignments, f"rules.target_yield={target_yield}")
+    kind, findings = _findings(source, assignments, waivers)
+    advice = None if target_yield is None else _advice(source, assignments, target_yield)
     if as_json:
-        print_json(checks(findings, "design"))
+        said = {"advice": advice.as_dict()} if advice else {}
+        print_json({**checks(findings, kind), **said})
     else:
-        console().print(findings_table(findings))
+        out = console()
+        if kind == "as-built":
+            out.print(f"as built: {source}", markup=False, soft_wrap=True)
+        out.print(findings_table(findings))
+        if advice:
+            out.print(advice.sentence, markup=False, soft_wrap=True)
     if has_failed(findings):
         click.get_current_context().exit(RULE_FAILED)
+
+
+def _advice(source: str, assignments: tuple[str, ...], target: float) -> Advice:
+    from sbafab.actuators import load_design
+    from sbafab.output.advice import advise
+
+    return advise(load_design(source, assignments), target)
+
+
+def _findings(
+    source: str, assignments: tuple[str, ...], waivers: tuple[str, ...]
+) -> tuple[str, tuple[Finding, ...]]:
+    from sbafab.design.reading import template_names
+    from sbafab.errors import DesignError
+
+    if source in template_names() or not Path(source).is_dir():
+        from sbafab.actuators import load_design
+        from sbafab.output.run import check as run_check
+
+        return "design", run_check(load_design(source, assignments, waivers))[1]
+    if assignments or waivers:
+        raise DesignError(
+            "--set, --waive and --target-yield go with a design; a folder is checked as it lies, "
+            "so leave them out"
+        )
+    import logging
+
+    from sbafab.output.as_built.check import check_folder
+
+    # A broken file is told of in a finding; what ezdxf logs of it would stand in between.
+    logging.getLogger("ezdxf").addHandler(logging.NullHandler())
+    return "as-built", check_folder(Path(source))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,7 +34,7 @@ waive_option = click.option(
 out_option = click.option(
     "-o",
     "--out",
-    type=click.Path(path_type=Path),
+    type=click.Path(path_type=Path, readable=False),
     default=Path("out"),
     show_default=True,
     metavar="OUT",
@@ -81,11 +82,19 @@ def run_options(command: Command) -> Command:
     return decorated
 
 
+def _finite(ctx: click.Context, param: click.Parameter, value: float) -> float:
+    # A range lets nan through: it is neither below nor above.
+    if not math.isfinite(value):
+        raise click.BadParameter("must be a number from 0.0001 to 0.1", ctx, param)
+    return value
+
+
 def dxf_options(command: Command) -> Command:
     """How arcs are written, for readers that do not know bulges."""
     chord = click.option(
         "--chord-error",
         type=click.FloatRange(0.0001, 0.1),
+        callback=_finite,
         default=0.005,
         show_default=True,
         metavar="MM",

@@ -28,7 +28,13 @@ def console() -> Console:
     """A console on standard output; 100 columns where there is no terminal."""
     from rich.console import Console
 
-    return Console(highlight=False, soft_wrap=False, width=None if sys.stdout.isatty() else 100)
+    class Told(Console):
+        """A console that leaves it to its caller what a closed pipe means."""
+
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError
+
+    return Told(highlight=False, soft_wrap=False, width=None if sys.stdout.isatty() else 100)
 
 
 @contextmanager
@@ -101,6 +107,8 @@ def print_run(run: Run) -> None:
 
 
 def _made(run: Run) -> Iterator[tuple[str, str]]:
+    from sbafab.cutting.properties import PTFE_WARNING
+
     index = run.manifest
     lam = run.laminate
     counts: dict[str, int] = {}
@@ -136,6 +144,8 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
     if index["meshes"]:
         names = ", ".join(mesh["file"] for mesh in index["meshes"])
         yield "meshes", names
+    if cut:
+        yield "warning", PTFE_WARNING
     for note in lam.notes:
         yield "note", note
     for warning in run.schedule.warnings if run.schedule is not None else ():

@@ -37,23 +37,16 @@ def write_layer_files(
 ) -> list[CutFile]:
     """Writes ``layers/<layer name>.dxf`` under ``folder`` for every layer, bottom to top.
 
-    Raises DesignError where the kerf leaves no path, OutputError where a file cannot be written
-    or does not read back as its profile.
+    Raises DesignError where the kerf leaves no path, OutputError where a file does not read back
+    as its profile, OSError where it cannot be written.
     """
     written: dict[int, CutFile] = {}
-    try:
-        (folder / FOLDER).mkdir(parents=True, exist_ok=True)
-        for layers in laminate.patterns.values():
-            for file in _write_pattern(layers, folder, settings):
-                written[file.layer] = file
-                if progress is not None:
-                    progress(len(written), len(laminate.layers))
-    except OutputError:
-        raise
-    except OSError as error:
-        raise OutputError(
-            f"{error.filename}: cannot be written ({error.strerror}); choose another folder."
-        ) from error
+    (folder / FOLDER).mkdir(parents=True, exist_ok=True)
+    for layers in laminate.patterns.values():
+        for file in _write_pattern(layers, folder, settings):
+            written[file.layer] = file
+            if progress is not None:
+                progress(len(written), len(laminate.layers))
     return [written[layer.index] for layer in laminate.layers]
 
 

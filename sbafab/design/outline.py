@@ -12,7 +12,7 @@ from sbafab.geometry.boolean import PointPool, split_edges, tidy
 from sbafab.geometry.edges import EPSILON
 from sbafab.geometry.region import Contour, Region
 
-MOST_BYTES = 5_000_000
+MOST_BYTES = 2_000_000
 LARGEST = 150.0
 SMALLEST = 1.0
 """Bounds of the outline's extent, in mm."""

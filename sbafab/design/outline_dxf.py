@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -22,6 +23,8 @@ MM_PER_UNIT = {0: 1.0, 1: 25.4, 4: 1.0, 5: 10.0, 6: 1000.0}
 """By $INSUNITS: none (taken as mm), inch, mm, cm, m."""
 LEVEL = 1e-6
 HIGHEST_DEGREE = 10
+MOST_ITEMS = 20_000
+"""Entities, table entries and flags of a drawing; the reader's time grows faster than these."""
 
 
 def dxf_strands(path: Path) -> Iterator[Strand]:
@@ -29,8 +32,11 @@ def dxf_strands(path: Path) -> Iterator[Strand]:
 
     Block references are left alone, whatever they hold. Raises DesignError.
     """
+    content = path.read_bytes()
+    _refuse_excess(content)
     drawing, space = _drawing(path)
-    unit = drawing.header.get("$INSUNITS", 0)
+    # Where a file has no header at all, the reader makes one up that says metres.
+    unit = drawing.header.get("$INSUNITS", 0) if b"$INSUNITS" in content else 0
     if unit not in MM_PER_UNIT:
         raise DesignError(
             f"has $INSUNITS {unit}; save it in millimetres (4), centimetres (5), metres (6) or "
@@ -40,6 +46,19 @@ def dxf_strands(path: Path) -> Iterator[Strand]:
     for entity in space:
         if entity.dxftype() in READERS:
             yield _read(entity, factor)
+
+
+def _refuse_excess(content: bytes) -> None:
+    """Raises DesignError for a drawing that would take long to read."""
+    if content.startswith(b"AutoCAD Binary DXF"):
+        items = len(re.findall(rb"\0[A-Z]", content))
+    else:
+        items = sum(line.strip() == b"0" for line in content.splitlines())
+    if items > MOST_ITEMS:
+        raise DesignError(
+            f"has more than {MOST_ITEMS:,} entities and settings; save a drawing of the outline "
+            "alone"
+        )
 
 
 def _drawing(path: Path) -> tuple[Drawing, Modelspace]:

@@ -18,8 +18,11 @@ from sbafab.geometry.edges import EPSILON, Edge, Line, Point
 MM_PER_UNIT = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6, "q": 0.25}
 MM_PER_PIXEL = 25.4 / 96
 MOST_ELEMENTS = 2000
+LONGEST_STYLE = 10_000
 Placement = Callable[[Any], Point]
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+MARK = re.compile(rf"{NUMBER.pattern}|[A-Za-z]")
+"""What a path is written with: numbers, and letters for its commands."""
 
 
 def svg_strands(path: Path) -> Iterator[Strand]:
@@ -72,14 +75,19 @@ def _refuse_excess(root: ElementTree.Element) -> None:
         elements += 1
         if str(element.tag).rpartition("}")[2] == "use":
             raise DesignError("holds a clone (use); unlink it, so that the path itself is there")
+        if (
+            str(element.tag).rpartition("}")[2] == "style"
+            and len(element.text or "") > LONGEST_STYLE
+        ):
+            raise DesignError("holds a long style sheet; save it as plain SVG")
         for name in ("d", "points"):
-            numbers += len(NUMBER.findall(element.get(name, "")))
+            numbers += len(MARK.findall(element.get(name, "")))
     if elements > MOST_ELEMENTS:
         raise DesignError(
             f"has more than {MOST_ELEMENTS} elements; save a drawing of the outline alone"
         )
-    # Seven numbers make the longest segment, an arc.
-    if numbers > 7 * MOST_EDGES:
+    # A letter and seven numbers make the longest segment, an arc.
+    if numbers > 8 * MOST_EDGES:
         refuse_more_than_limit(numbers)
 
 

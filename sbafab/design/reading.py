@@ -16,6 +16,10 @@ from sbafab.design.records import Design
 from sbafab.errors import DesignError
 
 MOST_BYTES = 1_000_000
+DEEPEST = 8
+"""Most parts of a dotted key; a design file needs three."""
+_PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*"""
+_TOO_DEEP = re.compile(rf"(?<![A-Za-z0-9_-])(?:{_PART}){{{DEEPEST}}}")
 
 
 def templates_folder() -> Path:
@@ -50,16 +54,25 @@ def design_path(source: str | Path) -> Path:
 def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a design file. Raises DesignError where it cannot be read."""
     try:
-        size = path.stat().st_size
-        if size > MOST_BYTES:
+        with path.open("rb") as opened:
+            content = opened.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            size = path.stat().st_size
             raise DesignError(
                 f"{path} has {size:,} bytes; a design file has at most {MOST_BYTES:,}"
             )
-        text = path.read_text(encoding="utf-8-sig")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise DesignError(f"{path} is not a text file in UTF-8; save it as UTF-8") from None
     except OSError as error:
         raise DesignError(f"{path} cannot be read: {error.strerror or error}") from None
+    # The parser's time grows with the square of the parts of a key.
+    deep = _TOO_DEEP.search(text)
+    if deep is not None:
+        raise DesignError(
+            f"{path} has a key of {DEEPEST} or more parts in line "
+            f"{text.count(chr(10), 0, deep.start()) + 1}; write [table] and key = value"
+        )
     try:
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
@@ -73,7 +86,7 @@ def override(data: Mapping[str, Any], assignments: Iterable[str]) -> dict[str, A
     for assignment in assignments:
         key, equals, text = assignment.partition("=")
         parts = [part.strip() for part in key.split(".")]
-        if not equals or not all(parts):
+        if not equals or not all(parts) or len(parts) > DEEPEST:
             raise DesignError(
                 f"--set {shown(assignment)} is not KEY=VALUE; write for example "
                 "--set chamber.diameter=6"
@@ -120,7 +133,7 @@ def validated(
     if family is None:
         raise DesignError(f"family is missing; add family = one of {listed(families)}")
     if not isinstance(family, str) or family not in families:
-        near = difflib.get_close_matches(str(family), families, 1)
+        near = difflib.get_close_matches(shown(family).strip("'"), families, 1)
         hint = f"; did you mean {near[0]}?" if near else ""
         raise DesignError(f"family = {shown(family)} must be one of {listed(families)}{hint}")
     record = families[family]
@@ -136,7 +149,11 @@ def listed(values: Iterable[object]) -> str:
 
 def shown(value: object) -> str:
     """A value as it may appear in a message: short, on one line."""
-    text = repr(str(value)) if isinstance(value, str | Path) else str(value)
+    try:
+        text = repr(str(value)) if isinstance(value, str | Path) else str(value)
+    except ValueError:
+        # Python does not write out integers of thousands of digits.
+        text = "a number of thousands of digits"
     text = " ".join(text.split())
     return text if len(text) <= 60 else text[:57] + "..."
 
@@ -148,7 +165,7 @@ def _sentence(
     unknown = [problem for problem in problems if problem["type"] == "extra_forbidden"]
     first = (unknown or problems)[0]
     # Alternatives of a union put their own name in the location; a key is what the file holds.
-    where = [str(part) for part in first["loc"] if not _is_alternative(part)]
+    where = [_plain(part) for part in first["loc"] if not _is_alternative(part)]
     field = ".".join(where)
     count = len({tuple(problem["loc"][:2]) for problem in problems}) - 1
     more = f" (and {count} more problem{'s' if count > 1 else ''} like it)" if count > 0 else ""
@@ -157,6 +174,12 @@ def _sentence(
     if first["type"] == "missing":
         return f"{field} is missing; add it to the design file{more}"
     return f"{field} = {shown(first['input'])} {_allowed(first)}{more}"
+
+
+def _plain(part: int | str) -> str:
+    """A key as it may appear in a message."""
+    text = str(part)
+    return text if text.isprintable() and len(text) <= 60 else shown(text)
 
 
 def _is_alternative(part: int | str) -> bool:

@@ -26,6 +26,8 @@ RULE_NAMES = (
     "film-limits",
     "press-fit",
     "registration-nominal",
+    "registration-worst-case",
+    "registration-yield",
 )
 RuleName = Literal[
     "bond-width",
@@ -37,6 +39,8 @@ RuleName = Literal[
     "film-limits",
     "press-fit",
     "registration-nominal",
+    "registration-worst-case",
+    "registration-yield",
 ]
 
 
@@ -119,6 +123,14 @@ class Registration(Section):
     paper's). "ears": tooling holes outside the outline, pinned in every press step."""
     pin_diameter: Length = 1.5
     """Dowel pins of the ears."""
+    cutting_error: Annotated[LengthOrZero, Field(le=1)] = 0.1
+    """The most by which a cut edge lies off its place (paper Sec. 2)."""
+    pin_error: Annotated[LengthOrZero, Field(le=1)] = 0.004
+    """The most by which a layer on its pins lies off its place (paper Sec. 2)."""
+    hand_placement: Annotated[LengthOrZero, Field(le=5)] = 0.2
+    """The most by which what no pin holds lies off what it is laid on (the paper gives none)."""
+    hand_turn: float = Field(default=1.0, ge=0, le=10)
+    """Degrees: the most by which what fewer than two pins hold is turned (the paper gives none)."""
 
 
 class Press(Section):
@@ -163,6 +175,14 @@ class Rules(Section):
     """Every bond must be at least this wide."""
     mask_overhang: Length = 0.5
     """Every mask must reach at least this far past the edges it keeps apart."""
+    worst_bond_width: LengthOrZero = 0.5
+    """What must be left of every bond with all errors of cutting and registration at worst."""
+    worst_mask_overhang: LengthOrZero = 0.25
+    """What must be left of every overhang with all errors at worst."""
+    target_yield: float | None = Field(default=None, gt=0, lt=1)
+    """The share of random builds that must keep the two limits above; none asked for by default."""
+    yield_builds: int = Field(default=10_000, ge=100, le=1_000_000)
+    """How many random builds are drawn."""
     validated_balloons: int = Field(default=20, ge=1, le=1000)
     """More balloons than this draw a warning (paper Sec. 6)."""
     waive: tuple[RuleName, ...] = Field(default=(), strict=False)

@@ -15,7 +15,7 @@ Strand = tuple[Edge, ...]
 
 JOIN = 0.001
 """Ends at most this far apart, in mm, are joined."""
-MOST_EDGES = 2000
+MOST_EDGES = 500
 FARTHEST = 10_000.0
 """No coordinate of a drawing may be larger, in mm."""
 

@@ -87,6 +87,8 @@ def _refuse_foreign(target: Path) -> None:
         return
     if not target.is_dir():
         raise OutputError(f"{target} is a file; remove it or choose another folder with -o")
+    if not os.access(target, os.W_OK):
+        raise OutputError(f"{target} is read-only; choose another folder with -o")
     if any(target.iterdir()) and read_manifest(target) is None:
         raise OutputError(
             f"{target} holds files that sbafab did not write; choose another folder with -o"
@@ -95,9 +97,10 @@ def _refuse_foreign(target: Path) -> None:
 
 def read_manifest(folder: Path) -> dict[str, object] | None:
     """The manifest of an output folder, or None if there is none."""
+    path = folder / "manifest.json"
     try:
-        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        manifest = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+    except (OSError, ValueError, RecursionError):
         return None
     is_ours = isinstance(manifest, dict) and manifest.get("schema") == SCHEMA
     return manifest if is_ours else None

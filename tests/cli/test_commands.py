@@ -70,7 +70,7 @@ def test_generate_says_what_it_made(capsys: pytest.CaptureFixture[str], tmp_path
 def test_a_failed_rule_is_exit_1_and_names_the_waiver(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    arguments = ["cut", "1dof-5mm", "-o", str(tmp_path), "--set", "mask.overhang=0.4"]
+    arguments = ["cut", "1dof-5mm", "-o", str(tmp_path), "--set", "mask.overhang=0.47"]
     code, out, _ = run(arguments, capsys)
     assert code == 1
     assert "No cut files were written" in out
@@ -85,7 +85,7 @@ def test_waivers_of_the_file_and_of_the_command_add_up(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     arguments = [
-        *("check", "1dof-5mm", "--set", "bond.width=0.7", "--set", 'rules.waive=["bond-width"]'),
+        *("check", "1dof-5mm", "--set", "bond.width=0.72", "--set", 'rules.waive=["bond-width"]'),
         *("--waive", "tube-fit"),
     ]
     code, _, _ = run(arguments, capsys)

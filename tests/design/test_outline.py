@@ -317,7 +317,7 @@ BAD_DXF: dict[str, tuple[Callable[[Any], object], str]] = {
     "endless spline": (_endless_spline, "cusp near"),
     "too many edges": (
         lambda m: m.add_lwpolyline([(math.cos(k), math.sin(k)) for k in range(2001)]),
-        "more than 2000 edges",
+        "more than 500 edges",
     ),
     "blocks are not followed": (lambda m: m.add_blockref("POCKET", (0, 0)), "no closed path"),
 }
@@ -350,7 +350,7 @@ BAD_SVG = {
     "no width": ('<circle r="2"/>', 'width="0mm" viewBox="0 0 1 1"', "width or height"),
     "many elements": ("<g/>" * 2001, PAGE, "more than 2000 elements"),
     "nested deeply": ("<g>" * 1500 + "</g>" * 1500, PAGE, "RecursionError"),
-    "long path": (f'<path d="M0 0{"c1 1 2 2 3 3" * 3000}"/>', PAGE, "more than 2000 edges"),
+    "long path": (f'<path d="M0 0{"c1 1 2 2 3 3" * 3000}"/>', PAGE, "more than 500 edges"),
     "broken": ("<circle", PAGE, "not valid SVG"),
 }
 
@@ -385,3 +385,10 @@ def test_a_file_of_another_kind_is_refused(tmp_path: Path, name: str) -> None:
 def test_a_path_without_a_file_is_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(DesignError, match="check its path"):
         read_outline(tmp_path / name)
+
+
+def test_a_drawing_without_a_header_is_millimetres(tmp_path: Path) -> None:
+    path = tmp_path / "outline.dxf"
+    circle = "  0\nCIRCLE\n  8\n0\n 10\n0\n 20\n0\n 40\n3\n"
+    path.write_text(f"  0\nSECTION\n  2\nENTITIES\n{circle}  0\nENDSEC\n  0\nEOF\n")
+    assert read_outline(path).area == pytest.approx(math.pi * 9)

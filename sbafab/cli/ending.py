@@ -1,0 +1,89 @@
+"""How a command ends when it does not end well: one sentence, an exit code, no traceback."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import FrameType
+
+import click
+
+from sbafab.errors import SbafabError
+
+BAD_INPUT = 2
+BY_SIGNAL = 128
+"""Added to a signal's number, as shells do."""
+
+
+def say(sentence: str) -> None:
+    click.echo(f"sbafab: {' '.join(sentence.split())}", err=True)
+
+
+def prepared_streams() -> None:
+    """Streams that are there, and that print what they cannot encode as escapes."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            # Closed by the caller (``>&-``).
+            setattr(sys, name, io.StringIO())
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+
+
+@contextmanager
+def ended_plainly() -> Iterator[None]:
+    """Turns what may stop a command into one sentence and an exit code."""
+    try:
+        try:
+            yield
+        finally:
+            sys.stdout.flush()
+    except SbafabError as error:
+        say(str(error))
+        sys.exit(BAD_INPUT)
+    except KeyboardInterrupt as stop:
+        say("stopped; the output folder is whole, as it was before or as the run made it")
+        sys.exit(BY_SIGNAL + (stop.args[0] if stop.args else signal.SIGINT))
+    except BrokenPipeError:
+        # The reader of standard output has seen enough (``| head``); the files are written.
+        _silence()
+        sys.exit(BY_SIGNAL + getattr(signal, "SIGPIPE", 13))
+    except MemoryError:
+        say("there is not enough memory; make the design smaller")
+        sys.exit(BAD_INPUT)
+    except OSError as error:
+        if error.filename is None:
+            _silence()
+        where = error.filename or "standard output"
+        say(f"{where}: {error.strerror or error}; free or name another place")
+        sys.exit(BAD_INPUT)
+
+
+def _silence() -> None:
+    """Sends what is left of standard output nowhere, so that leaving does not fail on it."""
+    with suppress(io.UnsupportedOperation), Path(os.devnull).open("wb") as nowhere:
+        os.dup2(nowhere.fileno(), sys.stdout.fileno())
+
+
+@contextmanager
+def stopped_by_signals() -> Iterator[None]:
+    """Lets a polite kill and a closed terminal stop a run as Ctrl-C does: tidied up."""
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt(number)
+
+    names = [name for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    # One that is ignored (nohup) stays so.
+    numbers = [s for s in (getattr(signal, n) for n in names) if signal.getsignal(s) == 0]
+    for number in numbers:
+        signal.signal(number, stop)
+    try:
+        yield
+    finally:
+        for number in numbers:
+            signal.signal(number, signal.SIG_DFL)
