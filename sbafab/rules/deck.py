@@ -15,6 +15,8 @@ from sbafab.rules import (
     piece_count,
     press_fit,
     registration_nominal,
+    registration_worst_case,
+    registration_yield,
     sealing,
     tube_fit,
 )
@@ -39,16 +41,22 @@ RULES = (
     Rule(film_limits.NAME, film_limits.check),
     Rule(press_fit.NAME, press_fit.check),
     Rule(registration_nominal.NAME, registration_nominal.check),
+    Rule(registration_worst_case.NAME, registration_worst_case.check),
+    Rule(registration_yield.NAME, registration_yield.check),
 )
 
 
 def run_deck(laminate: Laminate, limits: Limits) -> tuple[Finding, ...]:
     """What every rule finds, in the deck's order; failures the user waived say so."""
-    return tuple(
+    return tuple(finding for rule in RULES for finding in run_rule(rule, laminate, limits))
+
+
+def run_rule(rule: Rule, laminate: Laminate, limits: Limits) -> list[Finding]:
+    """What one rule finds; failures the user waived say so."""
+    return [
         _waived(finding) if rule.name in limits.waive and finding.verdict == "fail" else finding
-        for rule in RULES
         for finding in rule.check(laminate, limits)
-    )
+    ]
 
 
 def has_failed(findings: Iterable[Finding]) -> bool:
@@ -65,4 +73,4 @@ def _waived(finding: Finding) -> Finding:
     return replace(finding, verdict="waived", by_user=True, message=message)
 
 
-__all__ = ["RULES", "Limits", "Rule", "has_failed", "rule_names", "run_deck"]
+__all__ = ["RULES", "Limits", "Rule", "has_failed", "rule_names", "run_deck", "run_rule"]

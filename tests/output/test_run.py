@@ -65,7 +65,7 @@ def test_everything_is_there_and_hashed(name: str, tmp_path: Path) -> None:
 
 
 def test_a_failing_design_writes_no_cut_files(tmp_path: Path) -> None:
-    design = load_design("1dof-5mm", ["bond.width=0.7"])
+    design = load_design("1dof-5mm", ["bond.width=0.72"])
     run = generate(design, tmp_path)
     assert run.failed
     written = hashes(run.folder)
@@ -77,13 +77,13 @@ def test_a_failing_design_writes_no_cut_files(tmp_path: Path) -> None:
 
 def test_a_failing_run_leaves_no_older_cut_files(tmp_path: Path) -> None:
     generate(load_design("1dof-5mm"), tmp_path)
-    run = generate(load_design("1dof-5mm", ["bond.width=0.7"]), tmp_path)
+    run = generate(load_design("1dof-5mm", ["bond.width=0.72"]), tmp_path)
     assert not (run.folder / "layers").exists()
 
 
 def test_waivers_stand_in_every_file(tmp_path: Path) -> None:
     waive = 'rules.waive=["bond-width", "tube-fit"]'
-    run = generate(load_design("1dof-5mm", ["bond.width=0.7", waive]), tmp_path)
+    run = generate(load_design("1dof-5mm", ["bond.width=0.72", waive]), tmp_path)
     assert not run.failed
     cut = sorted((run.folder / "layers").iterdir())
     assert len(cut) == 23

@@ -1,0 +1,163 @@
+"""The cut files of a folder read back: the part each will cut, or what is wrong with it."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path, PurePosixPath
+
+from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER, CUT_SEQUENCE
+from sbafab.cutting.dxf_read import ReadBack, read_profile
+from sbafab.cutting.properties import COMPENSATED, UNCALIBRATED, chord_error_of
+from sbafab.errors import OutputError
+from sbafab.geometry.offset import shrink
+from sbafab.geometry.region import Region
+from sbafab.output.as_built.chords import chorded_place, with_arcs
+from sbafab.output.as_built.records import INTEGRITY, LayerClaim, Problem
+
+MOST_BYTES = 20_000_000
+DATUM = "LINE"
+"""What the datum cross is drawn with: all that a layer file holds beside its contours."""
+
+
+@dataclass(frozen=True)
+class CutPart:
+    """What a cut file cuts: ``region`` with the kerf undone and arcs for chords.
+
+    ``chord_error`` and ``kerf`` (full width) are what the file says, in mm, 0 where neither.
+    """
+
+    region: Region
+    properties: dict[str, str]
+    chord_error: float
+    kerf: float
+
+
+@dataclass(frozen=True)
+class LayerFile:
+    """A layer of the manifest with its place in the stack (from 1) and what its file cuts."""
+
+    position: int
+    claim: LayerClaim
+    part: CutPart | None
+
+    @property
+    def label(self) -> str:
+        return f"layer {self.position} ({self.claim.file or self.claim.name})"
+
+
+def read_layers(
+    folder: Path, claims: Sequence[LayerClaim], chords_drawn: bool
+) -> tuple[list[LayerFile], list[Problem]]:
+    """Every layer's file, files of equal bytes read once.
+
+    ``chords_drawn``: the design's own outline is drawn in chords, so they are no fault.
+    """
+    known: dict[str, CutPart] = {}
+    files, problems = [], []
+    for position, claim in enumerate(claims, start=1):
+        part: CutPart | None = None
+        try:
+            path = _inside(folder, claim.file)
+            digest = _digest(path)
+            if digest not in known:
+                known[digest] = read_part(path, chords_drawn)
+            part = known[digest]
+        except OutputError as error:
+            name = claim.file or claim.name
+            said = str(error).removeprefix(f"{PurePosixPath(name).name}: ")
+            message = f"layer {position} ({name}): {said}"
+            problems.append(Problem(INTEGRITY, message, (position,)))
+        files.append(LayerFile(position, claim, part))
+    return files, problems
+
+
+def _inside(folder: Path, file: str | None) -> Path:
+    if file is None:
+        raise OutputError("the manifest names no cut file for it; write the folder anew")
+    pure = PurePosixPath(file)
+    if pure.is_absolute() or ".." in pure.parts or "\\" in file or "\0" in file:
+        raise OutputError("its path leads out of the folder; write the folder anew")
+    return folder / pure
+
+
+def _digest(path: Path) -> str:
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise OutputError(f"larger than {MOST_BYTES:,} bytes; write it anew")
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except (FileNotFoundError, NotADirectoryError):
+        raise OutputError("missing; write it anew") from None
+    except OSError as error:
+        if isinstance(error, OutputError):
+            raise
+        raise OutputError(f"cannot be read ({error.strerror or error}); write it anew") from None
+
+
+def read_part(path: Path, chords_drawn: bool = False) -> CutPart:
+    """The part that a cut file cuts. Raises OutputError where it is not what the format says."""
+    try:
+        found = read_profile(path)
+        return _part(found, chords_drawn)
+    except OutputError:
+        raise
+    except (ArithmeticError, ValueError, LookupError, TypeError, AttributeError) as error:
+        raise OutputError(f"holds no sound contours ({error}); write it anew") from error
+
+
+def _part(found: ReadBack, chords_drawn: bool) -> CutPart:
+    _check_drawn(found)
+    properties = found.properties
+    kerf = _kerf(properties)
+    chord_error = chord_error_of(properties)
+    region = found.region
+    if chord_error:
+        region = with_arcs(region, chord_error, kerf / 2)
+    elif not chords_drawn:
+        place = chorded_place(region)
+        if place is not None:
+            raise OutputError(
+                f"an arc is drawn as chords at x {place[0]:.3f}, y {place[1]:.3f}, and the file "
+                "does not say so; write it anew with arcs"
+            )
+    if kerf:
+        region = shrink(region, kerf / 2)
+        if region.is_empty:
+            raise OutputError(f"nothing is left inside a kerf of {kerf:g} mm; write it anew")
+    return CutPart(region, properties, chord_error, kerf)
+
+
+def _check_drawn(found: ReadBack) -> None:
+    if found.region.is_empty:
+        raise OutputError(f"no contour on {CUT_INNER} or {CUT_OUTER}; write it anew")
+    for kind in found.other:
+        if kind != DATUM:
+            raise OutputError(
+                f"a {kind} lies on a layer other than {CUT_INNER} and {CUT_OUTER}, so it would "
+                "not be cut in its turn; move it"
+            )
+    ranks = [CUT_SEQUENCE.index(layer) for layer in found.layers if layer in CUT_SEQUENCE]
+    for before, after in pairwise(ranks):
+        if before > after:
+            raise OutputError(
+                f"{CUT_SEQUENCE[before]} is cut before {CUT_SEQUENCE[after]}; write it anew"
+            )
+
+
+def _kerf(properties: dict[str, str]) -> float:
+    state, width = properties.get("KERF_STATE"), properties.get("KERF_WIDTH")
+    if (state, width) == (UNCALIBRATED, "none"):
+        return 0.0
+    try:
+        kerf = float(width or "")
+    except ValueError:
+        kerf = math.nan
+    if state != COMPENSATED or not 0 <= kerf <= 1:
+        raise OutputError(
+            f"its properties say KERF_STATE {state!r} and KERF_WIDTH {width!r}, which leaves open "
+            "how it was compensated; write it anew"
+        )
+    return kerf

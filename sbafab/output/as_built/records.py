@@ -1,0 +1,179 @@
+"""What ``manifest.json`` claims, taken in with its types checked, and problems as data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from sbafab.errors import OutputError
+from sbafab.laminate.films import Material
+from sbafab.laminate.interfaces import InterfaceKind
+from sbafab.laminate.laminate import Role
+from sbafab.output.swap import SCHEMA
+from sbafab.rules.finding import Finding, Place, Verdict
+
+INTEGRITY = "file-integrity"
+CLAIMS = "manifest-claims"
+MOST_BYTES = 50_000_000
+MOST_SHOWN = 12
+"""Problems of one rule that are reported one by one."""
+
+Thickness = Annotated[float, Field(gt=0, le=10)]
+
+
+class _Claim(BaseModel):
+    model_config = ConfigDict(extra="ignore", frozen=True, strict=True, allow_inf_nan=False)
+
+
+class LayerClaim(_Claim):
+    index: int
+    name: str
+    material: Material
+    role: Role
+    balloon: int | None
+    thickness: Thickness
+    z: float
+    file: str | None
+    pattern: str
+    area: float
+    pieces: int
+    bores: tuple[str, ...]
+
+
+class InterfaceClaim(_Claim):
+    below: int
+    above: int
+    masks: tuple[int, ...]
+    kind: InterfaceKind
+    contact_area: float
+    bond_area: float
+
+
+class BoreClaim(_Claim):
+    chamber: str
+    x: float
+    y: float
+    diameter: float
+
+
+class InletClaim(_Claim):
+    chamber: str
+    x: float
+    y: float
+    width: float
+    tube_outer_diameter: float
+
+
+class PinClaim(_Claim):
+    name: str
+    x: float
+    y: float
+    diameter: float
+
+
+class RegistrationClaim(_Claim):
+    method: str
+    pins: tuple[PinClaim, ...]
+
+
+class KerfClaim(_Claim):
+    state: Literal["uncalibrated", "compensated"]
+    width: float | None
+
+
+class FilmClaim(_Claim):
+    material: Material
+    product: str
+    thickness: Thickness
+    layers: int
+    area: float
+
+
+class Manifest(_Claim):
+    """The part of ``manifest.json`` that a check compares with what lies on disk."""
+
+    schema_name: Literal["sbafab/manifest@1"] = Field(alias="schema")
+    name: str
+    family: str
+    units: Literal["mm"]
+    design_sha256: str
+    registration: RegistrationClaim
+    kerf: dict[Material, KerfClaim]
+    waived: tuple[str, ...]
+    sizes: dict[str, float]
+    films: tuple[FilmClaim, ...]
+    layers: Annotated[tuple[LayerClaim, ...], Field(min_length=1, max_length=10_000)]
+    interfaces: tuple[InterfaceClaim, ...]
+    bores: tuple[BoreClaim, ...]
+    inlets: tuple[InletClaim, ...]
+    lumen: float | None
+    fixture: str | None = None
+    files: dict[str, str]
+
+
+def read_claims(folder: Path) -> Manifest:
+    """The manifest of an output folder.
+
+    Raises OutputError with one sentence where there is none, or a key is missing or of a wrong
+    type.
+    """
+    path = folder / "manifest.json"
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise OutputError(f"{path} is larger than {MOST_BYTES:,} bytes; write the folder anew")
+        data = path.read_bytes()
+    except (FileNotFoundError, NotADirectoryError):
+        raise OutputError(
+            f"{folder} holds no manifest.json; give a folder that sbafab generate has written"
+        ) from None
+    except OSError as error:
+        if isinstance(error, OutputError):
+            raise
+        raise OutputError(f"{path} cannot be read: {error.strerror or error}") from None
+    try:
+        return Manifest.model_validate_json(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        reason = first["msg"][:1].lower() + first["msg"][1:]
+        said = f"{where}: {reason}" if where else reason
+        raise OutputError(
+            f"{path} is not a sound {SCHEMA}: {said}; write the folder anew with sbafab generate"
+        ) from None
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is not as it should be, found outside the rule deck."""
+
+    rule: str
+    message: str
+    layers: tuple[int, ...] = ()
+    interface: int | None = None
+    x: float | None = None
+    y: float | None = None
+    verdict: Verdict = "fail"
+
+
+def findings_of(rule: str, problems: list[Problem], praise: str) -> list[Finding]:
+    """Findings of one rule: each problem, the many in one at the end, or one that praises."""
+    own = [problem for problem in problems if problem.rule == rule]
+    if not any(problem.verdict == "fail" for problem in own):
+        own.append(Problem(rule, praise, verdict="pass"))
+    shown, rest = own[:MOST_SHOWN], own[MOST_SHOWN:]
+    if rest:
+        layers = tuple(dict.fromkeys(index for problem in rest for index in problem.layers))
+        message = f"and {len(rest)} more like these"
+        failed = any(problem.verdict == "fail" for problem in rest)
+        shown.append(
+            Problem(rule=rule, message=message, layers=layers, verdict="fail" if failed else "warn")
+        )
+    return [_finding(problem) for problem in shown]
+
+
+def _finding(problem: Problem) -> Finding:
+    place = Place(problem.interface, problem.layers, problem.x, problem.y)
+    return Finding(problem.rule, problem.verdict, None, None, "", place, problem.message)
