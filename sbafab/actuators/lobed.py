@@ -103,13 +103,12 @@ def build(design: LobedDesign) -> Laminate:
 
     first = lobes[shape_of[0]]
     outlines = [bonded(pocket, design.bond.width) for pocket in first]
-    near = max((lobes[shape] for shape in shape_of[:2]), key=lambda pockets: pockets[0].area)
     edge = pockets[shape_of[0]].bounds[2] + design.bond.width
     inlets = [
-        tab_and_strip(design, name, axis, direction, edge)
-        for name, axis, direction in zip(names, axes, directions, strict=True)
+        tab_and_strip(design, name, pocket, axis, direction, edge)
+        for name, pocket, axis, direction in zip(names, first, axes, directions, strict=True)
     ]
-    _check_tabs(design, outlines, [bonded(p, design.bond.width) for p in near], inlets)
+    _check_tabs(design, outlines, inlets)
     bottom = BalloonShape(
         fillet(union([hub, *outlines, *(tab for tab, _, _ in inlets)]), design.fillet.radius),
         union([*first, *(strip for _, strip, _ in inlets)]),
@@ -159,19 +158,13 @@ def _plate(design: LobedDesign, hub: Region, pockets: list[Region]) -> BalloonSh
 
 
 def _check_tabs(
-    design: LobedDesign,
-    outlines: list[Region],
-    near: list[Region],
-    inlets: list[tuple[Region, Region, Inlet]],
+    design: LobedDesign, outlines: list[Region], inlets: list[tuple[Region, Region, Inlet]]
 ) -> None:
-    """Raises DesignError where a tab comes nearer than one overhang to another lobe or tab.
-
-    ``near`` are the larger lobes of the first two balloons: what lies on the tabs.
-    """
+    """Raises DesignError where a tab comes nearer than one overhang to another lobe or tab."""
     room = design.mask.overhang
     for i, (tab, _, inlet) in enumerate(inlets):
         free = grow(tab - outlines[i], room)
-        for j, other in enumerate(near):
+        for j, other in enumerate(outlines):
             if j != i and not (free & (other | inlets[j][0])).is_empty:
                 raise DesignError(
                     f"the inlet tab of {inlet.chamber} ({inlet.width + 2 * design.bond.width:g} "
@@ -208,5 +201,6 @@ def _ears(design: LobedDesign, body: Region, axes: tuple[Point, ...]) -> tuple[E
     rays = [
         Ray(name, holder, start, unit(angle), name.endswith("2"))
         for (name, holder), (start, angle) in zip(names, places, strict=True)
+        if holder == "film" or design.stack.balloons > 1
     ]
     return placed(rays, body, design)

@@ -37,7 +37,9 @@ def build(design: OneDofDesign) -> Laminate:
         BalloonShape(bonded(pocket, design.bond.width), pocket, 1, 1) for pocket in pockets
     )
     first = shapes[shape_of[0]]
-    tab, strip, inlet = tab_and_strip(design, "chamber1", AXIS, (1.0, 0.0), first.outline.bounds[2])
+    tab, strip, inlet = tab_and_strip(
+        design, "chamber1", first.pockets, AXIS, (1.0, 0.0), first.outline.bounds[2]
+    )
     bottom = BalloonShape(
         fillet(first.outline | tab, design.fillet.radius), first.pockets | strip, 1, 1
     )
@@ -72,8 +74,11 @@ def _ears(
     rays = [
         Ray("film1", "film", AXIS, unit(90.0), False),
         Ray("film2", "film", AXIS, unit(210.0), True),
-        Ray("mask1", "mask", AXIS, unit(150.0), False),
-        Ray("mask2", "mask", AXIS, unit(270.0), True),
     ]
+    if design.stack.balloons > 1:
+        rays += [
+            Ray("mask1", "mask", AXIS, unit(150.0), False),
+            Ray("mask2", "mask", AXIS, unit(270.0), True),
+        ]
     body = union([bottom.outline, *(shape.outline for shape in shapes)])
     return placed(rays, body, design)

@@ -17,6 +17,9 @@ from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, strip
 from sbafab.laminate.laminate import Inlet
 
+MOST_SIZES = 40
+"""Different pockets in a stack: twice the balloons that have been built (paper Sec. 6)."""
+
 
 class RoundChamber(Section):
     """The chamber of a family whose pockets are discs, or one drawn outline."""
@@ -52,6 +55,11 @@ def pocket_shapes(design: Design, chamber: RoundChamber) -> tuple[list[Region], 
         return [drawn], (0,) * design.stack.balloons
     sizes = diameters(design, chamber)
     distinct = list(dict.fromkeys(sizes))
+    if len(distinct) > MOST_SIZES:
+        raise DesignError(
+            f"chamber.diameter lists {len(distinct)} different diameters, where at most "
+            f"{MOST_SIZES} are allowed; let neighbouring balloons share one"
+        )
     return (
         [disc((0.0, 0.0), size / 2) for size in distinct],
         tuple(distinct.index(size) for size in sizes),
@@ -81,14 +89,25 @@ def reach(region: Region, direction: Point) -> float:
 
 
 def tab_and_strip(
-    design: Design, chamber: str, start: Point, direction: Point, edge: float
+    design: Design, chamber: str, pocket: Region, start: Point, direction: Point, edge: float
 ) -> tuple[Region, Region, Inlet]:
     """Inlet tab, mask strip and inlet of a chamber.
 
     The strip starts at ``start`` inside the pocket and runs along ``direction``; the outline ends
-    ``edge`` mm from there. The strip reaches one overhang past the tab's end.
+    ``edge`` mm from there. The strip reaches one overhang past the tab's end. Raises DesignError
+    where the strip is wider than the pocket.
     """
     width = design.inlet.strip_width
+    for side in (1, -1):
+        corner = (
+            start[0] - side * direction[1] * width / 2,
+            start[1] + side * direction[0] * width / 2,
+        )
+        if not pocket.contains(corner):
+            raise DesignError(
+                f"inlet.width = {width:g} is wider than the pocket of {chamber} where the strip "
+                "leaves it; make inlet.width smaller or the chamber larger"
+            )
     length = edge + design.inlet.tab_length
 
     def along(distance: float) -> Point:

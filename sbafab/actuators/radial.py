@@ -215,7 +215,9 @@ def _bottom(
     count, manifold = len(centres), design.inlet.manifold
     fed = [centres[(count - 1) // 2]] if manifold else centres
     made = [
-        tab_and_strip(design, f"chamber{number}", centre, (0.0, 1.0), outline.bounds[3])
+        tab_and_strip(
+            design, f"chamber{number}", shape.pockets, centre, (0.0, 1.0), outline.bounds[3]
+        )
         for number, centre in enumerate(fed, start=1)
     ]
     tabs = [tab for tab, _, _ in made]

@@ -7,7 +7,8 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 
 from sbafab.geometry.boolean import PointPool, chain, left_turn, split_edges
-from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Point, distance_to
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, distance_to
+from sbafab.geometry.nearby import EdgeIndex
 from sbafab.geometry.region import Contour, Region
 
 
@@ -40,9 +41,7 @@ def _offset_pieces(
     contours: Sequence[Contour], distance: float, covers: Callable[[Point], bool]
 ) -> list[Edge]:
     """Pieces of the curve at exactly ``distance`` outside the side that ``covers`` knows."""
-    near = [
-        (_widened(edge.bounds, distance), edge) for contour in contours for edge in contour.edges
-    ]
+    near = EdgeIndex([edge for contour in contours for edge in contour.edges])
     raw: list[Edge] = []
     for contour in contours:
         for before, edge in zip((contour.edges[-1], *contour.edges), contour.edges, strict=False):
@@ -52,15 +51,15 @@ def _offset_pieces(
             moved = edge.offset(distance)
             if moved is not None:
                 raw.append(moved)
-    kept: list[tuple[float, Edge]] = []
+    kept: dict[frozenset[Point], list[tuple[float, Edge]]] = defaultdict(list)
     for pieces in split_edges(raw, PointPool()):
         for piece in pieces:
             middle = piece.at(0.5)
             depth = _depth(near, middle, distance)
             # In a touch of two pieces the inside, too, can be as far as this from every edge.
             if depth < 2 * EPSILON and not covers(middle):
-                _add(kept, depth, piece)
-    return _balanced(kept)
+                _add(kept[frozenset((piece.start, piece.end))], depth, piece)
+    return _balanced([entry for entries in kept.values() for entry in entries])
 
 
 def _corner_arc(before: Edge, after: Edge, distance: float) -> Arc | None:
@@ -85,33 +84,28 @@ def _corner_arc(before: Edge, after: Edge, distance: float) -> Arc | None:
     )
 
 
-def _widened(box: Bounds, margin: float) -> Bounds:
-    return box[0] - margin, box[1] - margin, box[2] + margin, box[3] + margin
-
-
-def _depth(near: Sequence[tuple[Bounds, Edge]], p: Point, distance: float) -> float:
+def _depth(near: EdgeIndex, p: Point, distance: float) -> float:
     """How far ``p`` lies within ``distance`` of the edges; negative where it does not.
 
-    Each edge comes with its bounds widened by the distance; the search ends at the first that
-    is clearly too near.
+    The search ends at the first edge that is clearly too near.
     """
-    x, y = p
+    (x, y), d = p, distance
     depth = -math.inf
-    for (low_x, low_y, high_x, high_y), edge in near:
-        if low_x <= x <= high_x and low_y <= y <= high_y:
-            depth = max(depth, distance - distance_to(edge, p))
-            if depth > 2 * EPSILON:
-                break
+    for edge in near.touching((x - d, y - d, x + d, y + d)):
+        depth = max(depth, distance - distance_to(edge, p))
+        if depth > 2 * EPSILON:
+            break
     return depth
 
 
 def _add(kept: list[tuple[float, Edge]], depth: float, piece: Edge) -> None:
-    """Keeps one of equal pieces, and neither of two that run opposite ways (a closed gap)."""
+    """Keeps one of equal pieces, and neither of two that run opposite ways (a closed gap).
+
+    All that are ``kept`` have the piece's ends.
+    """
     middle = piece.at(0.5)
     for index, (_, other) in enumerate(kept):
-        if {other.start, other.end} == {piece.start, piece.end} and (
-            math.dist(middle, other.at(0.5)) < 4 * EPSILON
-        ):
+        if math.dist(middle, other.at(0.5)) < 4 * EPSILON:
             if other.start != piece.start:
                 del kept[index]
             return

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,7 +22,10 @@ from sbafab.geometry.edges import (
     distance_to,
     unit,
 )
+from sbafab.geometry.nearby import EdgeIndex
 
+MANY = 32
+"""Edges from which on filing them by place is worth its cost."""
 NOWHERE: Bounds = (math.inf, math.inf, -math.inf, -math.inf)
 
 
@@ -90,7 +93,7 @@ class Contour:
         if not (low_x <= px <= high_x and low_y <= py <= high_y):
             return 0
         turns = 0
-        for edge in self.edges:
+        for edge in self._level_with(py):
             (x0, y0), (x1, y1) = edge.start, edge.end
             side = (x1 - x0) * (py - y0) - (px - x0) * (y1 - y0)
             upward = y0 <= py < y1
@@ -108,6 +111,28 @@ class Contour:
                     elif not edge.ccw and left:
                         turns -= 1
         return turns
+
+    def _level_with(self, y: float) -> Sequence[Edge]:
+        """The edges that a level line at ``y`` can meet, and perhaps some more."""
+        if len(self.edges) < MANY:
+            return self.edges
+        low, step, rows = self._rows
+        return rows[min(len(rows) - 1, int((y - low) / step))]
+
+    @cached_property
+    def _rows(self) -> tuple[float, float, list[list[Edge]]]:
+        """Edges by level: lowest y, height of a row, and each row's edges."""
+        _, low, _, high = self.bounds
+        count = len(self.edges) // 4
+        step = (high - low) / count
+        rows: list[list[Edge]] = [[] for _ in range(count)]
+        for edge in self.edges:
+            _, bottom, _, top = edge.bounds
+            # One row more at both ends: a row's own limits are rounded.
+            first, last = int((bottom - low) / step) - 1, int((top - low) / step) + 1
+            for row in range(max(0, first), min(count - 1, last) + 1):
+                rows[row].append(edge)
+        return low, step, rows
 
     def polygon(self, sagitta: float = 0.001) -> list[Point]:
         """Vertices of a polygon whose chords stay within ``sagitta`` of the arcs.
@@ -196,6 +221,11 @@ class Region:
         return tuple(edge for contour in self.contours for edge in contour.edges)
 
     @cached_property
+    def index(self) -> EdgeIndex:
+        """The edges filed by place."""
+        return EdgeIndex(self.edges)
+
+    @cached_property
     def pieces(self) -> tuple[Region, ...]:
         """The connected pieces, each an outer contour with its holes."""
         if len(self.outers) == 1:
@@ -239,7 +269,9 @@ class Region:
 
     def distance_to_edge(self, p: Point) -> float:
         """Least distance from ``p`` to any edge."""
-        return min((distance_to(edge, p) for edge in self.edges), default=math.inf)
+        if len(self.edges) < MANY:
+            return min((distance_to(edge, p) for edge in self.edges), default=math.inf)
+        return self.index.distance(p)
 
     def __or__(self, other: Region) -> Region:
         from sbafab.geometry.boolean import union

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sbafab.cutting.files import CutFile
+from sbafab.cutting.properties import PTFE_WARNING
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
 from sbafab.laminate.interfaces import Interface
@@ -62,6 +63,7 @@ def manifest(
         "sizes": {name: round(value, 6) for name, value in sizes(design, laminate).items()},
         "notes": list(laminate.notes),
         "films": _films(laminate),
+        "warnings": [PTFE_WARNING],
         "layers": [_layer(laminate, layer, paths.get(layer.index)) for layer in laminate.layers],
         "interfaces": [_interface(interface) for interface in laminate.interfaces],
         "bores": [

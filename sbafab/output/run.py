@@ -14,6 +14,8 @@ from sbafab.cutting.files import CutFile, write_layer_files
 from sbafab.cutting.fixture import write_fixture
 from sbafab.design.records import Design
 from sbafab.design.writing import design_toml, outline_file
+from sbafab.errors import DesignError
+from sbafab.geometry.boolean import GeometryError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.files import MeshFile, write_meshes
 from sbafab.output.manifest import as_json, carried_over, checks, file_hashes, manifest
@@ -48,8 +50,11 @@ class Run:
 
 def check(design: Design) -> tuple[Laminate, tuple[Finding, ...]]:
     """The laminate of a design and what the rule deck finds in it."""
-    laminate = build(design)
-    return laminate, run_deck(laminate, limits(design))
+    try:
+        laminate = build(design)
+        return laminate, run_deck(laminate, limits(design))
+    except GeometryError as error:
+        raise DesignError(f"design {design.name} cannot be resolved: {error}") from None
 
 
 def waived_rules(findings: Collection[Finding]) -> tuple[str, ...]:
@@ -119,7 +124,9 @@ def _schedule(design: Design, laminate: Laminate, waived: tuple[str, ...]) -> Sc
     if not waived:
         return made
     said = f"made although it breaks rules that the design waives: {', '.join(waived)}"
-    return replace(made, warnings=(said, *made.warnings))
+    first, *others = made.steps
+    marked = replace(first, instructions=f"{said[:1].upper()}{said[1:]}. {first.instructions}")
+    return replace(made, steps=(marked, *others), warnings=(said, *made.warnings))
 
 
 def _write(path: Path, text: str) -> None:
@@ -167,13 +174,25 @@ def _carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
     made = file_hashes(folder)
     files = old.get("files")
     kept = file_hashes(old_folder)
+    carried: set[str] = set()
     for path, digest in (files if isinstance(files, dict) else {}).items():
         if path not in made and kept.get(path) == digest:
             target = folder / path
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(old_folder / path, target)
-    if not any(layer["file"] for layer in index["layers"]):
-        index["layers"] = old["layers"]
-        index["fixture"] = old["fixture"]
-    if not index["meshes"]:
-        index["meshes"] = old["meshes"]
+            carried.add(path)
+    layers, meshes, plate = old.get("layers"), old.get("meshes"), old.get("fixture")
+    if _are_files(layers, carried):
+        index["layers"] = layers
+        index["fixture"] = plate if plate in carried else None
+    if _are_files(meshes, carried):
+        index["meshes"] = meshes
+
+
+def _are_files(entries: object, carried: set[str]) -> bool:
+    """Whether manifest entries name files that were all carried over."""
+    return (
+        isinstance(entries, list)
+        and bool(entries)
+        and all(isinstance(entry, dict) and entry.get("file") in carried for entry in entries)
+    )

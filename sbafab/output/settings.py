@@ -8,7 +8,7 @@ from sbafab.cutting.properties import CutSettings
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
 from sbafab.pressing.schedule import PressSettings
-from sbafab.rules.limits import Limits
+from sbafab.rules.limits import Limits, Tolerances
 
 GENERATOR = f"sbafab {__version__}"
 
@@ -28,6 +28,16 @@ def limits(design: Design) -> Limits:
         heated_width=design.press.platen_width,
         heated_length=design.press.platen_length,
         validated_balloons=design.rules.validated_balloons,
+        tolerances=Tolerances(
+            cutting=design.registration.cutting_error,
+            pin=design.registration.pin_error,
+            placement=design.registration.hand_placement,
+            turn=design.registration.hand_turn,
+        ),
+        worst_bond_width=design.rules.worst_bond_width,
+        worst_mask_overhang=design.rules.worst_mask_overhang,
+        target_yield=design.rules.target_yield,
+        yield_builds=design.rules.yield_builds,
         waive=frozenset(design.rules.waive),
     )
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from sbafab.cutting.properties import PTFE_WARNING
 from sbafab.geometry.edges import Point
 from sbafab.geometry.svg import number
 from sbafab.laminate.laminate import Laminate
@@ -15,7 +16,7 @@ from sbafab.reports.pattern_card import Card, cells, drawn, pattern_card, pin_ma
 
 PAGE = (420.0, 297.0)  # A3: the most a drawing may fill
 MARGIN = 10.0
-BLOCK = 18.0
+BLOCK = 22.5
 SCALES = (20.0, 15.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.0, 0.5, 0.2, 0.1)
 LEAST_DRAWN = 30.0
 
@@ -72,6 +73,7 @@ def _title_block(laminate: Laminate, grid: Grid) -> list[str]:
     low = (MARGIN, height - MARGIN - BLOCK)
     x, y = low
     needed = len(laminate.layers)
+    masked = any(layer.is_mask for layer in laminate.layers)
     facts = (
         f"{laminate.family}: {_count(laminate.balloons, 'balloon')}, "
         f"{_count(len(laminate.chambers), 'chamber')}, {needed} layers of "
@@ -82,6 +84,7 @@ def _title_block(laminate: Laminate, grid: Grid) -> list[str]:
         draw.text((x + 3.0, y + 7.2), laminate.name, size=4.6, bold=True),
         draw.text((x + 3.0, y + 12.0), facts),
         draw.text((x + 3.0, y + 16.2), "; ".join(laminate.notes), bold=True),
+        draw.text((x + 3.0, y + 20.4), PTFE_WARNING if masked else ""),
         *_films(laminate, (width / 2 + 18.0, y)),
         *_scale_bar(grid.scale, (width - MARGIN - 4.0, y)),
     ]

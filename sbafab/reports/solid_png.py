@@ -93,7 +93,7 @@ def solid_png(laminate: Laminate, width: int = 1600, height: int = 1200) -> byte
     what = f"{laminate.balloons} balloons" if laminate.balloons > 1 else "one balloon"
     caption = (
         f"{laminate.name}: TPE solid of {what} before inflation, cut open at {cut.chamber}; "
-        f"height exaggerated {factor} times"
+        f"height exaggerated {factor} times" + "".join(f"; {note}" for note in laminate.notes)
     )
     return canvas.png([rings[0] for rings in base.faces], caption)
 

@@ -127,6 +127,11 @@ def _heading(laminate: Laminate, view: View) -> list[str]:
     return [
         draw.text((10.0, 13.0), laminate.name, size=4.6, bold=True),
         draw.text((10.0, 18.6), what),
+        *(
+            [draw.text((10.0, 23.4), "; ".join(laminate.notes), bold=True)]
+            if laminate.notes
+            else []
+        ),
     ]
 
 

@@ -49,10 +49,13 @@ def tooling_holes(laminate: Laminate, layer: Layer) -> list[Point]:
 
 
 @pytest.mark.parametrize(("name", "assignments"), DESIGNS)
-def test_every_rule_passes_and_nothing_is_waived(name: str, assignments: list[str]) -> None:
+def test_nothing_fails_and_nothing_is_waived(name: str, assignments: list[str]) -> None:
     design = load_design(name, [*assignments, 'registration.method="ears"'])
     _, findings = check(design)
-    assert {finding.verdict for finding in findings} == {"pass"}
+    for finding in findings:
+        # Chamber masks have one pin each, or none, and the registration rules say what that costs.
+        allowed = {"pass", "warn"} if finding.rule.startswith("registration-") else {"pass"}
+        assert finding.verdict in allowed, finding.message
 
 
 @pytest.mark.parametrize(("name", "assignments"), DESIGNS)

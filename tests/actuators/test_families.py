@@ -129,7 +129,8 @@ def test_equal_profiles_share_a_pattern() -> None:
     [
         ("3dof-15mm", ["bore.diameter=4"], "bore.diameter"),
         ("3dof-15mm", ["chamber.axis_radius=4.2"], "at least 4.2500"),
-        ("3dof-15mm", ["chamber.count=6", "inlet.width=12"], "tab of chamber1"),
+        ("3dof-15mm", ["chamber.count=8", "inlet.width=4.8"], "tab of chamber1"),
+        ("1dof-5mm", ["inlet.width=8"], "wider than the pocket"),
         ("3dof-15mm", ["chamber.diameter=[5, 6]"], "stack.balloons = 15"),
         ("radial-15mm", ["chamber.count=4"], "must be at least 12.700"),
         ("radial-15mm", ["chamber.width=1.5"], "two bond widths"),
