@@ -16,6 +16,10 @@ __version__ = "0.1.0"
 __all__ = ["build", "check", "generate", "load", "schema", "templates"]
 
 
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]
+
+
 def __getattr__(name: str) -> Any:
     # The functions are fetched when first asked for, so that `sbafab --help` loads no geometry.
     if name in __all__:

@@ -16,19 +16,6 @@ from sbafab.design.units import Length, LengthOrZero, millimetres
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
 UNCALIBRATED: Literal["uncalibrated"] = "uncalibrated"
-RULE_NAMES = (
-    "bond-width",
-    "mask-overhang",
-    "sealing",
-    "channel-clear",
-    "tube-fit",
-    "piece-count",
-    "film-limits",
-    "press-fit",
-    "registration-nominal",
-    "registration-worst-case",
-    "registration-yield",
-)
 RuleName = Literal[
     "bond-width",
     "mask-overhang",
@@ -135,9 +122,13 @@ class Registration(Section):
 
 class Press(Section):
     temperature_c: float = Field(default=135.0, gt=0, le=500)
+    """C; between the TPE's melting point and the PTFE's limit."""
     pressure_kpa: float = Field(default=110.0, gt=0, le=10000)
+    """On the whole platen."""
     platen_width: Length = 152.4
+    """Heated area; the paper's press has 6 x 6 in."""
     platen_length: Length = 152.4
+    """Heated area, the other way."""
     flash_bottom_minutes: float = Field(default=3.0, gt=0, le=600)
     """Step 1: the bottom balloon's upper two layers."""
     bond_bottom_minutes: float = Field(default=12.0, gt=0, le=600)

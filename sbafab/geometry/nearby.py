@@ -8,19 +8,24 @@ from collections.abc import Iterator, Sequence
 from sbafab.geometry.edges import Bounds, Edge, Point, distance_to
 
 
+def widened(box: Bounds, margin: float) -> Bounds:
+    """The box with ``margin`` added on every side."""
+    return box[0] - margin, box[1] - margin, box[2] + margin, box[3] + margin
+
+
 class EdgeIndex:
     """Edges filed by the cells of a square grid that their bounding boxes touch."""
 
     def __init__(self, edges: Sequence[Edge]) -> None:
         self.edges = edges
-        boxes = [edge.bounds for edge in edges]
+        boxes = [edge.bounds for edge in edges] or [(0.0, 0.0, 0.0, 0.0)]
         self._low = min(box[0] for box in boxes), min(box[1] for box in boxes)
         high = max(box[2] for box in boxes), max(box[3] for box in boxes)
         across = max(high[0] - self._low[0], high[1] - self._low[1])
         self._cell = across / max(1.0, math.sqrt(len(edges))) or 1.0
         self._reach = self._places((*self._low, *high))
         self._filed: dict[tuple[int, int], list[int]] = {}
-        for number, box in enumerate(boxes):
+        for number, box in enumerate(boxes[: len(edges)]):
             x0, y0, x1, y1 = self._places(box)
             for x in range(x0, x1 + 1):
                 for y in range(y0, y1 + 1):
@@ -37,6 +42,10 @@ class EdgeIndex:
 
     def touching(self, box: Bounds) -> Iterator[Edge]:
         """Edges that may reach into a box: all that do, and a few that lie near it."""
+        return (self.edges[number] for number in self.numbers(box))
+
+    def numbers(self, box: Bounds) -> Iterator[int]:
+        """The same, by their place among the edges that were filed."""
         x0, y0, x1, y1 = self._places(box)
         low_x, low_y, high_x, high_y = self._reach
         x0, y0, x1, y1 = max(x0, low_x), max(y0, low_y), min(x1, high_x), min(y1, high_y)
@@ -46,22 +55,20 @@ class EdgeIndex:
                 for number in self._filed.get((x, y), ()):
                     if number not in seen:
                         seen.add(number)
-                        yield self.edges[number]
+                        yield number
+
+    def all_within(self, box: Bounds) -> bool:
+        """Whether no edge reaches out of the box."""
+        x0, y0, x1, y1 = self._places(box)
+        low_x, low_y, high_x, high_y = self._reach
+        return x0 <= low_x and y0 <= low_y and x1 >= high_x and y1 >= high_y
 
     def distance(self, p: Point) -> float:
         """Least distance from ``p`` to any edge."""
         margin = self._cell
         while True:
-            box = (p[0] - margin, p[1] - margin, p[0] + margin, p[1] + margin)
+            box = widened((*p, *p), margin)
             least = min((distance_to(edge, p) for edge in self.touching(box)), default=math.inf)
-            if least <= margin:
-                return least
-            places = self._places(box)
-            if (
-                places[0] <= self._reach[0]
-                and places[1] <= self._reach[1]
-                and places[2] >= self._reach[2]
-                and places[3] >= self._reach[3]
-            ):
+            if least <= margin or self.all_within(box):
                 return least
             margin *= 2

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 from sbafab.geometry.boolean import PointPool, chain, left_turn, split_edges
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, distance_to
-from sbafab.geometry.nearby import EdgeIndex
+from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Contour, Region
 
 
@@ -89,9 +89,8 @@ def _depth(near: EdgeIndex, p: Point, distance: float) -> float:
 
     The search ends at the first edge that is clearly too near.
     """
-    (x, y), d = p, distance
     depth = -math.inf
-    for edge in near.touching((x - d, y - d, x + d, y + d)):
+    for edge in near.touching(widened((*p, *p), distance)):
         depth = max(depth, distance - distance_to(edge, p))
         if depth > 2 * EPSILON:
             break

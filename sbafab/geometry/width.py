@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, left_normal
 from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Contour, Region
 
 SMOOTH = 1e-4
@@ -25,6 +26,10 @@ ROUNDED = 0.1
 """Degrees a corner may miss its angle by: coordinates read from a file are rounded."""
 TOUCH = 1e-6
 """mm within which two points are one."""
+STEP = math.radians(15)
+"""Widest step of samples along an arc: 7.5 degrees aside a shift counts 0.99 of its length."""
+OPPOSED = -0.9
+"""Cosine between the normals of samples that still face each other (within 25 degrees)."""
 
 
 class Width(NamedTuple):
@@ -50,6 +55,31 @@ def least_width(region: Region, sharp: float = 90.0) -> Width | None:
 def least_gap(region: Region, sharp: float = 90.0) -> Width | None:
     """The narrowest slot, hole or gap between pieces; None if there is none."""
     return _least([contour.reversed() for contour in region.contours], sharp)
+
+
+def facing_pairs(region: Region, slack: float, sharp: float = 90.0) -> list[Width]:
+    """Facing places that are at most ``slack`` mm wider than the narrowest, each once.
+
+    Besides the places where edges are square on each other they hold samples along edges that run
+    nearly alongside: where a layer turns, those may become the narrowest.
+    """
+    gathered = _Gathered([_side(edge) for edge in region.edges], slack)
+    pinch = _search(region.contours, sharp, gathered)
+    if pinch is not None:
+        return [Width(0.0, pinch, pinch)]
+    for a in gathered.sides:
+        samples = [_Foot(p, left_normal(a.edge, p)) for p in spread(a.edge)]
+        for j in gathered.near(a.box):
+            b = gathered.sides[j]
+            if a is not b and gathered.within_reach(a.box, b.box):
+                _from_samples(samples, b, gathered)
+    return gathered.pairs
+
+
+def spread(edge: Edge) -> list[Point]:
+    """Both ends of an edge and points between them: the middle of a line, an arc every 15 deg."""
+    count = max(2, math.ceil(abs(edge.sweep) / STEP)) if isinstance(edge, Arc) else 2
+    return [edge.start, *(edge.at(i / count) for i in range(1, count)), edge.end]
 
 
 class _Foot(NamedTuple):
@@ -114,6 +144,7 @@ class _Narrowest:
 
     def __init__(self, sides: Sequence[_Side]) -> None:
         self.sides = sides
+        self.index = EdgeIndex([side.edge for side in sides])
         self.best: Width | None = None
         self.value = math.inf
 
@@ -129,6 +160,12 @@ class _Narrowest:
         if dx * nx + dy * ny > TOUCH and dx * mx + dy * my < -TOUCH:
             self.offer((px, py), (qx, qy))
 
+    def near(self, box: Bounds) -> Iterable[int]:
+        """Places in ``sides`` of those that a segment shorter than the best could join to it."""
+        if math.isinf(self.value):
+            return range(len(self.sides))
+        return self.index.numbers(widened(box, self.value))
+
     def within_reach(self, a: Bounds, b: Bounds) -> bool:
         dx = max(a[0] - b[2], b[0] - a[2], 0.0)
         dy = max(a[1] - b[3], b[1] - a[3], 0.0)
@@ -137,36 +174,65 @@ class _Narrowest:
     def _clear(self, p: Point, q: Point) -> bool:
         segment = Line(p, q)
         box = segment.bounds
-        for side in self.sides:
-            other = side.box
-            if (
-                other[0] > box[2] + TOUCH
-                or other[2] < box[0] - TOUCH
-                or other[1] > box[3] + TOUCH
-                or other[3] < box[1] - TOUCH
-            ):
-                continue
-            for m in meeting_points(segment, side.edge):
+        for edge in self.index.touching(widened(box, TOUCH)):
+            for m in meeting_points(segment, edge):
                 if math.dist(m, p) > 10 * TOUCH and math.dist(m, q) > 10 * TOUCH:
                     return False
         return True
 
 
+class _Gathered(_Narrowest):
+    """Keeps every segment offered that is at most ``slack`` longer than the shortest."""
+
+    def __init__(self, sides: Sequence[_Side], slack: float) -> None:
+        super().__init__(sides)
+        self.slack = slack
+        self.found: dict[tuple[Point, Point], Width] = {}
+
+    def offer(self, p: Point, q: Point) -> None:
+        value = math.dist(p, q)
+        key = min((_rounded(p), _rounded(q)), (_rounded(q), _rounded(p)))
+        if value < self.value and key not in self.found and self._clear(p, q):
+            self.found[key] = Width(value, p, q)
+            self.value = min(self.value, value + self.slack)
+
+    @property
+    def pairs(self) -> list[Width]:
+        return [width for width in self.found.values() if width.value <= self.value]
+
+
+def _rounded(p: Point) -> Point:
+    return round(p[0], 5), round(p[1], 5)
+
+
+def _from_samples(samples: Iterable[_Foot], b: _Side, gathered: _Gathered) -> None:
+    for here in samples:
+        for foot in b.feet(here.point):
+            if _dot(here.normal, foot.normal) < OPPOSED:
+                gathered.offer_facing(here, foot)
+
+
 def _least(contours: Sequence[Contour], sharp: float) -> Width | None:
+    narrowest = _Narrowest([_side(edge) for contour in contours for edge in contour.edges])
+    pinch = _search(contours, sharp, narrowest)
+    return narrowest.best if pinch is None else Width(0.0, pinch, pinch)
+
+
+def _search(contours: Sequence[Contour], sharp: float, narrowest: _Narrowest) -> Point | None:
+    """Offers every facing place; instead, returns where the material is pinched to nothing."""
     corners = [corner for contour in contours for corner in _corners(contour)]
     pinch = _pinch(contours, corners, sharp)
     if pinch is not None:
-        return Width(0.0, pinch, pinch)
-    sides = [_side(edge) for contour in contours for edge in contour.edges]
-    narrowest = _Narrowest(sides)
+        return pinch
+    sides = narrowest.sides
     for i, a in enumerate(sides):
-        for b in sides[i + 1 :]:
-            if narrowest.within_reach(a.box, b.box):
-                _between_edges(a, b, narrowest)
+        for j in narrowest.near(a.box):
+            if j > i and narrowest.within_reach(a.box, sides[j].box):
+                _between_edges(a, sides[j], narrowest)
     _at_corners(corners, sides, narrowest)
     for contour in contours:
         _flat_ends(contour, narrowest)
-    return narrowest.best
+    return None
 
 
 def _side(edge: Edge) -> _Side:
@@ -213,8 +279,10 @@ def _between_edges(a: _Side, b: _Side, narrowest: _Narrowest) -> None:
         # The centre line of a line and an arc, or of two arcs, is square on both.
         origin = b.edge.centre if isinstance(b.edge, Arc) else None
         if origin is None:
+            (cx, cy) = a.edge.centre
             for foot in b.feet(a.edge.centre):
-                for other in _feet_along(a, foot):
+                (nx, ny) = foot.normal
+                for other in a.feet((cx + nx, cy + ny)):
                     narrowest.offer_facing(foot, other)
         elif math.dist(origin, a.edge.centre) > 1e-9:
             for foot in a.feet(origin):
@@ -224,13 +292,6 @@ def _between_edges(a: _Side, b: _Side, narrowest: _Narrowest) -> None:
         _between_edges(b, a, narrowest)
     elif _alongside(a.edge, b.edge):
         _along_each_other(a, b, narrowest)
-
-
-def _feet_along(arc: _Side, foot: _Foot) -> list[_Foot]:
-    """Feet on the arc of the line through ``foot`` along its normal."""
-    (x, y), (nx, ny) = foot
-    reach = 2 * (abs(arc.box[2] - x) + abs(arc.box[3] - y) + 1.0)
-    return arc.feet((x + reach * nx, y + reach * ny))
 
 
 def _alongside(a: Edge, b: Edge) -> bool:
@@ -253,10 +314,10 @@ def _along_each_other(a: _Side, b: _Side, narrowest: _Narrowest) -> None:
 def _at_corners(corners: Sequence[_Corner], sides: Sequence[_Side], narrowest: _Narrowest) -> None:
     for corner in corners:
         x, y = corner.point
-        for side in sides:
-            if narrowest.within_reach((x, y, x, y), side.box):
-                for foot in side.feet(corner.point):
-                    _corner_to_edge(corner, side, foot, narrowest)
+        for j in narrowest.near((x, y, x, y)):
+            if narrowest.within_reach((x, y, x, y), sides[j].box):
+                for foot in sides[j].feet(corner.point):
+                    _corner_to_edge(corner, sides[j], foot, narrowest)
     reflex = [corner for corner in corners if corner.turn < 0]
     for i, a in enumerate(reflex):
         for b in reflex[i + 1 :]:

@@ -174,7 +174,11 @@ class Laminate:
 
     def pins_holding(self, layer: Layer) -> tuple[Pin, ...]:
         """The pins on which the layer has a hole that fits; a wider opening does not hold it."""
-        circles = [hole.circle for hole in layer.profile.holes if hole.circle is not None]
+        return self.pins_in(layer.profile)
+
+    def pins_in(self, part: Region) -> tuple[Pin, ...]:
+        """The pins on which this part of a layer has a hole that fits."""
+        circles = [hole.circle for hole in part.holes if hole.circle is not None]
         return tuple(
             pin
             for pin in self.pins

@@ -10,12 +10,18 @@ import io
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
 from sbafab.errors import DesignError
-from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.assembly import AssemblyStep, Bond, StepName, assembly, distinct_layers
+from sbafab.laminate.laminate import Laminate
 
-Bond = Literal["flash", "full"]
+TITLES: dict[StepName, str] = {
+    "flash_bottom": "Bottom balloon, upper two layers",
+    "bond_bottom": "Bottom balloon, with its base",
+    "flash_middle": "Middle layers",
+    "bond_all": "Whole laminate",
+}
 
 HOTTEST_TRIED = 150.0
 PRESSURES_TRIED = (70.0, 200.0)
@@ -56,6 +62,15 @@ class PressSettings:
     def force_n(self) -> float:
         """Force on the whole platen."""
         return self.pressure_kpa * self.platen[0] * self.platen[1] / 1000
+
+    def minutes(self, step: StepName) -> float:
+        """How long the press stays closed in a step."""
+        return {
+            "flash_bottom": self.flash_bottom,
+            "bond_bottom": self.bond_bottom,
+            "flash_middle": self.flash_middle,
+            "bond_all": self.bond_all,
+        }[step]
 
 
 @dataclass(frozen=True)
@@ -99,7 +114,7 @@ def schedule(laminate: Laminate, press: PressSettings) -> Schedule:
     paper. Raises DesignError at a temperature that would not bond TPE or that PTFE does not stand.
     """
     _refuse_temperature(laminate, press)
-    steps = _steps(laminate, press)
+    steps = tuple(_step(part, press) for part in assembly(laminate))
     total = sum(step.minutes for step in steps)
     return Schedule(
         steps,
@@ -111,76 +126,25 @@ def schedule(laminate: Laminate, press: PressSettings) -> Schedule:
     )
 
 
-def _steps(laminate: Laminate, press: PressSettings) -> tuple[Step, ...]:
-    """The paper's four steps, less those that have nothing to press."""
-    indices = tuple(layer.index for layer in laminate.layers)
-    base = next(layer.index for layer in laminate.layers if layer.role == "base")
-    upper = (base + 1, base + 2)
-    bottom = (base, *upper)
-    under = tuple(index for index in indices if index < base)
-    over = tuple(index for index in indices if index > base + 2)
-    middle, cap = over[:-1], over[-1:]
-    plan = [
-        _Plan("Bottom balloon, upper two layers", "flash", (upper,), upper, press.flash_bottom),
-        _Plan(
-            "Bottom balloon, with its base", "full", ((base,), upper), (base,), press.bond_bottom
-        ),
-        _Plan("Middle layers", "flash", (middle,), middle, press.flash_middle),
-        _Plan("Whole laminate", "full", (under, bottom, middle, cap), under + cap, press.bond_all),
-    ]
-    return tuple(
-        _step(number, part, laminate, press)
-        for number, part in enumerate((part for part in plan if part.adds), 1)
-    )
-
-
-class _Plan(NamedTuple):
-    """A step before it has its number and pins; ``stacks`` lie on each other, lowest first."""
-
-    title: str
-    bond: Bond
-    stacks: tuple[tuple[int, ...], ...]
-    adds: tuple[int, ...]
-    minutes: float
-
-
-def _step(number: int, part: _Plan, laminate: Laminate, press: PressSettings) -> Step:
-    layers = tuple(index for stack in part.stacks for index in stack)
-    pinned = part.bond == "flash" or laminate.registration == "ears"
-    pins = _pins_in(laminate, layers) if pinned else ()
+def _step(part: AssemblyStep, press: PressSettings) -> Step:
     return Step(
-        step=number,
-        title=part.title,
+        step=part.number,
+        title=TITLES[part.name],
         bond=part.bond,
-        layers=layers,
+        layers=part.layers,
         adds=part.adds,
-        pins=pins,
+        pins=tuple(pin.name for pin in part.pins),
         temperature_c=press.temperature_c,
         pressure_kpa=press.pressure_kpa,
         force_n=round(press.force_n, 1),
         platen_mm=press.platen,
-        minutes=part.minutes,
-        instructions=_instructions(part, pins),
+        minutes=press.minutes(part.name),
+        instructions=_instructions(part),
     )
 
 
-def _pins_in(laminate: Laminate, layers: Sequence[int]) -> tuple[str, ...]:
-    """The pins that hold at least one of the layers and meet no film in any of them."""
-    shapes = _shapes(laminate, layers)
-    return tuple(
-        pin.name
-        for pin in laminate.pins
-        if any(pin in laminate.pins_holding(layer) for layer in shapes)
-        and not any(layer.profile.contains(pin.centre) for layer in shapes)
-    )
-
-
-def _shapes(laminate: Laminate, layers: Sequence[int]) -> tuple[Layer, ...]:
-    """One layer of each pattern among the layers."""
-    return tuple({laminate.layer(i).pattern: laminate.layer(i) for i in layers}.values())
-
-
-def _instructions(part: _Plan, pins: Sequence[str]) -> str:
+def _instructions(part: AssemblyStep) -> str:
+    pins = [pin.name for pin in part.pins]
     stacks = ", then ".join(_named(stack) for stack in part.stacks if stack)
     on_pins = f"on the pin{'s' if len(pins) > 1 else ''} {_listed(pins)}"
     if part.bond == "full":
@@ -253,7 +217,7 @@ def _warnings(laminate: Laminate, press: PressSettings, steps: Sequence[Step]) -
             held = {pin for pin in laminate.pins if pin.name in step.pins}
             loose = [
                 layer.pattern
-                for layer in _shapes(laminate, step.layers)
+                for layer in distinct_layers(laminate, step.layers)
                 if held.isdisjoint(laminate.pins_holding(layer))
             ]
             layers = [i for i in step.layers if laminate.layer(i).pattern in loose]

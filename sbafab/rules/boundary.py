@@ -9,7 +9,9 @@ from typing import NamedTuple
 from sbafab.geometry.boolean import PointPool, split_edges
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, left_normal
 from sbafab.geometry.intersect import line_circle
+from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Region
+from sbafab.geometry.width import spread
 
 END_ROOM = 1e-5
 """mm left out at both ends of an edge: what starts at a corner does not lie beside the edge."""
@@ -52,12 +54,22 @@ class Reach(NamedTuple):
     at: Point
 
 
-def outward_reach(edge: Edge, others: Iterable[Edge]) -> Reach | None:
+def outward_reach(edge: Edge, others: EdgeIndex) -> Reach | None:
     """The least distance from ``edge``, along its right-hand normal, to any of ``others``.
 
     Measured in the band that the edge sweeps along its normals; None if nothing lies in it.
     """
-    within = _line_band(edge) if isinstance(edge, Line) else _arc_band(edge)
+    band = _line_band(edge) if isinstance(edge, Line) else _arc_band(edge)
+    margin = 1.0
+    while True:
+        box = widened(edge.bounds, margin)
+        best = _nearest(band, others.touching(box))
+        if (best is not None and best.value <= margin) or others.all_within(box):
+            return best
+        margin *= 4
+
+
+def _nearest(within: _Band, others: Iterable[Edge]) -> Reach | None:
     best: Reach | None = None
     for other in others:
         for p in within.nearest_candidates(other):
@@ -149,3 +161,26 @@ def _on_ray(origin: Point, unit: Point, edge: Edge) -> list[Point]:
         t = ((x - ox) * uy - (y - oy) * ux) / cross
         found = [(ox + t * unit[0], oy + t * unit[1])]
     return [p for p in found if -1e-12 <= edge.parameter(p) <= 1 + 1e-12]
+
+
+def outward_samples(
+    edge: Edge, others: EdgeIndex, within: float
+) -> Iterator[tuple[Point, Point, Reach]]:
+    """Points spread over ``edge``, the outward normal at each, the first other edge along it.
+
+    Edges farther off than ``within`` may be left out.
+    """
+    room = END_ROOM / edge.length
+    near = list(others.touching(widened(edge.bounds, within)))
+    for p in spread(edge):
+        start = edge.at(min(1 - room, max(room, edge.parameter(p))))
+        nx, ny = left_normal(edge, start)
+        outward = (-nx, -ny)
+        best: Reach | None = None
+        for other in near:
+            for q in _on_ray(start, outward, other):
+                height = (q[0] - start[0]) * outward[0] + (q[1] - start[1]) * outward[1]
+                if height > -EPSILON and (best is None or height < best.value):
+                    best = Reach(max(0.0, height), q)
+        if best is not None:
+            yield start, outward, best

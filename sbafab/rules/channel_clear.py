@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from sbafab.geometry.edges import Point
+from sbafab.geometry.edges import Edge, Point, distance_to
 from sbafab.geometry.region import Contour
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.rules.channels import Channel, channels
@@ -58,12 +58,21 @@ def _clear(channel: Channel) -> _Clear:
     if any(_is_round_about(hole, channel.centre, radius) for hole in tightest.profile.holes):
         return _Clear(channel, 2 * radius, channel.centre, tightest)
     near = [layer for layer in channel.layers if room[layer.index] < 2 * channel.diameter]
+    # What is nearest to any place within reach lies no further from the axis than this.
+    edges = {
+        layer.index: [
+            edge
+            for edge in layer.profile.edges
+            if distance_to(edge, channel.centre) <= room[layer.index] + 1.5 * channel.diameter
+        ]
+        for layer in near
+    }
 
     def clearance(p: Point) -> float:
-        return min(_signed_room(layer, p) for layer in near)
+        return min(_signed_room(layer, edges[layer.index], p) for layer in near)
 
     best = _highest(clearance, channel.centre, channel.diameter / 2)
-    tightest = min(near, key=lambda layer: _signed_room(layer, best))
+    tightest = min(near, key=lambda layer: _signed_room(layer, edges[layer.index], best))
     return _Clear(channel, max(0.0, 2 * clearance(best)), best, tightest)
 
 
@@ -76,9 +85,9 @@ def _is_round_about(hole: Contour, centre: Point, radius: float) -> bool:
     )
 
 
-def _signed_room(layer: Layer, p: Point) -> float:
-    """Distance to the nearest edge, negative inside the film."""
-    room = layer.profile.distance_to_edge(p)
+def _signed_room(layer: Layer, edges: Sequence[Edge], p: Point) -> float:
+    """Distance to the nearest of the edges, negative inside the film."""
+    room = min(distance_to(edge, p) for edge in edges)
     return -room if layer.profile.contains(p) else room
 
 

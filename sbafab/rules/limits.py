@@ -12,11 +12,27 @@ TOLERANCE = 0.001
 
 
 @dataclass(frozen=True)
+class Tolerances:
+    """The most by which cut edges and layers may lie off their places.
+
+    ``cutting``: mm, any cut edge along its normal; ``pin``: mm, a layer on its pins; ``placement``
+    mm and ``turn`` degrees: a layer laid by hand. The first two are the paper's (Sec. 2).
+    """
+
+    cutting: float = 0.1
+    pin: float = 0.004
+    placement: float = 0.2
+    turn: float = 1.0
+
+
+@dataclass(frozen=True)
 class Limits:
     """A design's limits, mm; the defaults are the paper's (Sec. 2).
 
     ``least_feature`` is the laser's, ``kerf`` the full kerf width by material (none given: not
-    calibrated), ``waive`` the rules whose failure the user accepts by name.
+    calibrated), ``waive`` the rules whose failure the user accepts by name. The ``worst_`` limits
+    are for what is left of bond and overhang under the ``tolerances``; ``target_yield`` is the
+    share of ``yield_builds`` random builds that must keep them (None: none asked for).
     """
 
     bond_width: float = 0.75
@@ -27,6 +43,11 @@ class Limits:
     heated_length: float = 152.4
     validated_balloons: int = 20
     registration_tolerance: float = 0.001
+    tolerances: Tolerances = Tolerances()
+    worst_bond_width: float = 0.5
+    worst_mask_overhang: float = 0.25
+    target_yield: float | None = None
+    yield_builds: int = 10_000
     waive: frozenset[str] = frozenset()
 
 

@@ -35,7 +35,7 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
         if alike.interface.kind != "bond" and alike.interface.unbonded.is_empty:
             bare.append(alike)
         for edge, overhang in _overhangs(alike):
-            pin = _pin_at(edge, laminate.pins)
+            pin = pin_at(edge, laminate.pins)
             if pin is not None and not holds(overhang.value, limits.mask_overhang):
                 pinned.setdefault(pin.name, []).append(overhang)
             else:
@@ -48,13 +48,13 @@ def _overhangs(alike: Alike) -> list[tuple[Edge, _Overhang]]:
     interface = alike.interface
     found = []
     for edge in edges_along(interface.unbonded, interface.contact):
-        reach = outward_reach(edge, interface.mask.edges)
+        reach = outward_reach(edge, interface.mask.index)
         if reach is not None:
             found.append((edge, _Overhang(reach.value, edge.nearest(reach.at), alike)))
     return found
 
 
-def _pin_at(edge: Edge, pins: tuple[Pin, ...]) -> Pin | None:
+def pin_at(edge: Edge, pins: tuple[Pin, ...]) -> Pin | None:
     if not isinstance(edge, Arc) or edge.ccw:
         return None
     for pin in pins:

@@ -1,4 +1,4 @@
-"""registration-nominal: as drawn, bores are coaxial and the two films of a balloon congruent."""
+"""registration-nominal: as drawn, holes lie on their axes and pins, a balloon's films congruent."""
 
 from __future__ import annotations
 
@@ -6,15 +6,18 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from sbafab.geometry.edges import Point, distance_to
-from sbafab.geometry.region import Contour
-from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.geometry.edges import Point
+from sbafab.geometry.region import Contour, Region
+from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
 from sbafab.rules.alike import distinct_interfaces
 from sbafab.rules.channels import Channel, channels
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at
 
 NAME = "registration-nominal"
+
+ON_ONE_PIN = (("base", "wall", "cap"), ("separator-mask",), ("sheet",))
+"""Roles whose layers have the same tooling holes."""
 
 
 class _Departure(NamedTuple):
@@ -25,9 +28,9 @@ class _Departure(NamedTuple):
 
 
 def check(laminate: Laminate, limits: Limits) -> list[Finding]:
-    """The largest departure of a hole from its channel's axis, or of an outline from its twin."""
+    """The largest departure of a hole from its axis or pin, or of an outline from its twin."""
     limit = limits.registration_tolerance
-    departures = [*_off_axis(laminate), *_off_outline(laminate)]
+    departures = [*_off_axis(laminate), *_off_pins(laminate), *_off_outline(laminate)]
     if not departures:
         message = "no two layers have to lie over each other"
         return [Finding(NAME, "pass", limit, None, "mm", Place(), message)]
@@ -66,6 +69,32 @@ def _opening_centre(layer: Layer, channel: Channel) -> Point | None:
     return min(round_ones, key=lambda circle: circle[1])[0] if round_ones else None
 
 
+def _off_pins(laminate: Laminate) -> Iterator[_Departure]:
+    """Tooling holes off their pin; one that a layer lacks is off by the pin's diameter."""
+    axes = [channel.centre for channel in channels(laminate)]
+    for pin in laminate.pins:
+        if any(math.dist(pin.centre, axis) < LOOSE for axis in axes):
+            continue
+        off = {name: _off_pin(layers[0], pin) for name, layers in laminate.patterns.items()}
+        for roles in ON_ONE_PIN:
+            alike = [layer for layer in laminate.layers if layer.role in roles]
+            holed = sum(off[layer.pattern] < pin.diameter for layer in alike)
+            if 2 * holed > len(alike):
+                for layer in alike:
+                    yield _Departure(
+                        off[layer.pattern],
+                        pin.centre,
+                        (layer.index,),
+                        f"layer {layer.index} ({layer.name}) misses the pin {pin.name}",
+                    )
+
+
+def _off_pin(layer: Layer, pin: Pin) -> float:
+    """How far the nearest round hole lies from the pin, its diameter at most."""
+    circles = [hole.circle for hole in layer.profile.holes if hole.circle is not None]
+    return min([pin.diameter, *(math.dist(centre, pin.centre) for centre, _ in circles)])
+
+
 def _off_outline(laminate: Laminate) -> Iterator[_Departure]:
     for alike in distinct_interfaces(laminate):
         interface = alike.interface
@@ -92,8 +121,8 @@ def _distances(
     one: tuple[Contour, ...], other: tuple[Contour, ...]
 ) -> Iterator[tuple[float, Point]]:
     """How far the ends and middles of all edges of ``one`` lie from ``other``."""
-    edges = [edge for contour in other for edge in contour.edges]
+    outline = Region(other)
     for contour in one:
         for edge in contour.edges:
             for p in (edge.start, edge.at(0.5)):
-                yield min((distance_to(e, p) for e in edges), default=math.inf), p
+                yield outline.distance_to_edge(p), p

@@ -1,4 +1,7 @@
-"""sealing: every inlet feeds the pockets of its own chamber, all of them, and nothing else."""
+"""sealing: every inlet feeds the pockets of its own chamber, all of them, and nothing else.
+
+Nor may a balloon lie loose on what is below it.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from typing import NamedTuple
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Chamber, Laminate
+from sbafab.rules.alike import distinct_interfaces
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at
 from sbafab.rules.voids import OUTSIDE, Void, VoidGraph, void_graph
@@ -23,13 +27,14 @@ class _Offence(NamedTuple):
 
 
 def check(laminate: Laminate, limits: Limits) -> list[Finding]:
-    """How many pockets leak, reach a foreign one, are cut off or missing."""
+    """How many pockets leak, reach a foreign one, are cut off or missing, and films lie loose."""
     del limits
     graph = void_graph(laminate)
     owners = _owners(laminate, graph)
     offences = [
         *_missing_pockets(laminate, graph, owners),
         *_wrong_reaches(laminate, graph, owners),
+        *_loose_films(laminate),
     ]
     if not offences:
         pockets = "1 pocket" if len(owners) == 1 else f"{len(owners)} pockets"
@@ -141,6 +146,24 @@ def _foreign(
         f"({at(p)}); separate them by a bond there"
     )
     return _Offence(message, void.level, p)
+
+
+def _loose_films(laminate: Laminate) -> list[_Offence]:
+    """Pieces of film that nothing bonds to the balloon or sheet below."""
+    offences = []
+    for alike in distinct_interfaces(laminate):
+        gap = alike.interface
+        pieces = gap.above.profile.pieces if gap.kind == "separator" else ()
+        for piece in pieces:
+            held = gap.bond if len(pieces) == 1 else gap.bond & piece
+            if held.is_empty:
+                p = _somewhere(piece)
+                message = (
+                    f"the film of layer {gap.above.index} ({gap.above.name}) at {at(p)} is bonded "
+                    f"to nothing below it; open the mask at interface {gap.index} there"
+                )
+                offences.append(_Offence(message, gap.index, p))
+    return offences
 
 
 def _leak(

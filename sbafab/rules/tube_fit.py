@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Edge, Point
+from sbafab.geometry.nearby import EdgeIndex
 from sbafab.geometry.shapes import strip
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Inlet, Laminate
@@ -41,8 +42,11 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     good = not short
     message = (
         f"{worst.what} of {worst.inlet.chamber} is {worst.value:.3f} mm wide, {at(worst.at)}; "
-        f"a tube of {worst.inlet.tube_diameter:g} needs {worst.limit:.3f}"
     )
+    if worst.what == BOND:
+        message += f"to hold the tube it needs {worst.limit:.3f}"
+    else:
+        message += f"a tube of {worst.inlet.tube_diameter:g} needs {worst.limit:.3f}"
     if not good:
         message += f": {worst.remedy}"
     place = Place(None, (), *worst.at)
@@ -82,14 +86,14 @@ def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits
     run = interface.unbonded & strip(inner, inlet.mouth, 2 * inlet.width)
     sides = [edge for edge in run.edges if _is_side(edge, inlet)]
     widths = [
-        outward_reach(edge.reversed(), [other for other in run.edges if other is not edge])
+        outward_reach(edge.reversed(), EdgeIndex([e for e in run.edges if e is not edge]))
         for edge in sides
     ]
-    bonds = [outward_reach(edge, interface.contact.edges) for edge in sides]
+    bonds = [outward_reach(edge, interface.contact.index) for edge in sides]
     found = []
     for reaches, what, limit, remedy in (
         (widths, "the strip", needed, "widen inlet.width"),
-        (bonds, BOND, limits.bond_width, "widen the tab"),
+        (bonds, BOND, limits.bond_width, "raise bond.width, which makes the tab wider"),
     ):
         least = min((r for r in reaches if r), key=lambda r: r.value, default=None)
         if least is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from click.testing import CliRunner
+import pytest
 
 from sbafab.cli import main
 
@@ -12,19 +12,25 @@ SMALL = ["check", "1dof-5mm", "--set", "stack.balloons=2", "--set", "rules.yield
 EARS = ["--set", "registration.method=ears"]
 
 
-def test_a_missed_target_fails_and_is_advised_on() -> None:
-    run = CliRunner().invoke(main, [*SMALL, "--target-yield", "0.9"])
-    assert run.exit_code == 1
-    assert "A yield of 0.9 needs bond.width = " in run.output
+def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    return int(ended.value.code or 0), capsys.readouterr().out
 
 
-def test_a_reached_target_passes() -> None:
-    run = CliRunner().invoke(main, [*SMALL, *EARS, "--target-yield", "0.5", "--json"])
-    assert run.exit_code == 0
-    advice = json.loads(run.output)["advice"]
+def test_a_missed_target_fails_and_is_advised_on(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out = run([*SMALL, "--target-yield", "0.9"], capsys)
+    assert code == 1
+    assert "A yield of 0.9 needs bond.width = " in out
+
+
+def test_a_reached_target_passes(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out = run([*SMALL, *EARS, "--target-yield", "0.5", "--json"], capsys)
+    assert code == 0
+    advice = json.loads(out)["advice"]
     # The rules' own limits are enough.
     assert (advice["bond_width"], advice["mask_overhang"]) == (0.75, 0.5)
 
 
-def test_a_share_of_one_or_more_is_refused() -> None:
-    assert CliRunner().invoke(main, [*SMALL, "--target-yield", "1"]).exit_code == 2
+def test_a_share_of_one_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run([*SMALL, "--target-yield", "1"], capsys)[0] == 2

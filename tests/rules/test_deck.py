@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 import pytest
 
+from sbafab.design.records import RuleName
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, rectangle, strip
@@ -160,7 +161,7 @@ def test_kerf_that_closes_a_bore_fails_film_limits_alone(good: Callable[..., Lam
 
 
 def test_every_rule_has_a_fault_of_its_own() -> None:
-    tested_apart = {"press-fit"}
+    tested_apart = {"press-fit", "registration-worst-case", "registration-yield"}
     assert {fault.rule for fault in FAULTS.values()} | tested_apart == set(rule_names())
 
 
@@ -202,3 +203,7 @@ def test_a_waived_failure_stops_nothing_and_says_so(
 def test_findings_come_in_the_decks_order(good: Callable[..., Laminate]) -> None:
     found = list(dict.fromkeys(finding.rule for finding in run_deck(good(*LOBED), Limits())))
     assert tuple(found) == rule_names()
+
+
+def test_every_rule_of_the_deck_can_be_waived_by_name() -> None:
+    assert set(get_args(RuleName)) == set(rule_names())

@@ -9,6 +9,7 @@ import pytest
 
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Arc, Edge, Line
+from sbafab.geometry.nearby import EdgeIndex
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import circle, disc, rectangle, strip
 from sbafab.laminate.laminate import Laminate
@@ -134,7 +135,7 @@ REACHES: list[tuple[Edge, Edge, float | None]] = [
 
 @pytest.mark.parametrize(("edge", "other", "expected"), REACHES)
 def test_reach_along_the_normal(edge: Edge, other: Edge, expected: float | None) -> None:
-    reach = outward_reach(edge, [other])
+    reach = outward_reach(edge, EdgeIndex([other]))
     if expected is None:
         assert reach is None
     else:

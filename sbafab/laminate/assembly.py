@@ -1,0 +1,98 @@
+"""How a laminate is put together: which stacks are laid on each other in which step, on which pins.
+
+The paper's four steps (Sec. 2), less those that have nothing to press.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from sbafab.laminate.laminate import Laminate, Layer, Pin
+
+Bond = Literal["flash", "full"]
+StepName = Literal["flash_bottom", "bond_bottom", "flash_middle", "bond_all"]
+
+
+@dataclass(frozen=True)
+class AssemblyStep:
+    """One closing of the press, steps counted from 1.
+
+    ``stacks`` lie on each other, lowest first, and ``adds`` are those of their layers that join in
+    this step, both by layer index; ``pins`` are the dowel pins that are in.
+    """
+
+    number: int
+    name: StepName
+    bond: Bond
+    stacks: tuple[tuple[int, ...], ...]
+    adds: tuple[int, ...]
+    pins: tuple[Pin, ...]
+
+    @property
+    def layers(self) -> tuple[int, ...]:
+        return tuple(index for stack in self.stacks for index in stack)
+
+
+def assembly(laminate: Laminate) -> tuple[AssemblyStep, ...]:
+    """The steps of a laminate, bottom balloon first.
+
+    Flash bonds hold layers in place on their pins. With channel pins full bonds are pressed
+    without any: base and cap have no bore for one, and a lumen pin, though it would pass, stays
+    out as in the paper. With ears the pins are in every time.
+    """
+    return tuple(
+        _step(number, plan, laminate)
+        for number, plan in enumerate((plan for plan in _plans(laminate) if plan.adds), 1)
+    )
+
+
+class _Plan(NamedTuple):
+    """A step before it has its number and pins."""
+
+    name: StepName
+    bond: Bond
+    stacks: tuple[tuple[int, ...], ...]
+    adds: tuple[int, ...]
+
+
+def _plans(laminate: Laminate) -> tuple[_Plan, ...]:
+    indices = tuple(layer.index for layer in laminate.layers)
+    films = [layer for layer in laminate.layers if not layer.is_mask]
+    base = next((layer for layer in films if layer.role == "base"), films[0]).index
+    upper = tuple(index for index in indices if base < index <= base + 2)
+    bottom = (base, *upper)
+    under = tuple(index for index in indices if index < base)
+    over = tuple(index for index in indices if index > base + 2)
+    middle, cap = over[:-1], over[-1:]
+    return (
+        _Plan("flash_bottom", "flash", (upper,), upper),
+        _Plan("bond_bottom", "full", ((base,), upper), (base,)),
+        _Plan("flash_middle", "flash", (middle,), middle),
+        _Plan("bond_all", "full", (under, bottom, middle, cap), under + cap),
+    )
+
+
+def _step(number: int, plan: _Plan, laminate: Laminate) -> AssemblyStep:
+    layers = [index for stack in plan.stacks for index in stack]
+    pinned = plan.bond == "flash" or laminate.registration == "ears"
+    pins = _pins_in(laminate, layers) if pinned else ()
+    stacks = tuple(stack for stack in plan.stacks if stack)
+    return AssemblyStep(number, plan.name, plan.bond, stacks, plan.adds, pins)
+
+
+def _pins_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Pin, ...]:
+    """The pins that hold at least one of the layers and meet no film in any of them."""
+    shapes = distinct_layers(laminate, layers)
+    return tuple(
+        pin
+        for pin in laminate.pins
+        if any(pin in laminate.pins_holding(layer) for layer in shapes)
+        and not any(layer.profile.contains(pin.centre) for layer in shapes)
+    )
+
+
+def distinct_layers(laminate: Laminate, layers: Sequence[int]) -> tuple[Layer, ...]:
+    """One layer of each pattern among the layers."""
+    return tuple({laminate.layer(i).pattern: laminate.layer(i) for i in layers}.values())

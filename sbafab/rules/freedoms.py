@@ -1,0 +1,206 @@
+"""How far each layer may lie off its place once the laminate is put together.
+
+Layers come together in the steps of the assembly. What is not yet bonded together is a body of its
+own: a piece of a layer, or all that an earlier step has joined. Two pins hold a body but for the
+pin error; on one pin it may also turn; a body on no pin is laid by hand on what lies below it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from sbafab.geometry.centroid import centroid
+from sbafab.geometry.edges import Point
+from sbafab.geometry.region import Region
+from sbafab.laminate.assembly import AssemblyStep, assembly
+from sbafab.laminate.laminate import Laminate
+from sbafab.rules.limits import Tolerances
+
+
+class Part(NamedTuple):
+    """A piece of a layer: the layer's index and the piece's place in ``profile.pieces``."""
+
+    layer: int
+    piece: int
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """One way a body may lie off its place: by up to ``most`` mm in any direction, or, where a
+    ``centre`` is given, turned about it by up to ``most`` radians.
+
+    The body reaches from layer ``lowest`` to ``highest``; ``body`` tells it from others in the
+    same ``step``. ``pins`` are those that hold it.
+    """
+
+    step: int
+    body: int
+    lowest: int
+    highest: int
+    pins: int
+    most: float
+    centre: Point | None = None
+
+    @property
+    def by_hand(self) -> bool:
+        """Whether the hand decides it: every turn, and the place of what no pin holds."""
+        return self.centre is not None or self.pins == 0
+
+    def lever(self, p: Point, normal: Point) -> float:
+        """How many mm the body moves along ``normal`` at ``p`` per radian of its turn."""
+        if self.centre is None:
+            return 1.0
+        return (p[0] - self.centre[0]) * normal[1] - (p[1] - self.centre[1]) * normal[0]
+
+    def like(self) -> tuple[object, ...]:
+        """Equal for freedoms that differ in step and body only."""
+        centre = self.centre and (round(self.centre[0], 6), round(self.centre[1], 6))
+        return self.most, centre, self.pins
+
+
+Freedoms = Mapping[Part, tuple[Freedom, ...]]
+
+
+def freedoms(laminate: Laminate, tolerances: Tolerances) -> Freedoms:
+    """All that each piece of each layer can do, from every step that it goes through.
+
+    Two pieces lie off each other by what one of them does and the other does not.
+    """
+    shapes = _Shapes(laminate)
+    bodies = [[part] for layer in laminate.layers for part in shapes.parts(layer.index)]
+    found: dict[Part, tuple[Freedom, ...]] = {body[0]: () for body in bodies}
+    number = 0
+    for step in assembly(laminate):
+        layers = frozenset(step.layers)
+        present = sorted(body for body in bodies if body[0].layer in layers)
+        pinned = any(shapes.pins(body, step) for body in present)
+        for body in present:
+            number += 1
+            own = _own(body, number, shapes, step, tolerances)
+            if not shapes.pins(body, step):
+                under = shapes.under(body, present)
+                # The lowest body of a step without pins stays: the others are laid on it.
+                own = (*found[under], *own) if under else own if pinned else ()
+            for part in body:
+                found[part] += own
+        bodies = [body for body in bodies if body[0].layer not in layers]
+        bodies += shapes.joined(present)
+    return found
+
+
+def _own(
+    body: Sequence[Part], number: int, shapes: _Shapes, step: AssemblyStep, tolerances: Tolerances
+) -> tuple[Freedom, ...]:
+    """What a body can do in a step by itself."""
+    pins = shapes.pins(body, step)
+    lowest, highest = min(body).layer, max(body).layer
+
+    def freedom(most: float, centre: Point | None = None) -> Freedom:
+        return Freedom(step.number, number, lowest, highest, len(pins), most, centre)
+
+    shift = freedom(tolerances.pin if pins else tolerances.placement)
+    if len(pins) >= 2:
+        both = [shift]
+    else:
+        centre = pins[0] if pins else shapes.centre(body)
+        both = [shift, freedom(math.radians(tolerances.turn), centre)]
+    return tuple(one for one in both if one.most > 0)
+
+
+class _Shapes:
+    """The pieces of the layers, each pattern looked at once."""
+
+    def __init__(self, laminate: Laminate) -> None:
+        self.laminate = laminate
+        self.pieces: dict[str, tuple[Region, ...]] = {
+            pattern: layers[0].profile.pieces for pattern, layers in laminate.patterns.items()
+        }
+        self.centres: dict[tuple[str, int], Point] = {}
+        self.holders: dict[tuple[str, int], frozenset[str]] = {}
+        self.overlaps: dict[tuple[str, int, str, int], bool] = {}
+
+    def parts(self, layer: int) -> list[Part]:
+        return [Part(layer, i) for i in range(len(self.pieces[self._pattern(layer)]))]
+
+    def _pattern(self, layer: int) -> str:
+        return self.laminate.layer(layer).pattern
+
+    def _region(self, part: Part) -> Region:
+        return self.pieces[self._pattern(part.layer)][part.piece]
+
+    def pins(self, body: Iterable[Part], step: AssemblyStep) -> list[Point]:
+        """Centres of the step's pins that hold a part of the body."""
+        if not step.pins:
+            return []
+        names: set[str] = set()
+        for part in body:
+            key = self._pattern(part.layer), part.piece
+            if key not in self.holders:
+                held = self.laminate.pins_in(self._region(part))
+                self.holders[key] = frozenset(pin.name for pin in held)
+            names |= self.holders[key]
+        return [pin.centre for pin in step.pins if pin.name in names]
+
+    def centre(self, body: Sequence[Part]) -> Point:
+        """The body's centre of area, all its parts counted."""
+        area = x = y = 0.0
+        for part in body:
+            region, key = self._region(part), (self._pattern(part.layer), part.piece)
+            if key not in self.centres:
+                self.centres[key] = centroid(region)
+            px, py = self.centres[key]
+            area, x, y = area + region.area, x + px * region.area, y + py * region.area
+        return x / area, y / area
+
+    def overlap(self, a: Part, b: Part) -> bool:
+        """Whether two parts lie over each other."""
+        key = (self._pattern(a.layer), a.piece, self._pattern(b.layer), b.piece)
+        if key not in self.overlaps:
+            one, other = self._region(a), self._region(b)
+            self.overlaps[key] = _boxes_meet(one, other) and not (one & other).is_empty
+        return self.overlaps[key]
+
+    def under(self, body: Sequence[Part], present: Sequence[Sequence[Part]]) -> Part | None:
+        """What a body laid by hand is laid on: the highest film of the body below it."""
+        lowest = min(body).layer
+        feet = [part for part in body if part.layer == lowest]
+        below = [(part, other) for other in present for part in other if part.layer < lowest]
+        for part, other in sorted(below, reverse=True):
+            if any(self.overlap(part, foot) for foot in feet):
+                seen = [p for p in other if not self.laminate.layer(p.layer).is_mask]
+                return max(seen or other)
+        return None
+
+    def joined(self, present: Sequence[list[Part]]) -> list[list[Part]]:
+        """The bodies after a step: parts that lie on each other have become one."""
+        home = {part: index for index, body in enumerate(present) for part in body}
+        layers: dict[int, list[Part]] = {}
+        for part in sorted(home):
+            layers.setdefault(part.layer, []).append(part)
+        leader = list(range(len(present)))
+
+        def first(index: int) -> int:
+            while leader[index] != index:
+                index = leader[index]
+            return index
+
+        ordered = list(layers.values())
+        for lower, upper in zip(ordered, ordered[1:], strict=False):
+            for a in lower:
+                for b in upper:
+                    if self.overlap(a, b):
+                        one, other = sorted((first(home[a]), first(home[b])))
+                        leader[other] = one
+        merged: dict[int, list[Part]] = {}
+        for part in sorted(home):
+            merged.setdefault(first(home[part]), []).append(part)
+        return list(merged.values())
+
+
+def _boxes_meet(a: Region, b: Region) -> bool:
+    ax0, ay0, ax1, ay1 = a.bounds
+    bx0, by0, bx1, by1 = b.bounds
+    return ax0 < bx1 and bx0 < ax1 and ay0 < by1 and by0 < ay1

@@ -1,0 +1,179 @@
+"""registration-worst-case: what is left of bond and overhang when every error is at its worst.
+
+Cut edges lie off by the cutting error, layers on pins by the pin error (paper Sec. 2), what no pin
+holds by what a hand may misplace and turn it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from sbafab.laminate.interfaces import Interface
+from sbafab.laminate.laminate import Laminate
+from sbafab.rules.alike import Alike, interface_name
+from sbafab.rules.finding import Finding, Place, Verdict
+from sbafab.rules.freedoms import Freedom, freedoms
+from sbafab.rules.limits import Limits, Tolerances, at, holds
+from sbafab.rules.margins import Margin, Push, Quantity, interface_margins, pushes
+
+NAME = "registration-worst-case"
+
+WHAT: dict[Quantity, str] = {"bond": "bond", "overhang": "overhang of a mask past a film edge"}
+REMEDY: dict[Quantity, str] = {"bond": "bond.width", "overhang": "mask.overhang"}
+
+
+class Remaining(NamedTuple):
+    """What is left at the worst margin of an interface, mm; it may be negative.
+
+    ``pinned`` is the least that is left anywhere in it without what is laid by hand. Places that
+    are short as drawn do not count for it: bond-width and mask-overhang tell of those.
+    """
+
+    worst: float
+    pinned: float
+    margin: Margin
+    interfaces: tuple[Interface, ...]
+    pushes: tuple[Push, ...]
+
+    @property
+    def alike(self) -> Alike:
+        return Alike(self.interfaces[0], len(self.interfaces))
+
+
+def least_remaining(laminate: Laminate, limits: Limits) -> list[Remaining]:
+    """The worst place of every interface (one of each that are alike) for bond and overhang."""
+    moves = freedoms(laminate, limits.tolerances)
+    found: list[Remaining] = []
+    for group in interface_margins(laminate, limits, moves):
+        for quantity in WHAT:
+            places = [
+                _remaining(margin, group.interfaces, pushes(margin, group.first, moves), limits)
+                for margin in group.margins
+                if margin.quantity == quantity
+            ]
+            if places:
+                worst = min(places, key=lambda place: round(place.worst, 9))
+                drawn = limits.bond_width if quantity == "bond" else limits.mask_overhang
+                pinned = min(
+                    (place.pinned for place in places if holds(place.margin.nominal, drawn)),
+                    default=math.inf,
+                )
+                found.append(worst._replace(pinned=pinned))
+    return found
+
+
+def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+    """The least remaining bond and overhang, each with its place and what costs most there."""
+    found = least_remaining(laminate, limits)
+    return [
+        _finding("bond", limits.worst_bond_width, found, limits, laminate),
+        _finding("overhang", limits.worst_mask_overhang, found, limits, laminate),
+    ]
+
+
+def _remaining(
+    margin: Margin, interfaces: tuple[Interface, ...], found: list[Push], limits: Limits
+) -> Remaining:
+    # Both edges are cut: two contours, or one that is off on either side.
+    cut = margin.nominal - 2 * limits.tolerances.cutting
+    pinned = cut - sum(push.cost for push in found if not push.freedom.by_hand)
+    worst = cut - sum(push.cost for push in found)
+    return Remaining(worst, pinned, margin, interfaces, tuple(found))
+
+
+def _finding(
+    quantity: Quantity,
+    limit: float,
+    found: Iterable[Remaining],
+    limits: Limits,
+    laminate: Laminate,
+) -> Finding:
+    own = [place for place in found if place.margin.quantity == quantity]
+    if not own:
+        return Finding(NAME, "pass", limit, None, "mm", Place(), f"no {WHAT[quantity]} to measure")
+    worst = min(own, key=lambda place: round(place.worst, 9))
+    least_pinned = min(own, key=lambda place: round(place.pinned, 9))
+    verdict: Verdict = "pass"
+    if not holds(least_pinned.pinned, limit):
+        verdict = "fail"
+    elif not holds(worst.worst, limit):
+        verdict = "warn"
+    interface = worst.interfaces[0]
+    message = _message(worst, limits.tolerances)
+    if verdict == "fail":
+        message += (
+            f"; even without what is laid by hand {_mm(least_pinned.pinned)} is left at "
+            f"{interface_name(least_pinned.interfaces[0])}, and it needs {limit:g}: make "
+            f"{REMEDY[quantity]} larger"
+        )
+    elif verdict == "warn":
+        short = sum(len(place.interfaces) for place in own if not holds(place.worst, limit))
+        message += (
+            f"; that is short of {limit:g} at {short} interface{'s' if short > 1 else ''}, "
+            f"{_why(least_pinned.pinned)}: {_advice(worst, laminate)}"
+        )
+    place = Place(interface.index, interface.layer_indices, *worst.margin.middle)
+    return Finding(NAME, verdict, limit, max(0.0, worst.worst), "mm", place, message)
+
+
+def _message(worst: Remaining, tolerances: Tolerances) -> str:
+    """The value, its place and what costs most there."""
+    where = f"{interface_name(worst.interfaces[0])}{worst.alike.others}"
+    text = (
+        f"at worst {_mm(worst.worst)} is left of the {worst.margin.nominal:.3f} mm "
+        f"{WHAT[worst.margin.quantity]} at {where}, {at(worst.margin.middle)}"
+    )
+    bodies = costs(worst.pushes)
+    if not bodies:
+        return f"{text}; cutting takes {2 * tolerances.cutting:.3f} mm and nothing can move"
+    freedom, cost = bodies[0]
+    return f"{text}; of what moves {_what_it_does(freedom)}, costs most, {cost:.3f} mm"
+
+
+def costs(found: Iterable[Push]) -> list[tuple[Freedom, float]]:
+    """What each body costs, shift and turn together, the dearest first."""
+    total: dict[tuple[int, int], tuple[Freedom, float]] = {}
+    for push in found:
+        key = push.freedom.step, push.freedom.body
+        freedom, cost = total.get(key, (push.freedom, 0.0))
+        total[key] = freedom, cost + push.cost
+    return sorted(total.values(), key=lambda entry: -round(entry[1], 9))
+
+
+def _what_it_does(freedom: Freedom) -> str:
+    one = freedom.lowest == freedom.highest
+    what = (
+        f"layer {freedom.lowest}"
+        if one
+        else f"the stack of layers {freedom.lowest} to {freedom.highest}"
+    )
+    how = {0: "laid by hand", 1: "which can turn about its only pin"}.get(
+        freedom.pins, "on its pins"
+    )
+    return f"{what}, {how} in step {freedom.step}"
+
+
+def _why(pinned: float) -> str:
+    if math.isinf(pinned):
+        return "and short as drawn"
+    return f"though pins and cutting alone leave {_mm(pinned)}"
+
+
+def _advice(worst: Remaining, laminate: Laminate) -> str:
+    loose = next((freedom for freedom, _ in costs(worst.pushes) if freedom.pins < 2), None)
+    if loose is None:
+        return f"make {REMEDY[worst.margin.quantity]} larger"
+    on_its_own = loose.lowest == loose.highest
+    masks_pocket = on_its_own and laminate.layer(loose.lowest).role == "chamber-mask"
+    if laminate.registration == "channel-pin" and not masks_pocket:
+        return 'registration.method = "ears" pins it'
+    return (
+        "align it with care (registration.hand_placement, registration.hand_turn), or make "
+        f"{REMEDY[worst.margin.quantity]} larger"
+    )
+
+
+def _mm(value: float) -> str:
+    return f"{value:.3f} mm" if value > 0 else "nothing"

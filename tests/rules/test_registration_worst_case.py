@@ -1,0 +1,207 @@
+"""What the worst errors leave, against closed formulas and against profiles that shapely moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+import shapely
+from shapely import affinity
+
+from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import disc
+from sbafab.laminate.laminate import Laminate
+from sbafab.rules.deck import run_deck
+from sbafab.rules.finding import Finding
+from sbafab.rules.freedoms import Part, freedoms
+from sbafab.rules.limits import Limits, Tolerances
+from sbafab.rules.registration_worst_case import check, least_remaining
+
+Good = Callable[..., Laminate]
+Spoil = Callable[..., Laminate]
+
+AXIS = (0.0, 0.0)
+# Layers: 1 base, 2 chamber mask, 3 wall, 4 separator mask, 5 wall, 6 chamber mask, ... 11 cap.
+ONE = ("1dof-5mm", "stack.balloons=3")
+LOBED = ("3dof-15mm", "stack.balloons=3")
+EARS = "registration.method=ears"
+DEGREE = math.radians(1)
+STRIP_END = 2.5 + 0.75 + 5  # pocket, bond and tab
+
+
+def measured(laminate: Laminate, tolerances: Tolerances) -> tuple[float, float]:
+    bond, overhang = check(laminate, Limits(tolerances=tolerances))
+    assert bond.measured is not None
+    assert overhang.measured is not None
+    return bond.measured, overhang.measured
+
+
+def left(laminate: Laminate, interface: int, quantity: str, tolerances: Tolerances) -> float:
+    """What is left at an interface (or at one like it)."""
+    return next(
+        place.worst
+        for place in least_remaining(laminate, Limits(tolerances=tolerances))
+        if place.margin.quantity == quantity and interface in {i.index for i in place.interfaces}
+    )
+
+
+def test_cutting_and_pins_leave_what_the_papers_errors_say(good: Good) -> None:
+    # Two cut edges at 0.1 and two layers on pins at 0.004.
+    bond, overhang = measured(good(*ONE), Tolerances(placement=0, turn=0))
+    assert bond == pytest.approx(0.75 - 0.2 - 0.008, abs=1e-6)
+    assert overhang == pytest.approx(0.5 - 0.2 - 0.008, abs=1e-6)
+
+
+def test_without_errors_the_nominal_widths_are_left(good: Good) -> None:
+    for design in (ONE, LOBED, (*LOBED, EARS)):
+        assert measured(good(*design), Tolerances(0, 0, 0, 0)) == pytest.approx((0.75, 0.5))
+
+
+def test_hand_placement_counts_once_for_each_time_a_layer_is_laid_by_hand(good: Good) -> None:
+    only = Tolerances(0, 0, 0.2, 0)
+    laminate = good(*ONE)
+    # Between walls on the pin a separator mask, which no pin holds, lies by hand.
+    assert left(laminate, 4, "bond", only) == pytest.approx(0.55, abs=1e-6)
+    # The first one lies so in the middle stack, and that stack so on the bottom balloon.
+    assert left(laminate, 2, "bond", only) == pytest.approx(0.35, abs=1e-6)
+    assert left(laminate, 2, "overhang", only) == pytest.approx(0.1, abs=1e-6)
+    assert left(laminate, 3, "bond", only) == pytest.approx(0.75, abs=1e-6)
+    # The cap.
+    assert left(laminate, 5, "bond", only) == pytest.approx(0.55, abs=1e-6)
+
+
+def test_a_turned_strip_costs_its_lever_arm(good: Good) -> None:
+    # With ears only the chamber masks can turn, about the pin in their bore.
+    bond, _ = measured(good(*ONE, EARS), Tolerances(0, 0, 0, 1))
+    assert bond == pytest.approx(0.75 - STRIP_END * DEGREE, abs=1e-6)
+
+
+def test_discs_that_turn_about_their_centres_lose_nothing(good: Good) -> None:
+    laminate = good(*ONE)
+    for interface in (3, 4, 5):
+        assert left(laminate, interface, "bond", Tolerances(0, 0, 0, 3)) == pytest.approx(0.75)
+
+
+def test_a_mask_on_the_lumens_pin_turns_about_the_lumen(good: Good) -> None:
+    # The neck rings stand 4.25 from the lumen.
+    neck = left(good(*LOBED), 4, "bond", Tolerances(0, 0, 0, 1))
+    assert neck == pytest.approx(0.75 - 4.25 * DEGREE, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "more", [{"cutting": 0.15}, {"pin": 0.02}, {"placement": 0.3}, {"turn": 2}]
+)
+@pytest.mark.parametrize("design", [ONE, LOBED, (*LOBED, EARS)])
+def test_larger_errors_never_leave_more(
+    more: dict[str, float], design: tuple[str, ...], good: Good
+) -> None:
+    small = Tolerances(0.01, 0.001, 0.02, 0.1)
+    before = measured(good(*design), small)
+    after = measured(good(*design), Tolerances(**{**vars(small), **more}))
+    assert after[0] <= before[0] + 1e-9
+    assert after[1] <= before[1] + 1e-9
+    assert after != before or (EARS in design and "placement" in more)
+
+
+def shape(region: Region) -> shapely.Geometry:
+    return shapely.union_all(
+        [shapely.Polygon(rings[0], rings[1:]) for rings in region.polygons(1e-4)]
+    )
+
+
+def test_shapely_finds_the_same_ring_left_of_moved_and_miscut_layers(good: Good) -> None:
+    laminate = good(*ONE)
+    wall = shape(laminate.layer(5).profile).buffer(-0.1, quad_segs=64)
+    mask = affinity.translate(shape(laminate.layer(6).profile).buffer(0.1, quad_segs=64), 0.008)
+    ring = wall.exterior.distance(mask)
+    predicted = left(laminate, 3, "bond", Tolerances(placement=0, turn=0))
+    assert ring == pytest.approx(predicted, abs=1e-3)
+
+
+def test_shapely_finds_the_same_beside_a_turned_strip(good: Good) -> None:
+    laminate = good(*ONE, EARS)
+    turned = affinity.rotate(shape(laminate.layer(2).profile), 1, origin=AXIS)
+    tab_side = shapely.LineString([(4.5, 1.55), (STRIP_END, 1.55)])
+    inside = turned.intersection(shapely.box(-5, -5, STRIP_END, 5))
+    predicted = left(laminate, 1, "bond", Tolerances(0, 0, 0, 1))
+    # To first order in the turn: 0.8 (1 - cos 1) and 8.25 (1 - sinc) are left out.
+    assert tab_side.distance(inside) == pytest.approx(predicted, abs=3e-3)
+
+
+def by_rule(findings: tuple[Finding, ...], verdict: str) -> set[str]:
+    return {finding.rule for finding in findings if finding.verdict == verdict}
+
+
+def test_a_coarse_laser_is_caught_by_this_rule_alone(good: Good) -> None:
+    coarse = Limits(tolerances=Tolerances(cutting=0.2))
+    findings = run_deck(good(*ONE), coarse)
+    assert by_rule(findings, "fail") == {"registration-worst-case"}
+    # 0.75 - 2 x 0.2 - 2 x 0.004 is short of 0.5 even where pins hold everything.
+    assert any("0.342 mm is left" in finding.message for finding in findings)
+
+
+def test_a_neck_ring_that_just_holds_as_drawn_is_caught_by_this_rule_alone(
+    good: Good, spoil: Spoil
+) -> None:
+    narrow = spoil(good(*ONE), 8, disc(AXIS, 3.75) - disc(AXIS, 1.2))
+    findings = run_deck(narrow, Limits(bond_width=0.7))
+    assert by_rule(findings, "fail") == {"registration-worst-case"}
+    (found,) = [f for f in findings if f.verdict == "fail"]
+    # 0.7 - 0.2 - 0.008, and 0.2 less by hand.
+    assert "0.492 mm is left" in found.message
+    assert 8 in found.where.layers or found.measured < 0.292
+
+
+def test_what_is_short_as_drawn_only_warns_here(good: Good, spoil: Spoil) -> None:
+    narrow = spoil(good(*ONE), 4, disc(AXIS, 3.75) - disc(AXIS, 1.2))
+    findings = run_deck(narrow, Limits())
+    assert by_rule(findings, "fail") == {"bond-width"}
+    assert "registration-worst-case" in by_rule(findings, "warn")
+
+
+@pytest.mark.parametrize("template", ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"])
+def test_templates_are_short_by_the_hand_only(template: str, good: Good) -> None:
+    bond, overhang = check(good(template), Limits())
+    assert {bond.verdict, overhang.verdict} == {"warn"}
+    assert "by hand" in bond.message
+    assert "in step" in bond.message
+    assert 'registration.method = "ears" pins it' in bond.message
+    steady = check(good(template), Limits(tolerances=Tolerances(placement=0, turn=0)))
+    assert {finding.verdict for finding in steady} == {"pass"}
+
+
+def test_ears_leave_only_the_turn_of_the_chamber_mask(good: Good) -> None:
+    bond, overhang = check(good("3dof-15mm", EARS), Limits())
+    assert (bond.verdict, overhang.verdict) == ("warn", "pass")
+    assert "layer 2, which can turn about its only pin in step 1" in bond.message
+    assert "at 1 interface," in bond.message
+    assert "ears" not in bond.message
+
+
+def test_a_place_is_where_the_worst_is(good: Good) -> None:
+    bond, _ = check(good(*ONE, EARS), Limits())
+    assert bond.where.interface == 1
+    assert bond.where.layers == (1, 2, 3)
+    # Half way between the strip's edge and the tab's, at the tab's end.
+    assert bond.where.x == pytest.approx(STRIP_END)
+    assert abs(bond.where.y or 0) == pytest.approx((0.8 + 1.55) / 2)
+
+
+def test_pieces_of_a_layer_move_by_themselves(good: Good) -> None:
+    moves = freedoms(good(*LOBED), Tolerances())
+    turns = [
+        next(f for f in moves[Part(2, piece)] if f.step == 1 and f.centre is not None)
+        for piece in range(3)
+    ]
+    assert len({turn.body for turn in turns}) == 3
+    assert sorted(math.hypot(*(turn.centre or AXIS)) for turn in turns) == pytest.approx([4.25] * 3)
+    # In step 2 the three are bonded to their wall, and lie with it on the base.
+    assert len({f for piece in range(3) for f in moves[Part(2, piece)] if f.step == 2}) == 2
+
+
+def test_more_balloons_cost_no_more_patterns(good: Good) -> None:
+    few = least_remaining(good("1dof-5mm", "stack.balloons=6"), Limits())
+    many = least_remaining(good("1dof-5mm", "stack.balloons=60"), Limits())
+    assert [place.worst for place in many] == pytest.approx([place.worst for place in few])
+    assert sum(len(p.interfaces) for p in many if p.margin.quantity == "bond") == 119
