@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from sbafab.design.records import Design
+from sbafab.errors import DesignError
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import fillet, grow
@@ -77,7 +78,10 @@ def film_setback(design: Design) -> float:
 
 
 def placed(rays: Iterable[Ray], body: Region, design: Design) -> tuple[Ear, ...]:
-    """Ears on their rays, their roots clear of ``body``: all that is cut, without ears."""
+    """Ears on their rays, their roots clear of ``body``: all that is cut, without ears.
+
+    Raises DesignError where two ears come nearer to each other than one overhang.
+    """
     overhang, bond = design.mask.overhang, design.bond.width
     pin = design.registration.pin_diameter
     width = pin + 2 * bond
@@ -90,6 +94,7 @@ def placed(rays: Iterable[Ray], body: Region, design: Design) -> tuple[Ear, ...]
         root = reach + design.fillet.radius + overhang + LONGER[ray.holder][ray.long]
         hole = root + bond + pin / 2
         ears.append(Ear(ray, root, hole, hole + pin / 2 + bond, width, pin))
+    _check_apart(ears, overhang)
     return tuple(ears)
 
 
@@ -131,12 +136,18 @@ def with_sheet_ears(sheet: Region, ears: Sequence[Ear], radius: float) -> Region
     return fillet(union([sheet, *own]), radius) - _holes(ears, "sheet") if own else sheet
 
 
-def meeting(ears: Sequence[Ear], overhang: float) -> tuple[Ear, Ear] | None:
-    """Two ears that come nearer to each other than one overhang outside the parts, if any."""
+def _check_apart(ears: Sequence[Ear], overhang: float) -> None:
     for i, one in enumerate(ears):
+        outer = grow(_outer(one), overhang)
         for other in ears[:i]:
-            outer = strip(one.ray.at(one.root), one.ray.at(one.end), one.width)
-            theirs = strip(other.ray.at(other.root), other.ray.at(other.end), other.width)
-            if not (grow(outer, overhang) & theirs).is_empty:
-                return other, one
-    return None
+            if not (outer & _outer(other)).is_empty:
+                raise DesignError(
+                    f"the ears {other.ray.name} and {one.ray.name} meet; make the chambers larger "
+                    "or registration.pin_diameter smaller, or use registration.method = "
+                    '"channel-pin"'
+                )
+
+
+def _outer(ear: Ear) -> Region:
+    """The part of an ear that lies beyond its root."""
+    return strip(ear.ray.at(ear.root), ear.ray.at(ear.end), ear.width)

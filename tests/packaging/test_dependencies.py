@@ -23,13 +23,16 @@ def imported_modules(folder: Path) -> Iterator[str]:
                 yield node.module.partition(".")[0]
 
 
+OUR_OWN = {"sbafab", "benchmarks", "tests", *(path.stem for path in (ROOT / "tests").rglob("*.py"))}
+
+
 def names(requirements: list[str]) -> set[str]:
     return {re.split(r"[<>=~!\[; ]", requirement)[0].lower() for requirement in requirements}
 
 
 def third_party(folder: Path) -> set[str]:
     modules = set(imported_modules(folder)) - sys.stdlib_module_names
-    return {INSTALLED_AS.get(name, name) for name in modules} - {"sbafab", "benchmarks"}
+    return {INSTALLED_AS.get(name, name) for name in modules} - OUR_OWN
 
 
 def test_the_package_needs_what_it_imports_and_no_more() -> None:
