@@ -44,7 +44,7 @@ def check(
 
     if target_yield is not None:
         assignments = (*assignments, f"rules.target_yield={target_yield}")
-    kind, findings = _findings(source, assignments, waivers)
+    kind, findings = _findings(source, assignments, waivers, as_json)
     advice = None if target_yield is None else _advice(source, assignments, target_yield)
     if as_json:
         said = {"advice": advice.as_dict()} if advice else {}
@@ -68,8 +68,9 @@ def _advice(source: str, assignments: tuple[str, ...], target: float) -> Advice:
 
 
 def _findings(
-    source: str, assignments: tuple[str, ...], waivers: tuple[str, ...]
+    source: str, assignments: tuple[str, ...], waivers: tuple[str, ...], quiet: bool
 ) -> tuple[str, tuple[Finding, ...]]:
+    from sbafab.cli.printing import shown_progress
     from sbafab.design.reading import template_names
     from sbafab.errors import DesignError
 
@@ -77,7 +78,9 @@ def _findings(
         from sbafab.actuators import load_design
         from sbafab.output.run import check as run_check
 
-        return "design", run_check(load_design(source, assignments, waivers))[1]
+        design = load_design(source, assignments, waivers)
+        with shown_progress(quiet) as progress:
+            return "design", run_check(design, progress)[1]
     if assignments or waivers:
         raise DesignError(
             "--set, --waive and --target-yield go with a design; a folder is checked as it lies, "

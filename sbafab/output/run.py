@@ -48,11 +48,11 @@ class Run:
         return has_failed(self.findings)
 
 
-def check(design: Design) -> tuple[Laminate, tuple[Finding, ...]]:
+def check(design: Design, progress: Progress | None = None) -> tuple[Laminate, tuple[Finding, ...]]:
     """The laminate of a design and what the rule deck finds in it."""
     try:
         laminate = build(design)
-        return laminate, run_deck(laminate, limits(design))
+        return laminate, run_deck(laminate, limits(design), progress)
     except GeometryError as error:
         raise DesignError(f"design {design.name} cannot be resolved: {error}") from None
 
@@ -77,9 +77,7 @@ def generate(
     Raises DesignError or OutputError; the old folder is then whole.
     """
     tell = progress or (lambda what, done, total: None)
-    tell("rules", 0, 1)
-    laminate, findings = check(design)
-    tell("rules", 1, 1)
+    laminate, findings = check(design, tell)
     waived = waived_rules(findings)
     wanted = set(parts)
     if has_failed(findings):

@@ -24,6 +24,10 @@ from sbafab.rules.finding import Finding
 from sbafab.rules.limits import Limits
 
 
+Progress = Callable[[str, int, int], None]
+"""Told which rule runs next, and how many of how many are done."""
+
+
 class Rule(NamedTuple):
     """A rule's stable name and the function that measures it."""
 
@@ -46,9 +50,16 @@ RULES = (
 )
 
 
-def run_deck(laminate: Laminate, limits: Limits) -> tuple[Finding, ...]:
+def run_deck(
+    laminate: Laminate, limits: Limits, progress: Progress | None = None
+) -> tuple[Finding, ...]:
     """What every rule finds, in the deck's order; failures the user waived say so."""
-    return tuple(finding for rule in RULES for finding in run_rule(rule, laminate, limits))
+    findings: list[Finding] = []
+    for number, rule in enumerate(RULES):
+        if progress is not None:
+            progress(rule.name, number, len(RULES))
+        findings += run_rule(rule, laminate, limits)
+    return tuple(findings)
 
 
 def run_rule(rule: Rule, laminate: Laminate, limits: Limits) -> list[Finding]:
