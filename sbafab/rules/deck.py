@@ -23,7 +23,6 @@ from sbafab.rules import (
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import Limits
 
-
 Progress = Callable[[str, int, int], None]
 """Told which rule runs next, and how many of how many are done."""
 

@@ -1,0 +1,32 @@
+"""Writes ``docs/faults.md`` from what the checks find: ``python -m tests.faults``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from tests.faults.catalogue import FAULTS, TEMPLATES, caught_by, cell, good_folders
+from tests.faults.specimen import quick
+from tests.faults.table import PAGE, text
+
+
+def main() -> int:
+    """Puts every fault into every template; 1 if a rule missed one."""
+    cells: dict[tuple[str, str], str] = {}
+    with TemporaryDirectory() as folder, quick():
+        root = Path(folder)
+        (root / "good").mkdir()
+        goods = good_folders(root / "good")
+        for fault in FAULTS:
+            for template in TEMPLATES:
+                found = caught_by(fault, template, goods, root / "faulty")
+                cells[fault.name, template] = cell(fault, found)
+    PAGE.write_text(text(cells), newline="\n")
+    missed = [key for key, said in cells.items() if said.startswith("MISSED")]
+    for name, template in missed:
+        print(f"{name}, {template}: {cells[name, template]}")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

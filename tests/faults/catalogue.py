@@ -1,0 +1,68 @@
+"""The fault catalogue: every kind of fault, put into the output of a template and checked."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+from sbafab.actuators import load_design
+from sbafab.output.as_built.check import read_folder
+from sbafab.output.run import generate
+from tests.faults import claims, files, holes, layers, masks
+from tests.faults.record import Fault, Kind
+from tests.faults.specimen import Specimen, failing
+from tests.output.doctoring import Doctor
+
+TEMPLATES = ("1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm")
+BALLOONS = 3
+KINDS: tuple[Kind, ...] = (
+    layers.KIND,
+    holes.KIND,
+    holes.EARS_KIND,
+    masks.KIND,
+    files.KIND,
+    claims.KIND,
+)
+FAULTS = tuple(fault for kind in KINDS for fault in kind.faults)
+
+Goods = Callable[[str, tuple[str, ...]], Specimen]
+"""The good folder of a template with settings."""
+
+
+def good_folders(root: Path) -> Goods:
+    """Good folders of BALLOONS balloons under ``root``, each written when first asked for."""
+
+    @cache
+    def good(template: str, settings: tuple[str, ...]) -> Specimen:
+        few = (f"stack.balloons={BALLOONS}", "rules.yield_builds=100")
+        out = root / f"{template}-{len(list(root.iterdir()))}"
+        folder = generate(load_design(template, [*few, *settings]), out, ("cut",)).folder
+        clean = read_folder(folder).laminate
+        assert clean is not None
+        return Specimen(Doctor(folder), clean)
+
+    return good
+
+
+def caught_by(fault: Fault, template: str, goods: Goods, folder: Path) -> tuple[str, ...] | str:
+    """The rules that fail once the fault is in a copy at ``folder``, or why it does not apply."""
+    good = goods(template, fault.settings)
+    reason = fault.why_not(good.clean)
+    if reason:
+        return reason
+    shutil.copytree(good.doctor.folder, folder)
+    fault.put(Specimen(Doctor(folder), good.clean))
+    rules = failing(folder)
+    shutil.rmtree(folder)
+    return rules
+
+
+def cell(fault: Fault, found: tuple[str, ...] | str) -> str:
+    """What the table says of a fault in a template."""
+    if isinstance(found, str):
+        return f"n/a: {found}"
+    others = ", ".join(rule for rule in found if rule != fault.rule)
+    caught = "caught" if fault.rule in found else "MISSED"
+    return f"{caught}; {others}" if others else caught

@@ -1,0 +1,28 @@
+"""Good folders to copy, and checks that parse equal files once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from sbafab.output.as_built.cut_files import CutPart
+from tests.faults.catalogue import Goods, good_folders
+from tests.faults.specimen import quick
+
+
+@pytest.fixture(scope="session")
+def goods(tmp_path_factory: pytest.TempPathFactory) -> Goods:
+    return good_folders(tmp_path_factory.mktemp("good"))
+
+
+@pytest.fixture(scope="session")
+def parts() -> dict[str, CutPart]:
+    return {}
+
+
+@pytest.fixture(autouse=True)
+def _quick(parts: dict[str, CutPart]) -> Iterator[None]:
+    # For one test at a time: other tests of the session must meet the program as it is.
+    with quick(parts):
+        yield

@@ -1,0 +1,190 @@
+"""Cut files that are swapped, missing or broken, or that another program wrote carelessly."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.dxf_write import dxf_text
+from sbafab.cutting.order import cutting_order
+from sbafab.geometry.edges import Line
+from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.shapes import disc
+from tests.faults.holes import bore
+from tests.faults.record import Fault, Kind
+from tests.faults.specimen import Pick, Specimen, mask, separator, tabbed_wall, wall
+
+CLAIMS = "manifest-claims"
+POLYLINE = "AcDbPolyline\n"
+
+
+def broken(name: str, change: Callable[[Path], object]) -> Fault:
+    """A fault in the file of the lowest wall, with its hash put right."""
+
+    def put(specimen: Specimen) -> None:
+        change(specimen.doctor.path(tabbed_wall(specimen.clean).index))
+        specimen.doctor.rehash()
+
+    return Fault(name, "file-integrity", put)
+
+
+def edited(name: str, change: Callable[[str], str]) -> Fault:
+    """The same, as an edit that must change the text."""
+
+    def rewrite(path: Path) -> None:
+        text = path.read_text()
+        changed = change(text)
+        assert changed != text
+        path.write_text(changed, newline="\n")
+
+    return broken(name, rewrite)
+
+
+def inches(text: str) -> str:
+    return text.replace("$INSUNITS\n 70\n4\n", "$INSUNITS\n 70\n1\n")
+
+
+def imperial(text: str) -> str:
+    return text.replace("$MEASUREMENT\n 70\n1\n", "$MEASUREMENT\n 70\n0\n")
+
+
+def opened(text: str) -> str:
+    head, marker, tail = text.rpartition(POLYLINE)
+    return head + marker + tail.replace(" 70\n1\n", " 70\n0\n", 1)
+
+
+def doubled(text: str) -> str:
+    """The last contour twice, the second time under a handle of its own."""
+    start = text.rindex("  0\nLWPOLYLINE\n")
+    end = text.index("  0\n", start + 4)
+    head, handle, rest = text[start:end].partition("  5\n")
+    _, line, rest = rest.partition("\n")
+    return text[:end] + head + handle + "FFFF" + line + rest + text[end:]
+
+
+def on_layer(layer: str) -> Callable[[str], str]:
+    """The outline moved to another DXF layer."""
+
+    def change(text: str) -> str:
+        start = text.rindex("  0\nLWPOLYLINE\n")
+        return text[:start] + text[start:].replace("CUT_OUTER", layer, 1)
+
+    return change
+
+
+def raised(text: str) -> str:
+    """The outline lifted off the plane by 1 mm."""
+    head, marker, tail = text.rpartition(POLYLINE)
+    return head + marker + tail.replace(" 70\n1\n", " 70\n1\n 38\n1.0\n", 1)
+
+
+def redone(change: Callable[[Region], Region]) -> Callable[[Path], None]:
+    def rewrite(path: Path) -> None:
+        found = read_profile(path)
+        path.write_text(dxf_text(cutting_order(change(found.region)), found.properties))
+
+    return rewrite
+
+
+def as_chords(path: Path) -> None:
+    found = read_profile(path)
+    path.write_text(dxf_text(cutting_order(found.region), found.properties, "chords"))
+
+
+def crossing_itself(region: Region) -> Region:
+    """Two neighbouring vertices of the first outline in each other's place, where lines cross."""
+    outline = region.outers[0]
+    edges = outline.edges
+    for n in range(len(edges) - 3):
+        a, b, c, d = (edge.start for edge in edges[n : n + 4])
+        if meeting_points(Line(a, c), Line(b, d)):
+            lines = (Line(a, c), Line(c, b), Line(b, d))
+            crossed = Contour((*edges[:n], *lines, *edges[n + 3 :]))
+            return Region(tuple(crossed if own is outline else own for own in region.contours))
+    raise AssertionError
+
+
+def swapped(name: str, rule: str, first: Pick, second: Pick, tell: bool) -> Fault:
+    """Two layers' profiles in each other's file; with ``tell`` the claims follow."""
+
+    def put(specimen: Specimen) -> None:
+        one, other = first(specimen.clean), second(specimen.clean)
+        if tell:
+            specimen.redraw([one], lambda region, _: other.profile)
+            specimen.redraw([other], lambda region, _: one.profile)
+            specimen.agree()
+            return
+        paths = [specimen.doctor.path(layer.index) for layer in (one, other)]
+        texts = [path.read_text() for path in paths]
+        for path, text in zip(paths, reversed(texts), strict=True):
+            path.write_text(text, newline="\n")
+        specimen.doctor.rehash()
+
+    return Fault(name, rule, put)
+
+
+def missing(specimen: Specimen) -> None:
+    """Deleted, and struck from the list of hashes."""
+    path = specimen.doctor.path(tabbed_wall(specimen.clean).index)
+    path.unlink()
+    own = path.relative_to(specimen.doctor.folder).as_posix()
+    specimen.doctor.set_manifest(lambda claims: claims["files"].pop(own))
+
+
+def spare(specimen: Specimen) -> None:
+    path = specimen.doctor.path(wall(specimen.clean).index)
+    shutil.copy(path, path.with_name("spare.dxf"))
+
+
+def unhashed(specimen: Specimen) -> None:
+    """A wall shifted and nothing put right."""
+    specimen.doctor.redraw(wall(specimen.clean).index, lambda region: region.moved(0.15, 0.0))
+
+
+def undrilled_plate(specimen: Specimen) -> None:
+    manifest = specimen.doctor.manifest
+    path = specimen.doctor.folder / manifest["fixture"]
+    redone(lambda region: region | disc(bore(specimen.clean), 0.8))(path)
+    specimen.doctor.rehash()
+
+
+def shifted_plate(specimen: Specimen) -> None:
+    path = specimen.doctor.folder / specimen.doctor.manifest["fixture"]
+    redone(lambda region: region.moved(0.15, 0.0))(path)
+    specimen.doctor.rehash()
+
+
+KIND = Kind(
+    "Files",
+    "The broken file is that of the lowest wall. Hashes are put right, but in the rows on a file "
+    "changed and a file too many.",
+    (
+        swapped("mask and separator swapped", CLAIMS, mask, separator, tell=False),
+        swapped("mask and separator swapped, claims too", "sealing", mask, separator, tell=True),
+        swapped("two walls swapped", CLAIMS, tabbed_wall, wall, tell=False),
+        swapped(
+            "two walls swapped, claims too", "registration-nominal", tabbed_wall, wall, tell=True
+        ),
+        Fault("file missing", "file-integrity", missing),
+        broken("file empty", lambda path: path.write_text("")),
+        broken("file truncated", lambda path: path.write_text(path.read_text()[:12_000])),
+        broken("file not DXF", lambda path: path.write_bytes(b"\x89PNG\r\n\x1a\n\0\0")),
+        edited("inch header", inches),
+        edited("imperial header", imperial),
+        edited("contour open", opened),
+        edited("contour doubled", doubled),
+        broken("contour crossing itself", redone(crossing_itself)),
+        edited("contour on the wrong cut layer", on_layer("CUT_INNER")),
+        edited("contour on a layer that is not cut", on_layer("REFERENCE")),
+        edited("contour on layer 0", on_layer("0")),
+        edited("contour off the plane", raised),
+        broken("contours as chords", as_chords),
+        Fault("file changed after it was written", CLAIMS, unhashed),
+        Fault("a cut file too many", CLAIMS, spare),
+        Fault("pin plate without a hole", CLAIMS, undrilled_plate),
+        Fault("pin plate's holes shifted 0.15", CLAIMS, shifted_plate),
+    ),
+)

@@ -1,0 +1,134 @@
+"""A written folder to put a fault into, with its claims made to agree with what is then cut."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.dxf_write import dxf_text
+from sbafab.cutting.order import cutting_order
+from sbafab.geometry.region import Region
+from sbafab.laminate import laminate
+from sbafab.laminate.interfaces import interface_regions
+from sbafab.laminate.laminate import Laminate, Layer, Role
+from sbafab.output import run
+from sbafab.output.as_built import check as as_built
+from sbafab.output.as_built import cut_files, stack
+from sbafab.output.as_built.check import check_folder, read_folder
+from sbafab.output.as_built.cut_files import CutPart, read_part
+from sbafab.output.manifest import manifest
+from sbafab.rules import registration_worst_case, registration_yield
+from sbafab.rules.deck import RULES
+from tests.output.doctoring import Doctor
+
+Change = Callable[[Region, Laminate], Region]
+Pick = Callable[[Laminate], Layer]
+
+LEFT_OUT = (registration_worst_case.NAME, registration_yield.NAME)
+"""Rules that foresee errors on the bench: no fault is theirs, and they take most of the time."""
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """A copy of a good folder, and the laminate that it was before any fault."""
+
+    doctor: Doctor
+    clean: Laminate
+
+    def redraw(self, layers: Sequence[Layer], change: Change) -> None:
+        """The layers' files with their profiles changed, their patterns named after the shape."""
+        names = {
+            (layer.film.material, layer.profile.key): layer.pattern for layer in self.clean.layers
+        }
+        for layer in layers:
+            path = self.doctor.path(layer.index)
+            found = read_profile(path)
+            region = change(found.region, self.clean)
+            shape = layer.film.material, region.key
+            pattern = names.setdefault(shape, f"P{sha256(repr(shape).encode()).hexdigest()[:6]}")
+            text = dxf_text(cutting_order(region), {**found.properties, "PATTERN": pattern})
+            path.write_text(text, newline="\n")
+            self.doctor.set_manifest(_named(layer.index, pattern))
+
+    def agree(self) -> None:
+        """The manifest claims what lies on disk, so that only the geometry gives a fault away."""
+        built = read_folder(self.doctor.folder)
+        if built.laminate is not None:
+            told = manifest(built.design, built.laminate, built.claims.waived, (), None, ())
+            self.doctor.set_manifest(lambda claims: _retold(claims, told))
+        self.doctor.rehash()
+
+
+def _named(index: int, pattern: str) -> Callable[[dict[str, Any]], object]:
+    return lambda claims: claims["layers"][index - 1].update(pattern=pattern)
+
+
+def _retold(claims: dict[str, Any], told: dict[str, Any]) -> None:
+    for key in ("films", "sizes", "interfaces", "bores", "inlets"):
+        claims[key] = told[key]
+    claims["registration"]["pins"] = told["registration"]["pins"]
+    for own, found in zip(claims["layers"], told["layers"], strict=True):
+        own.update({key: found[key] for key in ("area", "pieces", "bores", "balloon")})
+
+
+@contextmanager
+def quick(parts: dict[str, CutPart]) -> Iterator[None]:
+    """Files of equal bytes are parsed, and layers of equal shape laid on each other, once.
+
+    ``parts`` remembers what was parsed. The rules of LEFT_OUT are not run, and none when a good
+    folder is written.
+    """
+
+    def known(path: Path, chords_drawn: bool = False) -> CutPart:
+        digest = sha256(path.read_bytes()).hexdigest()
+        if digest not in parts:
+            parts[digest] = read_part(path, chords_drawn)
+        return parts[digest]
+
+    def regions(below: Region, above: Region, masks: Sequence[Region]) -> tuple[Region, ...]:
+        return _laid(below, above, *masks)
+
+    rules = tuple(rule for rule in RULES if rule.name not in LEFT_OUT)
+    with (
+        patch.object(cut_files, "read_part", known),
+        patch.object(laminate, "interface_regions", regions),
+        patch.object(stack, "interface_regions", regions),
+        patch.object(as_built, "RULES", rules),
+        patch.object(run, "run_deck", lambda *_: ()),
+    ):
+        yield
+
+
+@cache
+def _laid(below: Region, above: Region, *masks: Region) -> tuple[Region, ...]:
+    return interface_regions(below, above, masks)
+
+
+def failing(folder: Path) -> tuple[str, ...]:
+    """The rules that fail in a folder, in the order they are reported."""
+    findings = check_folder(folder)
+    return tuple(dict.fromkeys(f.rule for f in findings if f.verdict == "fail"))
+
+
+def layer_of(role: Role, balloon: int | None = None) -> Pick:
+    """The lowest layer of a role, or the lowest of that role in a balloon."""
+    return lambda stack: next(
+        layer for layer in stack.layers if layer.role == role and balloon in (None, layer.balloon)
+    )
+
+
+base = layer_of("base")
+cap = layer_of("cap")
+sheet_mask = layer_of("separator-mask")
+tabbed_wall = layer_of("wall", 1)
+wall = layer_of("wall", 2)
+separator = layer_of("separator-mask", 1)
+inlet_mask = layer_of("chamber-mask", 1)
+mask = layer_of("chamber-mask", 2)

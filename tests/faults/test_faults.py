@@ -1,0 +1,44 @@
+"""Every fault is caught by the rule named for it, and ``docs/faults.md`` says what was found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from sbafab.output.as_built.records import CLAIMS, INTEGRITY
+from sbafab.rules.deck import rule_names
+from tests.faults.catalogue import FAULTS, KINDS, TEMPLATES, Goods, caught_by, cell
+from tests.faults.record import Fault
+from tests.faults.specimen import LEFT_OUT, failing
+from tests.faults.table import PAGE, cells_of, text
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+@pytest.mark.parametrize("template", TEMPLATES)
+def test_the_rule_named_for_a_fault_catches_it(
+    fault: Fault, template: str, goods: Goods, tmp_path: Path
+) -> None:
+    found = caught_by(fault, template, goods, tmp_path / "faulty")
+    if not isinstance(found, str):
+        assert fault.rule in found
+    stated = cells_of(PAGE.read_text())[fault.name, template]
+    assert stated == cell(fault, found), "python -m tests.faults writes the page anew"
+
+
+@pytest.mark.parametrize("template", TEMPLATES)
+def test_a_folder_without_a_fault_passes(template: str, goods: Goods) -> None:
+    for settings in dict.fromkeys(fault.settings for fault in FAULTS):
+        assert failing(goods(template, settings).doctor.folder) == ()
+
+
+def test_the_page_is_of_this_catalogue() -> None:
+    page = PAGE.read_text()
+    assert text(cells_of(page)) == page
+
+
+def test_there_are_enough_faults_and_every_rule_has_one() -> None:
+    names = [fault.name for fault in FAULTS]
+    assert len(set(names)) == len(names) >= 40
+    assert {fault.rule for fault in FAULTS} == {*rule_names(), INTEGRITY, CLAIMS} - {*LEFT_OUT}
+    assert all(kind.faults for kind in KINDS)
