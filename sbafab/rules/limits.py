@@ -32,7 +32,8 @@ class Limits:
     ``least_feature`` is the laser's, ``kerf`` the full kerf width by material (none given: not
     calibrated), ``waive`` the rules whose failure the user accepts by name. The ``worst_`` limits
     are for what is left of bond and overhang under the ``tolerances``; ``target_yield`` is the
-    share of ``yield_builds`` random builds that must keep them (None: none asked for).
+    share of ``yield_builds`` random builds that must keep them (None: none asked for; for the
+    builds: as many as are quick).
     """
 
     bond_width: float = 0.75
@@ -47,7 +48,7 @@ class Limits:
     worst_bond_width: float = 0.5
     worst_mask_overhang: float = 0.25
     target_yield: float | None = None
-    yield_builds: int = 10_000
+    yield_builds: int | None = None
     waive: frozenset[str] = frozenset()
 
 

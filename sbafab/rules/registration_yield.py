@@ -147,8 +147,9 @@ def _counted(groups: Sequence[_Group], limits: Limits, seed: int) -> Yield:
     whole = 0
     quantities = dict.fromkeys(QUANTITIES, 0)
     interfaces = dict.fromkeys(sorted(index for group in groups for index in group.own), 0)
-    for first in range(0, limits.yield_builds, BATCH):
-        builds = min(BATCH, limits.yield_builds - first)
+    wanted = limits.yield_builds or _quick_number(len(interfaces))
+    for first in range(0, wanted, BATCH):
+        builds = min(BATCH, wanted - first)
         draws = _Draws(generator, builds, limits.tolerances.cutting)
         good_of = {quantity: np.ones(builds, dtype=bool) for quantity in QUANTITIES}
         good_at = {index: np.ones(builds, dtype=bool) for index in interfaces}
@@ -162,12 +163,16 @@ def _counted(groups: Sequence[_Group], limits: Limits, seed: int) -> Yield:
         whole += int(np.logical_and.reduce(list(good_of.values())).sum())
         quantities = {name: total + int(good_of[name].sum()) for name, total in quantities.items()}
         interfaces = {i: total + int(good_at[i].sum()) for i, total in interfaces.items()}
-    builds = limits.yield_builds
     return Yield(
-        Share(whole, builds),
-        {index: Share(good, builds) for index, good in interfaces.items()},
-        {quantity: Share(good, builds) for quantity, good in quantities.items()},
+        Share(whole, wanted),
+        {index: Share(good, wanted) for index, good in interfaces.items()},
+        {quantity: Share(good, wanted) for quantity, good in quantities.items()},
     )
+
+
+def _quick_number(interfaces: int) -> int:
+    """10,000 builds up to 30 interfaces, fewer of a taller stack: its interval says so."""
+    return max(1000, min(10_000, 300_000 // max(1, interfaces)))
 
 
 def _kept(rows: Iterable[_Row], own: dict[_Error, _Error], draws: _Draws) -> Bools:
