@@ -80,6 +80,8 @@ def _fits(inlet: Inlet, laminate: Laminate, limits: Limits) -> list[_Fit]:
 
 
 def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits) -> list[_Fit]:
+    if inlet.length < TOLERANCE:
+        return []
     x, y = inlet.mouth
     dx, dy = inlet.direction
     inner = (x - dx * inlet.length, y - dy * inlet.length)

@@ -73,14 +73,17 @@ def _square_ends(contact: Region) -> Iterator[Tab]:
                 and _turns_square(edge, after)
             ):
                 ux, uy = edge.direction(edge.start)
-                run = min(before.length, after.length)
+                run = min(_straight(before), _straight(after))
                 yield Tab(edge.at(0.5), (uy, -ux), edge.length, run, None)
 
 
+def _straight(side: Edge) -> float:
+    """How far a tab's side runs straight: not at all where its fillet reaches the end."""
+    return side.length if isinstance(side, Line) else 0.0
+
+
 def _turns_square(one: Edge, other: Edge) -> bool:
-    """Whether two straight edges meet in a convex corner of about a right angle."""
-    if not (isinstance(one, Line) and isinstance(other, Line)):
-        return False
+    """Whether two edges meet in a convex corner of about a right angle."""
     (ux, uy), (vx, vy) = one.direction(one.end), other.direction(other.start)
     return abs(ux * vx + uy * vy) < SQUARE and ux * vy - uy * vx > 0
 
