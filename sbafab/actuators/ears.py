@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Literal
 
 from sbafab.design.records import Design
@@ -22,11 +23,17 @@ from sbafab.geometry.shapes import disc, strip
 from sbafab.laminate.laminate import Pin
 
 Holder = Literal["film", "mask", "sheet"]
-NOTE = "ears are cut, pressed and meshed with the actuator: snip them off along the outline"
+Named = tuple[str, Region]
+"""A part, and what to call it in a message."""
+NOTE = (
+    "ears are cut, pressed and meshed with the actuator: snip them off along the outline, and the "
+    "tails of the inlet strips at the tab's end"
+)
 LONGER = {"film": (0.0, 2.0), "mask": (1.0, 3.0), "sheet": (0.0, 2.0)}
 """mm by which the first and second ear of a part stand off, all different, so that a film that is
 turned or flipped does not go on the masks' pins either."""
 FAR = 500.0
+ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -61,6 +68,10 @@ class Ear:
     pin_diameter: float
 
     @property
+    def name(self) -> str:
+        return f"the ear {self.ray.name}"
+
+    @property
     def strip(self) -> Region:
         return strip(self.ray.start, self.ray.at(self.end), self.width)
 
@@ -77,31 +88,65 @@ def film_setback(design: Design) -> float:
     return design.mask.overhang if design.registration.method == "ears" else 0.0
 
 
-def placed(rays: Iterable[Ray], body: Region, design: Design) -> tuple[Ear, ...]:
+def placed(rays: Sequence[Ray], body: Region, plates: Region, design: Design) -> tuple[Ear, ...]:
     """Ears on their rays, their roots clear of ``body``: all that is cut, without ears.
 
-    Raises DesignError where two ears come nearer to each other than one overhang.
+    ``plates`` are the films that masks keep apart; their fillets beside the ears end at the root
+    too. Raises DesignError where two ears come nearer to each other than one overhang, or where
+    fillets fill all the room beside an ear.
     """
-    overhang, bond = design.mask.overhang, design.bond.width
-    pin = design.registration.pin_diameter
-    width = pin + 2 * bond
-    ears = []
-    for ray in rays:
-        band = strip(ray.start, ray.at(FAR), width + 4 * overhang) & body
-        reach = max(
-            (edge.farthest_along(ray.start, ray.direction) for edge in band.edges), default=0.0
-        )
-        root = reach + design.fillet.radius + overhang + LONGER[ray.holder][ray.long]
-        hole = root + bond + pin / 2
-        ears.append(Ear(ray, root, hole, hole + pin / 2 + bond, width, pin))
-    _check_apart(ears, overhang)
+    overhang, radius = design.mask.overhang, design.fillet.radius
+    roots = [_reach(ray, body, design) + radius + overhang + _longer(ray) for ray in rays]
+    ears = [_ear(ray, root, design) for ray, root in zip(rays, roots, strict=True)]
+    # Between an ear and what stands at a sharp angle to it a fillet reaches farther out.
+    spread = filleted(plates, ears, radius)
+    ears = [
+        _ear(ear.ray, max(ear.root, _reach(ear.ray, spread, design) + overhang), design)
+        for ear in ears
+    ]
+    spread = filleted(plates, ears, radius)
+    for ear in ears:
+        if _reach(ear.ray, spread, design) + overhang > ear.root + ROUNDING:
+            raise DesignError(
+                f"fillet.radius = {radius:g} fills the room beside {ear.name}; make it smaller, "
+                'or use registration.method = "channel-pin"'
+            )
+    check_apart(combinations([(ear.name, _outer(ear)) for ear in ears], 2), overhang)
     return tuple(ears)
 
 
+def _ear(ray: Ray, root: float, design: Design) -> Ear:
+    bond, pin = design.bond.width, design.registration.pin_diameter
+    hole = root + bond + pin / 2
+    return Ear(ray, root, hole, hole + pin / 2 + bond, pin + 2 * bond, pin)
+
+
+def _longer(ray: Ray) -> float:
+    return LONGER[ray.holder][ray.long]
+
+
+def _reach(ray: Ray, body: Region, design: Design) -> float:
+    """How far out along a ray the body stands in the way of an ear and the mask round it."""
+    width = design.registration.pin_diameter + 2 * design.bond.width
+    band = strip(ray.start, ray.at(FAR), width + 4 * design.mask.overhang) & body
+    return max((edge.farthest_along(ray.start, ray.direction) for edge in band.edges), default=0.0)
+
+
 def with_film_ears(outline: Region, ears: Sequence[Ear], radius: float) -> Region:
-    """A TPE outline with its ears, their concave corners filleted."""
-    own = [ear.strip for ear in ears if ear.ray.holder == "film"]
-    return fillet(union([outline, *own]), radius) if own else outline
+    """A TPE outline with its ears, their concave corners filleted; every piece by itself."""
+    if not ears:
+        return outline
+    own = [ear for ear in ears if ear.ray.holder == "film"]
+    return union(
+        fillet(union([piece, *(e.strip for e in own if piece.contains(e.ray.start))]), radius)
+        for piece in outline.pieces
+    )
+
+
+def filleted(outline: Region, ears: Sequence[Ear], radius: float) -> Region:
+    """A TPE outline with the fillets beside its ears, without the ears themselves."""
+    strips = union(ear.strip for ear in ears if ear.ray.holder == "film")
+    return with_film_ears(outline, ears, radius) - (strips - outline)
 
 
 def film_holes(ears: Sequence[Ear]) -> Region:
@@ -136,16 +181,14 @@ def with_sheet_ears(sheet: Region, ears: Sequence[Ear], radius: float) -> Region
     return fillet(union([sheet, *own]), radius) - _holes(ears, "sheet") if own else sheet
 
 
-def _check_apart(ears: Sequence[Ear], overhang: float) -> None:
-    for i, one in enumerate(ears):
-        outer = grow(_outer(one), overhang)
-        for other in ears[:i]:
-            if not (outer & _outer(other)).is_empty:
-                raise DesignError(
-                    f"the ears {other.ray.name} and {one.ray.name} meet; make the chambers larger "
-                    "or registration.pin_diameter smaller, or use registration.method = "
-                    '"channel-pin"'
-                )
+def check_apart(pairs: Iterable[tuple[Named, Named]], overhang: float) -> None:
+    """Raises DesignError where two parts come nearer to each other than one overhang."""
+    for (name, part), (other, neighbour) in pairs:
+        if not (grow(part, overhang) & neighbour).is_empty:
+            raise DesignError(
+                f"{name} and {other} meet; make the chambers larger or registration.pin_diameter "
+                'smaller, or use registration.method = "channel-pin"'
+            )
 
 
 def _outer(ear: Ear) -> Region:

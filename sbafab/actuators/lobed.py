@@ -17,6 +17,7 @@ from sbafab.actuators.pockets import (
     tab_and_strip,
 )
 from sbafab.actuators.stacking import BalloonShape, Stack, balloon_cuts, layers
+from sbafab.actuators.tails import tails
 from sbafab.design.records import Design, Section
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
@@ -115,8 +116,11 @@ def build(design: LobedDesign) -> Laminate:
         1,
         count,
     )
-    ears = _ears(design, union([bottom.outline, *(shape.outline for shape in shapes)]), axes)
-    stack = Stack(bottom, shapes, shape_of, axes, design.lumen.diameter, ears)
+    plates = union(shape.outline for shape in shapes)
+    body = bottom.outline | plates
+    ears = _ears(design, body, plates, axes)
+    held = tails([inlet for _, _, inlet in inlets], body, ears, design)
+    stack = Stack(bottom, shapes, shape_of, axes, design.lumen.diameter, ears, held)
     has_bores = design.stack.balloons > 1
     bore = design.bore.diameter
     pins = [Pin(n, axis, bore) for n, axis in zip(names, axes, strict=True) if has_bores]
@@ -130,7 +134,9 @@ def build(design: LobedDesign) -> Laminate:
         if has_bores
         else (),
         inlets=tuple(inlet for _, _, inlet in inlets),
-        pins=(*pins, *(ear.pin for ear in ears)) if ears else (*pins, lumen_pin),
+        pins=(*pins, *(ear.pin for ear in ears), *(pin for tail in held for pin in tail.pins))
+        if ears
+        else (*pins, lumen_pin),
         lumen=design.lumen.diameter,
         balloons=design.stack.balloons,
         registration=design.registration.method,
@@ -173,7 +179,9 @@ def _check_tabs(
                 )
 
 
-def _ears(design: LobedDesign, body: Region, axes: tuple[Point, ...]) -> tuple[Ear, ...]:
+def _ears(
+    design: LobedDesign, body: Region, plates: Region, axes: tuple[Point, ...]
+) -> tuple[Ear, ...]:
     """Two film and two mask ears between the inlet tabs.
 
     Up to four lobes have them on their flanks, 60 degrees off the tab; more lobes leave too
@@ -203,4 +211,4 @@ def _ears(design: LobedDesign, body: Region, axes: tuple[Point, ...]) -> tuple[E
         for (name, holder), (start, angle) in zip(names, places, strict=True)
         if holder == "film" or design.stack.balloons > 1
     ]
-    return placed(rays, body, design)
+    return placed(rays, body, plates, design)

@@ -13,10 +13,12 @@ from sbafab.actuators.pockets import (
     tab_and_strip,
 )
 from sbafab.actuators.stacking import BalloonShape, Stack, balloon_cuts, layers
+from sbafab.actuators.tails import tails
 from sbafab.design.records import Design
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import unit
 from sbafab.geometry.offset import fillet
+from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Bore, Chamber, Laminate, Pin
 
 AXIS = (0.0, 0.0)
@@ -43,8 +45,11 @@ def build(design: OneDofDesign) -> Laminate:
     bottom = BalloonShape(
         fillet(first.outline | tab, design.fillet.radius), first.pockets | strip, 1, 1
     )
-    ears = _ears(design, shapes, bottom)
-    stack = Stack(bottom, shapes, shape_of, (AXIS,), ears=ears)
+    plates = union(shape.outline for shape in shapes)
+    body = bottom.outline | plates
+    ears = _ears(design, body, plates)
+    held = tails([inlet], body, ears, design)
+    stack = Stack(bottom, shapes, shape_of, (AXIS,), ears=ears, tails=held)
     balloons = design.stack.balloons
     has_bore = balloons > 1
     return Laminate(
@@ -57,6 +62,7 @@ def build(design: OneDofDesign) -> Laminate:
         pins=(
             *((Pin("chamber1", AXIS, design.bore.diameter),) if has_bore else ()),
             *(ear.pin for ear in ears),
+            *(pin for tail in held for pin in tail.pins),
         ),
         lumen=None,
         balloons=balloons,
@@ -65,9 +71,7 @@ def build(design: OneDofDesign) -> Laminate:
     )
 
 
-def _ears(
-    design: OneDofDesign, shapes: tuple[BalloonShape, ...], bottom: BalloonShape
-) -> tuple[Ear, ...]:
+def _ears(design: OneDofDesign, body: Region, plates: Region) -> tuple[Ear, ...]:
     """Two film and two mask ears in the five sixths of the circle that the tab leaves free."""
     if design.registration.method != "ears":
         return ()
@@ -80,5 +84,4 @@ def _ears(
             Ray("mask1", "mask", AXIS, unit(150.0), False),
             Ray("mask2", "mask", AXIS, unit(270.0), True),
         ]
-    body = union([bottom.outline, *(shape.outline for shape in shapes)])
-    return placed(rays, body, design)
+    return placed(rays, body, plates, design)

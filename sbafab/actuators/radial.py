@@ -21,6 +21,7 @@ from sbafab.actuators.ears import (
 )
 from sbafab.actuators.pockets import bonded, check_neck, tab_and_strip
 from sbafab.actuators.stacking import BalloonShape, Cut, Stack, balloon_cuts, layers
+from sbafab.actuators.tails import head_reach, tails
 from sbafab.design.records import Design, Inlet, Section
 from sbafab.design.records import Stack as StackSection
 from sbafab.design.units import Length, LengthOrZero
@@ -114,15 +115,17 @@ def build(design: RadialDesign) -> Laminate:
     pockets = union(pocket.moved(*centre) for centre in centres)
     shape = BalloonShape(outlines, pockets, count, count)
     bottom, inlets = _bottom(design, shape, outline, centres)
-    ears = _ears(design, bottom, _sheet(design, outline), centres)
-    stack = Stack(bottom, (shape,), (0,) * design.stack.balloons, centres, ears=ears)
+    sheet = _sheet(design, outline)
+    ears = _ears(design, bottom, sheet, centres)
+    held = tails(inlets, bottom.outline, ears, design, sheet)
+    stack = Stack(bottom, (shape,), (0,) * design.stack.balloons, centres, ears=ears, tails=held)
     window = _window(design, pocket, outline)
     windows = union(window.moved(*centre) for centre in centres)
     fillet_radius = design.fillet.radius
     eared = with_film_ears(bottom.outline, ears, fillet_radius)
     carrier_mask = with_mask_ears(grow(eared, overhang), ears, overhang) - windows
     carrier = [
-        Cut("sheet", with_sheet_ears(_sheet(design, outline), ears, fillet_radius), None, 1),
+        Cut("sheet", with_sheet_ears(sheet, ears, fillet_radius), None, 1),
         Cut("separator-mask", carrier_mask, None, bottom.outline_pieces),
     ]
     manifold = design.inlet.manifold
@@ -144,6 +147,7 @@ def build(design: RadialDesign) -> Laminate:
                 for number, bore in enumerate(bores, start=1)
             ),
             *(ear.pin for ear in ears),
+            *(pin for tail in held for pin in tail.pins),
         ),
         lumen=None,
         balloons=design.stack.balloons,
@@ -251,7 +255,7 @@ def _ears(
         return ()
     low_x, low_y, high_x, high_y = sheet.bounds
     beside_film = design.chamber.width / 4
-    tab = design.inlet.strip_width / 2 + design.bond.width
+    tab = max(design.inlet.strip_width / 2 + design.bond.width, head_reach(design))
     ear = design.registration.pin_diameter / 2 + design.bond.width
     beside_mask = tab + 2 * design.mask.overhang + ear
     rays = []
@@ -275,4 +279,4 @@ def _ears(
         Ray("sheet1", "sheet", (high_x - 1.0, middle + off), (1.0, 0.0), False),
         Ray("sheet2", "sheet", (low_x + 1.0, middle), (-1.0, 0.0), True),
     ]
-    return placed(rays, bottom.outline | sheet, design)
+    return placed(rays, bottom.outline | sheet, bottom.outline, design)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 
@@ -13,8 +13,8 @@ from sbafab.actuators.ears import (
     with_film_ears,
     with_mask_ears,
 )
+from sbafab.actuators.tails import Tail, with_tails
 from sbafab.design.records import Design
-from sbafab.errors import DesignError
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import grow
@@ -39,7 +39,7 @@ class BalloonShape:
 
 @dataclass(frozen=True)
 class Stack:
-    """Balloons bottom to top, and what runs through them.
+    """Balloons bottom to top, what runs through them, and what holds them in register.
 
     ``shapes`` holds the distinct balloons and ``shape_of`` the index of each balloon's own;
     ``bottom`` is the first balloon with its inlet tabs and strips. ``axes`` are the channel axes.
@@ -51,6 +51,7 @@ class Stack:
     axes: tuple[Point, ...]
     lumen: float | None = None
     ears: tuple[Ear, ...] = ()
+    tails: tuple[Tail, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,8 @@ def balloon_cuts(stack: Stack, design: Design) -> list[Cut]:
 
     @cache
     def chamber_mask(shape: int) -> Region:
-        return shapes[shape].pockets - round_axes(radius)
+        pockets = shapes[shape].pockets
+        return (pockets if shape else with_tails(pockets, stack.tails)) - round_axes(radius)
 
     @cache
     def separator_mask(below: int, above: int) -> Region:
@@ -160,15 +162,3 @@ def layers(cuts: Iterable[Cut], design: Design) -> tuple[Layer, ...]:
         )
         z += film.thickness
     return tuple(placed)
-
-
-def check_neck(design: Design, half_widths: Sequence[float], what: str) -> None:
-    """Raises DesignError where bore and neck ring leave no free film in the smallest pocket."""
-    ring = design.bore.diameter / 2 + design.bond.width
-    if design.stack.balloons > 1 and ring >= min(half_widths):
-        room = 2 * (min(half_widths) - design.bond.width)
-        remedy = f"the bore must be under {room:.3f} mm" if room > 0 else f"enlarge {what}"
-        raise DesignError(
-            f"bore.diameter = {design.bore.diameter:g} with its neck ring of {design.bond.width:g} "
-            f"is wider than the pocket of {2 * min(half_widths):g}; {remedy}"
-        )

@@ -23,6 +23,11 @@ TITLES: dict[StepName, str] = {
     "bond_all": "Whole laminate",
 }
 
+SNIP = (
+    "Snip off the ears along the outline, and the tails of the inlet strips at the tab's end; the "
+    "masks stay in their pockets."
+)
+
 HOTTEST_TRIED = 150.0
 PRESSURES_TRIED = (70.0, 200.0)
 HANDLING_MINUTES = 60.0
@@ -114,7 +119,9 @@ def schedule(laminate: Laminate, press: PressSettings) -> Schedule:
     paper. Raises DesignError at a temperature that would not bond TPE or that PTFE does not stand.
     """
     _refuse_temperature(laminate, press)
-    steps = tuple(_step(part, press) for part in assembly(laminate))
+    *parts, last = assembly(laminate)
+    after = f" {SNIP}" if laminate.registration == "ears" else ""
+    steps = (*(_step(part, press) for part in parts), _step(last, press, after))
     total = sum(step.minutes for step in steps)
     return Schedule(
         steps,
@@ -126,7 +133,7 @@ def schedule(laminate: Laminate, press: PressSettings) -> Schedule:
     )
 
 
-def _step(part: AssemblyStep, press: PressSettings) -> Step:
+def _step(part: AssemblyStep, press: PressSettings, after: str = "") -> Step:
     return Step(
         step=part.number,
         title=TITLES[part.name],
@@ -139,7 +146,7 @@ def _step(part: AssemblyStep, press: PressSettings) -> Step:
         force_n=round(press.force_n, 1),
         platen_mm=press.platen,
         minutes=press.minutes(part.name),
-        instructions=_instructions(part),
+        instructions=_instructions(part) + after,
     )
 
 

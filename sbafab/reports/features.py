@@ -73,7 +73,9 @@ def _circle_name(laminate: Laminate, layer: Layer, contour: Contour) -> str:
         return "neck ring" if layer.role == "separator-mask" else "bore"
     if laminate.lumen and math.hypot(*centre) < SAME:
         return "lumen"
-    return "ear" if any(math.dist(centre, pin.centre) < SAME for pin in laminate.pins) else ""
+    held = any(math.dist(centre, pin.centre) < SAME for pin in laminate.pins)
+    tooling = "tail" if layer.role == "chamber-mask" else "ear"
+    return tooling if held else ""
 
 
 def radii(profile: Region) -> list[Circle]:

@@ -16,7 +16,8 @@ from sbafab.reports.pattern_card import Card, cells, drawn, pattern_card, pin_ma
 
 PAGE = (420.0, 297.0)  # A3: the most a drawing may fill
 MARGIN = 10.0
-BLOCK = 22.5
+BLOCK, NOTE_ROW = 22.5, 4.2
+"""Height of the title block with up to one note, and of every further one."""
 SCALES = (20.0, 15.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.0, 0.5, 0.2, 0.1)
 LEAST_DRAWN = 30.0
 
@@ -34,17 +35,18 @@ class Grid:
 def layers_svg(laminate: Laminate) -> str:
     """Every distinct pattern in plan at one scale, as a drawing for A3 (longer if need be)."""
     cards = [pattern_card(laminate, layers) for layers in laminate.patterns.values()]
-    grid = _grid(cards)
+    block = BLOCK + NOTE_ROW * max(0, len(laminate.notes) - 1)
+    grid = _grid(cards, block)
     elements: list[str] = []
     for place, card in enumerate(cards):
         row, column = divmod(place, grid.columns)
         corner = MARGIN + column * grid.cell[0], MARGIN + row * grid.cell[1]
         elements += drawn(card, grid.scale, corner, grid.cell)
-    elements += _title_block(laminate, grid)
+    elements += _title_block(laminate, grid, block)
     return draw.document(*grid.page, f"{laminate.name}: layers", elements)
 
 
-def _grid(cards: Sequence[Card]) -> Grid:
+def _grid(cards: Sequence[Card], block: float) -> Grid:
     """The largest scale at which all cards fit A3; a longer page rather than tiny drawings."""
     wide = PAGE[0] - 2 * MARGIN
     largest = max(max(card.size) for card in cards)
@@ -56,7 +58,7 @@ def _grid(cards: Sequence[Card]) -> Grid:
             continue
         rows = math.ceil(len(cards) / columns)
         columns = math.ceil(len(cards) / rows)
-        height = rows * cell[1] + 2 * MARGIN + BLOCK
+        height = rows * cell[1] + 2 * MARGIN + block
         if best is None or height <= PAGE[1] or largest * scale >= LEAST_DRAWN:
             best = Grid(scale, columns, (wide / columns, cell[1]), (PAGE[0], height))
         if height <= PAGE[1]:
@@ -64,13 +66,13 @@ def _grid(cards: Sequence[Card]) -> Grid:
     if best is not None:
         return best
     cell = cells(cards, SCALES[-1])
-    page = cell[0] + 2 * MARGIN, len(cards) * cell[1] + 2 * MARGIN + BLOCK
+    page = cell[0] + 2 * MARGIN, len(cards) * cell[1] + 2 * MARGIN + block
     return Grid(SCALES[-1], 1, cell, page)
 
 
-def _title_block(laminate: Laminate, grid: Grid) -> list[str]:
+def _title_block(laminate: Laminate, grid: Grid, block: float) -> list[str]:
     width, height = grid.page
-    low = (MARGIN, height - MARGIN - BLOCK)
+    low = (MARGIN, height - MARGIN - block)
     x, y = low
     needed = len(laminate.layers)
     masked = any(layer.is_mask for layer in laminate.layers)
@@ -83,8 +85,11 @@ def _title_block(laminate: Laminate, grid: Grid) -> list[str]:
         draw.box(low, (width - MARGIN, height - MARGIN), fill="none", stroke=draw.DARK, width=0.25),
         draw.text((x + 3.0, y + 7.2), laminate.name, size=4.6, bold=True),
         draw.text((x + 3.0, y + 12.0), facts),
-        draw.text((x + 3.0, y + 16.2), "; ".join(laminate.notes), bold=True),
-        draw.text((x + 3.0, y + 20.4), PTFE_WARNING if masked else ""),
+        *(
+            draw.text((x + 3.0, y + 16.2 + NOTE_ROW * row), note, bold=True)
+            for row, note in enumerate(laminate.notes or ("",))
+        ),
+        draw.text((x + 3.0, y + block - 2.1), PTFE_WARNING if masked else ""),
         *_films(laminate, (width / 2 + 18.0, y)),
         *_scale_bar(grid.scale, (width - MARGIN - 4.0, y)),
     ]

@@ -36,6 +36,17 @@ def layer_labels(section: Section) -> list[Label]:
     return labels
 
 
+def pin_labels(section: Section, beyond_tab: bool) -> list[Label]:
+    """Name and press steps of the pins on this side of the tab's end, or beyond it."""
+    mouth = section.tab[1] if section.tab else section.high
+    slabs = {slab.layer.index: slab for slab in section.slabs}
+    return [
+        _in_slab(rod.words, rod.middle, slabs[rod.stacks[-1][1]])
+        for rod in section.rods
+        if (rod.middle > mouth) == beyond_tab
+    ]
+
+
 def feature_labels(section: Section) -> list[Label]:
     """Bond, neck ring, overhang, bore, pocket and lumen, where the section has them."""
     found = [

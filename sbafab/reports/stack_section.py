@@ -9,6 +9,7 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.section import Interval, section
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Inlet, Laminate, Layer
+from sbafab.reports.stack_pins import Rod, rods
 
 MOST_BALLOONS = 4
 """Up to so many balloons are shown in full."""
@@ -50,6 +51,7 @@ class Section:
     tab: Interval | None
     hidden: int
     break_above: int
+    rods: tuple[Rod, ...]
 
 
 def chamber_section(laminate: Laminate) -> Section:
@@ -86,6 +88,7 @@ def chamber_section(laminate: Laminate) -> Section:
         _tab(inlet, origin) if inlet else None,
         hidden,
         break_above,
+        tuple(rod for rod in rods(laminate, origin, direction) if rod.span[0] > crop),
     )
 
 

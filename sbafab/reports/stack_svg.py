@@ -13,7 +13,8 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.picture import INK
 from sbafab.reports import drawing as draw
 from sbafab.reports.features import length
-from sbafab.reports.stack_labels import Label, feature_labels, layer_labels
+from sbafab.reports.stack_labels import Label, feature_labels, layer_labels, pin_labels
+from sbafab.reports.stack_pins import Rod
 from sbafab.reports.stack_section import Joint, Section, Slab, chamber_section, opening
 
 PAGE_WIDTH = 297.0
@@ -27,6 +28,9 @@ SLIT = 0.18
 """Share of the gap drawn open above and below a mask, so that one sees what does not bond."""
 EXAGGERATIONS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30, 40, 50, 60, 80, 100)
 BOND = "#2a7ab9"
+STEEL = "#ccd2d8"
+PAST = 2.0
+"""mm by which a pin's axis is drawn past its ends."""
 
 Dimension = tuple[Interval, str]
 """A stretch of the section to give the length of, and its name (may be empty)."""
@@ -74,6 +78,7 @@ def stack_svg(laminate: Laminate) -> str:
     page = view.height + HEAD + FOOT
     elements = [
         *_heading(laminate, view),
+        *(part for rod in view.section.rods for part in _rod(rod, view)),
         *(part for joint in view.section.joints for part in _joint(joint, view)),
         *(part for slab in view.section.slabs for part in _slab(slab, view)),
         *_breaks(view),
@@ -118,6 +123,23 @@ def _joint(joint: Joint, view: View) -> list[str]:
     ]
 
 
+def _rod(rod: Rod, view: View) -> list[str]:
+    """A dowel pin behind the films, stack by stack, and its axis; nothing across the break."""
+    parts: list[str] = []
+    x = view.x(rod.middle)
+    for lowest, highest in rod.stacks:
+        layers = [s.layer for s in view.section.slabs if lowest <= s.layer.index <= highest]
+        below = [layer for layer in layers if layer.index <= view.section.break_above]
+        above = [layer for layer in layers if layer.index > view.section.break_above]
+        for run in filter(None, (below, above)):
+            bottom = view.y(run[0].z, run[0].index)
+            top = view.y(run[-1].z + run[-1].film.thickness, run[-1].index)
+            low, high = (view.x(rod.span[0]), top), (view.x(rod.span[1]), bottom)
+            parts.append(draw.box(low, high, fill=STEEL, stroke=draw.GREY))
+            parts.append(draw.line([(x, top - PAST), (x, bottom + PAST)], colour=draw.GREY))
+    return parts
+
+
 def _heading(laminate: Laminate, view: View) -> list[str]:
     what = (
         f"Section through {view.section.chamber} along its inlet. "
@@ -128,9 +150,8 @@ def _heading(laminate: Laminate, view: View) -> list[str]:
         draw.text((10.0, 13.0), laminate.name, size=4.6, bold=True),
         draw.text((10.0, 18.6), what),
         *(
-            [draw.text((10.0, 23.4), "; ".join(laminate.notes), bold=True)]
-            if laminate.notes
-            else []
+            draw.text((10.0, 23.4 + 4.2 * row), note, bold=True)
+            for row, note in enumerate(laminate.notes)
         ),
     ]
 
@@ -212,7 +233,8 @@ def _dimensions_below(view: View) -> list[str]:
     masks = [slab for slab in section.slabs if slab.layer.role == "chamber-mask" and slab.spans]
     reach = max((slab.spans[-1][1] for slab in masks), default=mouth)
     if reach - mouth > 1e-3:
-        measured.append(((mouth, reach), "overhang"))
+        tail = any(rod.middle > mouth for rod in section.rods)
+        measured.append(((mouth, reach), "tail" if tail else "overhang"))
     return _levels(view, measured, bottom, (0.0, 1.0))[0]
 
 
@@ -251,8 +273,8 @@ def _labels(view: View) -> list[str]:
     right = view.x(view.section.high) + 5.0
     parts: list[str] = []
     for labels, x, side in (
-        (layer_labels(view.section), right, 1),
-        (feature_labels(view.section), LEFT - 6.0, -1),
+        (layer_labels(view.section) + pin_labels(view.section, True), right, 1),
+        (feature_labels(view.section) + pin_labels(view.section, False), LEFT - 6.0, -1),
     ):
         placed = sorted((view.y(label.z, label.layer), label) for label in labels)
         rows = draw.spread([y for y, _ in placed], 5.2, low, high)
@@ -281,6 +303,8 @@ def _legend(view: View, page: float) -> list[str]:
     ]
     entries.append(("bond: the gap filled with TPE", BOND))
     entries.append(("unbonded: drawn as a slit beside the mask", "#ffffff"))
+    if view.section.rods:
+        entries.append(("dowel pin", STEEL))
     parts: list[str] = []
     x = 10.0
     for words, fill in entries:

@@ -1,15 +1,19 @@
-"""Ears: pinned in every step, nothing flush, and on the pins in one position only."""
+"""Ears and tails: pinned in every step, nothing flush, on the pins in one position only."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
+from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import disc
+from sbafab.laminate.assembly import assembly
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.output.run import check
 from sbafab.output.settings import press_settings
@@ -17,11 +21,14 @@ from sbafab.pressing.schedule import schedule
 
 DESIGNS = [
     ("1dof-5mm", []),
+    ("1dof-5mm", ["stack.balloons=1"]),
     ("1dof-10mm", ["stack.balloons=2"]),
     ("1dof-5mm", ["stack.balloons=3", "chamber.diameter=[10, 5.5, 6]"]),
     ("3dof-15mm", []),
+    ("3dof-15mm", ["stack.balloons=1"]),
     *(("3dof-15mm", ["stack.balloons=3", f"chamber.count={n}"]) for n in (2, 4, 5, 6, 7, 8)),
     ("radial-15mm", []),
+    ("radial-15mm", ["inlet.manifold=true"]),
     ("radial-15mm", ["stack.balloons=3"]),
     ("radial-15mm", ["stack.balloons=2", "inlet.manifold=true"]),
 ]
@@ -36,6 +43,14 @@ SYMMETRIES: dict[str, Callable[[Point], Point]] = {
 }
 
 
+def moved(region: Region, symmetry: Callable[[Point], Point]) -> Region:
+    """The region turned or flipped about the origin."""
+    mirror = symmetry((1.0, 0.0))[0] * symmetry((0.0, 1.0))[1] < 0 or (
+        symmetry((1.0, 0.0))[1] * symmetry((0.0, 1.0))[0] > 0
+    )
+    return region.mapped(symmetry, 1.0, mirror=mirror)
+
+
 def eared(name: str, assignments: list[str]) -> Laminate:
     return build(load_design(name, [*assignments, 'registration.method="ears"']))
 
@@ -48,13 +63,21 @@ def tooling_holes(laminate: Laminate, layer: Layer) -> list[Point]:
     ]
 
 
+def bottom_masks(laminate: Laminate) -> tuple[Region, ...]:
+    """The bottom balloon's chamber masks, one a chamber."""
+    layer = next(layer for layer in laminate.layers if layer.role == "chamber-mask")
+    return layer.profile.pieces
+
+
 @pytest.mark.parametrize(("name", "assignments"), DESIGNS)
-def test_nothing_fails_and_nothing_is_waived(name: str, assignments: list[str]) -> None:
+def test_nothing_fails_warns_or_is_waived(name: str, assignments: list[str]) -> None:
     design = load_design(name, [*assignments, 'registration.method="ears"'])
     _, findings = check(design)
     for finding in findings:
-        # Chamber masks have one pin each, or none, and the registration rules say what that costs.
-        allowed = {"pass", "warn"} if finding.rule.startswith("registration-") else {"pass"}
+        allowed = {"pass"}
+        if finding.rule == "registration-worst-case" and name == "radial-15mm":
+            # Upper oblong masks have one pin, and are not round.
+            allowed = {"pass"} if design.stack.balloons == 1 else {"pass", "warn"}
         assert finding.verdict in allowed, finding.message
 
 
@@ -64,10 +87,47 @@ def test_every_film_and_separator_has_two_tooling_holes_a_part(
 ) -> None:
     laminate = eared(name, assignments)
     for layer in laminate.layers:
-        expected = 0 if layer.role == "chamber-mask" else 2
-        if layer.role not in ("chamber-mask", "sheet") and laminate.family == "radial":
+        if layer.role == "chamber-mask":
+            continue
+        expected = 2
+        if layer.role != "sheet" and laminate.family == "radial":
             expected *= 3
         assert len(tooling_holes(laminate, layer)) == expected, layer.name
+
+
+@pytest.mark.parametrize(("name", "assignments"), DESIGNS)
+def test_two_pins_hold_every_bottom_mask_whenever_it_is_laid(
+    name: str, assignments: list[str]
+) -> None:
+    laminate = eared(name, assignments)
+    first = assembly(laminate)[0]
+    for mask in bottom_masks(laminate):
+        names = [pin.name for pin in laminate.pins_in(mask)]
+        assert len(names) >= 2
+        assert any(name.startswith("strip") for name in names)
+        assert {pin.name for pin in first.pins}.issuperset(names)
+    tails = {pin.name for pin in laminate.pins if pin.name.startswith("strip")}
+    for step in assembly(laminate):
+        laid = first.layers[0] in step.layers
+        assert ({pin.name for pin in step.pins} >= tails) == laid
+
+
+@pytest.mark.parametrize(("name", "assignments"), DESIGNS)
+def test_tails_hold_their_pins_clear_of_every_other_layer(
+    name: str, assignments: list[str]
+) -> None:
+    laminate = eared(name, assignments)
+    mask = next(layer for layer in laminate.layers if layer.role == "chamber-mask")
+    for pin in laminate.pins:
+        if not pin.name.startswith("strip"):
+            continue
+        room = disc(pin.centre, pin.diameter / 2 + 0.75)
+        for layers in laminate.patterns.values():
+            if layers[0].pattern != mask.pattern:
+                assert (layers[0].profile & room).is_empty, layers[0].name
+        # Film all round, one bond wide.
+        ring = room - disc(pin.centre, pin.diameter / 2)
+        assert (ring - mask.profile).is_empty
 
 
 @pytest.mark.parametrize(("name", "assignments"), DESIGNS)
@@ -81,25 +141,51 @@ def test_the_two_ears_of_a_part_stand_at_unequal_distances(
             assert abs(math.hypot(*ends[0]) - math.hypot(*ends[1])) > 0.5
 
 
-@pytest.mark.parametrize("symmetry", SYMMETRIES)
+def alike(one: Region, other: Region) -> bool:
+    return (one - other).area + (other - one).area < 1e-6
+
+
+def goes_on(holes: list[Point], pins: list[Point]) -> bool:
+    """Whether every hole is over a pin, or so nearly that it may be forced on."""
+    return bool(pins) and all(min(math.dist(hole, pin) for pin in pins) < 0.75 for hole in holes)
+
+
 @pytest.mark.parametrize(("name", "assignments"), DESIGNS)
-def test_no_layer_goes_on_the_pins_turned_or_flipped(
-    name: str, assignments: list[str], symmetry: str
-) -> None:
+def test_no_part_goes_on_the_pins_turned_or_flipped(name: str, assignments: list[str]) -> None:
     laminate = eared(name, assignments)
-    moved = SYMMETRIES[symmetry]
     placed = {
-        layers[0].name: tooling_holes(laminate, layers[0]) for layers in laminate.patterns.values()
+        layers[0].name: tooling_holes(laminate, layers[0])
+        for layers in laminate.patterns.values()
+        if layers[0].role != "chamber-mask"
     }
-    for layer, holes in placed.items():
-        if not holes:
-            continue
-        # Against every layer as it should lie: its holes are where its pins stand.
-        for other, pins in placed.items():
-            fits = bool(pins) and all(
-                min(math.dist(moved(hole), pin) for pin in pins) < 0.75 for hole in holes
-            )
-            assert not fits, f"{layer} {symmetry} goes on the pins of {other}"
+    masks = {
+        mask: [pin.centre for pin in laminate.pins_in(mask)] for mask in bottom_masks(laminate)
+    }
+    for symmetry, turned in SYMMETRIES.items():
+        for layer, holes in placed.items():
+            # Against every layer as it should lie: its holes are where its pins stand.
+            for other, pins in placed.items():
+                fits = goes_on([turned(hole) for hole in holes], pins)
+                assert not fits, f"{layer} {symmetry} goes on the pins of {other}"
+        for mask, holes in masks.items():
+            for place, pins in masks.items():
+                if goes_on([turned(hole) for hole in holes], pins):
+                    # Equal masks may change places.
+                    assert alike(moved(mask, turned), place), f"a mask fits {symmetry}"
+
+
+def test_a_drawn_mask_does_not_go_on_the_pins_flipped(tmp_path: Path) -> None:
+    drawing = tmp_path / "pocket.svg"
+    path = "M-4,-3 H4 V3 A3,3 0 0 1 1,6 H-4 Z"
+    drawing.write_text(f'<svg xmlns="http://www.w3.org/2000/svg"><path d="{path}"/></svg>')
+    laminate = eared("1dof-5mm", [f"chamber.outline={drawing}"])
+    (mask,) = bottom_masks(laminate)
+    holes = [pin.centre for pin in laminate.pins_in(mask)]
+    assert len(holes) == 2
+    # About the line of its two pins, the one way in which both could still be met.
+    axis, tail = holes
+    assert axis == (0.0, 0.0)
+    assert 2 * abs(tail[1]) > 0.5 * 1.5
 
 
 @pytest.mark.parametrize(("name", "assignments"), DESIGNS)

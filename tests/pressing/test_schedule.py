@@ -216,3 +216,13 @@ def test_csv_reads_back(stack: Stack) -> None:
 def test_instructions_name_the_stacks_in_their_order(stack: Stack) -> None:
     last = schedule(stack(3, sheet=True), PAPER).steps[-1].instructions
     assert "layers 1 and 2, then layers 3 to 5, then layers 6 to 12, then layer 13," in last
+
+
+def test_ears_and_tails_are_snipped_off_at_the_end(stack: Stack) -> None:
+    on_ears = schedule(replace(stack(2), registration="ears"), PAPER)
+    *before, last = [step.instructions for step in on_ears.steps]
+    assert last.endswith("the masks stay in their pockets.")
+    assert "Snip off the ears along the outline, and the tails of the inlet strips" in last
+    assert not any("Snip" in words for words in before)
+    assert not any("Snip" in step.instructions for step in schedule(stack(2), PAPER).steps)
+    assert "Snip off the ears" in press_csv(on_ears)

@@ -78,6 +78,19 @@ class Common(NamedTuple):
         return float(bore + self.bond) if self.balloons > 1 else 0.0
 
     @property
+    def ear(self) -> float:
+        """How far the longest ear reaches out, about; 0 without ears."""
+        if not self.setback:
+            return 0.0
+        return 4 * self.tables["fillet"]["radius"] + self.overhang + 3.0 + PIN + 2 * self.bond
+
+    @property
+    def tail(self) -> float:
+        """How far a strip runs on past the tab's end and its overhang; 0 without ears."""
+        width = PIN + 2 * self.bond
+        return (width if self.balloons > 1 else 3 * width) if self.setback else 0.0
+
+    @property
     def least_half(self) -> float:
         """What a pocket must leave free round its axis: neck ring, or the inlet strip's start."""
         return max(self.neck, self.strip / 2) + ROOM
@@ -248,12 +261,12 @@ def one_dof(draw: st.DrawFn) -> Draft:
 
 
 @st.composite
-def lobed(draw: st.DrawFn) -> Draft:
-    # Whether ears find room between lobes and tabs has no closed formula here.
-    shared = draw(common(longest_tab=12.0, ears=False))
+def lobed(draw: st.DrawFn, ears: bool = False) -> Draft:
+    """Lobes round a lumen; whether ears find room between lobes and tabs has no closed formula."""
+    shared = draw(common(longest_tab=12.0, ears=ears))
     stack = draw(pockets(shared, 6.0))
     count, lumen = draw(st.integers(2, 8)), draw(mm(0.5, 6.0))
-    hole = lumen / 2
+    hole = lumen / 2 + shared.setback
     half = math.pi / count
     bond, reach = shared.bond, stack.reach
     # Far enough out for round pockets of this reach, whatever their outline.
@@ -263,7 +276,7 @@ def lobed(draw: st.DrawFn) -> Draft:
         axis = math.ceil(axis * 1000) / 1000 + draw(mm(0, 4.0))
         chamber["axis_radius"] = axis
     lobe = reach + bond + shared.overhang
-    assume(axis + lobe + shared.tab_length < HALF_PLATEN)
+    assume(axis + lobe + max(shared.tab_length + shared.tail, shared.ear) < HALF_PLATEN)
     assume(_tabs_clear(axis, count, stack, shared))
     # Between lobes that hardly meet or part, films and masks end in a point unless it is rounded.
     if shared.tables["fillet"]["radius"] < shared.overhang + LEAST_FEATURE / 2:
@@ -332,7 +345,7 @@ def _ears_clear(width: float, tube: float, count: int, shared: Common) -> bool:
     bond, overhang = shared.bond, shared.overhang
     fillet, ear = shared.tables["fillet"]["radius"], PIN + 2 * bond
     between_film = width / 2 - ear
-    beside_tab = shared.strip / 2 + bond + 2 * overhang + ear / 2
+    beside_tab = max(shared.strip / 2, 0.8 * PIN) + bond + 2 * overhang + ear / 2
     between_mask = math.pi * tube / count - 2 * beside_tab - ear
     length = math.pi * tube + 2 * (fillet + 2 * overhang + 4.0 + ear)
     room = 2 * fillet + 2.5 * overhang + ROOM

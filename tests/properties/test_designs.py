@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 
 from sbafab.actuators import load_design
 from sbafab.cli import main
+from sbafab.errors import DesignError
 from sbafab.output.as_built.check import check_folder
 from sbafab.output.run import check, generate
 from tests.properties.designs import Draft, lobed, one_dof, radial, valid
@@ -35,6 +36,18 @@ def failures(draft: Draft) -> list[str]:
     with TemporaryDirectory() as folder:
         _, findings = check(load_design(draft.write(Path(folder))))
     return [finding.message for finding in findings if finding.verdict == "fail"]
+
+
+def failures_beside_ears(draft: Draft) -> list[str]:
+    """Ears that find no room are refused with the way out; then what fails on that way."""
+    way_out = "registration.method", "channel-pin"
+    try:
+        return failures(draft)
+    except DesignError as refusal:
+        said = str(refusal)
+    if '{} = "{}"'.format(*way_out) not in said:
+        return [said]
+    return failures(draft.having(*way_out))
 
 
 def refused(draft: Draft) -> tuple[int, str, str]:
@@ -57,9 +70,9 @@ def test_valid_1dof_designs_break_no_rule(draft: Draft) -> None:
 
 
 @share(6, 3)
-@given(lobed())
+@given(lobed(ears=True))
 def test_valid_lobed_designs_break_no_rule(draft: Draft) -> None:
-    assert failures(draft) == []
+    assert failures_beside_ears(draft) == []
 
 
 @share(3, 3)

@@ -23,6 +23,8 @@ DESIGNS: dict[str, tuple[str, list[str]]] = {
     "eight lobes": ("3dof-15mm", ["chamber.count=8"]),
     "radial-15mm": ("radial-15mm", []),
     "radial, three balloons": ("radial-15mm", ["stack.balloons=3"]),
+    "one balloon, ears": ("1dof-5mm", ["stack.balloons=1", "registration.method=ears"]),
+    "seven lobes, ears": ("3dof-15mm", ["chamber.count=7", "registration.method=ears"]),
     "tapered": ("1dof-5mm", ["chamber.diameter=[8,7,6,5,4,3]"]),
 }
 TIMES = "\u00d7"

@@ -122,6 +122,8 @@ def box_of(text: ElementTree.Element) -> tuple[float, float, float, float]:
         ("3dof-15mm", ["chamber.diameter=20", "stack.balloons=1"]),
         ("1dof-10mm", ["chamber.diameter=100", "stack.balloons=1"]),
         ("radial-15mm", ["stack.balloons=3"]),
+        ("1dof-5mm", ["stack.balloons=1", "registration.method=ears"]),
+        ("3dof-15mm", ["chamber.count=7", "registration.method=ears"]),
     ],
 )
 def test_no_words_on_other_words_or_off_the_page(template: str, assignments: list[str]) -> None:
@@ -136,3 +138,29 @@ def test_no_words_on_other_words_or_off_the_page(template: str, assignments: lis
 def test_a_name_with_markup_is_escaped() -> None:
     laminate = replace(laminate_of("1dof-5mm"), name="a<b & c")
     assert "a<b & c" in words_of(stack_svg(laminate))
+
+
+def test_channel_pins_stand_where_they_hold_layers_between_base_and_cap() -> None:
+    rods = {rod.name: rod for rod in chamber_section(laminate_of("3dof-15mm")).rods}
+    assert rods["chamber1"].span == pytest.approx((-0.5, 0.5))
+    # The bottom balloon's upper two layers, and the middle stack, each in its own step; the
+    # separators round them, wider than a bore, are between the middle stack's ends.
+    assert rods["chamber1"].stacks == ((2, 3), (5, 58))
+    assert rods["lumen"].span == pytest.approx((-5.25, -3.25))
+    assert rods["chamber1"].words == "pin chamber1, steps 1, 3"
+    assert set(rods) == {"chamber1", "lumen"}
+
+
+def test_tails_run_on_to_their_pins() -> None:
+    laminate = laminate_of("1dof-5mm", "registration.method=ears")
+    section = chamber_section(laminate)
+    rods = {rod.name: rod for rod in section.rods}
+    # Overhang and bond past the tab; the chord of a pin of 1.5 that stands 0.45 off the plane.
+    centre, half = 8.25 + 0.5 + 0.75 + 0.75, (0.75**2 - 0.45**2) ** 0.5
+    assert rods["strip1"].span == pytest.approx((centre - half, centre + half))
+    assert rods["strip1"].stacks == ((2, 2),)
+    strip = next(slab.spans for slab in section.slabs if slab.layer.index == 2)
+    assert strip[-1] == pytest.approx((centre + half, centre + 1.5))
+    words = words_of(stack_svg(laminate))
+    assert {"pin strip1, steps 1, 2, 4", "pin chamber1, steps 1, 3", "tail 3.50"} <= set(words)
+    assert "dowel pin" in words

@@ -44,7 +44,9 @@ def bores(layers: Sequence[Layer], stated: float, lumen: float | None) -> list[O
 
 
 def tooling(layers: Sequence[Layer], pin_diameter: float, taken: Iterable[Point]) -> list[Opening]:
-    """Pin holes of ears: in most TPE layers, most separator masks or the sheet, nowhere else."""
+    """Pin holes of ears and tails: in most TPE layers, most separator masks, the sheet or the
+    lowest chamber mask, nowhere else.
+    """
     places = list(taken)
 
     def fits(hole: Contour) -> bool:
@@ -55,6 +57,7 @@ def tooling(layers: Sequence[Layer], pin_diameter: float, taken: Iterable[Point]
         [layer for layer in layers if layer.role in ("base", "wall", "cap")],
         [layer for layer in layers if layer.role == "separator-mask"],
         [layer for layer in layers if layer.role == "sheet"],
+        [layer for layer in layers if layer.role == "chamber-mask"][:1],
     )
     return [
         opening
