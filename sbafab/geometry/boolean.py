@@ -160,13 +160,15 @@ def chain(pieces: Sequence[Edge]) -> Region:
         if piece not in leaving[piece.start]:
             continue
         leaving[piece.start].remove(piece)
-        path = [piece]
+        path, place = [piece], {piece.start: 0}
         while path:
             here = path[-1].end
-            back = next((i for i, edge in enumerate(path) if edge.start == here), None)
+            back = place.get(here)
             if back is not None:
                 contour = tidy(path[back:])
                 contours += [contour] if contour is not None else []
+                for edge in path[back:]:
+                    del place[edge.start]
                 del path[back:]
                 continue
             options = leaving.get(here)
@@ -177,6 +179,7 @@ def chain(pieces: Sequence[Edge]) -> Region:
                 )
             follower = leftmost(path[-1], options)
             options.remove(follower)
+            place[here] = len(path)
             path.append(follower)
     return Region(tuple(sorted(contours, key=_reading_order)))
 

@@ -18,21 +18,22 @@ class EdgeIndex:
 
     def __init__(self, edges: Sequence[Edge]) -> None:
         self.edges = edges
-        boxes = [edge.bounds for edge in edges] or [(0.0, 0.0, 0.0, 0.0)]
+        self._boxes = [edge.bounds for edge in edges]
+        boxes = self._boxes or [(0.0, 0.0, 0.0, 0.0)]
         self._low = min(box[0] for box in boxes), min(box[1] for box in boxes)
-        high = max(box[2] for box in boxes), max(box[3] for box in boxes)
-        across = max(high[0] - self._low[0], high[1] - self._low[1])
-        self._cell = across / max(1.0, math.sqrt(len(edges))) or 1.0
-        self._reach = self._places((*self._low, *high))
+        self._high = max(box[2] for box in boxes), max(box[3] for box in boxes)
+        self.across = max(self._high[0] - self._low[0], self._high[1] - self._low[1])
+        self.cell = self.across / max(1.0, math.sqrt(len(edges))) or 1.0
+        self._reach = self._places((*self._low, *self._high))
         self._filed: dict[tuple[int, int], list[int]] = {}
-        for number, box in enumerate(boxes[: len(edges)]):
+        for number, box in enumerate(self._boxes):
             x0, y0, x1, y1 = self._places(box)
             for x in range(x0, x1 + 1):
                 for y in range(y0, y1 + 1):
                     self._filed.setdefault((x, y), []).append(number)
 
     def _places(self, box: Bounds) -> tuple[int, int, int, int]:
-        (x, y), cell = self._low, self._cell
+        (x, y), cell = self._low, self.cell
         return (
             math.floor((box[0] - x) / cell),
             math.floor((box[1] - y) / cell),
@@ -41,7 +42,7 @@ class EdgeIndex:
         )
 
     def touching(self, box: Bounds) -> Iterator[Edge]:
-        """Edges that may reach into a box: all that do, and a few that lie near it."""
+        """Edges whose bounding boxes meet a box."""
         return (self.edges[number] for number in self.numbers(box))
 
     def numbers(self, box: Bounds) -> Iterator[int]:
@@ -49,23 +50,26 @@ class EdgeIndex:
         x0, y0, x1, y1 = self._places(box)
         low_x, low_y, high_x, high_y = self._reach
         x0, y0, x1, y1 = max(x0, low_x), max(y0, low_y), min(x1, high_x), min(y1, high_y)
+        left, bottom, right, top = box
         seen: set[int] = set()
         for x in range(x0, x1 + 1):
             for y in range(y0, y1 + 1):
                 for number in self._filed.get((x, y), ()):
-                    if number not in seen:
-                        seen.add(number)
+                    if number in seen:
+                        continue
+                    seen.add(number)
+                    box = self._boxes[number]
+                    if box[0] <= right and box[2] >= left and box[1] <= top and box[3] >= bottom:
                         yield number
 
     def all_within(self, box: Bounds) -> bool:
         """Whether no edge reaches out of the box."""
-        x0, y0, x1, y1 = self._places(box)
-        low_x, low_y, high_x, high_y = self._reach
-        return x0 <= low_x and y0 <= low_y and x1 >= high_x and y1 >= high_y
+        (low_x, low_y), (high_x, high_y) = self._low, self._high
+        return box[0] <= low_x and box[1] <= low_y and box[2] >= high_x and box[3] >= high_y
 
     def distance(self, p: Point) -> float:
         """Least distance from ``p`` to any edge."""
-        margin = self._cell
+        margin = self.cell
         while True:
             box = widened((*p, *p), margin)
             least = min((distance_to(edge, p) for edge in self.touching(box)), default=math.inf)

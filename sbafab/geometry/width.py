@@ -12,24 +12,21 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, left_normal
+from sbafab.geometry.ends import ROUNDED, SMOOTH, tapered_ends
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Contour, Region
 
-SMOOTH = 1e-4
-"""Corners that turn by less, in radians, are none."""
 ALONGSIDE = 1e-3
 """Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
-TAPER = -math.cos(math.radians(30))
-"""Normals more opposed than this make the end of an arm a flat end."""
-ROUNDED = 0.1
-"""Degrees a corner may miss its angle by: coordinates read from a file are rounded."""
 TOUCH = 1e-6
 """mm within which two points are one."""
 STEP = math.radians(15)
 """Widest step of samples along an arc: 7.5 degrees aside a shift counts 0.99 of its length."""
-OPPOSED = -0.9
-"""Cosine between the normals of samples that still face each other (within 25 degrees)."""
+ASIDE = math.acos(0.9)
+"""Radians (25 degrees) that the normals of samples which still face each other may turn aside."""
+SQUARE = 0.05
+"""The same for edges square on each other: room for rounding, and for those alongside."""
 
 
 class Width(NamedTuple):
@@ -44,17 +41,18 @@ class Width(NamedTuple):
         return (self.start[0] + self.end[0]) / 2, (self.start[1] + self.end[1]) / 2
 
 
-def least_width(region: Region, sharp: float = 90.0) -> Width | None:
-    """The narrowest place of the material; None if no edge faces another.
+def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) -> Width | None:
+    """The narrowest place of the material, if under ``below`` mm; None if no edge faces another.
 
     A corner with an interior angle below ``sharp`` degrees has width 0.
     """
-    return _least(region.contours, sharp)
+    return _least(_Boundary(region.contours, sharp), below)
 
 
-def least_gap(region: Region, sharp: float = 90.0) -> Width | None:
-    """The narrowest slot, hole or gap between pieces; None if there is none."""
-    return _least([contour.reversed() for contour in region.contours], sharp)
+def least_gap(region: Region, sharp: float = 90.0, below: float = math.inf) -> Width | None:
+    """The narrowest slot, hole or gap between pieces, likewise."""
+    outside = [contour.reversed() for contour in region.contours]
+    return _least(_Boundary(outside, sharp), below)
 
 
 def facing_pairs(region: Region, slack: float, sharp: float = 90.0) -> list[Width]:
@@ -63,17 +61,18 @@ def facing_pairs(region: Region, slack: float, sharp: float = 90.0) -> list[Widt
     Besides the places where edges are square on each other they hold samples along edges that run
     nearly alongside: where a layer turns, those may become the narrowest.
     """
-    gathered = _Gathered([_side(edge) for edge in region.edges], slack)
-    pinch = _search(region.contours, sharp, gathered)
-    if pinch is not None:
-        return [Width(0.0, pinch, pinch)]
-    for a in gathered.sides:
+    boundary = _Boundary(region.contours, sharp)
+    least = _least(boundary, math.inf)
+    if least is None or least.value == 0.0:
+        return [] if least is None else [least]
+    gathered = _Gathered(boundary, least.value + slack)
+    _search(gathered)
+    for a in boundary.sides:
         samples = [_Foot(p, left_normal(a.edge, p)) for p in spread(a.edge)]
-        for j in gathered.near(a.box):
-            b = gathered.sides[j]
-            if a is not b and gathered.within_reach(a.box, b.box):
+        for _, b in gathered.near(a, ASIDE):
+            if a is not b:
                 _from_samples(samples, b, gathered)
-    return gathered.pairs
+    return list(gathered.found.values())
 
 
 def spread(edge: Edge) -> list[Point]:
@@ -93,7 +92,8 @@ class _Side(NamedTuple):
     edge: Edge
     box: Bounds
     middle: Point
-    half_cosine: float
+    normal: Point
+    half_turn: float
 
     def feet(self, p: Point) -> list[_Foot]:
         """Points of the edge where its normal passes through ``p``."""
@@ -114,10 +114,11 @@ class _Side(NamedTuple):
             return [_Foot(self.middle, left_normal(edge, self.middle))]
         inward = -1.0 if edge.ccw else 1.0
         mx, my = self.middle[0] - cx, self.middle[1] - cy
+        least = r * (math.cos(self.half_turn) - 1e-9)
         found = []
         for sign in (1.0, -1.0):
             vx, vy = sign * ux / distance, sign * uy / distance
-            if vx * mx + vy * my >= r * (self.half_cosine - 1e-9):
+            if vx * mx + vy * my >= least:
                 found.append(_Foot((cx + r * vx, cy + r * vy), (inward * vx, inward * vy)))
         return found
 
@@ -130,6 +131,20 @@ class _Corner(NamedTuple):
     leaving: Point
     turn: float
 
+    @property
+    def box(self) -> Bounds:
+        return (*self.point, *self.point)
+
+    @property
+    def normal(self) -> Point:
+        """The unit vector halfway between the normals of the two edges."""
+        (ux, uy), half = self.arriving, self.turn / 2
+        return -ux * math.sin(half) - uy * math.cos(half), ux * math.cos(half) - uy * math.sin(half)
+
+    @property
+    def half_turn(self) -> float:
+        return abs(self.turn) / 2
+
     def squarely(self, d: Point) -> bool:
         """Whether a reflex corner lies nearest, among its neighbours, to what ``d`` points at."""
         room = 1e-9 * math.hypot(*d)
@@ -139,14 +154,25 @@ class _Corner(NamedTuple):
         return _left(self.arriving), _left(self.leaving)
 
 
-class _Narrowest:
-    """Keeps the shortest segment offered that no edge crosses."""
+class _Boundary:
+    """Contours with the material on their left, made ready for the search."""
 
-    def __init__(self, sides: Sequence[_Side]) -> None:
-        self.sides = sides
-        self.index = EdgeIndex([side.edge for side in sides])
+    def __init__(self, contours: Sequence[Contour], sharp: float) -> None:
+        self.sides = [_side(edge) for contour in contours for edge in contour.edges]
+        self.index = EdgeIndex([side.edge for side in self.sides])
+        self.corners = [corner for contour in contours for corner in _corners(contour)]
+        """What corner each side starts at, if any."""
+        self.ends = [ends for contour in contours for ends in tapered_ends(contour, sharp)]
+        self.pinch = _pinch(contours, self.corners, sharp)
+
+
+class _Narrowest:
+    """Keeps the shortest segment offered, if below a length, that no edge crosses."""
+
+    def __init__(self, boundary: _Boundary, below: float) -> None:
+        self.boundary = boundary
         self.best: Width | None = None
-        self.value = math.inf
+        self.value = below
 
     def offer(self, p: Point, q: Point) -> None:
         value = math.dist(p, q)
@@ -160,21 +186,22 @@ class _Narrowest:
         if dx * nx + dy * ny > TOUCH and dx * mx + dy * my < -TOUCH:
             self.offer((px, py), (qx, qy))
 
-    def near(self, box: Bounds) -> Iterable[int]:
-        """Places in ``sides`` of those that a segment shorter than the best could join to it."""
-        if math.isinf(self.value):
-            return range(len(self.sides))
-        return self.index.numbers(widened(box, self.value))
+    def near(self, a: _Side | _Corner, aside: float) -> Iterator[tuple[int, _Side]]:
+        """Numbered sides that a segment shorter than the best could join to ``a``.
 
-    def within_reach(self, a: Bounds, b: Bounds) -> bool:
-        dx = max(a[0] - b[2], b[0] - a[2], 0.0)
-        dy = max(a[1] - b[3], b[1] - a[3], 0.0)
-        return dx < self.value and dy < self.value
+        Their normals are opposed somewhere, to within ``aside`` radians.
+        """
+        normal, turn = a.normal, a.half_turn + aside
+        for number in self.boundary.index.numbers(widened(a.box, self.value)):
+            side = self.boundary.sides[number]
+            room = turn + side.half_turn
+            if room > math.pi or _dot(normal, side.normal) < -math.cos(room):
+                yield number, side
 
     def _clear(self, p: Point, q: Point) -> bool:
         segment = Line(p, q)
         box = segment.bounds
-        for edge in self.index.touching(widened(box, TOUCH)):
+        for edge in self.boundary.index.touching(widened(box, 10 * TOUCH)):
             for m in meeting_points(segment, edge):
                 if math.dist(m, p) > 10 * TOUCH and math.dist(m, q) > 10 * TOUCH:
                     return False
@@ -182,23 +209,19 @@ class _Narrowest:
 
 
 class _Gathered(_Narrowest):
-    """Keeps every segment offered that is at most ``slack`` longer than the shortest."""
+    """Keeps every segment offered that is short enough, each once."""
 
-    def __init__(self, sides: Sequence[_Side], slack: float) -> None:
-        super().__init__(sides)
-        self.slack = slack
+    def __init__(self, boundary: _Boundary, below: float) -> None:
+        super().__init__(boundary, below)
         self.found: dict[tuple[Point, Point], Width] = {}
 
     def offer(self, p: Point, q: Point) -> None:
         value = math.dist(p, q)
+        if value > self.value:
+            return
         key = min((_rounded(p), _rounded(q)), (_rounded(q), _rounded(p)))
-        if value < self.value and key not in self.found and self._clear(p, q):
+        if key not in self.found and self._clear(p, q):
             self.found[key] = Width(value, p, q)
-            self.value = min(self.value, value + self.slack)
-
-    @property
-    def pairs(self) -> list[Width]:
-        return [width for width in self.found.values() if width.value <= self.value]
 
 
 def _rounded(p: Point) -> Point:
@@ -208,39 +231,43 @@ def _rounded(p: Point) -> Point:
 def _from_samples(samples: Iterable[_Foot], b: _Side, gathered: _Gathered) -> None:
     for here in samples:
         for foot in b.feet(here.point):
-            if _dot(here.normal, foot.normal) < OPPOSED:
+            if _dot(here.normal, foot.normal) < -math.cos(ASIDE):
                 gathered.offer_facing(here, foot)
 
 
-def _least(contours: Sequence[Contour], sharp: float) -> Width | None:
-    narrowest = _Narrowest([_side(edge) for contour in contours for edge in contour.edges])
-    pinch = _search(contours, sharp, narrowest)
-    return narrowest.best if pinch is None else Width(0.0, pinch, pinch)
+def _least(boundary: _Boundary, below: float) -> Width | None:
+    if boundary.pinch is not None:
+        return Width(0.0, boundary.pinch, boundary.pinch)
+    # Most edges lie far apart: those are looked at only where no near ones face.
+    reach, farthest = boundary.index.cell, min(below, 2 * boundary.index.across)
+    while True:
+        narrowest = _Narrowest(boundary, min(reach, farthest))
+        _search(narrowest)
+        if narrowest.best is not None or reach >= farthest:
+            return narrowest.best
+        reach *= 4
 
 
-def _search(contours: Sequence[Contour], sharp: float, narrowest: _Narrowest) -> Point | None:
-    """Offers every facing place; instead, returns where the material is pinched to nothing."""
-    corners = [corner for contour in contours for corner in _corners(contour)]
-    pinch = _pinch(contours, corners, sharp)
-    if pinch is not None:
-        return pinch
-    sides = narrowest.sides
-    for i, a in enumerate(sides):
-        for j in narrowest.near(a.box):
-            if j > i and narrowest.within_reach(a.box, sides[j].box):
-                _between_edges(a, sides[j], narrowest)
-    _at_corners(corners, sides, narrowest)
-    for contour in contours:
-        _flat_ends(contour, narrowest)
-    return None
+def _search(narrowest: _Narrowest) -> None:
+    """Offers every place where edges or corners face each other."""
+    boundary = narrowest.boundary
+    for i, a in enumerate(boundary.sides):
+        for j, b in narrowest.near(a, SQUARE):
+            if j > i:
+                _between_edges(a, b, narrowest)
+    _at_corners(boundary.corners, narrowest)
+    for p, q in boundary.ends:
+        narrowest.offer(p, q)
 
 
 def _side(edge: Edge) -> _Side:
-    cosine = math.cos(edge.sweep / 2) if isinstance(edge, Arc) else 0.0
-    return _Side(edge, edge.bounds, edge.at(0.5), cosine)
+    middle = edge.at(0.5)
+    half_turn = abs(edge.sweep) / 2 if isinstance(edge, Arc) else 0.0
+    return _Side(edge, edge.bounds, middle, left_normal(edge, middle), half_turn)
 
 
-def _corners(contour: Contour) -> Iterator[_Corner]:
+def _corners(contour: Contour) -> Iterator[_Corner | None]:
+    """The corner that each edge starts at; None where the path is smooth."""
     edges = contour.edges
     for before, after in zip((edges[-1], *edges), edges, strict=False):
         u, v = before.direction(after.start), after.direction(after.start)
@@ -248,8 +275,7 @@ def _corners(contour: Contour) -> Iterator[_Corner]:
         if abs(turn) > math.pi - SMOOTH:
             # At a cusp only the curvatures tell which side the material is on.
             turn = math.pi if _curvature(before) + _curvature(after) < 0 else -math.pi
-        if abs(turn) > SMOOTH:
-            yield _Corner(after.start, u, v, turn)
+        yield _Corner(after.start, u, v, turn) if abs(turn) > SMOOTH else None
 
 
 def _curvature(edge: Edge) -> float:
@@ -258,10 +284,12 @@ def _curvature(edge: Edge) -> float:
     return (1.0 if edge.ccw else -1.0) / edge.radius
 
 
-def _pinch(contours: Iterable[Contour], corners: Iterable[_Corner], sharp: float) -> Point | None:
+def _pinch(
+    contours: Iterable[Contour], corners: Iterable[_Corner | None], sharp: float
+) -> Point | None:
     """A corner sharper than allowed, or a point where the boundary meets itself."""
     for corner in corners:
-        if math.degrees(math.pi - corner.turn) < sharp - ROUNDED:
+        if corner is not None and math.degrees(math.pi - corner.turn) < sharp - ROUNDED:
             return corner.point
     seen: set[Point] = set()
     for contour in contours:
@@ -311,19 +339,24 @@ def _along_each_other(a: _Side, b: _Side, narrowest: _Narrowest) -> None:
                 narrowest.offer_facing(here, foot)
 
 
-def _at_corners(corners: Sequence[_Corner], sides: Sequence[_Side], narrowest: _Narrowest) -> None:
-    for corner in corners:
-        x, y = corner.point
-        for j in narrowest.near((x, y, x, y)):
-            if narrowest.within_reach((x, y, x, y), sides[j].box):
-                for foot in sides[j].feet(corner.point):
-                    _corner_to_edge(corner, sides[j], foot, narrowest)
-    reflex = [corner for corner in corners if corner.turn < 0]
-    for i, a in enumerate(reflex):
-        for b in reflex[i + 1 :]:
-            d = (b.point[0] - a.point[0], b.point[1] - a.point[1])
-            if a.squarely(d) and b.squarely((-d[0], -d[1])):
-                narrowest.offer(a.point, b.point)
+def _at_corners(corners: Sequence[_Corner | None], narrowest: _Narrowest) -> None:
+    for i, corner in enumerate(corners):
+        if corner is None:
+            continue
+        # What a convex corner faces may be square on neither of its edges.
+        aside = SQUARE if corner.turn < 0 else math.pi / 2
+        for j, side in narrowest.near(corner, aside):
+            for foot in side.feet(corner.point):
+                _corner_to_edge(corner, side, foot, narrowest)
+            other = corners[j] if j > i else None
+            if other is not None and corner.turn < 0 and other.turn < 0:
+                _between_corners(corner, other, narrowest)
+
+
+def _between_corners(a: _Corner, b: _Corner, narrowest: _Narrowest) -> None:
+    d = (b.point[0] - a.point[0], b.point[1] - a.point[1])
+    if a.squarely(d) and b.squarely((-d[0], -d[1])):
+        narrowest.offer(a.point, b.point)
 
 
 def _corner_to_edge(corner: _Corner, side: _Side, foot: _Foot, narrowest: _Narrowest) -> None:
@@ -339,18 +372,6 @@ def _corner_to_edge(corner: _Corner, side: _Side, foot: _Foot, narrowest: _Narro
         _dot(normal, foot.normal) < 0 < _dot(normal, d) for normal in corner.normals()
     ):
         narrowest.offer(corner.point, foot.point)
-
-
-def _flat_ends(contour: Contour, narrowest: _Narrowest) -> None:
-    """The ends of arms that taper: an edge between two convex corners whose neighbours face."""
-    edges = contour.edges
-    for i, edge in enumerate(edges):
-        before, after = edges[i - 1], edges[(i + 1) % len(edges)]
-        u, v = before.direction(edge.start), edge.direction(edge.start)
-        w, x = edge.direction(edge.end), after.direction(edge.end)
-        convex = u[0] * v[1] - u[1] * v[0] > SMOOTH and w[0] * x[1] - w[1] * x[0] > SMOOTH
-        if convex and _dot(u, x) < TAPER:
-            narrowest.offer(edge.start, edge.end)
 
 
 def _dot(a: Point, b: Point) -> float:

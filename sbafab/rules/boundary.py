@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from sbafab.geometry.boolean import PointPool, split_edges
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, left_normal
+from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal
 from sbafab.geometry.intersect import line_circle
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Region
@@ -62,11 +62,22 @@ def outward_reach(edge: Edge, others: EdgeIndex) -> Reach | None:
     band = _line_band(edge) if isinstance(edge, Line) else _arc_band(edge)
     margin = 1.0
     while True:
-        box = widened(edge.bounds, margin)
-        best = _nearest(band, others.touching(box))
-        if (best is not None and best.value <= margin) or others.all_within(box):
+        best = _nearest(band, others.touching(_swept(edge, margin)))
+        if best is not None and best.value <= margin:
             return best
+        if others.all_within(widened(edge.bounds, margin)):
+            return _nearest(band, others.edges)
         margin *= 4
+
+
+def _swept(edge: Edge, distance: float) -> Bounds:
+    """A box round what the edge sweeps when it moves ``distance`` along its right-hand normal."""
+    moved = edge.offset(distance)
+    if moved is None:
+        return widened(edge.bounds, distance)
+    one, other = edge.bounds, moved.bounds
+    low = min(one[0], other[0]), min(one[1], other[1])
+    return widened((*low, max(one[2], other[2]), max(one[3], other[3])), END_ROOM)
 
 
 def _nearest(within: _Band, others: Iterable[Edge]) -> Reach | None:
@@ -171,13 +182,13 @@ def outward_samples(
     Edges farther off than ``within`` may be left out.
     """
     room = END_ROOM / edge.length
-    near = list(others.touching(widened(edge.bounds, within)))
     for p in spread(edge):
         start = edge.at(min(1 - room, max(room, edge.parameter(p))))
         nx, ny = left_normal(edge, start)
         outward = (-nx, -ny)
+        end = (start[0] - nx * within, start[1] - ny * within)
         best: Reach | None = None
-        for other in near:
+        for other in others.touching(widened(Line(start, end).bounds, END_ROOM)):
             for q in _on_ray(start, outward, other):
                 height = (q[0] - start[0]) * outward[0] + (q[1] - start[1]) * outward[1]
                 if height > -EPSILON and (best is None or height < best.value):

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
+from sbafab.geometry.beam import beam_path, place_of, widths
 from sbafab.geometry.boolean import GeometryError
-from sbafab.geometry.offset import grow
-from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width, least_gap, least_width
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.rules.finding import Finding, Place
@@ -30,13 +30,11 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     lost = _lost_to_kerf(laminate, limits)
     if lost is not None:
         return [lost]
-    features = [
-        feature for layers in laminate.patterns.values() for feature in _features(layers[0])
-    ]
-    if not features:
+    finest = _finest(laminate)
+    if finest is None:
         message = "no layer has a web, slot or gap"
         return [Finding(NAME, "pass", limit, None, "mm", Place(), message)]
-    layer, kind, width = min(features, key=lambda feature: feature.width.value)
+    layer, kind, width = finest
     good = holds(width.value, limit)
     message = (
         f"the finest feature is a {kind} of {width.value:.3f} mm in layer {layer.index} "
@@ -48,10 +46,16 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     return [Finding(NAME, "pass" if good else "fail", limit, width.value, "mm", place, message)]
 
 
-def _features(layer: Layer) -> list[_Feature]:
-    web, slot = least_width(layer.profile, SHARP), least_gap(layer.profile, SHARP)
-    found = (("web", web), ("slot or hole", slot))
-    return [_Feature(layer, kind, width) for kind, width in found if width is not None]
+def _finest(laminate: Laminate) -> _Feature | None:
+    """The narrowest web or slot of all layers; wider ones than are known are not looked for."""
+    finest: _Feature | None = None
+    for layers in laminate.patterns.values():
+        for kind, least in (("web", least_width), ("slot or hole", least_gap)):
+            below = finest.width.value if finest else math.inf
+            width = least(layers[0].profile, SHARP, below)
+            if width is not None and (finest is None or width.value < below):
+                finest = _Feature(layers[0], kind, width)
+    return finest
 
 
 def _lost_to_kerf(laminate: Laminate, limits: Limits) -> Finding | None:
@@ -59,21 +63,23 @@ def _lost_to_kerf(laminate: Laminate, limits: Limits) -> Finding | None:
     for layers in laminate.patterns.values():
         layer = layers[0]
         kerf = limits.kerf.get(layer.film.material, 0.0)
-        if kerf > 0 and not _keeps_contours(layer.profile, kerf / 2):
-            message = (
-                f"layer {layer.index} ({layer.name}) loses or joins a hole or piece when its cut "
-                f"path is moved by half the kerf of {kerf:g} mm; widen what is narrower than the "
-                "kerf"
-            )
-            place = Place(None, (layer.index,))
-            return Finding(NAME, "fail", kerf, None, "mm", place, message)
+        if max(widths(kerf)) == 0:
+            continue
+        place, what = Place(None, (layer.index,)), "loses or joins a hole or piece"
+        try:
+            lost = beam_path(layer.profile, kerf).lost
+            if lost is None:
+                continue
+            spot = place_of(layer.profile, lost, kerf)
+            place = Place(None, (layer.index,), *spot)
+            kind = "hole" if lost.contour.is_hole else "outline"
+            what = f"has a {kind} that {lost.fate} at {at(spot)}"
+        except GeometryError:
+            pass
+        width = " x ".join(f"{w:g}" for w in dict.fromkeys(widths(kerf)))
+        message = (
+            f"layer {layer.index} ({layer.name}) {what} when its cut path is moved by half the "
+            f"kerf of {width} mm; widen what is narrower than the kerf"
+        )
+        return Finding(NAME, "fail", max(widths(kerf)), None, "mm", place, message)
     return None
-
-
-def _keeps_contours(profile: Region, distance: float) -> bool:
-    try:
-        path = grow(profile, distance)
-    except GeometryError:
-        return False
-    same_pieces = len(path.outers) == len(profile.outers)
-    return same_pieces and len(path.holes) == len(profile.holes)

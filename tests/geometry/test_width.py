@@ -170,3 +170,34 @@ def test_erosion_by_half_the_width_breaks_the_plate(seed: int) -> None:
 
     assert boundaries(0.99) == len(region.contours)
     assert boundaries(1.01) != len(region.contours)
+
+
+def test_only_what_is_narrower_than_asked_for_is_found() -> None:
+    bar = rectangle(AXIS, (4.0, 1.0))
+    assert least_width(bar, 15.0, 1.0) is None
+    found = least_width(bar, 15.0, 1.01)
+    assert found is not None
+    assert found.value == pytest.approx(1.0, abs=EXACT)
+    slit = rectangle((-5, -5), (5, 5)) - rectangle((0.0, -1.0), (0.15, 1.0))
+    assert least_gap(slit, 15.0, 0.1) is None
+    assert least_gap(slit, 15.0, 0.2) is not None
+
+
+def test_the_least_width_of_a_finely_drawn_ring_is_found_among_far_and_near_edges() -> None:
+    """Two polygons of 180 sides about one centre are nearest where their flats lie side by side."""
+
+    def ring(radius: float) -> Region:
+        return polygon(
+            [
+                (radius * math.cos(k * math.pi / 90), radius * math.sin(k * math.pi / 90))
+                for k in range(180)
+            ]
+        )
+
+    width = least_width(ring(6.0) - ring(5.0), 15.0)
+    gap = least_gap(ring(6.0) - ring(5.0), 15.0)
+    flat = math.cos(math.pi / 180)
+    assert width is not None
+    assert width.value == pytest.approx(flat, abs=EXACT)
+    assert gap is not None
+    assert gap.value == pytest.approx(10.0 * flat, abs=EXACT)

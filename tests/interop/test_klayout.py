@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -9,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 
 from sbafab.actuators import build, load_design
+from sbafab.geometry.offset import fillet
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, polygon, rectangle, strip
 from sbafab.geometry.width import least_gap, least_width
@@ -52,6 +54,22 @@ def test_both_measure_the_slot_between_two_pieces() -> None:
     assert found is not None
     assert found.ours == pytest.approx(0.4)
     assert found.theirs == pytest.approx(0.4, abs=TOLERANCE)
+
+
+@pytest.mark.parametrize("bottom", [0.1, 0.8])
+def test_both_measure_a_slot_that_tapers_to_a_rounded_bottom(bottom: float) -> None:
+    """Fillets of 0.3 meet in a bottom of 0.1; between them some of a bottom of 0.8 is left."""
+    lean, tall = math.radians(6.0), 8.0
+    half = bottom / 2 + tall * math.tan(lean)
+    slot = polygon([(0.0, -bottom / 2), (tall, -half), (tall, half), (0.0, bottom / 2)])
+    region = fillet(rectangle((-2.0, -4.0), (6.0, 4.0)) - slot, 0.3)
+    found = compared("slot", region, 1, least_gap(region, 15.0))
+    expected = 0.6 * math.cos(lean)
+    if bottom > expected:
+        expected = bottom + 0.6 * math.tan((math.pi / 2 - lean) / 2) * math.sin(lean)
+    assert found is not None
+    assert found.ours == pytest.approx(expected)
+    assert found.agrees, found
 
 
 @settings(max_examples=6)

@@ -12,6 +12,7 @@ from sbafab.output.run import generate
 def test_a_tab_no_longer_than_its_fillet_is_found_as_built(tmp_path: Path) -> None:
     short = ["stack.balloons=2", "inlet.tab_length=1.0", "fillet.radius=1.0"]
     wide = ["chamber.width=25.5", "chamber.length=8", "tube.outer_diameter=47", "chamber.count=1"]
-    run = generate(load_design("radial-15mm", [*short, *wide]), tmp_path, ["cut"])
+    film = "sheets.tpe.width=200"
+    run = generate(load_design("radial-15mm", [*short, *wide, film]), tmp_path, ["cut"])
     assert not run.failed
     assert [finding.rule for finding in check_folder(run.folder) if finding.verdict == "fail"] == []

@@ -1,0 +1,86 @@
+"""The ends of arms that taper: nothing stands square on both sides there, yet they are narrow.
+
+An end lies between two flanks that come together towards it: a rounded corner, or an edge between
+two bends, each a corner or its fillet. It is as wide as its flanks are apart where they stop.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+from sbafab.geometry.edges import Arc, Edge, Point
+from sbafab.geometry.region import Contour, same_support
+
+SMOOTH = 1e-4
+"""Corners that turn by less, in radians, are none."""
+TAPER = 30.0
+"""Degrees; flanks at a wider angle are two sides of a corner, not of an arm."""
+ROUNDED = 0.1
+"""Degrees a corner may miss its angle by: coordinates read from a file are rounded."""
+
+
+class _Run(NamedTuple):
+    """Consecutive edges on one line or circle, and how far they turn (radians, left positive)."""
+
+    first: Edge
+    last: Edge
+    sweep: float
+
+    @property
+    def radius(self) -> float:
+        return self.first.radius if isinstance(self.first, Arc) else math.inf
+
+    def corner(self, after: _Run) -> float:
+        """How far the path turns from this run to the next."""
+        ux, uy = self.last.direction(self.last.end)
+        vx, vy = after.first.direction(after.first.start)
+        return math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
+
+    def is_fillet(self, bottom: _Run) -> bool:
+        """Whether it rounds a corner of the run beside it, which turns less tightly."""
+        return self.sweep > 0 and (bottom.sweep <= 0 or self.radius < bottom.radius)
+
+
+def tapered_ends(contour: Contour, sharp: float) -> Iterator[tuple[Point, Point]]:
+    """Where the flanks of every end of an arm stop, in a contour with the arm on its left.
+
+    A rounded corner is an end where the corner itself would have less than ``sharp`` degrees.
+    """
+    runs = _runs(contour)
+    for i, run in enumerate(runs):
+        before, after = runs[i - 1], runs[(i + 1) % len(runs)]
+        into, out = before.corner(run), run.corner(after)
+        # A round end that turns further is wider than between its flanks.
+        if abs(into) < SMOOTH and abs(out) < SMOOTH and run.sweep < math.pi + SMOOTH:
+            yield from _between_flanks(runs, i, i, min(TAPER, sharp - ROUNDED))
+        start = i - 1 if abs(into) < SMOOTH and before.is_fillet(run) else i
+        stop = i + 1 if abs(out) < SMOOTH and after.is_fillet(run) else i
+        if (start < i or into > SMOOTH) and (stop > i or out > SMOOTH):
+            yield from _between_flanks(runs, start, stop, TAPER)
+
+
+def _runs(contour: Contour) -> list[_Run]:
+    edges = contour.edges
+    breaks = [i for i in range(len(edges)) if not same_support(edges[i - 1], edges[i])]
+    runs = []
+    for first, after in zip(breaks, [*breaks[1:], *breaks[:1]], strict=True):
+        own = edges[first:after] if first < after else edges[first:] + edges[:after]
+        sweep = sum(edge.sweep for edge in own if isinstance(edge, Arc))
+        runs.append(_Run(own[0], own[-1], sweep))
+    return runs
+
+
+def _between_flanks(
+    runs: Sequence[_Run], start: int, stop: int, taper: float
+) -> Iterator[tuple[Point, Point]]:
+    """The ends of the path along runs ``start`` to ``stop``, if it turns back between flanks."""
+    if stop - start + 3 > len(runs):
+        return
+    path = [runs[i % len(runs)] for i in range(start - 1, stop + 2)]
+    turn = sum(run.sweep for run in path[1:-1])
+    turn += sum(before.corner(after) for before, after in pairwise(path))
+    if abs(turn - math.pi) < math.radians(taper):
+        yield path[1].first.start, path[-2].last.end

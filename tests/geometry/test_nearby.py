@@ -1,0 +1,69 @@
+"""Edges filed by place, against a look at every one of them."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import pytest
+
+from sbafab.geometry.edges import Arc, Bounds, Edge, Line, distance_to
+from sbafab.geometry.nearby import EdgeIndex
+
+
+def scattered(seed: int) -> list[Edge]:
+    draw = random.Random(seed)
+    edges: list[Edge] = []
+    for _ in range(60):
+        x, y = draw.uniform(0, 20), draw.uniform(0, 10)
+        turn, length = draw.uniform(0, math.tau), draw.choice([0.1, 1.0, 8.0])
+        end = (x + length * math.cos(turn), y + length * math.sin(turn))
+        if draw.random() < 0.5:
+            edges.append(Line((x, y), end))
+        else:
+            middle = ((x + end[0]) / 2, (y + end[1]) / 2)
+            edges.append(Arc((x, y), end, middle, length / 2, True))
+    return edges
+
+
+def meet(a: Bounds, b: Bounds) -> bool:
+    return a[0] <= b[2] and b[0] <= a[2] and a[1] <= b[3] and b[1] <= a[3]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_index_gives_the_edges_whose_boxes_meet_each_once(seed: int) -> None:
+    edges = scattered(seed)
+    index = EdgeIndex(edges)
+    draw = random.Random(seed + 100)
+    for _ in range(40):
+        x, y, size = draw.uniform(-5, 25), draw.uniform(-5, 15), draw.choice([0.0, 0.5, 30.0])
+        box = (x, y, x + size, y + size)
+        expected = [number for number, edge in enumerate(edges) if meet(edge.bounds, box)]
+        assert sorted(index.numbers(box)) == expected
+        inside = all(
+            box[0] <= low_x and box[1] <= low_y and high_x <= box[2] and high_y <= box[3]
+            for low_x, low_y, high_x, high_y in (edge.bounds for edge in edges)
+        )
+        assert index.all_within(box) == inside
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_distance_is_that_of_the_nearest_edge(seed: int) -> None:
+    edges = scattered(seed)
+    index = EdgeIndex(edges)
+    draw = random.Random(seed + 200)
+    for _ in range(40):
+        p = draw.uniform(-30, 50), draw.uniform(-30, 40)
+        assert index.distance(p) == pytest.approx(min(distance_to(edge, p) for edge in edges))
+
+
+def test_the_distance_to_a_single_edge_is_found_from_anywhere() -> None:
+    index = EdgeIndex([Line((0.0, 0.0), (1.0, 0.0))])
+    for x, y, expected in ((0.5, 3.0, 3.0), (-1.9, 0.0, 1.9), (5.0, 3.0, 5.0), (0.2, -0.1, 0.1)):
+        assert index.distance((x, y)) == pytest.approx(expected)
+
+
+def test_an_empty_index_holds_nothing() -> None:
+    index = EdgeIndex([])
+    assert list(index.numbers((-1.0, -1.0, 1.0, 1.0))) == []
+    assert index.distance((0.0, 0.0)) == math.inf
