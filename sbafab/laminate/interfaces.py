@@ -75,6 +75,6 @@ def interface_regions(
     below: Region, above: Region, masks: Sequence[Region]
 ) -> tuple[Region, Region, Region, Region]:
     """Mask, contact, bond and unbonded region of two TPE profiles with masks between."""
-    mask = union(masks) if masks else Region()
+    mask = union(masks)
     contact = below & above
     return mask, contact, contact - mask, contact & mask

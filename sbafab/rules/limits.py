@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from sbafab.geometry.beam import Kerf
 from sbafab.geometry.edges import Point
 
 TOLERANCE = 0.001
@@ -29,17 +30,17 @@ class Tolerances:
 class Limits:
     """A design's limits, mm; the defaults are the paper's (Sec. 2).
 
-    ``least_feature`` is the laser's, ``kerf`` the full kerf width by material (none given: not
-    calibrated), ``waive`` the rules whose failure the user accepts by name. The ``worst_`` limits
-    are for what is left of bond and overhang under the ``tolerances``; ``target_yield`` is the
-    share of ``yield_builds`` random builds that must keep them (None: none asked for; for the
-    builds: as many as are quick).
+    ``least_feature`` is the laser's, ``kerf`` the full kerf width by material, or that along x and
+    along y (none given: not calibrated), ``waive`` the rules whose failure the user accepts by
+    name. The ``worst_`` limits are for what is left of bond and overhang under the ``tolerances``;
+    ``target_yield`` is the share of ``yield_builds`` random builds that must keep them (None: none
+    asked for; for the builds: as many as are quick).
     """
 
     bond_width: float = 0.75
     mask_overhang: float = 0.5
     least_feature: float = 0.2
-    kerf: Mapping[str, float] = field(default_factory=dict)
+    kerf: Mapping[str, Kerf] = field(default_factory=dict)
     heated_width: float = 152.4
     heated_length: float = 152.4
     validated_balloons: int = 20
@@ -59,4 +60,4 @@ def holds(measured: float, limit: float) -> bool:
 
 def at(p: Point) -> str:
     """A point as messages print it."""
-    return f"x {p[0] + 0.0:.3f}, y {p[1] + 0.0:.3f}"
+    return f"x {round(p[0], 3) + 0.0:.3f}, y {round(p[1], 3) + 0.0:.3f}"

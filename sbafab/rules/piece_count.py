@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.laminate import Laminate
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits
 
@@ -12,7 +12,7 @@ NAME = "piece-count"
 def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     """The largest departure of any layer's number of pieces from the one it should have."""
     del limits
-    counts = {name: _count(layers[0]) for name, layers in laminate.patterns.items()}
+    counts = {name: len(layers[0].profile.pieces) for name, layers in laminate.patterns.items()}
     worst = max(laminate.layers, key=lambda layer: abs(counts[layer.pattern] - layer.pieces))
     count = counts[worst.pattern]
     off = abs(count - worst.pieces)
@@ -36,7 +36,3 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     )
     place = Place(None, (worst.index,), x, y)
     return [Finding(NAME, "fail", 0.0, float(off), "pieces", place, message)]
-
-
-def _count(layer: Layer) -> int:
-    return 0 if layer.profile.is_empty else len(layer.profile.pieces)

@@ -179,7 +179,7 @@ def _leak(
     last, foreign = path[step - 1], path[step]
     p = graph.joins[last][foreign]
     pocket = next(void for void in reversed(path[:step]) if void.kind == "pocket")
-    interface = last.level if last.kind in ("pocket", "gap") else pocket.level
+    interface = last.level if last.kind == "gap" else pocket.level
     where = f"layer {last.level}" if last.kind == "opening" else f"interface {interface}"
     if foreign.kind == "separator":
         what = f"into the slit between two balloons at interface {foreign.level}"

@@ -108,7 +108,7 @@ def void_graph(laminate: Laminate) -> VoidGraph:
 
 
 def _gap(interface: Interface, frame: Region) -> _Gap:
-    unbonded = interface.unbonded.pieces if not interface.unbonded.is_empty else ()
+    unbonded = interface.unbonded.pieces
     missing = (frame - interface.contact).pieces
     touching = []
     for number, piece in enumerate(unbonded):

@@ -11,6 +11,7 @@ from shapely.geometry import Polygon
 from svgelements import Arc, Move, Path
 
 from sbafab.actuators import build, load_design
+from sbafab.geometry.shapes import rectangle
 from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.picture import laminate_svg, layer_svg
 
@@ -65,9 +66,28 @@ def test_the_profile_lies_inside_the_view(laminate: Laminate) -> None:
     assert -low_y < y + height
 
 
+def test_the_view_has_a_margin_of_three_hundredths(laminate: Laminate) -> None:
+    # Its bounds are off the axis both ways: 20 x 10 mm, a margin of 0.6 all round.
+    layer = replace(laminate.layer(1), profile=rectangle((5.0, 30.0), (25.0, 40.0)))
+    root = ElementTree.fromstring(layer_svg(layer))
+    box = [float(part) for part in root.attrib["viewBox"].split()]
+    assert box == pytest.approx([4.4, -40.6, 21.2, 11.2])
+    [group] = root.iter(f"{SVG}g")
+    # A line of 0.3 mm as shown, where 21.2 mm are 80 mm wide.
+    assert float(group.attrib["stroke-width"]) == pytest.approx(0.3 * 21.2 / 80, rel=1e-4)
+
+
+def test_only_the_laminate_is_see_through(laminate: Laminate) -> None:
+    [alone] = ElementTree.fromstring(layer_svg(laminate.layer(1))).iter(f"{SVG}path")
+    assert float(alone.attrib["fill-opacity"]) == 1.0
+    for path in ElementTree.fromstring(laminate_svg(laminate)).iter(f"{SVG}path"):
+        assert 0.2 < float(path.attrib["fill-opacity"]) < 0.8
+
+
 def test_a_laminate_shows_each_pattern_once(laminate: Laminate) -> None:
     root = ElementTree.fromstring(laminate_svg(laminate))
     assert len(list(root.iter(f"{SVG}path"))) == len(laminate.patterns)
+    assert not any(node.tail for node in root.iter(f"{SVG}path"))
 
 
 def test_a_name_with_markup_is_escaped(laminate: Laminate) -> None:

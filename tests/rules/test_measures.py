@@ -116,6 +116,8 @@ def test_a_flush_mask_without_a_pin_fails(good: Good, spoil: Spoil) -> None:
 
 UP = Line((0.0, 0.0), (0.0, 4.0))
 """Its right-hand normal points along x."""
+ALONG = Line((0.0, 0.0), (4.0, 0.0))
+"""Its right-hand normal points down y."""
 QUARTER = Arc((2.0, 0.0), (0.0, 2.0), AXIS, 2.0, True)
 REACHES: list[tuple[Edge, Edge, float | None]] = [
     (UP, Line((1.5, -1.0), (1.5, 5.0)), 1.5),
@@ -130,6 +132,12 @@ REACHES: list[tuple[Edge, Edge, float | None]] = [
     (QUARTER, circle((4.0, 3.0), 1.0).edges[2], 2.0),
     (QUARTER.reversed(), circle(AXIS, 1.25).edges[0], 0.75),
     (QUARTER.reversed(), Line((-1.0, 0.5), (5.0, 0.5)), 1.5),
+    (QUARTER.reversed(), circle((0.5, 0.5), 0.5).edges[0], 1.5 - 0.5**0.5),
+    # Slanting away from a side of the band, or from its end: nearest on that side.
+    (QUARTER, Line((3.0, -2.0), (5.0, 2.0)), 2.0),
+    (QUARTER, Line((-2.0, 3.0), (2.0, 5.0)), 2.0),
+    (ALONG, Line((-1.0, -1.0), (1.0, -3.0)), 2.0),
+    (ALONG, Line((5.0, -1.0), (3.0, -3.0)), 2.0),
 ]
 
 

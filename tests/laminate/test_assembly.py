@@ -1,0 +1,105 @@
+"""The paper's four steps (Sec. 2): which stacks meet in which step, and on which pins."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from sbafab.actuators import build, load_design
+from sbafab.geometry.shapes import disc
+from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers
+from sbafab.laminate.laminate import Laminate, Pin
+
+AXIS = (0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def laminate() -> Laminate:
+    return build(load_design("1dof-5mm", ["stack.balloons=3"]))
+
+
+def told(step: AssemblyStep) -> tuple[object, ...]:
+    return (
+        step.number,
+        step.name,
+        step.bond,
+        step.stacks,
+        step.adds,
+        [pin.name for pin in step.pins],
+    )
+
+
+def test_three_balloons_take_four_steps(laminate: Laminate) -> None:
+    middle = (4, 5, 6, 7, 8, 9, 10)
+    assert [told(step) for step in assembly(laminate)] == [
+        (1, "flash_bottom", "flash", ((2, 3),), (2, 3), ["chamber1"]),
+        (2, "bond_bottom", "full", ((1,), (2, 3)), (1,), []),
+        (3, "flash_middle", "flash", (middle,), middle, ["chamber1"]),
+        (4, "bond_all", "full", ((1, 2, 3), middle, (11,)), (11,), []),
+    ]
+
+
+def test_a_balloon_alone_takes_two(laminate: Laminate) -> None:
+    single = replace(laminate, layers=laminate.layers[:3])
+    assert [told(step) for step in assembly(single)] == [
+        (1, "flash_bottom", "flash", ((2, 3),), (2, 3), ["chamber1"]),
+        (2, "bond_bottom", "full", ((1,), (2, 3)), (1,), []),
+    ]
+
+
+def test_what_lies_under_the_base_joins_last() -> None:
+    radial = build(load_design("radial-15mm", ["stack.balloons=2"]))
+    channels = ["channel1", "channel2", "channel3"]
+    # Sheet and its separator below the base, which is the third layer.
+    assert [told(step) for step in assembly(radial)] == [
+        (1, "flash_bottom", "flash", ((4, 5),), (4, 5), channels),
+        (2, "bond_bottom", "full", ((3,), (4, 5)), (3,), []),
+        (3, "flash_middle", "flash", ((6, 7, 8),), (6, 7, 8), channels),
+        (4, "bond_all", "full", ((1, 2), (3, 4, 5), (6, 7, 8), (9,)), (1, 2, 9), []),
+    ]
+
+
+def test_layers_without_a_base_start_from_the_lowest_film(laminate: Laminate) -> None:
+    walls = replace(
+        laminate,
+        layers=tuple(replace(layer, index=i) for i, layer in enumerate(laminate.layers[4:7], 1)),
+    )
+    assert [step.stacks for step in assembly(walls)] == [((2, 3),), ((1,), (2, 3))]
+
+
+def test_a_steps_layers_are_those_of_its_stacks(laminate: Laminate) -> None:
+    assert [step.layers for step in assembly(laminate)] == [
+        (2, 3),
+        (1, 2, 3),
+        (4, 5, 6, 7, 8, 9, 10),
+        tuple(range(1, 12)),
+    ]
+
+
+def test_a_pin_that_a_film_covers_stays_out(laminate: Laminate) -> None:
+    layers = list(laminate.layers)
+    layers[2] = replace(layers[2], profile=disc(AXIS, 3.25), pattern="closed")
+    closed = replace(laminate, layers=tuple(layers))
+    assert [len(step.pins) for step in assembly(closed)] == [0, 0, 1, 0]
+
+
+def test_a_pin_that_holds_nothing_stays_out(laminate: Laminate) -> None:
+    # Beside all layers: no film is in its way, and none has a hole for it.
+    beside = replace(laminate, pins=(*laminate.pins, Pin("beside", (50.0, 0.0), 1.0)))
+    assert [len(step.pins) for step in assembly(beside)] == [1, 0, 1, 0]
+
+
+def test_pins_of_ears_are_in_every_time(laminate: Laminate) -> None:
+    holed = [
+        replace(layer, profile=layer.profile - disc((2.0, 1.0), 0.5), pattern=f"e{layer.index}")
+        for layer in laminate.layers
+    ]
+    ear = Pin("ear", (2.0, 1.0), 1.0)
+    eared = replace(laminate, layers=tuple(holed), pins=(ear,), registration="ears")
+    assert [step.pins for step in assembly(eared)] == [(ear,)] * 4
+
+
+def test_one_layer_of_each_pattern(laminate: Laminate) -> None:
+    patterns = [layer.pattern for layer in distinct_layers(laminate, range(4, 11))]
+    assert patterns == list(dict.fromkeys(laminate.layer(i).pattern for i in range(4, 11)))

@@ -1,0 +1,82 @@
+"""Which side of an edge is which, and which stretches of a boundary two regions share."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from sbafab.geometry.edges import Arc, Edge, Line, Point
+from sbafab.geometry.nearby import EdgeIndex
+from sbafab.geometry.shapes import disc, rectangle
+from sbafab.rules.boundary import beside, edges_along, outward_reach, outward_samples
+
+AXIS = (0.0, 0.0)
+UP = Line((1.0, 0.0), (1.0, 4.0))
+RIGHT = Line((0.0, 1.0), (4.0, 1.0))
+QUARTER = Arc((2.0, 0.0), (0.0, 2.0), AXIS, 2.0, True)
+HALF = math.sqrt(0.5)
+
+
+@pytest.mark.parametrize(
+    ("edge", "left"),
+    [
+        (UP, (0.5, 2.0)),
+        (RIGHT, (2.0, 1.5)),
+        (QUARTER, (1.5 * HALF, 1.5 * HALF)),
+        (QUARTER.reversed(), (2.5 * HALF, 2.5 * HALF)),
+    ],
+)
+def test_left_of_an_edges_middle(edge: Edge, left: Point) -> None:
+    assert beside(edge, 0.5) == pytest.approx(left)
+    middle = edge.at(0.5)
+    mirrored = (2 * middle[0] - left[0], 2 * middle[1] - left[1])
+    assert beside(edge, -0.5) == pytest.approx(mirrored)
+
+
+def test_edges_that_run_the_same_way_are_shared() -> None:
+    low, high = rectangle((0.0, 0.0), (4.0, 2.0)), rectangle((1.0, 0.0), (3.0, 1.0))
+    [shared] = edges_along(low, high)
+    assert sorted((shared.start, shared.end)) == [(1.0, 0.0), (3.0, 0.0)]
+    # Side by side their common edge runs opposite ways.
+    assert edges_along(low, rectangle((4.0, 0.0), (6.0, 2.0))) == []
+
+
+def test_an_arc_is_not_shared_with_its_chord() -> None:
+    # Both go from one end of the diameter to the other.
+    half = disc(AXIS, 2.0) & rectangle((-3.0, 0.0), (3.0, 3.0))
+    shared = edges_along(half, disc(AXIS, 2.0))
+    assert sum(edge.length for edge in shared) == pytest.approx(2 * math.pi)
+    assert all(isinstance(edge, Arc) for edge in shared)
+
+
+@pytest.mark.parametrize("far", [0.5, 3.0, 40.0])
+def test_a_reach_is_found_however_far(far: float) -> None:
+    others = [Line((1.0 + far, -9.0), (1.0 + far, 9.0)), Line((60.0, -9.0), (60.0, 9.0))]
+    reach = outward_reach(UP, EdgeIndex(others))
+    assert reach is not None
+    assert reach.value == pytest.approx(far)
+    assert reach.at[0] == pytest.approx(1.0 + far)
+
+
+def test_samples_look_along_the_normal_to_the_first_edge() -> None:
+    others = [Line((2.5, -9.0), (2.5, 9.0)), Line((4.0, -9.0), (4.0, 9.0))]
+    samples = list(outward_samples(UP, EdgeIndex(others), 5.0))
+    assert min(start[1] for start, _, _ in samples) == pytest.approx(0.0, abs=1e-4)
+    assert max(start[1] for start, _, _ in samples) == pytest.approx(4.0, abs=1e-4)
+    for start, outward, reach in samples:
+        assert outward == pytest.approx((1.0, 0.0))
+        assert reach.value == pytest.approx(1.5)
+        assert reach.at == pytest.approx((2.5, start[1]))
+
+
+def test_samples_on_an_arc_look_away_from_its_centre() -> None:
+    samples = list(outward_samples(QUARTER, disc(AXIS, 2.75).index, 1.0))
+    assert len(samples) > 1
+    for start, outward, reach in samples:
+        assert outward == pytest.approx((start[0] / 2, start[1] / 2))
+        assert reach.value == pytest.approx(0.75)
+
+
+def test_edges_behind_give_no_sample() -> None:
+    assert list(outward_samples(UP, EdgeIndex([Line((0.0, -9.0), (0.0, 9.0))]), 5.0)) == []

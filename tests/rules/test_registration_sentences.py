@@ -1,0 +1,276 @@
+"""What the registration rules say: the verdict's reasons, the dearest error, the advice."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from sbafab.laminate.laminate import Laminate
+from sbafab.rules import registration_worst_case, registration_yield
+from sbafab.rules.finding import Finding, Place
+from sbafab.rules.freedoms import Freedom
+from sbafab.rules.limits import Limits, Tolerances
+from sbafab.rules.margins import Push
+from sbafab.rules.registration_worst_case import costs
+from sbafab.rules.registration_yield import Share, Yield, simulate
+
+ONE = ("1dof-5mm", "stack.balloons=3")
+NONE = Tolerances(0, 0, 0, 0)
+TURN = math.radians(2)
+Good = Callable[..., Laminate]
+
+
+def films_only(laminate: Laminate) -> Laminate:
+    films = (layer for layer in laminate.layers if not layer.is_mask)
+    return replace(
+        laminate, layers=tuple(replace(layer, index=i) for i, layer in enumerate(films, 1))
+    )
+
+
+def worst_of(laminate: Laminate, limits: Limits) -> tuple[Finding, Finding]:
+    bond, overhang = registration_worst_case.check(laminate, limits)
+    return bond, overhang
+
+
+def test_nothing_moves_without_errors(good: Good) -> None:
+    bond, overhang = worst_of(good(*ONE), Limits(tolerances=NONE))
+    assert (bond.verdict, bond.limit, bond.measured) == ("pass", 0.5, pytest.approx(0.75))
+    assert (overhang.verdict, overhang.limit, overhang.measured) == ("pass", 0.25, 0.5)
+    assert (bond.rule, bond.unit) == ("registration-worst-case", "mm")
+    assert bond.message.startswith(
+        "at worst 0.750 mm is left of the 0.750 mm bond at chamber interface 1 (layers 1 and 3), x "
+    )
+    assert bond.message.endswith("; cutting takes 0.000 mm and nothing can move")
+    assert "0.500 mm overhang of a mask past a film edge at" in overhang.message
+
+
+def test_cutting_alone(good: Good) -> None:
+    bond, _ = worst_of(good(*ONE), Limits(tolerances=Tolerances(0.1, 0, 0, 0)))
+    assert bond.measured == pytest.approx(0.55)
+    assert bond.message.endswith("; cutting takes 0.200 mm and nothing can move")
+
+
+def test_a_layer_on_its_only_pin_costs_most(good: Good) -> None:
+    bond, _ = worst_of(good(*ONE), Limits(tolerances=Tolerances(placement=0, turn=0)))
+    assert bond.verdict == "pass"
+    assert bond.message.endswith(
+        "; of what moves layer 3, which can turn about its only pin in step 1, costs most, 0.004 mm"
+    )
+
+
+def test_a_layer_on_several_pins_cannot_turn(good: Good) -> None:
+    # Walls stand on the pins of three bores and of the lumen.
+    walls = films_only(good("3dof-15mm", "stack.balloons=3"))
+    bond, _ = worst_of(walls, Limits(tolerances=Tolerances(placement=0, turn=0)))
+    assert ", on its pins in step " in bond.message
+    assert bond.message.endswith(", costs most, 0.004 mm")
+
+
+def test_a_failure_says_what_is_left_without_the_hand(good: Good) -> None:
+    limits = Limits(tolerances=Tolerances(cutting=0.2))
+    bond, overhang = worst_of(good(*ONE), limits)
+    assert (bond.verdict, overhang.verdict) == ("fail", "fail")
+    # 0.75 - 2 x 0.2 - 2 x 0.004, and likewise from 0.5; less than nothing is reported as none.
+    assert bond.measured == 0.0
+    assert bond.message.startswith("at worst nothing is left of the 0.750 mm bond")
+    assert bond.message.endswith(
+        "; even without what is laid by hand 0.342 mm is left at chamber interface 1 (layers 1 "
+        "and 3), and it needs 0.5: make bond.width larger"
+    )
+    assert overhang.message.endswith(
+        "; even without what is laid by hand 0.092 mm is left at chamber interface 1 (layers 1 "
+        "and 3), and it needs 0.25: make mask.overhang larger"
+    )
+
+
+def test_what_is_short_as_drawn_says_so(good: Good) -> None:
+    limits = Limits(
+        bond_width=0.8,
+        worst_bond_width=0.76,
+        mask_overhang=0.6,
+        worst_mask_overhang=0.55,
+        tolerances=NONE,
+    )
+    bond, overhang = worst_of(good(*ONE), limits)
+    assert (bond.verdict, overhang.verdict) == ("warn", "warn")
+    # Every ring is 0.75; at the walls' pin the mask's bore is flush, and meant to be.
+    assert bond.message.endswith(
+        "; that is short of 0.76 at 5 interfaces, and short as drawn: make bond.width larger"
+    )
+    assert overhang.message.endswith(
+        "; that is short of 0.55 at 3 interfaces, and short as drawn: make mask.overhang larger"
+    )
+
+
+def test_films_without_masks_have_no_overhang(good: Good) -> None:
+    bond, overhang = worst_of(films_only(good(*ONE)), Limits())
+    assert bond.verdict == "pass"
+    # From the bore at 0.5 to the outline at 3.25.
+    assert "of the 2.750 mm bond at bond interface 1 (layers 1 and 2)" in bond.message
+    assert overhang == Finding(
+        "registration-worst-case",
+        "pass",
+        0.25,
+        None,
+        "mm",
+        Place(),
+        "no overhang of a mask past a film edge to measure",
+    )
+
+
+def test_layers_that_turn_together_cost_their_levers(good: Good) -> None:
+    bond, overhang = worst_of(good(*ONE), Limits(tolerances=Tolerances(0, 0, 0, 2)))
+    # Wall and mask each turn about the pin in step 1, at the tab's end 8.25 from it.
+    assert bond.measured == pytest.approx(0.75 - 2 * 8.25 * TURN)
+    assert bond.message.endswith(
+        f"costs most, {8.25 * TURN:.3f} mm; that is short of 0.5 at 1 interface, though pins and "
+        'cutting alone leave 0.750 mm: registration.method = "ears" pins it'
+    )
+    # The strip's corner stands 0.8 from the axis of its turn.
+    assert overhang.message.endswith(
+        f"of what moves layer 2, which can turn about its only pin in step 1, costs most, "
+        f"{0.8 * TURN:.3f} mm"
+    )
+
+
+def test_a_layer_laid_by_hand_costs_most(good: Good) -> None:
+    bond, overhang = worst_of(good(*ONE), Limits(tolerances=Tolerances(0, 0, 0.3, 0)))
+    # The first separator lies by hand in the middle stack, which lies so on the bottom balloon.
+    assert bond.measured == pytest.approx(0.75 - 2 * 0.3)
+    assert (bond.where.interface, bond.where.layers) == (2, (3, 4, 5))
+    assert bond.message.endswith(
+        "; of what moves layer 4, laid by hand in step 3, costs most, 0.300 mm; that is short of "
+        "0.5 at 4 interfaces, though pins and cutting alone leave 0.750 mm: "
+        'registration.method = "ears" pins it'
+    )
+    assert overhang.message.startswith("at worst nothing is left of the 0.500 mm overhang")
+
+
+def test_where_ears_are_no_help_care_is_advised(good: Good) -> None:
+    # As if its pins were ears already: what is still loose is for the hand.
+    eared = replace(good(*ONE), registration="ears")
+    bond, overhang = worst_of(eared, Limits(tolerances=Tolerances(0, 0, 0.3, 0)))
+    assert (bond.verdict, overhang.verdict) == ("warn", "warn")
+    assert bond.message.endswith(
+        ": align it with care (registration.hand_placement, registration.hand_turn), or make "
+        "bond.width larger"
+    )
+    assert overhang.message.endswith("or make mask.overhang larger")
+
+
+def test_a_mask_that_turns_in_its_pocket_is_aligned_with_care(good: Good) -> None:
+    # Its strip turns about the bore: 0.8 to the side at the mouth.
+    limits = Limits(worst_mask_overhang=0.48, tolerances=Tolerances(0, 0, 0, 2))
+    _, overhang = worst_of(good(*ONE), limits)
+    assert overhang.verdict == "warn"
+    assert overhang.message.endswith(
+        ": align it with care (registration.hand_placement, registration.hand_turn), or make "
+        "mask.overhang larger"
+    )
+
+
+def freedom(step: int, body: int, most: float) -> Freedom:
+    return Freedom(step, body, 1, 1, 0, most)
+
+
+def test_turns_are_alike_about_one_centre_only() -> None:
+    turns = [
+        Freedom(step, body, 1, 1, 1, 0.1, centre)
+        for step, body, centre in (
+            (1, 1, (1.2, 3.3)),
+            (2, 5, (1.2, 3.3 + 1e-9)),
+            (1, 1, (1.4, 3.3)),
+            (1, 1, (1.2, 3.4)),
+        )
+    ]
+    assert turns[0].like() == turns[1].like()
+    assert len({turn.like() for turn in turns}) == 3
+
+
+def test_shift_and_turn_of_a_body_count_together() -> None:
+    shift, turn, other = freedom(1, 1, 0.1), freedom(1, 1, 0.2), freedom(2, 1, 0.15)
+    pushes = [Push(shift, 0.1, True), Push(other, 0.15, False), Push(turn, 0.2, True)]
+    assert costs(pushes) == [(shift, pytest.approx(0.3)), (other, 0.15)]
+
+
+def shares(*good_builds: int) -> Yield:
+    found = {index: Share(count, 400) for index, count in enumerate(good_builds, 1)}
+    return Yield(Share(min(good_builds), 400), found, {})
+
+
+@pytest.mark.parametrize(
+    ("found", "says", "place"),
+    [
+        (shares(400, 400, 400), "", Place()),
+        (shares(400, 380, 400), "; by interface: 2 95.00%", Place(2, (3, 4, 5))),
+        (
+            shares(399, 380, 390, 380),
+            "; by interface: 2 95.00%, 4 95.00%, 3 97.50%, 1 others above",
+            Place(2, (3, 4, 5)),
+        ),
+        (
+            shares(380, 390, 399),
+            "; by interface: 1 95.00%, 2 97.50%, 3 99.75%",
+            Place(1, (1, 2, 3)),
+        ),
+    ],
+)
+def test_the_interfaces_that_lose_most_are_told_first(
+    found: Yield, says: str, place: Place, good: Good, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(registration_yield, "simulate", lambda *_: found)
+    (told,) = registration_yield.check(good(*ONE), Limits(tolerances=Tolerances(0, 0, 0.3, 2)))
+    low, high = found.whole.interval
+    share = found.whole.value
+    assert told == Finding(
+        "registration-yield",
+        "pass",
+        None,
+        share,
+        "",
+        place,
+        f"{share:.2%} of 400 random builds keep every limit (95 % interval {low:.2%} to "
+        f"{high:.2%}){says}; errors are assumed spread evenly, up to 0.3 mm and 2 degree where a "
+        "hand places",
+    )
+
+
+@pytest.mark.parametrize(
+    ("count", "target", "verdict"),
+    [(360, None, "pass"), (359, None, "warn"), (400, 0.99, "pass"), (400, 0.995, "fail")],
+)
+def test_a_yields_verdict(
+    count: int, target: float | None, verdict: str, good: Good, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # All of 400: 1 - 3.8415 / 403.8415 = 0.9905 at least.
+    monkeypatch.setattr(registration_yield, "simulate", lambda *_: shares(count))
+    (told,) = registration_yield.check(good(*ONE), Limits(target_yield=target))
+    assert (told.verdict, told.limit) == (verdict, target)
+    asked = "; the interval must lie above 0.995: `sbafab check --target-yield` advises"
+    assert told.message.endswith(asked) == (verdict == "fail")
+
+
+@pytest.mark.parametrize(
+    ("balloons", "builds"), [(3, 10_000), (15, 10_000), (20, 300_000 // 39), (160, 1000)]
+)
+def test_tall_stacks_draw_fewer_builds(balloons: int, builds: int, good: Good) -> None:
+    laminate = good("1dof-5mm", f"stack.balloons={balloons}")
+    found = simulate(laminate, Limits(tolerances=NONE))
+    assert found.whole == Share(builds, builds)
+    assert set(found.interfaces.values()) | set(found.quantities.values()) == {found.whole}
+    assert list(found.interfaces) == [interface.index for interface in laminate.interfaces]
+
+
+def test_builds_are_drawn_in_batches_to_the_last(good: Good) -> None:
+    # Two whole batches and a part of one.
+    only_cut = Tolerances(0.1, 0, 0, 0)
+    limits = Limits(tolerances=only_cut, yield_builds=10_007, worst_bond_width=0.75)
+    found = simulate(good(*ONE), limits)
+    assert found.whole.builds == 10_007
+    # Each ring between a wall's outline and a neck ring's mask: half of the builds, or fewer.
+    assert found.whole.good <= min(share.good for share in found.interfaces.values())
+    assert found.quantities["bond"] == found.whole
+    assert found.quantities["overhang"].value == 1.0
