@@ -1,0 +1,147 @@
+"""Whether parts lie as they must, told from their exact regions whatever an engine says."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from sbafab.errors import OutputError
+from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, distance_to
+from sbafab.geometry.intersect import line_circle, meeting_points
+from sbafab.geometry.nearby import widened
+from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import disc
+from sbafab.nesting.records import Nest, Stock
+
+SLACK = 1e-6
+"""mm by which a distance may miss what is asked for: rounding."""
+
+
+class Gap(NamedTuple):
+    """A least distance in mm (0 for an overlap) and a place where it is found."""
+
+    value: float
+    place: Point
+
+
+def check_nest(nest: Nest) -> None:
+    """Raises OutputError with the place where a nest breaks what its stock asks for."""
+    counts = Counter(placement.part for placement in nest.placements)
+    for number, part in enumerate(nest.parts):
+        if counts.pop(number, 0) != part.count:
+            raise OutputError(
+                f"part {part.name} of {part.design} is not nested {part.count} times; nest again."
+            )
+    sheets = {placement.sheet for placement in nest.placements}
+    if counts or sheets != set(range(nest.sheets)) or nest.sheets > nest.stock.most:
+        raise OutputError(f"the {nest.material} nest has parts or sheets too many; nest again.")
+    for sheet in range(nest.sheets):
+        named = [
+            (f"{nest.parts[placement.part].name} (no. {number})", nest.region(placement))
+            for number, placement in enumerate(nest.on_sheet(sheet), start=1)
+        ]
+        try:
+            check_placed(named, nest.stock)
+        except OutputError as error:
+            raise OutputError(f"{nest.material} sheet {sheet + 1}: {error}") from error
+
+
+def check_placed(regions: Sequence[tuple[str, Region]], stock: Stock, slack: float = SLACK) -> None:
+    """Raises OutputError where named regions on a sheet enter its border or come too near.
+
+    ``slack`` mm may be missing: what the numbers of a file are rounded by.
+    """
+    for name, region in regions:
+        _check_border(name, region, stock, slack)
+    # A part in another's hole would drop out with the waste: holes are cut first.
+    regions = [(name, Region(region.outers)) for name, region in regions]
+    pins = [
+        (f"the pin at x {x:g}, y {y:g}", disc((x, y), diameter / 2))
+        for x, y, diameter in stock.pins
+    ]
+    entries = [*regions, *pins]
+    for i, j in _neighbours([region.bounds for _, region in entries], stock.spacing):
+        if min(i, j) >= len(regions):
+            continue
+        gap = least_distance(entries[i][1], entries[j][1], stock.spacing)
+        if gap.value < stock.spacing - slack:
+            (x, y), (one, other) = gap.place, (entries[min(i, j)][0], entries[max(i, j)][0])
+            how = f"are {gap.value:.4f} mm apart" if gap.value > 0 else "overlap"
+            raise OutputError(
+                f"{one} and {other} {how} at x {x:.3f}, y {y:.3f}, where {stock.spacing:g} mm is "
+                "asked for; nest again."
+            )
+
+
+def least_distance(a: Region, b: Region, beyond: float) -> Gap:
+    """The least distance between two regions, exact for lines and arcs; 0 where they overlap.
+
+    Infinite if it is more than ``beyond`` mm.
+    """
+    best = Gap(math.inf, a.edges[0].start)
+    reach = beyond
+    for edge in a.index.touching(widened(b.bounds, beyond)):
+        for other in b.index.touching(widened(edge.bounds, reach)):
+            gap = edge_distance(edge, other)
+            if gap.value < best.value and gap.value <= beyond:
+                best, reach = gap, gap.value
+    if best.value > 0:
+        for one, holder in ((a, b), (b, a)):
+            for contour in one.outers:
+                if holder.contains(contour.edges[0].start):
+                    return Gap(0.0, contour.edges[0].start)
+    return best
+
+
+def edge_distance(a: Edge, b: Edge) -> Gap:
+    """The least distance between two edges and the place on ``a``, or where they meet."""
+    touching = meeting_points(a, b)
+    if touching:
+        return Gap(0.0, touching[0])
+    gaps = [Gap(distance_to(b, p), p) for p in (a.start, a.end, *_feet(a, b))]
+    gaps += [Gap(distance_to(a, p), a.nearest(p)) for p in (b.start, b.end)]
+    return min(gaps)
+
+
+def _feet(a: Edge, b: Edge) -> Iterator[Point]:
+    """Points of ``a`` where its normal can be that of ``b``, too: on the line of centres."""
+    if isinstance(a, Line) and isinstance(b, Line):
+        return
+    if isinstance(b, Arc):
+        yield a.nearest(b.centre)
+    if isinstance(a, Arc):
+        towards = b.centre if isinstance(b, Arc) else b.nearest(a.centre)
+        if math.dist(towards, a.centre) > 1e-9:
+            ux, uy = towards[0] - a.centre[0], towards[1] - a.centre[1]
+            length = math.hypot(ux, uy)
+            axis = (ux / length, uy / length)
+            # Both sides of the circle: from inside it, the far one may be the near one.
+            for p in line_circle(a.centre, axis, a.centre, a.radius):
+                yield a.nearest(p)
+
+
+def _check_border(name: str, region: Region, stock: Stock, slack: float) -> None:
+    left, bottom, right, top = stock.usable
+    low_x, low_y, high_x, high_y = region.bounds
+    over = max(left - low_x, bottom - low_y, high_x - right, high_y - top)
+    if over > slack:
+        x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
+        raise OutputError(
+            f"{name} at x {x:.3f}, y {y:.3f} reaches {over:.4f} mm into the border of "
+            f"{stock.border:g} mm; nest again."
+        )
+
+
+def _neighbours(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
+    """Pairs whose boxes come within ``reach``, by a sweep along x."""
+    order = sorted(range(len(boxes)), key=lambda i: boxes[i][0])
+    active: list[int] = []
+    for i in order:
+        left, low, _, high = boxes[i]
+        active = [j for j in active if boxes[j][2] >= left - reach]
+        for j in active:
+            if boxes[j][1] <= high + reach and boxes[j][3] >= low - reach:
+                yield j, i
+        active.append(i)

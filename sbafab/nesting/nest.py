@@ -1,0 +1,82 @@
+"""Nesting: every part of each material on as few sheets as an engine finds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from sbafab.laminate.films import Material
+from sbafab.nesting.records import MATERIALS, EngineName, Nest, Part, Stock
+from sbafab.nesting.refusals import no_usable_area, too_large, too_many
+
+ROUNDING = 5e-7
+
+
+def nest(
+    parts: Sequence[Part],
+    stocks: Mapping[Material, Stock],
+    engine: EngineName = "bottom-left",
+    seconds: float = 20.0,
+) -> tuple[Nest, ...]:
+    """One nest for each material that has parts, TPE first.
+
+    ``seconds`` is how long spyrrow looks for each sheet. Raises DesignError where a part does not
+    fit a sheet or more sheets are needed than may be used.
+    """
+    nests = []
+    for material in MATERIALS:
+        chosen = of_material(parts, material)
+        if chosen:
+            nests.append(_nest(material, chosen, stocks[material], engine, seconds))
+    return tuple(nests)
+
+
+def of_material(parts: Sequence[Part], material: Material) -> tuple[Part, ...]:
+    return tuple(part for part in parts if part.material == material and part.count > 0)
+
+
+def _nest(
+    material: Material,
+    parts: tuple[Part, ...],
+    stock: Stock,
+    engine: EngineName,
+    seconds: float,
+) -> Nest:
+    _check_fit(material, parts, stock)
+    total = sum(part.count for part in parts)
+    least = _least_sheets(parts, stock)
+    if least > stock.most:
+        raise too_many(material, total, f"at least {least} sheets", stock)
+    if engine == "spyrrow":
+        from sbafab.nesting.strip import strip
+
+        placements = strip(parts, stock, seconds)
+    else:
+        from sbafab.nesting.bottom_left import bottom_left
+
+        placements = bottom_left(parts, stock)
+    found = Nest(engine, material, stock, parts, placements)
+    if found.sheets > stock.most:
+        raise too_many(material, total, f"{found.sheets} sheets", stock)
+    return found
+
+
+def _check_fit(material: Material, parts: Sequence[Part], stock: Stock) -> None:
+    left, bottom, right, top = stock.usable
+    if right - left <= 0 or top - bottom <= 0:
+        raise no_usable_area(material, stock)
+    across, along = right - left + ROUNDING, top - bottom + ROUNDING
+    for part in parts:
+        low_x, low_y, high_x, high_y = part.region.bounds
+        width, height = high_x - low_x, high_y - low_y
+        lying = width <= across and height <= along
+        standing = 1 in stock.turns and height <= across and width <= along
+        if not (lying or standing):
+            raise too_large(part, stock)
+
+
+def _least_sheets(parts: Sequence[Part], stock: Stock) -> int:
+    """Sheets that the parts' bare areas fill: no nest can do with fewer."""
+    left, bottom, right, top = stock.usable
+    area = sum(part.count * part.region.area for part in parts)
+    return math.ceil(area / ((right - left) * (top - bottom)) - 1e-9)

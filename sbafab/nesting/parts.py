@@ -1,0 +1,36 @@
+"""The parts to cut for a laminate: the pieces of its patterns, equal ones counted together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from sbafab.geometry.region import Region
+from sbafab.laminate.laminate import Laminate
+from sbafab.nesting.records import Part
+
+
+def parts_of(laminate: Laminate, paths: Mapping[str, Region], copies: int) -> tuple[Part, ...]:
+    """Every piece of every pattern, by pattern in stacking order.
+
+    ``paths`` holds each pattern's path of the beam, kerf compensated. Pieces of one pattern that
+    differ only in their place are one part, named after the first of them.
+    """
+    parts: list[Part] = []
+    for pattern, layers in laminate.patterns.items():
+        alike: dict[str, list[int]] = {}
+        pieces = paths[pattern].pieces
+        for number, piece in enumerate(pieces):
+            low_x, low_y, _, _ = piece.bounds
+            alike.setdefault(piece.moved(-low_x, -low_y).key, []).append(number)
+        for numbers in alike.values():
+            parts.append(
+                Part(
+                    design=laminate.name,
+                    pattern=pattern,
+                    piece=numbers[0] + 1,
+                    material=layers[0].film.material,
+                    region=pieces[numbers[0]],
+                    count=len(numbers) * len(layers) * copies,
+                )
+            )
+    return tuple(parts)

@@ -1,0 +1,112 @@
+"""What is nested on what: parts, film sheets, and the places a nest gives them.
+
+Lengths are mm, areas mm2. A sheet's lower left corner is its origin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.region import Region
+from sbafab.laminate.films import Material
+
+EngineName = Literal["bottom-left", "spyrrow"]
+Turn = Literal[0, 1, 2, 3]
+"""Quarter turns, counterclockwise. Never mirrored: a film's faces differ by their cut."""
+TURNS: tuple[Turn, ...] = (0, 1, 2, 3)
+MATERIALS: tuple[Material, ...] = ("TPE", "PTFE")
+
+
+@dataclass(frozen=True)
+class Part:
+    """One piece that is to be cut ``count`` times.
+
+    ``region`` is the path of the beam, kerf compensated, in the frame of its layer; ``design`` and
+    ``pattern`` say what it is a piece of, ``piece`` which (from 1) where the pattern falls apart.
+    """
+
+    design: str
+    pattern: str
+    piece: int
+    material: Material
+    region: Region
+    count: int
+
+    @property
+    def name(self) -> str:
+        return f"{self.pattern}.{self.piece}"
+
+
+@dataclass(frozen=True)
+class Stock:
+    """Film to cut from, as it lies on the machine.
+
+    A roll's ``length`` is the most that is unrolled for one sheet. Parts stay inside ``border``,
+    their paths ``spacing`` apart, and as far from ``pins``: centre x, y and diameter of what holds
+    the sheet down. ``most`` sheets may be used. Parts may be turned by ``turns``: a path that is
+    compensated for other kerfs along x and along y keeps its axes.
+    """
+
+    width: float
+    length: float
+    border: float
+    spacing: float
+    pins: tuple[tuple[float, float, float], ...] = ()
+    most: int = 20
+    roll: bool = False
+    turns: tuple[Turn, ...] = TURNS
+
+    @property
+    def usable(self) -> Bounds:
+        """What the border leaves of a sheet."""
+        return self.border, self.border, self.width - self.border, self.length - self.border
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A part on a sheet: its region turned by ``turn`` about the origin, then moved by ``shift``.
+
+    ``part`` is an index into the parts that were nested; sheets count from 0.
+    """
+
+    part: int
+    sheet: int
+    turn: Turn
+    shift: Point
+
+
+@dataclass(frozen=True)
+class Nest:
+    """Where every part of one material lies; ``placements`` in no order that matters."""
+
+    engine: EngineName
+    material: Material
+    stock: Stock
+    parts: tuple[Part, ...]
+    placements: tuple[Placement, ...]
+
+    @property
+    def sheets(self) -> int:
+        return 1 + max((placement.sheet for placement in self.placements), default=-1)
+
+    def on_sheet(self, sheet: int) -> Sequence[Placement]:
+        return [placement for placement in self.placements if placement.sheet == sheet]
+
+    def length(self, sheet: int) -> float:
+        """The sheet's length: a roll is cut off one border past the last part."""
+        if not self.stock.roll:
+            return self.stock.length
+        tops = (self.region(placement).bounds[3] for placement in self.on_sheet(sheet))
+        return max(tops) + self.stock.border
+
+    def region(self, placement: Placement) -> Region:
+        """The part's path where the nest puts it."""
+        return placed(self.parts[placement.part].region, placement.turn, placement.shift)
+
+
+def placed(region: Region, turn: Turn, shift: Point) -> Region:
+    """A region turned by exact quarter turns about the origin and then moved."""
+    return region.turned(90.0 * turn).moved(*shift)

@@ -1,0 +1,164 @@
+"""The default engine: numbers known by closed forms, and shapely as the other judge."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import unary_union
+from shapely.geometry import Point as ShapelyPoint
+from shapely.geometry import Polygon, box
+
+from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import disc, polygon, rectangle, stadium
+from sbafab.nesting.check import check_nest
+from sbafab.nesting.nest import nest
+from sbafab.nesting.records import Nest, Part, Stock
+
+
+def part(region: Region, count: int, pattern: str = "P01") -> Part:
+    return Part("demo", pattern, 1, "TPE", region, count)
+
+
+def nested(parts: Sequence[Part], stock: Stock) -> Nest:
+    (found,) = nest(parts, {"TPE": stock})
+    check_nest(found)
+    return found
+
+
+def shapely_of(region: Region) -> Polygon:
+    rings = region.polygons(1e-4)[0]
+    return Polygon(rings[0], rings[1:])
+
+
+@pytest.mark.parametrize(("spacing", "a_row"), [(1.0, 5), (0.4, 5), (2.0, 3)])
+def test_squares_fill_the_grid_they_fit_in_exactly(spacing: float, a_row: int) -> None:
+    """A row of n squares of 10 mm takes 10 n + spacing (n - 1); by area, none can be added."""
+    usable = 10 * a_row + spacing * (a_row - 1)
+    stock = Stock(usable + 20, usable + 20, 10, spacing)
+    square = rectangle((3.0, 4.0), (13.0, 14.0))
+    assert nested([part(square, a_row**2)], stock).sheets == 1
+    assert nested([part(square, a_row**2 + 1)], stock).sheets == 2
+
+
+@pytest.mark.parametrize(("usable", "column"), [(54.0, 5), (53.9, 4), (43.0, 4), (42.9, 3)])
+def test_a_column_holds_as_many_squares_as_its_length(usable: float, column: int) -> None:
+    stock = Stock(10 + 20, usable + 20, 10, 1.0)
+    found = nested([part(rectangle((0.0, 0.0), (10.0, 10.0)), 2 * column)], stock)
+    assert [len(found.on_sheet(sheet)) for sheet in range(found.sheets)] == [column, column]
+
+
+def test_discs_in_a_row_touch_the_spacing() -> None:
+    """Diameter 8 at spacing 2: ten need 98 mm of length in a channel as wide as one."""
+    stock = Stock(8 + 2 * 5, 98 + 2 * 5, 5, 2.0)
+    found = nested([part(disc((0.0, 0.0), 4.0), 10)], stock)
+    assert found.sheets == 1
+    heights = sorted(found.region(place).bounds[1] for place in found.placements)
+    assert heights == pytest.approx([5.0 + 10.0 * i for i in range(10)], abs=1e-6)
+
+
+def test_discs_lie_closer_than_in_squares() -> None:
+    """Rows of discs in a triangular array are sqrt(3)/2 of a pitch apart."""
+    pitch, rows, a_row = 11.0, 9, 5
+    # The grid may cost every row two of its cells of 0.1 mm.
+    length = 10 + (rows - 1) * (pitch * math.sqrt(3) / 2 + 0.2)
+    width = 10 + (a_row - 0.5) * pitch + 0.5
+    stock = Stock(width + 10, length + 10, 5, 1.0)
+    assert length < 10 + (rows - 1) * pitch
+    assert nested([part(disc((0.0, 0.0), 5.0), rows * a_row)], stock).sheets == 1
+
+
+def test_no_part_goes_into_a_hole_which_is_cut_before_it() -> None:
+    frame = rectangle((0.0, 0.0), (40.0, 40.0)) - rectangle((5.0, 5.0), (35.0, 35.0))
+    stock = Stock(60, 60, 10, 1.0)
+    found = nested([part(frame, 1), part(disc((0.0, 0.0), 14.0), 1, "P02")], stock)
+    assert found.sheets == 2
+
+
+def test_only_turns_that_the_stock_allows_are_used() -> None:
+    upright = Stock(60, 200, 10, 1.0, turns=(0, 2))
+    found = nested([part(rectangle((0.0, 0.0), (39.0, 5.0)), 12)], upright)
+    assert {place.turn % 2 for place in found.placements} == {0}
+
+
+def test_a_part_is_turned_where_only_that_fits() -> None:
+    stock = Stock(40, 80, 5, 1.0)
+    found = nested([part(rectangle((0.0, 0.0), (69.97, 29.98)), 1)], stock)
+    assert [place.turn % 2 for place in found.placements] == [1]
+
+
+def test_a_part_as_large_as_the_usable_area_is_nested() -> None:
+    stock = Stock(52.437, 61.291, 10, 1.0)
+    whole = rectangle((1.0, 1.0), (33.437, 42.291))
+    assert nested([part(whole, 2)], stock).sheets == 2
+
+
+def test_parts_keep_clear_of_pins() -> None:
+    pins = ((20.0, 20.0, 6.0), (50.0, 61.0, 3.0))
+    stock = Stock(80, 80, 5, 1.5, pins=pins)
+    found = nested([part(rectangle((0.0, 0.0), (11.0, 9.0)), 30)], stock)
+    assert found.sheets == 1
+    for x, y, diameter in pins:
+        pin = ShapelyPoint(x, y)
+        nearest = min(pin.distance(shapely_of(found.region(p))) for p in found.placements)
+        assert nearest >= diameter / 2 + 1.5 - 1e-6
+
+
+def test_a_roll_is_cut_off_after_its_parts() -> None:
+    """Twelve squares of 10 mm, four across: three rows and two spacings between borders."""
+    stock = Stock(63, 5000, 10, 1.0, roll=True)
+    found = nested([part(rectangle((0.0, 0.0), (10.0, 10.0)), 12)], stock)
+    assert found.sheets == 1
+    assert found.length(0) == pytest.approx(10 + 3 * 10 + 2 * 1 + 10)
+
+
+def test_sheets_have_their_whole_length() -> None:
+    found = nested([part(disc((0.0, 0.0), 5.0), 1)], Stock(60, 70, 10, 1.0))
+    assert found.length(0) == 70
+
+
+def test_the_same_parts_are_nested_alike() -> None:
+    parts = [part(polygon([(0.0, 0.0), (9.0, 1.0), (3.0, 7.0)]), 9), part(disc((1.0, 2.0), 3.0), 7)]
+    stock = Stock(70, 60, 5, 0.8)
+    assert nested(parts, stock).placements == nested(parts, stock).placements
+
+
+sizes = st.floats(2.0, 14.0)
+regions = st.one_of(
+    sizes.map(lambda d: disc((d, -d), d / 2)),
+    st.tuples(sizes, sizes).map(lambda s: rectangle((-1.0, 2.0), (s[0] - 1.0, s[1] + 2.0))),
+    st.tuples(sizes, sizes).map(lambda s: stadium((0.0, 0.0), min(s), max(s))),
+    st.tuples(sizes, sizes).map(
+        lambda s: polygon([(0.0, 0.0), (s[0], 0.0), (s[0], 1.0), (1.0, 1.0), (1.0, s[1] + 1)])
+    ),
+)
+
+
+@settings(max_examples=12)
+@given(st.lists(st.tuples(regions, st.integers(1, 5)), min_size=1, max_size=4), st.floats(0.1, 3.0))
+def test_shapely_agrees_that_random_parts_are_apart(
+    chosen: list[tuple[Region, int]], spacing: float
+) -> None:
+    stock = Stock(45.0, 50.0, 4.0, spacing, pins=((22.0, 25.0, 2.0),))
+    found = nested(
+        [part(region, count, f"P{i}") for i, (region, count) in enumerate(chosen)], stock
+    )
+    assert len(found.placements) == sum(count for _, count in chosen)
+    for sheet in range(found.sheets):
+        shapes = [shapely_of(found.region(place)) for place in found.on_sheet(sheet)]
+        shapes.append(ShapelyPoint(22.0, 25.0).buffer(1.0, quad_segs=200))
+        least = min(
+            (a.distance(b) for i, a in enumerate(shapes) for b in shapes[:i]), default=math.inf
+        )
+        assert least >= spacing - 5e-4
+        assert box(4, 4, 41, 46).buffer(1e-5).contains(unary_union(shapes))
+
+
+def test_forty_lobed_plates_and_39_separators_lie_on_one_sheet(lobed_plates: list[Part]) -> None:
+    """On the 132.4 mm square that a border of 10 mm leaves of the press's heated area."""
+    found = nested(lobed_plates, Stock(152.4, 152.4, 10, 1.0))
+    assert len(found.placements) == 79
+    assert found.sheets == 1

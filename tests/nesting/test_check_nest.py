@@ -1,0 +1,155 @@
+"""Faulty nests are refused with the place; distances agree with closed forms and shapely."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely.geometry import Polygon
+
+from sbafab.errors import OutputError
+from sbafab.geometry.edges import Arc, Line
+from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import disc, polygon, rectangle, stadium
+from sbafab.nesting.check import check_nest, check_placed, edge_distance, least_distance
+from sbafab.nesting.records import Nest, Part, Placement, Stock
+
+SQUARE = rectangle((0.0, 0.0), (10.0, 10.0))
+STOCK = Stock(60, 60, 5, 1.0, pins=((50.0, 50.0, 4.0),), most=2)
+
+
+def nest_of(*shifts: tuple[float, float, int], count: int | None = None) -> Nest:
+    wanted = len(shifts) if count is None else count
+    return Nest(
+        engine="bottom-left",
+        material="TPE",
+        stock=STOCK,
+        parts=(Part("demo", "P01", 1, "TPE", SQUARE, wanted),),
+        placements=tuple(Placement(0, sheet, 0, (x, y)) for x, y, sheet in shifts),
+    )
+
+
+def test_a_sound_nest_passes() -> None:
+    check_nest(nest_of((5, 5, 0), (16, 5, 0), (5, 16, 0), (5, 5, 1)))
+
+
+@pytest.mark.parametrize(
+    ("faulty", "told"),
+    [
+        (nest_of((5, 5, 0), (15.9, 5, 0)), r"are 0\.9000 mm apart at x 15\.\d+, y \d+\.\d+"),
+        (nest_of((5, 5, 0), (12, 8, 0)), r"overlap at x"),
+        (nest_of((5, 5, 0), (5, 5, 0)), r"overlap at x"),
+        (nest_of((4.9, 5, 0)), r"0\.1000 mm into the border"),
+        (nest_of((5, 45.01, 0)), r"0\.0100 mm into the border"),
+        (nest_of((45, 30, 0), (45, 45, 0)), r"pin at x 50, y 50 overlap"),
+        (nest_of((37.5, 45, 0)), r"pin at x 50, y 50 are 0\.5000 mm apart"),
+        (nest_of((5, 5, 0), count=2), r"not nested 2 times"),
+        (nest_of((5, 5, 1)), r"sheets too many"),
+        (nest_of((5, 5, 0), (5, 5, 1), (5, 5, 2)), r"sheets too many"),
+    ],
+)
+def test_a_faulty_nest_is_refused(faulty: Nest, told: str) -> None:
+    with pytest.raises(OutputError, match=told):
+        check_nest(faulty)
+
+
+def test_a_part_on_no_known_index_is_refused() -> None:
+    sound = nest_of((5, 5, 0))
+    stray = replace(sound, placements=(*sound.placements, Placement(3, 0, 0, (30.0, 30.0))))
+    with pytest.raises(OutputError, match="parts or sheets too many"):
+        check_nest(stray)
+
+
+def test_slack_allows_for_the_rounding_of_a_file() -> None:
+    regions = [("a", SQUARE.moved(5, 5)), ("b", SQUARE.moved(15.9995, 5))]
+    check_placed(regions, STOCK, slack=1e-3)
+    with pytest.raises(OutputError, match="a and b"):
+        check_placed(regions, STOCK)
+
+
+def test_nothing_may_lie_in_a_hole_which_is_cut_first() -> None:
+    frame = rectangle((34.0, 34.0), (55.0, 55.0)) - rectangle((36.0, 36.0), (53.0, 53.0))
+    with pytest.raises(OutputError, match="frame and inside overlap"):
+        check_placed([("frame", frame), ("inside", disc((40.0, 40.0), 2.5))], STOCK)
+    with pytest.raises(OutputError, match="pin"):
+        check_placed([("frame", frame)], STOCK)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "expected"),
+    [
+        (disc((0, 0), 2), disc((5, 0), 2), 1.0),
+        (disc((0, 0), 2), disc((3, 4), 1), 2.0),
+        (disc((0, 0), 2), rectangle((3, -5), (4, 5)), 1.0),
+        (rectangle((0, 0), (1, 1)), rectangle((4, 5), (6, 6)), 5.0),
+        (disc((0, 0), 9) - disc((0, 0), 5), disc((1.5, 0), 2), 1.5),
+        (disc((0, 0), 9) - disc((0, 0), 5), disc((0, 0), 2), 3.0),
+        (disc((0, 0), 9), disc((0, 0), 2), 0.0),
+        (disc((0, 0), 2), disc((0, 0), 9), 0.0),
+        (disc((0, 0), 2), disc((3, 0), 2), 0.0),
+        (disc((0, 0), 2), disc((4, 0), 2), 0.0),
+        (disc((0, 0), 9) - disc((0, 0), 5), rectangle((-3, -1), (3, 1)), 5 - math.sqrt(10)),
+    ],
+)
+def test_least_distances_by_closed_forms(a: Region, b: Region, expected: float) -> None:
+    assert least_distance(a, b, 10.0).value == pytest.approx(expected, abs=1e-9)
+    assert least_distance(b, a, 10.0).value == pytest.approx(expected, abs=1e-9)
+
+
+def test_nothing_is_told_beyond_the_reach() -> None:
+    assert least_distance(disc((0, 0), 2), disc((9, 0), 2), 4.9).value == math.inf
+    assert least_distance(disc((0, 0), 2), disc((9, 0), 2), 5.1).value == pytest.approx(5.0)
+
+
+def test_the_place_lies_between_the_parts() -> None:
+    gap = least_distance(disc((0, 0), 2), disc((5, 0), 2), 2.0)
+    assert gap.place == pytest.approx((2.0, 0.0))
+
+
+spots = st.tuples(st.floats(-4, 4), st.floats(-4, 4))
+
+
+def arc(centre: tuple[float, float], radius: float, first: float, sweep: float) -> Arc:
+    ends = [
+        (centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle))
+        for angle in (first, first + sweep)
+    ]
+    return Arc(ends[0], ends[1], centre, radius, sweep > 0)
+
+
+arcs = st.builds(
+    arc,
+    spots,
+    st.floats(0.5, 6),
+    st.floats(-3, 3),
+    st.floats(0.2, 1.5) | st.floats(-1.5, -0.2),
+)
+lines = st.builds(Line, spots, spots).filter(lambda line: line.length > 0.1)
+
+
+@given(arcs | lines, arcs | lines)
+def test_edge_distances_are_what_dense_samples_find(a: Arc | Line, b: Arc | Line) -> None:
+    count = 400
+    sampled = min(math.dist(b.nearest(p), p) for p in (a.at(i / count) for i in range(count + 1)))
+    found = edge_distance(a, b).value
+    assert found <= sampled + 1e-6
+    assert found >= sampled - a.length / count
+
+
+sizes = st.floats(0.5, 3)
+shapes = st.one_of(
+    st.builds(disc, spots, sizes),
+    st.builds(lambda p, w, h: stadium(p, w, w + h), spots, sizes, st.floats(0, 3)),
+    st.builds(lambda p, w: polygon([p, (p[0] + w, p[1]), (p[0], p[1] + 2 * w)]), spots, sizes),
+)
+
+
+@settings(max_examples=80)
+@given(shapes, shapes, spots)
+def test_shapely_finds_the_same_distance(a: Region, b: Region, shift: tuple[float, float]) -> None:
+    b = b.moved(*shift)
+    judge = Polygon(a.polygons(1e-5)[0][0]).distance(Polygon(b.polygons(1e-5)[0][0]))
+    assert least_distance(a, b, 30.0).value == pytest.approx(judge, abs=3e-5)
