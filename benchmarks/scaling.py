@@ -14,7 +14,7 @@ DESIGN = "3dof-15mm"
 def rules_and_cut_files(balloons: int) -> float:
     """Seconds from the design to its findings and cut files, without the copies' share."""
     from sbafab.actuators import build, load_design
-    from sbafab.cutting.files import write_layer_files
+    from sbafab.cutting.files import compensated_paths, write_layer_files
     from sbafab.output.settings import cut_settings, limits
     from sbafab.rules.deck import run_deck
 
@@ -24,7 +24,9 @@ def rules_and_cut_files(balloons: int) -> float:
         began = time.perf_counter()
         laminate = build(design)
         run_deck(laminate, limits(design))
-        files = write_layer_files(laminate, folder, cut_settings(design, (), "bulges", 0.005))
+        settings = cut_settings(design, (), "bulges", 0.005)
+        paths = compensated_paths(laminate, settings)
+        files = write_layer_files(laminate, paths, folder, settings)
         taken = time.perf_counter() - began
         copies = len(files) - len(laminate.patterns)
         return taken - copies * _copy_time(folder / files[0].path)

@@ -31,7 +31,7 @@ class ReadBack:
 
     ``region``: the contours on CUT_INNER and CUT_OUTER; ``properties``: the custom properties;
     ``layers``: the layer of every entity in file order; ``other``: types of the entities that
-    are not part of the region (datum, engraving, sheet).
+    are not part of the region (datum, engraving, sheet), and ``strokes`` their layers and edges.
     """
 
     region: Region
@@ -39,6 +39,7 @@ class ReadBack:
     units: str
     layers: tuple[str, ...]
     other: tuple[str, ...]
+    strokes: tuple[tuple[str, tuple[Edge, ...]], ...]
 
 
 def read_profile(source: Path | str) -> ReadBack:
@@ -90,10 +91,11 @@ def _read(document: Drawing) -> ReadBack:
             raise OutputError(f"layout {layout.name} is not empty; draw in model space only.")
     closed: dict[str, list[Contour]] = {CUT_INNER: [], CUT_OUTER: []}
     loose: dict[str, list[Edge]] = {CUT_INNER: [], CUT_OUTER: []}
-    other = []
+    other: list[str] = []
+    strokes: list[tuple[str, tuple[Edge, ...]]] = []
     for entity in model:
         layer = entity.dxf.layer
-        contour, edges = _geometry(entity)
+        contour, edges = _geometry(entity, may_be_open=layer not in closed)
         drawn = contour.edges if contour else edges
         x, y = drawn[0].start
         place = f"{entity.dxftype()} at x {x:.3f}, y {y:.3f}"
@@ -103,6 +105,7 @@ def _read(document: Drawing) -> ReadBack:
             raise OutputError(f"{place} is on layer {layer}; use {', '.join(COLOURS)}.")
         if layer not in closed:
             other.append(entity.dxftype())
+            strokes.append((layer, tuple(drawn)))
         elif contour:
             closed[layer].append(contour)
         else:
@@ -115,10 +118,11 @@ def _read(document: Drawing) -> ReadBack:
         "mm",
         tuple(entity.dxf.layer for entity in model),
         tuple(other),
+        tuple(strokes),
     )
 
 
-def _geometry(entity: DXFEntity) -> tuple[Contour | None, list[Edge]]:
+def _geometry(entity: DXFEntity, may_be_open: bool) -> tuple[Contour | None, list[Edge]]:
     """The closed contour, or else the loose edges, that an entity draws."""
     from ezdxf.entities.lwpolyline import LWPolyline
 
@@ -131,7 +135,8 @@ def _geometry(entity: DXFEntity) -> tuple[Contour | None, list[Edge]]:
         raise OutputError(f"{kind} (handle {dxf.handle}) has a coordinate that is no number.")
     if isinstance(entity, LWPolyline):
         _check_flat(entity, dxf.elevation)
-        return _polyline(entity), []
+        edges = _polyline(entity, may_be_open)
+        return (Contour(tuple(edges)), []) if entity.closed else (None, edges)
     if kind == "LINE":
         _check_flat(entity, dxf.start.z, dxf.end.z)
         return None, [Line((dxf.start.x, dxf.start.y), (dxf.end.x, dxf.end.y))]
@@ -163,23 +168,24 @@ def _check_flat(entity: DXFEntity, *heights: float) -> None:
         )
 
 
-def _polyline(entity: LWPolyline) -> Contour:
+def _polyline(entity: LWPolyline, may_be_open: bool) -> list[Edge]:
     rows = [tuple(map(float, row)) for row in entity.lwpoints]
     x, y = rows[0][:2] if rows else (0.0, 0.0)
     place = f"polyline at x {x:.3f}, y {y:.3f}"
-    if not entity.closed or len(rows) < 2:
+    if len(rows) < 2 or not (entity.closed or may_be_open):
         raise OutputError(f"{place} is open; close it.")
     if entity.dxf.get("const_width", 0.0) or any(row[2] or row[3] for row in rows):
         raise OutputError(f"{place} has a width; draw the cut's middle without width.")
     edges: list[Edge] = []
-    for row, following in zip(rows, [*rows[1:], rows[0]], strict=True):
+    followers = [*rows[1:], rows[0]] if entity.closed else rows[1:]
+    for row, following in zip(rows, followers, strict=False):
         start, end = (row[0], row[1]), (following[0], following[1])
         if start == end:
             raise OutputError(
                 f"{place} repeats its vertex x {row[0]:.3f}, y {row[1]:.3f}; remove one."
             )
         edges += _bulge_edges(start, end, row[4])
-    return Contour(tuple(edges))
+    return edges
 
 
 def _bulge_edges(start: Point, end: Point, bulge: float) -> list[Edge]:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import Literal, NamedTuple
 
-from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER, REFERENCE
+from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER, CUT_SHEET, ENGRAVE, REFERENCE
 from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point
 from sbafab.geometry.region import Contour
 
@@ -17,6 +17,18 @@ DxfProfile = Literal["bulges", "arcs", "chords"]
 
 DATUM_ARM = 1.0
 """Half the length in mm of the datum cross at the origin."""
+
+
+class Surroundings(NamedTuple):
+    """What a film sheet has beside its parts: open runs of points, and its frame's far corner.
+
+    ``engraved`` strokes are burnt into the waste; ``parting`` cuts the sheet off its roll; the
+    frame from the origin to ``frame`` is for reference, as a check of scale.
+    """
+
+    engraved: Sequence[Sequence[Point]] = ()
+    parting: Sequence[Sequence[Point]] = ()
+    frame: Point | None = None
 
 
 class _Entity(NamedTuple):
@@ -45,16 +57,28 @@ def dxf_text(
     properties: Mapping[str, str],
     profile: DxfProfile = "bulges",
     chord_error: float = 0.005,
-    datum: bool = True,
+    sheet: Surroundings | None = None,
 ) -> str:
     """A DXF document of the contours, cut in the order given.
 
     Holes (clockwise) go on CUT_INNER, outlines on CUT_OUTER. ``properties`` become the
     document's custom properties; ``chord_error`` is the largest sagitta in mm of the chords
-    profile; ``datum`` draws a cross at the origin on REFERENCE, after all that is cut.
+    profile. A layer's file has a cross at the origin on REFERENCE, after all that is cut; a
+    ``sheet`` has its engraving, parting cut and frame instead.
     """
     skeleton = _skeleton()
-    entities = [*_cuts(contours, profile, chord_error), *(_datum_cross() if datum else ())]
+    cuts = _cuts(contours, profile, chord_error)
+    if sheet is None:
+        entities = [*cuts, *_datum_cross()]
+        low, high = (-DATUM_ARM, -DATUM_ARM), (DATUM_ARM, DATUM_ARM)
+    else:
+        entities = [
+            *(_stroke(ENGRAVE, run) for run in sheet.engraved),
+            *cuts,
+            *(_stroke(CUT_SHEET, run) for run in sheet.parting),
+            *(_stroke(REFERENCE, run) for run in _frames(sheet)),
+        ]
+        low, high = (0.0, 0.0), sheet.frame or (0.0, 0.0)
     seed = skeleton.first_handle + len(entities)
     drawn = "".join(
         f"  0\n{entity.kind}\n  5\n{handle:X}\n330\n{skeleton.model_space}\n100\nAcDbEntity\n"
@@ -66,7 +90,7 @@ def dxf_text(
             skeleton.before_properties,
             _custom_properties(properties),
             skeleton.before_extents,
-            _extents(contours, datum),
+            _extents([*(contour.bounds for contour in contours), (*low, *high)]),
             skeleton.before_seed,
             f"{seed:X}",
             skeleton.before_entities,
@@ -105,8 +129,23 @@ def _quarters(edge: Edge) -> list[Edge]:
     return [edge.part(stops[i], stops[i + 1]) for i in range(count)]
 
 
-def _polyline(layer: str, vertices: Sequence[tuple[float, float, float]]) -> _Entity:
-    rows = [f" 90\n{len(vertices)}\n 70\n1\n"]
+def _frames(sheet: Surroundings) -> Iterator[Sequence[Point]]:
+    if sheet.frame is not None:
+        x, y = sheet.frame
+        yield ((0.0, 0.0), (x, 0.0), (x, y), (0.0, y), (0.0, 0.0))
+
+
+def _stroke(layer: str, run: Sequence[Point]) -> _Entity:
+    """A run of straight lines; one that ends where it began is closed."""
+    closed = run[0] == run[-1]
+    points = run[:-1] if closed else run
+    return _polyline(layer, [(x, y, 0.0) for x, y in points], closed)
+
+
+def _polyline(
+    layer: str, vertices: Sequence[tuple[float, float, float]], closed: bool = True
+) -> _Entity:
+    rows = [f" 90\n{len(vertices)}\n 70\n{int(closed)}\n"]
     for x, y, bulge in vertices:
         rows.append(f" 10\n{number(x)}\n 20\n{number(y)}\n")
         if bulge:
@@ -170,10 +209,7 @@ def _one_line(text: str) -> str:
     return " ".join(text.split())
 
 
-def _extents(contours: Sequence[Contour], datum: bool) -> str:
-    boxes: list[Bounds] = [contour.bounds for contour in contours]
-    if datum or not boxes:
-        boxes.append((-DATUM_ARM, -DATUM_ARM, DATUM_ARM, DATUM_ARM))
+def _extents(boxes: Sequence[Bounds]) -> str:
     low = f" 10\n{number(min(b[0] for b in boxes))}\n 20\n{number(min(b[1] for b in boxes))}\n"
     high = f" 10\n{number(max(b[2] for b in boxes))}\n 20\n{number(max(b[3] for b in boxes))}\n"
     return (

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import compensate
 from sbafab.cutting.order import cutting_order
-from sbafab.cutting.properties import CutSettings, file_properties
+from sbafab.cutting.properties import FOLDER, CutSettings, file_properties, layer_path
 from sbafab.cutting.verify import verify_file
 from sbafab.errors import DesignError, OutputError
+from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
 
-FOLDER = "layers"
 Progress = Callable[[int, int], None]
 """Told how many of how many layers are written."""
 
@@ -32,37 +32,63 @@ class CutFile:
     cut_length: float
 
 
+def compensated_paths(laminate: Laminate, settings: CutSettings) -> dict[str, Region]:
+    """The path of the beam for every pattern.
+
+    Raises DesignError where the kerf leaves none.
+    """
+    return {
+        pattern: _compensated(layers[0], settings) for pattern, layers in laminate.patterns.items()
+    }
+
+
+def _compensated(layer: Layer, settings: CutSettings) -> Region:
+    kerf = settings.kerf_width(layer.film.material)
+    try:
+        if isinstance(kerf, tuple) and settings.profile == "chords":
+            raise DesignError(
+                "chords do not tell how a kerf along x and y was compensated; write bulges or arcs."
+            )
+        return compensate(layer.profile, kerf or 0.0)
+    except DesignError as error:
+        raise DesignError(f"layer {layer.name}: {error}") from error
+
+
 def write_layer_files(
-    laminate: Laminate, folder: Path, settings: CutSettings, progress: Progress | None = None
+    laminate: Laminate,
+    paths: Mapping[str, Region],
+    folder: Path,
+    settings: CutSettings,
+    progress: Progress | None = None,
 ) -> list[CutFile]:
     """Writes ``layers/<layer name>.dxf`` under ``folder`` for every layer, bottom to top.
 
-    Raises DesignError where the kerf leaves no path, OutputError where a file does not read back
-    as its profile, OSError where it cannot be written.
+    ``paths`` holds the beam's path for every pattern. The name of a compensated file ends in its
+    kerf: ``layers/001_TPE_base_kerf0.12.dxf``. Raises OutputError where a file does not read
+    back as its path, OSError where it cannot be written.
     """
     written: dict[int, CutFile] = {}
     (folder / FOLDER).mkdir(parents=True, exist_ok=True)
-    for layers in laminate.patterns.values():
-        for file in _write_pattern(layers, folder, settings):
+    for pattern, layers in laminate.patterns.items():
+        for file in _write_pattern(layers, paths[pattern], folder, settings):
             written[file.layer] = file
             if progress is not None:
                 progress(len(written), len(laminate.layers))
     return [written[layer.index] for layer in laminate.layers]
 
 
-def _write_pattern(layers: Sequence[Layer], folder: Path, settings: CutSettings) -> list[CutFile]:
+def _write_pattern(
+    layers: Sequence[Layer], path: Region, folder: Path, settings: CutSettings
+) -> list[CutFile]:
     """The files of the layers that share one pattern: the first made, the others copied."""
     first = layers[0]
     material = first.film.material
-    try:
-        path = compensate(first.profile, settings.kerf_width(material) or 0.0)
-    except DesignError as error:
-        raise DesignError(f"layer {first.name}: {error}") from error
+    kerf = settings.kerf_width(material)
     properties = file_properties(settings, material, first.pattern)
     contours = cutting_order(path)
     text = dxf_text(contours, properties, settings.profile, settings.chord_error)
     data = text.encode()
-    original = folder / FOLDER / f"{first.name}.dxf"
+    original = folder / layer_path(first.name, kerf)
     original.write_bytes(data)
     chord_error = settings.chord_error if settings.profile == "chords" else 0.0
     verify_file(original, path, properties, chord_error)
@@ -70,10 +96,11 @@ def _write_pattern(layers: Sequence[Layer], folder: Path, settings: CutSettings)
     length = sum(contour.length for contour in contours)
     files = []
     for layer in layers:
-        target = folder / FOLDER / f"{layer.name}.dxf"
+        path_of_layer = layer_path(layer.name, kerf)
+        target = folder / path_of_layer
         if layer is not first:
             shutil.copyfile(original, target)
         if hashlib.sha256(target.read_bytes()).hexdigest() != digest:
             raise OutputError(f"{target.name}: differs from what was written; write it anew.")
-        files.append(CutFile(layer.index, f"{FOLDER}/{target.name}", digest, len(contours), length))
+        files.append(CutFile(layer.index, path_of_layer, digest, len(contours), length))
     return files

@@ -1,30 +1,100 @@
-"""The order in which the contours of a region are cut."""
+"""The order in which contours are cut: inner before outer, short travel, heat spread."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
 
-from sbafab.geometry.edges import Point
+from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Contour, Region
 
 ORIGIN: Point = (0.0, 0.0)
+SWEEPS = 6
+"""How often a path is looked through for crossings to undo."""
+LOOKED_AHEAD = 40
+"""Contours along the path that one end of a crossing may lie from the other."""
 
 
-def cutting_order(region: Region) -> tuple[Contour, ...]:
-    """Holes first, then outlines, each time on to the nearest start, from the origin."""
-    holes = _nearest_first(region.holes, ORIGIN)
-    here = holes[-1].edges[0].start if holes else ORIGIN
-    return (*holes, *_nearest_first(region.outers, here))
+def cutting_order(region: Region, heat_distance: float = 0.0) -> tuple[Contour, ...]:
+    """Holes first, then outlines, each time on to the nearest start, from the origin.
+
+    Contours nearer to each other than ``heat_distance`` mm do not follow each other, as far as
+    others are left to cut in between.
+    """
+    holes = _short(region.holes, ORIGIN)
+    here = _start(holes[-1]) if holes else ORIGIN
+    outers = _short(region.outers, here)
+    return (*_spread(holes, heat_distance), *_spread(outers, heat_distance))
 
 
-def _nearest_first(contours: Iterable[Contour], here: Point) -> list[Contour]:
-    """A contour ends where it starts, so the head travels from start to start."""
+def travel(contours: Iterable[Contour], here: Point = ORIGIN) -> float:
+    """Mm that the head moves between contours, which end where they start."""
+    stops = [here, *map(_start, contours)]
+    return sum(math.dist(a, b) for a, b in pairwise(stops))
+
+
+def _start(contour: Contour) -> Point:
+    return contour.edges[0].start
+
+
+def _short(contours: Iterable[Contour], here: Point) -> list[Contour]:
+    """A short path through all contours: on to the nearest, then crossings undone."""
     rest = list(contours)
     path: list[Contour] = []
+    place = here
     while rest:
         # Rounding lets equal ways stay equal on every machine; the first of them wins.
-        ways = [round(math.dist(here, contour.edges[0].start), 6) for contour in rest]
+        ways = [round(math.dist(place, _start(contour)), 6) for contour in rest]
         path.append(rest.pop(ways.index(min(ways))))
-        here = path[-1].edges[0].start
+        place = _start(path[-1])
+    for _ in range(SWEEPS):
+        if not _undo_crossings(path, here):
+            break
     return path
+
+
+def _undo_crossings(path: list[Contour], here: Point) -> bool:
+    """Turns stretches of the path round wherever that shortens it (2-opt)."""
+    shorter = False
+    stops = [here, *map(_start, path)]
+    count = len(path)
+    for i in range(count - 1):
+        for j in range(i + 1, min(count, i + LOOKED_AHEAD)):
+            before = math.dist(stops[i], stops[i + 1])
+            after = math.dist(stops[i], stops[j + 1])
+            if j + 1 < count:
+                before += math.dist(stops[j + 1], stops[j + 2])
+                after += math.dist(stops[i + 1], stops[j + 2])
+            if after < before - 1e-6:
+                path[i : j + 1] = path[i : j + 1][::-1]
+                stops[i + 1 : j + 2] = stops[i + 1 : j + 2][::-1]
+                shorter = True
+    return shorter
+
+
+def _spread(path: Sequence[Contour], heat_distance: float) -> list[Contour]:
+    """The path with the next contour that is not near the last one, time after time."""
+    if heat_distance <= 0.0:
+        return list(path)
+    rest = list(path)
+    spread: list[Contour] = []
+    while rest:
+        last = spread[-1].bounds if spread else None
+        index = next(
+            (
+                i
+                for i, contour in enumerate(rest)
+                if last is None or _apart(last, contour.bounds) >= heat_distance
+            ),
+            0,
+        )
+        spread.append(rest.pop(index))
+    return spread
+
+
+def _apart(a: Bounds, b: Bounds) -> float:
+    """The gap between two bounding boxes in mm."""
+    across = max(a[0] - b[2], b[0] - a[2], 0.0)
+    along = max(a[1] - b[3], b[1] - a[3], 0.0)
+    return math.hypot(across, along)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from sbafab.cutting.dxf_write import DxfProfile
 from sbafab.errors import OutputError
+from sbafab.geometry.beam import Kerf, is_kerf, widths
 from sbafab.laminate.films import Material
 
 UNCALIBRATED = "uncalibrated: nominal edges"
 COMPENSATED = "compensated"
 CHORDS = "chords within"
+FOLDER = "layers"
 PTFE_WARNING = (
     "Hot PTFE gives off toxic fumes (COF2, HF): cut it with a laser only on a machine whose owner "
     "permits PTFE, or use a drag knife."
@@ -22,20 +25,21 @@ PTFE_WARNING = (
 class CutSettings:
     """What the cut files need to know beside the laminate.
 
-    ``kerf_widths``: full width in mm by material, None or absent where it was not measured.
+    ``kerf_widths``: full width in mm (or along x and along y) by material, None or absent where
+    it was not measured.
     ``waived``: names of the waived rules. ``chord_error`` in mm counts for profile "chords" only.
     ``generator``: program and version, for example ``sbafab 1.0.0``.
     """
 
     design: str
     design_sha256: str
-    kerf_widths: Mapping[str, float | None] = field(default_factory=dict)
+    kerf_widths: Mapping[str, Kerf | None] = field(default_factory=dict)
     waived: tuple[str, ...] = ()
     profile: DxfProfile = "bulges"
     chord_error: float = 0.005
     generator: str = "sbafab"
 
-    def kerf_width(self, material: Material) -> float | None:
+    def kerf_width(self, material: Material) -> Kerf | None:
         return self.kerf_widths.get(material)
 
 
@@ -47,13 +51,38 @@ def file_properties(settings: CutSettings, material: Material, pattern: str) -> 
     return properties
 
 
+def sheet_properties(
+    settings: CutSettings, material: Material, sheet: str, parts: str
+) -> dict[str, str]:
+    """Custom properties of a film sheet: ``sheet`` is "1 of 2", ``parts`` what lies on it."""
+    properties = {
+        **_properties(settings, material, f"sheet {sheet}", settings.kerf_width(material)),
+        "PARTS": parts,
+    }
+    if material == "PTFE":
+        properties["WARNING"] = PTFE_WARNING
+    return properties
+
+
 def fixture_properties(settings: CutSettings) -> dict[str, str]:
     """Custom properties of the pin plate's cut file; its edges are nominal."""
     return _properties(settings, "plate", "fixture", None)
 
 
+def coupon_properties(generator: str) -> dict[str, str]:
+    """Custom properties of the calibration piece: never compensated, for it measures the kerf."""
+    return {
+        "PATTERN": "coupon",
+        "MATERIAL": "any film",
+        "UNITS": "mm",
+        **kerf_properties(None),
+        "GENERATOR": generator,
+        "WARNING": PTFE_WARNING,
+    }
+
+
 def _properties(
-    settings: CutSettings, material: str, pattern: str, kerf: float | None
+    settings: CutSettings, material: str, pattern: str, kerf: Kerf | None
 ) -> dict[str, str]:
     return {
         "DESIGN": settings.design,
@@ -61,12 +90,55 @@ def _properties(
         "PATTERN": pattern,
         "MATERIAL": material,
         "UNITS": "mm",
-        "KERF_STATE": UNCALIBRATED if kerf is None else COMPENSATED,
-        "KERF_WIDTH": "none" if kerf is None else f"{kerf:g}",
+        **kerf_properties(kerf),
         "WAIVED": ", ".join(settings.waived) or "none",
         "GENERATOR": settings.generator,
         **_curves(settings),
     }
+
+
+def kerf_properties(kerf: Kerf | None) -> dict[str, str]:
+    """What a cut file says of its kerf."""
+    if kerf is None:
+        return {"KERF_STATE": UNCALIBRATED, "KERF_WIDTH": "none"}
+    return {"KERF_STATE": COMPENSATED, "KERF_WIDTH": kerf_text(kerf)}
+
+
+def kerf_of(properties: Mapping[str, str]) -> Kerf | None:
+    """The kerf that a file says it is compensated for; None for nominal edges.
+
+    Raises OutputError where it says neither.
+    """
+    state, width = properties.get("KERF_STATE"), properties.get("KERF_WIDTH")
+    if (state, width) == (UNCALIBRATED, "none"):
+        return None
+    try:
+        x, _, y = (width or "").partition(" x ")
+        kerf = (float(x), float(y or x))
+    except ValueError:
+        kerf = (math.nan, math.nan)
+    if state != COMPENSATED or not is_kerf(*kerf):
+        raise OutputError(
+            f"its properties say KERF_STATE {state!r} and KERF_WIDTH {width!r}, which leaves open "
+            "how it was compensated; write it anew"
+        )
+    return kerf[0] if kerf[0] == kerf[1] else kerf
+
+
+def kerf_text(kerf: Kerf) -> str:
+    """A kerf as files and messages print it: ``0.12``, or ``0.12 x 0.1`` along x and along y."""
+    x, y = widths(kerf)
+    return f"{x:g}" if x == y else f"{x:g} x {y:g}"
+
+
+def kerf_suffix(kerf: Kerf | None) -> str:
+    """What the name of a compensated cut file ends in: ``_kerf0.12``, ``_kerf0.12x0.1``."""
+    return "" if kerf is None else f"_kerf{kerf_text(kerf).replace(' ', '')}"
+
+
+def layer_path(name: str, kerf: Kerf | None) -> str:
+    """Where the cut file of the layer of this name lies in an output folder."""
+    return f"{FOLDER}/{name}{kerf_suffix(kerf)}.dxf"
 
 
 def _curves(settings: CutSettings) -> dict[str, str]:

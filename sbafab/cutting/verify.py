@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 
-from sbafab.cutting.cut_layers import CUT_SEQUENCE
+from sbafab.cutting.cut_layers import CUT_SEQUENCE, CUT_SHEET, ENGRAVE, REFERENCE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
+from sbafab.cutting.dxf_write import Surroundings
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Line, Point, distance_to
 from sbafab.geometry.region import Contour, Region
@@ -38,6 +39,34 @@ def verify_file(
         _check_area(found.region, expected, chord_error)
     except OutputError as error:
         raise OutputError(f"{path.name}: {error} Write it anew.") from error
+
+
+def check_surroundings(found: ReadBack, expected: Surroundings) -> None:
+    """Compares what a sheet has beside its parts: engraving in the waste, parting cut, frame.
+
+    Raises OutputError with the layer and place of what differs, or of engraving inside a part.
+    """
+    frame = [expected.frame] if expected.frame is not None else []
+    for layer, runs in (
+        (ENGRAVE, expected.engraved),
+        (CUT_SHEET, expected.parting),
+        (REFERENCE, [((0.0, 0.0), (x, 0.0), (x, y), (0.0, y), (0.0, 0.0)) for x, y in frame]),
+    ):
+        drawn = [edges for name, edges in found.strokes if name == layer]
+        if len(drawn) != len(runs):
+            raise OutputError(f"{layer} has {len(drawn)} strokes, not {len(runs)}.")
+        for edges, run in zip(drawn, runs, strict=True):
+            points = [edges[0].start, *(edge.end for edge in edges)]
+            if len(points) != len(run) or any(
+                math.dist(p, q) > TOLERANCE for p, q in zip(points, run, strict=True)
+            ):
+                x, y = run[0]
+                raise OutputError(f"the stroke on {layer} at x {x:.3f}, y {y:.3f} is another.")
+    for name, edges in found.strokes:
+        for edge in edges if name == ENGRAVE else ():
+            if found.region.contains(edge.at(0.5)) or found.region.contains(edge.start):
+                x, y = edge.start
+                raise OutputError(f"engraving at x {x:.3f}, y {y:.3f} lies in a part.")
 
 
 def _check_properties(found: Mapping[str, str], expected: Mapping[str, str]) -> None:

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 MM_PER_UNIT = {0: 1.0, 1: 25.4, 4: 1.0, 5: 10.0, 6: 1000.0}
 """By $INSUNITS: none (taken as mm), inch, mm, cm, m."""
+COMPENSATED = "compensated"
+"""What a cut file's custom property KERF_STATE says where its edges are moved."""
 LEVEL = 1e-6
 HIGHEST_DEGREE = 10
 MOST_ITEMS = 20_000
@@ -35,6 +37,7 @@ def dxf_strands(path: Path) -> Iterator[Strand]:
     content = path.read_bytes()
     _refuse_excess(content)
     drawing, space = _drawing(path)
+    _refuse_compensated(drawing)
     # Where a file has no header at all, the reader makes one up that says metres.
     unit = drawing.header.get("$INSUNITS", 0) if b"$INSUNITS" in content else 0
     if unit not in MM_PER_UNIT:
@@ -73,6 +76,16 @@ def _drawing(path: Path) -> tuple[Drawing, Modelspace]:
         raise DesignError(
             f"is not a DXF file that can be read ({kind}); save it anew as DXF R2010"
         ) from None
+
+
+def _refuse_compensated(drawing: Drawing) -> None:
+    """Raises DesignError for a cut path: it would be compensated for its kerf once more."""
+    said = dict(drawing.header.custom_vars.properties)
+    if said.get("KERF_STATE") == COMPENSATED:
+        raise DesignError(
+            f"is a cut file compensated for a kerf of {said.get('KERF_WIDTH')} mm; give the "
+            "outline itself, without kerf"
+        )
 
 
 def _read(entity: Any, factor: float) -> Strand:

@@ -13,6 +13,7 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator
 
 from sbafab.design.units import Length, LengthOrZero, millimetres
+from sbafab.geometry.beam import Kerf, is_kerf
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
 UNCALIBRATED: Literal["uncalibrated"] = "uncalibrated"
@@ -139,26 +140,84 @@ class Press(Section):
     """Step 4: the whole laminate, full bond."""
 
 
+KerfWidth = LengthOrZero | tuple[LengthOrZero, LengthOrZero] | Literal["uncalibrated"]
+
+
 class Laser(Section):
     least_feature: Length = 0.2
     """The narrowest slot or web the laser cuts well."""
-    kerf_tpe: LengthOrZero | Literal["uncalibrated"] = UNCALIBRATED
-    """Full kerf width in TPE, measured; "uncalibrated" writes nominal edges and says so."""
-    kerf_ptfe: LengthOrZero | Literal["uncalibrated"] = UNCALIBRATED
-    """Full kerf width in PTFE, measured; "uncalibrated" writes nominal edges and says so."""
+    cut_speed: float = Field(default=20.0, gt=0, le=5000)
+    """mm/s; for estimates of time only, no setting of a machine."""
+    travel_speed: float = Field(default=200.0, gt=0, le=5000)
+    """mm/s between cuts; for estimates of time only."""
+    pierce_seconds: float = Field(default=0.1, ge=0, le=60)
+    """Time to begin a contour; for estimates only."""
+    heat_distance: LengthOrZero = 3.0
+    """Parts nearer to each other than this are not cut one right after the other."""
+    kerf_tpe: KerfWidth = UNCALIBRATED
+    """Full kerf width in TPE, measured, or [along x, along y]; "uncalibrated" writes nominal edges
+    and says so."""
+    kerf_ptfe: KerfWidth = UNCALIBRATED
+    """Full kerf width in PTFE, measured, likewise."""
 
     @field_validator("kerf_tpe", "kerf_ptfe", mode="before")
     @classmethod
-    def _kerf(cls, value: object) -> float | str:
+    def _kerf(cls, value: object) -> Kerf | str:
         if value == UNCALIBRATED:
             return UNCALIBRATED
+        pair = list(value) if isinstance(value, list | tuple) else [value, value]
         try:
-            kerf = millimetres(value)
+            x, y = map(millimetres, pair)
         except ValueError:
-            kerf = -1.0
-        if not 0 <= kerf <= 1:
-            raise ValueError('must be a length from 0 to 1 mm, or "uncalibrated"')
-        return kerf
+            x = y = -1.0
+        if not is_kerf(x, y):
+            raise ValueError(
+                "must be a length from 0 to 1 mm, or two of them, [along x, along y], neither over "
+                'ten times the other, or "uncalibrated"'
+            )
+        return x if x == y else (x, y)
+
+
+SheetPin = Annotated[tuple[LengthOrZero, LengthOrZero, Length], Field(strict=False)]
+
+
+class Sheet(Section):
+    """Film to cut from, as it lies on the machine."""
+
+    width: Annotated[Length, Field(le=10000)] = 152.4
+    """Size along x; the heated area of the paper's press."""
+    length: Annotated[Length, Field(le=10000)] = 152.4
+    """Size along y; of a roll, the most that is unrolled for one sheet."""
+    roll: bool = False
+    """Whether it comes off a roll: a sheet then ends where its parts do."""
+    border: LengthOrZero = 10.0
+    """What is left free along every edge of the sheet."""
+    spacing: Annotated[Length, Field(le=100)] = 1.0
+    """Least distance between two parts' cuts, and to pins."""
+    pins: tuple[SheetPin, ...] = Field(default=(), max_length=100, strict=False)
+    """What holds the sheet down: x, y from its lower left corner, and diameter."""
+    most: int = Field(default=20, ge=1, le=1000)
+    """Sheets that may be used."""
+
+
+class Sheets(Section):
+    tpe: Sheet = Sheet()
+    ptfe: Sheet = Sheet()
+    engine: Literal["bottom-left", "spyrrow"] = "bottom-left"
+    """What looks for places; "spyrrow" (an extra) packs tighter and takes its time."""
+    seconds: float = Field(default=20.0, gt=0, le=3600)
+    """How long spyrrow looks, for each sheet."""
+    label: bool = True
+    """Whether name, material, number and design hash are engraved into the border."""
+
+
+class Order(Section):
+    copies: int = Field(default=1, ge=1, le=1000)
+    """How many of the actuator are cut."""
+    made_for: str = Field(default="", max_length=120)
+    """Printed on the traveller."""
+    note: str = Field(default="", max_length=400)
+    """Printed on the traveller."""
 
 
 class Rules(Section):
@@ -201,6 +260,8 @@ class Design(Section):
     registration: Registration = Registration()
     press: Press = Press()
     laser: Laser = Laser()
+    sheets: Sheets = Sheets()
+    order: Order = Order()
     rules: Rules = Rules()
 
     _folder: Path = PrivateAttr(default=Path())

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import DxfProfile, dxf_text, number
+from sbafab.cutting.dxf_write import DxfProfile, Surroundings, dxf_text, number
 from sbafab.cutting.order import cutting_order
 from sbafab.geometry.edges import Arc, Line, Point
 from sbafab.geometry.region import Contour, Region
@@ -67,7 +67,7 @@ def test_holes_come_first_and_the_datum_last(plate: Region) -> None:
 
 
 def test_datum_can_be_left_out(plate: Region) -> None:
-    assert read_profile(dxf_text(cutting_order(plate), {}, datum=False)).other == ()
+    assert read_profile(dxf_text(cutting_order(plate), {}, sheet=Surroundings())).other == ()
 
 
 def test_no_bulge_turns_more_than_a_quarter() -> None:

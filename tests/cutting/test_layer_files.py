@@ -15,7 +15,7 @@ import sbafab
 from sbafab.cutting import files
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import DxfProfile
-from sbafab.cutting.files import write_layer_files
+from sbafab.cutting.files import CutFile, Progress, compensated_paths, write_layer_files
 from sbafab.cutting.properties import CutSettings
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
@@ -30,17 +30,24 @@ CALIBRATED = CutSettings(
 )
 
 
+def written(
+    laminate: Laminate, folder: Path, settings: CutSettings, progress: Progress | None = None
+) -> list[CutFile]:
+    paths = compensated_paths(laminate, settings)
+    return write_layer_files(laminate, paths, folder, settings, progress)
+
+
 def test_every_layer_has_its_file_bottom_to_top(laminate: Laminate, tmp_path: Path) -> None:
-    written = write_layer_files(laminate, tmp_path, SETTINGS)
-    assert [file.path for file in written] == [
+    made = written(laminate, tmp_path, SETTINGS)
+    assert [file.path for file in made] == [
         "layers/001_TPE_base.dxf",
         "layers/002_PTFE_chamber-mask.dxf",
         "layers/003_TPE_cap.dxf",
     ]
     assert sorted(p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*.dxf")) == [
-        file.path for file in written
+        file.path for file in made
     ]
-    for file, layer in zip(written, laminate.layers, strict=True):
+    for file, layer in zip(made, laminate.layers, strict=True):
         data = (tmp_path / file.path).read_bytes()
         assert hashlib.sha256(data).hexdigest() == file.sha256
         assert file.layer == layer.index
@@ -52,13 +59,13 @@ def test_every_layer_has_its_file_bottom_to_top(laminate: Laminate, tmp_path: Pa
 def test_equal_patterns_are_equal_files_and_separate_ones(
     laminate: Laminate, tmp_path: Path
 ) -> None:
-    base, _, cap = write_layer_files(laminate, tmp_path, SETTINGS)
+    base, _, cap = written(laminate, tmp_path, SETTINGS)
     assert base.sha256 == cap.sha256
     assert not (tmp_path / base.path).samefile(tmp_path / cap.path)
 
 
 def test_kerf_is_stated_and_done_for_each_material(laminate: Laminate, tmp_path: Path) -> None:
-    base, mask, _ = write_layer_files(laminate, tmp_path, CALIBRATED)
+    base, mask, _ = written(laminate, tmp_path, CALIBRATED)
     found = read_profile(tmp_path / base.path)
     assert found.properties == {
         "DESIGN": "two-plates",
@@ -80,7 +87,7 @@ def test_kerf_is_stated_and_done_for_each_material(laminate: Laminate, tmp_path:
 
 
 def test_ptfe_carries_the_fume_warning(laminate: Laminate, tmp_path: Path) -> None:
-    base, mask, _ = write_layer_files(laminate, tmp_path, SETTINGS)
+    base, mask, _ = written(laminate, tmp_path, SETTINGS)
     properties = read_profile(tmp_path / mask.path).properties
     assert properties["WAIVED"] == "none"
     for word in ("COF2", "HF", "permits", "drag knife"):
@@ -96,14 +103,14 @@ def test_other_ways_of_writing_curves(
     profile: DxfProfile, kinds: set[str], laminate: Laminate, tmp_path: Path
 ) -> None:
     settings = CutSettings("two-plates", "", profile=profile, chord_error=0.01)
-    base, *_ = write_layer_files(laminate, tmp_path, settings)
+    base, *_ = written(laminate, tmp_path, settings)
     model = ezdxf.readfile(tmp_path / base.path).modelspace()
     assert {entity.dxftype() for entity in model.query('*[layer!="REFERENCE"]')} == kinds
 
 
 def test_progress_counts_the_layers(laminate: Laminate, tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
-    write_layer_files(laminate, tmp_path, SETTINGS, lambda done, of: told.append((done, of)))
+    written(laminate, tmp_path, SETTINGS, lambda done, of: told.append((done, of)))
     assert told[-1] == (3, 3)
     assert [done for done, _ in told] == sorted(done for done, _ in told)
 
@@ -111,7 +118,7 @@ def test_progress_counts_the_layers(laminate: Laminate, tmp_path: Path) -> None:
 def test_kerf_too_wide_names_the_layer(laminate: Laminate, tmp_path: Path) -> None:
     settings = CutSettings("two-plates", "", {"TPE": 1.1})
     with pytest.raises(DesignError, match=r"layer 001_TPE_base: .* hole at x .* vanishes"):
-        write_layer_files(laminate, tmp_path, settings)
+        written(laminate, tmp_path, settings)
 
 
 def test_a_copy_that_differs_is_found(
@@ -122,7 +129,7 @@ def test_a_copy_that_differs_is_found(
 
     monkeypatch.setattr(files.shutil, "copyfile", cut_short)
     with pytest.raises(OutputError, match=r"003_TPE_cap\.dxf: differs"):
-        write_layer_files(laminate, tmp_path, SETTINGS)
+        written(laminate, tmp_path, SETTINGS)
 
 
 def test_a_wrong_write_is_found(
@@ -131,7 +138,7 @@ def test_a_wrong_write_is_found(
     write = files.dxf_text
     monkeypatch.setattr(files, "dxf_text", lambda contours, *rest: write(contours[1:], *rest))
     with pytest.raises(OutputError, match=r"001_TPE_base\.dxf: it has 3 holes, not 4"):
-        write_layer_files(laminate, tmp_path, SETTINGS)
+        written(laminate, tmp_path, SETTINGS)
 
 
 def test_a_folder_that_cannot_be_written_is_left_to_the_run_to_report(
@@ -139,7 +146,7 @@ def test_a_folder_that_cannot_be_written_is_left_to_the_run_to_report(
 ) -> None:
     (tmp_path / "layers").write_text("in the way")
     with pytest.raises(FileExistsError):
-        write_layer_files(laminate, tmp_path, SETTINGS)
+        written(laminate, tmp_path, SETTINGS)
 
 
 SCRIPT = """

@@ -392,3 +392,17 @@ def test_a_drawing_without_a_header_is_millimetres(tmp_path: Path) -> None:
     circle = "  0\nCIRCLE\n  8\n0\n 10\n0\n 20\n0\n 40\n3\n"
     path.write_text(f"  0\nSECTION\n  2\nENTITIES\n{circle}  0\nENDSEC\n  0\nEOF\n")
     assert read_outline(path).area == pytest.approx(math.pi * 9)
+
+
+@pytest.mark.parametrize("state", ["compensated", "uncalibrated: nominal edges"])
+def test_a_compensated_cut_file_is_no_outline(tmp_path: Path, state: str) -> None:
+    path = dxf(tmp_path, lambda m: m.add_circle((0, 0), 3))
+    document = ezdxf.readfile(path)
+    document.header.custom_vars.append("KERF_STATE", state)
+    document.header.custom_vars.append("KERF_WIDTH", "0.12 x 0.1")
+    document.saveas(path)
+    if state == "compensated":
+        with pytest.raises(DesignError, match=r"compensated for a kerf of 0\.12 x 0\.1 mm"):
+            read_outline(path)
+    else:
+        assert read_outline(path).area == pytest.approx(9 * math.pi)

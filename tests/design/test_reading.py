@@ -64,6 +64,12 @@ def test_not_a_length(text: object) -> None:
         (['rules.waive=["bond"]'], "'bond-width'"),
         (["laser.kerf_tpe=abc"], '"uncalibrated"'),
         (["laser.kerf_tpe=7"], "from 0 to 1 mm"),
+        (["laser.kerf_tpe=-0.1"], "from 0 to 1 mm"),
+        (["laser.kerf_ptfe=[0.1, 2]"], "from 0 to 1 mm"),
+        (["laser.kerf_ptfe=[0.1, 0]"], "neither over ten times the other"),
+        (["laser.kerf_ptfe=[0.1]"], "[along x, along y]"),
+        (["laser.kerf_ptfe=[0.1, 0.1, 0.1]"], "[along x, along y]"),
+        (["laser.kerf_ptfe=[0.1, true]"], "[along x, along y]"),
         (["chamber.diameter.x=5"], "is a value, not a table"),
         (["chamber"], "is not KEY=VALUE"),
         (["chamber.diameter=-5", "bond.width=-1"], "and 1 more problem"),
@@ -147,3 +153,14 @@ def test_families_are_distinct_records() -> None:
     records = [record for record, _ in FAMILIES.values()]
     assert len(set(records)) == len(records)
     assert all(issubclass(record, Design) for record in records)
+
+
+def test_a_kerf_may_differ_along_x_and_y(tmp_path: Path) -> None:
+    design = load_design(
+        "1dof-5mm", ['laser.kerf_tpe=["120 um", 0.1]', "laser.kerf_ptfe=[0.1,0.1]"]
+    )
+    assert design.laser.kerf_tpe == (0.12, 0.1)
+    assert design.laser.kerf_ptfe == 0.1
+    path = tmp_path / "again.toml"
+    path.write_text(design_toml(design))
+    assert load_design(path).laser == design.laser

@@ -1,0 +1,206 @@
+"""Film sheets: the parts of a nest as one cut file a sheet, with a picture beside it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sbafab.cutting.dxf_read import ReadBack, read_profile
+from sbafab.cutting.dxf_write import Surroundings, dxf_text
+from sbafab.cutting.files import Progress
+from sbafab.cutting.lettering import strokes
+from sbafab.cutting.lettering import width as text_width
+from sbafab.cutting.order import cutting_order, travel
+from sbafab.cutting.properties import CutSettings, kerf_suffix, sheet_properties
+from sbafab.cutting.svg_write import sheet_svg
+from sbafab.cutting.verify import TOLERANCE, check_surroundings, verify_file
+from sbafab.errors import OutputError
+from sbafab.geometry.edges import Point
+from sbafab.geometry.region import Contour, Region
+from sbafab.laminate.films import Material
+from sbafab.nesting.check import check_placed
+from sbafab.nesting.records import Nest, Placement, Stock
+
+FOLDER = "sheets"
+LETTERS = 4.0
+"""Height of engraved letters in mm, less where the border is narrow."""
+LEAST_LETTERS = 1.5
+
+
+@dataclass(frozen=True)
+class Machine:
+    """What the estimate of cutting time assumes; mm/s, seconds and mm."""
+
+    cut_speed: float = 20.0
+    travel_speed: float = 200.0
+    pierce_seconds: float = 0.1
+    heat_distance: float = 3.0
+
+
+@dataclass(frozen=True)
+class SheetFile:
+    """One written sheet: paths relative to the output folder, lengths in mm, area in mm2.
+
+    ``number`` counts from 1 within the material, and is the nest's sheet plus one. ``counts``
+    says how many parts of each design and pattern lie on it: (design, pattern, count).
+    ``unsorted_travel`` is what the head would travel in the nest's own order.
+    """
+
+    path: str
+    picture: str
+    sha256: str
+    nest: Nest
+    number: int
+    width: float
+    length: float
+    counts: tuple[tuple[str, str, int], ...]
+    contours: int
+    parts_area: float
+    cut_length: float
+    travel: float
+    unsorted_travel: float
+    minutes: float
+
+    @property
+    def material(self) -> Material:
+        return self.nest.material
+
+    @property
+    def density(self) -> float:
+        """Share of the sheet's whole area that becomes parts."""
+        return self.parts_area / (self.width * self.length)
+
+
+def write_sheets(
+    nests: Sequence[Nest],
+    folder: Path,
+    settings: CutSettings,
+    machine: Machine,
+    label: bool = True,
+    progress: Progress | None = None,
+) -> list[SheetFile]:
+    """Writes ``sheets/<material>_<number>.dxf`` and ``.svg`` for every sheet of every nest.
+
+    Each file is read back: its contours are those of the nest, inside the border, apart from
+    each other and clear of pins. Raises OutputError where one is not, OSError where it cannot be
+    written.
+    """
+    (folder / FOLDER).mkdir(parents=True, exist_ok=True)
+    total = sum(nest.sheets for nest in nests)
+    written: list[SheetFile] = []
+    for nest in nests:
+        for sheet in range(nest.sheets):
+            written.append(_write_sheet(nest, sheet, folder, settings, machine, label))
+            if progress is not None:
+                progress(len(written), total)
+    return written
+
+
+def _write_sheet(
+    nest: Nest, sheet: int, folder: Path, settings: CutSettings, machine: Machine, label: bool
+) -> SheetFile:
+    placements = nest.on_sheet(sheet)
+    region = Region(tuple(c for p in placements for c in nest.region(p).contours))
+    contours = cutting_order(region, machine.heat_distance)
+    width, length = nest.stock.width, nest.length(sheet)
+    around = _surroundings(nest, sheet, (width, length), settings, label)
+    properties = sheet_properties(
+        settings, nest.material, f"{sheet + 1} of {nest.sheets}", _parts_said(nest, placements)
+    )
+    stem = f"{nest.material}_{sheet + 1}{kerf_suffix(settings.kerf_width(nest.material))}"
+    path = folder / FOLDER / f"{stem}.dxf"
+    text = dxf_text(contours, properties, settings.profile, settings.chord_error, around)
+    path.write_bytes(text.encode())
+    chord_error = settings.chord_error if settings.profile == "chords" else 0.0
+    verify_file(path, region, properties, chord_error)
+    _verify_sheet(path, around, nest.stock, width, length, chord_error)
+    picture = path.with_suffix(".svg")
+    title = f"{settings.design}: {nest.material} sheet {sheet + 1} of {nest.sheets}"
+    picture.write_text(
+        sheet_svg(contours, around, width, length, title), encoding="utf-8", newline="\n"
+    )
+    cut_length = sum(contour.length for contour in contours)
+    moved = travel(contours)
+    return SheetFile(
+        path=f"{FOLDER}/{path.name}",
+        picture=f"{FOLDER}/{picture.name}",
+        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+        nest=nest,
+        number=sheet + 1,
+        width=width,
+        length=length,
+        counts=_counts(nest, placements),
+        contours=len(contours),
+        parts_area=region.area,
+        cut_length=cut_length,
+        travel=moved,
+        unsorted_travel=travel((*region.holes, *region.outers)),
+        minutes=_minutes(contours, cut_length, moved, machine),
+    )
+
+
+def _minutes(
+    contours: Sequence[Contour], cut_length: float, moved: float, machine: Machine
+) -> float:
+    seconds = (
+        cut_length / machine.cut_speed
+        + moved / machine.travel_speed
+        + len(contours) * machine.pierce_seconds
+    )
+    return seconds / 60
+
+
+def _surroundings(
+    nest: Nest, sheet: int, size: tuple[float, float], settings: CutSettings, label: bool
+) -> Surroundings:
+    width, length = size
+    parting = ((0.0, length), (width, length))
+    engraved = _label(nest, sheet, settings) if label else ()
+    return Surroundings(engraved, (parting,) if nest.stock.roll else (), size)
+
+
+def _label(nest: Nest, sheet: int, settings: CutSettings) -> tuple[tuple[Point, ...], ...]:
+    """What is engraved into the lower border, if there is room for it between the pins."""
+    stock = nest.stock
+    kerf = kerf_suffix(settings.kerf_width(nest.material)).strip("_") or "kerf none"
+    waived = f" waived: {', '.join(settings.waived)}" if settings.waived else ""
+    text = (
+        f"{settings.design} {nest.material} {sheet + 1}/{nest.sheets} "
+        f"#{settings.design_sha256[:8]} {kerf}{waived}"
+    )
+    room = stock.width - 2 * stock.border
+    height = min(LETTERS, stock.border / 2, LETTERS * room / max(text_width(text, LETTERS), 1e-9))
+    low = (stock.border - height) / 2
+    clear = all(y - d / 2 > low + height or y + d / 2 < low for _, y, d in stock.pins)
+    return strokes(text, (stock.border, low), height) if height >= LEAST_LETTERS and clear else ()
+
+
+def _counts(nest: Nest, placements: Sequence[Placement]) -> tuple[tuple[str, str, int], ...]:
+    found = Counter(
+        (nest.parts[placement.part].design, nest.parts[placement.part].pattern)
+        for placement in placements
+    )
+    return tuple((design, pattern, count) for (design, pattern), count in sorted(found.items()))
+
+
+def _parts_said(nest: Nest, placements: Sequence[Placement]) -> str:
+    return ", ".join(
+        f"{count} x {design} {pattern}" for design, pattern, count in _counts(nest, placements)
+    )
+
+
+def _verify_sheet(
+    path: Path, around: Surroundings, stock: Stock, width: float, length: float, chord_error: float
+) -> None:
+    """The written file once more, now as a sheet: frame, engraving, borders, gaps and pins."""
+    found: ReadBack = read_profile(path)
+    used = Stock(width, length, stock.border, stock.spacing, stock.pins)
+    pieces = [(f"piece {i}", piece) for i, piece in enumerate(found.region.pieces, start=1)]
+    try:
+        check_surroundings(found, around)
+        check_placed(pieces, used, TOLERANCE + 2 * chord_error)
+    except OutputError as error:
+        raise OutputError(f"{path.name}: {error}") from error

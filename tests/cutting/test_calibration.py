@@ -1,0 +1,154 @@
+"""Kerf and uncertainty from a measured coupon, against closed formulas and printed tables."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sbafab.cutting.calibration import (
+    Axis,
+    Kind,
+    Measurement,
+    calibrated,
+    read_measurements,
+    student_t,
+)
+from sbafab.errors import DesignError
+
+HEADER = "feature,axis,nominal_mm,measured_mm\n"
+
+
+def sizes(kerf_x: float, kerf_y: float, scale: float = 1.0) -> list[Measurement]:
+    """What an ideal instrument reads, with a scatter that sums to 0 over each group of four."""
+    found = []
+    features: list[tuple[Kind, float]] = [
+        ("outer", 24.0),
+        ("outer", 12.0),
+        ("window", 14.0),
+        ("window", 6.0),
+    ]
+    axes: list[tuple[Axis, float]] = [("x", kerf_x), ("y", kerf_y)]
+    for kind, nominal in features:
+        for axis, kerf in axes:
+            for off in (-0.001, 0.001):
+                sign = -1 if kind == "outer" else 1
+                measured = scale * nominal + sign * kerf + off
+                found.append(Measurement(kind, axis, nominal, measured))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("degrees", "t"),
+    [(1, 12.7062), (2, 4.30265), (3, 3.18245), (5, 2.57058), (10, 2.22814), (30, 2.04227)],
+)
+def test_student_t_is_the_printed_table_s(degrees: int, t: float) -> None:
+    assert student_t(degrees) == pytest.approx(t, abs=6e-5)
+
+
+def test_mean_and_uncertainty_by_hand() -> None:
+    """Kerfs 0.11, 0.12 and 0.16: mean 0.13, s = sqrt(0.0007)."""
+    rows = [
+        Measurement("outer", "x", 20.0, 19.89),
+        Measurement("window", "y", 20.0, 20.12),
+        Measurement("outer", "y", 20.0, 19.84),
+    ]
+    kerf = calibrated(rows, 0.02).overall.kerf
+    assert kerf.value == pytest.approx(0.13, abs=1e-12)
+    expected = math.sqrt(0.0007 / 3 + 0.02**2 / 12)
+    assert kerf.uncertainty == pytest.approx(expected, rel=1e-9)
+    assert kerf.half_width == pytest.approx(4.30265 * expected, rel=1e-5)
+
+
+def test_equal_kerfs_do_not_differ() -> None:
+    found = calibrated(sizes(0.12, 0.12), 0.001)
+    assert found.overall.kerf.value == pytest.approx(0.12, abs=1e-9)
+    assert not found.differs
+    assert not found.overall.is_scaled
+
+
+def test_x_and_y_are_told_apart() -> None:
+    found = calibrated(sizes(0.12, 0.09), 0.001)
+    assert found.x is not None
+    assert found.y is not None
+    assert found.difference is not None
+    assert found.x.kerf.value == pytest.approx(0.12, abs=1e-9)
+    assert found.y.kerf.value == pytest.approx(0.09, abs=1e-9)
+    assert found.difference.value == pytest.approx(0.03, abs=1e-9)
+    assert found.differs
+
+
+def test_shrunk_film_is_told_from_kerf() -> None:
+    rows = sizes(0.12, 0.12, scale=0.997)
+    overall = calibrated(rows, 0.001).overall
+    assert overall.is_scaled
+    assert overall.scale is not None
+    assert overall.scale.value == pytest.approx(0.997, abs=1e-9)
+    assert overall.kerf.value == pytest.approx(0.12, abs=1e-9)
+    design = np.array([[m.nominal, -1.0 if m.kind == "outer" else 1.0] for m in rows])
+    measured = np.array([m.measured for m in rows])
+    solution, rest, *_ = np.linalg.lstsq(design, measured, rcond=None)
+    spread = rest[0] / (len(rows) - 2) * np.linalg.inv(design.T @ design)
+    assert (overall.scale.value, overall.kerf.value) == pytest.approx(tuple(solution), abs=1e-9)
+    assert overall.scale.uncertainty == pytest.approx(math.sqrt(spread[0, 0]), rel=1e-6)
+
+
+def test_a_coarse_instrument_does_not_find_a_scale() -> None:
+    assert not calibrated(sizes(0.12, 0.12, scale=0.9999), 0.1).overall.is_scaled
+
+
+@pytest.mark.parametrize(
+    ("kerf", "says"), [(-0.05, "negative"), (1.2, "over 1 mm"), (-3.0, "negative")]
+)
+def test_a_kerf_that_no_beam_has_is_refused(kerf: float, says: str) -> None:
+    with pytest.raises(DesignError, match=says):
+        calibrated(sizes(kerf, kerf), 0.01)
+
+
+def table(folder: Path, text: str) -> Path:
+    path = folder / "measured.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_remarks_blank_and_empty_rows_are_skipped(tmp_path: Path) -> None:
+    text = (
+        f"# a remark, with commas\n{HEADER}A outer,x,20,19.9\n\nA outer,y,20,\n"
+        "B window,y,10,10.1,\n"
+    )
+    assert read_measurements(table(tmp_path, text)) == [
+        Measurement("outer", "x", 20.0, 19.9),
+        Measurement("window", "y", 10.0, 10.1),
+    ]
+
+
+def test_a_table_of_a_spreadsheet_with_decimal_commas(tmp_path: Path) -> None:
+    text = "\ufeffFeature;Axis;Nominal_mm;Measured_mm\r\nA outer;X;20;19,88\r\n"
+    (row,) = read_measurements(table(tmp_path, text))
+    assert row.kerf == pytest.approx(0.12)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "no column feature"),
+        ("feature,axis,nominal_mm\nA outer,x,20\n", "no column measured_mm"),
+        (f"{HEADER}A outer,x,20,about 20\n", "line 2: measured_mm is 'about 20', not a number"),
+        (f"{HEADER}A outer,x,,19.9\n", "nominal_mm is '', not a number"),
+        (f"{HEADER}A outer,x,20,nan\n", "above 0"),
+        (f"{HEADER}A outer,x,20,-19.9\n", "above 0"),
+        (f"{HEADER}A outer,z,20,19.9\n", "axis must be x or y"),
+        (f"{HEADER}A,x,20,19.9\n", "feature must end in outer or window"),
+    ],
+)
+def test_a_table_that_cannot_be_understood_is_refused(text: str, says: str, tmp_path: Path) -> None:
+    with pytest.raises(DesignError, match=says):
+        read_measurements(table(tmp_path, text))
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_too_few_rows_are_refused(count: int) -> None:
+    with pytest.raises(DesignError, match="needs 2"):
+        calibrated(sizes(0.1, 0.1)[:count], 0.01)
