@@ -1,0 +1,1 @@
+"""traveller.html: what the technician has at the laser and the press."""

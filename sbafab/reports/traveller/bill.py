@@ -1,0 +1,135 @@
+"""The bill of materials and the cut list."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sbafab.actuators.radial import RadialDesign
+from sbafab.laminate.laminate import Layer
+from sbafab.reports.features import layer_numbers
+from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller.job import Job, Work
+from sbafab.reports.traveller.shapes import thumbnail
+
+ADHESIVE = "Loctite Vinyl, Fabric & Plastic Flexible Adhesive"
+
+
+@dataclass(frozen=True)
+class Item:
+    """A row of the bill of materials."""
+
+    name: str
+    what: str
+    quantity: str
+
+
+def bill(work: Work) -> list[Item]:
+    """All that must be at hand before the work starts, for all copies."""
+    job, laminate = work.job, work.laminate
+    items = [*_films(work)]
+    if laminate.inlets:
+        number = len(laminate.inlets) * job.copies
+        diameter = say.millimetres(laminate.inlets[0].tube_diameter)
+        tube = work.design.inlet.tube
+        items.append(Item("Tube", f"{tube}, outer diameter {diameter}", say.count(number, "piece")))
+        drops = say.count(number, "small drop")
+        items.append(Item("Adhesive", ADHESIVE, drops))
+    if isinstance(work.design, RadialDesign):
+        diameter = say.millimetres(work.design.tube.outer_diameter)
+        what = f"to wrap the sheet round, outer diameter {diameter}"
+        items.append(Item("Tube to wrap", what, str(job.copies)))
+    pins = Counter(pin.diameter for pin in laminate.pins)
+    items += [
+        Item("Dowel pins", f"⌀{say.millimetres(diameter)}", str(number))
+        for diameter, number in sorted(pins.items())
+    ]
+    if job.fixture is not None:
+        items.append(Item("Pin plate", f"cut from {job.fixture}, holes reamed to the pins", "1"))
+    items.append(
+        Item(
+            "Release film",
+            "two pieces, larger than the laminate, that TPE does not stick to at press temperature "
+            "(our advice; the paper names none)",
+            "2",
+        )
+    )
+    items += [Item(name, "", quantity) for name, quantity in job.extras]
+    return items
+
+
+def _films(work: Work) -> list[Item]:
+    items = []
+    for film in dict.fromkeys(layer.film for layer in work.laminate.layers):
+        layers = [layer for layer in work.laminate.layers if layer.film == film]
+        area = sum(layer.profile.area for layer in layers) * work.job.copies / 100
+        sheets = [sheet for sheet in work.sheets if sheet.material == film.material]
+        sizes = Counter(say.size(sheet.width, sheet.length) for sheet in sheets)
+        needed = [f"{say.count(number, 'sheet')} {size}" for size, number in sizes.items()]
+        items.append(
+            Item(
+                f"{film.material} film",
+                f"{film.product}, {say.millimetres(film.thickness)} thick; {area:.1f} cm² of parts "
+                f"in {len(layers) * work.job.copies} layers",
+                ", ".join(needed) or "see the cut files",
+            )
+        )
+    return items
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A row of the cut list: one pattern. ``cut_length`` in mm, of one layer."""
+
+    pattern: str
+    picture: str
+    material: str
+    roles: str
+    layers: str
+    count: int
+    pieces: int
+    cut_length: float
+    sheets: str
+
+
+def cut_list(work: Work) -> list[Cut]:
+    """Every pattern once, in the order of its first layer."""
+    return [_cut(work, layers) for layers in work.laminate.patterns.values()]
+
+
+def _cut(work: Work, layers: tuple[Layer, ...]) -> Cut:
+    first = layers[0]
+    profile = first.profile
+    name = work.design.name
+    holding = [
+        sheet.path.rpartition("/")[2].removesuffix(".dxf")
+        for sheet in work.sheets
+        if any((design, pattern) == (name, first.pattern) for design, pattern, _ in sheet.counts)
+    ]
+    return Cut(
+        first.pattern,
+        thumbnail(f"thumb-{first.pattern}", first.pattern, first.film.material, profile.bounds),
+        first.film.material,
+        ", ".join(dict.fromkeys(layer.role.replace("-", " ") for layer in layers)),
+        layer_numbers([layer.index for layer in layers]),
+        len(layers) * work.job.copies,
+        len(profile.pieces),
+        sum(contour.length for contour in profile.contours),
+        ", ".join(holding),
+    )
+
+
+def kerf_states(job: Job, materials: Sequence[str]) -> list[tuple[str, str, bool]]:
+    """For every material: what the cut files say of its kerf, and whether it was measured."""
+    states = []
+    for material in materials:
+        kerf = job.kerf.get(material)
+        if kerf is None:
+            states.append((material, "uncalibrated: edges are nominal", False))
+        elif isinstance(kerf, tuple):
+            words = f"compensated for {kerf[0]:g} mm along x, {kerf[1]:g} mm along y"
+            states.append((material, words, True))
+        else:
+            states.append((material, f"compensated for {kerf:g} mm", True))
+    return states

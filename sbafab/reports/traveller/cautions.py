@@ -1,0 +1,41 @@
+"""What the technician must know before starting."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from sbafab.cutting.properties import PTFE_WARNING
+from sbafab.reports.traveller.bill import kerf_states
+from sbafab.reports.traveller.job import Work
+
+
+def cautions(work: Work) -> list[tuple[str, str]]:
+    """Every warning once: a short title and what it says."""
+    return list(dict.fromkeys(_all(work)))
+
+
+def _all(work: Work) -> Iterator[tuple[str, str]]:
+    job, schedule = work.job, work.schedule
+    materials = list(dict.fromkeys(layer.film.material for layer in work.laminate.layers))
+    if "PTFE" in materials:
+        yield "PTFE fumes", PTFE_WARNING
+    if job.waived:
+        yield (
+            "Waived rules",
+            f"made although the design waives {', '.join(job.waived)}. What they found: "
+            + " / ".join(f.message for f in job.findings if f.by_user),
+        )
+    for material, _, measured in kerf_states(job, materials):
+        if not measured:
+            yield (
+                f"{material} kerf uncalibrated",
+                "edges are nominal, so outlines come out smaller and holes larger by half a kerf. "
+                "Make a calibration piece with “sbafab new coupon”, cut and measure it, compute "
+                "the width with “sbafab kerf”, and generate again.",
+            )
+    for finding in job.findings:
+        if finding.verdict == "warn":
+            yield f"Rule {finding.rule} warns", finding.message
+    for warning in schedule.warnings:
+        if not (job.waived and warning.startswith("made although")):
+            yield "Press schedule", warning

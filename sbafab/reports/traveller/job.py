@@ -1,0 +1,48 @@
+"""What a traveller is written from, beside the pictures that it draws itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from sbafab.cutting.sheets import SheetFile
+from sbafab.design.records import Design
+from sbafab.laminate.laminate import Laminate
+from sbafab.pressing.schedule import Schedule
+from sbafab.rules.finding import Finding
+
+Kerf = float | tuple[float, float] | None
+"""Full kerf width in mm, one or along x and y; None where it was not measured."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """The order behind a traveller.
+
+    ``kerf`` by material, ``fixture`` the path of the pin plate's cut file, ``solid_png`` the bytes
+    of the picture of the solid. ``extras`` are further rows of the bill of materials: item and
+    quantity. Empty ``made_for`` leaves a blank to fill in by hand.
+    """
+
+    design_sha256: str
+    generator: str
+    waived: Sequence[str] = ()
+    findings: Sequence[Finding] = ()
+    fixture: str | None = None
+    kerf: Mapping[str, Kerf] = field(default_factory=dict)
+    copies: int = 1
+    made_for: str = ""
+    note: str = ""
+    solid_png: bytes | None = None
+    extras: Sequence[tuple[str, str]] = ()
+
+
+@dataclass(frozen=True)
+class Work:
+    """All that the pages are made from."""
+
+    design: Design
+    laminate: Laminate
+    schedule: Schedule
+    sheets: Sequence[SheetFile]
+    job: Job

@@ -1,0 +1,156 @@
+"""A press step seen from above: plate, layers, pins in or out, inlet tabs."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sbafab.cutting.fixture import CHAMFER, fixture
+from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.region import Region
+from sbafab.geometry.section import section
+from sbafab.geometry.svg import number, path_data
+from sbafab.laminate.assembly import AssemblyStep, distinct_layers
+from sbafab.laminate.laminate import Inlet, Laminate, Pin
+from sbafab.reports import drawing as draw
+from sbafab.reports.traveller.layup import Bed, inlets_in
+from sbafab.reports.traveller.shapes import Picture, flat, label, pattern_id
+
+WIDEST, TALLEST = 64.0, 66.0
+EDGE, HEAD, FOOT = 5.0, 5.0, 9.0
+FREE = 6.0
+"""mm of air round a laminate that has no pin plate."""
+PLATE = "#f1f1ef"
+BESIDE = 2.2
+
+
+class _View(NamedTuple):
+    """Where the step's frame (mm of the laminate) lands on the page."""
+
+    bounds: Bounds
+    scale: float
+
+    @property
+    def width(self) -> float:
+        return (self.bounds[2] - self.bounds[0]) * self.scale + 2 * EDGE
+
+    @property
+    def height(self) -> float:
+        return (self.bounds[3] - self.bounds[1]) * self.scale + HEAD + FOOT
+
+    @property
+    def origin(self) -> Point:
+        return EDGE - self.bounds[0] * self.scale, HEAD + self.bounds[3] * self.scale
+
+    def at(self, p: Point) -> Point:
+        x, y = self.origin
+        return x + p[0] * self.scale, y - p[1] * self.scale
+
+
+def _view(bounds: Bounds) -> _View:
+    low_x, low_y, high_x, high_y = bounds
+    return _View(bounds, min(WIDEST / (high_x - low_x), TALLEST / (high_y - low_y)))
+
+
+def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: str) -> str:
+    """The step from above; earlier stacks grey, what joins in its own colour."""
+    plate = fixture(laminate)
+    view = _view(plate.bounds if plate is not None else _widened(laminate.bounds))
+    state = "pins in" if step.pins else "no pins"
+    words = f"step {step.number} from above, {state}; the text beside it says the same"
+    picture = Picture(name, view.width, view.height, words)
+    if plate is not None:
+        picture.add(_plate(plate, bool(step.pins), view))
+    for bed in lying:
+        for layer in distinct_layers(laminate, bed.layers):
+            look = "made" if bed.made_in else "clear"
+            picture.part(
+                pattern_id(layer.pattern),
+                layer.film.material,
+                flat(view.scale, view.origin),
+                look,
+            )
+    for pin in laminate.pins:
+        picture.add(*_pin(pin, pin in step.pins, view))
+    for inlet in inlets_in(laminate, step.layers):
+        picture.add(*_inlet(inlet, _reach(laminate, inlet), view))
+    picture.add(*_datum(view), *_captions(view, plate is not None, bool(step.pins)))
+    return picture.svg()
+
+
+def _plate(plate: Region, used: bool, view: _View) -> str:
+    """The pin plate, dashed where it is not used: it still tells which way round things go."""
+    shape = path_data(plate.mapped(view.at, view.scale, mirror=True))
+    dash = "" if used else ' stroke-dasharray="1.6 1.2"'
+    return (
+        f'<path d="{shape}" fill="{PLATE if used else "none"}" fill-rule="evenodd" '
+        f'stroke="{draw.GREY}" stroke-width="0.25"{dash}/>'
+    )
+
+
+def _widened(bounds: Bounds) -> Bounds:
+    low_x, low_y, high_x, high_y = bounds
+    return low_x - FREE, low_y - FREE, high_x + FREE, high_y + FREE
+
+
+def _pin(pin: Pin, is_in: bool, view: _View) -> list[str]:
+    """A pin that is in: filled, with its name; one that is out: hollow."""
+    (x, y), r = view.at(pin.centre), max(pin.diameter * view.scale / 2, 0.7)
+    fill = draw.DARK if is_in else "#ffffff"
+    circle = (
+        f'<circle cx="{number(x)}" cy="{number(y)}" r="{number(r)}" fill="{fill}" '
+        f'stroke="{draw.DARK}" stroke-width="0.3"/>'
+    )
+    named = [label((x, y + r + 2.2), pin.name, 1.9)] if is_in else []
+    return [circle, *named]
+
+
+def _reach(laminate: Laminate, inlet: Inlet) -> float:
+    """How far past its mouth an inlet's strip goes at most, mm."""
+    shapes = (layers[0].profile for layers in laminate.patterns.values())
+    spans = [span for shape in shapes for span in section(shape, inlet.mouth, inlet.direction)]
+    return max((end for _, end in spans), default=0.0)
+
+
+def _inlet(inlet: Inlet, reach: float, view: _View) -> list[str]:
+    """An arrow outward from the end of the tab and its strip, and the chamber's name at its end."""
+    u, v = inlet.direction
+    (x, y), v = view.at((inlet.mouth[0] + reach * u, inlet.mouth[1] + reach * v)), -v
+    start, tip = (x + 0.8 * u, y + 0.8 * v), (x + 4.0 * u, y + 4.0 * v)
+    half = draw.text_width(inlet.chamber, 2.2) / 2
+    # Sideways the words need room for their width, up and down for their height.
+    middle = tip[0] + (half + 0.8) * u, tip[1] + BESIDE * v + 0.8
+    middle = min(max(middle[0], half + 0.5), view.width - half - 0.5), middle[1]
+    return [
+        draw.line([start, tip], width=0.35),
+        draw.arrow(tip, (u, v)),
+        label(middle, inlet.chamber, 2.2),
+    ]
+
+
+def _datum(view: _View) -> list[str]:
+    """The cross that every cut file carries at the actuator's axis."""
+    x, y = view.origin
+    return [
+        draw.line([(x - 1.6, y), (x + 1.6, y)], width=0.2),
+        draw.line([(x, y - 1.6), (x, y + 1.6)], width=0.2),
+    ]
+
+
+def _captions(view: _View, plate: bool, pinned: bool) -> list[str]:
+    """What the marks mean, under the picture, and the plate's corner, above it."""
+    y = view.height - 4.6
+    parts = [draw.text((EDGE, view.height - 1.2), "seen from above; + datum", size=2.2)]
+    if not plate:
+        return parts
+    mark = '<circle cx="{}" cy="{}" r="0.8" fill="{}" stroke="#1a1a1a" stroke-width="0.3"/>'
+    parts += [
+        mark.format(number(EDGE + 0.8), number(y - 0.8), draw.DARK),
+        draw.text((EDGE + 2.4, y), "pin in", size=2.2),
+        mark.format(number(EDGE + 13.0), number(y - 0.8), "#ffffff"),
+        draw.text((EDGE + 14.6, y), "no pin", size=2.2),
+    ]
+    _, _, high_x, high_y = view.bounds
+    corner = view.at((high_x - CHAMFER / 2, high_y))
+    words = "cut corner" if pinned else "pin plate not used"
+    parts.append(draw.text((corner[0] + 2.0, HEAD - 1.2), words, size=2.2, anchor="end"))
+    return parts

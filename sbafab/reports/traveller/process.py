@@ -1,0 +1,284 @@
+"""What the technician does at the press, action by action, each with a box to tick."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+from sbafab.actuators.radial import RadialDesign
+from sbafab.laminate.assembly import AssemblyStep, assembly
+from sbafab.laminate.laminate import Laminate, Layer, Pin
+from sbafab.pressing.schedule import Step
+from sbafab.reports.features import layer_numbers
+from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller.exploded import exploded
+from sbafab.reports.traveller.job import Work
+from sbafab.reports.traveller.layup import Bed, Round, beds, inlets_in, rounds
+from sbafab.reports.traveller.plan import plan
+
+LEAK_KILOPASCALS = 5.0
+"""Our choice, far below the paper's burst pressure and enough to open every balloon."""
+LEAK_SECONDS = 60
+MOST_LINES = 12
+"""Single layers up to which each has a line of its own."""
+BONDS = {
+    "flash": "Flash bond: the layers just barely stick together.",
+    "full": "Full bond: all TPE that touches melts into one.",
+}
+
+
+@dataclass(frozen=True)
+class Action:
+    """One thing to do. ``layers`` are laid in it; ``ticks`` label one box each, or there is one."""
+
+    text: str
+    layers: tuple[int, ...] = ()
+    ticks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class StepPage:
+    """One press step as it stands on the page; pictures are inline SVG."""
+
+    step: Step
+    bond: str
+    dials: tuple[tuple[str, str], ...]
+    plan: str
+    exploded: str
+    actions: tuple[Action, ...]
+
+
+def step_pages(work: Work) -> list[StepPage]:
+    """The press steps in order, each with its pictures, dial settings and actions."""
+    parts = assembly(work.laminate)
+    found = []
+    for part, step in zip(parts, work.schedule.steps, strict=True):
+        lying = beds(parts, part)
+        found.append(
+            StepPage(
+                step,
+                BONDS[step.bond],
+                _dials(step),
+                plan(work.laminate, part, lying, f"plan-{step.step}"),
+                exploded(work.laminate, part, lying, f"exploded-{step.step}"),
+                tuple(_actions(work.laminate, part, step, lying)),
+            )
+        )
+    return found
+
+
+def _dials(step: Step) -> tuple[tuple[str, str], ...]:
+    width, length = step.platen_mm
+    return (
+        ("Both platens", say.temperature(step.temperature_c)),
+        ("Force", say.force(step.force_n)),
+        (f"Pressure on {say.size(width, length)}", say.pressure(step.pressure_kpa)),
+        ("Timer", say.minutes(step.minutes)),
+        ("Pins", f"{len(step.pins)} in" if step.pins else "none"),
+    )
+
+
+def _actions(
+    laminate: Laminate, part: AssemblyStep, step: Step, lying: Sequence[Bed]
+) -> Iterator[Action]:
+    yield Action(
+        f"Heat both platens to {say.temperature(step.temperature_c)}; set the force to "
+        f"{say.force(step.force_n)}."
+    )
+    if part.pins:
+        yield Action(
+            f"Lay the pin plate down, cut corner at the back right. Pins in: {_pins(part.pins)}. "
+            "Prick a release film over them."
+        )
+    else:
+        yield Action("Lay a release film on a flat plate. No pins: lay edge on edge, by eye.")
+    for bed in lying:
+        yield from _lay(laminate, bed, part.pins)
+    stacked = sum(laminate.layer(index).film.thickness for index in part.layers)
+    yield Action(
+        f"Check: {_tabs(laminate, part.layers)}edges lie as in the picture, nothing is folded, no "
+        f"dust or hair between the films, the stack lies flat (about {say.millimetres(stacked)})."
+    )
+    if part.pins:
+        yield Action("Check: no pin stands so high that it keeps the platens apart.")
+    yield Action("Cover with a release film.")
+    yield Action(f"Close the press and start the timer: {say.minutes(step.minutes)}.")
+    yield Action("Take it out: it is as hot as the platens. Let it cool flat before you touch it.")
+    if part.pins:
+        yield Action(f"Pins out, straight up: {say.listed([pin.name for pin in part.pins])}.")
+    yield Action(f"Take off the release films. You now hold {_product(laminate, part)}.")
+
+
+def _pins(pins: Sequence[Pin]) -> str:
+    sizes: dict[float, list[str]] = {}
+    for pin in pins:
+        sizes.setdefault(pin.diameter, []).append(pin.name)
+    return "; ".join(f"⌀{say.millimetres(d)}: {say.listed(names)}" for d, names in sizes.items())
+
+
+def _lay(laminate: Laminate, bed: Bed, pins: Sequence[Pin]) -> Iterator[Action]:
+    if bed.made_in is not None:
+        numbers = layer_numbers(bed.layers)
+        lowest = laminate.layer(bed.layers[0])
+        yield Action(
+            f"Lay the stack from step {bed.made_in} (layers {numbers}), layer {lowest.index}, the "
+            f"{lowest.film.material} {lowest.role.replace('-', ' ')}, down."
+        )
+        return
+    turns = rounds([laminate.layer(index) for index in bed.layers])
+    for repeats, group in groupby(turns, key=lambda turn: turn.count > 1):
+        found = list(group)
+        if repeats:
+            yield from (_lay_round(laminate, turn, pins) for turn in found)
+        elif len(found) > MOST_LINES:
+            yield _lay_many(laminate, [turn.first for turn in found], pins)
+        else:
+            for layer in (turn.first for turn in found):
+                text = f"Lay layer {layer.index}: {_named(layer)}."
+                yield Action(text + _by_eye(laminate, [layer], pins), (layer.index,))
+
+
+def _lay_round(laminate: Laminate, turn: Round, pins: Sequence[Pin]) -> Action:
+    """One box for every turn, so that nobody loses count."""
+    order = ", then ".join(_named(layer) for layer in turn.turns[0])
+    return Action(
+        f"Lay layers {turn.first.index} to {turn.last.index}, {turn.count} times the same "
+        f"{len(turn.places)}, lowest first: {order}." + _by_eye(laminate, turn.turns[0], pins),
+        tuple(layer.index for layer in turn.layers),
+        tuple(layer_numbers([layer.index for layer in part]) for part in turn.turns),
+    )
+
+
+def _lay_many(laminate: Laminate, layers: Sequence[Layer], pins: Sequence[Pin]) -> Action:
+    """Many layers that do not repeat, close together so that the step stays on its page."""
+    return Action(
+        f"Lay layers {layers[0].index} to {layers[-1].index} one by one, lowest first."
+        + _by_eye(laminate, layers, pins),
+        tuple(layer.index for layer in layers),
+        tuple(f"{layer.index}: {_named(layer)}" for layer in layers),
+    )
+
+
+def _by_eye(laminate: Laminate, layers: Sequence[Layer], pins: Sequence[Pin]) -> str:
+    """A sentence on those of the layers that none of the pins in the plate holds."""
+    if not pins:
+        return ""
+    loose = [
+        layer.pattern
+        for layer in layers
+        if not set(pins).intersection(laminate.pins_holding(layer))
+    ]
+    return f" No pin holds {say.listed(loose)}: lay by eye." if loose else ""
+
+
+def _named(layer: Layer) -> str:
+    pieces = len(layer.profile.pieces)
+    loose = f" in {pieces} pieces" if pieces > 1 else ""
+    return f"{layer.film.material} {layer.role.replace('-', ' ')} {layer.pattern}{loose}"
+
+
+def _tabs(laminate: Laminate, layers: Sequence[int]) -> str:
+    """Where the inlet tabs of these layers point; empty if no layer has one."""
+    there = inlets_in(laminate, layers)
+    if not there:
+        return ""
+    points = say.listed([f"{inlet.chamber} {say.toward(inlet)}" for inlet in there])
+    return f"inlet tabs point as in the picture ({points}), "
+
+
+def _product(laminate: Laminate, part: AssemblyStep) -> str:
+    if len(part.layers) == len(laminate.layers):
+        return "the whole laminate"
+    numbers = layer_numbers(part.layers)
+    return f"the stack from step {part.number}, layers {numbers}; keep it this side up"
+
+
+def finishing(work: Work) -> list[Action]:
+    """Trimming after the last press step; empty where nothing is to be cut off."""
+    if work.laminate.registration != "ears":
+        return []
+    return [
+        Action("Snip off every ear along the outline, not into the bond."),
+        Action("Cut the tails of the inlet strips flush with the tab's end."),
+        Action("Leave the masks in their pockets."),
+    ]
+
+
+def tubing(work: Work) -> list[Action]:
+    """The paper's step 5, one box an inlet where it is done for each of them."""
+    inlets = work.laminate.inlets
+    if not inlets:
+        return []
+    names = _apart([inlet.chamber for inlet in inlets])
+    diameter = say.millimetres(inlets[0].tube_diameter)
+    straight = say.millimetres(min(inlet.length for inlet in inlets))
+    return [
+        Action(
+            f"Cut {say.count(len(inlets), 'piece')} of {work.design.inlet.tube}, outer diameter "
+            f"{diameter}, square and without burr, as long as your rig needs."
+        ),
+        Action("Part the two films at the tab's end; the PTFE strip lies between them.", (), names),
+        Action(
+            f"Push the tube in beside the strip, up to {straight} deep: so long is the straight "
+            "run of the tab.",
+            (),
+            names,
+        ),
+        Action(
+            "Seal the mouth all round with a small drop of Loctite Vinyl, Fabric & Plastic; keep "
+            "it out of the tube.",
+            (),
+            names,
+        ),
+        Action("Let the adhesive cure as its package says before you pressurise anything."),
+    ]
+
+
+def _apart(names: Sequence[str]) -> tuple[str, ...]:
+    """A box for each of several; a single one needs no name."""
+    return tuple(names) if len(names) > 1 else ()
+
+
+def wrapping(work: Work) -> list[Action]:
+    """A radial laminate goes round its tube in the end; empty for other families."""
+    design = work.design
+    if not isinstance(design, RadialDesign):
+        return []
+    return [
+        Action(
+            f"Wrap the sheet round its tube, outer diameter "
+            f"{say.millimetres(design.tube.outer_diameter)}, balloons outward, its straight edges "
+            "along the tube. The paper does not say what holds it there."
+        )
+    ]
+
+
+def leak_test(work: Work) -> list[Action]:
+    """The paper's way to find leaks; the pressure and the time are ours."""
+    names = _apart([chamber.name for chamber in work.laminate.chambers])
+    lumen = ["lumen"] if work.laminate.lumen else []
+    places = say.listed(["outline", "tab", "tube", "cap", *lumen])
+    several = (
+        [
+            Action(
+                "While one chamber is full, watch the open tubes of the others: bubbles there mean "
+                "a leak between chambers.",
+            )
+        ]
+        if len(work.laminate.inlets) > 1
+        else []
+    )
+    return [
+        Action("Connect a regulator or a syringe with a gauge. Wear eye protection."),
+        Action(
+            f"Under water, or brushed with soapy water, raise each chamber slowly to "
+            f"{LEAK_KILOPASCALS:g} kPa and hold for {LEAK_SECONDS} s.",
+            (),
+            names,
+        ),
+        Action("All balloons open evenly. One that stays shut was over-melted."),
+        Action(f"No stream of bubbles anywhere; look at {places}."),
+        *several,
+        Action("Let the pressure out, dry it, write the result at the head of this traveller."),
+    ]

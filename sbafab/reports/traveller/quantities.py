@@ -1,0 +1,69 @@
+"""Quantities in the words and units that stand on dials and rulers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from sbafab.laminate.laminate import Inlet
+from sbafab.reports.drawing import TIMES
+
+NEWTONS_PER_POUND = 4.4482216152605
+KILOPASCALS_PER_PSI = 6.894757293168
+ROUND = 10.0
+"""Minutes above which tenths say nothing."""
+
+DIRECTIONS = (
+    "to the right",
+    "to the back right",
+    "to the back",
+    "to the back left",
+    "to the left",
+    "to the front left",
+    "to the front",
+    "to the front right",
+)
+
+
+def temperature(celsius: float) -> str:
+    return f"{celsius:g} °C ({celsius * 9 / 5 + 32:.0f} °F)"
+
+
+def pressure(kilopascals: float) -> str:
+    return f"{kilopascals:g} kPa ({kilopascals / KILOPASCALS_PER_PSI:.1f} psi)"
+
+
+def force(newtons: float) -> str:
+    pounds = newtons / NEWTONS_PER_POUND
+    return f"{newtons:.0f} N = {newtons / 1000:.3f} kN = {pounds:.0f} lbf"
+
+
+def minutes(value: float) -> str:
+    """Minutes to the tenth below ten, whole ones above: 3 min, 2.4 min, 47 min."""
+    return f"{round(value, 1):g} min" if value < ROUND else f"{value:.0f} min"
+
+
+def hours(value: float) -> str:
+    return f"{value / 60:.2f} h"
+
+
+def millimetres(value: float) -> str:
+    return f"{round(value, 3) + 0.0:g} mm"
+
+
+def size(width: float, length: float) -> str:
+    return f"{round(width, 2):g} {TIMES} {round(length, 2):g} mm"
+
+
+def count(number: int, noun: str, plural: str = "") -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {plural or noun + 's'}"
+
+
+def listed(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def toward(inlet: Inlet) -> str:
+    """Where an inlet tab points on the bench: x goes to the right, y to the back."""
+    u, v = inlet.direction
+    return DIRECTIONS[round(math.atan2(v, u) / (math.pi / 4)) % 8]

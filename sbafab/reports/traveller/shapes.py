@@ -1,0 +1,127 @@
+"""What all pictures of the page share: the outline of every pattern, drawn once and used often.
+
+Pictures are inline SVG with millimetres as units. PTFE is hatched as well as orange, so that a
+grey print still tells it from TPE.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from xml.sax.saxutils import escape, quoteattr
+
+from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.region import Region
+from sbafab.geometry.svg import number, path_data
+from sbafab.laminate.films import Material
+from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.picture import INK
+from sbafab.reports import drawing as draw
+
+LINE = 0.22
+"""Width in mm on the page of the outline of a part."""
+THUMB = (24.0, 12.5)
+HATCH_STEP = 1.3
+
+
+def definitions(regions: Iterable[tuple[str, Region]]) -> str:
+    """The outlines that ``used`` refers to, by id, in a picture that takes no room."""
+    paths = (
+        f'<path id="{name}" d="{path_data(region)}" fill-rule="evenodd"/>'
+        for name, region in regions
+    )
+    return (
+        '<svg width="0" height="0" class="shapes" aria-hidden="true"><defs>'
+        f"{''.join(paths)}</defs></svg>"
+    )
+
+
+def pattern_id(pattern: str) -> str:
+    return f"shape-{pattern}"
+
+
+def pattern_regions(laminate: Laminate) -> Iterable[tuple[str, Region]]:
+    for pattern, layers in laminate.patterns.items():
+        yield pattern_id(pattern), layers[0].profile
+
+
+class Picture:
+    """An inline SVG in the making: its elements in drawing order, and a hatch of its own.
+
+    ``name`` is unique on the page; ``words`` tell what is seen to who does not see it.
+    """
+
+    def __init__(self, name: str, width: float, height: float, words: str) -> None:
+        self.name, self.width, self.height, self.words = name, width, height, words
+        self._elements: list[str] = []
+        self._hatches: dict[float, str] = {}
+
+    def add(self, *elements: str) -> None:
+        self._elements += elements
+
+    def part(self, shape: str, material: Material, matrix: tuple[float, ...], look: str) -> None:
+        """A shape drawn by its id; ``matrix`` takes its frame to the page, ``look`` is fresh,
+        made (both opaque) or clear.
+        """
+        scale = abs(matrix[0]) or abs(matrix[1])
+        ink = INK[material]
+        fill = "#e4e7ea" if look == "made" else self._fill(material, scale)
+        opacity = ' fill-opacity="0.6"' if look == "clear" else ""
+        moved = " ".join(map(number, matrix))
+        self.add(
+            f'<use href="#{shape}" transform="matrix({moved})" fill="{fill}"{opacity} '
+            f'stroke="{ink.line}" stroke-width="{number(LINE / scale)}"/>'
+        )
+
+    def _fill(self, material: Material, scale: float) -> str:
+        if material == "TPE":
+            return INK[material].fill
+        self._hatches.setdefault(scale, f"hatch-{self.name}-{len(self._hatches) + 1}")
+        return f"url(#{self._hatches[scale]})"
+
+    def svg(self) -> str:
+        w, h = number(self.width), number(self.height)
+        hatches = "".join(_hatch(name, scale) for scale, name in self._hatches.items())
+        return (
+            f'<svg class="picture" role="img" aria-label={quoteattr(self.words)} '
+            f'width="{w}mm" height="{h}mm" viewBox="0 0 {w} {h}" font-family="{draw.FONT}" '
+            f'font-size="{number(draw.TEXT)}" fill="{draw.DARK}">'
+            f"<defs>{hatches}</defs>{''.join(self._elements)}</svg>"
+        )
+
+
+def _hatch(name: str, scale: float) -> str:
+    """Oblique lines, as dense on the page whatever the scale of what they fill."""
+    ink = INK["PTFE"]
+    turned = f"rotate(45) scale({number(1 / scale)})"
+    step = number(HATCH_STEP)
+    return (
+        f'<pattern id="{name}" patternUnits="userSpaceOnUse" width="{step}" height="{step}" '
+        f'patternTransform="{turned}"><rect width="{step}" height="{step}" fill="{ink.fill}"/>'
+        f'<rect width="0.18" height="{step}" fill="{ink.line}" fill-opacity="0.6"/></pattern>'
+    )
+
+
+def flat(scale: float, at: Point) -> tuple[float, ...]:
+    """Plan view: the part's origin comes to ``at`` on the page, y upward."""
+    return scale, 0.0, 0.0, -scale, at[0], at[1]
+
+
+def label(at: Point, words: str, size: float = draw.SMALL, anchor: str = "middle") -> str:
+    """Words over a drawing, with a white rim that keeps them legible."""
+    x, y = map(number, at)
+    return (
+        f'<text x="{x}" y="{y}" font-size="{number(size)}" text-anchor="{anchor}" stroke="#ffffff" '
+        f'stroke-width="{number(size / 4)}" stroke-linejoin="round" paint-order="stroke" '
+        f'fill="{draw.DARK}">{escape(words)}</text>'
+    )
+
+
+def thumbnail(name: str, pattern: str, material: Material, bounds: Bounds) -> str:
+    """A pattern by itself, small."""
+    low_x, low_y, high_x, high_y = bounds
+    scale = min((THUMB[0] - 1) / (high_x - low_x), (THUMB[1] - 1) / (high_y - low_y))
+    picture = Picture(name, *THUMB, f"outline of pattern {pattern}")
+    middle = (low_x + high_x) / 2, (low_y + high_y) / 2
+    at = THUMB[0] / 2 - scale * middle[0], THUMB[1] / 2 + scale * middle[1]
+    picture.part(pattern_id(pattern), material, flat(scale, at), "fresh")
+    return picture.svg()

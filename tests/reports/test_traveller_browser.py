@@ -1,0 +1,125 @@
+"""traveller.html in Chromium: it shows, it prints on both papers, and a phone reads its code."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PIL import Image
+
+from sbafab.actuators import build, load_design
+from sbafab.output.settings import press_settings
+from sbafab.pressing.schedule import schedule
+from sbafab.reports.traveller.code import code_text
+from sbafab.reports.traveller.job import Job
+from sbafab.reports.traveller.page import traveller_html
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)
+FLAGS = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--disable-background-networking",
+    "--no-first-run",
+)
+SHA = hashlib.sha256(b"design").hexdigest()
+# Points, as the browser rounds them.
+PAPERS = {"A4": (595, 842), "letter": (612, 792)}
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here")
+
+
+def chromium(folder: Path, page: Path, *flags: str) -> str:
+    """Opens a page headless and returns what the browser prints to its standard output."""
+    command = [str(CHROMIUM), *FLAGS, f"--user-data-dir={folder / 'profile'}", *flags]
+    done = subprocess.run(
+        [*command, page.as_uri()], capture_output=True, text=True, timeout=60, check=True
+    )
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def html(sheet_files: Any) -> str:
+    design = load_design("3dof-15mm", ())
+    laminate = build(design)
+    plan = schedule(laminate, press_settings(design))
+    job = Job(SHA, "sbafab 1.0.0", fixture="sheets/fixture.dxf")
+    return traveller_html(design, laminate, plan, sheet_files(laminate), job)
+
+
+@pytest.mark.parametrize("paper", PAPERS)
+def test_it_prints_on_both_papers(paper: str, html: str, tmp_path: Path) -> None:
+    page, printed = tmp_path / "page.html", tmp_path / "page.pdf"
+    # The page itself names no paper: a printer does.
+    page.write_text(html.replace("</head>", f"<style>@page {{ size: {paper} }}</style></head>"))
+    chromium(tmp_path, page, "--no-pdf-header-footer", f"--print-to-pdf={printed}")
+    data = printed.read_bytes()
+    boxes = re.findall(rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", data)
+    sizes = {(round(float(width)), round(float(height))) for width, height in boxes}
+    assert len(sizes) == 1
+    assert next(iter(sizes)) == pytest.approx(PAPERS[paper], abs=1)
+    pages = len(re.findall(rb"/Type /Page\b", data))
+    # Four press steps and the import notes stand on pages of their own, and something before them.
+    assert 6 <= pages <= 12
+    if shutil.which("pdftotext"):
+        check_pages(printed, pages)
+
+
+def check_pages(printed: Path, pages: int) -> None:
+    """No step runs over a page's end, and the import notes are alone on the last page."""
+    sheets = text_of(printed).split("\f")[:pages]
+    assert "For the laser's computer" in sheets[-1]
+    assert "LibreCAD" in sheets[-1]
+    assert not any("For the laser's computer" in sheet for sheet in sheets[:-1])
+    for number in range(1, 5):
+        [own] = [sheet for sheet in sheets if f"Press step {number} of 4" in sheet]
+        after = own[own.index(f"Press step {number} of 4") :]
+        assert "You now hold" in after
+    assert re.search(r"Printed: \d", sheets[-1])
+
+
+def test_the_browser_reads_it_as_it_was_written(html: str, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    page.write_text(html)
+    shown = chromium(tmp_path, page, "--dump-dom")
+    assert "Press step 4 of 4" in shown
+    for mark in ('type="checkbox"', "<use ", "<article", "<section", "<td", "<path"):
+        assert shown.count(mark) == html.count(mark) > 0
+
+
+def test_it_prints_without_scripts(html: str, tmp_path: Path) -> None:
+    page, printed = tmp_path / "page.html", tmp_path / "page.pdf"
+    # Chromium prints nothing with scripts switched off as a whole; a policy stops the page's own.
+    policy = """<meta http-equiv="Content-Security-Policy" content="script-src 'none'">"""
+    page.write_text(html.replace("<head>", f"<head>{policy}"))
+    chromium(tmp_path, page, "--no-pdf-header-footer", f"--print-to-pdf={printed}")
+    assert len(re.findall(rb"/Type /Page\b", printed.read_bytes())) >= 6
+    if shutil.which("pdftotext"):
+        assert "Printed: ____" in text_of(printed)
+
+
+def text_of(printed: Path) -> str:
+    command = ["pdftotext", "-layout", str(printed), "-"]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def test_a_phone_reads_its_code_off_the_screen(html: str, tmp_path: Path) -> None:
+    page, shot = tmp_path / "page.html", tmp_path / "shot.png"
+    page.write_text(html)
+    chromium(tmp_path, page, "--window-size=1000,1400", f"--screenshot={shot}")
+    with Image.open(shot) as picture:
+        grey = picture.convert("L")
+    dark, light = grey.getextrema()
+    assert dark < 60
+    assert light == 255
+    zxing = pytest.importorskip("zxingcpp")
+    [code] = zxing.read_barcodes(grey)
+    assert code.text == code_text("3dof-15mm", SHA, "sbafab 1.0.0")
+    assert code.text.splitlines() == ["3dof-15mm", f"sha256 {SHA}", "sbafab 1.0.0"]
