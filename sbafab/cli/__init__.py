@@ -12,13 +12,15 @@ from sbafab.cli.check import check
 from sbafab.cli.cut import cut
 from sbafab.cli.ending import BAD_INPUT, ended_plainly, prepared_streams, say, stopped_by_signals
 from sbafab.cli.generate import generate
+from sbafab.cli.kerf import kerf
 from sbafab.cli.mesh import mesh
+from sbafab.cli.nest import nest
 from sbafab.cli.new import new
 from sbafab.cli.press import press
 from sbafab.cli.schema import schema
 from sbafab.cli.templates import templates
 
-COMMANDS = (templates, new, generate, check, cut, press, mesh, schema)
+COMMANDS = (templates, new, generate, check, cut, press, mesh, nest, kerf, schema)
 
 
 class InOrder(click.Group):

@@ -1,4 +1,4 @@
-"""``sbafab new``: a commented design file to start from."""
+"""``sbafab new``: a commented design file to start from, or the kerf's calibration piece."""
 
 from __future__ import annotations
 
@@ -6,13 +6,31 @@ from pathlib import Path
 
 import click
 
+COUPON = "coupon"
+
 
 @click.command()
 @click.argument("template")
 @click.argument("file", type=click.Path(path_type=Path), required=False)
 def new(template: str, file: Path | None) -> None:
-    """Write a commented design file to start from (FILE: by default TEMPLATE.toml here)."""
+    """Write a commented design file to start from (FILE: by default TEMPLATE.toml here).
+
+    TEMPLATE "coupon" writes the kerf's calibration piece, its picture and its table to fill in
+    (FILE is then a folder: by default coupon).
+    """
+    if template == COUPON:
+        _coupon(file or Path(COUPON))
+        return
     from sbafab.design.reading import write_new
 
     written = write_new(template, file)
     click.echo(f"{written} is yours to edit; then: sbafab generate {written}")
+
+
+def _coupon(folder: Path) -> None:
+    from sbafab.cutting.coupon import write_coupon
+    from sbafab.output.settings import GENERATOR
+
+    drawing, picture, table = write_coupon(folder, GENERATOR)
+    click.echo(f"Cut {drawing} (picture: {picture}) from each film, with a kerf offset of 0.")
+    click.echo(f"Measure it and fill in {table}; then: sbafab kerf {table} --material tpe")

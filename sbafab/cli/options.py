@@ -5,15 +5,13 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import click
 
 Command = Callable[..., Any]
-
-design_argument = click.argument("design", metavar="DESIGN")
 
 set_option = click.option(
     "--set",
@@ -48,7 +46,7 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print result
 class Request:
     """What every command that writes a folder is asked for."""
 
-    design: str
+    designs: tuple[str, ...]
     out: Path
     assignments: tuple[str, ...]
     waivers: tuple[str, ...]
@@ -57,29 +55,56 @@ class Request:
 
 def run_options(command: Command) -> Command:
     """DESIGN and the options of a writing command, handed over as one Request."""
+    return _requested(command, click.argument("designs", metavar="DESIGN", nargs=1))
 
+
+def several_run_options(command: Command) -> Command:
+    """The same with any number of designs."""
+    several = click.argument("designs", metavar="DESIGN...", nargs=-1, required=True)
+    return _requested(command, several)
+
+
+def _requested(command: Command, argument: Callable[[Command], Command]) -> Command:
     @functools.wraps(command)
     def gathered(
-        design: str,
+        designs: str | tuple[str, ...],
         out: Path,
         assignments: tuple[str, ...],
         waivers: tuple[str, ...],
         as_json: bool,
         **others: Any,
     ) -> Any:
-        return command(Request(design, out, assignments, waivers, as_json), **others)
+        named = (designs,) if isinstance(designs, str) else designs
+        return command(request=Request(named, out, assignments, waivers, as_json), **others)
 
-    options: tuple[Callable[[Command], Command], ...] = (
-        design_argument,
-        out_option,
-        set_option,
-        waive_option,
-        json_option,
-    )
     decorated: Command = gathered
-    for option in reversed(options):
+    for option in (json_option, waive_option, set_option, out_option, argument):
         decorated = option(decorated)
     return decorated
+
+
+def sheet_options(command: Command) -> Command:
+    """How many are cut, and what looks for places on film sheets; both are keys of a design."""
+
+    @functools.wraps(command)
+    def assigned(request: Request, copies: int | None, nest: str | None, **others: Any) -> Any:
+        said = [] if copies is None else [f"order.copies={copies}"]
+        said += [] if nest is None else [f"sheets.engine={nest}"]
+        request = replace(request, assignments=(*request.assignments, *said))
+        return command(request=request, **others)
+
+    engine = click.option(
+        "--nest",
+        type=click.Choice(["bottom-left", "spyrrow"]),
+        help="What looks for places on the film sheets [default: the design's sheets.engine].",
+    )
+    count = click.option(
+        "--copies",
+        type=int,
+        metavar="K",
+        help="Cut K of each actuator [default: the design's order.copies, 1].",
+    )
+    return count(engine(assigned))
 
 
 def _finite(ctx: click.Context, param: click.Parameter, value: float) -> float:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from sbafab.output.run import Progress, Run
+    from sbafab.output.job import Job
+    from sbafab.output.run import Run
+    from sbafab.output.shop import Progress
     from sbafab.rules.finding import Finding
 
 COLOURS = {"pass": "green", "fail": "bold red", "waived": "yellow", "warn": "yellow"}
@@ -106,6 +108,51 @@ def print_run(run: Run) -> None:
         )
 
 
+def print_job(job: Job) -> None:
+    """What a job made; for a design that a rule stopped, what the rules found."""
+    from rich.table import Table
+    from rich.text import Text
+
+    out = console()
+    made = Table(box=None, pad_edge=False, show_header=False)
+    made.add_column(no_wrap=True, style="bold")
+    made.add_column(ratio=1)
+    for one in job.checked:
+        warned = sorted({f.rule for f in one.findings if f.verdict == "warn"})
+        said = f"; warns: {', '.join(warned)}" if warned else ""
+        waived = f"; waived: {', '.join(one.waived)}" if one.waived else ""
+        verdict = "a rule failed" if one.failed else "every rule holds"
+        made.add_row(one.design.name, Text(f"{one.design.order.copies} x, {verdict}{waived}{said}"))
+    for film in job.manifest.get("films", ()):
+        sheets = _film_said(film, job.manifest["sheets"], 1)
+        made.add_row(f"{film['material']} film", Text(sheets))
+    if not job.failed:
+        made.add_row("folder", Text(str(job.folder)))
+    out.print(made)
+    for one in job.checked:
+        if one.failed:
+            out.print()
+            out.print(Text(f"{one.design.name}: nothing was written", style="bold red"))
+            out.print(findings_table(one.findings))
+
+
+def job_json(job: Job) -> dict[str, object]:
+    """The result of a job for programs."""
+    return {
+        "folder": str(job.folder),
+        "failed": job.failed,
+        "designs": [
+            {
+                "name": one.design.name,
+                "failed": one.failed,
+                "findings": [finding.as_dict() for finding in one.findings],
+            }
+            for one in job.checked
+        ],
+        "files": sorted(job.manifest.get("files", ())),
+    }
+
+
 def _made(run: Run) -> Iterator[tuple[str, str]]:
     from sbafab.cutting.properties import PTFE_WARNING
 
@@ -134,6 +181,9 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
             "cut files",
             f"{len(cut)} in layers/{plate}, each read back and compared with its profile",
         )
+    for film in index["films"]:
+        if "sheets" in film:
+            yield f"{film['material']} film", _film_said(film, index["sheets"], index["copies"])
     if run.schedule is not None:
         force = run.schedule.steps[0].force_n / 1000
         yield (
@@ -151,6 +201,20 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
     for warning in run.schedule.warnings if run.schedule is not None else ():
         yield "warning", warning
     yield "folder", str(run.folder)
+
+
+def _film_said(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], copies: int) -> str:
+    """How a film is used: sheets, their size, density, waste and estimated time."""
+    own = [sheet for sheet in sheets if sheet["material"] == film["material"]]
+    count = f"{len(own)} sheet{'s' if len(own) > 1 else ''}"
+    sizes = dict.fromkeys(f"{sheet['width']:g} x {sheet['length']:g}" for sheet in own)
+    minutes = sum(sheet["estimated_minutes"] for sheet in own)
+    many = f" for {copies} copies" if copies > 1 else ""
+    return (
+        f"{count} of {', '.join(sizes)} mm{many}, {film['density']:.0%} used, "
+        f"{film['waste'] / 100:.0f} cm2 waste, about {minutes:.1f} min of cutting; "
+        f"{', '.join(sheet['file'] for sheet in own)}"
+    )
 
 
 def run_json(run: Run) -> dict[str, object]:

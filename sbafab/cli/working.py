@@ -11,7 +11,7 @@ from sbafab.cli.options import Request
 
 if TYPE_CHECKING:
     from sbafab.cutting.dxf_write import DxfProfile
-    from sbafab.output.run import Part
+    from sbafab.output.contents import Part
 
 RULE_FAILED = 1
 
@@ -27,7 +27,7 @@ def run_parts(
     from sbafab.cli.printing import print_json, print_run, run_json, shown_progress
     from sbafab.output.run import generate
 
-    design = load_design(request.design, request.assignments, request.waivers)
+    design = load_design(request.designs[0], request.assignments, request.waivers)
     with shown_progress(request.as_json) as progress:
         run = generate(design, request.out, parts, progress, dxf_profile, chord_error)
     if request.as_json:

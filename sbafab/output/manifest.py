@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sbafab.cutting.files import CutFile
 from sbafab.cutting.properties import PTFE_WARNING
+from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
 from sbafab.laminate.interfaces import Interface
@@ -17,6 +17,7 @@ from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.meshing.files import MeshFile
 from sbafab.models.sizes import sizes
 from sbafab.output.settings import GENERATOR, kerf_widths
+from sbafab.output.shop import CutSet, film_use
 from sbafab.output.swap import SCHEMA
 from sbafab.rules.finding import Finding
 
@@ -35,12 +36,12 @@ def manifest(
     design: Design,
     laminate: Laminate,
     waived: Sequence[str],
-    cut_files: Sequence[CutFile],
-    fixture: str | None,
+    cut: CutSet | None,
+    sheets: Sequence[SheetFile],
     meshes: Sequence[MeshFile],
 ) -> dict[str, Any]:
     """The index of an output folder, but for the hashes of its files."""
-    paths = {file.layer: file.path for file in cut_files}
+    paths = {file.layer: file.path for file in cut.files} if cut else {}
     return {
         "schema": SCHEMA,
         "name": laminate.name,
@@ -62,7 +63,8 @@ def manifest(
         "waived": list(waived),
         "sizes": {name: round(value, 6) for name, value in sizes(design, laminate).items()},
         "notes": list(laminate.notes),
-        "films": _films(laminate),
+        "copies": design.order.copies,
+        "films": _films(laminate, sheets),
         "warnings": [PTFE_WARNING],
         "layers": [_layer(laminate, layer, paths.get(layer.index)) for layer in laminate.layers],
         "interfaces": [_interface(interface) for interface in laminate.interfaces],
@@ -80,7 +82,8 @@ def manifest(
             for inlet in laminate.inlets
         ],
         "lumen": laminate.lumen,
-        "fixture": fixture,
+        "fixture": cut.fixture if cut else None,
+        "sheets": [sheet_entry(sheet) for sheet in sheets],
         "meshes": [
             {
                 "file": mesh.file,
@@ -100,7 +103,36 @@ def _place(point: tuple[float, float]) -> dict[str, float]:
     return {"x": round(point[0], 6) + 0.0, "y": round(point[1], 6) + 0.0}
 
 
-def _films(laminate: Laminate) -> list[dict[str, Any]]:
+def sheet_entry(sheet: SheetFile) -> dict[str, Any]:
+    """A film sheet as the manifest lists it; lengths mm, areas mm2."""
+    stock = sheet.nest.stock
+    return {
+        "file": sheet.path,
+        "picture": sheet.picture,
+        "material": sheet.material,
+        "number": sheet.number,
+        "width": sheet.width,
+        "length": round(sheet.length, 6),
+        "border": stock.border,
+        "spacing": stock.spacing,
+        "pins": [{"x": x, "y": y, "diameter": d} for x, y, d in stock.pins],
+        "engine": sheet.nest.engine,
+        "parts": [
+            {"design": design, "pattern": pattern, "count": count}
+            for design, pattern, count in sheet.counts
+        ],
+        "parts_area": round(sheet.parts_area, 6),
+        "density": round(sheet.density, 4),
+        "contours": sheet.contours,
+        "cut_length": round(sheet.cut_length, 3),
+        "travel": round(sheet.travel, 3),
+        "unsorted_travel": round(sheet.unsorted_travel, 3),
+        "estimated_minutes": round(sheet.minutes, 2),
+    }
+
+
+def _films(laminate: Laminate, sheets: Sequence[SheetFile]) -> list[dict[str, Any]]:
+    use = film_use(sheets)
     used: dict[str, dict[str, Any]] = {}
     for layer in laminate.layers:
         film = layer.film
@@ -116,7 +148,10 @@ def _films(laminate: Laminate) -> list[dict[str, Any]]:
         )
         entry["layers"] += 1
         entry["area"] += layer.profile.area
-    return [{**entry, "area": round(entry["area"], 6)} for entry in used.values()]
+    return [
+        {**entry, "area": round(entry["area"], 6), **use.get(material, {})}
+        for material, entry in used.items()
+    ]
 
 
 def _layer(laminate: Laminate, layer: Layer, path: str | None) -> dict[str, Any]:

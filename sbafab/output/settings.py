@@ -5,16 +5,20 @@ from __future__ import annotations
 from sbafab import __version__
 from sbafab.cutting.dxf_write import DxfProfile
 from sbafab.cutting.properties import CutSettings
-from sbafab.design.records import Design
+from sbafab.cutting.sheets import Machine
+from sbafab.design.records import Design, Sheet
 from sbafab.design.writing import design_sha256
+from sbafab.geometry.beam import Kerf
+from sbafab.laminate.films import Material
+from sbafab.nesting.records import TURNS, Stock
 from sbafab.pressing.schedule import PressSettings
 from sbafab.rules.limits import Limits, Tolerances
 
 GENERATOR = f"sbafab {__version__}"
 
 
-def kerf_widths(design: Design) -> dict[str, float | None]:
-    """Full kerf width by material, None where it was not measured."""
+def kerf_widths(design: Design) -> dict[str, Kerf | None]:
+    """Full kerf width (or that along x and y) by material, None where it was not measured."""
     widths = {"TPE": design.laser.kerf_tpe, "PTFE": design.laser.kerf_ptfe}
     return {name: None if isinstance(kerf, str) else kerf for name, kerf in widths.items()}
 
@@ -67,4 +71,35 @@ def press_settings(design: Design) -> PressSettings:
         flash_middle=press.flash_middle_minutes,
         bond_all=press.bond_all_minutes,
         validated_balloons=design.rules.validated_balloons,
+    )
+
+
+def machine(design: Design) -> Machine:
+    laser = design.laser
+    return Machine(
+        cut_speed=laser.cut_speed,
+        travel_speed=laser.travel_speed,
+        pierce_seconds=laser.pierce_seconds,
+        heat_distance=laser.heat_distance,
+    )
+
+
+def stocks(design: Design) -> dict[Material, Stock]:
+    """The film sheets by material."""
+    return {
+        "TPE": _stock(design.sheets.tpe, design.laser.kerf_tpe),
+        "PTFE": _stock(design.sheets.ptfe, design.laser.kerf_ptfe),
+    }
+
+
+def _stock(sheet: Sheet, kerf: object) -> Stock:
+    return Stock(
+        width=sheet.width,
+        length=sheet.length,
+        border=sheet.border,
+        spacing=sheet.spacing,
+        pins=sheet.pins,
+        most=sheet.most,
+        roll=sheet.roll,
+        turns=(0, 2) if isinstance(kerf, tuple) else TURNS,
     )

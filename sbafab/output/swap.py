@@ -17,6 +17,8 @@ from filelock import FileLock, Timeout
 from sbafab.errors import OutputError, SbafabError
 
 SCHEMA = "sbafab/manifest@1"
+JOB_SCHEMA = "sbafab/job@1"
+"""Of a folder that holds several designs cut together."""
 BEGUN, ASIDE = ".part", ".old.part"
 """Endings of a folder that is being written, and of an old one that is moved out of its way."""
 LONGEST_SHOWN = 120
@@ -102,7 +104,7 @@ def read_manifest(folder: Path) -> dict[str, object] | None:
         manifest = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
     except (OSError, ValueError, RecursionError):
         return None
-    is_ours = isinstance(manifest, dict) and manifest.get("schema") == SCHEMA
+    is_ours = isinstance(manifest, dict) and manifest.get("schema") in (SCHEMA, JOB_SCHEMA)
     return manifest if is_ours else None
 
 

@@ -13,7 +13,7 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.design.writing import design_sha256
-from sbafab.output import run as run_module
+from sbafab.output import contents
 from sbafab.output.run import generate
 
 TEMPLATES = ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"]
@@ -118,7 +118,7 @@ def test_a_run_that_dies_half_way_leaves_the_old_output(
     def dies(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(run_module, "write_meshes", dies)
+    monkeypatch.setattr(contents, "write_meshes", dies)
     with pytest.raises(KeyboardInterrupt):
         generate(load_design("1dof-5mm", ["bond.width=0.8"]), tmp_path)
     assert hashes(run.folder) == before

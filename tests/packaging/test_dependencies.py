@@ -10,7 +10,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-INSTALLED_AS = {"PIL": "pillow", "tomli_w": "tomli-w"}
+INSTALLED_AS = {
+    "PIL": "pillow",
+    "netgen": "netgen-mesher",
+    "tomli_w": "tomli-w",
+    "zxingcpp": "zxing-cpp",
+}
 
 
 def imported_modules(folder: Path) -> Iterator[str]:
@@ -37,7 +42,14 @@ def third_party(folder: Path) -> set[str]:
 
 def test_the_package_needs_what_it_imports_and_no_more() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert third_party(ROOT / "sbafab") == names(project["dependencies"])
+    extras = {
+        name
+        for extra, needed in project["optional-dependencies"].items()
+        if extra != "dev"
+        for name in names(needed)
+    }
+    assert third_party(ROOT / "sbafab") == names(project["dependencies"]) | extras
+    assert extras <= names(project["optional-dependencies"]["dev"])
 
 
 def test_the_tests_need_nothing_undeclared() -> None:

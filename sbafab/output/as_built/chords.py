@@ -32,12 +32,20 @@ class Run(NamedTuple):
 
 def chorded_place(region: Region) -> Point | None:
     """Where a run of chords stands in for an arc; None if there is none."""
-    widest = 2 * math.sin(WIDEST_STEP / 2)
     for contour in region.contours:
-        for run in _runs(_ends(contour), lambda length, radius: length < widest * radius):
+        for run in _runs(_ends(contour), _narrow):
             if len(run.points) > LEAST_CHORDS:
                 return run.points[0]
     return None
+
+
+def with_short_chords_rounded(contour: Contour) -> Contour:
+    """The contour of lines with arcs through every run of chords that are meant as one."""
+    return _with_arcs(contour, _narrow)
+
+
+def _narrow(length: float, radius: float) -> bool:
+    return length < 2 * math.sin(WIDEST_STEP / 2) * radius
 
 
 def with_arcs(region: Region, chord_error: float, known: float = 0.0) -> Region:
@@ -57,7 +65,7 @@ def _sagitta(length: float, radius: float) -> float:
     return radius - math.sqrt(radius * radius - length * length / 4)
 
 
-def _with_arcs(contour: Contour, short: Short, known: float) -> Contour:
+def _with_arcs(contour: Contour, short: Short, known: float = 0.0) -> Contour:
     points = _ends(contour)
     if len(points) != len(contour.edges):
         return contour

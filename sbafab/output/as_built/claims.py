@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from sbafab.cutting.properties import COMPENSATED, UNCALIBRATED
+from sbafab.cutting.properties import kerf_properties, layer_path
 from sbafab.design.records import Design
 from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Layer
@@ -62,8 +62,10 @@ def order_problems(claims: Manifest) -> list[Problem]:
             problems.append(
                 claim(f"layer {position} is named {layer.name!r}, not {name}", position)
             )
-        if layer.file not in (None, f"layers/{name}.dxf"):
-            message = f"layer {position} ({name}) is cut from {layer.file!r}, not layers/{name}.dxf"
+        kerf = claims.kerf.get(layer.material)
+        file = layer_path(name, kerf.width if kerf is not None else None)
+        if layer.file not in (None, file):
+            message = f"layer {position} ({name}) is cut from {layer.file!r}, not {file}"
             problems.append(claim(message, position))
         if layer.role != role:
             message = f"layer {position} has the role {layer.role}, where the order asks for {role}"
@@ -203,7 +205,6 @@ def _properties(layer: LayerClaim, claims: Manifest) -> dict[str, str]:
         "PATTERN": layer.pattern,
         "MATERIAL": layer.material,
         "UNITS": "mm",
-        "KERF_STATE": UNCALIBRATED if width is None else COMPENSATED,
-        "KERF_WIDTH": "none" if width is None else f"{width:g}",
+        **kerf_properties(width),
         "WAIVED": ", ".join(claims.waived) or "none",
     }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -11,12 +10,12 @@ from pathlib import Path, PurePosixPath
 
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER, CUT_SEQUENCE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
-from sbafab.cutting.properties import COMPENSATED, UNCALIBRATED, chord_error_of
+from sbafab.cutting.properties import chord_error_of, kerf_of, kerf_text
 from sbafab.errors import OutputError
-from sbafab.geometry.offset import shrink
 from sbafab.geometry.region import Region
 from sbafab.output.as_built.chords import chorded_place, with_arcs
 from sbafab.output.as_built.records import INTEGRITY, LayerClaim, Problem
+from sbafab.output.as_built.uncut import uncut
 
 MOST_BYTES = 20_000_000
 DATUM = "LINE"
@@ -27,13 +26,14 @@ DATUM = "LINE"
 class CutPart:
     """What a cut file cuts: ``region`` with the kerf undone and arcs for chords.
 
-    ``chord_error`` and ``kerf`` (full width) are what the file says, in mm, 0 where neither.
+    ``chord_error`` is what the file says, in mm, 0 for true arcs; ``corner_room`` the mm2 by which
+    the area may be off because the beam rounds corners.
     """
 
     region: Region
     properties: dict[str, str]
     chord_error: float
-    kerf: float
+    corner_room: float
 
 
 @dataclass(frozen=True)
@@ -111,10 +111,12 @@ def read_part(path: Path, chords_drawn: bool = False) -> CutPart:
 def _part(found: ReadBack, chords_drawn: bool) -> CutPart:
     _check_drawn(found)
     properties = found.properties
-    kerf = _kerf(properties)
+    kerf = kerf_of(properties) or 0.0
     chord_error = chord_error_of(properties)
     region = found.region
     if chord_error:
+        if isinstance(kerf, tuple):
+            raise OutputError("its chords do not tell how its kerf was compensated; write it anew")
         region = with_arcs(region, chord_error, kerf / 2)
     elif not chords_drawn:
         place = chorded_place(region)
@@ -123,11 +125,10 @@ def _part(found: ReadBack, chords_drawn: bool) -> CutPart:
                 f"an arc is drawn as chords at x {place[0]:.3f}, y {place[1]:.3f}, and the file "
                 "does not say so; write it anew with arcs"
             )
-    if kerf:
-        region = shrink(region, kerf / 2)
-        if region.is_empty:
-            raise OutputError(f"nothing is left inside a kerf of {kerf:g} mm; write it anew")
-    return CutPart(region, properties, chord_error, kerf)
+    region, corner_room = uncut(region, kerf)
+    if region.is_empty:
+        raise OutputError(f"nothing is left inside a kerf of {kerf_text(kerf)} mm; write it anew")
+    return CutPart(region, properties, chord_error, corner_room)
 
 
 def _check_drawn(found: ReadBack) -> None:
@@ -145,19 +146,3 @@ def _check_drawn(found: ReadBack) -> None:
             raise OutputError(
                 f"{CUT_SEQUENCE[before]} is cut before {CUT_SEQUENCE[after]}; write it anew"
             )
-
-
-def _kerf(properties: dict[str, str]) -> float:
-    state, width = properties.get("KERF_STATE"), properties.get("KERF_WIDTH")
-    if (state, width) == (UNCALIBRATED, "none"):
-        return 0.0
-    try:
-        kerf = float(width or "")
-    except ValueError:
-        kerf = math.nan
-    if state != COMPENSATED or not 0 <= kerf <= 1:
-        raise OutputError(
-            f"its properties say KERF_STATE {state!r} and KERF_WIDTH {width!r}, which leaves open "
-            "how it was compensated; write it anew"
-        )
-    return kerf

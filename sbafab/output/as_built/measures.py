@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from sbafab.errors import OutputError
-from sbafab.geometry.edges import Arc, Point
+from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.output.as_built.claims import claim
@@ -61,13 +61,8 @@ def layer_problems(files: Iterable[LayerFile], claims: Manifest) -> list[Problem
 
 def _area_room(region: Region, part: CutPart) -> float:
     """mm2 by which an area may be off: its share, the chords' error, corners the beam rounds."""
-    rounded = sum(
-        isinstance(edge, Arc) and not edge.ccw and abs(2 * edge.radius - part.kerf) < 1e-4
-        for edge in region.edges
-    )
     length = sum(contour.length for contour in region.contours)
-    corners = 0.25 * rounded * part.kerf**2
-    return SHARE * region.area + 1e-6 + corners + part.chord_error * length
+    return SHARE * region.area + 1e-6 + part.corner_room + part.chord_error * length
 
 
 def _listed(names: Sequence[str]) -> str:

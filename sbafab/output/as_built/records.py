@@ -81,7 +81,8 @@ class RegistrationClaim(_Claim):
 
 class KerfClaim(_Claim):
     state: Literal["uncalibrated", "compensated"]
-    width: float | None
+    width: float | tuple[float, float] | None
+    """Full width in mm, or that along x and along y."""
 
 
 class FilmClaim(_Claim):

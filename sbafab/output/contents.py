@@ -1,0 +1,190 @@
+"""What lies in the output folder of one design beside its cut files."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from sbafab.cutting.sheets import SheetFile
+from sbafab.design.records import Design
+from sbafab.design.writing import design_sha256, design_toml, outline_file
+from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.files import MeshFile, write_meshes
+from sbafab.output.manifest import as_json, carried_over, checks, file_hashes, manifest
+from sbafab.output.settings import GENERATOR, kerf_widths, press_settings
+from sbafab.output.shop import CutSet, Progress
+from sbafab.output.swap import read_manifest
+from sbafab.pressing.schedule import Schedule, press_csv, press_json, schedule
+from sbafab.rules.deck import has_failed
+from sbafab.rules.finding import Finding
+
+Part = Literal["cut", "press", "mesh", "preview"]
+TRAVELLER = "traveller.html"
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A design, its laminate, and what the rules found in it."""
+
+    design: Design
+    laminate: Laminate
+    findings: tuple[Finding, ...]
+
+    @property
+    def failed(self) -> bool:
+        """Whether a rule failed that the design does not waive."""
+        return has_failed(self.findings)
+
+    @property
+    def waived(self) -> tuple[str, ...]:
+        """The rules that fail and that the design waives by name."""
+        return tuple(dict.fromkeys(finding.rule for finding in self.findings if finding.by_user))
+
+
+def schedule_of(checked: Checked) -> Schedule:
+    """The press schedule; its first step and its warnings name waived rules."""
+    made = schedule(checked.laminate, press_settings(checked.design))
+    if not checked.waived:
+        return made
+    said = f"made although it breaks rules that the design waives: {', '.join(checked.waived)}"
+    first, *others = made.steps
+    marked = replace(first, instructions=f"{said[:1].upper()}{said[1:]}. {first.instructions}")
+    return replace(made, steps=(marked, *others), warnings=(said, *made.warnings))
+
+
+def write_contents(
+    checked: Checked,
+    wanted: Collection[Part],
+    cut: CutSet | None,
+    sheets: Sequence[SheetFile],
+    pressing: Schedule | None,
+    folder: Path,
+    tell: Progress,
+) -> dict[str, Any]:
+    """Writes what is wanted beside the cut files; the manifest, without the files' hashes.
+
+    The traveller needs cut files, schedule and pictures.
+    """
+    meshes: list[MeshFile] = []
+    if pressing is not None:
+        write_text(folder / "press.json", as_json(press_json(pressing)))
+        write_text(folder / "press.csv", press_csv(pressing))
+    if "mesh" in wanted:
+        meshes = write_meshes(
+            checked.laminate, folder, progress=lambda done, total: tell("meshes", done, total)
+        )
+    if "preview" in wanted:
+        _write_pictures(checked, folder, tell)
+    if cut is not None and pressing is not None and "preview" in wanted:
+        write_text(folder / TRAVELLER, _traveller(checked, cut, sheets, pressing, folder))
+    write_text(folder / "checks.json", as_json(checks(checked.findings, "design")))
+    _write_design(checked.design, folder)
+    return manifest(checked.design, checked.laminate, checked.waived, cut, sheets, meshes)
+
+
+def close_folder(folder: Path, index: dict[str, Any]) -> None:
+    """Writes the manifest, with the hashes of all that lies in the folder."""
+    index["files"] = file_hashes(folder)
+    write_text(folder / "manifest.json", as_json(index))
+
+
+def write_text(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _traveller(
+    checked: Checked,
+    cut: CutSet,
+    sheets: Sequence[SheetFile],
+    pressing: Schedule,
+    folder: Path,
+) -> str:
+    from sbafab.reports.traveller.job import Job
+    from sbafab.reports.traveller.page import traveller_html
+
+    design = checked.design
+    job = Job(
+        design_sha256=design_sha256(design),
+        generator=GENERATOR,
+        waived=checked.waived,
+        findings=checked.findings,
+        fixture=cut.fixture,
+        kerf=kerf_widths(design),
+        copies=design.order.copies,
+        made_for=design.order.made_for,
+        note=design.order.note,
+        solid_png=(folder / "preview" / "solid.png").read_bytes(),
+    )
+    return traveller_html(design, checked.laminate, pressing, sheets, job)
+
+
+def _marked(checked: Checked) -> Laminate:
+    """The laminate with a note for its pictures where a rule failed or is waived."""
+    failed = dict.fromkeys(f.rule for f in checked.findings if f.verdict == "fail")
+    notes = [f"not to be built, failed: {', '.join(failed)}"] if failed else []
+    notes += [f"waived: {', '.join(checked.waived)}"] if checked.waived else []
+    laminate = checked.laminate
+    return replace(laminate, notes=(*laminate.notes, *notes)) if notes else laminate
+
+
+def _write_pictures(checked: Checked, folder: Path, tell: Progress) -> None:
+    from sbafab.reports.layers_svg import layers_svg
+    from sbafab.reports.solid_png import solid_png
+    from sbafab.reports.stack_svg import stack_svg
+
+    laminate = _marked(checked)
+    preview = folder / "preview"
+    preview.mkdir()
+    write_text(preview / "layers.svg", layers_svg(laminate))
+    tell("pictures", 1, 3)
+    write_text(preview / "stack.svg", stack_svg(laminate))
+    tell("pictures", 2, 3)
+    (preview / "solid.png").write_bytes(solid_png(laminate))
+    tell("pictures", 3, 3)
+
+
+def _write_design(design: Design, folder: Path) -> None:
+    drawn = outline_file(design)
+    if drawn is not None:
+        name = f"outline{drawn.suffix.lower()}"
+        shutil.copyfile(drawn, folder / name)
+        chamber = design.chamber.model_copy(update={"outline": name})  # type: ignore[attr-defined]
+        design = design.model_copy(update={"chamber": chamber})
+    write_text(folder / "design.toml", design_toml(design))
+
+
+def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
+    """Keeps files of the old run that this one did not make, if they are of the same design."""
+    old = read_manifest(old_folder)
+    if old is None or not carried_over(old, index):
+        return
+    made = file_hashes(folder)
+    files = old.get("files")
+    kept = file_hashes(old_folder)
+    carried: set[str] = set()
+    for path, digest in (files if isinstance(files, dict) else {}).items():
+        if path not in made and kept.get(path) == digest:
+            target = folder / path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(old_folder / path, target)
+            carried.add(path)
+    layers, meshes, plate = old.get("layers"), old.get("meshes"), old.get("fixture")
+    if _are_files(layers, carried):
+        index["layers"] = layers
+        index["fixture"] = plate if plate in carried else None
+        if _are_files(old.get("sheets"), carried):
+            index["sheets"], index["films"] = old["sheets"], old.get("films")
+    if _are_files(meshes, carried):
+        index["meshes"] = meshes
+
+
+def _are_files(entries: object, carried: set[str]) -> bool:
+    """Whether manifest entries name files that were all carried over."""
+    return (
+        isinstance(entries, list)
+        and bool(entries)
+        and all(isinstance(entry, dict) and entry.get("file") in carried for entry in entries)
+    )

@@ -1,0 +1,105 @@
+"""What the cutting shop gets of one or several designs: layer files, pin plates, film sheets."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sbafab.cutting.files import CutFile, compensated_paths, write_layer_files
+from sbafab.cutting.fixture import write_fixture
+from sbafab.cutting.properties import CutSettings
+from sbafab.cutting.sheets import FOLDER, SheetFile, write_sheets
+from sbafab.design.records import Design
+from sbafab.laminate.laminate import Laminate
+from sbafab.nesting.nest import nest
+from sbafab.nesting.parts import parts_of
+from sbafab.nesting.records import Nest, Part
+from sbafab.nesting.saved import as_dict, from_dict
+from sbafab.output.settings import machine, stocks
+
+PLACES = f"{FOLDER}/nest.json"
+Progress = Callable[[str, int, int], None]
+"""Told what is being done, and how much of how much is done."""
+
+
+@dataclass(frozen=True)
+class CutSet:
+    """The cut files of one laminate, and its pieces for the nest."""
+
+    files: tuple[CutFile, ...]
+    fixture: str | None
+    parts: tuple[Part, ...]
+
+
+def write_cut_set(
+    laminate: Laminate, copies: int, folder: Path, settings: CutSettings, tell: Progress
+) -> CutSet:
+    """Writes the layer files and the pin plate of a laminate; its parts, ``copies`` of each."""
+    paths = compensated_paths(laminate, settings)
+    files = write_layer_files(
+        laminate, paths, folder, settings, lambda done, total: tell("cut files", done, total)
+    )
+    plate = write_fixture(laminate, folder, settings)
+    return CutSet(tuple(files), plate, parts_of(laminate, paths, copies))
+
+
+def write_nested_sheets(
+    parts: Sequence[Part],
+    design: Design,
+    folder: Path,
+    old_folder: Path,
+    settings: CutSettings,
+    tell: Progress,
+) -> list[SheetFile]:
+    """Nests the parts on the design's film sheets and writes those.
+
+    Places that an earlier run found for the same parts and sheets are taken over, not searched
+    for again.
+    """
+    nests = _saved(parts, design, old_folder / PLACES)
+    if nests is None:
+        tell("nesting", 0, 1)
+        nests = nest(parts, stocks(design), design.sheets.engine, design.sheets.seconds)
+    sheets = write_sheets(
+        nests,
+        folder,
+        settings,
+        machine(design),
+        design.sheets.label,
+        lambda done, total: tell("sheets", done, total),
+    )
+    places = json.dumps(as_dict(nests), indent=1)
+    (folder / PLACES).write_text(places + "\n", encoding="utf-8", newline="\n")
+    return sheets
+
+
+def _saved(parts: Sequence[Part], design: Design, path: Path) -> tuple[Nest, ...] | None:
+    try:
+        data: Any = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None
+    return from_dict(data, parts, stocks(design), design.sheets.engine)
+
+
+def film_use(sheets: Sequence[SheetFile]) -> dict[str, dict[str, float]]:
+    """Sheets, their area, the parts' share and the waste in mm2, by material."""
+    used: dict[str, dict[str, float]] = {}
+    for sheet in sheets:
+        entry = used.setdefault(sheet.material, {"sheets": 0, "sheet_area": 0.0, "parts_area": 0.0})
+        entry["sheets"] += 1
+        entry["sheet_area"] += sheet.width * sheet.length
+        entry["parts_area"] += sheet.parts_area
+    return {material: _shares(entry) for material, entry in used.items()}
+
+
+def _shares(entry: Mapping[str, float]) -> dict[str, float]:
+    area, parts = entry["sheet_area"], entry["parts_area"]
+    return {
+        "sheets": entry["sheets"],
+        "sheet_area": round(area, 3),
+        "waste": round(area - parts, 3),
+        "density": round(parts / area, 4),
+    }

@@ -1,0 +1,145 @@
+"""``sbafab new coupon`` and ``sbafab kerf``, from the empty table to the lines to paste."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from sbafab.cli import main
+
+
+def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    out, err = capsys.readouterr()
+    return int(ended.value.code or 0), out, err
+
+
+@pytest.fixture
+def table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Path:
+    """A coupon's table filled in for a kerf of 0.12 along x and 0.1 along y."""
+    monkeypatch.chdir(tmp_path)
+    assert run(["new", "coupon"], capsys)[0] == 0
+    assert sorted(path.name for path in Path("coupon").iterdir()) == [
+        "coupon.csv",
+        "coupon.dxf",
+        "coupon.svg",
+    ]
+    lines = []
+    for line in Path("coupon/coupon.csv").read_text().splitlines():
+        name, _, rest = line.partition(",")
+        if name.endswith(("outer", "window")):
+            axis, nominal, _ = rest.split(",")
+            kerf = {"x": 0.12, "y": 0.1}[axis] * (-1 if name.endswith("outer") else 1)
+            line += f"{float(nominal) + kerf:.3f}"  # noqa: PLW2901
+        lines.append(line)
+    path = Path("coupon/coupon.csv")
+    path.write_text("\n".join(lines))
+    return path
+
+
+def test_the_lines_to_paste_are_toml(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(["kerf", str(table), "--resolution", "0.001"], capsys)
+    assert code == 0
+    assert tomllib.loads(out[out.index("[laser]") :]) == {"laser": {"kerf_tpe": 0.11}}
+    assert "x and y differ by 0.0200 mm" in out
+    assert "--split-xy gives both" in out
+
+
+def test_x_and_y_apart_for_programs(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["kerf", str(table), "--material", "ptfe", "--split-xy", "--json"]
+    code, out, _ = run([*arguments, "--resolution", "0.001"], capsys)
+    assert code == 0
+    said = json.loads(out)
+    assert said["x"]["kerf"]["value"] == pytest.approx(0.12)
+    assert said["y"]["kerf"]["value"] == pytest.approx(0.1)
+    assert said["differs"] is True
+    assert tomllib.loads(said["toml"]) == {"laser": {"kerf_ptfe": [0.12, 0.1]}}
+
+
+def test_shrunk_film_draws_a_warning(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = table.read_text().splitlines()
+    shrunk = [
+        f"{','.join(cells[:3])},{float(cells[3]) - 0.003 * float(cells[2]):.3f}"
+        for cells in (line.split(",") for line in lines[2:])
+    ]
+    table.write_text("\n".join([*lines[:2], *shrunk]))
+    code, out, _ = run(["kerf", str(table), "--resolution", "0.001"], capsys)
+    assert code == 0
+    assert "outers and windows disagree" in out
+    assert "scale by 0.9970" in out
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda text: text.replace("measured_mm", "size"), "no column measured_mm"),
+        (lambda text: text.replace("24.120", "wide").replace("23.880", "wide"), "not a number"),
+        (lambda text: "\n".join(text.splitlines()[:3]), "needs 2"),
+        (lambda text: text.replace("outer", "cave").replace("window", "outer"), "must end in"),
+        (
+            lambda text: (
+                text.replace("outer", "?").replace("window", "outer").replace("?", "window")
+            ),
+            "negative",
+        ),
+    ],
+)
+def test_a_bad_table_is_one_sentence_and_exit_2(
+    change: object, says: str, table: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table.write_text(change(table.read_text()))  # type: ignore[operator]
+    code, out, err = run(["kerf", str(table)], capsys)
+    assert (code, out) == (2, "")
+    assert says in err
+    assert err.count("\n") == 1
+
+
+def test_no_table_and_no_second_coupon(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments in (["kerf", "nosuch.csv"], ["new", "coupon"]):
+        code, out, err = run(arguments, capsys)
+        assert (code, out) == (2, "")
+        assert err.count("\n") == 1
+
+
+def test_a_calibrated_folder_checks_as_built(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    settings = ["stack.balloons=2", "laser.kerf_tpe=0.12", "laser.kerf_ptfe=[0.1,0.08]"]
+    arguments = [part for setting in settings for part in ("--set", setting)]
+    code, _, _ = run(["cut", "1dof-5mm", *arguments, "-o", str(tmp_path)], capsys)
+    assert code == 0
+    folder = tmp_path / "1dof-5mm"
+    names = sorted(path.name for path in (folder / "layers").iterdir())
+    assert names[:2] == ["001_TPE_base_kerf0.12.dxf", "002_PTFE_chamber-mask_kerf0.1x0.08.dxf"]
+    kerf = json.loads((folder / "manifest.json").read_text())["kerf"]
+    assert kerf["TPE"] == {"state": "compensated", "width": 0.12}
+    assert kerf["PTFE"] == {"state": "compensated", "width": [0.1, 0.08]}
+    code, out, _ = run(["check", str(folder)], capsys)
+    assert code == 0
+    assert "the manifest's claims hold" in " ".join(out.split())
+
+
+def test_a_kerf_that_takes_a_bore_is_told_with_its_place(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["cut", "1dof-5mm", "--set", "laser.kerf_ptfe=[0.5,1.0]", "-o", str(tmp_path)]
+    code, out, _ = run(arguments, capsys)
+    assert code == 1
+    said = " ".join(out.split())
+    assert "has a hole that vanishes at x 0.000, y 0.000" in said
+    assert "kerf of 0.5 x 1 mm" in said
+
+
+def test_chords_do_not_go_with_two_widths(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["cut", "1dof-5mm", "--set", "laser.kerf_tpe=[0.1,0.08]", "-o", str(tmp_path)]
+    code, _, err = run([*arguments, "--dxf-profile", "chords"], capsys)
+    assert code == 2
+    assert "write bulges or arcs" in err
