@@ -19,7 +19,14 @@ from sbafab.output.contents import Checked, Part, close_folder, schedule_of, wri
 from sbafab.output.manifest import sheet_entry
 from sbafab.output.run import check
 from sbafab.output.settings import GENERATOR, cut_settings, kerf_widths
-from sbafab.output.shop import CutSet, Progress, film_use, write_cut_set, write_nested_sheets
+from sbafab.output.shop import (
+    Progress,
+    film_use,
+    find_nests,
+    plan_cuts,
+    write_cut_set,
+    write_nested_sheets,
+)
 from sbafab.output.swap import JOB_SCHEMA, replaced_folder
 
 PARTS: tuple[Part, ...] = ("press", "mesh", "preview")
@@ -61,23 +68,28 @@ def generate_job(
     if any(one.failed for one in checked):
         return Job(checked, target, {})
     schedules = [schedule_of(one) for one in checked]
+    own_settings = [
+        cut_settings(one.design, one.waived, dxf_profile, chord_error) for one in checked
+    ]
+    plans = [
+        plan_cuts(one.laminate, one.design.order.copies, settings)
+        for one, settings in zip(checked, own_settings, strict=True)
+    ]
+    nests = find_nests([part for plan in plans for part in plan.parts], designs[0], target, tell)
+    shared = _settings(checked, name, dxf_profile, chord_error)
     with replaced_folder(target) as folder:
-        cuts: list[CutSet] = []
-        for one in checked:
+        sheets = write_nested_sheets(nests, designs[0], folder, shared, tell)
+        seen = _seen_from_below(sheets)
+        for one, plan, settings, pressing in zip(
+            checked, plans, own_settings, schedules, strict=True
+        ):
             own = folder / one.design.name
             own.mkdir()
-            settings = cut_settings(one.design, one.waived, dxf_profile, chord_error)
-            cuts.append(write_cut_set(one.laminate, one.design.order.copies, own, settings, tell))
-        parts = [part for cut in cuts for part in cut.parts]
-        settings = _settings(checked, name, dxf_profile, chord_error)
-        sheets = write_nested_sheets(parts, designs[0], folder, target, settings, tell)
-        for one, cut, pressing in zip(checked, cuts, schedules, strict=True):
-            own = folder / one.design.name
-            seen = _seen_from_below(sheets)
+            cut = write_cut_set(one.laminate, plan, own, settings, tell)
             index = write_contents(one, PARTS, cut, seen, pressing, own, tell)
             # The job's manifest has the sheets; a design's own folder is one without.
             close_folder(own, {**index, "sheets": []})
-        index = _manifest(checked, name, settings, sheets)
+        index = _manifest(checked, name, shared, sheets)
         close_folder(folder, index)
     return Job(checked, target, index)
 

@@ -23,7 +23,14 @@ from sbafab.output.contents import (
     write_contents,
 )
 from sbafab.output.settings import cut_settings, limits
-from sbafab.output.shop import CutSet, Progress, write_cut_set, write_nested_sheets
+from sbafab.output.shop import (
+    CutSet,
+    Progress,
+    find_nests,
+    plan_cuts,
+    write_cut_set,
+    write_nested_sheets,
+)
 from sbafab.output.swap import replaced_folder
 from sbafab.pressing.schedule import Schedule
 from sbafab.rules.deck import has_failed, run_deck
@@ -77,16 +84,18 @@ def generate(
     wanted = set(parts)
     if checked.failed:
         wanted &= {"preview"}
-    # The schedule is made before anything is written: it may refuse the design.
+    # Schedule and nest are made before anything is written: they may refuse the design.
     pressing = schedule_of(checked) if "press" in wanted else None
     target = out / design.name
+    settings = cut_settings(design, checked.waived, dxf_profile, chord_error)
+    plan = plan_cuts(checked.laminate, design.order.copies, settings) if "cut" in wanted else None
+    nests = find_nests(plan.parts, design, target, tell) if plan is not None else ()
     with replaced_folder(target) as folder:
         cut: CutSet | None = None
         sheets: list[SheetFile] = []
-        if "cut" in wanted:
-            settings = cut_settings(design, checked.waived, dxf_profile, chord_error)
-            cut = write_cut_set(checked.laminate, design.order.copies, folder, settings, tell)
-            sheets = write_nested_sheets(cut.parts, design, folder, target, settings, tell)
+        if plan is not None:
+            cut = write_cut_set(checked.laminate, plan, folder, settings, tell)
+            sheets = write_nested_sheets(nests, design, folder, settings, tell)
         index = write_contents(checked, wanted, cut, sheets, pressing, folder, tell)
         if not checked.failed:
             carry_over(target, folder, index)

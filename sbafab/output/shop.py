@@ -13,6 +13,7 @@ from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import FOLDER, SheetFile, write_sheets
 from sbafab.design.records import Design
+from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.nest import nest
 from sbafab.nesting.parts import parts_of
@@ -26,43 +27,54 @@ Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
-class CutSet:
-    """The cut files of one laminate, and its pieces for the nest."""
+class CutPlan:
+    """What is to be cut of a laminate: the beam's path for every pattern, and its parts."""
 
-    files: tuple[CutFile, ...]
-    fixture: str | None
+    paths: Mapping[str, Region]
     parts: tuple[Part, ...]
 
 
-def write_cut_set(
-    laminate: Laminate, copies: int, folder: Path, settings: CutSettings, tell: Progress
-) -> CutSet:
-    """Writes the layer files and the pin plate of a laminate; its parts, ``copies`` of each."""
+@dataclass(frozen=True)
+class CutSet:
+    """The cut files of one laminate; ``fixture`` is the pin plate's path, if it has pins."""
+
+    files: tuple[CutFile, ...]
+    fixture: str | None
+
+
+def plan_cuts(laminate: Laminate, copies: int, settings: CutSettings) -> CutPlan:
+    """Raises DesignError where the kerf leaves no path."""
     paths = compensated_paths(laminate, settings)
+    return CutPlan(paths, parts_of(laminate, paths, copies))
+
+
+def find_nests(
+    parts: Sequence[Part], design: Design, old_folder: Path, tell: Progress
+) -> tuple[Nest, ...]:
+    """Places for the parts on the design's film sheets.
+
+    Places that an earlier run found for the same parts and sheets are taken over, not searched
+    for again. Raises DesignError where parts do not fit.
+    """
+    tell("nesting", 0, 1)
+    saved = _saved(parts, design, old_folder / PLACES)
+    return saved or nest(parts, stocks(design), design.sheets.engine, design.sheets.seconds)
+
+
+def write_cut_set(
+    laminate: Laminate, plan: CutPlan, folder: Path, settings: CutSettings, tell: Progress
+) -> CutSet:
+    """Writes the layer files and the pin plate of a laminate."""
     files = write_layer_files(
-        laminate, paths, folder, settings, lambda done, total: tell("cut files", done, total)
+        laminate, plan.paths, folder, settings, lambda done, total: tell("cut files", done, total)
     )
-    plate = write_fixture(laminate, folder, settings)
-    return CutSet(tuple(files), plate, parts_of(laminate, paths, copies))
+    return CutSet(tuple(files), write_fixture(laminate, folder, settings))
 
 
 def write_nested_sheets(
-    parts: Sequence[Part],
-    design: Design,
-    folder: Path,
-    old_folder: Path,
-    settings: CutSettings,
-    tell: Progress,
+    nests: Sequence[Nest], design: Design, folder: Path, settings: CutSettings, tell: Progress
 ) -> list[SheetFile]:
-    """Nests the parts on the design's film sheets and writes those.
-
-    Places that an earlier run found for the same parts and sheets are taken over, not searched
-    for again.
-    """
-    nests = _saved(parts, design, old_folder / PLACES)
-    if nests is None:
-        tell("nesting", 0, 1)
-        nests = nest(parts, stocks(design), design.sheets.engine, design.sheets.seconds)
+    """Writes the film sheets, and beside them the places for a later run."""
     sheets = write_sheets(
         nests,
         folder,

@@ -1,0 +1,175 @@
+"""Film sheets as they are written: read back, in order, with label, frame and time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from sbafab.cutting import sheets as module
+from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.lettering import GLYPHS, strokes, width
+from sbafab.cutting.properties import CutSettings
+from sbafab.cutting.sheets import Machine, write_sheets
+from sbafab.errors import OutputError
+from sbafab.geometry.shapes import disc, rectangle
+from sbafab.nesting.nest import nest
+from sbafab.nesting.records import Nest, Part, Placement, Stock
+
+SETTINGS = CutSettings("demo", "cd" * 32, generator="sbafab 1.2.3")
+STOCK = Stock(60.0, 80.0, 6.0, 1.0)
+RING = disc((0.0, 0.0), 5.0) - disc((0.0, 0.0), 2.0)
+MACHINE = Machine(cut_speed=10.0, travel_speed=100.0, pierce_seconds=0.5, heat_distance=0.0)
+
+
+def ring_nest(count: int, stock: Stock = STOCK) -> Nest:
+    (found,) = nest([Part("demo", "P01", 1, "TPE", RING, count)], {"TPE": stock})
+    return found
+
+
+def test_the_file_holds_the_parts_with_holes_before_outlines(tmp_path: Path) -> None:
+    (sheet,) = write_sheets([ring_nest(7)], tmp_path, SETTINGS, MACHINE)
+    found = read_profile(tmp_path / sheet.path)
+    assert sheet.path == "sheets/TPE_1.dxf"
+    assert found.region.area == pytest.approx(7 * math.pi * (25 - 4))
+    assert sheet.parts_area == pytest.approx(7 * math.pi * 21)
+    assert sheet.density == pytest.approx(7 * math.pi * 21 / 4800)
+    cut = [layer for layer in found.layers if layer.startswith("CUT_")]
+    assert cut == ["CUT_INNER"] * 7 + ["CUT_OUTER"] * 7
+    assert sheet.counts == (("demo", "P01", 7),)
+    assert found.properties["PARTS"] == "7 x demo P01"
+    assert found.properties["PATTERN"] == "sheet 1 of 1"
+
+
+def test_time_is_cut_travel_and_piercing(tmp_path: Path) -> None:
+    (sheet,) = write_sheets([ring_nest(3)], tmp_path, SETTINGS, MACHINE)
+    length = 3 * 2 * math.pi * (5 + 2)
+    assert sheet.cut_length == pytest.approx(length)
+    assert sheet.minutes * 60 == pytest.approx(length / 10 + sheet.travel / 100 + 6 * 0.5)
+    assert sheet.contours == 6
+
+
+def test_the_frame_is_the_sheet_and_starts_at_the_origin(tmp_path: Path) -> None:
+    (sheet,) = write_sheets([ring_nest(1)], tmp_path, SETTINGS, MACHINE)
+    frame = [
+        edges
+        for layer, edges in read_profile(tmp_path / sheet.path).strokes
+        if layer == "REFERENCE"
+    ]
+    assert [edge.end for edge in frame[0]] == [(60, 0), (60, 80), (0, 80), (0, 0)]
+
+
+def test_the_label_is_engraved_in_the_border_alone(tmp_path: Path) -> None:
+    (sheet,) = write_sheets([ring_nest(20)], tmp_path, SETTINGS, MACHINE)
+    engraved = [
+        edge
+        for layer, edges in read_profile(tmp_path / sheet.path).strokes
+        if layer == "ENGRAVE"
+        for edge in edges
+    ]
+    assert engraved
+    assert all(0 < y < 6 for edge in engraved for _, y in (edge.start, edge.end))
+    assert all(6 - 1e-6 <= x <= 54 for edge in engraved for x, _ in (edge.start, edge.end))
+    (plain,) = write_sheets([ring_nest(20)], tmp_path, SETTINGS, MACHINE, label=False)
+    assert "ENGRAVE" not in read_profile(tmp_path / plain.path).layers
+
+
+def test_no_label_where_a_pin_or_a_narrow_border_leaves_no_room(tmp_path: Path) -> None:
+    for stock in (replace(STOCK, border=2.0), replace(STOCK, pins=((30.0, 3.0, 3.0),))):
+        (sheet,) = write_sheets([ring_nest(1, stock)], tmp_path, SETTINGS, MACHINE)
+        assert "ENGRAVE" not in read_profile(tmp_path / sheet.path).layers
+
+
+def test_a_roll_is_cut_off_one_border_past_its_parts(tmp_path: Path) -> None:
+    roll = replace(STOCK, roll=True, length=500.0)
+    (sheet,) = write_sheets([ring_nest(4, roll)], tmp_path, SETTINGS, MACHINE)
+    # Four rings of 10 mm, 1 mm apart, take 43 of the 48 mm: one row.
+    assert sheet.length == pytest.approx(6 + 10 + 6, abs=1e-6)
+    found = read_profile(tmp_path / sheet.path)
+    (parting,) = [edges for layer, edges in found.strokes if layer == "CUT_SHEET"]
+    assert {y for edge in parting for _, y in (edge.start, edge.end)} == {sheet.length}
+    assert found.layers.index("CUT_SHEET") > max(
+        i for i, layer in enumerate(found.layers) if layer == "CUT_OUTER"
+    )
+
+
+def test_the_picture_has_the_sheets_size_and_colours(tmp_path: Path) -> None:
+    (sheet,) = write_sheets([ring_nest(2)], tmp_path, SETTINGS, MACHINE)
+    picture = (tmp_path / sheet.picture).read_text(encoding="utf-8")
+    assert 'width="60mm" height="80mm" viewBox="0 0 60 80"' in picture
+    assert picture.count('r="5"') == picture.count('r="2"') == 2
+    assert picture.index("#0000ff") < picture.index("#ff0000")
+
+
+def test_a_compensated_sheet_says_so_in_its_name(tmp_path: Path) -> None:
+    settings = replace(SETTINGS, kerf_widths={"TPE": 0.12})
+    (sheet,) = write_sheets([ring_nest(1)], tmp_path, settings, MACHINE)
+    assert sheet.path == "sheets/TPE_1_kerf0.12.dxf"
+    properties = read_profile(tmp_path / sheet.path).properties
+    assert (properties["KERF_STATE"], properties["KERF_WIDTH"]) == ("compensated", "0.12")
+
+
+@pytest.mark.parametrize(
+    ("shift", "said"),
+    [
+        ((12.0, 11.0), "touch or cross"),
+        ((21.5, 11.0), "0.5000 mm apart"),
+        ((5.0, 40.0), "border"),
+        ((30.0, 76.0), "border"),
+    ],
+)
+def test_a_nest_that_comes_too_near_is_not_let_through(
+    shift: tuple[float, float], said: str, tmp_path: Path
+) -> None:
+    part = Part("demo", "P01", 1, "TPE", RING, 2)
+    places = (Placement(0, 0, 0, (11.0, 11.0)), Placement(0, 0, 0, shift))
+    bad = Nest("bottom-left", "TPE", STOCK, (part,), places)
+    with pytest.raises(OutputError, match=said):
+        write_sheets([bad], tmp_path, SETTINGS, MACHINE)
+
+
+def test_engraving_that_runs_through_a_part_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def through(*_: object) -> tuple[tuple[tuple[float, float], ...], ...]:
+        return (((0.0, 11.0), (60.0, 11.0)), ((7.0, 11.0), (8.0, 11.0)))
+
+    monkeypatch.setattr(module, "_label", through)
+    with pytest.raises(OutputError, match=r"engraving at .* lies in a part"):
+        write_sheets([ring_nest(1)], tmp_path, SETTINGS, MACHINE)
+
+
+def test_a_frame_of_another_size_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from sbafab.cutting.dxf_write import dxf_text
+
+    def scaled(contours, properties, profile, error, around):  # type: ignore[no-untyped-def]
+        return dxf_text(contours, properties, profile, error, around._replace(frame=(61.0, 80.0)))
+
+    monkeypatch.setattr(module, "dxf_text", scaled)
+    with pytest.raises(OutputError, match="REFERENCE"):
+        write_sheets([ring_nest(1)], tmp_path, SETTINGS, MACHINE)
+
+
+def test_letters_are_as_high_and_wide_as_asked() -> None:
+    text = "".join(GLYPHS)
+    points = [p for run in strokes(text, (10.0, 20.0), 3.0) for p in run]
+    assert min(y for _, y in points) == 20.0
+    assert max(y for _, y in points) == 23.0
+    assert min(x for x, _ in points) == 10.0
+    assert max(x for x, _ in points) <= 10.0 + width(text, 3.0) + 1e-9
+
+
+def test_every_letter_is_another() -> None:
+    drawn = {strokes(letter, (0.0, 0.0), 6.0) for letter in GLYPHS}
+    assert len(drawn) == len(GLYPHS)
+    assert strokes("a", (0.0, 0.0), 6.0) == strokes("A", (0.0, 0.0), 6.0)
+    assert strokes(" ", (0.0, 0.0), 6.0) == ()
+
+
+def test_engraving_does_not_touch_a_part_that_fills_its_sheet(tmp_path: Path) -> None:
+    full = rectangle((0.0, 0.0), (48.0, 68.0))
+    (whole,) = nest([Part("demo", "P01", 1, "TPE", full, 1)], {"TPE": STOCK})
+    (sheet,) = write_sheets([whole], tmp_path, SETTINGS, MACHINE)
+    assert "ENGRAVE" in read_profile(tmp_path / sheet.path).layers

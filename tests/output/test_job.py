@@ -1,0 +1,107 @@
+"""Several designs cut from the same film sheets."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from sbafab.actuators import load_design
+from sbafab.cutting.dxf_read import read_profile
+from sbafab.design.records import Design
+from sbafab.errors import DesignError
+from sbafab.output.job import Job, generate_job
+from sbafab.output.manifest import file_hashes
+
+
+def designs(*assignments: str) -> list[Design]:
+    return [
+        load_design("1dof-5mm", ["stack.balloons=2", *assignments]),
+        load_design("3dof-15mm", ["stack.balloons=1", *assignments]),
+    ]
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory: pytest.TempPathFactory) -> Job:
+    return generate_job(designs("order.copies=2"), "batch", tmp_path_factory.mktemp("job"))
+
+
+def test_every_design_has_its_folder_and_the_sheets_are_shared(job: Job) -> None:
+    assert not job.failed
+    assert {path.name for path in job.folder.iterdir()} == {
+        "1dof-5mm",
+        "3dof-15mm",
+        "manifest.json",
+        "sheets",
+    }
+    for name in ("1dof-5mm", "3dof-15mm"):
+        made = {path.name for path in (job.folder / name).iterdir()}
+        assert {"layers", "press.json", "traveller.html", "mesh", "manifest.json"} <= made
+
+
+def test_the_sheets_hold_every_layer_of_every_design_as_often_as_ordered(job: Job) -> None:
+    for material in ("TPE", "PTFE"):
+        layers = [
+            read_profile(path).region.area
+            for name in ("1dof-5mm", "3dof-15mm")
+            for path in (job.folder / name / "layers").glob(f"*_{material}_*.dxf")
+        ]
+        sheets = [
+            read_profile(path).region.area
+            for path in (job.folder / "sheets").glob(f"{material}_*.dxf")
+        ]
+        assert sum(sheets) == pytest.approx(2 * sum(layers), abs=1e-3)
+
+
+def test_the_manifest_lists_designs_sheets_and_files(job: Job) -> None:
+    told = json.loads((job.folder / "manifest.json").read_text(encoding="utf-8"))
+    assert told["schema"] == "sbafab/job@1"
+    assert [(one["name"], one["copies"]) for one in told["designs"]] == [
+        ("1dof-5mm", 2),
+        ("3dof-15mm", 2),
+    ]
+    found = file_hashes(job.folder)
+    found.pop("manifest.json")
+    assert told["files"] == found
+    parts = [part for sheet in told["sheets"] for part in sheet["parts"]]
+    assert {part["design"] for part in parts} == {"1dof-5mm", "3dof-15mm"}
+
+
+def test_travellers_name_the_shared_sheets(job: Job) -> None:
+    page = (job.folder / "1dof-5mm" / "traveller.html").read_text(encoding="utf-8")
+    assert "../sheets/TPE_1.dxf" in page
+
+
+def test_the_same_job_gives_the_same_bytes(job: Job, tmp_path: Path) -> None:
+    again = generate_job(designs("order.copies=2"), "batch", tmp_path)
+    assert file_hashes(again.folder) == file_hashes(job.folder)
+
+
+def test_a_failing_design_stops_the_whole_job(tmp_path: Path) -> None:
+    bad = load_design("1dof-10mm", ["bond.width=0.4"])
+    stopped = generate_job([*designs(), bad], "batch", tmp_path)
+    assert stopped.failed
+    assert [one.failed for one in stopped.checked] == [False, False, True]
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("others", "name", "said"),
+    [
+        (["1dof-5mm"], "batch", "two designs are named 1dof-5mm"),
+        (["1dof-10mm"], "1dof-10mm", "as one of its folders"),
+        (["1dof-10mm"], "sheets", "as one of its folders"),
+        (["1dof-10mm"], "../up", "--name"),
+    ],
+)
+def test_unfit_names_are_refused(others: list[str], name: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(DesignError, match=said):
+        generate_job([load_design("1dof-5mm"), *map(load_design, others)], name, tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("key", ["sheets.tpe.width=300", "laser.kerf_tpe=0.1"])
+def test_designs_of_other_films_or_machines_are_not_cut_together(key: str, tmp_path: Path) -> None:
+    with pytest.raises(DesignError, match=key.partition(".")[0]):
+        generate_job([load_design("1dof-5mm"), load_design("1dof-10mm", [key])], "batch", tmp_path)
