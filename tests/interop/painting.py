@@ -94,7 +94,9 @@ def _bends(coloured: Grid) -> float:
 
     A quarter of pi times the sides of pixels along a curve is its length, if it points all ways.
     """
-    sides = np.count_nonzero(np.diff(coloured, axis=0)) + np.count_nonzero(np.diff(coloured, axis=1))
+    sides = np.count_nonzero(np.diff(coloured, axis=0)) + np.count_nonzero(
+        np.diff(coloured, axis=1)
+    )
     length = sides / 2 * math.pi / 4
     half_width = np.count_nonzero(coloured) / (2 * length)
     return math.pi * half_width**2

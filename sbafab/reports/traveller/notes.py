@@ -24,7 +24,7 @@ from sbafab.reports.traveller.job import Work
 
 COLOUR_NAMES = {1: "red", 5: "blue", 6: "magenta", 7: "black or white", 8: "grey"}
 MEANINGS = {
-    ENGRAVE: "pattern labels, engraved in the waste only; leave out if you like",
+    ENGRAVE: "the sheet's label, in its border; leave it out if you like",
     CUT_INNER: "holes: cut these before the outlines",
     CUT_OUTER: "outlines of the parts",
     CUT_SHEET: "cuts the used sheet off a roll; last",
