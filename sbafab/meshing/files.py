@@ -16,7 +16,7 @@ from sbafab.meshing.write_3mf import write_3mf
 from sbafab.meshing.write_glb import write_glb
 from sbafab.meshing.write_stl import write_stl
 
-Kind = Literal["solid", "cavity"]
+Kind = Literal["solid", "cavity", "volume", "shell"]
 Writer = Callable[[Surface, Path], None]
 
 SOLID_WRITERS: dict[str, Writer] = {
@@ -30,8 +30,9 @@ SOLID_WRITERS: dict[str, Writer] = {
 class MeshFile:
     """A mesh as the manifest lists it.
 
-    ``file`` is relative to the output folder; ``chamber`` is None for the solid; ``elements``
-    counts triangles. ``fill_ul`` is the volume of air in a balloon that the shape is for.
+    ``file`` is relative to the output folder; ``chamber`` is None but for cavities; ``elements``
+    counts triangles of surfaces, elements of volume and shell meshes. ``fill_ul`` is the volume of
+    air in a balloon that the shape is for.
     """
 
     file: str

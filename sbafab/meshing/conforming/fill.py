@@ -1,0 +1,144 @@
+"""Fill: films lifted off each other by the air of their balloons.
+
+The lift is vertical in the frame of each balloon, so no element changes its volume; balloons
+are then set on each other by their neck discs, leaning where chambers hold unlike amounts. Films
+stretch a little along the meridian (1 % at 5 ul in the paper's 5 mm balloon). The filled shape is
+free of stress as written; the flat mesh is the rest position for a solver that takes one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sbafab.errors import DesignError
+from sbafab.meshing.conforming.bodies import bodies
+from sbafab.meshing.conforming.form import Form, flat
+from sbafab.meshing.conforming.layup import Layup
+from sbafab.meshing.conforming.pockets import Pocket, pockets
+from sbafab.meshing.conforming.poses import UPRIGHT, Pose, set_on, slopes_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+ROUNDS = 4
+"""Leaning discs change volumes, and these the lean, by less each round."""
+
+
+@dataclass(frozen=True)
+class Fill:
+    """The air asked for, in ul a balloon, by chamber; ``largest`` is what the fullest one holds."""
+
+    ul: Mapping[str, float]
+
+    @property
+    def largest(self) -> float:
+        return max(self.ul.values())
+
+
+def filled(stack: Layup, fill_ul: float | Mapping[str, float]) -> tuple[Fill, list[Form]]:
+    """Every film where the air has moved it to.
+
+    ``fill_ul`` is the air in every balloon in ul, or in those of the chambers named; 0 is flat.
+    Raises DesignError for a chamber that is not there, for more air than a film of constant
+    length can hold, and where unlike fills have no common plane.
+    """
+    fill = _fill(stack, fill_ul)
+    held = pockets(stack)
+    body_of_node, body_of_centre = bodies(stack)
+    forms = [Form(form.base.copy(), form.up.copy()) for form in flat(stack)]
+    for body in np.unique(body_of_centre).tolist():
+        nodes = np.flatnonzero(body_of_node == body)
+        centres = np.flatnonzero(body_of_centre == body)
+        own = [pocket for pocket in held if pocket.centres[0] in centres]
+        for k, form in _raised(stack, own, centres, fill).items():
+            forms[k].base[nodes] = form.base[nodes]
+            forms[k].up[nodes] = form.up[nodes]
+    return fill, forms
+
+
+def _raised(
+    stack: Layup, own: list[Pocket], centres: NDArray[np.int64], fill: Fill
+) -> dict[int, Form]:
+    """The films of one body, by ply; sheets stay as they are."""
+    lifts = np.zeros((len(stack.plies), len(stack.plane.points)))
+    # Height of each stack's neck disc on each film, above the film itself.
+    necks = np.zeros((len(stack.plies), len(stack.centres)))
+    places = np.array(stack.centres)[centres]
+    for k in sorted({pocket.ply for pocket in own}):
+        there = [pocket for pocket in own if pocket.ply == k]
+        _lift(there, fill, centres, places, lifts, necks)
+    poses = _poses(stack, places, necks[:, centres])
+    forms = {}
+    for k, (ply, rise, pose) in enumerate(zip(stack.plies, lifts, poses, strict=True)):
+        if ply.layer.role != "sheet":
+            local = np.column_stack([stack.plane.points, ply.z + rise])
+            up = np.broadcast_to(pose.turn[:, 2], local.shape)
+            forms[k] = Form(local @ pose.turn.T + pose.shift, up)
+    return forms
+
+
+def _fill(stack: Layup, fill_ul: float | Mapping[str, float]) -> Fill:
+    names = [chamber.name for chamber in stack.laminate.chambers]
+    if not isinstance(fill_ul, Mapping):
+        asked = dict.fromkeys(names, float(fill_ul))
+    else:
+        unknown = [name for name in fill_ul if name not in names]
+        if unknown:
+            raise DesignError(
+                f"fill names chamber {unknown[0]}, which is not there; "
+                f"the chambers are {', '.join(names)}"
+            )
+        asked = {name: float(fill_ul.get(name, 0.0)) for name in names}
+        if stack.sector is not None and len(set(asked.values())) > 1:
+            raise DesignError(
+                "a mesh of a part by symmetry has the same fill in every chamber; "
+                "ask for symmetry full"
+            )
+    for name, value in asked.items():
+        if not (math.isfinite(value) and value >= 0):
+            raise DesignError(f"fill of {name} = {value:g} ul must be 0 ul or more")
+    return Fill(asked)
+
+
+def _lift(
+    there: list[Pocket],
+    fill: Fill,
+    centres: NDArray[np.int64],
+    places: NDArray[np.float64],
+    lifts: NDArray[np.float64],
+    necks: NDArray[np.float64],
+) -> None:
+    """Adds the lift of one balloon's two films, and of their necks."""
+    lean = np.zeros((2, 2))
+    for _ in range(ROUNDS):
+        amounts = np.array([pocket.pressure(fill.ul[pocket.chamber], lean) for pocket in there])
+        heights = np.zeros((2, necks.shape[1]))
+        for pocket, amount in zip(there, amounts, strict=True):
+            for side, half in enumerate((pocket.lower, pocket.upper)):
+                heights[side, list(pocket.centres)] = half.plateaus @ [amount, *lean[side]]
+        lean = np.array([slopes_of(places, row) for row in heights[:, centres]])
+    for pocket, amount in zip(there, amounts, strict=True):
+        lifts[pocket.ply - 1] -= np.array([amount, *lean[0]]) @ pocket.lower.shapes
+        lifts[pocket.ply] += np.array([amount, *lean[1]]) @ pocket.upper.shapes
+    necks[there[0].ply - 1] = -heights[0]
+    necks[there[0].ply] = heights[1]
+
+
+def _poses(stack: Layup, places: NDArray[np.float64], necks: NDArray[np.float64]) -> list[Pose]:
+    """The place of every film: those of a balloon move as one, each balloon stands on the last."""
+    poses = [UPRIGHT]
+    kinds = [interface.kind for interface in stack.laminate.interfaces]
+    for k, kind in enumerate(kinds, start=1):
+        if kind == "chamber":
+            poses.append(poses[-1])
+            continue
+        below, above = stack.plies[k - 1], stack.plies[k]
+        top = necks[k - 1] + below.z + below.thickness * stack.is_thick
+        bottom = necks[k] + above.z
+        poses.append(set_on(poses[-1], places, top, bottom, above.gap))
+    return poses

@@ -1,0 +1,187 @@
+"""The pockets of a laminate as the fill needs them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sbafab.errors import DesignError
+from sbafab.geometry.edges import Arc, Point
+from sbafab.laminate.interfaces import Interface
+from sbafab.meshing.conforming.layup import Layup
+from sbafab.meshing.conforming.poisson import Lift, lift
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+NEAR = 1e-3
+"""mm by which a round pocket may stand off its chamber's axis."""
+
+
+@dataclass(frozen=True)
+class Pocket:
+    """One pocket of a chamber, under film ``ply``, with the lift of the films below and above.
+
+    ``centres`` are its stacks, as places in the layup's. ``share`` of each of them is meshed;
+    ``flat_ul`` is what the meshed part holds before it is filled, ``largest_ul`` the most air
+    that a balloon can hold.
+    """
+
+    chamber: str
+    ply: int
+    layer: int
+    centres: tuple[int, ...]
+    lower: Lift
+    upper: Lift
+    share: float
+    flat_ul: float
+    largest_ul: float
+
+    def pressure(self, ul: float, lean: NDArray[np.float64]) -> float:
+        """The amount of the even shape, in 1/mm, at which each balloon holds ``ul``.
+
+        ``lean`` (2, 2) are the slopes of the lower and the upper neck disc. Raises DesignError
+        where a balloon cannot hold that much.
+        """
+        if ul > self.largest_ul:
+            raise DesignError(
+                f"fill of {self.chamber} = {ul:g} ul is more than the balloon under layer "
+                f"{self.layer} can hold with a film of constant length: "
+                f"ask for {math.floor(self.largest_ul * 100) / 100:.2f} ul at most"
+            )
+        wanted = ul * len(self.centres) * self.share
+        if 0 < wanted < self.flat_ul:
+            raise DesignError(
+                f"fill of {self.chamber} = {ul:g} ul is less than the gaps between flat films "
+                f"hold; ask for {self.flat_ul / len(self.centres) / self.share:.2f} ul or more"
+            )
+        if ul == 0:
+            return 0.0
+        even = self.lower.volumes[0] + self.upper.volumes[0]
+        leaning = lean[0] @ self.lower.volumes[1:] + lean[1] @ self.upper.volumes[1:]
+        return float((wanted - self.flat_ul - leaning) / even)
+
+
+def pockets(stack: Layup) -> list[Pocket]:
+    """The pockets of every chamber, bottom to top; equal ones are worked out once."""
+    known: dict[tuple[bytes, ...], Lift] = {}
+    limits: dict[tuple[bytes, bytes], float] = {}
+    return [
+        _pocket(stack, chamber, ply, known, limits)
+        for ply, interface in enumerate(stack.laminate.interfaces, start=1)
+        if interface.kind == "chamber"
+        for chamber, void in stack.voids.items()
+        if ply in void.under
+    ]
+
+
+def _pocket(
+    stack: Layup,
+    chamber: str,
+    ply: int,
+    known: dict[tuple[bytes, ...], Lift],
+    limits: dict[tuple[bytes, bytes], float],
+) -> Pocket:
+    plane, plies = stack.plane, stack.plies
+    cells = stack.voids[chamber].under[ply]
+    inner = np.unique(plane.triangles[cells])
+    held = np.intersect1d(inner, np.unique(plane.triangles[plies[ply].bonded]))
+    centres = tuple(i for i, owner in enumerate(stack.centre_chambers) if owner == chamber)
+    places = [stack.centres[i] for i in centres]
+
+    def lift_of(necks: NDArray[np.bool_]) -> Lift:
+        key = cells.tobytes(), held.tobytes(), necks.tobytes()
+        if key not in known:
+            discs = list(_discs(stack, necks, held, places))
+            known[key] = lift(plane, cells, held, discs)
+        return known[key]
+
+    above = plies[ply + 1].bonded if ply + 1 < len(plies) else cells & False
+    lower = lift_of(cells & (plies[ply - 1].bonded | ~plies[ply - 1].cells))
+    upper = lift_of(cells & (above | ~plies[ply].cells))
+    share = stack.shares[chamber]
+    key = cells.tobytes(), held.tobytes()
+    if key not in limits:
+        interface = stack.laminate.interfaces[ply - 1]
+        limits[key] = _largest(stack, interface, lift_of(cells & False), held, places, share)
+    return Pocket(
+        chamber,
+        ply,
+        plies[ply].layer.index,
+        centres,
+        lower,
+        upper,
+        share,
+        float(plane.areas()[cells].sum()) * plies[ply].gap,
+        limits[key],
+    )
+
+
+def _discs(
+    stack: Layup, necks: NDArray[np.bool_], held: NDArray[np.int64], places: list[Point]
+) -> Iterator[tuple[NDArray[np.int64], Point]]:
+    """The nodes of each neck disc, and the axis it is on."""
+    nodes = np.setdiff1d(np.unique(stack.plane.triangles[necks]), held)
+    offsets = stack.plane.points[nodes][:, None] - np.array(places)
+    nearest = np.linalg.norm(offsets, axis=2).argmin(axis=1)
+    for number, place in enumerate(places):
+        if (nearest == number).any():
+            yield nodes[nearest == number], place
+
+
+def _largest(
+    stack: Layup,
+    interface: Interface,
+    even: Lift,
+    held: NDArray[np.int64],
+    places: list[Point],
+    share: float,
+) -> float:
+    """Most air in ul that a balloon can hold, of which ``share`` is meshed.
+
+    A round pocket's is that of :func:`largest_fill`; any other holds as much more than the disc
+    in it as the even lift of equal height does.
+    """
+    radius = _round_radius(interface, places[0])
+    if radius is not None:
+        return largest_fill(radius)
+    offsets = stack.plane.points[held][:, None] - np.array(places)
+    half = float(np.linalg.norm(offsets, axis=2).min())
+    disc = math.pi * half**2 / 2
+    wider = float(even.volumes[0] / even.shapes[0].max()) / disc
+    return largest_fill(half) * wider / len(places) / share
+
+
+def _round_radius(interface: Interface, centre: Point) -> float | None:
+    """The radius of the pocket round a centre if most of its edge is one circle."""
+    turns: dict[float, float] = {}
+    for outer in interface.unbonded.outers:
+        for edge in outer.edges:
+            if isinstance(edge, Arc) and math.dist(edge.centre, centre) < NEAR:
+                radius = round(edge.radius, 6)
+                turns[radius] = turns.get(radius, 0.0) + abs(edge.sweep)
+    return next((radius for radius, turn in sorted(turns.items()) if turn > math.pi), None)
+
+
+def largest_fill(half: float) -> float:
+    """Most air in ul between two paraboloids over a disc of radius ``half`` mm, films unstretched.
+
+    The meridian keeps its length while the edge is drawn in (paper Eqs. 1 to 3).
+    """
+
+    def volume(slope: float) -> float:
+        radius = 2 * half / (math.sqrt(1 + slope**2) + math.asinh(slope) / slope)
+        return math.pi * radius**3 * slope / 2
+
+    low, high = 0.1, 10.0
+    for _ in range(80):
+        third = (high - low) / 3
+        if volume(low + third) < volume(high - third):
+            low += third
+        else:
+            high -= third
+    return volume((low + high) / 2)

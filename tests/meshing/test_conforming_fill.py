@@ -1,0 +1,153 @@
+"""Filled meshes and parts by symmetry."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from sbafab.api import build
+from sbafab.errors import DesignError
+from sbafab.geometry.shapes import disc
+from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.conforming.meshes import conforming_meshes
+from sbafab.meshing.conforming.pockets import largest_fill
+from sbafab.meshing.conforming.settings import MeshSettings
+
+AXIS = (0.0, 0.0)
+FILM = 0.038
+
+
+@pytest.fixture(scope="module")
+def one_balloon() -> Laminate:
+    return build("1dof-5mm", "stack.balloons=1")
+
+
+def test_the_largest_fill_is_the_paraboloid_pair_of_constant_length() -> None:
+    assert largest_fill(2.5) == pytest.approx(16.95, abs=0.005)
+    assert largest_fill(5.0) == pytest.approx(8 * largest_fill(2.5), rel=1e-9)
+
+
+def test_a_balloon_rises_as_the_paraboloid(one_balloon: Laminate) -> None:
+    settings = MeshSettings(h=0.5, symmetry="quarter", fill_ul=3.0)
+    mesh = conforming_meshes(one_balloon, settings).volume
+    # Volume of two paraboloids of height a over radius 2.5: pi 2.5^2 a.
+    apex = 3.0 / (math.pi * 2.5**2)
+    cap = mesh.points[np.unique(mesh.cells[mesh.cell_sets["film_003_TPE_cap"]])]
+    radii = np.hypot(*cap[:, :2].T)
+    lowest = {r: cap[np.isclose(radii, r, atol=1e-6), 2].min() for r in (0.0, 1.25, 2.5)}
+    assert lowest[0.0] == pytest.approx(FILM + apex, rel=2e-3)
+    assert lowest[1.25] == pytest.approx(FILM + 0.75 * apex, rel=2e-3)
+    assert lowest[2.5] == pytest.approx(FILM)
+
+
+def test_stretch_is_that_of_the_paraboloid(one_balloon: Laminate) -> None:
+    settings = MeshSettings(h=0.5, symmetry="quarter", fill_ul=5.0)
+    apex, half = 5.0 / (math.pi * 2.5**2), 2.5
+    area = math.pi * half / (6 * apex**2) * ((half**2 + 4 * apex**2) ** 1.5 - half**3)
+    expected = area / (math.pi * half**2) - 1
+    assert conforming_meshes(one_balloon, settings).stretch == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("template", "changes", "fill"),
+    [
+        ("1dof-5mm", ("stack.balloons=3",), 5.0),
+        ("1dof-5mm", ("stack.balloons=2",), 16.9),
+        ("3dof-15mm", ("stack.balloons=2",), 8.0),
+        ("radial-15mm", ("chamber.count=1", "tube.outer_diameter=4"), 40.0),
+        ("1dof-5mm", ("stack.balloons=2", "registration.method=ears"), 4.0),
+    ],
+)
+def test_cavities_hold_what_was_asked(template: str, changes: tuple[str, ...], fill: float) -> None:
+    laminate = build(template, *changes)
+    meshes = conforming_meshes(laminate, MeshSettings(h=0.7, fill_ul=fill))
+    asked = fill * laminate.balloons
+    for chamber in laminate.chambers:
+        bores = math.pi * 0.5**2 * FILM * 2 * (laminate.balloons - 1)
+        held = meshes.volume.cavity(chamber.name)[0].volume - bores
+        assert held == pytest.approx(asked, rel=0.02)
+        assert meshes.shell.cavity(chamber.name)[0].volume == pytest.approx(asked, rel=0.02)
+    films = sum(layer.profile.area * layer.film.thickness for layer in laminate.tpe_layers)
+    assert meshes.statistics["volume"]["volume_mm3"] == pytest.approx(films, rel=1e-3)
+    assert meshes.statistics["volume"]["least_scaled_jacobian"] > 0.02
+    assert meshes.flat_shell.cells.tobytes() == meshes.shell.cells.tobytes()
+
+
+def test_gaps_count_as_air(one_balloon: Laminate) -> None:
+    settings = MeshSettings(h=0.5, gaps=True, fill_ul=2.0)
+    mesh = conforming_meshes(one_balloon, settings).volume
+    assert mesh.cavity("chamber1")[0].volume == pytest.approx(2.0, rel=0.02)
+
+
+def test_unlike_fills_lean_away_from_the_full_chamber() -> None:
+    laminate = build("3dof-15mm", "stack.balloons=2")
+    fills = {"chamber1": 6.0, "chamber2": 3.0, "chamber3": 3.0}
+    mesh = conforming_meshes(laminate, MeshSettings(h=0.7, fill_ul=fills)).volume
+    for chamber, fill in fills.items():
+        assert mesh.cavity(chamber)[0].volume == pytest.approx(2 * fill, rel=0.02)
+    # Chamber 1 lies on the x axis: the plane of the topmost bonds faces away from it.
+    x, y, z = mesh.points[mesh.node_sets["bond_003"]].T
+    slopes = np.linalg.lstsq(np.column_stack([x, y, np.ones_like(x)]), z, rcond=None)[0]
+    assert slopes[0] > 0.02
+    assert slopes[1] == pytest.approx(0.0, abs=0.002)
+
+
+def test_each_oblong_stack_has_its_own_fill() -> None:
+    laminate = build("radial-15mm", "chamber.count=2", "tube.outer_diameter=8.2")
+    mesh = conforming_meshes(laminate, MeshSettings(h=0.7, fill_ul={"chamber2": 20.0})).volume
+    assert mesh.cavity("chamber2")[0].volume == pytest.approx(20.0, rel=0.02)
+    assert mesh.cavity("chamber1")[0].volume == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("fill", "message"),
+    [
+        (17.0, r"ask for 16\.94 ul at most"),
+        (-1.0, "must be 0 ul or more"),
+        (math.nan, "must be 0 ul or more"),
+        ({"chamber7": 1.0}, "chamber7, which is not there; the chambers are chamber1"),
+    ],
+)
+def test_fills_out_of_range_are_refused(
+    one_balloon: Laminate, fill: float | dict[str, float], message: str
+) -> None:
+    with pytest.raises(DesignError, match=message):
+        conforming_meshes(one_balloon, MeshSettings(h=0.7, fill_ul=fill))
+
+
+def test_less_air_than_the_gaps_hold_is_refused(one_balloon: Laminate) -> None:
+    with pytest.raises(DesignError, match="less than the gaps"):
+        conforming_meshes(one_balloon, MeshSettings(h=0.7, gaps=True, fill_ul=0.1))
+
+
+def test_a_quarter_is_the_actuator_without_its_inlet(one_balloon: Laminate) -> None:
+    meshes = conforming_meshes(one_balloon, MeshSettings(h=0.5, symmetry="quarter"))
+    plates = 2 * disc(AXIS, 3.25).area * FILM
+    figures = meshes.statistics["volume"]
+    assert 4 * figures["volume_mm3"] == pytest.approx(plates, rel=5e-4)
+    for axis, name in enumerate(("symmetry_x", "symmetry_y")):
+        nodes = meshes.volume.node_sets[name]
+        on_plane = np.flatnonzero(np.abs(meshes.volume.points[:, axis]) < 1e-9)
+        assert np.array_equal(nodes, on_plane)
+        assert len(nodes) > 20
+    assert meshes.volume.cavities == {}
+    assert len(meshes.volume.face_sets["cavity_chamber1"]) > 100
+
+
+@pytest.mark.parametrize(("symmetry", "copies"), [("half", 2), ("sector", 3)])
+def test_parts_add_up_to_the_whole(symmetry: str, copies: int) -> None:
+    laminate = build("3dof-15mm", "stack.balloons=1")
+    settings = MeshSettings(h=0.7, symmetry=symmetry, fill_ul=4.0)  # type: ignore[arg-type]
+    meshes = conforming_meshes(laminate, settings)
+    films = sum(layer.profile.area * layer.film.thickness for layer in laminate.tpe_layers)
+    assert copies * meshes.statistics["volume"]["volume_mm3"] == pytest.approx(films, rel=1e-3)
+    inlets = [name for name in meshes.volume.node_sets if name.startswith("inlet")]
+    assert len(inlets) == {"half": 2, "sector": 1}[symmetry]
+
+
+def test_ears_have_no_quarter() -> None:
+    laminate = build("1dof-5mm", "stack.balloons=1", "registration.method=ears")
+    with pytest.raises(DesignError, match="symmetry quarter is not this laminate's"):
+        conforming_meshes(laminate, MeshSettings(symmetry="quarter"))

@@ -1,0 +1,213 @@
+"""Volume and shell meshes: what they hold, what they share, and what is refused."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sbafab.api import build
+from sbafab.errors import DesignError, OutputError
+from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.cavity import cavity_slabs
+from sbafab.meshing.conforming.checks import check_cavities, check_mesh
+from sbafab.meshing.conforming.elements import volumes
+from sbafab.meshing.conforming.meshes import ConformingMeshes, conforming_meshes
+from sbafab.meshing.conforming.model import Mesh
+from sbafab.meshing.conforming.settings import MeshSettings
+
+FILM = 0.038
+
+
+@pytest.fixture(scope="module")
+def meshes(two_balloons: Laminate) -> ConformingMeshes:
+    return conforming_meshes(two_balloons, MeshSettings(h=0.5))
+
+
+@pytest.fixture(scope="module")
+def with_gaps(two_balloons: Laminate) -> ConformingMeshes:
+    return conforming_meshes(two_balloons, MeshSettings(h=0.5, gaps=True))
+
+
+def held(mesh: Mesh, name: str) -> float:
+    return float(volumes(mesh.kind, mesh.points, mesh.cells)[mesh.cell_sets[name]].sum())
+
+
+def test_films_hold_area_times_thickness(meshes: ConformingMeshes) -> None:
+    wall = math.pi * (3.25**2 - 0.5**2) * FILM
+    cap = math.pi * 3.25**2 * FILM
+    assert held(meshes.volume, "film_005_TPE_wall") == pytest.approx(wall, rel=5e-4)
+    assert held(meshes.volume, "film_007_TPE_cap") == pytest.approx(cap, rel=5e-4)
+
+
+def test_films_lie_on_each_other_or_as_far_apart_as_masks(
+    meshes: ConformingMeshes, with_gaps: ConformingMeshes
+) -> None:
+    assert meshes.volume.points[:, 2].max() == pytest.approx(4 * FILM)
+    assert with_gaps.volume.points[:, 2].max() == pytest.approx(4 * FILM + 3 * 0.025)
+
+
+def test_bonds_fill_the_gaps(with_gaps: ConformingMeshes) -> None:
+    ring = math.pi * (3.25**2 - 2.5**2) * 0.025
+    neck = math.pi * (1.25**2 - 0.5**2) * 0.025
+    assert held(with_gaps.volume, "bond_002") == pytest.approx(neck, rel=1e-3)
+    assert held(with_gaps.volume, "bond_003") == pytest.approx(ring, rel=1e-3)
+
+
+def test_films_share_the_nodes_of_their_bond_and_no_other(meshes: ConformingMeshes) -> None:
+    mesh = meshes.volume
+    below, above = (
+        np.unique(mesh.cells[mesh.cell_sets[name]])
+        for name in ("film_005_TPE_wall", "film_007_TPE_cap")
+    )
+    shared = np.intersect1d(below, above)
+    assert np.array_equal(shared, mesh.node_sets["bond_003"])
+    radii = np.hypot(*mesh.points[shared, :2].T)
+    assert radii.min() == pytest.approx(2.5, abs=1e-6)
+    assert radii.max() == pytest.approx(3.25, abs=1e-6)
+    inside = np.hypot(*mesh.points[above, :2].T) < 2.5 - 1e-6
+    assert np.isclose(mesh.points[above[inside], 2], 3 * FILM).any()
+
+
+def test_tetrahedra_fill_the_same_space(two_balloons: Laminate, meshes: ConformingMeshes) -> None:
+    tets = conforming_meshes(two_balloons, MeshSettings(h=0.5, element="tet")).volume
+    assert tets.cells.shape == (3 * len(meshes.volume.cells), 10)
+    for name in meshes.volume.cell_sets:
+        assert held(tets, name) == pytest.approx(held(meshes.volume, name), rel=1e-9)
+    assert len(tets.face_sets["cavity_A"]) > 0
+
+
+def test_cavities_hold_pockets_and_bores(
+    two_balloons: Laminate, with_gaps: ConformingMeshes
+) -> None:
+    (chamber,) = two_balloons.chambers
+    exact = sum(slab.volume for slab in cavity_slabs(two_balloons, chamber))
+    surface, nodes = with_gaps.volume.cavity("A")
+    assert surface.volume == pytest.approx(exact, rel=5e-3)
+    assert np.array_equal(with_gaps.volume.points[nodes], surface.points)
+
+
+def test_flat_cavities_hold_the_bores_alone(meshes: ConformingMeshes) -> None:
+    surface, _ = meshes.volume.cavity("A")
+    assert surface.volume == pytest.approx(math.pi * 0.5**2 * 2 * FILM, rel=0.03)
+    assert meshes.shell.cavity("A")[0].volume == pytest.approx(0.0, abs=1e-12)
+
+
+def test_cavity_faces_look_into_the_pocket(with_gaps: ConformingMeshes) -> None:
+    mesh = with_gaps.volume
+    faces = mesh.face_sets["cavity_A"]
+    cap = faces[np.isin(faces[:, 0], mesh.cell_sets["film_007_TPE_cap"])]
+    base = faces[np.isin(faces[:, 0], mesh.cell_sets["film_001_TPE_base"])]
+    assert set(cap[:, 1].tolist()) == {0}
+    assert set(base[:, 1].tolist()) == {1}
+    areas = volumes("triangle6", mesh.points, mesh.cells[cap[:, 0]][:, [0, 1, 2, 6, 7, 8]])
+    assert areas.sum() == pytest.approx(math.pi * 2.5**2, rel=1e-3)
+
+
+def test_shells_carry_the_films_that_are_bonded(meshes: ConformingMeshes) -> None:
+    shell = meshes.shell
+    assert shell.thickness == {"section_38um": 0.038, "section_76um": 0.076}
+    total = sum(held(shell, name) * value for name, value in shell.thickness.items())
+    films = [name for name in meshes.volume.cell_sets if name.startswith("film_")]
+    assert total == pytest.approx(sum(held(meshes.volume, name) for name in films), rel=1e-9)
+    neck = math.pi * (1.25**2 - 0.5**2)
+    walls = [set(shell.cell_sets[name].tolist()) for name in shell.cell_sets if "wall" in name]
+    common = np.array(sorted(walls[0] & walls[1]))
+    assert volumes(shell.kind, shell.points, shell.cells)[common].sum() == pytest.approx(
+        neck, rel=1e-3
+    )
+    # The neck's lamina has the same air on both sides.
+    assert not np.isin(common, shell.face_sets["cavity_A"][:, 0]).any()
+
+
+def test_base_and_tip_are_the_neck_discs(meshes: ConformingMeshes) -> None:
+    mesh = meshes.volume
+    for name, height in (("base", 0.0), ("tip", 4 * FILM)):
+        places = mesh.points[mesh.node_sets[name]]
+        assert places[:, 2] == pytest.approx(height)
+        assert np.hypot(*places[:, :2].T).max() == pytest.approx(1.25, abs=1e-6)
+
+
+def test_the_inlet_is_where_the_strip_leaves_the_tab(meshes: ConformingMeshes) -> None:
+    places = meshes.volume.points[meshes.volume.node_sets["inlet_A"]]
+    assert places[:, 0] == pytest.approx(8.25)
+    assert np.ptp(places[:, 1]) == pytest.approx(1.6)
+
+
+@pytest.mark.parametrize(
+    ("template", "changes"),
+    [
+        ("1dof-5mm", ("stack.balloons=2", "registration.method=ears")),
+        ("1dof-5mm", ("chamber.diameter=[5, 4]", "stack.balloons=2")),
+        ("3dof-15mm", ("stack.balloons=2",)),
+        ("3dof-15mm", ("stack.balloons=1", "chamber.count=5")),
+        ("radial-15mm", ("chamber.count=2", "tube.outer_diameter=8.2", "inlet.manifold=true")),
+    ],
+)
+def test_every_family_meshes(template: str, changes: tuple[str, ...]) -> None:
+    laminate = build(template, *changes)
+    meshes = conforming_meshes(laminate, MeshSettings(h=0.7))
+    films = sum(layer.profile.area * layer.film.thickness for layer in laminate.tpe_layers)
+    figures = meshes.statistics["volume"]
+    assert figures["volume_mm3"] == pytest.approx(films, rel=1e-3)
+    assert figures["least_scaled_jacobian"] > 0.05
+    assert set(meshes.volume.cavities) == {chamber.name for chamber in laminate.chambers}
+    assert figures["elements"] == len(meshes.volume.cells)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (MeshSettings(h=0.8), "ask for 0.750 mm at most"),
+        (MeshSettings(h=0.0), "no size for a mesh"),
+        (MeshSettings(h=0.002), "more than 3,000,000"),
+        (MeshSettings(h=0.5, symmetry="sector"), "symmetry sector is not"),
+    ],
+)
+def test_what_cannot_be_meshed_is_refused(
+    two_balloons: Laminate, settings: MeshSettings, message: str
+) -> None:
+    with pytest.raises(DesignError, match=message):
+        conforming_meshes(two_balloons, settings)
+
+
+def test_inverted_elements_are_found(meshes: ConformingMeshes) -> None:
+    cells = meshes.volume.cells.copy()
+    cells[7] = cells[7][[0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13]]
+    with pytest.raises(OutputError, match="1 elements of the volume mesh are inverted"):
+        check_mesh(replace(meshes.volume, cells=cells), {})
+
+
+def test_missing_cells_and_wrong_volumes_are_found(meshes: ConformingMeshes) -> None:
+    mesh = meshes.volume
+    name = "film_007_TPE_cap"
+    with pytest.raises(OutputError, match="ask for a smaller h"):
+        check_mesh(mesh, {name: held(mesh, name) * 1.002})
+    # Two wedges that meet along one edge only.
+    fan = mesh.cells[mesh.cell_sets[name]]
+    hub = fan[(fan[:, :3] == np.bincount(fan[:, :3].ravel()).argmax()).any(axis=1)]
+    lonely = next(
+        pair
+        for pair in ((hub[0], other) for other in hub[1:])
+        if len(np.intersect1d(pair[0][:6], pair[1][:6])) == 2
+    )
+    with pytest.raises(OutputError, match="not closed and manifold"):
+        check_mesh(replace(mesh, cells=np.array(lonely)), {})
+
+
+def test_open_cavities_are_found(meshes: ConformingMeshes) -> None:
+    mesh = meshes.volume
+    holed = replace(mesh, cavities={"A": mesh.cavities["A"][1:]})
+    with pytest.raises(OutputError, match="open at 3 edges"):
+        check_cavities(holed)
+
+
+def test_without_netgen_the_extra_is_named(
+    two_balloons: Laminate, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "netgen.geom2d", None)
+    with pytest.raises(DesignError, match=r'need Netgen; install it with: pip install "sbafab'):
+        conforming_meshes(two_balloons, MeshSettings(h=0.5))
