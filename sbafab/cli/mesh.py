@@ -1,15 +1,105 @@
-"""``sbafab mesh``: the meshes only."""
+"""``sbafab mesh``: the meshes only, volume and shell meshes for simulation included."""
 
 from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
 
 import click
 
 from sbafab.cli.options import Request, run_options
 from sbafab.cli.working import run_parts
 
+if TYPE_CHECKING:
+    from sbafab.meshing.conforming.settings import Element, Symmetry
+
+FORMATS = ("vtu", "vtk", "msh", "inp", "stl", "obj", "ply")
+
+
+def _positive(ctx: click.Context, param: click.Parameter, value: float) -> float:
+    # A range lets nan through: it is neither below nor above.
+    if not (math.isfinite(value) and value > 0):
+        raise click.BadParameter("must be a length above 0 mm", ctx, param)
+    return value
+
+
+def _fill(
+    ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
+) -> float | dict[str, float] | None:
+    """One volume for every balloon, or NAME=VOLUME for the balloons of a chamber."""
+    found: dict[str, float] = {}
+    for value in values:
+        name, equals, text = value.rpartition("=")
+        try:
+            volume = float(text.strip().removesuffix("ul").strip())
+        except ValueError:
+            volume = math.nan
+        if not math.isfinite(volume) or (equals and not name.strip()):
+            raise click.BadParameter(
+                f"{value!r} must be microlitres a balloon, such as 5ul or chamber1=5ul", ctx, param
+            )
+        found[name.strip()] = volume
+    if "" in found and len(values) > 1:
+        raise click.BadParameter("give one volume for all, or one for each chamber", ctx, param)
+    return found.get("", found) if found else None
+
 
 @click.command()
 @run_options
-def mesh(request: Request) -> None:
-    """Write the solid and its cavities as meshes."""
-    run_parts(request, ("mesh",))
+@click.option(
+    "--h",
+    "size",
+    type=float,
+    callback=_positive,
+    default=0.35,
+    show_default=True,
+    metavar="MM",
+    help="Side of the triangles.",
+)
+@click.option(
+    "--element",
+    type=click.Choice(["wedge", "tet"]),
+    default="wedge",
+    show_default=True,
+    help="Second-order wedges or tetrahedra.",
+)
+@click.option(
+    "--symmetry",
+    type=click.Choice(["full", "half", "quarter", "sector"]),
+    default="full",
+    show_default=True,
+    help="Which part is meshed.",
+)
+@click.option(
+    "--fill",
+    multiple=True,
+    callback=_fill,
+    metavar="UL|CHAMBER=UL",
+    help="Air in each balloon, e.g. 5ul. Repeatable for chambers.  [default: flat]",
+)
+@click.option("--gaps", is_flag=True, help="Keep films as far apart as the masks hold them.")
+@click.option(
+    "--format",
+    "formats",
+    type=click.Choice(FORMATS),
+    multiple=True,
+    help="Formats of the volume, shell and cavity meshes. Repeatable.  [default: all]",
+)
+def mesh(
+    request: Request,
+    size: float,
+    element: Element,
+    symmetry: Symmetry,
+    fill: float | dict[str, float] | None,
+    gaps: bool,
+    formats: tuple[str, ...],
+) -> None:
+    """Write the meshes: solid and cavities, and conforming volume and shell meshes.
+
+    The conforming ones take the extra "mesh": pip install "sbafab[mesh]".
+    """
+    from sbafab.meshing.conforming.settings import MeshSettings
+    from sbafab.output.contents import Conforming
+
+    settings = MeshSettings(size, element, symmetry, fill, gaps)
+    run_parts(request, ("mesh",), conforming=Conforming(settings, formats or FORMATS))

@@ -194,6 +194,13 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
     if index["meshes"]:
         names = ", ".join(mesh["file"] for mesh in index["meshes"])
         yield "meshes", names
+    for name, figures in run.conforming.statistics.items() if run.conforming else ():
+        yield (
+            f"{name} mesh",
+            f"{figures['elements']:,} {figures['element']} elements, {figures['nodes']:,} nodes, "
+            f"least scaled Jacobian {figures['least_scaled_jacobian']:.3f}, worst aspect "
+            f"{figures['worst_aspect']:.1f}, {figures['volume_mm3']:.3f} mm3",
+        )
     if cut:
         yield "warning", PTFE_WARNING
     for note in lam.notes:

@@ -11,7 +11,7 @@ from sbafab.cli.options import Request
 
 if TYPE_CHECKING:
     from sbafab.cutting.dxf_write import DxfProfile
-    from sbafab.output.contents import Part
+    from sbafab.output.contents import Conforming, Part
 
 RULE_FAILED = 1
 
@@ -21,6 +21,7 @@ def run_parts(
     parts: Sequence[Part],
     dxf_profile: DxfProfile = "bulges",
     chord_error: float = 0.005,
+    conforming: Conforming | None = None,
 ) -> None:
     """Generates the parts of a design and exits with 1 if a rule failed."""
     from sbafab.actuators import load_design
@@ -29,7 +30,7 @@ def run_parts(
 
     design = load_design(request.designs[0], request.assignments, request.waivers)
     with shown_progress(request.as_json) as progress:
-        run = generate(design, request.out, parts, progress, dxf_profile, chord_error)
+        run = generate(design, request.out, parts, progress, dxf_profile, chord_error, conforming)
     if request.as_json:
         print_json(run_json(run))
     else:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sbafab.cutting.dxf_read import ReadBack, read_profile
+from sbafab.cutting.dxf_read import ReadBack
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.files import Progress
 from sbafab.cutting.lettering import strokes
@@ -115,8 +115,9 @@ def _write_sheet(
     text = dxf_text(contours, properties, settings.profile, settings.chord_error, around)
     path.write_bytes(text.encode())
     chord_error = settings.chord_error if settings.profile == "chords" else 0.0
-    verify_file(path, region, properties, chord_error)
-    _verify_sheet(path, around, nest.stock, width, length, chord_error)
+    found = verify_file(path, region, properties, chord_error)
+    used = replace(nest.stock, length=length)
+    _verify_sheet(path.name, found, around, used, TOLERANCE + 2 * chord_error)
     picture = path.with_suffix(".svg")
     title = f"{settings.design}: {nest.material} sheet {sheet + 1} of {nest.sheets}"
     picture.write_text(
@@ -193,14 +194,12 @@ def _parts_said(nest: Nest, placements: Sequence[Placement]) -> str:
 
 
 def _verify_sheet(
-    path: Path, around: Surroundings, stock: Stock, width: float, length: float, chord_error: float
+    name: str, found: ReadBack, around: Surroundings, stock: Stock, slack: float
 ) -> None:
-    """The written file once more, now as a sheet: frame, engraving, borders, gaps and pins."""
-    found: ReadBack = read_profile(path)
-    used = Stock(width, length, stock.border, stock.spacing, stock.pins)
+    """The written file as a sheet: frame, engraving, border, gaps and pins."""
     pieces = [(f"piece {i}", piece) for i, piece in enumerate(found.region.pieces, start=1)]
     try:
         check_surroundings(found, around)
-        check_placed(pieces, used, TOLERANCE + 2 * chord_error)
+        check_placed(pieces, stock, slack)
     except OutputError as error:
-        raise OutputError(f"{path.name}: {error}") from error
+        raise OutputError(f"{name}: {error}") from error

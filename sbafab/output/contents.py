@@ -5,8 +5,9 @@ from __future__ import annotations
 import shutil
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
@@ -21,8 +22,31 @@ from sbafab.pressing.schedule import Schedule, press_csv, press_json, schedule
 from sbafab.rules.deck import has_failed
 from sbafab.rules.finding import Finding
 
+if TYPE_CHECKING:
+    from sbafab.meshing.conforming.meshes import ConformingMeshes
+    from sbafab.meshing.conforming.settings import MeshSettings
+
 Part = Literal["cut", "press", "mesh", "preview"]
 TRAVELLER = "traveller.html"
+
+
+@dataclass(frozen=True)
+class Conforming:
+    """Volume and shell meshes that are asked for, in the formats of these file endings."""
+
+    settings: MeshSettings
+    formats: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Made:
+    """What was made before the rest is written; None or empty for what was not asked for."""
+
+    cut: CutSet | None = None
+    sheets: Sequence[SheetFile] = ()
+    pressing: Schedule | None = None
+    conforming: ConformingMeshes | None = None
+    formats: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -56,33 +80,38 @@ def schedule_of(checked: Checked) -> Schedule:
 
 
 def write_contents(
-    checked: Checked,
-    wanted: Collection[Part],
-    cut: CutSet | None,
-    sheets: Sequence[SheetFile],
-    pressing: Schedule | None,
-    folder: Path,
-    tell: Progress,
+    checked: Checked, wanted: Collection[Part], made: Made, folder: Path, tell: Progress
 ) -> dict[str, Any]:
     """Writes what is wanted beside the cut files; the manifest, without the files' hashes.
 
     The traveller needs cut files, schedule and pictures.
     """
     meshes: list[MeshFile] = []
-    if pressing is not None:
-        write_text(folder / "press.json", as_json(press_json(pressing)))
-        write_text(folder / "press.csv", press_csv(pressing))
+    if made.pressing is not None:
+        write_text(folder / "press.json", as_json(press_json(made.pressing)))
+        write_text(folder / "press.csv", press_csv(made.pressing))
     if "mesh" in wanted:
         meshes = write_meshes(
             checked.laminate, folder, progress=lambda done, total: tell("meshes", done, total)
         )
+    if made.conforming is not None:
+        from sbafab.meshing.conforming.meshes import write_conforming
+
+        told = partial(tell, "conforming meshes")
+        meshes += write_conforming(made.conforming, folder, told, made.formats)
     if "preview" in wanted:
         _write_pictures(checked, folder, tell)
-    if cut is not None and pressing is not None and "preview" in wanted:
-        write_text(folder / TRAVELLER, _traveller(checked, cut, sheets, pressing, folder))
+    if made.cut is not None and made.pressing is not None and "preview" in wanted:
+        page = _traveller(checked, made.cut, made.sheets, made.pressing, folder)
+        write_text(folder / TRAVELLER, page)
     write_text(folder / "checks.json", as_json(checks(checked.findings, "design")))
     _write_design(checked.design, folder)
-    return manifest(checked.design, checked.laminate, checked.waived, cut, sheets, meshes)
+    index = manifest(
+        checked.design, checked.laminate, checked.waived, made.cut, made.sheets, meshes
+    )
+    if made.conforming is not None:
+        index["mesh_statistics"] = made.conforming.statistics
+    return index
 
 
 def close_folder(folder: Path, index: dict[str, Any]) -> None:
@@ -177,8 +206,11 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
         index["fixture"] = plate if plate in carried else None
         if _are_files(old.get("sheets"), carried):
             index["sheets"], index["films"] = old["sheets"], old.get("films")
-    if _are_files(meshes, carried):
-        index["meshes"] = meshes
+    if isinstance(meshes, list):
+        kept_meshes = [mesh for mesh in meshes if _are_files([mesh], carried)]
+        index["meshes"] += kept_meshes
+        if any(mesh.get("kind") == "volume" for mesh in kept_meshes):
+            index["mesh_statistics"] = old.get("mesh_statistics", {})
 
 
 def _are_files(entries: object, carried: set[str]) -> bool:

@@ -15,7 +15,7 @@ from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import NAME_PATTERN, Design
 from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError
-from sbafab.output.contents import Checked, Part, close_folder, schedule_of, write_contents
+from sbafab.output.contents import Checked, Made, Part, close_folder, schedule_of, write_contents
 from sbafab.output.manifest import sheet_entry
 from sbafab.output.run import check
 from sbafab.output.settings import GENERATOR, cut_settings, kerf_widths
@@ -86,7 +86,7 @@ def generate_job(
             own = folder / one.design.name
             own.mkdir()
             cut = write_cut_set(one.laminate, plan, own, settings, tell)
-            index = write_contents(one, PARTS, cut, seen, pressing, own, tell)
+            index = write_contents(one, PARTS, Made(cut, seen, pressing), own, tell)
             # The job's manifest has the sheets; a design's own folder is one without.
             close_folder(own, {**index, "sheets": []})
         index = _manifest(checked, name, shared, sheets)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sbafab.actuators import build
 from sbafab.cutting.dxf_write import DxfProfile
@@ -16,6 +16,8 @@ from sbafab.geometry.boolean import GeometryError
 from sbafab.laminate.laminate import Laminate
 from sbafab.output.contents import (
     Checked,
+    Conforming,
+    Made,
     Part,
     carry_over,
     close_folder,
@@ -36,6 +38,9 @@ from sbafab.pressing.schedule import Schedule
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding
 
+if TYPE_CHECKING:
+    from sbafab.meshing.conforming.meshes import ConformingMeshes
+
 EVERYTHING: tuple[Part, ...] = ("cut", "press", "mesh", "preview")
 
 
@@ -49,6 +54,7 @@ class Run:
     folder: Path
     manifest: dict[str, Any]
     schedule: Schedule | None
+    conforming: ConformingMeshes | None = None
 
     @property
     def failed(self) -> bool:
@@ -72,8 +78,11 @@ def generate(
     progress: Progress | None = None,
     dxf_profile: DxfProfile = "bulges",
     chord_error: float = 0.005,
+    conforming: Conforming | None = None,
 ) -> Run:
     """Writes ``out/<design name>/`` and returns what was made.
+
+    ``conforming`` asks for volume and shell meshes as well (they take the extra "mesh").
 
     A design that breaks a rule gets its findings and pictures, but no cut files, schedule or
     meshes. With some of the ``parts`` only, the others stay if they are of the same design.
@@ -84,20 +93,31 @@ def generate(
     wanted = set(parts)
     if checked.failed:
         wanted &= {"preview"}
-    # Schedule and nest are made before anything is written: they may refuse the design.
+    # Schedule, nest and meshes are made before anything is written: they may refuse the design.
     pressing = schedule_of(checked) if "press" in wanted else None
     target = out / design.name
     settings = cut_settings(design, checked.waived, dxf_profile, chord_error)
     plan = plan_cuts(checked.laminate, design.order.copies, settings) if "cut" in wanted else None
     nests = find_nests(plan.parts, design, target, tell) if plan is not None else ()
+    meshes = _meshed(checked, conforming, tell) if "mesh" in wanted else None
     with replaced_folder(target) as folder:
         cut: CutSet | None = None
         sheets: list[SheetFile] = []
         if plan is not None:
             cut = write_cut_set(checked.laminate, plan, folder, settings, tell)
             sheets = write_nested_sheets(nests, design, folder, settings, tell)
-        index = write_contents(checked, wanted, cut, sheets, pressing, folder, tell)
+        made = Made(cut, sheets, pressing, meshes, conforming.formats if conforming else ())
+        index = write_contents(checked, wanted, made, folder, tell)
         if not checked.failed:
             carry_over(target, folder, index)
         close_folder(folder, index)
-    return Run(design, checked.laminate, checked.findings, target, index, pressing)
+    return Run(design, checked.laminate, checked.findings, target, index, pressing, meshes)
+
+
+def _meshed(checked: Checked, asked: Conforming | None, tell: Progress) -> ConformingMeshes | None:
+    if asked is None:
+        return None
+    from sbafab.meshing.conforming.meshes import conforming_meshes
+
+    tell("meshing", 0, 1)
+    return conforming_meshes(checked.laminate, asked.settings)

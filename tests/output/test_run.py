@@ -13,7 +13,9 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.design.writing import design_sha256
+from sbafab.meshing.conforming.settings import MeshSettings
 from sbafab.output import contents
+from sbafab.output.contents import Conforming
 from sbafab.output.run import generate
 
 TEMPLATES = ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"]
@@ -152,3 +154,20 @@ def test_a_drawn_outline_travels_with_the_output(tmp_path: Path) -> None:
     again = load_design(run.folder / "design.toml")
     assert design_sha256(again) == design_sha256(design)
     assert run.manifest["sizes"]["outline_diameter"] == pytest.approx(9.5)
+
+
+def test_conforming_meshes_stay_beside_those_of_a_later_run(tmp_path: Path) -> None:
+    design = load_design("1dof-5mm", ["stack.balloons=1"])
+    asked = Conforming(MeshSettings(h=0.7, symmetry="quarter"), ("vtu",))
+    made = generate(design, tmp_path, ("mesh",), conforming=asked)
+    figures = made.manifest["mesh_statistics"]
+    assert figures["volume"]["least_scaled_jacobian"] > 0
+    assert made.manifest["meshes"][-1]["kind"] == "shell"
+    later = generate(design, tmp_path)
+    assert {mesh["file"] for mesh in later.manifest["meshes"]} == {
+        mesh["file"] for mesh in made.manifest["meshes"]
+    }
+    assert later.manifest["mesh_statistics"] == figures
+    assert (later.folder / "mesh" / "volume.vtu").is_file()
+    other = generate(load_design("1dof-5mm"), tmp_path)
+    assert not (other.folder / "mesh" / "volume.vtu").exists()

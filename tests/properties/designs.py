@@ -132,6 +132,8 @@ def common(
             "worst_mask_overhang": 0.0,
             "yield_builds": 100,
         },
+        # As large as a press takes, for a sheet that is wrapped round a thick tube.
+        "sheets": {film: {"width": 200.0, "length": 200.0} for film in ("tpe", "ptfe")},
     }
     if draw(st.booleans()):
         tables["laser"] = {"kerf_tpe": draw(mm(0, 0.15)), "kerf_ptfe": draw(mm(0, 0.15))}
