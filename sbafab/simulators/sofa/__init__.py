@@ -1,0 +1,1 @@
+"""SOFA: scenes of a whole actuator, and running them where SOFA is installed."""

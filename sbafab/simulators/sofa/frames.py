@@ -1,0 +1,183 @@
+"""Scenes B and D: nine frames on the backbone that carry the films, or stand in for them."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+
+from sbafab.geometry.edges import Point
+from sbafab.simulators.sofa.actuator import POISSON, Actuator
+from sbafab.simulators.sofa.coarse import CoarseMesh, Triangle, Vector, coarse_mesh
+from sbafab.simulators.sofa.markup import add, child, document, number, root_node
+from sbafab.simulators.sofa.meridian import standing
+from sbafab.simulators.sofa.notes import beam_note, frames_note
+from sbafab.simulators.sofa.parts import add_films, add_pressure, add_tip
+
+FRAMES = 9
+"""Reference frames on the backbone (paper, Sec. 3.2.2)."""
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+ALONG_Z = (0.0, -math.sqrt(0.5), 0.0, math.sqrt(0.5))
+"""Turns local x, a beam's own axis, upward."""
+
+FRAMES_DT = 0.05
+SOFTENING = 0.3
+"""Share of the true modulus: the middle of 0.25 to 0.35, fitted to scene A."""
+
+BEAM_DT = 0.02
+BEAM_MASS = 1e3
+"""Times the true mass: keeps the beam upright at 10 kPa."""
+
+
+@dataclass(frozen=True)
+class Beam:
+    """The surrogate of a stack, scaled from what was fitted for 15 balloons of 5 mm.
+
+    ``height`` (mm) without pressure, ``area`` (mm2) a chamber's pressure acts on, ``spring``
+    (mN/mm) of a chamber; ``radius`` (mm) and ``young`` (kPa) of the beam that has the stiffness
+    of the chambers' springs on their axes.
+    """
+
+    height: float
+    area: float
+    spring: float
+    radius: float
+    young: float
+
+
+def beam_of(actuator: Actuator) -> Beam:
+    """EA = N k H0 and EI = N k R^2 H0 / 2 of a round bar: its radius is R times root 2."""
+    count, axis = actuator.stack.lobes, actuator.stack.radius
+    height = 7.2 * actuator.balloons / 15 * actuator.size
+    spring = 7.0 * 15 / actuator.balloons
+    radius = axis * math.sqrt(2)
+    young = count * spring * height / (math.pi * radius**2)
+    return Beam(height, 10.9 * actuator.size**2, spring, radius, young)
+
+
+def frames_scene(actuator: Actuator) -> str:
+    """B: the films move with nine frames, by weights that are linear in z."""
+    mesh = actuator.mesh
+    root = root_node(FRAMES_DT)
+    add(root, "DefaultAnimationLoop")
+    node = _frames(root, mesh.height, UPRIGHT, actuator.mass)
+    film = child(node, "film")
+    add(
+        film,
+        "MechanicalObject",
+        name="dofs",
+        template="Vec3",
+        position=mesh.position,
+        rest_position=mesh.rest,
+    )
+    _add_skin(film, mesh)
+    add_films(film, actuator, mesh, SOFTENING)
+    cavities = dict(mesh.cavities)
+    for name, pressure in actuator.pressures:
+        add_pressure(film, name, cavities[name], pressure)
+    add_tip(film, mesh)
+    return document(root, frames_note(actuator, FRAMES_DT, SOFTENING))
+
+
+def beam_scene(actuator: Actuator) -> str:
+    """D: nine frames as a beam, each chamber a prism of air; the film is only shown."""
+    beam = beam_of(actuator)
+    mesh = coarse_mesh(actuator.stack, standing(beam.height / actuator.balloons))
+    root = root_node(BEAM_DT)
+    add(root, "DefaultAnimationLoop")
+    node = _frames(root, mesh.height, ALONG_Z, actuator.mass * BEAM_MASS)
+    links = [index for i in range(FRAMES - 1) for index in (i, i + 1)]
+    add(node, "MeshTopology", name="beams", edges=links)
+    add(
+        node,
+        "BeamFEMForceField",
+        template="Rigid3d",
+        topology="@beams",
+        radius=beam.radius,
+        youngModulus=beam.young,
+        poissonRatio=POISSON,
+    )
+    for axis, (name, pressure) in zip(actuator.stack.axes, actuator.pressures, strict=True):
+        _add_prism(node, name, axis, beam.area, mesh.height, pressure)
+    film = child(node, "film")
+    add(
+        film,
+        "MechanicalObject",
+        name="dofs",
+        template="Vec3",
+        position=mesh.position,
+        showObject="1",
+    )
+    _add_skin(film, mesh, mapForces="0", mapConstraints="0", mapMasses="0")
+    # The surface on which to hang a visual model.
+    shown = child(film, "surface")
+    add(shown, "TriangleSetTopologyContainer", name="t", triangles=mesh.single + mesh.double)
+    add_tip(film, mesh)
+    return document(root, beam_note(actuator, beam.height, beam.area, beam.spring, BEAM_DT))
+
+
+def _frames(root: ET.Element, height: float, turn: tuple[float, ...], mass: float) -> ET.Element:
+    node = child(root, "frames")
+    add(node, "EulerImplicitSolver", rayleighStiffness=0.05, rayleighMass=2)
+    add(node, "CGLinearSolver", iterations=100, tolerance="1e-8", threshold="1e-14")
+    places = [(0.0, 0.0, height * i / (FRAMES - 1), *turn) for i in range(FRAMES)]
+    add(node, "MechanicalObject", name="dofs", template="Rigid3d", position=places)
+    add(node, "UniformMass", totalMass=float(f"{mass:.4g}"))
+    add(node, "FixedProjectiveConstraint", indices=0)
+    return node
+
+
+def _add_skin(film: ET.Element, mesh: CoarseMesh, **off: str) -> None:
+    between = [_between(z, mesh.height) for _, _, z in mesh.position]
+    add(
+        film,
+        "SkinningMapping",
+        input="@../dofs",
+        output="@dofs",
+        nbRef=2,
+        indices=" ".join(f"[{i},{i + 1}]" for i, _ in between),
+        weight=" ".join(f"[{number(1 - w)},{number(w)}]" for _, w in between),
+        **off,
+    )
+
+
+def _between(z: float, height: float) -> tuple[int, float]:
+    """The frame below a height, and the weight of the one above."""
+    place = z / height * (FRAMES - 1)
+    below = min(FRAMES - 2, max(0, math.floor(place)))
+    return below, round(place - below, 6)
+
+
+def _add_prism(
+    node: ET.Element, name: str, axis: Point, area: float, height: float, pressure: float
+) -> None:
+    points, triangles = prism(axis, area, height)
+    chamber = child(node, f"air_{name}")
+    add(chamber, "MechanicalObject", name="dofs", template="Vec3", position=points)
+    add(
+        chamber,
+        "RigidMapping",
+        input="@../dofs",
+        output="@dofs",
+        rigidIndexPerPoint=[i for i in range(FRAMES) for _ in range(4)],
+        globalToLocalCoords="1",
+    )
+    add_pressure(chamber, name, triangles, pressure)
+
+
+def prism(axis: Point, area: float, height: float) -> tuple[list[Vector], list[Triangle]]:
+    """A closed square prism on a chamber's axis, four points a frame, normals outward."""
+    half = math.sqrt(area) / 2
+    corners = ((half, half), (-half, half), (-half, -half), (half, -half))
+    points = [
+        (axis[0] + x, axis[1] + y, height * i / (FRAMES - 1))
+        for i in range(FRAMES)
+        for x, y in corners
+    ]
+    triangles: list[Triangle] = [(0, 2, 1), (0, 3, 2)]
+    for start in range(0, 4 * (FRAMES - 1), 4):
+        for i in range(4):
+            a, b = start + i, start + (i + 1) % 4
+            triangles += [(a, b, b + 4), (a, b + 4, a + 4)]
+    top = 4 * (FRAMES - 1)
+    return points, [*triangles, (top, top + 1, top + 2), (top, top + 2, top + 3)]

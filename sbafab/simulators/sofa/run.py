@@ -1,0 +1,217 @@
+"""Runs a scene with runSofa in batch and reads back what the tip did."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO, Literal
+
+from sbafab.errors import DesignError, OutputError
+from sbafab.laminate.laminate import Laminate
+from sbafab.simulators.sofa.files import BEAM, FRAMES, SHELL, VOLUME, write_scenes
+from sbafab.simulators.sofa.frames import BEAM_DT, FRAMES_DT
+from sbafab.simulators.sofa.parts import TIP_FILE, TIP_PERIOD
+from sbafab.simulators.sofa.shell_scene import DT
+from sbafab.simulators.sofa.tip import Log, Tip, read_log, read_tips
+
+Progress = Callable[[str, int, int], None]
+"""Told what is being done, and how much of how much is."""
+Scene = Literal["shell", "frames", "volume", "beam"]
+
+SCENES: dict[Scene, tuple[str, float]] = {
+    "shell": (SHELL, DT),
+    "frames": (FRAMES, FRAMES_DT),
+    "volume": (VOLUME, DT),
+    "beam": (BEAM, BEAM_DT),
+}
+"""File and time step in s of each scene."""
+
+LOG_FILE = "runSofa.log"
+LONGEST = 1e5
+"""s of simulated time."""
+PAUSE = 0.1
+"""s between two looks at how far the run is."""
+
+
+@dataclass(frozen=True)
+class SofaJob:
+    """What is run: a scene, for so many ``seconds`` of simulated time.
+
+    ``limit`` is the most real time in s it may take; ``volumes`` (ul above the start, by chamber)
+    are for scene "volume".
+    """
+
+    scene: Scene = "shell"
+    seconds: float = 8.0
+    limit: float | None = None
+    volumes: Mapping[str, float] | None = None
+
+
+USUAL = SofaJob()
+
+
+@dataclass(frozen=True)
+class SofaRun:
+    """A run that can be believed: what the tip did, steps done, s they took, steps per s."""
+
+    scene: Path
+    tips: tuple[Tip, ...]
+    steps: int
+    seconds: float | None
+    rate: float | None
+
+    @property
+    def last(self) -> Tip:
+        return self.tips[-1]
+
+
+def simulate(
+    laminate: Laminate,
+    folder: Path,
+    pressures: Mapping[str, float] | None = None,
+    job: SofaJob = USUAL,
+    tell: Progress | None = None,
+) -> SofaRun:
+    """Writes the scenes of a laminate into a folder and runs one of them.
+
+    ``pressures`` in kPa by chamber, 0 for those left out, or 5 kPa everywhere. Raises DesignError
+    where no such scene can be made of the laminate, OutputError where runSofa is missing or what
+    it ran cannot be believed.
+    """
+    name, dt = SCENES[job.scene]
+    if not TIP_PERIOD <= job.seconds <= LONGEST:
+        raise DesignError(
+            f"simulated time = {job.seconds:g} s must lie between {TIP_PERIOD:g} and {LONGEST:g} s"
+        )
+    program = find_program()
+    if folder / name not in write_scenes(laminate, folder, pressures, job.volumes):
+        raise DesignError(
+            f"scene {job.scene} needs three chambers or more, {laminate.name} has "
+            f"{len(laminate.chambers)}; take scene shell"
+        )
+    return run_scene(program, folder / name, job.seconds, dt, job.limit, tell)
+
+
+def find_program() -> str:
+    """The path of runSofa. Raises OutputError with what to do where it is not there."""
+    program = shutil.which("runSofa")
+    if program is None:
+        raise OutputError(
+            "runSofa was not found; install SOFA 25.06 (https://www.sofa-framework.org) and put "
+            "the folder that holds runSofa on PATH"
+        )
+    return program
+
+
+def run_scene(
+    program: str,
+    scene: Path,
+    seconds: float,
+    dt: float,
+    limit: float | None = None,
+    tell: Progress | None = None,
+) -> SofaRun:
+    """Runs a scene for so many s in steps of ``dt``; its log stays beside it in runSofa.log.
+
+    Raises OutputError if it ends by itself, is killed, takes longer than ``limit`` s, or logs what
+    makes it void; the sentence says how far the tip was known.
+    """
+    folder = scene.parent
+    state = folder / TIP_FILE
+    state.unlink(missing_ok=True)
+    # The tip is written at the beginning of a step: one more step writes the last.
+    steps = round(seconds / dt) + 1
+    log_path = folder / LOG_FILE
+    with log_path.open("wb") as log_file:
+        process = _started([program, "-g", "batch", "-n", str(steps), scene.name], folder, log_file)
+        try:
+            in_time = _watched(process, limit, lambda: _report(state, dt, steps, tell))
+        finally:
+            _end(process)
+    log = read_log(log_path.read_text(encoding="utf-8", errors="replace"))
+    tips = read_tips(state)
+    why = _trouble(process.returncode, in_time, limit, log, tips, seconds)
+    if why is not None:
+        known = (
+            f"the tip is known to {tips[-1].time:g} s" if tips else "nothing is known of the tip"
+        )
+        raise OutputError(f"{scene.name} did not run to its end: {why}; {known} (see {log_path})")
+    if tell is not None:
+        tell("runSofa", steps, steps)
+    return SofaRun(scene, tuple(tips), log.steps or steps, log.seconds, log.rate)
+
+
+def _started(command: list[str], folder: Path, log: BinaryIO) -> subprocess.Popen[bytes]:
+    """The program in a session of its own: runSofa may be a script that starts the real one."""
+    try:
+        return subprocess.Popen(
+            command,
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+    except OSError as reason:
+        raise OutputError(
+            f"{command[0]} could not be started ({reason.strerror}); "
+            "see whether it is a program that runs on this machine"
+        ) from reason
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    if process.poll() is not None:
+        return
+    if hasattr(os, "killpg"):
+        os.killpg(process.pid, signal.SIGKILL)
+    else:
+        process.kill()
+    process.wait()
+
+
+def _watched(
+    process: subprocess.Popen[bytes], limit: float | None, report: Callable[[], None]
+) -> bool:
+    """Waits for the end; False if it did not come in time."""
+    started = time.monotonic()
+    while True:
+        try:
+            process.wait(PAUSE)
+        except subprocess.TimeoutExpired:
+            if limit is not None and time.monotonic() - started > limit:
+                return False
+            report()
+        else:
+            return True
+
+
+def _report(state: Path, dt: float, steps: int, tell: Progress | None) -> None:
+    if tell is not None:
+        tips = read_tips(state)
+        if tips:
+            tell("runSofa", min(steps, round(tips[-1].time / dt)), steps)
+
+
+def _trouble(
+    code: int, in_time: bool, limit: float | None, log: Log, tips: list[Tip], seconds: float
+) -> str | None:
+    """Why a run cannot be believed."""
+    if not in_time:
+        return f"it took longer than {limit:g} s"
+    if code < 0:
+        return f"runSofa was killed by signal {-code} ({signal.Signals(-code).name})"
+    if log.trouble is not None:
+        return f'its log says "{log.trouble[:200]}"'
+    if code > 0:
+        return f"runSofa ended with exit code {code}"
+    if not tips:
+        return f"it wrote no place of the tip into {TIP_FILE}"
+    if tips[-1].time < seconds - 1.5 * TIP_PERIOD:
+        return f"the tip's record ends before {seconds:g} s or is no finite number from there on"
+    return None

@@ -1,0 +1,195 @@
+"""Running scenes: a script stands in for runSofa and does what runSofa has been seen to do."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import sbafab
+from sbafab.errors import DesignError, OutputError
+from sbafab.laminate.laminate import Laminate
+from sbafab.simulators.sofa.run import SofaJob, SofaRun, run_scene, simulate
+from sbafab.simulators.sofa.tip import read_log, read_tips
+
+HALF_TURN = "T= 0.2\n  X= 0 0 5 0 1 5 0 0 6\n"
+"""Three points whose plane has the normal (1, 0, 0)."""
+RECORD = "T= 0\n  X= 1 0 4 0 1 4 -1 -1 4\nT= 0.1\n  X= 1 0 4.5 0 1 4.5 -1 -1 4.5\n" + HALF_TURN
+DONE = "[INFO]    [BatchGUI] 11 iterations done in 0.1875 s ( 58.6667 FPS)."
+BRIEF = SofaJob(seconds=0.2)
+Fake = Callable[[str], None]
+
+
+@cache
+def laminate() -> Laminate:
+    return sbafab.build("1dof-5mm", "stack.balloons=1")
+
+
+@pytest.fixture
+def fake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Fake:
+    """Puts a runSofa with this body on PATH."""
+
+    def put(body: str) -> None:
+        program = tmp_path / "bin" / "runSofa"
+        program.parent.mkdir(exist_ok=True)
+        program.write_text(f"#!/bin/sh\n{body}\n", encoding="utf-8")
+        program.chmod(0o755)
+        monkeypatch.setenv("PATH", f"{program.parent}{os.pathsep}{os.environ['PATH']}")
+
+    return put
+
+
+def writing(record: str, said: str = DONE) -> str:
+    return f"cat > tip.state <<'END'\n{record}END\necho '{said}'\necho \"$@\" > arguments"
+
+
+def run(tmp_path: Path, job: SofaJob = BRIEF) -> SofaRun:
+    return simulate(laminate(), tmp_path / "sofa", {"chamber1": 5.0}, job)
+
+
+def test_a_good_run_is_read_back(tmp_path: Path, fake: Fake) -> None:
+    fake(writing(RECORD))
+    told: list[tuple[str, int, int]] = []
+    done = simulate(laminate(), tmp_path / "sofa", job=BRIEF, tell=lambda *news: told.append(news))
+    assert [tip.time for tip in done.tips] == [0, 0.1, 0.2]
+    assert done.tips[1].place == pytest.approx((0, 0, 4.5))
+    assert done.tips[1].tilt == pytest.approx(0)
+    assert done.last.place == pytest.approx((0, 1 / 3, 16 / 3))
+    assert done.last.tilt == pytest.approx(90)
+    assert (done.steps, done.seconds, done.rate) == (11, 0.1875, 58.6667)
+    assert told[-1] == ("runSofa", 11, 11)
+    arguments = (tmp_path / "sofa" / "arguments").read_text(encoding="utf-8").split()
+    assert arguments == ["-g", "batch", "-n", "11", "actuator.scn"]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "[ERROR]   [SparseLDLSolver(SparseLDLSolver1)] Invalid Linear System",
+        "[WARNING] [TriangularFEMForceField] Division by zero",
+        "Null determinant",
+        "residual = -nan",
+    ],
+)
+def test_trouble_in_the_log_voids_a_run_that_ended_with_0(
+    tmp_path: Path, fake: Fake, line: str
+) -> None:
+    fake(writing(RECORD, f"{DONE}\n{line}"))
+    with pytest.raises(OutputError) as failed:
+        run(tmp_path)
+    assert line in str(failed.value)
+    assert "the tip is known to 0.2 s" in str(failed.value)
+
+
+def test_nan_in_the_record_voids_a_run(tmp_path: Path, fake: Fake) -> None:
+    fake(writing(RECORD.replace("4.5 0 1 4.5", "nan 0 -nan 4.5")))
+    with pytest.raises(OutputError, match=r"no finite number .* known to 0 s"):
+        run(tmp_path)
+
+
+@pytest.mark.parametrize("record", ["", "T= 0\n", "T= 0\n  X= 1 2 3\n"])
+def test_a_record_without_a_place_is_a_failure(tmp_path: Path, fake: Fake, record: str) -> None:
+    fake(writing(record))
+    with pytest.raises(OutputError, match=r"no place of the tip into tip\.state; nothing is known"):
+        run(tmp_path)
+
+
+def test_no_record_is_a_failure_and_an_old_one_is_not_taken(tmp_path: Path, fake: Fake) -> None:
+    fake(writing(RECORD))
+    run(tmp_path)
+    fake(f"echo '{DONE}'")
+    with pytest.raises(OutputError, match="no place of the tip"):
+        run(tmp_path)
+
+
+def test_a_run_that_is_killed_says_by_what_and_how_far_it_came(tmp_path: Path, fake: Fake) -> None:
+    fake(writing(RECORD) + "\nkill -9 $$")
+    with pytest.raises(OutputError, match=r"signal 9 \(SIGKILL\); the tip is known to 0\.2 s"):
+        run(tmp_path)
+
+
+def test_an_exit_code_is_a_failure(tmp_path: Path, fake: Fake) -> None:
+    fake(writing(RECORD) + "\nexit 3")
+    with pytest.raises(OutputError, match="exit code 3"):
+        run(tmp_path)
+
+
+def test_a_run_that_takes_too_long_is_ended(tmp_path: Path, fake: Fake) -> None:
+    fake("echo $$ > process\nexec sleep 60")
+    with pytest.raises(OutputError, match=r"longer than 0\.3 s"):
+        run(tmp_path, SofaJob(seconds=0.2, limit=0.3))
+    process = int((tmp_path / "sofa" / "process").read_text(encoding="utf-8"))
+    with pytest.raises(ProcessLookupError):
+        os.kill(process, 0)
+
+
+def test_progress_is_told_while_it_runs(tmp_path: Path, fake: Fake) -> None:
+    fake(f"printf 'T= 0.1\\n  X= 1 0 4 0 1 4 -1 -1 4\\n' > tip.state\nsleep 0.4\n{writing(RECORD)}")
+    told: list[int] = []
+    simulate(laminate(), tmp_path / "sofa", job=BRIEF, tell=lambda _, done, of: told.append(done))
+    assert told[0] == 5
+    assert told[-1] == 11
+
+
+def test_a_missing_program_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(OutputError, match=r"install SOFA 25\.06"):
+        run(tmp_path)
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, math.nan, math.inf])
+def test_times_that_cannot_be(tmp_path: Path, fake: Fake, seconds: float) -> None:
+    fake(writing(RECORD))
+    with pytest.raises(DesignError, match="simulated time"):
+        run(tmp_path, SofaJob(seconds=seconds))
+
+
+def test_a_single_chamber_has_no_beam(tmp_path: Path, fake: Fake) -> None:
+    fake(writing(RECORD))
+    with pytest.raises(DesignError, match="scene beam needs three chambers or more"):
+        run(tmp_path, SofaJob("beam", 0.2))
+
+
+def test_each_scene_is_run_with_its_own_step(tmp_path: Path, fake: Fake) -> None:
+    fake(writing(RECORD))
+    run(tmp_path, SofaJob("frames", 0.2))
+    arguments = (tmp_path / "sofa" / "arguments").read_text(encoding="utf-8").split()
+    assert arguments[-2:] == ["5", "actuator_frames.scn"]
+
+
+def test_a_record_cut_short_keeps_what_is_whole(tmp_path: Path) -> None:
+    path = tmp_path / "tip.state"
+    for end in range(len(RECORD)):
+        path.write_text(RECORD[:end], encoding="utf-8")
+        assert [tip.time for tip in read_tips(path)] == [0, 0.1, 0.2][
+            : RECORD[:end].count("\n") // 2
+        ]
+
+
+def test_a_log_without_times_is_read() -> None:
+    assert read_log("nanometre and banana\n").trouble is None
+    assert read_log("").rate is None
+
+
+def test_a_program_that_cannot_start_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="nowhere could not be started"):
+        run_scene(str(tmp_path / "nowhere"), tmp_path / "actuator.scn", 0.2, 0.02)
+
+
+def test_what_runs_below_the_program_is_ended_with_it(tmp_path: Path, fake: Fake) -> None:
+    fake("sleep 60 &\necho $! > process\nwait")
+    with pytest.raises(OutputError, match="longer than"):
+        run(tmp_path, SofaJob(seconds=0.2, limit=0.3))
+    process = int((tmp_path / "sofa" / "process").read_text(encoding="utf-8"))
+    for _ in range(50):
+        state = Path(f"/proc/{process}/stat")
+        if not state.exists() or state.read_text().split()[2] == "Z":
+            break
+        time.sleep(0.05)
+    else:
+        pytest.fail("the program's own child still runs")
