@@ -94,10 +94,8 @@ def nested_region(inner: Sequence[Contour], outer: Sequence[Contour]) -> Region:
     """
     drawn = [*inner, *outer]
     turned = []
-    for index, contour in enumerate(drawn):
+    for index, (contour, depth) in enumerate(zip(drawn, _depths(drawn), strict=True)):
         is_hole = index < len(inner)
-        p = contour.edges[0].at(0.5)
-        depth = sum(_holds(other, p) for other in drawn if other is not contour)
         x, y = contour.edges[0].start
         if (depth % 2 == 1) != is_hole:
             found, layer = ("an outline", CUT_INNER) if is_hole else ("a hole", CUT_OUTER)
@@ -110,6 +108,21 @@ def nested_region(inner: Sequence[Contour], outer: Sequence[Contour]) -> Region:
         right = contour if contour.is_hole == is_hole else contour.reversed()
         turned.append(tidy(right.edges) or right)
     return Region(tuple(turned))
+
+
+def _depths(contours: Sequence[Contour]) -> list[int]:
+    """How many of the others hold each contour, by a sweep along x."""
+    places = [contour.edges[0].at(0.5) for contour in contours]
+    coming = sorted(range(len(contours)), key=lambda i: contours[i].bounds[0], reverse=True)
+    depths = [0] * len(contours)
+    active: list[int] = []
+    for here in sorted(range(len(contours)), key=lambda i: places[i][0]):
+        p = places[here]
+        while coming and contours[coming[-1]].bounds[0] <= p[0]:
+            active.append(coming.pop())
+        active = [i for i in active if contours[i].bounds[2] >= p[0]]
+        depths[here] = sum(_holds(contours[i], p) for i in active if i != here)
+    return depths
 
 
 def _holds(contour: Contour, p: Point) -> bool:

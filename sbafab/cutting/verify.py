@@ -25,8 +25,8 @@ def verify_file(
     expected: Region,
     expected_properties: Mapping[str, str],
     chord_error: float = 0.0,
-) -> None:
-    """Reads the file at ``path`` and compares it with what was meant.
+) -> ReadBack:
+    """Reads the file at ``path``, compares it with what was meant, and returns it.
 
     ``chord_error`` is the sagitta in mm allowed on top where curves were written as chords.
     Raises OutputError with the file, the worst deviation and its place.
@@ -35,10 +35,11 @@ def verify_file(
     try:
         _check_properties(found.properties, expected_properties)
         _check_sequence(found)
-        _check_contours(found.region, expected, TOLERANCE + chord_error)
+        check_contours(found.region, expected, TOLERANCE + chord_error)
         _check_area(found.region, expected, chord_error)
     except OutputError as error:
         raise OutputError(f"{path.name}: {error} Write it anew.") from error
+    return found
 
 
 def check_surroundings(found: ReadBack, expected: Surroundings) -> None:
@@ -84,7 +85,8 @@ def _check_sequence(found: ReadBack) -> None:
             raise OutputError(f"{CUT_SEQUENCE[before]} is cut before {CUT_SEQUENCE[after]}.")
 
 
-def _check_contours(found: Region, expected: Region, tolerance: float) -> None:
+def check_contours(found: Region, expected: Region, tolerance: float) -> None:
+    """Raises OutputError where a contour is missing, or off by more than ``tolerance`` mm."""
     for kind, ours, theirs in (
         ("holes", expected.holes, found.holes),
         ("outlines", expected.outers, found.outers),

@@ -13,8 +13,10 @@ from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import FOLDER, SheetFile, write_sheets
 from sbafab.design.records import Design
+from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
+from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import nest
 from sbafab.nesting.parts import parts_of
 from sbafab.nesting.records import Nest, Part
@@ -22,6 +24,8 @@ from sbafab.nesting.saved import as_dict, from_dict
 from sbafab.output.settings import machine, stocks
 
 PLACES = f"{FOLDER}/nest.json"
+MOST_BYTES = 50_000_000
+"""Of saved places; more are not read but searched anew."""
 Progress = Callable[[str, int, int], None]
 """Told what is being done, and how much of how much is done."""
 
@@ -89,11 +93,25 @@ def write_nested_sheets(
 
 
 def _saved(parts: Sequence[Part], design: Design, path: Path) -> tuple[Nest, ...] | None:
+    """The places of an earlier run; None where there are none for these parts, or bad ones."""
     try:
+        if not path.is_file() or path.stat().st_size > MOST_BYTES:
+            return None
         data: Any = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        nests = from_dict(data, parts, stocks(design), design.sheets.engine)
+        if nests is None or not all(_is_possible(nest) for nest in nests):
+            return None
+        for nested in nests:
+            check_nest(nested)
+    except (OSError, ValueError, ArithmeticError, RecursionError, OutputError):
         return None
-    return from_dict(data, parts, stocks(design), design.sheets.engine)
+    return nests
+
+
+def _is_possible(nest: Nest) -> bool:
+    """Whether sheets and turns are ones that the stock allows."""
+    turns = nest.stock.turns
+    return nest.sheets <= nest.stock.most and all(p.turn in turns for p in nest.placements)
 
 
 def film_use(sheets: Sequence[SheetFile]) -> dict[str, dict[str, float]]:

@@ -13,7 +13,7 @@ from tests.faults.table import PAGE, text
 def main() -> int:
     """Puts every fault into every template; 1 if a rule missed one."""
     cells: dict[tuple[str, str], str] = {}
-    with TemporaryDirectory() as folder, quick():
+    with TemporaryDirectory() as folder, quick({}):
         root = Path(folder)
         (root / "good").mkdir()
         goods = good_folders(root / "good")

@@ -10,7 +10,7 @@ from pathlib import Path
 from sbafab.actuators import load_design
 from sbafab.output.as_built.check import read_folder
 from sbafab.output.run import generate
-from tests.faults import claims, files, holes, layers, masks
+from tests.faults import claims, files, holes, layers, masks, sheets
 from tests.faults.record import Fault, Kind
 from tests.faults.specimen import Specimen, failing
 from tests.output.doctoring import Doctor
@@ -24,6 +24,7 @@ KINDS: tuple[Kind, ...] = (
     masks.KIND,
     files.KIND,
     claims.KIND,
+    sheets.KIND,
 )
 FAULTS = tuple(fault for kind in KINDS for fault in kind.faults)
 
@@ -54,7 +55,7 @@ def caught_by(fault: Fault, template: str, goods: Goods, folder: Path) -> tuple[
         return reason
     shutil.copytree(good.doctor.folder, folder)
     fault.put(Specimen(Doctor(folder), good.clean))
-    rules = failing(folder)
+    rules = failing(folder, layers=not fault.sheets, sheets=fault.sheets)
     shutil.rmtree(folder)
     return rules
 

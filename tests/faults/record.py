@@ -15,13 +15,18 @@ WhyNot = Callable[[Laminate], str]
 
 @dataclass(frozen=True)
 class Fault:
-    """A kind of fault. ``settings`` are those of the good folder that it is put into."""
+    """A kind of fault. ``settings`` are those of the good folder that it is put into.
+
+    ``sheets``: it is one of the film sheets. These are looked at for such faults alone, for they
+    cut what the layers were and would tell every fault of a layer; the deck is then left out.
+    """
 
     name: str
     rule: str
     put: Put
     why_not: WhyNot = lambda laminate: ""
     settings: tuple[str, ...] = ()
+    sheets: bool = False
 
 
 @dataclass(frozen=True)

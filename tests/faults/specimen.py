@@ -23,6 +23,7 @@ from sbafab.output.as_built import check as as_built
 from sbafab.output.as_built import cut_files, stack
 from sbafab.output.as_built.check import check_folder, read_folder
 from sbafab.output.as_built.cut_files import CutPart, read_part
+from sbafab.output.as_built.sheets import sheet_problems
 from sbafab.output.manifest import manifest
 from sbafab.rules import registration_worst_case, registration_yield
 from sbafab.rules.deck import RULES
@@ -61,7 +62,7 @@ class Specimen:
         """The manifest claims what lies on disk, so that only the geometry gives a fault away."""
         built = read_folder(self.doctor.folder)
         if built.laminate is not None:
-            told = manifest(built.design, built.laminate, built.claims.waived, (), None, ())
+            told = manifest(built.design, built.laminate, built.claims.waived, None, (), ())
             self.doctor.set_manifest(lambda claims: _retold(claims, told))
         self.doctor.rehash()
 
@@ -71,8 +72,10 @@ def _named(index: int, pattern: str) -> Callable[[dict[str, Any]], object]:
 
 
 def _retold(claims: dict[str, Any], told: dict[str, Any]) -> None:
-    for key in ("films", "sizes", "interfaces", "bores", "inlets"):
+    for key in ("sizes", "interfaces", "bores", "inlets"):
         claims[key] = told[key]
+    for own, found in zip(claims["films"], told["films"], strict=True):
+        own.update(found)
     claims["registration"]["pins"] = told["registration"]["pins"]
     for own, found in zip(claims["layers"], told["layers"], strict=True):
         own.update({key: found[key] for key in ("area", "pieces", "bores", "balloon")})
@@ -83,7 +86,7 @@ def quick(parts: dict[str, CutPart]) -> Iterator[None]:
     """Files of equal bytes are parsed, and layers of equal shape laid on each other, once.
 
     ``parts`` remembers what was parsed. The rules of LEFT_OUT are not run, and none when a good
-    folder is written.
+    folder is written; film sheets are not looked at.
     """
 
     def known(path: Path, chords_drawn: bool = False) -> CutPart:
@@ -101,6 +104,7 @@ def quick(parts: dict[str, CutPart]) -> Iterator[None]:
         patch.object(laminate, "interface_regions", regions),
         patch.object(stack, "interface_regions", regions),
         patch.object(as_built, "RULES", rules),
+        patch.object(as_built, "sheet_problems", lambda *_: []),
         patch.object(run, "run_deck", lambda *_: ()),
     ):
         yield
@@ -111,9 +115,16 @@ def _laid(below: Region, above: Region, *masks: Region) -> tuple[Region, ...]:
     return interface_regions(below, above, masks)
 
 
-def failing(folder: Path) -> tuple[str, ...]:
-    """The rules that fail in a folder, in the order they are reported."""
-    findings = check_folder(folder)
+def failing(folder: Path, layers: bool = True, sheets: bool = True) -> tuple[str, ...]:
+    """The rules that fail in a folder, in the order they are reported.
+
+    The deck is run with ``layers`` only, the film sheets are looked at with ``sheets`` only.
+    """
+    with (
+        patch.object(as_built, "sheet_problems", sheet_problems if sheets else lambda *_: []),
+        patch.object(as_built, "RULES", as_built.RULES if layers else ()),
+    ):
+        findings = check_folder(folder)
     return tuple(dict.fromkeys(f.rule for f in findings if f.verdict == "fail"))
 
 

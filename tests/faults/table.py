@@ -27,7 +27,10 @@ def text(cells: Cells) -> str:
         f"The templates have {BALLOONS} balloons here, so that the tests are quick. A fault of "
         "geometry comes with a manifest that agrees with the faulty files (hashes, areas, pieces, "
         "bores, interfaces), so that the rule has to see it in the profiles. "
-        f"`{LEFT_OUT[0]}` and `{LEFT_OUT[1]}`, which foresee errors on the bench, are not run.",
+        f"`{LEFT_OUT[0]}` and `{LEFT_OUT[1]}`, which foresee errors on the bench, are not run. "
+        "The film sheets are looked at in the table of their own only: they are cut as the layers "
+        "were before the fault, and would tell every fault in a layer's profile besides. The rules "
+        "on the layers, which are sound there, are not run for that table.",
         "",
         "**caught**: the rule named for the fault fails; what fails besides it stands after the "
         "semicolon. **n/a**: the fault does not apply, and why.",

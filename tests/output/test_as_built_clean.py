@@ -22,6 +22,10 @@ DROP = (
 )
 FEW_BUILDS = "rules.yield_builds=100"
 KERF = ("laser.kerf_tpe=0.2", "laser.kerf_ptfe=0.12")
+UNEVEN = "laser.kerf_tpe=[0.2, 0.1]"
+PINS = "sheets.ptfe.pins=[[30, 30, 3], [120, 120, 3]]"
+ROLLS = ("sheets.tpe.roll=true", "sheets.ptfe.roll=true", "sheets.tpe.length=400")
+SMALL = ("sheets.tpe.width=70", "sheets.tpe.length=50", "sheets.label=false")
 
 CLEAN: list[tuple[str, tuple[str, ...], DxfProfile]] = [
     ("1dof-5mm", (), "bulges"),
@@ -45,6 +49,12 @@ CLEAN: list[tuple[str, tuple[str, ...], DxfProfile]] = [
         (name, ("stack.balloons=2", "registration.method=ears"), "bulges")
         for name in ("1dof-5mm", "3dof-15mm", "radial-15mm")
     ),
+    ("3dof-15mm", ("stack.balloons=1", "order.copies=3", *KERF), "chords"),
+    ("3dof-15mm", ("stack.balloons=1", PINS, UNEVEN, "order.copies=2"), "bulges"),
+    ("1dof-10mm", ("stack.balloons=2", UNEVEN, "registration.method=ears"), "arcs"),
+    ("1dof-5mm", ("stack.balloons=2", *ROLLS, "order.copies=3", *KERF), "arcs"),
+    ("1dof-10mm", ("stack.balloons=1", *ROLLS, "order.copies=3"), "chords"),
+    ("radial-15mm", ("stack.balloons=2", *SMALL, "order.copies=3"), "bulges"),
 ]
 
 

@@ -22,7 +22,7 @@ from sbafab.output.as_built.claims import (
     order_problems,
     property_problems,
 )
-from sbafab.output.as_built.cut_files import CutPart, LayerFile, read_layers
+from sbafab.output.as_built.cut_files import CutPart, LayerFile, inside, read_layers
 from sbafab.output.as_built.measures import (
     fixture_problems,
     interface_problems,
@@ -31,14 +31,18 @@ from sbafab.output.as_built.measures import (
     place_problems,
     size_problems,
 )
+from sbafab.output.as_built.pieces import Lot
 from sbafab.output.as_built.records import (
     CLAIMS,
     INTEGRITY,
     Manifest,
     Problem,
     findings_of,
+    is_job,
     read_claims,
+    read_job,
 )
+from sbafab.output.as_built.sheets import Order, sheet_problems
 from sbafab.output.as_built.stack import laminate_of, stacked_layers
 from sbafab.output.settings import limits as limits_of
 from sbafab.rules import film_limits
@@ -66,9 +70,15 @@ class AsBuilt:
 def check_folder(folder: Path) -> tuple[Finding, ...]:
     """Everything found in an output folder: file integrity, the manifest's claims, the deck.
 
-    Raises OutputError with one sentence for a folder that holds no sound manifest or no cut files.
+    Of a job's folder, that of every design, and of the film sheets they share. Raises OutputError
+    with one sentence for a folder that holds no sound manifest or no cut files.
     """
-    built = read_folder(folder)
+    if is_job(folder):
+        return _check_job(folder)
+    return _findings(read_folder(folder))
+
+
+def _findings(built: AsBuilt) -> tuple[Finding, ...]:
     if built.laminate is None:
         measured = _by_layer(built)
     else:
@@ -84,10 +94,51 @@ def check_folder(folder: Path) -> tuple[Finding, ...]:
     )
 
 
-def read_folder(folder: Path) -> AsBuilt:
+def _check_job(folder: Path) -> tuple[Finding, ...]:
+    """What is found in every design of a job, its name before it, and on the job's sheets."""
+    job = read_job(folder)
+    found: list[Finding] = []
+    lots: list[Lot] = []
+    problems: list[Problem] = []
+    first: AsBuilt | None = None
+    for told in job.designs:
+        built = read_folder(inside(folder, told.folder), of_job=True)
+        first = first or built
+        found += [replace(f, message=f"{told.name}: {f.message}") for f in _findings(built)]
+        lots.append(Lot(told.name, told.copies, built.files))
+        own = (built.claims.name, built.claims.copies, built.claims.design_sha256)
+        if own != (told.name, told.copies, told.design_sha256):
+            message = f"{told.folder}: name, copies or design_sha256 are not those of its manifest"
+            problems.append(claim(message))
+    assert first is not None
+    problems += file_problems(folder, job)
+    problems += sheet_problems(
+        folder,
+        Order(
+            job.name,
+            job.designs_sha256,
+            first.design,
+            first.claims.kerf,
+            job.waived,
+            job.films,
+            job.sheets,
+            job.files,
+            lots,
+        ),
+    )
+    count = len(job.sheets)
+    return (
+        *found,
+        *findings_of(INTEGRITY, problems, f"{count} sheets read back: closed contours, no overlap"),
+        *findings_of(CLAIMS, problems, "the sheets hold what the job's designs are made of"),
+    )
+
+
+def read_folder(folder: Path, of_job: bool = False) -> AsBuilt:
     """The laminate that a folder's cut files make, and what is wrong with files and claims.
 
-    Raises OutputError as ``check_folder`` does.
+    The folder of a design ``of_job`` has no film sheets of its own. Raises OutputError as
+    ``check_folder`` does.
     """
     claims = read_claims(folder)
     if all(layer.file is None for layer in claims.layers):
@@ -105,6 +156,8 @@ def read_folder(folder: Path) -> AsBuilt:
     problems += property_problems(files, claims)
     problems += layer_problems(files, claims)
     problems += pattern_problems(layers, claims)
+    if not of_job:
+        problems += _own_sheet_problems(folder, claims, design, files)
     laminate: Laminate | None = None
     parts = [file.part for file in files if file.part is not None]
     chord_error = max((part.chord_error for part in parts), default=0.0)
@@ -120,6 +173,28 @@ def read_folder(folder: Path) -> AsBuilt:
             problems.append(Problem(INTEGRITY, message))
     limits = _within(limits_of(design), chord_error)
     return AsBuilt(claims, design, limits, tuple(files), laminate, tuple(problems))
+
+
+def _own_sheet_problems(
+    folder: Path, claims: Manifest, design: Design, files: Sequence[LayerFile]
+) -> list[Problem]:
+    if not claims.sheets and is_job(folder.absolute().parent):
+        message = "the film sheets are those of the job, and were not looked at; check the folder "
+        return [Problem(CLAIMS, f"{message}above this one", verdict="warn")]
+    return sheet_problems(
+        folder,
+        Order(
+            claims.name,
+            claims.design_sha256,
+            design,
+            claims.kerf,
+            claims.waived,
+            claims.films,
+            claims.sheets,
+            claims.files,
+            [Lot(claims.name, claims.copies, files)],
+        ),
+    )
 
 
 def _laminate_problems(

@@ -10,7 +10,7 @@ from sbafab.design.records import Design
 from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Layer
 from sbafab.output.as_built.cut_files import LayerFile
-from sbafab.output.as_built.records import CLAIMS, KerfClaim, LayerClaim, Manifest, Problem
+from sbafab.output.as_built.records import CLAIMS, Job, KerfClaim, LayerClaim, Manifest, Problem
 from sbafab.output.manifest import file_hashes
 from sbafab.output.settings import kerf_widths
 
@@ -22,11 +22,12 @@ def claim(message: str, *layers: int) -> Problem:
     return Problem(CLAIMS, message, layers)
 
 
-def file_problems(folder: Path, claims: Manifest) -> list[Problem]:
+def file_problems(folder: Path, claims: Manifest | Job) -> list[Problem]:
     """Files that are missing, changed, or not in the manifest (a cut file is worse than a note)."""
     found = file_hashes(folder)
     found.pop("manifest.json", None)
-    layer_of = {layer.file: number for number, layer in enumerate(claims.layers, start=1)}
+    layers = claims.layers if isinstance(claims, Manifest) else ()
+    layer_of = {layer.file: number for number, layer in enumerate(layers, start=1)}
     problems = []
     for path, digest in claims.files.items():
         own = (layer_of[path],) if path in layer_of else ()
@@ -147,6 +148,7 @@ def design_problems(claims: Manifest, design: Design, digest: str) -> list[Probl
         ("family", claims.family, design.family),
         ("registration.method", claims.registration.method, design.registration.method),
         ("balloons", balloons, design.stack.balloons),
+        ("copies", claims.copies, design.order.copies),
     )
     problems = [
         claim(f"{what} is {said} in the manifest and {stated} by design.toml")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -18,6 +19,9 @@ from sbafab.output.as_built.records import INTEGRITY, LayerClaim, Problem
 from sbafab.output.as_built.uncut import uncut
 
 MOST_BYTES = 20_000_000
+MOST_MARKS = 100_000
+"""Entities and points a cut file may be drawn with: more would take minutes to be kept apart."""
+MARK = re.compile(rb"\n *1?0\r?\n")
 DATUM = "LINE"
 """What the datum cross is drawn with: all that a layer file holds beside its contours."""
 
@@ -26,11 +30,12 @@ DATUM = "LINE"
 class CutPart:
     """What a cut file cuts: ``region`` with the kerf undone and arcs for chords.
 
-    ``chord_error`` is what the file says, in mm, 0 for true arcs; ``corner_room`` the mm2 by which
-    the area may be off because the beam rounds corners.
+    ``path`` is the beam's path as it is drawn. ``chord_error`` is what the file says, in mm, 0 for
+    true arcs; ``corner_room`` the mm2 by which the area may be off because the beam rounds corners.
     """
 
     region: Region
+    path: Region
     properties: dict[str, str]
     chord_error: float
     corner_room: float
@@ -61,8 +66,8 @@ def read_layers(
     for position, claim in enumerate(claims, start=1):
         part: CutPart | None = None
         try:
-            path = _inside(folder, claim.file)
-            digest = _digest(path)
+            path = inside(folder, claim.file)
+            digest = sound_digest(path)
             if digest not in known:
                 known[digest] = read_part(path, chords_drawn)
             part = known[digest]
@@ -75,7 +80,8 @@ def read_layers(
     return files, problems
 
 
-def _inside(folder: Path, file: str | None) -> Path:
+def inside(folder: Path, file: str | None) -> Path:
+    """Where a file of the manifest lies. Raises OutputError where that is not in the folder."""
     if file is None:
         raise OutputError("the manifest names no cut file for it; write the folder anew")
     pure = PurePosixPath(file)
@@ -84,11 +90,21 @@ def _inside(folder: Path, file: str | None) -> Path:
     return folder / pure
 
 
-def _digest(path: Path) -> str:
+def sound_digest(path: Path) -> str:
+    """sha256 of a file that is there and can be read in time. Raises OutputError."""
     try:
+        # A pipe or a device would be read for ever.
+        if path.exists() and not path.is_file():
+            raise OutputError("no plain file; write it anew")
         if path.stat().st_size > MOST_BYTES:
             raise OutputError(f"larger than {MOST_BYTES:,} bytes; write it anew")
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        data = path.read_bytes()
+        marks = sum(1 for _ in MARK.finditer(data))
+        if marks > MOST_MARKS:
+            raise OutputError(
+                f"drawn with {marks:,} entities and points, where at most {MOST_MARKS:,} may be"
+            )
+        return hashlib.sha256(data).hexdigest()
     except (FileNotFoundError, NotADirectoryError):
         raise OutputError("missing; write it anew") from None
     except OSError as error:
@@ -128,7 +144,7 @@ def _part(found: ReadBack, chords_drawn: bool) -> CutPart:
     region, corner_room = uncut(region, kerf)
     if region.is_empty:
         raise OutputError(f"nothing is left inside a kerf of {kerf_text(kerf)} mm; write it anew")
-    return CutPart(region, properties, chord_error, corner_room)
+    return CutPart(region, found.region, properties, chord_error, corner_room)
 
 
 def _check_drawn(found: ReadBack) -> None:
@@ -140,6 +156,11 @@ def _check_drawn(found: ReadBack) -> None:
                 f"a {kind} lies on a layer other than {CUT_INNER} and {CUT_OUTER}, so it would "
                 "not be cut in its turn; move it"
             )
+    check_sequence(found)
+
+
+def check_sequence(found: ReadBack) -> None:
+    """Raises OutputError where an outline is cut before a hole, or anything out of its turn."""
     ranks = [CUT_SEQUENCE.index(layer) for layer in found.layers if layer in CUT_SEQUENCE]
     for before, after in pairwise(ranks):
         if before > after:

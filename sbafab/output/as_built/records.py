@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -12,7 +12,7 @@ from sbafab.errors import OutputError
 from sbafab.laminate.films import Material
 from sbafab.laminate.interfaces import InterfaceKind
 from sbafab.laminate.laminate import Role
-from sbafab.output.swap import SCHEMA
+from sbafab.output.swap import JOB_SCHEMA, SCHEMA, read_manifest
 from sbafab.rules.finding import Finding, Place, Verdict
 
 INTEGRITY = "file-integrity"
@@ -21,6 +21,11 @@ MOST_BYTES = 50_000_000
 MOST_SHOWN = 12
 """Problems of one rule that are reported one by one."""
 
+MOST_SIZE = 10_000.0
+"""mm, of a film sheet."""
+
+Count = Annotated[int, Field(ge=1, le=10_000_000)]
+Size = Annotated[float, Field(gt=0, le=MOST_SIZE)]
 Thickness = Annotated[float, Field(gt=0, le=10)]
 
 
@@ -85,12 +90,53 @@ class KerfClaim(_Claim):
     """Full width in mm, or that along x and along y."""
 
 
-class FilmClaim(_Claim):
+class FilmUseClaim(_Claim):
+    """Sheets of a film and their area in mm2; nothing where there are none."""
+
     material: Material
+    sheets: int = 0
+    sheet_area: float = 0.0
+    waste: float = 0.0
+    density: float = 0.0
+
+
+class FilmClaim(FilmUseClaim):
     product: str
     thickness: Thickness
     layers: int
     area: float
+
+
+class SheetPinClaim(_Claim):
+    x: float
+    y: float
+    diameter: float
+
+
+class SheetPartClaim(_Claim):
+    design: str
+    pattern: str
+    count: Count
+
+
+class SheetClaim(_Claim):
+    """A film sheet; lengths in mm, areas in mm2."""
+
+    file: str
+    picture: str
+    material: Material
+    number: Count
+    width: Size
+    length: Size
+    border: Annotated[float, Field(ge=0, le=MOST_SIZE)]
+    spacing: Annotated[float, Field(gt=0, le=MOST_SIZE)]
+    pins: Annotated[tuple[SheetPinClaim, ...], Field(max_length=100)]
+    engine: str
+    parts: tuple[SheetPartClaim, ...]
+    parts_area: float
+    density: float
+    contours: Count
+    cut_length: float
 
 
 class Manifest(_Claim):
@@ -104,6 +150,7 @@ class Manifest(_Claim):
     registration: RegistrationClaim
     kerf: dict[Material, KerfClaim]
     waived: tuple[str, ...]
+    copies: Annotated[int, Field(ge=1, le=1000)] = 1
     sizes: dict[str, float]
     films: tuple[FilmClaim, ...]
     layers: Annotated[tuple[LayerClaim, ...], Field(min_length=1, max_length=10_000)]
@@ -112,6 +159,28 @@ class Manifest(_Claim):
     inlets: tuple[InletClaim, ...]
     lumen: float | None
     fixture: str | None = None
+    sheets: Annotated[tuple[SheetClaim, ...], Field(max_length=2000)] = ()
+    files: dict[str, str]
+
+
+class DesignClaim(_Claim):
+    name: str
+    folder: str
+    copies: Annotated[int, Field(ge=1, le=1000)]
+    design_sha256: str
+
+
+class Job(_Claim):
+    """The part of a job's ``manifest.json`` that a check compares with what lies on disk."""
+
+    schema_name: Literal["sbafab/job@1"] = Field(alias="schema")
+    name: str
+    units: Literal["mm"]
+    designs_sha256: str
+    waived: tuple[str, ...]
+    designs: Annotated[tuple[DesignClaim, ...], Field(min_length=1, max_length=100)]
+    films: tuple[FilmUseClaim, ...]
+    sheets: Annotated[tuple[SheetClaim, ...], Field(max_length=2000)]
     files: dict[str, str]
 
 
@@ -121,8 +190,33 @@ def read_claims(folder: Path) -> Manifest:
     Raises OutputError with one sentence where there is none, or a key is missing or of a wrong
     type.
     """
+    return _read(folder, Manifest, SCHEMA)
+
+
+def is_job(folder: Path) -> bool:
+    """Whether a folder is one of several designs."""
     path = folder / "manifest.json"
     try:
+        is_small = path.is_file() and path.stat().st_size <= MOST_BYTES
+    except OSError:
+        return False
+    return is_small and (read_manifest(folder) or {}).get("schema") == JOB_SCHEMA
+
+
+def read_job(folder: Path) -> Job:
+    """The manifest of a job's folder. Raises OutputError as ``read_claims`` does."""
+    return _read(folder, Job, JOB_SCHEMA)
+
+
+Read = TypeVar("Read", Manifest, Job)
+
+
+def _read(folder: Path, kind: type[Read], schema: str) -> Read:
+    path = folder / "manifest.json"
+    try:
+        # A pipe or a device would be read for ever.
+        if path.exists() and not path.is_file():
+            raise OutputError(f"{path} is no plain file; write the folder anew")
         if path.stat().st_size > MOST_BYTES:
             raise OutputError(f"{path} is larger than {MOST_BYTES:,} bytes; write the folder anew")
         data = path.read_bytes()
@@ -135,14 +229,14 @@ def read_claims(folder: Path) -> Manifest:
             raise
         raise OutputError(f"{path} cannot be read: {error.strerror or error}") from None
     try:
-        return Manifest.model_validate_json(data)
+        return kind.model_validate_json(data)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in first["loc"])
         reason = first["msg"][:1].lower() + first["msg"][1:]
         said = f"{where}: {reason}" if where else reason
         raise OutputError(
-            f"{path} is not a sound {SCHEMA}: {said}; write the folder anew with sbafab generate"
+            f"{path} is not a sound {schema}: {said}; write the folder anew with sbafab generate"
         ) from None
 
 
