@@ -15,6 +15,8 @@ from sbafab.rules.limits import TOLERANCE
 
 SQUARE = 0.1
 """Cosine up to which a tab's corner counts as square: a turned layer still has its tabs."""
+ROUNDED_OFF = 0.9
+"""The same where a large fillet takes all of a short tab's sides, and comes aslant to its end."""
 STEP = 0.05
 
 
@@ -59,18 +61,25 @@ def tabs(interface: Interface, tooling: Sequence[Point]) -> list[Tab]:
         )
         if not is_ear:
             found.append(tab._replace(mouth=_mouth(tab, interface)))
+    if not found:
+        # Other convex corners may lie beside any straight edge: only a strip tells a tab there.
+        aslant = (
+            tab._replace(mouth=_mouth(tab, interface))
+            for tab in _square_ends(interface.contact, ROUNDED_OFF)
+        )
+        found += [tab for tab in aslant if tab.mouth]
     return found
 
 
-def _square_ends(contact: Region) -> Iterator[Tab]:
+def _square_ends(contact: Region, square: float = SQUARE) -> Iterator[Tab]:
     for outer in contact.outers:
         edges = (tidy(outer.edges) or outer).edges
         for i, edge in enumerate(edges):
             before, after = edges[i - 1], edges[(i + 1) % len(edges)]
             if (
                 isinstance(edge, Line)
-                and _turns_square(before, edge)
-                and _turns_square(edge, after)
+                and _turns_square(before, edge, square)
+                and _turns_square(edge, after, square)
             ):
                 ux, uy = edge.direction(edge.start)
                 run = min(_straight(before), _straight(after))
@@ -82,10 +91,10 @@ def _straight(side: Edge) -> float:
     return side.length if isinstance(side, Line) else 0.0
 
 
-def _turns_square(one: Edge, other: Edge) -> bool:
-    """Whether two edges meet in a convex corner of about a right angle."""
+def _turns_square(one: Edge, other: Edge, square: float) -> bool:
+    """Whether two edges meet in a convex corner, no further off a right angle than ``square``."""
     (ux, uy), (vx, vy) = one.direction(one.end), other.direction(other.start)
-    return abs(ux * vx + uy * vy) < SQUARE and ux * vy - uy * vx > 0
+    return abs(ux * vx + uy * vy) < square and ux * vy - uy * vx > 0
 
 
 def _mouth(tab: Tab, interface: Interface) -> tuple[float, float] | None:
