@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
 from sbafab.geometry.boolean import LEAST_AREA, PointPool, tidy
 from sbafab.geometry.edges import EPSILON, Edge, Point
 from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.nearby import close_pairs
 from sbafab.geometry.region import Contour, Region, same_support
 
 
@@ -53,12 +54,12 @@ def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
 def check_clear(contours: Sequence[Contour]) -> None:
     """Raises OutputError where an edge is drawn twice or contours touch or cross."""
     owned = [
-        (edge.bounds, edge, number, place)
+        (edge, number, place)
         for number, contour in enumerate(contours)
         for place, edge in enumerate(contour.edges)
     ]
-    owned.sort(key=lambda entry: entry[0][0])
-    for (_, a, owner_a, place_a), (_, b, owner_b, place_b) in _close_pairs(owned):
+    for i, j in close_pairs([edge.bounds for edge, *_ in owned], EPSILON):
+        (a, owner_a, place_a), (b, owner_b, place_b) = owned[i], owned[j]
         points = meeting_points(a, b)
         if not points:
             continue
@@ -70,21 +71,6 @@ def check_clear(contours: Sequence[Contour]) -> None:
         neighbours = owner_a == owner_b and steps in (1, len(contours[owner_a].edges) - 1)
         if not neighbours:
             raise OutputError(f"contours touch or cross at x {x:.3f}, y {y:.3f}; part them.")
-
-
-_Owned = tuple[tuple[float, float, float, float], Edge, int, int]
-
-
-def _close_pairs(owned: Sequence[_Owned]) -> Iterator[tuple[_Owned, _Owned]]:
-    """Pairs of edges, sorted by least x, whose bounding boxes meet."""
-    active: list[_Owned] = []
-    for entry in owned:
-        left, low, _, high = entry[0]
-        active = [other for other in active if other[0][2] >= left - EPSILON]
-        for other in active:
-            if other[0][1] <= high + EPSILON and other[0][3] >= low - EPSILON:
-                yield other, entry
-        active.append(entry)
 
 
 def nested_region(inner: Sequence[Contour], outer: Sequence[Contour]) -> Region:

@@ -14,6 +14,7 @@ from itertools import pairwise
 from sbafab.errors import SbafabError
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
 from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.nearby import close_pairs
 from sbafab.geometry.region import Contour, Region, same_support
 from sbafab.geometry.shapes import circle
 
@@ -121,7 +122,7 @@ def split_edges(edges: Sequence[Edge], pool: PointPool) -> Iterator[list[Edge]]:
         pool.index(edge.start)
         pool.index(edge.end)
     cuts: list[list[Point]] = [[] for _ in edges]
-    for i, j in _close_pairs(edges):
+    for i, j in close_pairs([edge.bounds for edge in edges], EPSILON):
         points = meeting_points(edges[i], edges[j])
         cuts[i] += points
         cuts[j] += points
@@ -131,20 +132,6 @@ def split_edges(edges: Sequence[Edge], pool: PointPool) -> Iterator[list[Edge]]:
         inner = sorted((pool.points[stop] for stop in stops), key=edge.parameter)
         corners = [start, *inner, end]
         yield [edge.part(a, b) for a, b in pairwise(corners) if a is not b]
-
-
-def _close_pairs(edges: Sequence[Edge]) -> Iterator[tuple[int, int]]:
-    """Pairs of edges whose bounding boxes meet, by a sweep along x."""
-    boxes = [edge.bounds for edge in edges]
-    order = sorted(range(len(edges)), key=lambda i: boxes[i][0])
-    active: list[int] = []
-    for i in order:
-        left, low, _, high = boxes[i]
-        active = [j for j in active if boxes[j][2] >= left - EPSILON]
-        for j in active:
-            if boxes[j][1] <= high + EPSILON and boxes[j][3] >= low - EPSILON:
-                yield j, i
-        active.append(i)
 
 
 def chain(pieces: Sequence[Edge]) -> Region:

@@ -13,6 +13,18 @@ def widened(box: Bounds, margin: float) -> Bounds:
     return box[0] - margin, box[1] - margin, box[2] + margin, box[3] + margin
 
 
+def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
+    """Numbers of the boxes that come within ``reach`` of each other, by a sweep along x."""
+    active: list[int] = []
+    for i in sorted(range(len(boxes)), key=lambda i: boxes[i][0]):
+        left, low, _, high = boxes[i]
+        active = [j for j in active if boxes[j][2] >= left - reach]
+        for j in active:
+            if boxes[j][1] <= high + reach and boxes[j][3] >= low - reach:
+                yield j, i
+        active.append(i)
+
+
 class EdgeIndex:
     """Edges filed by the cells of a square grid that their bounding boxes touch."""
 

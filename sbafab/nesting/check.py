@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from sbafab.errors import OutputError
-from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, distance_to
+from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to
 from sbafab.geometry.intersect import line_circle, meeting_points
-from sbafab.geometry.nearby import widened
+from sbafab.geometry.nearby import close_pairs, widened
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc
 from sbafab.nesting.records import Nest, Stock
@@ -62,7 +62,7 @@ def check_placed(regions: Sequence[tuple[str, Region]], stock: Stock, slack: flo
         for x, y, diameter in stock.pins
     ]
     entries = [*regions, *pins]
-    for i, j in _neighbours([region.bounds for _, region in entries], stock.spacing):
+    for i, j in close_pairs([region.bounds for _, region in entries], stock.spacing):
         if min(i, j) >= len(regions):
             continue
         gap = least_distance(entries[i][1], entries[j][1], stock.spacing)
@@ -132,16 +132,3 @@ def _check_border(name: str, region: Region, stock: Stock, slack: float) -> None
             f"{name} at x {x:.3f}, y {y:.3f} reaches {over:.4f} mm into the border of "
             f"{stock.border:g} mm; nest again."
         )
-
-
-def _neighbours(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
-    """Pairs whose boxes come within ``reach``, by a sweep along x."""
-    order = sorted(range(len(boxes)), key=lambda i: boxes[i][0])
-    active: list[int] = []
-    for i in order:
-        left, low, _, high = boxes[i]
-        active = [j for j in active if boxes[j][2] >= left - reach]
-        for j in active:
-            if boxes[j][1] <= high + reach and boxes[j][3] >= low - reach:
-                yield j, i
-        active.append(i)

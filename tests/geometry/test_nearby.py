@@ -8,7 +8,7 @@ import random
 import pytest
 
 from sbafab.geometry.edges import Arc, Bounds, Edge, Line, distance_to
-from sbafab.geometry.nearby import EdgeIndex
+from sbafab.geometry.nearby import EdgeIndex, close_pairs
 
 
 def scattered(seed: int) -> list[Edge]:
@@ -67,3 +67,19 @@ def test_an_empty_index_holds_nothing() -> None:
     index = EdgeIndex([])
     assert list(index.numbers((-1.0, -1.0, 1.0, 1.0))) == []
     assert index.distance((0.0, 0.0)) == math.inf
+
+
+def test_close_pairs_are_those_whose_boxes_come_within_reach() -> None:
+    draw = random.Random(11)
+    corners = [(draw.uniform(0, 50), draw.uniform(0, 50)) for _ in range(80)]
+    boxes = [(x, y, x + draw.uniform(0, 6), y + draw.uniform(0, 6)) for x, y in corners]
+    for reach in (0.0, 1.5):
+        expected = {
+            frozenset((i, j))
+            for i, a in enumerate(boxes)
+            for j, b in enumerate(boxes[:i])
+            if max(a[0] - b[2], b[0] - a[2]) <= reach and max(a[1] - b[3], b[1] - a[3]) <= reach
+        }
+        found = list(close_pairs(boxes, reach))
+        assert {frozenset(pair) for pair in found} == expected
+        assert len(found) == len(expected)
