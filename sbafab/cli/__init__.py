@@ -18,9 +18,10 @@ from sbafab.cli.nest import nest
 from sbafab.cli.new import new
 from sbafab.cli.press import press
 from sbafab.cli.schema import schema
+from sbafab.cli.simulate import simulate
 from sbafab.cli.templates import templates
 
-COMMANDS = (templates, new, generate, check, cut, press, mesh, nest, kerf, schema)
+COMMANDS = (templates, new, generate, check, cut, press, mesh, nest, kerf, simulate, schema)
 
 
 class InOrder(click.Group):

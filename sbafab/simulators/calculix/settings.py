@@ -1,0 +1,106 @@
+"""What a CalculiX run is asked to do, and the film it does it with.
+
+Units are mm, N, MPa, t and s; pressures are given in kPa.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from sbafab.errors import DesignError
+from sbafab.laminate.laminate import Laminate
+
+Procedure = Literal["dynamic", "static"]
+
+PAPER_PRESSURE = 6.0
+"""kPa up to which the paper's model of one balloon is inflated (Fig. 7c)."""
+MOST_PRESSURE = 1000.0
+
+
+class Elastic(NamedTuple):
+    """A film: Young's modulus in MPa, Poisson's ratio, density in t/mm3."""
+
+    modulus: float
+    poisson: float
+    density: float
+
+
+TPE = Elastic(10.0, 0.2, 1.122e-9)
+"""As in the paper's model. The density is the film's own where there is a laminate."""
+
+
+@dataclass(frozen=True)
+class DeckSettings:
+    """Load and procedure.
+
+    ``pressures`` in kPa by chamber, reached after ``ramp`` seconds and written out ``outputs``
+    times on the way. They rise with the square of time, because a flat film gives way at once and
+    then ever less. Films start ``imperfection`` mm off flat, or wrinkles would be a bifurcation
+    that no Newton iteration gets past; "static" leaves out the inertia that carries a film from
+    one pattern of wrinkles to the next, and mostly stops there.
+    """
+
+    pressures: Mapping[str, float]
+    procedure: Procedure = "dynamic"
+    ramp: float = 1.0
+    outputs: int = 24
+    imperfection: float = 0.010
+    film: Elastic = TPE
+
+    def times(self) -> list[float]:
+        """When results are written, in s, and the start."""
+        return [self.ramp * n / self.outputs for n in range(self.outputs + 1)]
+
+    def share(self, time: float) -> float:
+        """The part of the pressures that is on at a time; straight between outputs."""
+        at = min(max(time / self.ramp, 0.0), 1.0) * self.outputs
+        n = min(int(at), self.outputs - 1)
+        return (n**2 + (at - n) * (2 * n + 1)) / self.outputs**2
+
+    @property
+    def largest(self) -> float:
+        """The highest of the pressures in kPa."""
+        return max(self.pressures.values())
+
+
+def deck_settings(
+    laminate: Laminate,
+    all_chambers: float | None = None,
+    single: Mapping[str, float] | None = None,
+    procedure: Procedure = "dynamic",
+) -> DeckSettings:
+    """Settings for a laminate; pressures in kPa as in ``chamber_pressures``."""
+    names = [chamber.name for chamber in laminate.chambers]
+    kilograms = laminate.tpe_layers[0].film.density
+    film = TPE._replace(density=1e-12 * kilograms)
+    return DeckSettings(chamber_pressures(names, all_chambers, single or {}), procedure, film=film)
+
+
+def chamber_pressures(
+    names: Sequence[str], all_chambers: float | None, single: Mapping[str, float]
+) -> dict[str, float]:
+    """Pressure in kPa of every chamber: ``single`` ones by name, ``all_chambers`` in the others.
+
+    With nothing said it is the paper's 6 kPa in all of them; with single ones only, 0 in the
+    others. Raises DesignError for a chamber that is not there and a pressure out of range.
+    """
+    unknown = [name for name in single if name not in names]
+    if unknown:
+        raise DesignError(
+            f"pressure names chamber {unknown[0]}, which is not there; "
+            f"the chambers are {', '.join(names)}"
+        )
+    if all_chambers is None:
+        all_chambers = 0.0 if single else PAPER_PRESSURE
+    found = {name: single.get(name, all_chambers) for name in names}
+    for name, value in found.items():
+        if not (math.isfinite(value) and 0 <= value <= MOST_PRESSURE):
+            raise DesignError(
+                f"pressure of {name} = {value:g} kPa must be from 0 to {MOST_PRESSURE:g} kPa"
+            )
+    if not any(found.values()):
+        raise DesignError("pressure is 0 kPa in every chamber; give one of them more")
+    return found

@@ -1,0 +1,248 @@
+"""What is read back: files written here line by line, shapes whose volume is known."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+from sbafab.actuators import build, load_design
+from sbafab.errors import OutputError
+from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.conforming.model import Mesh
+from sbafab.meshing.conforming.settings import MeshSettings, Symmetry
+from sbafab.simulators.calculix.frd import Frame, read_frd, read_sta
+from sbafab.simulators.calculix.history import State, history, history_csv
+from sbafab.simulators.calculix.job import converged_frames, deck_mesh
+from sbafab.simulators.calculix.picture import deformed_png
+from sbafab.simulators.calculix.plot import history_svg
+from sbafab.simulators.calculix.run import Ending
+from sbafab.simulators.calculix.settings import DeckSettings
+from sbafab.simulators.calculix.vtu import write_deformed
+
+pytest.importorskip("netgen")
+
+
+def block(time: float, name: str, rows: list[list[float]]) -> str:
+    """One field as ccx 2.20 prints it."""
+    lines = [
+        f"    1PSTEP{1:26d}{1:12d}{1:12d}          ",
+        f"  100CL  101{time:12.5E}{len(rows):12d}                     0{1:5d}           1",
+        f" -4  {name:8s}{len(rows[0]):5d}    1",
+        *(f" -5  {name[0]}{n}          1    2    1    0" for n in range(len(rows[0]))),
+    ]
+    for node, values in enumerate(rows, start=1):
+        lines.append(f" -1{node:10d}" + "".join(f"{value:12.5E}" for value in values))
+    return "\n".join([*lines, " -3", ""])
+
+
+def frd(*times: float) -> str:
+    """A result file of two nodes; displacements are the time, stresses ten times it."""
+    found = "    1C\n    2C                             2                                     1\n"
+    for time in times:
+        found += block(time, "DISP", [[time, -time, 0.0], [0.0, 0.0, 2 * time]])
+        found += block(time, "STRESS", [[10 * time, 0, 0, 0, 0, 0], [0, 0, 0, 10 * time, 0, 0]])
+    return found + " 9999\n"
+
+
+def test_frd(tmp_path: Path) -> None:
+    path = tmp_path / "actuator.frd"
+    path.write_text(frd(0.25, 0.5))
+    first, last = read_frd(path, 2)
+    assert (first.time, last.time) == (0.25, 0.5)
+    np.testing.assert_allclose(last.displacement, [[0.5, -0.5, 0], [0, 0, 1]])
+    # Pull along x, and shear: von Mises is the stress itself, and the root of three times it.
+    np.testing.assert_allclose(last.von_mises, [5, 5 * 3**0.5], rtol=1e-5)
+
+
+@pytest.mark.parametrize("cut", [1, 5, 40, 100, 200, 400])
+def test_frd_cut_short(tmp_path: Path, cut: int) -> None:
+    path = tmp_path / "actuator.frd"
+    path.write_text(frd(0.25, 0.5)[: -5 - cut])
+    with pytest.raises(OutputError, match=r"actuator\.frd is cut short: .*run ccx again"):
+        read_frd(path, 2)
+    # Of a run that was stopped, what is whole counts.
+    assert [frame.time for frame in read_frd(path, 2, whole=False)][:1] == [0.25]
+
+
+def test_frd_of_another_mesh(tmp_path: Path) -> None:
+    path = tmp_path / "actuator.frd"
+    path.write_text(frd(0.25))
+    with pytest.raises(OutputError, match="a mesh of 2 nodes, not of this one of 3"):
+        read_frd(path, 3)
+
+
+def test_frd_with_words_for_numbers(tmp_path: Path) -> None:
+    path = tmp_path / "actuator.frd"
+    path.write_text(frd(0.25).replace(" 2.50000E+00", "      wrong "))
+    with pytest.raises(OutputError, match=r"no number at time 0\.25 s"):
+        read_frd(path, 2)
+
+
+def test_frd_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="cannot be read"):
+        read_frd(tmp_path / "actuator.frd", 2)
+
+
+STA = """SUMMARY OF JOB INFORMATION
+  STEP      INC     ATT  ITRS     TOT TIME     STEP TIME      INC TIME
+     1          1     1     8  0.250000E+00  0.250000E+00  0.250000E+00
+     1          2     1U    4  0.250000E+00  0.250000E+00  0.250000E+00
+     1          2     2     7  0.312500E+00  0.312500E+00  0.625000E-01
+     1          3     1     7  0.3125"""
+
+
+def test_sta_counts_what_converged(tmp_path: Path) -> None:
+    path = tmp_path / "actuator.sta"
+    assert read_sta(path) == []
+    path.write_text(STA)
+    assert read_sta(path) == [0.25, 0.3125]
+
+
+def test_frames_after_the_last_converged_step_are_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "actuator.frd"
+    path.write_text(frd(0.25, 0.3125, 0.5))
+    mesh = Mesh("volume", "wedge15", np.zeros((2, 3)), np.zeros((0, 15), int), {}, {}, {}, {})
+    kept = converged_frames(path, mesh, Ending(0.3125, "it diverged"))
+    assert [frame.time for frame in kept] == [0.25, 0.3125]
+
+
+SETTINGS = DeckSettings({"chamber1": 6.0}, imperfection=0.0)
+
+
+def lone(symmetry: Symmetry) -> tuple[Laminate, Mesh]:
+    laminate = build(load_design("1dof-5mm", ("stack.balloons=1",)))
+    return laminate, deck_mesh(laminate, MeshSettings(h=0.6, symmetry=symmetry, gaps=True))
+
+
+def stretched(mesh: Mesh, by: float) -> Frame:
+    """Every length ``by`` times what it was."""
+    return Frame(SETTINGS.ramp, (by - 1) * mesh.points, np.zeros((len(mesh.points), 6)))
+
+
+def states_of(symmetry: Symmetry, by: float = 2.0) -> tuple[Laminate, Mesh, list[State]]:
+    laminate, mesh = lone(symmetry)
+    return (
+        laminate,
+        mesh,
+        history(mesh, laminate, symmetry, SETTINGS, [stretched(mesh, by)]),
+    )
+
+
+@pytest.mark.parametrize("symmetry", ["full", "quarter"])
+def test_air_is_what_the_pocket_holds(symmetry: Symmetry) -> None:
+    laminate, _, (start, end) = states_of(symmetry)
+    # Pocket area x mask thickness; the quarter stands for a balloon without inlet.
+    (interface,) = laminate.interfaces
+    area = interface.unbonded.area if symmetry == "full" else np.pi * 2.5**2
+    assert start.volumes["chamber1"] == pytest.approx(0.025 * area, rel=2e-3)
+    assert end.volumes["chamber1"] == pytest.approx(8 * start.volumes["chamber1"], rel=1e-9)
+
+
+def test_stroke_is_how_far_tip_and_base_part() -> None:
+    _, mesh, (start, end) = states_of("quarter")
+    height = np.ptp(mesh.points[:, 2])
+    assert start.tip == (0, 0, 0)
+    assert end.stroke == pytest.approx(height, rel=1e-9)
+    assert end.pressures == {"chamber1": 6.0}
+    assert end.tilt is None
+
+
+def test_tilt_is_the_angle_of_the_tip() -> None:
+    laminate = build(load_design("3dof-15mm", ("stack.balloons=1",)))
+    mesh = deck_mesh(laminate, MeshSettings(h=0.75))
+    angle = np.radians(30)
+    turn = np.array(
+        [[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]]
+    )
+    moved = mesh.points @ turn.T - mesh.points
+    frame = Frame(1.0, moved, np.zeros((len(moved), 6)))
+    pressures = {f"chamber{n}": 1.0 for n in (1, 2, 3)}
+    start, end = history(mesh, laminate, "full", DeckSettings(pressures), [frame])
+    assert start.tilt == pytest.approx(0, abs=1e-6)
+    assert end.tilt == pytest.approx(30, abs=1e-6)
+    assert end.volumes["chamber2"] == pytest.approx(start.volumes["chamber2"], rel=1e-9)
+
+
+def test_pressure_rises_with_the_square_of_time() -> None:
+    shares = [SETTINGS.share(time) for time in (0.0, 0.25, 0.5, 1.0, 1.5)]
+    assert shares == pytest.approx([0, 1 / 16, 1 / 4, 1, 1])
+
+
+def test_csv() -> None:
+    _, _, states = states_of("quarter")
+    first, last = csv.DictReader(io.StringIO(history_csv(states)))
+    assert list(last) == [
+        "time_s",
+        "pressure_chamber1_kPa",
+        "stroke_mm",
+        "tip_x_mm",
+        "tip_y_mm",
+        "volume_chamber1_ul",
+        "von_mises_max_MPa",
+        "work_uJ",
+    ]
+    assert float(last["pressure_chamber1_kPa"]) == 6
+    # 3 kPa in the mean; seven times the volume has come in.
+    came = 7 * states[0].volumes["chamber1"]
+    assert float(last["work_uJ"]) == pytest.approx(3 * came, rel=1e-5)
+    assert float(last["stroke_mm"]) == pytest.approx(states[1].stroke, rel=1e-5)
+    assert set(first.values()) >= {"0"}
+
+
+def test_plot_draws_every_state_and_names_its_axes() -> None:
+    _, _, (start, end) = states_of("quarter")
+    pressures = {"left": 6.0, "right & up": 3.0}
+    volumes = {"left": 19.0, "right & up": 9.0}
+    states = [
+        replace(start, pressures=dict.fromkeys(pressures, 0.0), volumes=volumes),
+        replace(end, pressures=pressures, volumes=volumes),
+    ]
+    root = ET.fromstring(history_svg("a < b", states))
+    texts = ["".join(text.itertext()) for text in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert texts[0] == "a < b"
+    assert {"stroke of the tip, mm", "volume of air, ul", "left", "right & up"} <= set(texts)
+    assert texts.count("pressure in left, kPa") == 3
+    curves = list(root.iter("{http://www.w3.org/2000/svg}polyline"))
+    assert len(curves) == 4
+    # The last point of the first panel lies at 6 of its axis, which ends at the last tick.
+    assert all(len(curve.attrib["points"].split()) == 2 for curve in curves)
+    dashes = [curve.get("stroke-dasharray") for curve in curves[1:3]]
+    assert dashes[0] != dashes[1]
+
+
+def test_deformed_vtu_holds_moved_points_and_stress(tmp_path: Path) -> None:
+    _, mesh = lone("quarter")
+    frame = stretched(mesh, 2.0)
+    frame.stress[:, 3] = 1.0
+    write_deformed(mesh, frame, tmp_path / "deformed.vtu")
+    piece = ET.parse(tmp_path / "deformed.vtu").getroot().find("UnstructuredGrid/Piece")
+    assert piece is not None
+    arrays = {a.attrib["Name"]: np.array((a.text or "").split()) for a in piece.iter("DataArray")}
+    points = arrays["points"].astype(float).reshape(-1, 3)
+    np.testing.assert_allclose(points, 2 * mesh.points, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(arrays["von_mises"].astype(float), 3**0.5, rtol=1e-6)
+    assert set(arrays["types"]) == {"26"}
+    cells = arrays["connectivity"].astype(int).reshape(-1, 15)
+    np.testing.assert_array_equal(cells, mesh.cells)
+
+
+def test_picture_shows_the_stress_by_colour() -> None:
+    from PIL import Image
+
+    _, mesh = lone("quarter")
+    frame = stretched(mesh, 1.0)
+    right = mesh.points[:, 0] > mesh.points[:, 0].mean()
+    frame.stress[right, 0] = 2.0
+    data = deformed_png(mesh, frame, "caption")
+    assert data == deformed_png(mesh, frame, "caption")
+    picture = np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
+    red, green, blue = picture[:700].transpose(2, 0, 1)
+    # Dark blue where there is none, yellow where it is highest (shaded a little).
+    assert ((red < 80) & (green < 20) & (blue > 60)).any()
+    assert ((red > 180) & (green > 170) & (blue < 50)).any()

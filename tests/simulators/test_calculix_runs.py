@@ -1,0 +1,231 @@
+"""Runs of the real ccx, where it is installed, and of programs that stand in for it."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from sbafab.actuators import build, load_design
+from sbafab.cli import app
+from sbafab.errors import OutputError
+from sbafab.meshing.conforming.settings import MeshSettings
+from sbafab.simulators.calculix.axisymmetric import Section, axisymmetric_strokes
+from sbafab.simulators.calculix.job import Simulated, simulate
+from sbafab.simulators.calculix.run import run_ccx
+from sbafab.simulators.calculix.settings import DeckSettings
+
+pytest.importorskip("netgen")
+needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="ccx is not installed")
+
+# CAX8R, 133 nodes, of the paper's balloon: pocket 5, ring 0.75, films 0.038, E 10 MPa, nu 0.2.
+ORACLE = {0.95: 0.867, 6.0: 1.559}
+
+
+def inflated(folder: Path, settings: DeckSettings, h: float, minutes: float = 5) -> Simulated:
+    """A quarter of the paper's balloon."""
+    laminate = build(load_design("1dof-5mm", ("stack.balloons=1",)))
+    mesh = MeshSettings(h=h, symmetry="quarter")
+    return simulate(laminate, mesh, settings, folder, 60 * minutes, lambda what, done, total: None)
+
+
+@needs_ccx
+def test_the_axisymmetric_balloon() -> None:
+    strokes = axisymmetric_strokes(list(ORACLE))
+    assert strokes == pytest.approx(list(ORACLE.values()), rel=0.01)
+
+
+@needs_ccx
+def test_the_section_of_an_inner_balloon_bends_as_a_plate() -> None:
+    kilopascals, thickness, neck, pocket, bore = 1e-3, 0.038, 1.25, 2.5, 0.5
+    stiffness = 10 * thickness**3 / (12 * (1 - 0.2**2))
+    # Kirchhoff's plate between neck and pocket's edge, clamped there and guided here:
+    # D d/dr (1/r d/dr (r slope)) = shear, shear = p (r^2 - bore^2) / 2r.
+    r = np.linspace(neck, pocket, 2001)
+    shear = kilopascals / 1000 * (r**2 - bore**2) / (2 * r)
+    particular = summed(r * summed(shear / stiffness, r), r) / r
+    # Homogeneous: C r and C / r, chosen so that both edges keep level.
+    c, d = np.linalg.solve([[neck, 1 / neck], [pocket, 1 / pocket]], -particular[[0, -1]])
+    slope = particular + c * r + d / r
+    (stroke,) = axisymmetric_strokes([kilopascals], Section(neck=2 * neck, bore=2 * bore))
+    # Edges that are held in one face only give a little, a plate's do not.
+    assert stroke == pytest.approx(-2 * summed(slope, r)[-1], rel=0.15)
+
+
+def summed(values: np.ndarray, over: np.ndarray) -> np.ndarray:
+    """The integral from the start up to each place (trapezoids)."""
+    steps = (values[1:] + values[:-1]) / 2 * np.diff(over)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+@needs_ccx
+@pytest.mark.parametrize("procedure", ["static", "dynamic"])
+def test_the_balloon_in_3d_before_it_wrinkles(tmp_path: Path, procedure: str) -> None:
+    settings = DeckSettings({"chamber1": 0.95}, procedure, outputs=8)  # type: ignore[arg-type]
+    found = inflated(tmp_path, settings, 0.5)
+    assert found.stopped is None
+    last = found.states[-1]
+    assert last.pressures == pytest.approx({"chamber1": 0.95})
+    assert last.stroke == pytest.approx(ORACLE[0.95], rel=0.04)
+    # A parabola pair of this height (paper Eqs. 1 to 3) over the drawn-in radius holds 8 ul.
+    assert last.volumes["chamber1"] == pytest.approx(8.2, rel=0.1)
+    # What the air has done, the films of four quarters store, as ccx says, but for what is damped.
+    stored = re.findall(r"internal energy.*\n\n +(\S+)", (tmp_path / "actuator.dat").read_text())
+    assert last.work == pytest.approx(4 * 1000 * float(stored[-1]), rel=0.05)
+
+
+@needs_ccx
+def test_a_run_that_diverges() -> None:
+    # A film as soft as this thins faster than its curvature grows: it bursts.
+    with pytest.raises(OutputError, match="kPa: its iterations no longer converge"):
+        axisymmetric_strokes([6.0, 3000.0])
+
+
+@needs_ccx
+def test_simulate_command(tmp_path: Path) -> None:
+    arguments = ["simulate", "1dof-5mm", "--set", "stack.balloons=1", "--with", "calculix"]
+    arguments += ["--symmetry", "quarter", "--h", "0.75", "--pressure", "5 mbar"]
+    arguments += ["--procedure", "static", "--json", "-o", str(tmp_path)]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    assert told["stopped"] is None
+    assert told["states"][-1]["pressures"] == {"chamber1": 0.5}
+    folder = tmp_path / "1dof-5mm"
+    made = {path.name for path in (folder / "calculix").iterdir()}
+    assert made == {
+        *(f"actuator.{suffix}" for suffix in ("inp", "frd", "sta", "dat")),
+        *(f"history.{suffix}" for suffix in ("csv", "svg")),
+        *(f"deformed.{suffix}" for suffix in ("vtu", "png")),
+        "mesh.inp",
+    }
+    listed = json.loads((folder / "manifest.json").read_text())["files"]
+    assert {f"calculix/{name}" for name in made} <= set(listed)
+
+
+def test_no_ccx(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(OutputError, match=r"ccx is not here; .* calculix-ccx"):
+        inflated(tmp_path / "run", DeckSettings({"chamber1": 1.0}), 0.75)
+    assert not (tmp_path / "run").exists()
+
+
+def stand_in(folder: Path, monkeypatch: pytest.MonkeyPatch, script: str) -> None:
+    """A ``ccx`` that does what the script says."""
+    program = folder / "bin" / "ccx"
+    program.parent.mkdir()
+    program.write_text(f"#!{sys.executable}\n{script}")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(program.parent))
+
+
+GIVES_UP = """
+import re
+nodes = re.search(r"NSET=all_nodes.(.*?).[*]ELEMENT", open("mesh.inp").read(), re.S)[1]
+count = len(nodes.splitlines())
+def block(time, name, size):
+    value = f"{time:12.5E}" * size
+    rows = "".join(f" -1{node:10d}{value}\\n" for node in range(1, count + 1))
+    parts = "".join(f" -5  {n}\\n" for n in range(size))
+    head = f"  100CL  101{time:12.5E}{count:12d}   0    1   1\\n -4  {name}  {size}\\n"
+    return head + parts + rows + " -3\\n"
+times = 0.25, 0.5, 0.6
+with open("actuator.frd", "w") as frd:
+    frd.write("    1C\\n    1UDATE   21.november.2026\\n")
+    frd.writelines(block(time, "DISP", 3) + block(time, "STRESS", 6) for time in times)
+with open("actuator.sta", "w") as sta:
+    sta.write("head\\nhead\\n 1 1 1 8 0.25 0.25 0.25\\n 1 2 1 8 0.5 0.5 0.25\\n")
+    sta.write(" 1 3 1 2 0.55 0.55 0.05\\n 1 4 1U 8 0.6 0.6 0.05\\n")
+print("*ERROR: increment size smaller than minimum")
+raise SystemExit(201)
+"""
+
+
+def test_a_run_that_gives_up_keeps_what_it_has(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stand_in(tmp_path, monkeypatch, GIVES_UP)
+    settings = DeckSettings({"chamber1": 8.0}, "static", outputs=4)
+    found = inflated(tmp_path / "run", settings, 0.75)
+    # A quarter of the pressure is on at half of the time; what came after 0.55 s did not converge.
+    assert [state.pressures["chamber1"] for state in found.states] == pytest.approx([0, 0.5, 2])
+    assert found.states[-1].stroke == 0
+    assert found.stopped == (
+        "ccx stopped at 0.55 s, 2.5 of 8 kPa: its iterations no longer converge, however small "
+        "the step; results up to 2 kPa are kept; take --procedure dynamic, which gets past wrinkles"
+    )
+    assert len((tmp_path / "run" / "history.csv").read_text().splitlines()) == 1 + 3
+    assert b"november" not in (tmp_path / "run" / "actuator.frd").read_bytes()
+
+
+def test_a_run_that_reaches_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    script = """
+print("*ERROR in nothing: no memory left.")
+raise SystemExit(201)
+"""
+    stand_in(tmp_path, monkeypatch, script)
+    with pytest.raises(OutputError, match="at 0 s, 0 of 8 kPa, before the first result: it repor"):
+        inflated(tmp_path / "run", DeckSettings({"chamber1": 8.0}), 0.75)
+
+
+HALF_WAY = """
+open("job.sta", "w").write("head\\nhead\\n 1 1 1 8 0.5 0.5 0.5\\n")
+"""
+
+
+def test_a_run_that_takes_too_long_is_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stand_in(tmp_path, monkeypatch, f"{HALF_WAY}\nimport time\ntime.sleep(600)")
+    told: list[int] = []
+    ending = run_ccx(tmp_path, "job", 1.0, 1.5, lambda what, done, total: told.append(done))
+    assert ending == (0.5, "it was stopped after 0.025 minutes")
+    assert told[-1] == 50
+
+
+@pytest.mark.parametrize(
+    ("says", "code", "reason"),
+    [
+        ("*ERROR: increment size smaller than minimum", 201, "no longer converge"),
+        ("*ERROR in calinput: no material was found.", 201, "it reports: no material was found"),
+        ("", 11, "it ended with code 11"),
+        ("Job finished", 0, "it ended with code 0"),
+    ],
+)
+def test_what_ended_a_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, says: str, code: int, reason: str
+) -> None:
+    stand_in(tmp_path, monkeypatch, f"{HALF_WAY}\nprint({says!r})\nraise SystemExit({code})")
+    ending = run_ccx(tmp_path, "job", 1.0, 30.0)
+    assert ending.time == 0.5
+    assert reason in str(ending.stopped)
+
+
+def test_a_step_tried_again_is_no_failure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    script = f"{HALF_WAY}\nprint('divergence; the increment is cut back')\nprint('Job finished')"
+    stand_in(tmp_path, monkeypatch, script)
+    assert run_ccx(tmp_path, "job", 0.5, 30.0) == (0.5, None)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--pressure", "6 inches"], "must be a pressure"),
+        (["--pressure", "nan"], "must be a pressure"),
+        (["--chamber", "chamber1"], "must be NAME=PRESSURE"),
+        (["--chamber", "left=3"], "names chamber left, which is not there"),
+        (["--with", "ansys"], "calculix"),
+    ],
+)
+def test_bad_arguments(tmp_path: Path, options: list[str], words: str) -> None:
+    arguments = ["simulate", "1dof-5mm", "--with", "calculix", "-o", str(tmp_path), *options]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert list(tmp_path.iterdir()) == []
