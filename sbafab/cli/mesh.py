@@ -100,6 +100,8 @@ def mesh(
     """
     from sbafab.meshing.conforming.settings import MeshSettings
     from sbafab.output.contents import Conforming
+    from sbafab.output.run import Extras
 
     settings = MeshSettings(size, element, symmetry, fill, gaps)
-    run_parts(request, ("mesh",), conforming=Conforming(settings, formats or FORMATS))
+    conforming = Conforming(settings, formats or FORMATS)
+    run_parts(request, ("mesh",), extras=Extras(conforming))

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from sbafab.output.shop import Progress
     from sbafab.rules.finding import Finding
 
+DECKS = ("calculix/actuator.inp", "sofa/actuator.scn")
+"""What a simulator opens."""
 COLOURS = {"pass": "green", "fail": "bold red", "waived": "yellow", "warn": "yellow"}
 
 
@@ -194,6 +196,9 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
     if index["meshes"]:
         names = ", ".join(mesh["file"] for mesh in index["meshes"])
         yield "meshes", names
+    decks = [path for path in DECKS if path in index["files"]]
+    if decks:
+        yield "simulators", ", ".join(decks)
     for name, figures in run.conforming.statistics.items() if run.conforming else ():
         yield (
             f"{name} mesh",

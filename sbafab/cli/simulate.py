@@ -1,14 +1,12 @@
-"""``sbafab simulate``: the exported deck run in a real simulator, its results beside it."""
+"""``sbafab simulate``: a real simulator run on the design, its results beside it."""
 
 from __future__ import annotations
 
 import math
 import re
-import shutil
 import tempfile
-from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -16,93 +14,66 @@ from sbafab.cli.options import Request, run_options
 from sbafab.cli.working import RULE_FAILED
 
 if TYPE_CHECKING:
-    from sbafab.laminate.laminate import Laminate
-    from sbafab.output.run import Run
-    from sbafab.output.shop import Progress
+    from sbafab.simulators.simulator import Name, Result, Wish
 
+SIMULATORS = ("calculix", "sofa")
+"""As in ``sbafab.simulators.simulator``, whose imports would slow ``--help`` down."""
 KILOPASCALS = {"Pa": 0.001, "kPa": 1.0, "MPa": 1000.0, "mbar": 0.1, "bar": 100.0, "psi": 6.894757}
+MICROLITRES = {"ul": 1.0, "ml": 1000.0, "mm3": 1.0}
 MOST_MINUTES = 10_000
 
 
-def _kilopascals(value: str) -> float:
-    """A pressure from a number (kPa) or a text with a unit."""
-    written = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*([A-Za-z]*)\s*", value)
+def _measure(value: str, units: dict[str, float], usual: str, what: str) -> float:
+    """A quantity from a number in the usual unit, or a text with a unit."""
+    written = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*([A-Za-z]\w*)?\s*", value)
     try:
         if written is not None and math.isfinite(number := float(written[1])):
-            return number * KILOPASCALS[written[2] or "kPa"]
+            return number * units[written[2] or usual]
     except (KeyError, ValueError):
         pass
-    raise click.BadParameter(f'{value!r} must be a pressure such as 6, "6 kPa" or "60 mbar"')
+    raise click.BadParameter(f"{value!r} must be a {what}; the units are {', '.join(units)}")
+
+
+def _kilopascals(value: str) -> float:
+    return _measure(value, KILOPASCALS, "kPa", 'pressure such as 6, "6 kPa" or "60 mbar"')
 
 
 def _pressure(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
     return None if value is None else _kilopascals(value)
 
 
+def _named(value: str, example: str) -> tuple[str, str]:
+    name, equals, text = value.partition("=")
+    if not equals or not name.strip():
+        raise click.BadParameter(f"{value!r} must be {example}")
+    return name.strip(), text
+
+
 def _chambers(
     ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
 ) -> dict[str, float]:
-    found = {}
-    for value in values:
-        chamber, equals, pressure = value.partition("=")
-        if not equals:
-            raise click.BadParameter(f"{value!r} must be NAME=PRESSURE, such as chamber1=6")
-        found[chamber.strip()] = _kilopascals(pressure)
-    return found
+    pairs = [_named(value, "NAME=PRESSURE, such as chamber1=6") for value in values]
+    return {name: _kilopascals(text) for name, text in pairs}
 
 
-class Wish(NamedTuple):
-    """What a simulator is asked for: pressures in kPa, h in mm, time in minutes."""
-
-    pressure: float | None
-    chambers: Mapping[str, float]
-    h: float
-    symmetry: str
-    procedure: str
-    minutes: float
-
-
-class Result(NamedTuple):
-    """What a simulator found: lines to print, the same for programs, why it stopped early."""
-
-    lines: tuple[str, ...]
-    figures: dict[str, Any]
-    stopped: str | None
-
-
-def _calculix(laminate: Laminate, wish: Wish, folder: Path, tell: Progress) -> Result:
-    from sbafab.meshing.conforming.settings import MeshSettings, Symmetry
-    from sbafab.simulators.calculix.job import simulate as inflate
-    from sbafab.simulators.calculix.settings import Procedure, deck_settings
-
-    procedure = cast("Procedure", wish.procedure)
-    settings = deck_settings(laminate, wish.pressure, wish.chambers, procedure)
-    mesh = MeshSettings(h=wish.h, symmetry=cast("Symmetry", wish.symmetry))
-    found = inflate(laminate, mesh, settings, folder, 60 * wish.minutes, tell)
-    last = found.states[-1]
-    lines = [f"{name:14} {value:8.3f} kPa" for name, value in last.pressures.items()]
-    lines += [f"{'stroke':14} {last.stroke:8.3f} mm"]
-    lines += [f"{'tilt':14} {last.tilt:8.2f} deg"] if last.tilt is not None else []
-    lines += [f"{f'air {name}':14} {value:8.2f} ul" for name, value in last.volumes.items()]
-    lines += [f"{'von Mises':14} {last.stress:8.3f} MPa at most"]
-    states = [state.as_dict() for state in found.states]
-    return Result(tuple(lines), {"states": states}, found.stopped)
-
-
-SIMULATORS: dict[str, Callable[[Laminate, Wish, Path, Progress], Result]] = {"calculix": _calculix}
-"""Each writes into the folder it is given, which becomes ``OUT/<name>/<simulator>/``."""
+def _volumes(
+    ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
+) -> dict[str, float] | None:
+    pairs = [_named(value, "NAME=VOLUME, such as chamber1=80") for value in values]
+    what = 'volume such as 80 or "0.08 ml"'
+    return {name: _measure(text, MICROLITRES, "ul", what) for name, text in pairs} or None
 
 
 @click.command()
 @run_options
 @click.option(
-    "--with", "simulator", type=click.Choice(list(SIMULATORS)), required=True, help="The simulator."
+    "--with", "simulator", type=click.Choice(SIMULATORS), required=True, help="The simulator."
 )
 @click.option(
     "--pressure",
     callback=_pressure,
     metavar="P",
-    help='Pressure in every chamber, kPa or with a unit ("60 mbar") [default: 6 kPa].',
+    help='In every chamber, kPa or with a unit ("60 mbar").  [default: calculix 6, sofa 5 kPa]',
 )
 @click.option(
     "--chamber",
@@ -112,21 +83,6 @@ SIMULATORS: dict[str, Callable[[Laminate, Wish, Path, Progress], Result]] = {"ca
     metavar="NAME=P",
     help="Pressure in one chamber; without --pressure the others have none. Repeatable.",
 )
-@click.option("--h", type=float, default=0.35, show_default=True, metavar="MM", help="Mesh size.")
-@click.option(
-    "--symmetry",
-    type=click.Choice(["full", "half", "quarter", "sector"]),
-    default="full",
-    show_default=True,
-    help="The part that is computed; the whole is what can wrinkle and bend as it likes.",
-)
-@click.option(
-    "--procedure",
-    type=click.Choice(["dynamic", "static"]),
-    default="dynamic",
-    show_default=True,
-    help="Static is faster, but ends where films wrinkle.",
-)
 @click.option(
     "--minutes",
     type=click.FloatRange(0, MOST_MINUTES, min_open=True),
@@ -134,20 +90,51 @@ SIMULATORS: dict[str, Callable[[Laminate, Wish, Path, Progress], Result]] = {"ca
     show_default=True,
     help="Stop then, and keep what has been reached.",
 )
-def simulate(request: Request, simulator: str, **asked: Any) -> None:
+@click.option("--export", is_flag=True, help="Write what the simulator reads, and run nothing.")
+@click.option("--h", type=float, metavar="MM", help="calculix: mesh size.  [default: 0.35]")
+@click.option(
+    "--symmetry",
+    type=click.Choice(["full", "half", "quarter", "sector"]),
+    help="calculix: the part that is computed; only all of it wrinkles and bends as it likes."
+    "  [default: full]",
+)
+@click.option(
+    "--procedure",
+    type=click.Choice(["dynamic", "static"]),
+    help="calculix: static is faster, but ends where films wrinkle.  [default: dynamic]",
+)
+@click.option(
+    "--scene",
+    type=click.Choice(["shell", "frames", "volume", "beam"]),
+    help="sofa: which of the scenes is run.  [default: shell]",
+)
+@click.option("--seconds", type=float, metavar="S", help="sofa: simulated time.  [default: 8]")
+@click.option(
+    "--volume",
+    "volumes",
+    callback=_volumes,
+    multiple=True,
+    metavar="NAME=UL",
+    help="sofa, scene volume: what a chamber is given above its start. Repeatable.",
+)
+def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> None:
     """Inflate a design in a simulator that is installed, and read back what it says.
 
-    calculix: stroke, air and wall stress against pressure as table and plot, deformed shape as VTU
-    and picture, in OUT/<name>/calculix/. Exit code 1 if the run stopped before the full pressure.
+    Into OUT/<name>/calculix/ come stroke, air and wall stress against pressure as table and plot,
+    the deformed shape as VTU and picture; into OUT/<name>/sofa/ the scenes and the tip's record.
+    Exit code 1 if a run stopped early: what it reached is kept.
     """
     from sbafab.actuators import load_design
     from sbafab.cli.printing import console, findings_table, print_json, shown_progress
     from sbafab.output.manifest import checks
-    from sbafab.output.run import check, generate
+    from sbafab.output.run import Extras, check, generate, with_folder
     from sbafab.rules.deck import has_failed
+    from sbafab.simulators.simulator import Result, Wish
+    from sbafab.simulators.simulator import simulator as find
 
-    design = load_design(request.designs[0], request.assignments, request.waivers)
     wish = Wish(**asked)
+    _refuse_unused(simulator, wish)
+    design = load_design(request.designs[0], request.assignments, request.waivers)
     with shown_progress(request.as_json) as tell, tempfile.TemporaryDirectory() as place:
         laminate, findings = check(design, tell)
         if has_failed(findings):
@@ -156,27 +143,38 @@ def simulate(request: Request, simulator: str, **asked: Any) -> None:
             else:
                 console().print(findings_table(findings))
             click.get_current_context().exit(RULE_FAILED)
-        found = SIMULATORS[simulator](laminate, wish, Path(place), tell)
-        run = generate(design, request.out, (), tell)
-        _put_in(run, Path(place), simulator)
+        # A folder in the temporary one has the usual rights, the temporary one itself has not.
+        folder = Path(place) / simulator
+        if export:
+            find(simulator).export(laminate, wish, folder)
+            found = Result((), {})
+        else:
+            found = find(simulator).run(laminate, wish, folder, tell)
+        run = generate(design, request.out, (), tell, extras=Extras(also=with_folder(folder)))
+    target = run.folder / simulator
     if request.as_json:
-        folder = str(run.folder / simulator)
-        print_json({"folder": folder, **found.figures, "stopped": found.stopped})
+        print_json({"folder": str(target), **found.figures, "stopped": found.stopped})
     else:
-        click.echo("\n".join([*found.lines, f"written to {run.folder / simulator}"]))
+        _print(found, target)
     if found.stopped is not None:
         click.echo(f"sbafab: {found.stopped}", err=True)
         click.get_current_context().exit(RULE_FAILED)
 
 
-def _put_in(run: Run, results: Path, name: str) -> None:
-    """Puts a folder of results into a run's, in place of an older one, and into its manifest."""
-    from sbafab.output.contents import close_folder
-    from sbafab.output.swap import replaced_folder
+def _refuse_unused(simulator: Name, wish: Wish) -> None:
+    from sbafab.simulators.simulator import simulator as find
+    from sbafab.simulators.simulator import users
 
-    with replaced_folder(run.folder) as fresh:
-        old = shutil.ignore_patterns("manifest.json")
-        shutil.copytree(run.folder, fresh, ignore=old, dirs_exist_ok=True)
-        shutil.rmtree(fresh / name, ignore_errors=True)
-        shutil.copytree(results, fresh / name)
-        close_folder(fresh, dict(run.manifest))
+    for name in wish.given:
+        if name not in find(simulator).USES:
+            option = "volume" if name == "volumes" else name
+            raise click.UsageError(
+                f"--{option} is for {' and '.join(users(name))}; leave it out with {simulator}"
+            )
+
+
+def _print(found: Result, target: Path) -> None:
+    width = max((len(label) for label, _, _ in found.rows), default=0)
+    for label, value, unit in found.rows:
+        click.echo(f"{label:{width}} {value:10.3f} {unit}")
+    click.echo(f"written to {target}")

@@ -11,7 +11,8 @@ from sbafab.cli.options import Request
 
 if TYPE_CHECKING:
     from sbafab.cutting.dxf_write import DxfProfile
-    from sbafab.output.contents import Conforming, Part
+    from sbafab.output.contents import Part
+    from sbafab.output.run import Extras
 
 RULE_FAILED = 1
 
@@ -21,16 +22,18 @@ def run_parts(
     parts: Sequence[Part],
     dxf_profile: DxfProfile = "bulges",
     chord_error: float = 0.005,
-    conforming: Conforming | None = None,
+    extras: Extras | None = None,
 ) -> None:
     """Generates the parts of a design and exits with 1 if a rule failed."""
     from sbafab.actuators import load_design
     from sbafab.cli.printing import print_json, print_run, run_json, shown_progress
-    from sbafab.output.run import generate
+    from sbafab.output.run import NONE, generate
 
     design = load_design(request.designs[0], request.assignments, request.waivers)
     with shown_progress(request.as_json) as progress:
-        run = generate(design, request.out, parts, progress, dxf_profile, chord_error, conforming)
+        run = generate(
+            design, request.out, parts, progress, dxf_profile, chord_error, extras or NONE
+        )
     if request.as_json:
         print_json(run_json(run))
     else:

@@ -21,6 +21,7 @@ from sbafab.output.swap import read_manifest
 from sbafab.pressing.schedule import Schedule, press_csv, press_json, schedule
 from sbafab.rules.deck import has_failed
 from sbafab.rules.finding import Finding
+from sbafab.simulators.simulator import NAMES as SIMULATORS
 
 if TYPE_CHECKING:
     from sbafab.meshing.conforming.meshes import ConformingMeshes
@@ -194,8 +195,10 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
     files = old.get("files")
     kept = file_hashes(old_folder)
     carried: set[str] = set()
+    # Results belong to the input beside them: such a folder is kept whole or not at all.
+    anew = {name for name in SIMULATORS if (folder / name).exists()}
     for path, digest in (files if isinstance(files, dict) else {}).items():
-        if path not in made and kept.get(path) == digest:
+        if path not in made and kept.get(path) == digest and path.partition("/")[0] not in anew:
             target = folder / path
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(old_folder / path, target)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import shutil
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sbafab.actuators import build
 from sbafab.cutting.dxf_write import DxfProfile
@@ -41,7 +42,23 @@ from sbafab.rules.finding import Finding
 if TYPE_CHECKING:
     from sbafab.meshing.conforming.meshes import ConformingMeshes
 
+Also = Callable[[Laminate, Path], None]
+"""Writes something of its own for a laminate into the folder of a run."""
 EVERYTHING: tuple[Part, ...] = ("cut", "press", "mesh", "preview")
+
+
+class Extras(NamedTuple):
+    """What a run may be asked for beside its parts.
+
+    ``conforming``: volume and shell meshes, which take the extra "mesh"; ``also`` writes what it
+    likes into the folder of a design that holds.
+    """
+
+    conforming: Conforming | None = None
+    also: Also | None = None
+
+
+NONE = Extras()
 
 
 @dataclass(frozen=True)
@@ -78,11 +95,9 @@ def generate(
     progress: Progress | None = None,
     dxf_profile: DxfProfile = "bulges",
     chord_error: float = 0.005,
-    conforming: Conforming | None = None,
+    extras: Extras = NONE,
 ) -> Run:
     """Writes ``out/<design name>/`` and returns what was made.
-
-    ``conforming`` asks for volume and shell meshes as well (they take the extra "mesh").
 
     A design that breaks a rule gets its findings and pictures, but no cut files, schedule or
     meshes. With some of the ``parts`` only, the others stay if they are of the same design.
@@ -99,16 +114,19 @@ def generate(
     settings = cut_settings(design, checked.waived, dxf_profile, chord_error)
     plan = plan_cuts(checked.laminate, design.order.copies, settings) if "cut" in wanted else None
     nests = find_nests(plan.parts, design, target, tell) if plan is not None else ()
-    meshes = _meshed(checked, conforming, tell) if "mesh" in wanted else None
+    meshes = _meshed(checked, extras.conforming, tell) if "mesh" in wanted else None
     with replaced_folder(target) as folder:
         cut: CutSet | None = None
         sheets: list[SheetFile] = []
         if plan is not None:
             cut = write_cut_set(checked.laminate, plan, folder, settings, tell)
             sheets = write_nested_sheets(nests, design, folder, settings, tell)
-        made = Made(cut, sheets, pressing, meshes, conforming.formats if conforming else ())
+        formats = extras.conforming.formats if extras.conforming else ()
+        made = Made(cut, sheets, pressing, meshes, formats)
         index = write_contents(checked, wanted, made, folder, tell)
         if not checked.failed:
+            if extras.also is not None:
+                extras.also(checked.laminate, folder)
             carry_over(target, folder, index)
         close_folder(folder, index)
     return Run(design, checked.laminate, checked.findings, target, index, pressing, meshes)
@@ -121,3 +139,12 @@ def _meshed(checked: Checked, asked: Conforming | None, tell: Progress) -> Confo
 
     tell("meshing", 0, 1)
     return conforming_meshes(checked.laminate, asked.settings)
+
+
+def with_folder(made: Path) -> Also:
+    """Puts a folder that was made elsewhere into that of a run, under its own name."""
+
+    def put(_: Laminate, folder: Path) -> None:
+        shutil.copytree(made, folder / made.name)
+
+    return put

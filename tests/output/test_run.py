@@ -16,7 +16,7 @@ from sbafab.design.writing import design_sha256
 from sbafab.meshing.conforming.settings import MeshSettings
 from sbafab.output import contents
 from sbafab.output.contents import Conforming
-from sbafab.output.run import generate
+from sbafab.output.run import Extras, generate
 
 TEMPLATES = ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"]
 
@@ -159,7 +159,7 @@ def test_a_drawn_outline_travels_with_the_output(tmp_path: Path) -> None:
 def test_conforming_meshes_stay_beside_those_of_a_later_run(tmp_path: Path) -> None:
     design = load_design("1dof-5mm", ["stack.balloons=1"])
     asked = Conforming(MeshSettings(h=0.7, symmetry="quarter"), ("vtu",))
-    made = generate(design, tmp_path, ("mesh",), conforming=asked)
+    made = generate(design, tmp_path, ("mesh",), extras=Extras(asked))
     figures = made.manifest["mesh_statistics"]
     assert figures["volume"]["least_scaled_jacobian"] > 0
     assert made.manifest["meshes"][-1]["kind"] == "shell"

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.errors import DesignError
 from sbafab.meshing.conforming.model import Mesh
 from sbafab.meshing.conforming.settings import MeshSettings, Symmetry
 from sbafab.simulators.calculix.deck import started, write_deck
 from sbafab.simulators.calculix.job import deck_mesh
-from sbafab.simulators.calculix.settings import DeckSettings, chamber_pressures, deck_settings
+from sbafab.simulators.calculix.settings import DeckSettings, deck_settings
 
 pytest.importorskip("netgen")
 
@@ -201,20 +200,20 @@ def test_imperfection_leaves_films_as_thick_and_bonded(lobed: Mesh) -> None:
     np.testing.assert_allclose(moved[:, 2], mean[column.ravel()], atol=1e-9)
 
 
+def test_abaqus_is_told_the_same_but_for_outputs(lone: Mesh, tmp_path: Path) -> None:
+    calculix, abaqus, _ = (path.read_text("ascii") for path in write_deck(lone, PLAIN, tmp_path))
+    same, _, outputs = abaqus.partition("*OUTPUT")
+    assert calculix.startswith(same)
+    assert "*DLOAD" in same
+    # Abaqus's result file knows no TIME POINTS; its output database does.
+    assert "FILE" not in outputs
+    assert outputs.endswith("*END STEP\n")
+
+
 def test_same_design_same_bytes(lone: Mesh, tmp_path: Path) -> None:
     first, second = (write_deck(lone, PLAIN, tmp_path / name) for name in ("a", "b"))
-    assert [path.name for path in first] == ["actuator.inp", "mesh.inp"]
+    assert [path.name for path in first] == ["actuator.inp", "abaqus.inp", "mesh.inp"]
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
-
-
-NAMES = ("chamber1", "chamber2")
-
-
-def test_chamber_pressures() -> None:
-    assert chamber_pressures(NAMES, None, {}) == {"chamber1": 6.0, "chamber2": 6.0}
-    assert chamber_pressures(NAMES, 2.0, {}) == {"chamber1": 2.0, "chamber2": 2.0}
-    assert chamber_pressures(NAMES, None, {"chamber2": 3.0}) == {"chamber1": 0.0, "chamber2": 3.0}
-    assert chamber_pressures(NAMES, 1.0, {"chamber2": 3.0}) == {"chamber1": 1.0, "chamber2": 3.0}
 
 
 def test_settings_of_a_design_take_its_density() -> None:
@@ -222,19 +221,3 @@ def test_settings_of_a_design_take_its_density() -> None:
     settings = deck_settings(laminate)
     assert settings.film == pytest.approx((10, 0.2, 1e-9))
     assert settings.pressures == {"chamber1": 6.0}
-
-
-@pytest.mark.parametrize(
-    ("everywhere", "single", "words"),
-    [
-        (None, {"left": 1.0}, "names chamber left, which is not there; the chambers are chamber1"),
-        (-1.0, {}, "pressure of chamber1 = -1 kPa must be from 0 to 1000 kPa"),
-        (None, {"chamber2": 2000.0}, "pressure of chamber2 = 2000 kPa"),
-        (0.0, {}, "0 kPa in every chamber"),
-    ],
-)
-def test_pressures_that_cannot_be(
-    everywhere: float | None, single: dict[str, float], words: str
-) -> None:
-    with pytest.raises(DesignError, match=words):
-        chamber_pressures(NAMES, everywhere, single)

@@ -104,6 +104,7 @@ def test_simulate_command(tmp_path: Path) -> None:
         *(f"history.{suffix}" for suffix in ("csv", "svg")),
         *(f"deformed.{suffix}" for suffix in ("vtu", "png")),
         "mesh.inp",
+        "abaqus.inp",
     }
     listed = json.loads((folder / "manifest.json").read_text())["files"]
     assert {f"calculix/{name}" for name in made} <= set(listed)
@@ -189,6 +190,18 @@ def test_a_run_that_takes_too_long_is_stopped(
     assert told[-1] == 50
 
 
+def test_an_interrupted_run_keeps_what_it_has(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stand_in(tmp_path, monkeypatch, f"{HALF_WAY}\nimport time\ntime.sleep(600)")
+
+    def interrupt(what: str, done: int, total: int) -> None:
+        if done:
+            raise KeyboardInterrupt
+
+    assert run_ccx(tmp_path, "job", 1.0, 60, interrupt) == (0.5, "it was interrupted")
+
+
 @pytest.mark.parametrize(
     ("says", "code", "reason"),
     [
@@ -211,21 +224,3 @@ def test_a_step_tried_again_is_no_failure(tmp_path: Path, monkeypatch: pytest.Mo
     script = f"{HALF_WAY}\nprint('divergence; the increment is cut back')\nprint('Job finished')"
     stand_in(tmp_path, monkeypatch, script)
     assert run_ccx(tmp_path, "job", 0.5, 30.0) == (0.5, None)
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--pressure", "6 inches"], "must be a pressure"),
-        (["--pressure", "nan"], "must be a pressure"),
-        (["--chamber", "chamber1"], "must be NAME=PRESSURE"),
-        (["--chamber", "left=3"], "names chamber left, which is not there"),
-        (["--with", "ansys"], "calculix"),
-    ],
-)
-def test_bad_arguments(tmp_path: Path, options: list[str], words: str) -> None:
-    arguments = ["simulate", "1dof-5mm", "--with", "calculix", "-o", str(tmp_path), *options]
-    result = CliRunner().invoke(app, arguments)
-    assert result.exit_code == 2
-    assert words in result.stderr
-    assert list(tmp_path.iterdir()) == []

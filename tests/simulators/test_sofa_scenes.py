@@ -16,10 +16,11 @@ import trimesh
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.simulators.sofa.actuator import actuator
+from sbafab.simulators.coarse.actuator import actuator
 from sbafab.simulators.sofa.files import write_scenes
 from sbafab.simulators.sofa.frames import beam_of, prism
 from sbafab.simulators.sofa.markup import document, root_node
+from sbafab.simulators.sofa.parts import scaled_mass
 
 FACTS = json.loads(Path(__file__).with_name("sofa_components.json").read_text(encoding="utf-8"))
 SCENES = ("actuator.scn", "actuator_frames.scn", "actuator_volume.scn", "actuator_beam.scn")
@@ -166,7 +167,7 @@ def test_the_shell_has_the_numbers_that_ran(folder: Path) -> None:
 @pytest.mark.parametrize("design", ["3dof-15mm", "1dof-10mm"])
 def test_nodal_mass_follows_the_rule_that_held(design: str) -> None:
     made = actuator(sbafab.build(design))
-    nodal = made.scaled_mass(0.02) / len(made.mesh.rest)
+    nodal = scaled_mass(made, 0.02) / len(made.mesh.rest)
     assert nodal / 0.02**2 == pytest.approx(7, rel=0.05)
 
 

@@ -1,4 +1,7 @@
-"""The input of CalculiX (and Abaqus) for an actuator: ``actuator.inp``, and its mesh beside it."""
+"""The input of CalculiX for an actuator, ``actuator.inp``, its mesh, and the same for Abaqus.
+
+Both read the same keywords but for what is to be written out.
+"""
 
 from __future__ import annotations
 
@@ -16,25 +19,39 @@ from sbafab.simulators.calculix.supports import supports
 
 JOB = "actuator"
 MESH_FILE = "mesh.inp"
+ABAQUS_FILE = "abaqus.inp"
 FIRST, LEAST = 0.1, 1e-7
 """First and least increment, as parts of the time between outputs and of the ramp."""
 DAMPING = -0.3
 """Of high frequencies, by Hilber, Hughes and Taylor: the most there is."""
 MOST_INCREMENTS = 100_000
+ABAQUS_OUTPUTS = """\
+*OUTPUT, FIELD, TIME POINTS=outputs
+*NODE OUTPUT
+U, RF
+*ELEMENT OUTPUT
+S
+*OUTPUT, HISTORY, TIME POINTS=outputs
+*ENERGY OUTPUT
+ALLSE, ALLKE
+"""
 
 
 def write_deck(mesh: Mesh, settings: DeckSettings, folder: Path) -> list[Path]:
-    """Write ``actuator.inp`` and the ``mesh.inp`` it includes into ``folder``.
+    """Write ``actuator.inp``, ``abaqus.inp`` and the ``mesh.inp`` they include into ``folder``.
 
-    ``mesh`` is a flat volume mesh. The files are returned; run them with ``ccx -i actuator``.
+    ``mesh`` is a flat volume mesh. The files are returned; run them with ``ccx -i actuator`` or
+    ``abaqus job=abaqus``. The latter was written from Abaqus's manual and never run.
     """
     folder.mkdir(parents=True, exist_ok=True)
     run_mesh = started(mesh, settings)
     write_inp(run_mesh, folder / MESH_FILE)
-    deck = folder / f"{JOB}.inp"
-    with deck.open("w", encoding="ascii", newline="\n") as file:
-        file.writelines(_lines(run_mesh, settings))
-    return [deck, folder / MESH_FILE]
+    decks = {f"{JOB}.inp": _ccx_outputs(settings), ABAQUS_FILE: ABAQUS_OUTPUTS}
+    for name, outputs in decks.items():
+        with (folder / name).open("w", encoding="ascii", newline="\n") as file:
+            file.writelines(_lines(run_mesh, settings))
+            file.write(f"{outputs}*END STEP\n")
+    return [*(folder / name for name in decks), folder / MESH_FILE]
 
 
 def started(mesh: Mesh, settings: DeckSettings) -> Mesh:
@@ -74,11 +91,15 @@ def _step(mesh: Mesh, settings: DeckSettings) -> Iterator[str]:
         yield f"*DLOAD, AMPLITUDE=ramp_{name}\n"
         for number in _face_numbers(mesh, name):
             yield f"faces_{name}_{number}, P{number}, {kilopascals / 1000:.9g}\n"
-    yield "*NODE FILE, TIME POINTS=outputs\nU\n*EL FILE, TIME POINTS=outputs\nS\n"
-    yield "*NODE PRINT, NSET=held, TOTALS=ONLY, TIME POINTS=outputs\nRF\n"
+
+
+def _ccx_outputs(settings: DeckSettings) -> str:
     energies = "ELSE, ELKE" if settings.procedure == "dynamic" else "ELSE"
-    yield f"*EL PRINT, ELSET=all_elements, TOTALS=ONLY, TIME POINTS=outputs\n{energies}\n"
-    yield "*END STEP\n"
+    return (
+        "*NODE FILE, TIME POINTS=outputs\nU\n*EL FILE, TIME POINTS=outputs\nS\n"
+        "*NODE PRINT, NSET=held, TOTALS=ONLY, TIME POINTS=outputs\nRF\n"
+        f"*EL PRINT, ELSET=all_elements, TOTALS=ONLY, TIME POINTS=outputs\n{energies}\n"
+    )
 
 
 def _face_numbers(mesh: Mesh, chamber: str) -> list[int]:

@@ -19,7 +19,15 @@ from sbafab.simulators.calculix.frd import SAME_TIME, Frame, read_frd
 from sbafab.simulators.calculix.history import State, history, history_csv
 from sbafab.simulators.calculix.picture import deformed_png
 from sbafab.simulators.calculix.plot import history_svg
-from sbafab.simulators.calculix.run import DIVERGED, LOG, Ending, Progress, find_ccx, run_ccx
+from sbafab.simulators.calculix.run import (
+    DIVERGED,
+    INTERRUPTED,
+    LOG,
+    Ending,
+    Progress,
+    find_ccx,
+    run_ccx,
+)
 from sbafab.simulators.calculix.settings import DeckSettings
 from sbafab.simulators.calculix.vtu import write_deformed
 
@@ -101,6 +109,8 @@ def _place(time: float, settings: DeckSettings) -> str:
 
 
 def _advice(ending: Ending, settings: DeckSettings) -> str:
+    if ending.stopped == INTERRUPTED:
+        return "run it again for the rest"
     if ending.stopped != DIVERGED:
         return "give it more --minutes or a larger --h, or less to do with --symmetry"
     if settings.procedure == "static":

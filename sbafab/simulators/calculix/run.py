@@ -21,6 +21,7 @@ PROGRAM = "ccx"
 LOG = "ccx.log"
 LOOK_EVERY = 0.2
 STOP_WITHIN = 10.0
+INTERRUPTED = "it was interrupted"
 DIVERGED = "its iterations no longer converge, however small the step"
 
 
@@ -47,7 +48,8 @@ def run_ccx(
 ) -> Ending:
     """Runs a deck in its folder to the time ``end``, for at most ``timeout`` seconds.
 
-    What ccx prints goes to ``ccx.log`` there. One thread, unless OMP_NUM_THREADS says otherwise.
+    Ctrl-C ends the run, not the program. What ccx prints goes to ``ccx.log`` there. One thread,
+    unless OMP_NUM_THREADS says otherwise.
     """
     command = [find_ccx(), "-i", job]
     started = time.monotonic()
@@ -56,19 +58,23 @@ def run_ccx(
         process = subprocess.Popen(
             command, cwd=folder, stdout=log, stderr=subprocess.STDOUT, env=environment
         )
-        in_time = True
+        stopped: str | None = None
         try:
-            while process.poll() is None and in_time:
+            while process.poll() is None and stopped is None:
                 time.sleep(LOOK_EVERY)
                 reached = _reached(folder / f"{job}.sta")
                 if tell is not None:
                     tell("ccx, percent of the load", int(100 * reached / end), 100)
-                in_time = time.monotonic() - started < timeout
+                if time.monotonic() - started >= timeout:
+                    stopped = f"it was stopped after {timeout / 60:g} minutes"
+        except KeyboardInterrupt:
+            # Hours of computing are not thrown away with the rest of them.
+            stopped = INTERRUPTED
         finally:
             _stop(process)
     reached = _reached(folder / f"{job}.sta")
-    if not in_time:
-        return Ending(reached, f"it was stopped after {timeout / 60:g} minutes")
+    if stopped is not None:
+        return Ending(reached, stopped)
     is_there = reached >= end * (1 - SAME_TIME)
     return Ending(reached, _complaint(folder / LOG, process.returncode, is_there))
 

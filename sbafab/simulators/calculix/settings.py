@@ -5,19 +5,17 @@ Units are mm, N, MPa, t and s; pressures are given in kPa.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
+from sbafab.simulators.simulator import Wish, chamber_pressures
 
 Procedure = Literal["dynamic", "static"]
 
 PAPER_PRESSURE = 6.0
 """kPa up to which the paper's model of one balloon is inflated (Fig. 7c)."""
-MOST_PRESSURE = 1000.0
 
 
 class Elastic(NamedTuple):
@@ -67,40 +65,10 @@ class DeckSettings:
 
 
 def deck_settings(
-    laminate: Laminate,
-    all_chambers: float | None = None,
-    single: Mapping[str, float] | None = None,
-    procedure: Procedure = "dynamic",
+    laminate: Laminate, wish: Wish | None = None, procedure: Procedure = "dynamic"
 ) -> DeckSettings:
-    """Settings for a laminate; pressures in kPa as in ``chamber_pressures``."""
+    """Settings for a laminate; pressures as in ``chamber_pressures``, by default the paper's."""
     names = [chamber.name for chamber in laminate.chambers]
+    pressures = chamber_pressures(names, wish or Wish(), PAPER_PRESSURE)
     kilograms = laminate.tpe_layers[0].film.density
-    film = TPE._replace(density=1e-12 * kilograms)
-    return DeckSettings(chamber_pressures(names, all_chambers, single or {}), procedure, film=film)
-
-
-def chamber_pressures(
-    names: Sequence[str], all_chambers: float | None, single: Mapping[str, float]
-) -> dict[str, float]:
-    """Pressure in kPa of every chamber: ``single`` ones by name, ``all_chambers`` in the others.
-
-    With nothing said it is the paper's 6 kPa in all of them; with single ones only, 0 in the
-    others. Raises DesignError for a chamber that is not there and a pressure out of range.
-    """
-    unknown = [name for name in single if name not in names]
-    if unknown:
-        raise DesignError(
-            f"pressure names chamber {unknown[0]}, which is not there; "
-            f"the chambers are {', '.join(names)}"
-        )
-    if all_chambers is None:
-        all_chambers = 0.0 if single else PAPER_PRESSURE
-    found = {name: single.get(name, all_chambers) for name in names}
-    for name, value in found.items():
-        if not (math.isfinite(value) and 0 <= value <= MOST_PRESSURE):
-            raise DesignError(
-                f"pressure of {name} = {value:g} kPa must be from 0 to {MOST_PRESSURE:g} kPa"
-            )
-    if not any(found.values()):
-        raise DesignError("pressure is 0 kPa in every chamber; give one of them more")
-    return found
+    return DeckSettings(pressures, procedure, film=TPE._replace(density=1e-12 * kilograms))

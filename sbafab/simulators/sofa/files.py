@@ -7,12 +7,11 @@ from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 
-from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-from sbafab.simulators.sofa.actuator import NODAL_STIFFNESS, POISSON, Actuator, actuator
+from sbafab.simulators.coarse.actuator import POISSON, Actuator, actuator
+from sbafab.simulators.coarse.rounds import why_not_round
 from sbafab.simulators.sofa.frames import beam_scene, frames_scene
-from sbafab.simulators.sofa.parts import film_groups
-from sbafab.simulators.sofa.rounds import round_stack
+from sbafab.simulators.sofa.parts import NODAL_STIFFNESS, film_groups
 from sbafab.simulators.sofa.shell_scene import shell_scene, volume_scene
 
 SHELL, FRAMES, VOLUME, BEAM = (
@@ -28,11 +27,7 @@ LEAST_LOBES = 3
 
 def why_no_scene(laminate: Laminate) -> str | None:
     """The reason why no scene can be written for a laminate, or None."""
-    try:
-        round_stack(laminate)
-    except DesignError as reason:
-        return str(reason)
-    return None
+    return why_not_round(laminate)
 
 
 def write_scenes(

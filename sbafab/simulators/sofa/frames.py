@@ -7,10 +7,10 @@ import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 
 from sbafab.geometry.edges import Point
-from sbafab.simulators.sofa.actuator import POISSON, Actuator
-from sbafab.simulators.sofa.coarse import CoarseMesh, Triangle, Vector, coarse_mesh
+from sbafab.simulators.coarse.actuator import POISSON, Actuator
+from sbafab.simulators.coarse.meridian import standing
+from sbafab.simulators.coarse.mesh import CoarseMesh, Triangle, Vector, coarse_mesh
 from sbafab.simulators.sofa.markup import add, child, document, number, root_node
-from sbafab.simulators.sofa.meridian import standing
 from sbafab.simulators.sofa.notes import beam_note, frames_note
 from sbafab.simulators.sofa.parts import add_films, add_pressure, add_tip
 

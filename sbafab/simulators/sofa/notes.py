@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from sbafab.simulators.sofa.actuator import NODAL_STIFFNESS, Actuator
-from sbafab.simulators.sofa.coarse import CoarseMesh
+from sbafab.simulators.coarse.actuator import Actuator
+from sbafab.simulators.coarse.mesh import CoarseMesh
+from sbafab.simulators.sofa.parts import NODAL_STIFFNESS, scaled_mass
 
 UNITS = "Units: mm, kg, s; so force mN, pressure and modulus kPa, volume ul."
 REFERENCE = """\
@@ -126,7 +127,7 @@ def _mesh(actuator: Actuator, mesh: CoarseMesh) -> str:
 
 
 def _mass(actuator: Actuator, dt: float) -> str:
-    mass = actuator.scaled_mass(dt)
+    mass = scaled_mass(actuator, dt)
     return (
         f"ARTIFICIAL: mass. The true one, {actuator.mass:.3g} kg, jitters to NaN; totalMass is "
         f"{mass / actuator.mass:.3g} times it, from\nnodal mass / dt^2 = "

@@ -5,12 +5,12 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 
-from sbafab.simulators.sofa.actuator import Actuator
-from sbafab.simulators.sofa.coarse import CoarseMesh, coarse_mesh
+from sbafab.simulators.coarse.actuator import Actuator
+from sbafab.simulators.coarse.meridian import partly
+from sbafab.simulators.coarse.mesh import CoarseMesh, coarse_mesh
 from sbafab.simulators.sofa.markup import add, child, document, root_node
-from sbafab.simulators.sofa.meridian import partly
 from sbafab.simulators.sofa.notes import shell_note, volume_note
-from sbafab.simulators.sofa.parts import add_films, add_pressure, add_tip
+from sbafab.simulators.sofa.parts import add_films, add_pressure, add_tip, scaled_mass
 
 DT = 0.02
 VOLUME = 80.0
@@ -35,7 +35,7 @@ def volume_scene(actuator: Actuator, volumes: Mapping[str, float] | None = None)
     ``volumes`` by chamber, 0 for those left out. Raises DesignError for an unknown chamber.
     """
     usual = float(f"{VOLUME * actuator.balloons / 15 * actuator.size**3:.3g}")
-    told = actuator.told(volumes, usual)
+    told = actuator.volumes(volumes, usual)
     mesh = coarse_mesh(actuator.stack, partly)
     root = root_node(DT)
     add(root, "FreeMotionAnimationLoop")
@@ -76,7 +76,7 @@ def _shell(
         position=mesh.position,
         rest_position=mesh.rest,
     )
-    add(node, "UniformMass", totalMass=float(f"{actuator.scaled_mass(DT):.3g}"))
+    add(node, "UniformMass", totalMass=float(f"{scaled_mass(actuator, DT):.3g}"))
     add(node, "FixedProjectiveConstraint", indices=mesh.fixed)
     if constrained:
         add(node, "LinearSolverConstraintCorrection")

@@ -8,19 +8,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-Vector = tuple[float, float, float]
+from sbafab.simulators.coarse.mesh import Vector
+from sbafab.simulators.coarse.tip import Tip, tip_at
 
 TROUBLE = re.compile(r"\[ERROR\]|\bnan\b|Division by zero|Null determinant", re.IGNORECASE)
 DONE = re.compile(r"(\d+) iterations done in (\S+) s \(\s*(\S+) FPS\s*\)")
-
-
-@dataclass(frozen=True)
-class Tip:
-    """The tip at a time in s: its place in mm, and how far it leans off the axis in degrees."""
-
-    time: float
-    place: Vector
-    tilt: float
 
 
 @dataclass(frozen=True)
@@ -50,7 +42,7 @@ def read_tips(path: Path) -> list[Tip]:
             if len(numbers) < 9 or len(numbers) % 3:
                 break
             points = list(_points(numbers))
-            found.append(Tip(time, _mean(points), _tilt(points)))
+            found.append(tip_at(time, points))
     return found
 
 
@@ -73,18 +65,3 @@ def _numbers(text: str) -> list[float] | None:
 def _points(numbers: list[float]) -> Iterator[Vector]:
     for i in range(0, len(numbers), 3):
         yield numbers[i], numbers[i + 1], numbers[i + 2]
-
-
-def _mean(points: list[Vector]) -> Vector:
-    x, y, z = (sum(values) / len(points) for values in zip(*points, strict=True))
-    return x, y, z
-
-
-def _tilt(points: list[Vector]) -> float:
-    """Angle between the axis and the normal of the polygon the points go round."""
-    nx = ny = nz = 0.0
-    for (ax, ay, az), (bx, by, bz) in zip(points, points[1:] + points[:1], strict=True):
-        nx += ay * bz - az * by
-        ny += az * bx - ax * bz
-        nz += ax * by - ay * bx
-    return math.degrees(math.atan2(math.hypot(nx, ny), nz))

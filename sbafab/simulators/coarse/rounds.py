@@ -15,7 +15,7 @@ from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
 
 ON_AXIS = 1e-6
-SUPPORTED = "SOFA scenes are written for stacks of round pockets, families 1dof and lobed"
+SUPPORTED = "the coarse shell is made for stacks of round pockets, families 1dof and lobed"
 NECK_SHARE, BORE_SHARE = 0.5, 0.2
 """Neck ring and bore of the paper's 5 mm pocket, for a single balloon, which has neither."""
 
@@ -91,6 +91,15 @@ def round_stack(laminate: Laminate) -> RoundStack:
         lumen=lumen,
         film=laminate.tpe_layers[0].film,
     )
+
+
+def why_not_round(laminate: Laminate) -> str | None:
+    """The reason why a laminate has no coarse shell, or None."""
+    try:
+        round_stack(laminate)
+    except DesignError as reason:
+        return str(reason)
+    return None
 
 
 def _pocket(gap: Interface, axis: Point) -> float:

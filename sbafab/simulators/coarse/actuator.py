@@ -1,4 +1,4 @@
-"""What all scenes of one actuator share: its stack, its film, what each chamber is told."""
+"""What all models of one actuator share: its stack, its film, what each chamber is told."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ from functools import cached_property
 
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-from sbafab.simulators.sofa.coarse import CoarseMesh, coarse_mesh
-from sbafab.simulators.sofa.rounds import RoundStack, round_stack
+from sbafab.simulators.coarse.mesh import CoarseMesh, coarse_mesh
+from sbafab.simulators.coarse.rounds import RoundStack, round_stack
+from sbafab.simulators.simulator import refuse_unknown
 
 YOUNG = 10_000.0
 """kPa (paper, Sec. 3.2.1)."""
 POISSON = 0.2
 """Likewise."""
-NODAL_STIFFNESS = 6.56 / 2304 / 0.02**2
-"""mN/mm: nodal mass / dt^2 at which the coarse shell was seen to keep still (7.12)."""
 PRESSURE = 5.0
 """kPa in each chamber that is told nothing else."""
 
@@ -48,10 +47,6 @@ class Actuator:
         """True mass of the films in kg, tabs left out."""
         return self.mesh.mass(self.stack.film.thickness, self.stack.film.density)
 
-    def scaled_mass(self, dt: float) -> float:
-        """Mass in kg that keeps the shell still at a time step in s: artificial."""
-        return NODAL_STIFFNESS * len(self.mesh.rest) * dt**2
-
     @property
     def balloons(self) -> int:
         return len(self.stack.pockets)
@@ -61,9 +56,9 @@ class Actuator:
         """Mean pocket radius over that of the 5 mm pocket that was measured."""
         return sum(self.stack.pockets) / self.balloons / 2.5
 
-    def told(self, given: Mapping[str, float] | None, default: float) -> dict[str, float]:
-        """A value for every chamber. Raises DesignError for chambers that are not there."""
-        return checked(self.stack.chambers, given, default)
+    def volumes(self, given: Mapping[str, float] | None, usual: float) -> dict[str, float]:
+        """What every chamber is given, in ul. Raises DesignError for unknown chambers."""
+        return checked(self.stack.chambers, given, usual, "volume", "ul")
 
 
 def actuator(laminate: Laminate, pressures: Mapping[str, float] | None = None) -> Actuator:
@@ -72,25 +67,24 @@ def actuator(laminate: Laminate, pressures: Mapping[str, float] | None = None) -
     Raises DesignError where the laminate has other than round pockets, or a chamber is unknown.
     """
     stack = round_stack(laminate)
-    told = checked(stack.chambers, pressures, PRESSURE)
+    told = checked(stack.chambers, pressures, PRESSURE, "pressure", "kPa")
     return Actuator(stack, tuple(told.items()))
 
 
 def checked(
-    chambers: tuple[str, ...], given: Mapping[str, float] | None, default: float
+    chambers: tuple[str, ...],
+    given: Mapping[str, float] | None,
+    usual: float,
+    what: str,
+    unit: str,
 ) -> dict[str, float]:
-    """What each chamber is told: the default, or what is given and 0 for the rest."""
+    """What each chamber is told: the usual, or what is given and 0 for the rest."""
     if given is None:
-        return dict.fromkeys(chambers, default)
+        return dict.fromkeys(chambers, usual)
+    refuse_unknown(chambers, given, what)
     for name, value in given.items():
-        if name not in chambers:
-            raise DesignError(
-                f"pressure names chamber {name}, which is not there; "
-                f"the chambers are {', '.join(chambers)}"
-            )
         if not (math.isfinite(value) and value >= 0):
             raise DesignError(
-                f"pressure of {name} = {value:g} kPa must be 0 or more; "
-                "the scenes have not been tried with vacuum"
+                f"{what} of {name} = {value:g} {unit} must be 0 or more; vacuum has not been tried"
             )
     return {name: float(given.get(name, 0.0)) for name in chambers}

@@ -1,6 +1,6 @@
 """The coarse shell of a whole actuator: mid-surfaces that share the nodes of what is bonded.
 
-In each pocket rings of eight nodes at bore, neck, between them and the edge; the web between the
+In each pocket rings of (usually) eight nodes at bore, neck, between them and the edge; the web between the
 pockets and the neck rings are one layer of double thickness. Inlet tabs and strips are left out.
 Lengths mm, volumes ul.
 """
@@ -11,11 +11,12 @@ import math
 from dataclasses import dataclass
 
 from sbafab.geometry.edges import Point
-from sbafab.simulators.sofa.meridian import Meridian, Start, fullest
-from sbafab.simulators.sofa.rounds import RoundStack
-from sbafab.simulators.sofa.web import web_of
+from sbafab.simulators.coarse.meridian import Meridian, Start, fullest
+from sbafab.simulators.coarse.rounds import RoundStack
+from sbafab.simulators.coarse.web import web_of
 
 SECTORS = 8
+"""Nodes of a ring; a multiple of four."""
 RING_STEP = 0.25
 """Distance of the rings between neck and edge, in pocket radii."""
 
@@ -70,9 +71,10 @@ class CoarseMesh:
         return (single + 2 * double) * thickness * density * 1e-9
 
 
-def coarse_mesh(stack: RoundStack, start: Start = fullest) -> CoarseMesh:
+def coarse_mesh(stack: RoundStack, start: Start = fullest, sectors: int = SECTORS) -> CoarseMesh:
     """The mesh of a stack, inflated to what ``start`` makes of each pocket and neck radius."""
-    return _Builder(stack, tuple(start(pocket, stack.neck) for pocket in stack.pockets)).mesh()
+    meridians = tuple(start(pocket, stack.neck) for pocket in stack.pockets)
+    return _Builder(stack, meridians, sectors).mesh()
 
 
 def enclosed(points: tuple[Vector, ...], triangles: tuple[Triangle, ...]) -> float:
@@ -96,8 +98,9 @@ def area(points: tuple[Vector, ...], triangle: Triangle) -> float:
 class _Builder:
     """Collects nodes and triangles balloon by balloon, bottom to top."""
 
-    def __init__(self, stack: RoundStack, meridians: tuple[Meridian, ...]) -> None:
+    def __init__(self, stack: RoundStack, meridians: tuple[Meridian, ...], sectors: int) -> None:
         self.stack = stack
+        self.sectors = sectors
         self.meridians = meridians
         # As pockets draw in, their axes follow, or the web between them would be torn.
         gaps = (p - m.edge for p, m in zip(stack.pockets, meridians, strict=True))
@@ -167,11 +170,11 @@ class _Builder:
     def _ring(self, k: int, flat: float, placed: float, z: float) -> Ring:
         return tuple(
             self._node(
-                self._about(k, flat, 360 / SECTORS * i),
-                self._about(k, placed, 360 / SECTORS * i, self.shift),
+                self._about(k, flat, 360 / self.sectors * i),
+                self._about(k, placed, 360 / self.sectors * i, self.shift),
                 z,
             )
-            for i in range(SECTORS)
+            for i in range(self.sectors)
         )
 
     def _disc(self, k: int, z: float, *, closed: bool) -> tuple[Ring, ...]:
@@ -216,7 +219,7 @@ class _Builder:
         if stack.lobes == 1:
             self.web += annulus(edges[0], self._ring(0, rim, drawn_in, z))
             return
-        web = web_of(stack.lobes, (stack.radius, pocket, rim, stack.hub, stack.lumen), SECTORS)
+        web = web_of(stack.lobes, (stack.radius, pocket, rim, stack.hub, stack.lumen), self.sectors)
         lumen = self._polar(web.lumen, stack.lumen, stack.lumen, z)
         junctions = self._polar(
             web.between, web.junction, web.junction * (1 - self.shift / stack.radius), z
@@ -224,8 +227,8 @@ class _Builder:
         outlines = [
             {
                 i: self._node(
-                    self._about(k, rim, 360 / SECTORS * i),
-                    self._about(k, drawn_in, 360 / SECTORS * i, self.shift),
+                    self._about(k, rim, 360 / self.sectors * i),
+                    self._about(k, drawn_in, 360 / self.sectors * i, self.shift),
                     z,
                 )
                 for i in range(-web.reach, web.reach + 1)
@@ -253,8 +256,10 @@ class _Builder:
         if len(discs) >= 3:
             return tuple(disc[0][0] for disc in discs)
         if len(discs) == 2:
-            return tuple(disc[-1][i] for disc in discs for i in (-SECTORS // 4, SECTORS // 4))
-        return tuple(discs[0][-1][i] for i in range(0, SECTORS, SECTORS // 4))
+            return tuple(
+                disc[-1][i] for disc in discs for i in (-self.sectors // 4, self.sectors // 4)
+            )
+        return tuple(discs[0][-1][i] for i in range(0, self.sectors, self.sectors // 4))
 
 
 def annulus(inner: Ring, outer: Ring) -> list[Triangle]:

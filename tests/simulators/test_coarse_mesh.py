@@ -13,10 +13,10 @@ import trimesh
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.simulators.sofa.coarse import CoarseMesh, Triangle, area, coarse_mesh
+from sbafab.simulators.coarse.meridian import Meridian, fullest, holding, partly, standing
+from sbafab.simulators.coarse.mesh import CoarseMesh, Triangle, area, coarse_mesh
+from sbafab.simulators.coarse.rounds import round_stack
 from sbafab.simulators.sofa.files import why_no_scene
-from sbafab.simulators.sofa.meridian import Meridian, fullest, holding, partly, standing
-from sbafab.simulators.sofa.rounds import round_stack
 
 LOBED = "3dof-15mm"
 DESIGNS = [

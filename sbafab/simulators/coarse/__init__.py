@@ -1,0 +1,1 @@
+"""The coarse shell of a stack of round balloons, which several simulators take."""

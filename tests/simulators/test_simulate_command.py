@@ -1,0 +1,125 @@
+"""What every simulator is asked for, and ``sbafab simulate`` and ``generate --decks``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from sbafab.cli import app
+from sbafab.cli.simulate import SIMULATORS
+from sbafab.errors import DesignError
+from sbafab.simulators.simulator import NAMES, Wish, chamber_pressures, simulator
+
+CHAMBERS = ("chamber1", "chamber2")
+
+
+def test_the_command_knows_the_simulators() -> None:
+    assert SIMULATORS == NAMES
+
+
+def test_every_simulator_names_fields_of_a_wish() -> None:
+    fields = set(Wish.__dataclass_fields__)
+    for name in NAMES:
+        assert set(simulator(name).USES) <= fields
+
+
+@pytest.mark.parametrize(
+    ("wish", "pressures"),
+    [
+        (Wish(), (6.0, 6.0)),
+        (Wish(2.0), (2.0, 2.0)),
+        (Wish(chambers={"chamber2": 3.0}), (0.0, 3.0)),
+        (Wish(1.0, {"chamber2": 3.0}), (1.0, 3.0)),
+    ],
+)
+def test_chamber_pressures(wish: Wish, pressures: tuple[float, float]) -> None:
+    assert chamber_pressures(CHAMBERS, wish, 6.0) == dict(zip(CHAMBERS, pressures, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("wish", "words"),
+    [
+        (Wish(chambers={"left": 1.0}), "names chamber left, which is not there; the chambers are"),
+        (Wish(-1.0), "pressure of chamber1 = -1 kPa must be from 0 to 1000 kPa"),
+        (Wish(chambers={"chamber2": 2000.0}), "pressure of chamber2 = 2000 kPa"),
+        (Wish(0.0), "0 kPa in every chamber"),
+    ],
+)
+def test_pressures_that_cannot_be(wish: Wish, words: str) -> None:
+    with pytest.raises(DesignError, match=words):
+        chamber_pressures(CHAMBERS, wish, 6.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--with", "calculix", "--pressure", "6 inches"], "must be a pressure"),
+        (["--with", "calculix", "--pressure", "nan"], "must be a pressure"),
+        (["--with", "calculix", "--chamber", "chamber1"], "must be NAME=PRESSURE"),
+        (["--with", "calculix", "--chamber", "left=3"], "names chamber left, which is not there"),
+        (["--with", "calculix", "--scene", "beam"], "--scene is for sofa"),
+        (["--with", "calculix", "--h", "3"], "h = 3"),
+        (["--with", "sofa", "--h", "0.3"], "--h is for calculix"),
+        (["--with", "sofa", "--volume", "chamber1=1 kg"], "must be a volume"),
+        (["--with", "sofa", "--volume", "chamber1=8"], "--volume is for --scene volume"),
+        (["--with", "sofa", "--seconds", "-1"], "simulated time = -1 s"),
+        (["--with", "ansys"], "calculix"),
+    ],
+)
+def test_bad_arguments(tmp_path: Path, options: list[str], words: str) -> None:
+    result = CliRunner().invoke(app, ["simulate", "1dof-5mm", "-o", str(tmp_path), *options])
+    assert result.exit_code == 2, result.output
+    assert words in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_design_that_breaks_a_rule_is_not_simulated(tmp_path: Path) -> None:
+    arguments = ["simulate", "1dof-5mm", "--with", "sofa", "--export", "-o", str(tmp_path)]
+    result = CliRunner().invoke(app, [*arguments, "--set", "bond.width=0.5"])
+    assert result.exit_code == 1
+    assert "bond-width" in result.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_export_keeps_what_is_there(tmp_path: Path) -> None:
+    folder = tmp_path / "1dof-5mm"
+    for command in (["press"], ["simulate", "--with", "sofa", "--export", "--pressure", "3"]):
+        result = CliRunner().invoke(app, [*command, "1dof-5mm", "-o", str(tmp_path)])
+        assert result.exit_code == 0, result.output
+    listed = json.loads((folder / "manifest.json").read_text())["files"]
+    assert {"press.json", "sofa/actuator.scn", "sofa/scene.py"} <= set(listed)
+    assert 'pressure="3"' in (folder / "sofa" / "actuator.scn").read_text()
+    assert (folder / "sofa").stat().st_mode == folder.stat().st_mode
+
+
+def test_decks_of_a_whole_run(tmp_path: Path) -> None:
+    pytest.importorskip("netgen")
+    arguments = ["--set", "stack.balloons=1", "-o", str(tmp_path), "--json"]
+    exported = ["simulate", "1dof-5mm", "--with", "calculix", "--export", "--pressure", "3"]
+    assert CliRunner().invoke(app, [*exported, *arguments]).exit_code == 0
+    folder = tmp_path / "1dof-5mm"
+    assert "3 kPa" in (folder / "calculix" / "actuator.inp").read_text()
+    result = CliRunner().invoke(app, ["generate", "1dof-5mm", "--decks", *arguments])
+    assert result.exit_code == 0, result.output
+    assert "6 kPa" in (folder / "calculix" / "actuator.inp").read_text()
+    assert (folder / "sofa" / "actuator.scn").is_file()
+
+
+def test_a_simulator_that_cannot_take_a_design(tmp_path: Path) -> None:
+    result = CliRunner().invoke(
+        app, ["simulate", "radial-15mm", "--with", "sofa", "--export", "-o", str(tmp_path)]
+    )
+    assert result.exit_code == 2
+    assert "round" in result.stderr
+
+
+def test_results_of_another_input_are_not_kept(tmp_path: Path) -> None:
+    common = ["1dof-5mm", "--with", "sofa", "--export", "-o", str(tmp_path)]
+    assert CliRunner().invoke(app, ["simulate", *common]).exit_code == 0
+    folder = tmp_path / "1dof-5mm"
+    (folder / "sofa" / "tip.state").write_text("of a run")
+    assert CliRunner().invoke(app, ["simulate", *common, "--pressure", "2"]).exit_code == 0
+    assert not (folder / "sofa" / "tip.state").exists()
