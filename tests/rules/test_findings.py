@@ -2,58 +2,26 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
 from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle, strip
+from sbafab.geometry.shapes import disc
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules import (
-    bond_width,
-    channel_clear,
-    film_limits,
-    mask_overhang,
-    piece_count,
-    sealing,
-    tube_fit,
-)
+from sbafab.rules import bond_width, film_limits, mask_overhang, piece_count
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits
+from tests.rules.compared import only, same
 
 AXIS = (0.0, 0.0)
 LIMITS = Limits()
 ONE = ("1dof-5mm", "stack.balloons=3")
-LOBED = ("3dof-15mm", "stack.balloons=3")
-# The second chamber's axis of three, 4.25 from the lumen's.
-SECOND = (4.25 * math.cos(math.tau / 3), 4.25 * math.sin(math.tau / 3))
 FILM = disc(AXIS, 3.25) - disc(AXIS, 0.5)
-TUBE = math.pi * 1.016 / 2
 NOWHERE = Place()
 Good = Callable[..., Laminate]
 Spoil = Callable[..., Laminate]
-
-
-def same(found: Finding, expected: Finding) -> bool:
-    """Equal but for rounding of value, limit, x and y."""
-    numbers = [
-        (found.limit, expected.limit),
-        (found.measured, expected.measured),
-        (found.where.x, expected.where.x),
-        (found.where.y, expected.where.y),
-    ]
-    where = replace(found.where, x=expected.where.x, y=expected.where.y)
-    rest = replace(found, limit=expected.limit, measured=expected.measured, where=where)
-    return rest == expected and all(
-        a == b or (a is not None and a == pytest.approx(b, abs=1e-4)) for a, b in numbers
-    )
-
-
-def only(findings: list[Finding]) -> Finding:
-    (finding,) = findings
-    return finding
 
 
 def test_bond_width_of_a_narrow_ring(good: Good, spoil: Spoil) -> None:
@@ -177,215 +145,6 @@ def test_mask_overhang_counts_the_interfaces_of_each_pattern(good: Good, spoil: 
     reaching = spoil(good(*ONE), 6, disc(AXIS, 2.5))
     _, waived = mask_overhang.check(reaching, LIMITS)
     assert "at 2 interfaces" in waived.message
-
-
-def test_channel_clear_of_a_narrow_bore(good: Good, spoil: Spoil) -> None:
-    narrow = spoil(good(*ONE), 6, disc(AXIS, 2.5) - disc(AXIS, 0.4))
-    assert same(
-        only(channel_clear.check(narrow, LIMITS)),
-        Finding(
-            "channel-clear",
-            "fail",
-            1.0,
-            0.8,
-            "mm",
-            Place(None, (6,), 0.0, 0.0),
-            "the bore of chamber1 passes 0.800 mm, x 0.000, y 0.000, and should pass 1; layer 6 "
-            "(006_PTFE_chamber-mask) stands in the way: open or align its hole",
-        ),
-    )
-
-
-def test_channel_clear_of_the_lumen_in_the_cap(good: Good, spoil: Spoil) -> None:
-    laminate = good(*LOBED)
-    cap = (laminate.layer(11).profile | disc(AXIS, 1.5)) - disc(AXIS, 0.9)
-    assert same(
-        only(channel_clear.check(spoil(laminate, 11, cap), LIMITS)),
-        Finding(
-            "channel-clear",
-            "fail",
-            2.0,
-            1.8,
-            "mm",
-            Place(None, (11,), 0.0, 0.0),
-            "the lumen passes 1.800 mm, x 0.000, y 0.000, and should pass 2; layer 11 "
-            "(011_TPE_cap) stands in the way: open or align its hole",
-        ),
-    )
-
-
-def test_channel_clear_of_an_open_bore(good: Good) -> None:
-    assert same(
-        only(channel_clear.check(good(*ONE), LIMITS)),
-        Finding(
-            "channel-clear",
-            "pass",
-            1.0,
-            1.0,
-            "mm",
-            Place(None, (2,), 0.0, 0.0),
-            "the bore of chamber1 passes 1.000 mm, x 0.000, y 0.000",
-        ),
-    )
-
-
-def test_channel_clear_beside_an_island_in_a_wide_bore(good: Good, spoil: Spoil) -> None:
-    # The island's edge lies 0.4 from the axis; 0.05 to its other side both it and the other
-    # layers' bores of 1.0 leave 0.45.
-    island = (disc(AXIS, 2.5) - disc(AXIS, 0.9)) | disc((0.6, 0.0), 0.2)
-    found = only(channel_clear.check(spoil(good(*ONE), 6, island), LIMITS))
-    assert found.measured == pytest.approx(0.9, abs=1e-4)
-    assert found.where.x == pytest.approx(-0.05, abs=1e-3)
-
-
-def test_channel_clear_without_channels(good: Good) -> None:
-    bare = replace(good(*ONE), bores=())
-    assert channel_clear.check(bare, LIMITS) == [
-        Finding(
-            "channel-clear",
-            "pass",
-            None,
-            None,
-            "mm",
-            NOWHERE,
-            "no balloon is joined to another, so there is no channel to keep clear",
-        )
-    ]
-
-
-def test_a_bore_ends_below_the_cap(good: Good, spoil: Spoil) -> None:
-    # Neither base nor cap has a hole; the topmost mask must have one.
-    closed = spoil(good(*ONE), 10, disc(AXIS, 2.5))
-    found = only(channel_clear.check(closed, LIMITS))
-    assert (found.measured, found.where) == (0.0, Place(None, (10,), 0.0, 0.0))
-
-
-@pytest.mark.parametrize("turn", [0.0, 120.0, 240.0])
-@pytest.mark.parametrize(("left", "right"), [(-0.05, 0.1), (-0.1, 0.05), (-0.2, 0.3)])
-def test_a_channel_through_a_slit(
-    turn: float, left: float, right: float, good: Good, spoil: Spoil
-) -> None:
-    # A slit aside of each chamber's axis; its width is all that passes.
-    laminate = good(*LOBED)
-    slit = rectangle((4.25 + left, -2.0), (4.25 + right, 2.0)).turned(turn)
-    wall = laminate.layer(7).profile
-    bore = disc((4.25, 0.0), 0.6).turned(turn)
-    found = only(channel_clear.check(spoil(laminate, 7, (wall | bore) - slit), LIMITS))
-    assert found.measured == pytest.approx(right - left, abs=1e-4)
-    assert found.where.layers == (7,)
-
-
-@pytest.mark.parametrize("diameter", [0.6, 1.0, 1.4])
-def test_channels_of_other_diameters(diameter: float, good: Good, spoil: Spoil) -> None:
-    laminate = good(*ONE, f"bore.diameter={diameter}")
-    radius = diameter / 2
-    for layer, y in ((5, 0.1), (7, -0.1)):
-        laminate = spoil(laminate, layer, disc(AXIS, 3.25) - disc((0.0, y), radius))
-    found = only(channel_clear.check(laminate, LIMITS))
-    assert found.measured == pytest.approx(diameter - 0.2, abs=1e-4)
-
-
-def test_a_round_hole_is_measured_exactly(good: Good, spoil: Spoil) -> None:
-    narrow = spoil(good(*ONE), 6, disc(AXIS, 2.5) - disc(AXIS, 0.3))
-    assert only(channel_clear.check(narrow, LIMITS)).measured == pytest.approx(0.6, abs=1e-12)
-
-
-def test_tube_fit_at_the_mouth(good: Good) -> None:
-    assert same(
-        only(tube_fit.check(good(*ONE), LIMITS)),
-        Finding(
-            "tube-fit",
-            "pass",
-            TUBE,
-            1.6,
-            "mm",
-            Place(1, (1, 2, 3), 8.25, 0.0),
-            "the mouth of chamber1 is 1.600 mm wide, x 8.250, y 0.000; a tube of 1.016 needs 1.596",
-        ),
-    )
-
-
-def test_tube_fit_of_a_strip_with_a_narrow_place(good: Good, spoil: Spoil) -> None:
-    mask = good(*ONE).layer(2).profile - rectangle((5.0, 0.65), (6.0, 1.0))
-    found = only(tube_fit.check(spoil(good(*ONE), 2, mask), LIMITS))
-    assert (found.verdict, found.where.interface) == ("fail", 1)
-    assert found.message.startswith("the strip of chamber1 is 1.450 mm wide, x ")
-    assert found.message.endswith("; a tube of 1.016 needs 1.596: widen inlet.width")
-
-
-def test_tube_fit_of_a_narrow_mouth(good: Good, spoil: Spoil) -> None:
-    mask = (disc(AXIS, 2.5) | strip(AXIS, (8.75, 0.0), 1.4)) - disc(AXIS, 0.5)
-    assert same(
-        only(tube_fit.check(spoil(good(*ONE), 2, mask), LIMITS)),
-        Finding(
-            "tube-fit",
-            "fail",
-            TUBE,
-            1.4,
-            "mm",
-            Place(1, (1, 2, 3), 8.25, 0.0),
-            "the mouth of chamber1 is 1.400 mm wide, x 8.250, y 0.000; a tube of 1.016 needs "
-            "1.596: widen inlet.width",
-        ),
-    )
-
-
-def test_tube_fit_of_a_closed_mouth(good: Good, spoil: Spoil) -> None:
-    mask = (disc(AXIS, 2.5) | strip(AXIS, (7.0, 0.0), 1.6)) - disc(AXIS, 0.5)
-    assert same(
-        only(tube_fit.check(spoil(good(*ONE), 2, mask), LIMITS)),
-        Finding(
-            "tube-fit",
-            "fail",
-            TUBE,
-            0.0,
-            "mm",
-            Place(None, (), 8.25, 0.0),
-            "the mouth of chamber1 is 0.000 mm wide, x 8.250, y 0.000; a tube of 1.016 needs "
-            "1.596: open a mask strip to the tab's end",
-        ),
-    )
-
-
-def test_tube_fit_of_a_narrow_bond(good: Good, spoil: Spoil) -> None:
-    mask = (disc(AXIS, 2.5) | strip((0.0, 0.1), (8.75, 0.1), 1.6)) - disc(AXIS, 0.5)
-    found = only(tube_fit.check(spoil(good(*ONE), 2, mask), LIMITS))
-    assert found.message.startswith("the bond beside the strip of chamber1 is 0.650 mm wide, x ")
-    assert found.message.endswith(
-        "; to hold the tube it needs 0.750: raise bond.width, which makes the tab wider"
-    )
-
-
-def test_tube_fit_of_two_faults_tells_the_worse(good: Good, spoil: Spoil) -> None:
-    # A strip 1.3 wide is 0.296 too narrow; 0.25 off the tab's middle it leaves 0.1 too little bond.
-    mask = (disc(AXIS, 2.5) | strip((0.0, 0.25), (8.75, 0.25), 1.3)) - disc(AXIS, 0.5)
-    found = only(tube_fit.check(spoil(good(*ONE), 2, mask), LIMITS))
-    assert found.limit == pytest.approx(TUBE)
-    assert found.measured == pytest.approx(1.3)
-
-
-def test_tube_fit_of_a_mouth_off_its_place(good: Good, spoil: Spoil) -> None:
-    # Its middle 0.6 from the inlet's, still within half the strip's width: 0.15 of bond is left.
-    mask = (disc(AXIS, 2.5) | strip((0.0, 0.6), (8.75, 0.6), 1.6)) - disc(AXIS, 0.5)
-    shifted = spoil(good(*ONE), 2, mask)
-    found = only(tube_fit.check(shifted, LIMITS))
-    assert found.measured == pytest.approx(0.15)
-    assert (found.where.interface, found.where.layers) == (1, (1, 2, 3))
-    assert only(sealing.check(shifted, LIMITS)).verdict == "pass"
-
-
-def test_tube_fit_without_inlets(good: Good) -> None:
-    assert tube_fit.check(replace(good(*ONE), inlets=()), LIMITS) == [
-        Finding(
-            "tube-fit",
-            "fail",
-            None,
-            None,
-            "mm",
-            NOWHERE,
-            "the laminate has no inlet, so no tube can be fitted; give every chamber one",
-        )
-    ]
 
 
 def test_every_layer_in_its_pieces(good: Good) -> None:
