@@ -51,6 +51,6 @@ def inflated_diameter(design: RadialDesign, laminate: Laminate) -> float:
 
     A flat pocket of width w whose films do not stretch becomes a cylinder of diameter 2 w / pi.
     """
-    pocket = design.chamber.width - 2 * design.bond.width
+    pocket = min(design.chamber.width, design.chamber.length) - 2 * design.bond.width
     height = design.stack.balloons * 2 * pocket / math.pi
     return design.tube.outer_diameter + 2 * (height + laminate.thickness)

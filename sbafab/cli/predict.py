@@ -1,0 +1,169 @@
+"""``sbafab predict``: what the actuator will do, by closed formulas."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sbafab.cli.options import Request, run_options
+from sbafab.cli.working import RULE_FAILED
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from sbafab.models.figures import Prediction
+
+
+def _finite(
+    ctx: click.Context, param: click.Parameter, value: float | tuple[float, ...]
+) -> float | tuple[float, ...]:
+    # Any float option lets nan and inf through.
+    if not all(map(math.isfinite, value if isinstance(value, tuple) else (value,))):
+        raise click.BadParameter("must be a number", ctx, param)
+    return value
+
+
+@click.command()
+@run_options
+@click.option(
+    "--pressure",
+    "pressures",
+    type=float,
+    multiple=True,
+    callback=_finite,
+    metavar="KPA",
+    help="Force and work at this pressure. Repeatable.  [default: 10, 100]",
+)
+@click.option(
+    "--flow",
+    type=float,
+    default=35.0,
+    show_default=True,
+    callback=_finite,
+    metavar="ML/MIN",
+    help="Time to actuate at this flow.",
+)
+@click.option(
+    "--volume",
+    "volumes",
+    type=float,
+    multiple=True,
+    callback=_finite,
+    metavar="UL",
+    help="Stroke with this much in each balloon. Repeatable.",
+)
+@click.option(
+    "--press-factor",
+    type=float,
+    default=1.0,
+    callback=_finite,
+    metavar="F",
+    help="Thickness after pressing over that of the films, if measured.  [default: 1, off]",
+)
+@click.option(
+    "--contact-factor",
+    type=float,
+    default=1.0,
+    callback=_finite,
+    metavar="F",
+    help="Measured force over the predicted one, if measured.  [default: 1, off]",
+)
+def predict(
+    request: Request,
+    pressures: tuple[float, ...],
+    flow: float,
+    volumes: tuple[float, ...],
+    **factors: float,
+) -> None:
+    """Predict sizes, stroke, force, time, bending: predict.json and plots.
+
+    Every figure names its model and how far that is trusted. A design that fails a rule is
+    predicted on the screen only (exit code 1).
+    """
+    from sbafab.actuators import load_design
+    from sbafab.cli.printing import print_json, shown_progress
+    from sbafab.models.figures import Asked, Calibration
+    from sbafab.models.prediction import predict as predicted
+    from sbafab.output.predicting import prediction_json, with_prediction
+    from sbafab.output.run import Extras, generate
+
+    design = load_design(request.designs[0], request.assignments, request.waivers)
+    wish = Asked(pressures or Asked.pressures_kpa, flow, volumes, Calibration(**factors))
+    found = predicted(design, wish)
+    with shown_progress(request.as_json) as tell:
+        extras = Extras(also=with_prediction(design, found))
+        run = generate(design, request.out, (), tell, extras=extras)
+    failed = sorted({finding.rule for finding in run.findings if finding.verdict == "fail"})
+    if request.as_json:
+        print_json({**prediction_json(design, found), "failed": failed, "folder": str(run.folder)})
+    else:
+        _print(found)
+        if not run.failed:
+            click.echo(f"written to {run.folder}: predict.json, predict/")
+    if run.failed:
+        click.echo(
+            f"sbafab: {', '.join(failed)} failed, so this actuator may not hold and no prediction "
+            "was written; change the design or waive the rule by name",
+            err=True,
+        )
+        click.get_current_context().exit(RULE_FAILED)
+
+
+def _print(found: Prediction) -> None:
+    """The table, with a number for each model, and below what the numbers stand for."""
+    from rich.text import Text
+
+    from sbafab.cli.printing import console
+
+    models = list(dict.fromkeys(figure.model for figure in found.figures))
+    out = console()
+    out.print(_table(found, models))
+    out.print()
+    out.print(Text("Models, and how far they are trusted", style="bold"))
+    notes = _grid()
+    for number, model in enumerate(models, start=1):
+        notes.add_row(Text(f"[{number}]"), Text(f"{model.title}: {model.trust}"))
+    out.print(notes)
+    if found.left_out:
+        out.print()
+        out.print(Text("Left out", style="bold"))
+        left = _grid()
+        for item in found.left_out:
+            left.add_row("-", Text(f"{item.name}: {item.reason}"))
+        out.print(left)
+    out.print()
+
+
+def _table(found: Prediction, models: list[Any]) -> Table:
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("", no_wrap=True)
+    table.add_column("figure", ratio=1)
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    table.add_column("model", no_wrap=True)
+    group = ""
+    for figure in found.figures:
+        number = models.index(figure.model) + 1
+        table.add_row(
+            figure.group if figure.group != group else "",
+            Text(figure.name),
+            f"{figure.value:.4g}",
+            figure.unit,
+            Text(f"[{number}] {figure.model.name}"),
+        )
+        group = figure.group
+    return table
+
+
+def _grid() -> Table:
+    from rich.table import Table
+
+    grid = Table.grid(padding=(0, 1))
+    grid.add_column(no_wrap=True)
+    grid.add_column(ratio=1)
+    return grid

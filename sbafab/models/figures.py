@@ -1,0 +1,186 @@
+"""What a prediction is made of: figures and curves that know their model and its trust."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from sbafab.errors import DesignError
+
+
+@dataclass(frozen=True)
+class Model:
+    """Where a number comes from: ``source`` is equation or section, ``trust`` how far it holds."""
+
+    name: str
+    source: str
+    trust: str
+
+    @property
+    def title(self) -> str:
+        """Name and source in one."""
+        return f"{self.name} ({self.source})" if self.source else self.name
+
+    def times(self, what: str, factor: float) -> Model:
+        """The same with a calibration factor, named unless it is 1."""
+        return self if factor == 1 else replace(self, name=f"{self.name} x {what} {factor:g}")
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One predicted number; ``group`` gathers what belongs together in a table."""
+
+    group: str
+    name: str
+    value: float
+    unit: str
+    model: Model
+
+    def as_dict(self) -> dict[str, Any]:
+        return {
+            "group": self.group,
+            "name": self.name,
+            "value": _rounded(self.value),
+            "unit": self.unit,
+            "model": self.model.title,
+            "trust": self.model.trust,
+        }
+
+
+@dataclass(frozen=True)
+class Line:
+    """A predicted curve; without a model, what the paper measured along it."""
+
+    label: str
+    x: Sequence[float]
+    y: Sequence[float]
+    model: Model | None = None
+
+
+@dataclass(frozen=True)
+class Points:
+    """What the paper measured, each +- its error (0 where it gives none)."""
+
+    label: str
+    x: Sequence[float]
+    y: Sequence[float]
+    error: Sequence[float]
+
+
+@dataclass(frozen=True)
+class Relation:
+    """One quantity against another: ``name`` is a file's stem, labels carry their units."""
+
+    name: str
+    title: str
+    x_label: str
+    y_label: str
+    lines: tuple[Line, ...]
+    points: tuple[Points, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        return {
+            "name": self.name,
+            "title": self.title,
+            "x": self.x_label,
+            "y": self.y_label,
+            "lines": [
+                {
+                    "label": line.label,
+                    "model": line.model.title if line.model else "measured (paper)",
+                    "trust": line.model.trust if line.model else "",
+                    "x": [_rounded(value) for value in line.x],
+                    "y": [_rounded(value) for value in line.y],
+                }
+                for line in self.lines
+            ],
+            "measured": [
+                {
+                    "label": points.label,
+                    "x": [_rounded(value) for value in points.x],
+                    "y": [_rounded(value) for value in points.y],
+                    "error": list(points.error),
+                }
+                for points in self.points
+            ],
+        }
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A figure that is not given, and why."""
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Factors from a measurement of one's own; 1 leaves a model as it is.
+
+    ``press_factor`` is what is left of the films' thickness after pressing, ``contact_factor`` the
+    measured force over the predicted one.
+    """
+
+    press_factor: float = 1.0
+    contact_factor: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name, value, most in (
+            ("press factor", self.press_factor, 1.0),
+            ("contact factor", self.contact_factor, 10.0),
+        ):
+            if not 0 < value <= most:
+                raise DesignError(f"{name} = {value:g} must be above 0 and at most {most:g}")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a prediction is asked for: kPa, ml/min into each chamber or all, ul a balloon."""
+
+    pressures_kpa: tuple[float, ...] = (10.0, 100.0)
+    flow_ml_min: float = 35.0
+    volumes_ul: tuple[float, ...] = ()
+    calibration: Calibration = field(default_factory=Calibration)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """All that is predicted of one design."""
+
+    asked: Asked
+    figures: tuple[Figure, ...]
+    relations: tuple[Relation, ...]
+    left_out: tuple[LeftOut, ...]
+
+    def value(self, name: str, model: str = "") -> float:
+        """The value of the figure with this name, by the model whose title begins so."""
+        for figure in self.figures:
+            if figure.name == name and figure.model.title.startswith(model):
+                return figure.value
+        raise KeyError(f"no figure {name!r} by {model!r}")
+
+    def as_dict(self) -> dict[str, Any]:
+        """What ``predict.json`` holds of it."""
+        return {
+            "asked": {
+                "pressures_kpa": list(self.asked.pressures_kpa),
+                "flow_ml_min": self.asked.flow_ml_min,
+                "volumes_ul": list(self.asked.volumes_ul),
+                "press_factor": self.asked.calibration.press_factor,
+                "contact_factor": self.asked.calibration.contact_factor,
+            },
+            "figures": [figure.as_dict() for figure in self.figures],
+            "left_out": [{"name": left.name, "reason": left.reason} for left in self.left_out],
+            "relations": [relation.as_dict() for relation in self.relations],
+        }
+
+
+def _rounded(value: float) -> float:
+    """Seven digits: what a model says, without the noise of arithmetic."""
+    if value == 0 or not math.isfinite(value):
+        return 0.0
+    digits = 6 - math.floor(math.log10(abs(value)))
+    return 0.0 if abs(value) < 1e-9 else round(float(value), digits)

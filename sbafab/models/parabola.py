@@ -1,0 +1,112 @@
+"""The paper's geometric model, Eqs. 1 to 3 solved numerically (paper, Sec. 3.1).
+
+The meridian of one half of a balloon is the parabola y = h - a x^2 down to y = 0 at x = rho; its
+arc keeps the length l of the flat pocket's radius. Eq. 1 prints an upper limit of infinity where
+rho is meant, Eq. 3 a rho under the root where x is meant. Lengths mm, volumes ul.
+
+Everything follows from the slope k = 2 a rho at the edge. With s = sqrt(1 + k^2), q = asinh(k) / k:
+
+    rho = 2 l / (s + q)    h = k rho / 2    v = pi rho^2 h / 2    dv/dh = pi rho^2 (2 q - s) / 2 q
+
+A half holds most where s = 2 q. A whole balloon is two halves, and twice as high: ``balloon_...``.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from sbafab.models.numeric import ROUNDS, inverse, within
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+MODEL = "Eqs. 1-3"
+
+
+class Fullest(NamedTuple):
+    """One half at its largest volume: slope of the edge, height, radius (mm), volume (ul)."""
+
+    slope: float
+    height: float
+    radius: float
+    volume: float
+
+
+@cache
+def fullest(length: float) -> Fullest:
+    """The half balloon that holds most: at l = 2.5 mm 8.47 ul, 1.33 mm high (both: 16.947 ul)."""
+    low, high = 1.0, 10.0
+    for _ in range(ROUNDS):
+        k = (low + high) / 2
+        low, high = (k, high) if math.hypot(1, k) < 2 * math.asinh(k) / k else (low, k)
+    radius = 2 * length / (math.hypot(1, high) + math.asinh(high) / high)
+    height = high * radius / 2
+    return Fullest(high, height, radius, math.pi * radius**2 * height / 2)
+
+
+def radius(h: ArrayLike, length: float) -> NDArray[np.float64]:
+    """Radius rho (mm) of a half ``h`` mm high; Eq. 2 then gives a = h / rho^2."""
+    s, q = _terms(_slope(h, length))
+    return 2 * length / (s + q)
+
+
+def volume(h: ArrayLike, length: float) -> NDArray[np.float64]:
+    """Volume (ul) of a half ``h`` mm high: Eq. 1. Raises DesignError past the fullest one."""
+    k = _slope(h, length)
+    return _volume(k, length)
+
+
+def height(v: ArrayLike, length: float) -> NDArray[np.float64]:
+    """Height (mm) of a half that holds ``v`` ul. Raises DesignError past the fullest one."""
+    most = fullest(length)
+    wanted = within(v, most.volume, "volume of half a balloon", "ul", MODEL)
+    k = inverse(lambda slope: _volume(slope, length), wanted, most.slope)
+    return _height(k, length)
+
+
+def rate(h: ArrayLike, length: float) -> NDArray[np.float64]:
+    """dv/dh in mm2 at a half's height ``h``; the same for two halves and their whole height."""
+    s, q = _terms(_slope(h, length))
+    return math.pi * (2 * length / (s + q)) ** 2 * (2 * q - s) / (2 * q)
+
+
+def balloon_volume(stroke: ArrayLike, length: float) -> NDArray[np.float64]:
+    """Volume (ul) of two halves, together ``stroke`` mm high."""
+    return 2 * volume(np.asarray(stroke, dtype=float) / 2, length)
+
+
+def balloon_stroke(v: ArrayLike, length: float) -> NDArray[np.float64]:
+    """Height (mm) of two halves that together hold ``v`` ul."""
+    most = 2 * fullest(length).volume
+    return 2 * height(within(v, most, "volume of a balloon", "ul", MODEL) / 2, length)
+
+
+def balloon_rate(stroke: ArrayLike, length: float) -> NDArray[np.float64]:
+    """dv/dh in mm2 of two halves, together ``stroke`` mm high."""
+    return rate(np.asarray(stroke, dtype=float) / 2, length)
+
+
+def _slope(h: ArrayLike, length: float) -> NDArray[np.float64]:
+    most = fullest(length)
+    wanted = within(h, most.height, "height of half a balloon", "mm", MODEL)
+    return inverse(lambda slope: _height(slope, length), wanted, most.slope)
+
+
+def _height(k: NDArray[np.float64], length: float) -> NDArray[np.float64]:
+    s, q = _terms(k)
+    return length * k / (s + q)
+
+
+def _volume(k: NDArray[np.float64], length: float) -> NDArray[np.float64]:
+    s, q = _terms(k)
+    return 2 * math.pi * length**3 * k / (s + q) ** 3
+
+
+def _terms(k: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The s and q of the module's formulas; q is 1 at k = 0."""
+    safe = np.where(k > 0, k, 1.0)
+    return np.sqrt(1 + k**2), np.where(k > 0, np.arcsinh(safe) / safe, 1.0)

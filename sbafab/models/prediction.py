@@ -1,0 +1,189 @@
+"""All that the models say of one design, put together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from sbafab.actuators import build
+from sbafab.actuators.lobed import LobedDesign
+from sbafab.actuators.radial import RadialDesign
+from sbafab.design.records import Design
+from sbafab.errors import DesignError
+from sbafab.geometry.boolean import GeometryError
+from sbafab.geometry.region import Region
+from sbafab.laminate.laminate import Laminate
+from sbafab.models import axial, lobes, paper
+from sbafab.models.actuator import NO_OUTLINE, Actuator, actuator
+from sbafab.models.figures import (
+    Asked,
+    Figure,
+    LeftOut,
+    Line,
+    Model,
+    Prediction,
+    Relation,
+)
+from sbafab.models.inlet import largest_tube
+from sbafab.models.sizes import sizes
+from sbafab.models.stiffness import second_moments, tip_stiffness
+
+GEOMETRY = Model("plain geometry", "of the cut files", "exact for what is cut")
+NOMINAL = Model(
+    "sum of the films",
+    "Sec. 2",
+    "nominal: films flow in the press; the paper's 15 balloons measure 0.95 mm, not 1.865",
+)
+
+
+def predict(
+    design: Design, asked: Asked | None = None, laminate: Laminate | None = None
+) -> Prediction:
+    """Figures and curves of a design of any family.
+
+    Raises DesignError where the design cannot be built, or for pressures, a flow or volumes that
+    are out of range.
+    """
+    wish = asked or Asked()
+    try:
+        flat = laminate or build(design)
+    except GeometryError as error:
+        raise DesignError(f"design {design.name} cannot be resolved: {error}") from None
+    one = actuator(design, flat, wish.calibration)
+    axial.check_asked(one, wish)
+    found = list(_all(one, wish))
+    return Prediction(
+        wish,
+        tuple(item for item in found if isinstance(item, Figure)),
+        tuple(_relations(one, wish)),
+        tuple(item for item in found if isinstance(item, LeftOut)),
+    )
+
+
+def _all(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
+    mass = _mass(one.laminate)
+    yield from _sizes(one, asked)
+    if one.kinematics and isinstance(one.design, LobedDesign):
+        yield lobes.folding(one, asked)
+    yield Figure("size", "mass", mass.value, mass.unit, mass.model)
+    yield from _tubes(one)
+    if not one.kinematics:
+        for what in ("stroke", "force", "actuation", "bending", "folded diameter"):
+            yield LeftOut(what, NO_OUTLINE)
+        return
+    yield from axial.strokes(one, asked)
+    yield from axial.forces(one, asked)
+    yield from axial.power(one, asked, mass.value)
+    if isinstance(one.design, LobedDesign):
+        yield from lobes.bending(one)
+    yield from _stiffness(one)
+
+
+def _relations(one: Actuator, asked: Asked) -> Iterator[Relation]:
+    if not one.kinematics:
+        return
+    yield axial.stroke_relation(one)
+    if asked.pressures_kpa:
+        yield axial.force_relation(one, asked)
+    if isinstance(one.design, LobedDesign):
+        yield lobes.bending_relation(one, asked)
+        yield lobes.workspace_relation(one)
+    if isinstance(one.design, RadialDesign):
+        yield _diameter_relation(one, one.design)
+
+
+def _sizes(one: Actuator, asked: Asked) -> Iterator[Figure]:
+    """Flat sizes, and round the tube for radial designs."""
+    factor = asked.calibration.press_factor
+    pressed = NOMINAL.times("press factor", factor)
+    for name, value in sizes(one.design, one.laminate).items():
+        shown = name.replace("_", " ")
+        if name == "thickness":
+            yield Figure("size", "deflated height", one.thickness, "mm", pressed)
+        elif name.endswith("flated_diameter"):
+            # The laminate is in it twice.
+            thinner = 2 * (one.laminate.thickness - one.thickness)
+            yield Figure("size", shown, value - thinner, "mm", _round_tube(name, factor))
+        else:
+            yield Figure("size", shown, value, "mm", GEOMETRY)
+
+
+def _round_tube(name: str, factor: float) -> Model:
+    if name == "deflated_diameter":
+        trust = "the paper's 15.33 is this sum; the sheet is taken to lie close to the tube"
+        return Model("tube and films", "Sec. 2.1", trust).times("press factor", factor)
+    trust = "upper end: the films a full cylinder, nothing in their way; the paper says about 28"
+    model = Model("cylinder of unstretched film", "Sec. 2.1: 2 w / pi a balloon", trust)
+    return model.times("press factor", factor)
+
+
+def _mass(laminate: Laminate) -> Figure:
+    grams = sum(
+        layer.profile.area * layer.film.thickness * layer.film.density * 1e-6
+        for layer in laminate.layers
+    )
+    trust = "exact for the films, masks, tabs and ears included; without tubing, glue and fluid"
+    return Figure("size", "mass", grams, "g", Model("area x thickness x density", "", trust))
+
+
+def _tubes(one: Actuator) -> Iterator[Figure]:
+    inlet = min(one.laminate.inlets, key=lambda inlet: inlet.width - inlet.tube_diameter)
+    model = Model(
+        "half the perimeter", "a flat strip opened round", "films do not stretch; glue not counted"
+    )
+    most = largest_tube(inlet.width)
+    yield Figure("inlet", "largest tube that the inlet opens to", most, "mm", model)
+    spare = most - inlet.tube_diameter
+    name = f"room round the tube of {inlet.tube_diameter:g} mm"
+    yield Figure("inlet", name, spare, "mm", model)
+
+
+def _plate(one: Actuator) -> Region | None:
+    """What is cut of the topmost film, if it has neither tabs nor ears."""
+    if one.balloons == 1 or one.laminate.registration == "ears":
+        return None
+    return one.laminate.tpe_layers[-1].profile
+
+
+def _stiffness(one: Actuator) -> Iterator[Figure | LeftOut]:
+    """Bending stiffness of a full actuator by the paper's cantilever formula."""
+    name = "stiffness of the tip across, full"
+    plate = _plate(one)
+    if not one.radii:
+        yield LeftOut(name, "the paper measured no modulus of oblong balloons")
+        return
+    if plate is None:
+        yield LeftOut(name, "the topmost film is not the plain outline: it has tabs or ears")
+        return
+    lobed = isinstance(one.design, LobedDesign)
+    measured = paper.MODULUS_3DOF if lobed else paper.MODULUS_1DOF
+    least, _ = second_moments(plate)
+    yield Figure("stiffness", "second moment of area of the plate", least, "mm4", GEOMETRY)
+    model = Model(
+        "3 E I / l^3",
+        f"Sec. 4.4, E = {measured.value:g} kPa as measured there",
+        "order of magnitude: E is the paper's of its own actuators, not predicted, and its I is "
+        "not given",
+    )
+    value = tip_stiffness(measured.value, least, one.full_height)
+    yield Figure("stiffness", name, value, "N/mm", model)
+
+
+def _diameter_relation(one: Actuator, design: RadialDesign) -> Relation:
+    """Diameter round the tube against the air in a balloon."""
+    k = one.kinematics[0]
+    stroke = np.linspace(0, k.largest_stroke, axial.SAMPLES)
+    around = design.tube.outer_diameter + 2 * (one.thickness + stroke)
+    lines = [Line(k.model.name, k.volume(stroke).tolist(), around.tolist(), k.model)]
+    label = f"paper: about {paper.RADIAL_FULL.value:g} mm inflated"
+    chamber = design.chamber
+    if (chamber.width, chamber.length, one.balloons) == (11.5, 20.0, 1):
+        lines.append(Line(label, [0.0, k.largest_volume], [paper.RADIAL_FULL.value] * 2))
+    return Relation(
+        "diameter",
+        "Diameter round the tube against volume",
+        "volume a balloon, ul",
+        "diameter, mm",
+        tuple(lines),
+    )

@@ -1,0 +1,107 @@
+"""``sbafab predict``: what it prints and writes, what a later run keeps, bad input."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import pytest
+
+import sbafab
+from sbafab.cli import main
+from sbafab.output.run import generate
+
+
+def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as ended:
+        main(["predict", *arguments])
+    out, err = capsys.readouterr()
+    return int(ended.value.code or 0), out, err
+
+
+def test_writes_figures_and_plots_that_the_manifest_lists(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, _ = run(["3dof-15mm", "-o", str(tmp_path), "--volume", "5"], capsys)
+    assert code == 0
+    assert "0.9353  s" in out
+    assert "geometric regime only" in " ".join(out.split())
+    folder = tmp_path / "3dof-15mm"
+    found = json.loads((folder / "predict.json").read_text(encoding="utf-8"))
+    assert found["schema"] == "sbafab/predict@1"
+    for figure in found["figures"]:
+        assert set(figure) == {"group", "name", "value", "unit", "model", "trust"}
+        assert all(figure[key] for key in ("name", "unit", "model", "trust"))
+    plots = {relation["plot"] for relation in found["relations"]}
+    assert plots == {f"predict/{name}.svg" for name in ("stroke", "force", "bending", "workspace")}
+    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    assert found["design_sha256"] == manifest["design_sha256"]
+    for path in (*plots, "predict.json"):
+        digest = hashlib.sha256((folder / path).read_bytes()).hexdigest()
+        assert manifest["files"][path] == digest
+
+
+def test_json_is_what_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(["1dof-5mm", "-o", str(tmp_path), "--json", "--pressure", "50"], capsys)
+    assert code == 0
+    printed = json.loads(out)
+    folder = Path(printed.pop("folder"))
+    assert printed.pop("failed") == []
+    assert printed == json.loads((folder / "predict.json").read_text(encoding="utf-8"))
+    assert printed["asked"]["pressures_kpa"] == [50]
+
+
+def test_twice_the_same_bytes_and_a_later_run_keeps_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run(["1dof-5mm", "-o", str(tmp_path / "a")], capsys)
+    run(["1dof-5mm", "-o", str(tmp_path / "b")], capsys)
+    a, b = (
+        {p.relative_to(f).as_posix(): p.read_bytes() for p in f.rglob("*") if p.is_file()}
+        for f in (tmp_path / "a" / "1dof-5mm", tmp_path / "b" / "1dof-5mm")
+    )
+    assert a == b
+    kept = generate(sbafab.load("1dof-5mm"), tmp_path / "a", ("press",))
+    assert {"predict.json", "predict/force.svg", "press.json"} <= set(kept.manifest["files"])
+    other = sbafab.load("1dof-5mm", "stack.balloons=3")
+    dropped = generate(other, tmp_path / "a", ("press",))
+    assert "predict.json" not in dropped.manifest["files"]
+
+
+def test_failing_design_is_predicted_but_not_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["1dof-5mm", "--set", "bond.width=0.6", "-o", str(tmp_path)]
+    code, out, err = run(arguments, capsys)
+    assert code == 1
+    assert "full stroke" in out
+    assert "bond-width" in err
+    assert "no prediction was written" in err
+    assert not (tmp_path / "1dof-5mm" / "predict.json").exists()
+    code, _, _ = run([*arguments, "--waive", "bond-width"], capsys)
+    assert (code == 0) == (tmp_path / "1dof-5mm" / "predict.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--volume", "17"], "give 0 to 16.94 ul a balloon"),
+        (["--volume", "-1"], "give 0 to 16.94 ul a balloon"),
+        (["--volume", "nan"], "must be a number"),
+        (["--pressure", "368"], "give 0 to 367 kPa"),
+        (["--flow", "0"], "must be above 0 ml/min"),
+        (["--flow", "inf"], "must be a number"),
+        (["--press-factor", "2"], "at most 1"),
+        (["--contact-factor", "-1"], "must be above 0"),
+    ],
+)
+def test_out_of_range_is_one_sentence_exit_2_and_nothing_on_disk(
+    arguments: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, err = run(["1dof-5mm", "-o", str(tmp_path / "out"), *arguments], capsys)
+    assert code == 2
+    assert out == ""
+    assert said in err
+    assert "Traceback" not in err
+    assert list(tmp_path.iterdir()) == []

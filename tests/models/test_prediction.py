@@ -1,0 +1,196 @@
+"""Predictions of whole designs: the paper's numbers, every family, what is left out and why."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+import sbafab
+from sbafab.errors import DesignError
+from sbafab.models import parabola, printed
+from sbafab.models.figures import Prediction
+from sbafab.models.kinematics import round_stack, slot_stack
+
+TEMPLATES = ("1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm")
+
+
+@pytest.fixture(scope="module")
+def three() -> Prediction:
+    return sbafab.predict("3dof-15mm")
+
+
+def test_3dof_takes_0_935_s_of_water(three: Prediction) -> None:
+    assert three.value("time to full stroke at 35 ml/min") == pytest.approx(0.935, abs=0.0005)
+    # The paper: 0.92 +- 0.08 s.
+    assert abs(three.value("time to full stroke at 35 ml/min") - 0.92) < 0.08
+
+
+def test_3dof_forces_are_three_times_one_balloon_s(three: Prediction) -> None:
+    flat = 3 * 100e-3 * math.pi * 2.5**2
+    by_eq_4 = three.value("force at 100 kPa, flat", "virtual work on Eq. 4")
+    by_eqs_1_to_3 = three.value("force at 100 kPa, flat", "virtual work on Eqs. 1-3")
+    assert by_eq_4 == pytest.approx(flat * 2 / 3)
+    assert by_eqs_1_to_3 == pytest.approx(flat / 2)
+    held = three.value("force at 100 kPa, at 75 % of full stroke", "virtual work on Eq. 4")
+    assert held == pytest.approx(3 * 0.1 * float(printed.rate(0.75 * 17.5 / 15, 2.5)))
+
+
+def test_3dof_folds_to_9_9_and_pressed_to_8_6(three: Prediction) -> None:
+    assert three.value("folded diameter") == pytest.approx(9.9, abs=0.05)
+    pressed = sbafab.predict("3dof-15mm", press_factor=0.95 / 1.865)
+    assert pressed.value("folded diameter") == pytest.approx(8.6, abs=0.05)
+    assert pressed.value("deflated height") == pytest.approx(0.95)
+
+
+def test_3dof_bends_by_the_difference_of_its_chambers(three: Prediction) -> None:
+    # A plane over axes at 4.25 mm, one side 17.5 long and the others flat.
+    angle = (17.5 - 1.865) / (1.5 * 4.25)
+    found = three.value("bend with one chamber at full stroke, the others flat")
+    assert found == pytest.approx(math.degrees(angle))
+    assert three.value("bend with 2 chambers at full stroke, the others flat") == pytest.approx(
+        found
+    )
+
+
+def test_radial_is_15_33_flat_and_about_28_inflated() -> None:
+    found = sbafab.predict("radial-15mm")
+    assert found.value("deflated diameter") == pytest.approx(15.328)
+    assert found.value("inflated diameter") == pytest.approx(28.06, abs=0.005)
+    # The diameter of a full balloon's lens lies a little below the cylinder's.
+    (around,) = (r for r in found.relations if r.name == "diameter")
+    assert around.lines[0].y[0] == pytest.approx(15.328)
+    assert 27 < around.lines[0].y[-1] < 28.06
+
+
+def test_mass_of_a_lone_balloon_by_hand() -> None:
+    found = sbafab.predict("1dof-10mm", "stack.balloons=1", "inlet.tab_length=5")
+    laminate = sbafab.build("1dof-10mm", "stack.balloons=1", "inlet.tab_length=5")
+    base, mask, cap = (layer.profile.area for layer in laminate.layers)
+    # 1122 and 2200 kg/m3 are 1.122e-3 and 2.2e-3 g/mm3.
+    by_hand = (base + cap) * 0.038 * 1.122e-3 + mask * 0.025 * 2.2e-3
+    assert found.value("mass") == pytest.approx(by_hand)
+
+
+def test_strokes_at_a_volume_by_both_models() -> None:
+    found = sbafab.predict("1dof-5mm", volumes_ul=[5.0])
+    by_eq_4 = found.value("stroke at 5 ul a balloon", "Eq. 4")
+    assert by_eq_4 == pytest.approx(6 * float(printed.stroke(5.0, 2.5)), rel=1e-9)
+    by_eqs_1_to_3 = found.value("stroke at 5 ul a balloon", "Eqs. 1-3")
+    assert by_eqs_1_to_3 == pytest.approx(6 * float(parabola.balloon_stroke(5.0, 2.5)), rel=1e-9)
+
+
+def test_between_the_two_limits_eq_4_is_left_out_with_its_range() -> None:
+    found = sbafab.predict("1dof-5mm", volumes_ul=[15.0])
+    assert found.value("stroke at 15 ul a balloon", "Eqs. 1-3") > 0
+    (left,) = found.left_out
+    assert left.name == "stroke at 15 ul a balloon, Eq. 4"
+    assert "0 to 13.29 ul" in left.reason
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"volumes_ul": [17.0]}, "outside the range of Eqs. 1-3; give 0 to 16.94 ul a balloon"),
+        ({"volumes_ul": [-1.0]}, "volume = -1 ul"),
+        ({"pressures_kpa": [400.0]}, "give 0 to 367 kPa"),
+        ({"flow_ml_min": 0.0}, "flow = 0 ml/min"),
+        ({"press_factor": 1.5}, "press factor = 1.5 must be above 0 and at most 1"),
+        ({"contact_factor": 0.0}, "contact factor = 0 must be above 0"),
+    ],
+)
+def test_what_is_out_of_range_says_the_range(asked: dict[str, object], said: str) -> None:
+    with pytest.raises(DesignError, match=said):
+        sbafab.predict("1dof-5mm", **asked)  # type: ignore[arg-type]
+
+
+def test_calibration_is_named_wherever_it_counts() -> None:
+    plain = sbafab.predict("3dof-15mm")
+    found = sbafab.predict("3dof-15mm", press_factor=0.5, contact_factor=2.0)
+    for before, after in zip(plain.figures, found.figures, strict=True):
+        factor = {"N": "contact factor 2", "W/kg": "contact factor 2"}.get(before.unit)
+        if before.name in {"deflated height", "folded diameter"}:
+            factor = "press factor 0.5"
+        assert (factor is None) or factor in after.model.name, after.name
+        if factor is None and before.group != "bending":
+            assert after == before
+        if factor == "contact factor 2":
+            assert after.value == pytest.approx(2 * before.value)
+    assert all("factor" not in figure.model.name for figure in plain.figures)
+
+
+@pytest.mark.parametrize("name", TEMPLATES)
+def test_every_figure_and_curve_says_model_and_trust(name: str) -> None:
+    found = sbafab.predict(name, volumes_ul=[1.0])
+    for figure in found.figures:
+        assert figure.model.title
+        assert len(figure.model.trust) > 10
+        assert figure.unit
+        assert math.isfinite(figure.value)
+    for relation in found.relations:
+        assert "," in relation.x_label
+        assert "," in relation.y_label
+        for line in relation.lines:
+            assert line.model is not None or line.label.startswith("paper")
+            assert len(line.x) == len(line.y) > 1
+
+
+@pytest.mark.parametrize("count", range(2, 9))
+def test_lobes_from_2_to_8(count: int) -> None:
+    # Widely spaced lobes, or the tabs of eight would meet.
+    found = sbafab.predict("3dof-15mm", f"chamber.count={count}", "chamber.axis_radius=10")
+    names = [figure.name for figure in found.figures] + [left.name for left in found.left_out]
+    assert sum(name.startswith("bend with") for name in names) == count - 1
+    assert ("folded diameter" in [left.name for left in found.left_out]) == (count != 3)
+    one = found.value("bend with one chamber at full stroke, the others flat")
+    # The gradient of the nearest plane: 2 / n of the difference, over the radius; two chambers
+    # have no plane but a line.
+    share = 2 / count if count > 2 else 1 / 2
+    assert one == pytest.approx(math.degrees((17.5 - 1.865) * share / 10))
+
+
+def test_more_than_half_a_turn_is_left_out() -> None:
+    found = sbafab.predict("3dof-15mm", "stack.balloons=20")
+    bends = [left for left in found.left_out if left.name.startswith("bend with")]
+    assert len(bends) == 2
+    assert "half a turn" in bends[0].reason
+
+
+def test_drawn_outline_has_sizes_and_reasons_for_the_rest(tmp_path: Path) -> None:
+    (tmp_path / "pocket.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="20mm" height="20mm" '
+        'viewBox="-10 -10 20 20"><path d="M-4 -4 L4 -4 L4 4 L-4 4 Z"/></svg>'
+    )
+    drawn = f'chamber.outline="{tmp_path / "pocket.svg"}"'
+    found = sbafab.predict("1dof-10mm", drawn)
+    assert {figure.group for figure in found.figures} == {"size", "inlet"}
+    assert {"stroke", "force", "actuation"} <= {left.name for left in found.left_out}
+    assert found.relations == ()
+    assert all("drawn pocket outline" in left.reason for left in found.left_out)
+
+
+def test_tapered_stack_is_the_sum_of_its_balloons() -> None:
+    radii = (3.0, 2.5, 2.0)
+    for k in round_stack(radii):
+        # At equal height over radius, each balloon by its own formula.
+        u = 0.3
+        law = printed.volume if k.model.name == "Eq. 4" else parabola.balloon_volume
+        each = [float(law(u * radius, radius)) for radius in radii]
+        stroke = u * sum(radii)
+        assert float(k.volume(stroke)) == pytest.approx(sum(each) / 3)
+        assert float(k.stroke(sum(each) / 3)) == pytest.approx(stroke)
+        step = 1e-5
+        slope = 3 * float(k.volume(stroke + step) - k.volume(stroke - step)) / (2 * step)
+        assert float(k.rate(stroke)) == pytest.approx(slope, rel=1e-6)
+
+
+def test_stack_of_slots_is_as_many_times_one() -> None:
+    (one,), (four,) = slot_stack(10.0, 8.5, 1), slot_stack(10.0, 8.5, 4)
+    assert float(four.stroke(100.0)) == pytest.approx(4 * float(one.stroke(100.0)))
+    assert float(four.rate(4.0)) == pytest.approx(float(one.rate(1.0)))
+
+
+def test_an_unknown_figure_is_a_key_error(three: Prediction) -> None:
+    with pytest.raises(KeyError, match="no figure 'weight'"):
+        three.value("weight")

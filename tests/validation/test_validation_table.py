@@ -1,0 +1,96 @@
+"""docs/validation.md is what its command writes, and holds every figure that was measured."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from docs.validate import PATH, validation
+from sbafab.models import parabola, printed
+
+MEASURED = (
+    # Value as printed in the paper, and a word of its row.
+    ("367 +- 18 kPa", "burst"),
+    ("90 %", "success"),
+    ("1.75 h", "build"),
+    ("15 mm", "circle round"),
+    ("15.33 mm", "deflated"),
+    ("28 mm", "inflated"),
+    ("9.25 mm", "folded"),
+    ("0.95 mm", "deflated"),
+    ("17.5 mm", "height"),
+    ("1.2 mm", "stroke of one balloon"),
+    ("0.13 mm", "air"),
+    ("0.12 mm", "water"),
+    ("0.95 kPa", "geometric regime"),
+    ("19 ul", "SOFA"),
+    ("0.531 mJ", "energy in at 1 kPa"),
+    ("0.055 mJ", "energy lost at 1 kPa"),
+    ("45.3 mJ", "energy in at 10 kPa"),
+    ("4.2 mJ", "energy lost at 10 kPa"),
+    ("1.48 +- 0.04 N", "flat"),
+    ("1.01 +- 0.01 N", "25 %"),
+    ("0.64 +- 0.01 N", "75 %"),
+    ("4.87 +- 0.02 N", "flat"),
+    ("4.07 +- 0.07 N", "25 %"),
+    ("2.4 +- 0.03 N", "75 %"),
+    ("3.22 +- 0.12 N", "30 deg"),
+    ("1.41 +- 0.05 N", "60 deg"),
+    ("0.55 +- 0.02 N", "90 deg"),
+    ("35 kPa", "modulus, 1-DoF"),
+    ("60 kPa", "modulus, 3-DoF"),
+    ("0.067 +- 0.011 s", "air"),
+    ("0.92 +- 0.08 s", "water"),
+    ("81 +- 6 deg", "bend"),
+    ("0.56 s", "30.3 deg"),
+    ("0.78 s", "58.5 deg"),
+    ("0.91 s", "89.7 deg"),
+    ("13.3 %", "SOFA"),
+    ("4.9 %", "SOFA"),
+)
+RESIDUAL = re.compile(r"([+-][\d.e+-]+), [+-][\d.]+%")
+
+
+def rows() -> list[list[str]]:
+    lines = PATH.read_text(encoding="utf-8").splitlines()
+    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if "|" in line]
+    return [row for row in cells if len(row) == 7 and not row[0].startswith(("figure", "---"))]
+
+
+def test_the_file_is_what_the_command_writes() -> None:
+    assert PATH.read_text(encoding="utf-8") == validation()
+
+
+def test_every_measured_figure_has_its_row() -> None:
+    found = rows()
+    for value, word in MEASURED:
+        assert any(row[1] == value and word in row[0] for row in found), (value, word)
+
+
+def test_every_row_has_a_prediction_or_says_that_there_is_none_and_why() -> None:
+    for what, measured, where, predicted, residual, _, why in rows():
+        assert where.startswith(("Sec.", "Table")), what
+        assert len(why) > 5, what
+        if predicted == "not":
+            assert residual == "", what
+            continue
+        found = RESIDUAL.match(residual)
+        assert found is not None, what
+        apart = float(predicted.split()[0]) - float(measured.split()[0])
+        # Four digits of the prediction, three of the residual.
+        rounding = 0.006 * abs(apart) + 6e-4 * float(predicted.split()[0])
+        assert abs(float(found[1]) - apart) <= rounding, what
+
+
+def test_comparison_of_eq_4_in_the_documentation() -> None:
+    text = (PATH.parent / "prediction.md").read_text(encoding="utf-8")
+    table = [re.findall(r"[\d.]+", line) for line in text.splitlines() if line.startswith("| 0.")]
+    assert len(table) == 6
+    for share, h, by_eqs, by_eq_4, ratio, slopes in [map(float, row) for row in table]:
+        assert h == pytest.approx(2.5 * share)
+        assert by_eqs == pytest.approx(float(parabola.volume(h, 2.5)), abs=6e-4)
+        assert by_eq_4 == pytest.approx(float(printed.volume(h, 2.5)), abs=6e-4)
+        assert ratio == pytest.approx(by_eq_4 / by_eqs, abs=1e-3)
+        exact = float(printed.rate(h, 2.5) / parabola.rate(h, 2.5))
+        assert slopes == pytest.approx(exact, abs=6e-3)
