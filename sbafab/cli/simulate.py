@@ -16,7 +16,7 @@ from sbafab.cli.working import RULE_FAILED
 if TYPE_CHECKING:
     from sbafab.simulators.simulator import Name, Result, Wish
 
-SIMULATORS = ("calculix", "sofa")
+SIMULATORS = ("calculix", "sofa", "mujoco")
 """As in ``sbafab.simulators.simulator``, whose imports would slow ``--help`` down."""
 KILOPASCALS = {"Pa": 0.001, "kPa": 1.0, "MPa": 1000.0, "mbar": 0.1, "bar": 100.0, "psi": 6.894757}
 MICROLITRES = {"ul": 1.0, "ml": 1000.0, "mm3": 1.0}
@@ -73,7 +73,7 @@ def _volumes(
     "--pressure",
     callback=_pressure,
     metavar="P",
-    help='In every chamber, kPa or with a unit ("60 mbar").  [default: calculix 6, sofa 5 kPa]',
+    help='In every chamber, kPa or with a unit ("60 mbar").  [default: calculix 6, others 5]',
 )
 @click.option(
     "--chamber",
@@ -108,7 +108,9 @@ def _volumes(
     type=click.Choice(["shell", "frames", "volume", "beam"]),
     help="sofa: which of the scenes is run.  [default: shell]",
 )
-@click.option("--seconds", type=float, metavar="S", help="sofa: simulated time.  [default: 8]")
+@click.option(
+    "--seconds", type=float, metavar="S", help="sofa, mujoco: simulated time.  [default: 8; 5]"
+)
 @click.option(
     "--volume",
     "volumes",
@@ -121,8 +123,8 @@ def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> N
     """Inflate a design in a simulator that is installed, and read back what it says.
 
     Into OUT/<name>/calculix/ come stroke, air and wall stress against pressure as table and plot,
-    the deformed shape as VTU and picture; into OUT/<name>/sofa/ the scenes and the tip's record.
-    Exit code 1 if a run stopped early: what it reached is kept.
+    the deformed shape as VTU and picture; into OUT/<name>/sofa/ or mujoco/ what it has read, and
+    the tip's record. Exit code 1 if a run stopped early: what it reached is kept.
     """
     from sbafab.actuators import load_design
     from sbafab.cli.printing import console, findings_table, print_json, shown_progress

@@ -14,8 +14,8 @@ from sbafab.laminate.laminate import Laminate
 
 Progress = Callable[[str, int, int], None]
 """Told what is being done, and how much of how much is."""
-Name = Literal["calculix", "sofa"]
-NAMES: tuple[Name, ...] = ("calculix", "sofa")
+Name = Literal["calculix", "sofa", "mujoco"]
+NAMES: tuple[Name, ...] = ("calculix", "sofa", "mujoco")
 MOST_PRESSURE = 1000.0
 """kPa: nearly three times what bursts the paper's actuators."""
 

@@ -169,6 +169,18 @@ def test_tilt_is_the_angle_of_the_tip() -> None:
     assert end.volumes["chamber2"] == pytest.approx(start.volumes["chamber2"], rel=1e-9)
 
 
+@pytest.mark.parametrize("symmetry", ["half", "sector"])
+def test_air_of_chambers_that_are_images(symmetry: Symmetry) -> None:
+    laminate = build(load_design("3dof-15mm", ("stack.balloons=1",)))
+    mesh = deck_mesh(laminate, MeshSettings(h=0.75, symmetry=symmetry, gaps=True))
+    pressures = {f"chamber{n}": 1.0 for n in (1, 2, 3)}
+    frame = Frame(1.0, np.zeros_like(mesh.points), np.zeros((len(mesh.points), 6)))
+    *_, last = history(mesh, laminate, symmetry, DeckSettings(pressures, imperfection=0), [frame])
+    # Each lobe's pocket with its inlet: mask thickness times the area that is not bonded.
+    pockets = laminate.interfaces[0].unbonded
+    assert list(last.volumes.values()) == pytest.approx([0.025 * pockets.area / 3] * 3, rel=5e-3)
+
+
 def test_pressure_rises_with_the_square_of_time() -> None:
     shares = [SETTINGS.share(time) for time in (0.0, 0.25, 0.5, 1.0, 1.5)]
     assert shares == pytest.approx([0, 1 / 16, 1 / 4, 1, 1])
@@ -205,15 +217,16 @@ def test_plot_draws_every_state_and_names_its_axes() -> None:
     ]
     root = ET.fromstring(history_svg("a < b", states))
     texts = ["".join(text.itertext()) for text in root.iter("{http://www.w3.org/2000/svg}text")]
-    assert texts[0] == "a < b"
-    assert {"stroke of the tip, mm", "volume of air, ul", "left", "right & up"} <= set(texts)
+    assert {"a < b", "stroke, mm", "volume, ul", "stress, MPa", "left", "right & up"} <= set(texts)
     assert texts.count("pressure in left, kPa") == 3
-    curves = list(root.iter("{http://www.w3.org/2000/svg}polyline"))
-    assert len(curves) == 4
-    # The last point of the first panel lies at 6 of its axis, which ends at the last tick.
-    assert all(len(curve.attrib["points"].split()) == 2 for curve in curves)
-    dashes = [curve.get("stroke-dasharray") for curve in curves[1:3]]
-    assert dashes[0] != dashes[1]
+    curves = [g for g in root.iter("{http://www.w3.org/2000/svg}g") if "curve" in g.get("id", "")]
+    assert [g.get("id") for g in curves] == ["curve1.1", "curve2.1", "curve2.2", "curve3.1"]
+    # Two states: a path of two points, and a dot at each.
+    for curve in curves:
+        line = curve.find("{http://www.w3.org/2000/svg}path")
+        assert line is not None
+        assert line.attrib["d"].split()[::3] == ["M", "L"]
+        assert len(list(curve.iter("{http://www.w3.org/2000/svg}use"))) == 2
 
 
 def test_deformed_vtu_holds_moved_points_and_stress(tmp_path: Path) -> None:

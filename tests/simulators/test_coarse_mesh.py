@@ -1,4 +1,4 @@
-"""The coarse shell that SOFA's scenes are made of."""
+"""The coarse shell that several simulators take."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ import sbafab
 from sbafab.errors import DesignError
 from sbafab.simulators.coarse.meridian import Meridian, fullest, holding, partly, standing
 from sbafab.simulators.coarse.mesh import CoarseMesh, Triangle, area, coarse_mesh
-from sbafab.simulators.coarse.rounds import round_stack
-from sbafab.simulators.sofa.files import why_no_scene
+from sbafab.simulators.coarse.rounds import round_stack, why_not_round
 
 LOBED = "3dof-15mm"
 DESIGNS = [
@@ -88,6 +87,20 @@ def test_cavities_are_closed_and_look_outward(design: tuple[str, ...]) -> None:
         assert surface.volume == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.parametrize("sectors", [12, 16, 24])
+def test_finer_rings_hold_nearly_what_round_ones_do(sectors: int) -> None:
+    stack = round_stack(sbafab.build(LOBED, "stack.balloons=2"))
+    mesh = coarse_mesh(stack, sectors=sectors)
+    for group in (mesh.lower, mesh.upper, mesh.web, mesh.necks):
+        assert all(count == 1 for count in edges(group).values())
+    eight = coarse_mesh(stack)
+    # Areas of polygons of so many corners, against that of eight.
+    ratio = sectors * math.sin(math.tau / sectors) / (8 * math.sin(math.tau / 8))
+    for name, triangles in mesh.cavities:
+        assert trimesh.Trimesh(mesh.position, triangles, process=False).is_watertight
+        assert mesh.volume(name) / eight.volume(name) == pytest.approx(ratio, rel=0.02)
+
+
 def eight_sided(meridian: Meridian, pocket: float) -> float:
     """Volume of a balloon of eight-sided frustums between points of its meridian."""
     steps = max(2, round(meridian.length / (pocket / 4)))
@@ -107,6 +120,8 @@ def test_ends_are_where_they_belong() -> None:
     for node, (x, y) in zip(mesh.tip, axes, strict=True):
         assert mesh.rest[node][:2] == pytest.approx((x, y), abs=1e-6)
         assert mesh.position[node][2] == mesh.height
+        assert node in mesh.poles
+    assert [mesh.rest[node][:2] for node in mesh.roots] == [mesh.rest[n][:2] for n in mesh.poles]
     assert all(z == 0 for _, _, z in mesh.rest)
 
 
@@ -164,5 +179,5 @@ def test_unsuited_designs_are_refused_with_the_reason(tmp_path: Path) -> None:
     square = sbafab.build("1dof-5mm", "stack.balloons=2", f"chamber.outline={drawn}")
     with pytest.raises(DesignError, match=r"x 0\.000, y 0\.000 is drawn otherwise"):
         round_stack(square)
-    assert "family radial" in (why_no_scene(sbafab.build("radial-15mm")) or "")
-    assert why_no_scene(sbafab.build("1dof-5mm")) is None
+    assert "family radial" in (why_not_round(sbafab.build("radial-15mm")) or "")
+    assert why_not_round(sbafab.build("1dof-5mm")) is None

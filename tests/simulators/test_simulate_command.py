@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -76,6 +77,16 @@ def test_bad_arguments(tmp_path: Path, options: list[str], words: str) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_parts_that_are_images_take_one_pressure(tmp_path: Path) -> None:
+    arguments = ["simulate", "3dof-15mm", "--with", "calculix", "-o", str(tmp_path)]
+    arguments += ["--symmetry", "half", "--export"]
+    result = CliRunner().invoke(app, [*arguments, "--chamber", "chamber2=1"])
+    assert result.exit_code == 2
+    assert "symmetry half computes" in result.stderr
+    assert "give both one pressure" in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_design_that_breaks_a_rule_is_not_simulated(tmp_path: Path) -> None:
     arguments = ["simulate", "1dof-5mm", "--with", "sofa", "--export", "-o", str(tmp_path)]
     result = CliRunner().invoke(app, [*arguments, "--set", "bond.width=0.5"])
@@ -121,5 +132,10 @@ def test_results_of_another_input_are_not_kept(tmp_path: Path) -> None:
     assert CliRunner().invoke(app, ["simulate", *common]).exit_code == 0
     folder = tmp_path / "1dof-5mm"
     (folder / "sofa" / "tip.state").write_text("of a run")
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["files"]["sofa/tip.state"] = sha256(b"of a run").hexdigest()
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    assert CliRunner().invoke(app, ["press", "1dof-5mm", "-o", str(tmp_path)]).exit_code == 0
+    assert (folder / "sofa" / "tip.state").exists()
     assert CliRunner().invoke(app, ["simulate", *common, "--pressure", "2"]).exit_code == 0
     assert not (folder / "sofa" / "tip.state").exists()

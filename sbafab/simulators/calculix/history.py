@@ -14,7 +14,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.cavities import flat_triangles
 from sbafab.meshing.conforming.model import Mesh
 from sbafab.meshing.conforming.settings import Symmetry
-from sbafab.meshing.conforming.symmetry import sector
+from sbafab.meshing.conforming.symmetry import images, sector
 from sbafab.simulators.calculix.frd import Frame
 from sbafab.simulators.calculix.settings import DeckSettings
 
@@ -63,6 +63,7 @@ def history(
     tips, bases = (_poles(mesh, laminate, name) for name in ("tip", "base"))
     walls = {name: _walls(mesh, name) for name in settings.pressures}
     shares = {name: _share(laminate, name, symmetry) for name in settings.pressures}
+    stand = images(laminate, symmetry)
     start = np.zeros_like(mesh.points)
     unloaded = Frame(0.0, start, np.zeros((len(start), 6)))
     states: list[State] = []
@@ -71,7 +72,8 @@ def history(
         moved = frame.displacement[tips].mean(axis=0) - frame.displacement[bases].mean(axis=0)
         part = settings.share(frame.time)
         pressures = {name: part * value for name, value in settings.pressures.items()}
-        volumes = {name: _volume(points, walls[name]) / shares[name] for name in walls}
+        meshed = {name: _volume(points, walls[name]) / shares[name] for name in set(stand.values())}
+        volumes = {name: meshed[stand[name]] for name in walls}
         work = states[-1].work + _work(states[-1], pressures, volumes) if states else 0.0
         states.append(
             State(
@@ -131,7 +133,7 @@ def _volume(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> float:
 
 
 def _share(laminate: Laminate, chamber: str, symmetry: Symmetry) -> float:
-    """The part of a chamber that is meshed; 1 where it is not meshed at all."""
+    """The part of a chamber that is meshed; 1 where none of it is."""
     part = sector(laminate, symmetry)
     if part is None:
         return 1.0

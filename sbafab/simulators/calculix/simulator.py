@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import cast
 
+from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.settings import MeshSettings, Symmetry
+from sbafab.meshing.conforming.symmetry import images
 from sbafab.simulators.calculix.deck import write_deck
 from sbafab.simulators.calculix.job import deck_mesh, simulate
 from sbafab.simulators.calculix.settings import DeckSettings, Procedure, deck_settings
@@ -46,4 +48,11 @@ def _settings(laminate: Laminate, wish: Wish) -> tuple[MeshSettings, DeckSetting
         h=usual.h if wish.h is None else wish.h,
         symmetry=cast(Symmetry, wish.symmetry or usual.symmetry),
     )
-    return mesh, deck_settings(laminate, wish, cast(Procedure, wish.procedure or "dynamic"))
+    settings = deck_settings(laminate, wish, cast(Procedure, wish.procedure or "dynamic"))
+    for name, meshed in images(laminate, mesh.symmetry).items():
+        if settings.pressures[name] != settings.pressures[meshed]:
+            raise DesignError(
+                f"symmetry {mesh.symmetry} computes {meshed} in place of {name}: give both one "
+                "pressure, or take symmetry full"
+            )
+    return mesh, settings

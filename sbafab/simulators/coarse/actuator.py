@@ -9,7 +9,7 @@ from functools import cached_property
 
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-from sbafab.simulators.coarse.mesh import CoarseMesh, coarse_mesh
+from sbafab.simulators.coarse.mesh import SECTORS, CoarseMesh, coarse_mesh
 from sbafab.simulators.coarse.rounds import RoundStack, round_stack
 from sbafab.simulators.simulator import refuse_unknown
 
@@ -27,11 +27,12 @@ class Actuator:
 
     stack: RoundStack
     pressures: tuple[tuple[str, float], ...]
+    sectors: int = SECTORS
 
     @cached_property
     def mesh(self) -> CoarseMesh:
         """The coarse shell, inflated."""
-        return coarse_mesh(self.stack)
+        return coarse_mesh(self.stack, sectors=self.sectors)
 
     @property
     def membrane(self) -> float:
@@ -61,14 +62,17 @@ class Actuator:
         return checked(self.stack.chambers, given, usual, "volume", "ul")
 
 
-def actuator(laminate: Laminate, pressures: Mapping[str, float] | None = None) -> Actuator:
+def actuator(
+    laminate: Laminate, pressures: Mapping[str, float] | None = None, sectors: int = SECTORS
+) -> Actuator:
     """An actuator under pressure: 5 kPa a chamber, or what is given by chamber in kPa, 0 elsewhere.
 
-    Raises DesignError where the laminate has other than round pockets, or a chamber is unknown.
+    ``sectors`` nodes make a ring. Raises DesignError where the laminate has other than round
+    pockets, or a chamber is unknown.
     """
     stack = round_stack(laminate)
     told = checked(stack.chambers, pressures, PRESSURE, "pressure", "kPa")
-    return Actuator(stack, tuple(told.items()))
+    return Actuator(stack, tuple(told.items()), sectors)
 
 
 def checked(

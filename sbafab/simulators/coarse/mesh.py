@@ -1,8 +1,8 @@
 """The coarse shell of a whole actuator: mid-surfaces that share the nodes of what is bonded.
 
-In each pocket rings of (usually) eight nodes at bore, neck, between them and the edge; the web between the
-pockets and the neck rings are one layer of double thickness. Inlet tabs and strips are left out.
-Lengths mm, volumes ul.
+In each pocket rings of eight nodes or more at bore, neck, between them and the edge; the web
+between the pockets and the neck rings are one layer of double thickness. Inlet tabs and strips are
+left out. Lengths mm, volumes ul.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ class CoarseMesh:
     ``lower`` and ``upper`` are the free films, ``web`` and ``necks`` are bonded pairs. In each
     group no edge has more than two triangles. ``cavities`` holds a closed surface a chamber,
     normals out of the air. ``fixed`` are the nodes on the ground, ``tip`` those whose mean is the
-    tip and whose plane is its tilt, counter-clockwise from above.
+    tip and whose plane is its tilt, counter-clockwise from above; ``roots`` and ``poles`` are the
+    centres of the lowest and of the highest film over each chamber axis.
     """
 
     rest: tuple[Vector, ...]
@@ -44,6 +45,8 @@ class CoarseMesh:
     cavities: tuple[tuple[str, tuple[Triangle, ...]], ...]
     fixed: tuple[int, ...]
     tip: tuple[int, ...]
+    roots: tuple[int, ...]
+    poles: tuple[int, ...]
 
     @property
     def single(self) -> tuple[Triangle, ...]:
@@ -117,6 +120,7 @@ class _Builder:
         z = 0.0
         discs = [self._disc(k, z, closed=True) for k in range(self.stack.lobes)]
         fixed = tuple(node for disc in discs for ring in disc for node in ring)
+        roots = tuple(disc[0][0] for disc in discs)
         for k, disc in enumerate(discs):
             self._cap(k, disc, self.lower, turned=True)
         last = len(self.meridians) - 1
@@ -150,6 +154,8 @@ class _Builder:
             ),
             fixed=fixed,
             tip=self._tip(discs),
+            roots=roots,
+            poles=tuple(disc[0][0] for disc in discs),
         )
 
     def _node(self, flat: Point, placed: Point, z: float) -> int:
@@ -253,13 +259,12 @@ class _Builder:
 
     def _tip(self, discs: list[tuple[Ring, ...]]) -> tuple[int, ...]:
         """The cap's centres; where they are fewer than three, points of its neck rims."""
+        quarter = self.sectors // 4
         if len(discs) >= 3:
             return tuple(disc[0][0] for disc in discs)
         if len(discs) == 2:
-            return tuple(
-                disc[-1][i] for disc in discs for i in (-self.sectors // 4, self.sectors // 4)
-            )
-        return tuple(discs[0][-1][i] for i in range(0, self.sectors, self.sectors // 4))
+            return tuple(disc[-1][i] for disc in discs for i in (-quarter, quarter))
+        return tuple(discs[0][-1][i] for i in range(0, self.sectors, quarter))
 
 
 def annulus(inner: Ring, outer: Ring) -> list[Triangle]:

@@ -14,11 +14,12 @@ from typing import BinaryIO, Literal
 
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
+from sbafab.simulators.coarse.tip import Tip
 from sbafab.simulators.sofa.files import BEAM, FRAMES, SHELL, VOLUME, write_scenes
 from sbafab.simulators.sofa.frames import BEAM_DT, FRAMES_DT
 from sbafab.simulators.sofa.parts import TIP_FILE, TIP_PERIOD
 from sbafab.simulators.sofa.shell_scene import DT
-from sbafab.simulators.sofa.tip import Log, Tip, read_log, read_tips
+from sbafab.simulators.sofa.tip import Log, read_log, read_tips
 
 Progress = Callable[[str, int, int], None]
 """Told what is being done, and how much of how much is."""

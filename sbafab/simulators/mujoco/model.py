@@ -1,0 +1,168 @@
+"""The actuator as a MuJoCo model (MJCF): a body a node, a flex a group of films."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Sequence
+
+from sbafab.simulators.coarse.actuator import POISSON, YOUNG, Actuator
+from sbafab.simulators.coarse.mesh import Triangle, Vector, area
+
+DT = 0.01
+"""s: a step. The integrator is implicit; four times as long does as well."""
+SOLVER_STEPS = 1000
+"""Of the solver in each time step; the usual 100 do not suffice for long stacks."""
+START = "inflated"
+COLOURS = {
+    "lower": "0.35 0.60 0.85 1",
+    "upper": "0.55 0.75 0.95 1",
+    "web": "0.20 0.35 0.60 1",
+    "necks": "0.90 0.60 0.25 1",
+}
+
+
+def model_text(actuator: Actuator) -> str:
+    """The model as a file: node i is body ``n<i>``, which stands flat unless the key is loaded."""
+    root = ET.Element("mujoco", {"model": actuator.stack.name})
+    option = ET.SubElement(
+        root,
+        "option",
+        {
+            "timestep": _number(DT),
+            "gravity": "0 0 0",
+            "integrator": "discrete",
+            "iterations": str(SOLVER_STEPS),
+        },
+    )
+    ET.SubElement(option, "flag", {"contact": "disable", "autoreset": "disable"})
+    height = actuator.mesh.height
+    centre = {"center": f"0 0 {_number(height / 2)}", "extent": _number(max(height, 5.0))}
+    ET.SubElement(root, "statistic", centre)
+    _add_nodes(ET.SubElement(root, "worldbody"), actuator)
+    _add_films(ET.SubElement(root, "deformable"), actuator)
+    _add_start(ET.SubElement(root, "keyframe"), actuator)
+    ET.indent(root, " ")
+    body = ET.tostring(root, encoding="unicode")
+    return f'<?xml version="1.0"?>\n<!--\n{_note(actuator)}\n-->\n{body}\n'
+
+
+def held(actuator: Actuator) -> frozenset[int]:
+    """Nodes that stand still: the base; of a lone balloon its centre, so that it bulges both ways.
+
+    That is how the CalculiX deck holds them.
+    """
+    mesh = actuator.mesh
+    return frozenset(mesh.roots if actuator.balloons == 1 else mesh.fixed)
+
+
+def _add_nodes(world: ET.Element, actuator: Actuator) -> None:
+    still = held(actuator)
+    masses = _masses(actuator)
+    for node, place in enumerate(actuator.mesh.rest):
+        body = ET.SubElement(world, "body", {"name": f"n{node}", "pos": _numbers(place)})
+        if node in still:
+            continue
+        mass = _number(masses[node])
+        # It never turns, but MuJoCo wants a moment of inertia.
+        ET.SubElement(
+            body,
+            "inertial",
+            {"pos": "0 0 0", "mass": mass, "diaginertia": f"{mass} {mass} {mass}"},
+        )
+        for axis in ("1 0 0", "0 1 0", "0 0 1"):
+            ET.SubElement(body, "joint", {"type": "slide", "axis": axis})
+
+
+def _add_films(deformable: ET.Element, actuator: Actuator) -> None:
+    for name, triangles, films in film_groups(actuator):
+        nodes = sorted({node for triangle in triangles for node in triangle})
+        place = {node: i for i, node in enumerate(nodes)}
+        thickness = films * actuator.stack.film.thickness
+        flex = ET.SubElement(
+            deformable,
+            "flex",
+            {
+                "name": name,
+                "dim": "2",
+                "radius": _number(thickness / 2),
+                "rgba": COLOURS[name],
+                "body": " ".join(f"n{node}" for node in nodes),
+                "element": " ".join(str(place[node]) for t in triangles for node in t),
+            },
+        )
+        contact = {"selfcollide": "none", "contype": "0", "conaffinity": "0"}
+        ET.SubElement(flex, "contact", contact)
+        elasticity = {
+            "young": _number(YOUNG),
+            "poisson": _number(POISSON),
+            "thickness": _number(thickness),
+            "elastic2d": "both",
+        }
+        ET.SubElement(flex, "elasticity", elasticity)
+
+
+def _add_start(keyframe: ET.Element, actuator: Actuator) -> None:
+    still = held(actuator)
+    mesh = actuator.mesh
+    moved = (
+        q - p
+        for node, (rest, position) in enumerate(zip(mesh.rest, mesh.position, strict=True))
+        if node not in still
+        for p, q in zip(rest, position, strict=True)
+    )
+    ET.SubElement(keyframe, "key", {"name": START, "qpos": _numbers(moved)})
+
+
+def film_groups(actuator: Actuator) -> list[tuple[str, Sequence[Triangle], int]]:
+    """Flexes with the number of films bonded in each. They share bodies where films are bonded.
+
+    In one flex an edge may have two triangles at most, so that it takes several.
+    """
+    mesh = actuator.mesh
+    groups = [
+        ("lower", mesh.lower, 1),
+        ("upper", mesh.upper, 1),
+        ("web", mesh.web, 2),
+        ("necks", mesh.necks, 2),
+    ]
+    return [group for group in groups if group[1]]
+
+
+def _masses(actuator: Actuator) -> list[float]:
+    """True mass in kg of each node: a third of each triangle's."""
+    film = actuator.stack.film
+    masses = [0.0] * len(actuator.mesh.rest)
+    for _, triangles, films in film_groups(actuator):
+        for triangle in triangles:
+            surface = area(actuator.mesh.rest, triangle)
+            for node in triangle:
+                masses[node] += surface / 3 * films * film.thickness * film.density * 1e-9
+    return masses
+
+
+def _note(actuator: Actuator) -> str:
+    mesh = actuator.mesh
+    triangles = len(mesh.single) + len(mesh.double)
+    # Two hyphens in a row would end an XML comment.
+    name = actuator.stack.name.replace("--", "- -")
+    return f"""\
+{name}: a stack of balloons for MuJoCo 4.0 or newer. Up to 3.17 a flex of dimension 2
+stretches with a quarter of its modulus: do not run it there.
+Units: mm, kg, s; so force mN, pressure and modulus kPa, volume ul.
+Mesh: {len(mesh.rest)} nodes, {triangles} triangles, rings of {actuator.sectors} nodes: not mesh
+converged. Node i is the body n<i>. It stands flat, where the film is free of stress; the key
+"{START}" is where runs start.
+Pressure is not in this file: inflate.py puts it on the cavities that actuator.json lists.
+Not scaled: mass ({actuator.mass:.3g} kg), modulus and thickness are the film's. No damping is set,
+but steps of {DT:g} s of an implicit integrator damp all that is faster: transients and settling
+times mean nothing, only the state at rest.
+Not in it: gravity, contact of films, inlet tabs and strips. Not validated by a measurement."""
+
+
+def _number(value: float) -> str:
+    """Nine digits, and no minus before a zero."""
+    return f"{value + 0.0:.9g}"
+
+
+def _numbers(values: Iterable[float] | Vector) -> str:
+    return " ".join(_number(round(value, 9)) for value in values)

@@ -1,0 +1,209 @@
+"""Inflates a model with MuJoCo and tells what its tip did."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sbafab.errors import DesignError, OutputError
+from sbafab.laminate.laminate import Laminate
+from sbafab.simulators.coarse.tip import Tip, tip_at
+from sbafab.simulators.mujoco.files import DATA, MODEL, SECTORS, write_model
+
+Progress = Callable[[str, int, int], None]
+"""Told what is being done, and how much of how much is."""
+
+SECONDS = 5.0
+RAMP = 1.0
+"""s in which a pressure rises from 0."""
+TIP_PERIOD = 0.1
+"""s between two records of the tip."""
+LONGEST = 1e5
+"""s of simulated time."""
+OLDEST = 4
+"""Up to version 3.17 a flex of dimension 2 stretches with a quarter of its modulus."""
+INSTALL = 'install it with: pip install "sbafab[mujoco]"'
+
+
+@dataclass(frozen=True)
+class MujocoRun:
+    """A run that can be believed: what the tip did, and how it ended.
+
+    ``stroke`` in mm is by how much the films' centres at both ends have parted upward since flat;
+    ``volumes`` in ul by chamber; ``rate`` in steps per s of real time.
+    """
+
+    model: Path
+    tips: tuple[Tip, ...]
+    stroke: float
+    volumes: tuple[tuple[str, float], ...]
+    steps: int
+    rate: float
+
+    @property
+    def last(self) -> Tip:
+        return self.tips[-1]
+
+    @property
+    def drift(self) -> float:
+        """How far in mm the tip moved in the last half second: is it at rest?"""
+        since = [tip for tip in self.tips if tip.time >= self.last.time - 0.5 - TIP_PERIOD / 2]
+        return math.dist(since[0].place, self.last.place)
+
+
+def simulate(
+    laminate: Laminate,
+    folder: Path,
+    pressures: Mapping[str, float] | None = None,
+    seconds: float = SECONDS,
+    tell: Progress | None = None,
+    sectors: int = SECTORS,
+    limit: float | None = None,
+) -> MujocoRun:
+    """Writes the model of a laminate into a folder and inflates it.
+
+    ``pressures`` in kPa by chamber, 0 for those left out, or 5 kPa everywhere; ``sectors`` nodes
+    make a ring; ``limit`` is the most real time in s. Raises DesignError where no such model can
+    be made of the laminate, OutputError where mujoco is missing or its run cannot be believed.
+    """
+    if not 2 * RAMP <= seconds <= LONGEST:
+        raise DesignError(
+            f"simulated time = {seconds:g} s must lie between {2 * RAMP:g} and {LONGEST:g} s"
+        )
+    find_mujoco()
+    write_model(laminate, folder, pressures, sectors)
+    return run_model(folder, seconds, tell, limit)
+
+
+def find_mujoco() -> Any:
+    """The package mujoco. Raises OutputError with what to do where it is missing or too old."""
+    try:
+        import mujoco
+    except ImportError as reason:
+        raise OutputError(f"mujoco is not installed; {INSTALL}") from reason
+    version = str(mujoco.__version__)
+    if int(version.split(".", maxsplit=1)[0]) < OLDEST:
+        raise OutputError(
+            f"mujoco {version} stretches films with a quarter of their modulus, {OLDEST}.0 does "
+            f"not; {INSTALL}"
+        )
+    return mujoco
+
+
+def run_model(
+    folder: Path, seconds: float, tell: Progress | None = None, limit: float | None = None
+) -> MujocoRun:
+    """Inflates the model in a folder.
+
+    Raises OutputError if the model does not load, a step is unstable or not solved, or it all
+    takes longer than ``limit`` s; the sentence says how far the tip was known.
+    """
+    mujoco = find_mujoco()
+    path = folder / MODEL
+    with _said(mujoco) as said:
+        try:
+            model = mujoco.MjModel.from_xml_path(str(path))
+        except ValueError as reason:
+            text = " ".join(str(reason).split())
+            raise OutputError(f"{path} does not load in MuJoCo: {text}") from reason
+        inflation = _Inflation(mujoco, model, json.loads((folder / DATA).read_text("utf-8")))
+        steps = round(seconds / model.opt.timestep)
+        every = max(1, round(TIP_PERIOD / model.opt.timestep))
+        tips = [inflation.tip()]
+        started = time.monotonic()
+        for step in range(1, steps + 1):
+            inflation.step()
+            why = inflation.trouble(said)
+            if why is None and limit is not None and time.monotonic() - started > limit:
+                why = f"it took longer than {limit:g} s"
+            if why is not None:
+                known = f"the tip is known to {tips[-1].time:g} s"
+                raise OutputError(f"{MODEL} did not run to its end: {why}; {known}")
+            if step % every == 0 or step == steps:
+                tips.append(inflation.tip())
+                if tell is not None:
+                    tell("mujoco", step, steps)
+    rate = steps / max(time.monotonic() - started, 1e-9)
+    return MujocoRun(path, tuple(tips), inflation.stroke(), inflation.volumes(), steps, rate)
+
+
+class _Inflation:
+    """The model's state, and the cavities that the pressures act on."""
+
+    def __init__(self, mujoco: Any, model: Any, told: Mapping[str, Any]) -> None:
+        import numpy as np
+
+        self.mujoco, self.model, self.told = mujoco, model, told
+        self.state = mujoco.MjData(model)
+        key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, told["start"])
+        mujoco.mj_resetDataKeyframe(model, self.state, key)
+        self.cavities = {name: np.array(t) for name, t in told["cavities"].items()}
+        # The world, body 0, comes before the nodes.
+        self.free = model.body_dofnum[1:] > 0
+        self.nodes = self._placed()
+
+    def _placed(self) -> Any:
+        self.mujoco.mj_kinematics(self.model, self.state)
+        return self.state.xpos[1:].copy()
+
+    def step(self) -> None:
+        """One time step under the pressures of this time, which follow the films."""
+        import numpy as np
+
+        share = min(1.0, (self.state.time + self.model.opt.timestep) / RAMP)
+        forces = np.zeros_like(self.nodes)
+        for name, triangles in self.cavities.items():
+            a, b, c = self.nodes[triangles].transpose(1, 0, 2)
+            push = np.cross(b - a, c - a) * (share * self.told["pressures"][name] / 6)
+            for corner in triangles.T:
+                np.add.at(forces, corner, push)
+        self.state.qfrc_applied[:] = forces[self.free].ravel()
+        self.mujoco.mj_step(self.model, self.state)
+        self.nodes = self._placed()
+
+    def trouble(self, said: list[str]) -> str | None:
+        """Why the state cannot be believed."""
+        import numpy as np
+
+        if said:
+            return f'MuJoCo says "{" ".join(said[0].split())[:200]}"'
+        if any(warning.number for warning in self.state.warning):
+            return "MuJoCo warns of an unstable step"
+        # MuJoCo takes a force that is no number for none, and says nothing.
+        if not np.isfinite(self.state.qfrc_smooth).all() or not np.isfinite(self.nodes).all():
+            return "a force or a place is no finite number"
+        return None
+
+    def tip(self) -> Tip:
+        points = [(float(x), float(y), float(z)) for x, y, z in self.nodes[self.told["tip"]]]
+        return tip_at(round(float(self.state.time), 9), points)
+
+    def stroke(self) -> float:
+        poles, roots = (self.nodes[self.told[end]].mean(axis=0) for end in ("poles", "roots"))
+        return float(poles[2] - roots[2])
+
+    def volumes(self) -> tuple[tuple[str, float], ...]:
+        import numpy as np
+
+        found = []
+        for name, triangles in self.cavities.items():
+            a, b, c = self.nodes[triangles].transpose(1, 0, 2)
+            found.append((name, float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6))
+        return tuple(found)
+
+
+@contextmanager
+def _said(mujoco: Any) -> Iterator[list[str]]:
+    """What MuJoCo says is wrong, which it would otherwise write into the current folder."""
+    said: list[str] = []
+    mujoco.set_mju_user_warning(said.append)
+    try:
+        yield said
+    finally:
+        mujoco.set_mju_user_warning(None)
