@@ -43,6 +43,10 @@ def ended_plainly() -> Iterator[None]:
             yield
         finally:
             sys.stdout.flush()
+    except click.UsageError as error:
+        help_of = f"; see {error.ctx.command_path} --help" if error.ctx is not None else ""
+        say(f"{error.format_message().rstrip('.')}{help_of}")
+        sys.exit(BAD_INPUT)
     except SbafabError as error:
         say(str(error))
         sys.exit(BAD_INPUT)
@@ -60,7 +64,8 @@ def ended_plainly() -> Iterator[None]:
         if error.filename is None:
             _silence()
         where = error.filename or "standard output"
-        say(f"{where}: {error.strerror or error}; free or name another place")
+        reason = error.strerror or str(error)
+        say(f"{where}: {reason[:1].lower()}{reason[1:]}; make room there or name another place")
         sys.exit(BAD_INPUT)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sbafab.cli.options import json_option
+from sbafab.cli.options import finite, json_option
 
 if TYPE_CHECKING:
     from sbafab.cutting.calibration import Calibration, Estimate, Value
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 @click.option(
     "--resolution",
     type=click.FloatRange(0, 1),
+    callback=finite,
     default=0.01,
     show_default=True,
     metavar="MM",

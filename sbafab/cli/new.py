@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import click
@@ -24,7 +25,8 @@ def new(template: str, file: Path | None) -> None:
     from sbafab.design.reading import write_new
 
     written = write_new(template, file)
-    click.echo(f"{written} is yours to edit; then: sbafab generate {written}")
+    path = shlex.quote(str(written))
+    click.echo(f"{written} is yours to edit; then: sbafab generate {path}")
 
 
 def _coupon(folder: Path) -> None:
@@ -33,4 +35,5 @@ def _coupon(folder: Path) -> None:
 
     drawing, picture, table = write_coupon(folder, GENERATOR)
     click.echo(f"Cut {drawing} (picture: {picture}) from each film, with a kerf offset of 0.")
-    click.echo(f"Measure it and fill in {table}; then: sbafab kerf {table} --material tpe")
+    path = shlex.quote(str(table))
+    click.echo(f"Measure it and fill in {table}; then: sbafab kerf {path} --material tpe")

@@ -12,6 +12,7 @@ from typing import Any
 import click
 
 Command = Callable[..., Any]
+CHORD_ERROR = 0.005
 
 set_option = click.option(
     "--set",
@@ -107,10 +108,10 @@ def sheet_options(command: Command) -> Command:
     return count(engine(assigned))
 
 
-def _finite(ctx: click.Context, param: click.Parameter, value: float) -> float:
-    # A range lets nan through: it is neither below nor above.
-    if not math.isfinite(value):
-        raise click.BadParameter("must be a number from 0.0001 to 0.1", ctx, param)
+def finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
+    """A callback; a range lets nan through, which is neither below nor above."""
+    if value is not None and not math.isfinite(value):
+        raise click.BadParameter("must be a finite number", ctx, param)
     return value
 
 
@@ -119,11 +120,9 @@ def dxf_options(command: Command) -> Command:
     chord = click.option(
         "--chord-error",
         type=click.FloatRange(0.0001, 0.1),
-        callback=_finite,
-        default=0.005,
-        show_default=True,
+        callback=finite,
         metavar="MM",
-        help="Farthest a chord may leave its arc, with --dxf-profile chords.",
+        help="Farthest a chord may leave its arc, with --dxf-profile chords.  [default: 0.005]",
     )
     profile = click.option(
         "--dxf-profile",
@@ -132,4 +131,11 @@ def dxf_options(command: Command) -> Command:
         show_default=True,
         help="Arcs as polyline bulges, as ARC entities, or as chords.",
     )
-    return profile(chord(command))
+
+    @functools.wraps(command)
+    def said(dxf_profile: str, chord_error: float | None, **others: Any) -> Any:
+        if chord_error is not None and dxf_profile != "chords":
+            raise click.UsageError("--chord-error goes with --dxf-profile chords; add it")
+        return command(dxf_profile=dxf_profile, chord_error=chord_error or CHORD_ERROR, **others)
+
+    return profile(chord(said))

@@ -24,6 +24,10 @@ MOST_DEGREES = 200
 LARGEST = 1.0
 """mm; a wider kerf is a mistake in the table."""
 LONGEST = 10_000.0
+WORST_SCALE = 0.1
+"""Of measured over nominal sizes: no machine is so far off, another unit is."""
+LARGEST_SLIP = 0.25
+"""mm; more than twice the largest error of laser cutting (paper, Sec. 2) is a slip of the pen."""
 
 Kind = Literal["outer", "window"]
 Axis = Literal["x", "y"]
@@ -108,9 +112,14 @@ def calibrated(measurements: Sequence[Measurement], resolution: float) -> Calibr
 def _estimate(measurements: Sequence[Measurement], resolution: float, where: str = "") -> Estimate:
     if len(measurements) < 2:
         raise DesignError(
-            f"{len(measurements)} of the sizes is measured, and a kerf needs 2; fill in more rows"
+            f"sizes measured{where}: {len(measurements)}, and a kerf needs 2; fill in more rows"
         )
     scale, fitted = _fitted(measurements, resolution)
+    if scale is not None and abs(scale.value - 1) > WORST_SCALE:
+        raise DesignError(
+            f"the measured sizes{where} are about {scale.value:.3g} times the nominal ones; give "
+            "them in millimetres"
+        )
     found = Estimate(_mean(measurements, resolution), scale, len(measurements))
     if found.is_scaled and fitted is not None:
         found = Estimate(fitted, scale, len(measurements))
@@ -120,7 +129,22 @@ def _estimate(measurements: Sequence[Measurement], resolution: float, where: str
             f"the kerf{where} comes out as {found.kerf.value:.3f} mm, which is {kind}; check the "
             "measurements, the unit and which rows are outers and windows"
         )
+    _refuse_slips(measurements, found)
     return found
+
+
+def _refuse_slips(measurements: Sequence[Measurement], found: Estimate) -> None:
+    """Raises DesignError for a size that lies far from what the others say."""
+    scale = found.scale.value if found.is_scaled and found.scale is not None else 1.0
+    signs = {"outer": -1, "window": 1}
+    gaps = [m.measured - scale * m.nominal - signs[m.kind] * found.kerf.value for m in measurements]
+    worst = max(range(len(gaps)), key=lambda n: abs(gaps[n]))
+    if abs(gaps[worst]) > LARGEST_SLIP:
+        m = measurements[worst]
+        raise DesignError(
+            f"the {m.kind} along {m.axis}, nominal {m.nominal:g} and measured {m.measured:g} mm, "
+            f"is {abs(gaps[worst]):.2f} mm off what the sizes together say; measure it again"
+        )
 
 
 def _mean(measurements: Sequence[Measurement], resolution: float) -> Value:

@@ -93,6 +93,26 @@ def _pins_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Pin, ...]:
     )
 
 
+def pins_when_added(laminate: Laminate) -> dict[int, tuple[Pin, ...]]:
+    """By layer index: the pins that hold the layer in the step that adds it.
+
+    A hole that fits a pin does not hold a layer where the pin is out.
+    """
+    fitting = {
+        pattern: laminate.pins_holding(layers[0]) for pattern, layers in laminate.patterns.items()
+    }
+    return {
+        index: tuple(pin for pin in fitting[laminate.layer(index).pattern] if pin in step.pins)
+        for step in assembly(laminate)
+        for index in step.adds
+    }
+
+
+def stack_count(laminate: Laminate, layers: Sequence[int]) -> int:
+    """How many stacks the layers make beside each other: as few as any layer has pieces."""
+    return min(len(layer.profile.pieces) for layer in distinct_layers(laminate, layers))
+
+
 def distinct_layers(laminate: Laminate, layers: Sequence[int]) -> tuple[Layer, ...]:
     """One layer of each pattern among the layers."""
     return tuple({laminate.layer(i).pattern: laminate.layer(i) for i in layers}.values())

@@ -103,7 +103,7 @@ class Pin:
     diameter: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Laminate:
     """A stack of layers, bottom to top, with what the layers alone do not tell."""
 
@@ -118,6 +118,9 @@ class Laminate:
     balloons: int
     registration: str
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"Laminate({self.name!r}, {self.family!r}, {len(self.layers)} layers)"
 
     @cached_property
     def interfaces(self) -> tuple[Interface, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from sbafab.errors import OutputError
+from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.simulators.simulator import NAMES, Wish, simulator
 
@@ -17,7 +17,7 @@ def write_decks(laminate: Laminate, folder: Path) -> Iterable[tuple[str, str]]:
         if why is None:
             try:
                 simulator(name).export(laminate, Wish(), folder / name)
-            except OutputError as error:
+            except (DesignError, OutputError) as error:
                 # The meshes of CalculiX take an extra, which may be missing.
                 why = str(error)
         if why is not None:

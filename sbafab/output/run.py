@@ -34,7 +34,7 @@ from sbafab.output.shop import (
     write_cut_set,
     write_nested_sheets,
 )
-from sbafab.output.swap import replaced_folder
+from sbafab.output.swap import listed_files, replaced_folder
 from sbafab.pressing.schedule import Schedule
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding
@@ -72,6 +72,8 @@ class Run:
     manifest: dict[str, Any]
     schedule: Schedule | None
     conforming: ConformingMeshes | None = None
+    dropped: tuple[str, ...] = ()
+    """Files of an older run of another design or version that this one put away."""
 
     @property
     def failed(self) -> bool:
@@ -115,6 +117,7 @@ def generate(
     plan = plan_cuts(checked.laminate, design.order.copies, settings) if "cut" in wanted else None
     nests = find_nests(plan.parts, design, target, tell) if plan is not None else ()
     meshes = _meshed(checked, extras.conforming, tell) if "mesh" in wanted else None
+    listed = listed_files(target)
     with replaced_folder(target) as folder:
         cut: CutSet | None = None
         sheets: list[SheetFile] = []
@@ -129,7 +132,8 @@ def generate(
                 extras.also(checked.laminate, folder)
             carry_over(target, folder, index)
         close_folder(folder, index)
-    return Run(design, checked.laminate, checked.findings, target, index, pressing, meshes)
+    dropped = tuple(path for path in listed if path not in index["files"])
+    return Run(design, checked.laminate, checked.findings, target, index, pressing, meshes, dropped)
 
 
 def _meshed(checked: Checked, asked: Conforming | None, tell: Progress) -> ConformingMeshes | None:

@@ -19,6 +19,12 @@ from sbafab.errors import OutputError, SbafabError
 SCHEMA = "sbafab/manifest@1"
 JOB_SCHEMA = "sbafab/job@1"
 """Of a folder that holds several designs cut together."""
+ASSEMBLY_SCHEMA = "sbafab/assembly@1"
+"""Of a folder that holds the designs of an assembly, cut together."""
+SCHEMAS = (SCHEMA, JOB_SCHEMA, ASSEMBLY_SCHEMA)
+MANIFEST = "manifest.json"
+CUT_FOLDERS = ("layers", "sheets")
+"""Where a file of somebody else would be cut together with those of the run."""
 BEGUN, ASIDE = ".part", ".old.part"
 """Endings of a folder that is being written, and of an old one that is moved out of its way."""
 LONGEST_SHOWN = 120
@@ -28,8 +34,9 @@ LONGEST_SHOWN = 120
 def replaced_folder(target: Path) -> Iterator[Path]:
     """Yields an empty folder beside ``target`` that takes its place when the block ends well.
 
-    Whatever happens, ``target`` is the old folder or the new one, whole. Raises OutputError where
-    the place cannot be written or holds something that is not an output of this program.
+    Whatever happens, ``target`` is the old folder or the new one, whole; files that others have
+    put there stay. Raises OutputError where the place cannot be written, holds something that is
+    not an output of this program, or somebody's file among the cut files.
     """
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -42,6 +49,8 @@ def replaced_folder(target: Path) -> Iterator[Path]:
             try:
                 fresh.chmod(0o755)
                 yield fresh
+                for path in _foreign_files(target):
+                    _keep(target / path, fresh / path)
                 _swap(fresh, target)
             finally:
                 shutil.rmtree(fresh, ignore_errors=True)
@@ -95,16 +104,49 @@ def _refuse_foreign(target: Path) -> None:
         raise OutputError(
             f"{target} holds files that sbafab did not write; choose another folder with -o"
         )
+    among = next((p for p in _foreign_files(target) if {*p.parts} & {*CUT_FOLDERS}), None)
+    if among is not None:
+        raise OutputError(
+            f"{target / among} was not written by sbafab and lies among the cut files; move it "
+            "away, or choose another folder with -o"
+        )
+
+
+def _foreign_files(target: Path) -> list[Path]:
+    """Files of a run's folder, relative to it, that the run did not write."""
+    listed = listed_files(target)
+    if not listed:
+        return []
+    ours = {*listed, MANIFEST}
+    return [
+        path.relative_to(target)
+        for path in sorted(target.rglob("*"))
+        if (path.is_symlink() or not path.is_dir())
+        and path.relative_to(target).as_posix() not in ours
+    ]
+
+
+def listed_files(folder: Path) -> list[str]:
+    """The files that the manifest of a folder names, none if there is none."""
+    files = (read_manifest(folder) or {}).get("files")
+    return list(files) if isinstance(files, dict) else []
+
+
+def _keep(old: Path, new: Path) -> None:
+    """Takes somebody's file over into the new folder, unless the run wrote one of that name."""
+    if not os.path.lexists(new):
+        new.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(old, new, follow_symlinks=False)
 
 
 def read_manifest(folder: Path) -> dict[str, object] | None:
     """The manifest of an output folder, or None if there is none."""
-    path = folder / "manifest.json"
+    path = folder / MANIFEST
     try:
         manifest = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
     except (OSError, ValueError, RecursionError):
         return None
-    is_ours = isinstance(manifest, dict) and manifest.get("schema") in (SCHEMA, JOB_SCHEMA)
+    is_ours = isinstance(manifest, dict) and manifest.get("schema") in SCHEMAS
     return manifest if is_ours else None
 
 

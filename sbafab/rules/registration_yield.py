@@ -115,7 +115,7 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     )
     if verdict == "fail":
         message += (
-            f"; the interval must lie above {target:g}: `sbafab check --target-yield` advises"
+            f"; the interval must lie above {target:.10g}: `sbafab check --target-yield` advises"
         )
     worst = min(found.interfaces, key=lambda index: found.interfaces[index].good, default=None)
     place = Place()

@@ -107,6 +107,20 @@ def test_a_kerf_that_no_beam_has_is_refused(kerf: float, says: str) -> None:
         calibrated(sizes(kerf, kerf), 0.01)
 
 
+def test_inches_are_refused() -> None:
+    inches = [m._replace(measured=m.measured / 25.4) for m in sizes(0.12, 0.12)]
+    with pytest.raises(DesignError, match=r"about 0\.039\d* times .* millimetres"):
+        calibrated(inches, 0.01)
+
+
+def test_a_slip_of_the_pen_is_named() -> None:
+    rows = sizes(0.12, 0.12)
+    rows[2] = rows[2]._replace(nominal=25.0)
+    assert (rows[2].kind, rows[2].axis) == ("outer", "y")
+    with pytest.raises(DesignError, match=r"the outer along y, nominal 25 and measured 23\.879"):
+        calibrated(rows, 0.01)
+
+
 def table(folder: Path, text: str) -> Path:
     path = folder / "measured.csv"
     path.write_text(text, encoding="utf-8")

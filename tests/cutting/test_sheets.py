@@ -72,7 +72,7 @@ def test_the_label_is_engraved_in_the_border_alone(tmp_path: Path) -> None:
     assert engraved
     assert all(0 < y < 6 for edge in engraved for _, y in (edge.start, edge.end))
     assert all(6 - 1e-6 <= x <= 54 for edge in engraved for x, _ in (edge.start, edge.end))
-    (plain,) = write_sheets([ring_nest(20)], tmp_path, SETTINGS, MACHINE, label=False)
+    (plain,) = write_sheets([ring_nest(20)], tmp_path, SETTINGS, MACHINE, labelled=False)
     assert "ENGRAVE" not in read_profile(tmp_path / plain.path).layers
 
 

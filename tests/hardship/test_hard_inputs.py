@@ -146,7 +146,7 @@ def test_no_standard_output_at_all(runs: Runs, output: Output) -> None:
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
 def test_a_full_standard_output_is_one_sentence(runs: Runs, output: Output) -> None:
     ended = runs.run(output.arguments("0.75"), output.folder, out="/dev/full")
-    assert_refused(ended, "standard output", "No space left on device")
+    assert_refused(ended, "standard output", "no space left on device")
     assert output.held() == "0.75"
 
 

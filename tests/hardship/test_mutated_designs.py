@@ -15,9 +15,15 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import load_design
+from sbafab.assemblies.build import assemble
+from sbafab.assemblies.reading import load
+from sbafab.assemblies.records import Assembly
+from sbafab.assemblies.writing import assembly_toml
 from sbafab.design.reading import template_names, templates_folder
+from sbafab.design.records import Design
 from sbafab.design.writing import design_toml
 from sbafab.errors import SbafabError
+from sbafab.output.assembly import check_assembly
 from sbafab.output.run import check
 
 COUNT = int(os.environ.get("SBAFAB_MUTATIONS", "160"))
@@ -94,6 +100,14 @@ MUTATIONS: list[Callable[[str, random.Random], bytes]] = [
 ]
 
 
+def written_out(name: str) -> str:
+    """A template with every key; the designs of an assembly are templates here, too."""
+    found = load(name)
+    if isinstance(found, Design):
+        return design_toml(found)
+    return assembly_toml(assemble(found)).replace("/design.toml", "")
+
+
 def sources() -> list[str]:
     """Every template as it ships, and with every key written out."""
     shipped = [(templates_folder() / f"{n}.toml").read_text("utf-8") for n in template_names()]
@@ -101,7 +115,7 @@ def sources() -> list[str]:
         "\n".join(line.partition(" #")[0].rstrip() for line in text.split("\n") if line)
         for text in shipped
     ]
-    richer = [design_toml(load_design(name)) for name in template_names()]
+    richer = [written_out(name) for name in template_names()]
     others = [
         load_design("3dof-15mm", ["stack.balloons=3", "chamber.diameter=[7, 6, 5]"]),
         load_design("1dof-5mm", ["registration.method=ears", "laser.kerf_tpe=0.1"]),
@@ -129,7 +143,11 @@ def at_most(seconds: int) -> Iterator[None]:
 def refused(path: Path) -> str | None:
     """What is said of a design file that is refused, None of one that is checked."""
     try:
-        check(load_design(path))
+        found = load(path)
+        if isinstance(found, Assembly):
+            check_assembly(found)
+        else:
+            check(found)
     except SbafabError as error:
         return str(error)
     return None

@@ -145,6 +145,7 @@ def test_parts_add_up_to_the_whole(symmetry: str, copies: int) -> None:
     assert copies * meshes.statistics["volume"]["volume_mm3"] == pytest.approx(films, rel=1e-3)
     inlets = [name for name in meshes.volume.node_sets if name.startswith("inlet")]
     assert len(inlets) == {"half": 2, "sector": 1}[symmetry]
+    assert any(symmetry in note.lower() or "lobe" in note for note in meshes.volume.notes)
 
 
 def test_ears_have_no_quarter() -> None:

@@ -87,6 +87,41 @@ def test_files_of_others_are_not_replaced(tmp_path: Path) -> None:
     assert (target / "thesis.txt").read_text() == "mine"
 
 
+def test_files_that_others_put_into_a_run_stay(tmp_path: Path) -> None:
+    target = tmp_path / "run"
+    for ours in ("one.txt", "two.txt"):
+        with replaced_folder(target) as folder:
+            (folder / ours).write_text("ours")
+            listed = {"schema": SCHEMA, "text": ours, "files": {ours: "hash"}}
+            (folder / "manifest.json").write_text(json.dumps(listed))
+        (target / "photos").mkdir(exist_ok=True)
+        (target / "photos" / "leak test.jpg").write_text("mine")
+        (target / "two.txt").write_text("mine as well, but of a name that is ours")
+        (target / "link").unlink(missing_ok=True)
+        (target / "link").symlink_to(tmp_path)
+    found = {path.relative_to(target).as_posix() for path in target.rglob("*") if path.is_file()}
+    assert found == {"manifest.json", "two.txt", "photos/leak test.jpg"}
+    assert (target / "link").is_symlink()
+    with replaced_folder(target) as folder:
+        (folder / "two.txt").write_text("ours")
+        write_run(folder, "three")
+    assert (target / "two.txt").read_text() == "ours"
+
+
+@pytest.mark.parametrize("place", ["layers/mine.dxf", "sheets/mine.dxf", "arm/sheets/mine.dxf"])
+def test_a_file_of_others_among_the_cut_files_is_refused(tmp_path: Path, place: str) -> None:
+    target = tmp_path / "run"
+    with replaced_folder(target) as folder:
+        listed = {"schema": SCHEMA, "text": "one", "files": {"one.txt": "hash"}}
+        (folder / "manifest.json").write_text(json.dumps(listed))
+    (target / place).parent.mkdir(parents=True)
+    (target / place).write_text("mine")
+    refused = pytest.raises(OutputError, match=r"mine\.dxf .* among the cut files")
+    with refused, replaced_folder(target):
+        pass
+    assert text_in(target) == "one"
+
+
 def test_links_files_and_running_twice_are_refused(tmp_path: Path) -> None:
     (tmp_path / "real").mkdir()
     (tmp_path / "link").symlink_to(tmp_path / "real")

@@ -15,7 +15,7 @@ from sbafab.meshing.conforming.fill import Fill, filled
 from sbafab.meshing.conforming.form import flat
 from sbafab.meshing.conforming.layup import layup
 from sbafab.meshing.conforming.model import Mesh
-from sbafab.meshing.conforming.settings import MeshSettings
+from sbafab.meshing.conforming.settings import MeshSettings, Symmetry
 from sbafab.meshing.conforming.shell_mesh import shell_mesh, thin
 from sbafab.meshing.conforming.statistics import Statistics, mesh_statistics
 from sbafab.meshing.conforming.volume_mesh import volume_mesh
@@ -43,6 +43,11 @@ SURFACE_WRITERS: dict[str, Callable[[Surface, Path], None]] = {
 HEIGHTS = {
     False: "Films lie on each other: heights are sums of the TPE films, without the masks.",
     True: "Films are as far apart as the masks hold them, and bonds are as thick.",
+}
+PARTS: dict[Symmetry, str] = {
+    "half": "Half of the actuator, on one side of its plane of symmetry.",
+    "quarter": "A quarter of the actuator, away from its inlet, which is left out.",
+    "sector": "One lobe of the actuator with its inlet.",
 }
 HEIGHT_OF_SHELL = "Mid-surfaces: films have no height of their own, and lie in one plane when flat."
 FORMATS = ("vtu", "vtk", "msh", "inp", "stl", "obj", "ply")
@@ -104,18 +109,20 @@ def conforming_meshes(laminate: Laminate, settings: MeshSettings | None = None) 
     return ConformingMeshes(
         laminate.name,
         settings,
-        replace(volume, notes=(HEIGHTS[settings.gaps], *_fill_note(fill))),
-        replace(shell, notes=(HEIGHT_OF_SHELL, *_fill_note(fill))),
+        replace(volume, notes=(HEIGHTS[settings.gaps], *_notes(settings.symmetry, fill))),
+        replace(shell, notes=(HEIGHT_OF_SHELL, *_notes(settings.symmetry, fill))),
         flat_shell,
         fill,
     )
 
 
-def _fill_note(fill: Fill | None) -> tuple[str, ...]:
+def _notes(symmetry: Symmetry, fill: Fill | None) -> tuple[str, ...]:
+    part = (PARTS[symmetry],) if symmetry in PARTS else ()
     if fill is None:
-        return ()
+        return part
     amounts = ", ".join(f"{name} {ul:g} ul" for name, ul in fill.ul.items())
-    return (f"Filled with air, a balloon: {amounts}. This shape is taken to be free of stress.",)
+    note = f"Filled with air, a balloon: {amounts}. This shape is taken to be free of stress."
+    return (*part, note)
 
 
 def write_conforming(

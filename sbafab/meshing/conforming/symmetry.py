@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point, unit
 from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import polygon
+from sbafab.geometry.shapes import disc, polygon
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.settings import Symmetry
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 SLACK = 1e-5
 """mm2 by which a profile may differ from its image."""
 ON_PLANE = 1e-6
+NEAR = 0.01
+"""mm round a chamber's centre, any part of which makes it meshed."""
 
 
 class Sector(NamedTuple):
@@ -110,3 +113,27 @@ def _is_quarter(laminate: Laminate, region: Region) -> bool:
         width = inlet.width / 2
         image = image - polygon([(0.0, -width), (far, -width), (far, width), (0.0, width)])
     return _covers(region, image)
+
+
+def images(laminate: Laminate, symmetry: Symmetry) -> dict[str, str]:
+    """For each chamber the one that is meshed in its place: itself, or one it is an image of."""
+    part = sector(laminate, symmetry)
+    chambers = {chamber.name: chamber.centres for chamber in laminate.chambers}
+    if part is None:
+        return {name: name for name in chambers}
+    meshed = [
+        name
+        for name, centres in chambers.items()
+        if any(not (disc(centre, NEAR) & part.region).is_empty for centre in centres)
+    ]
+    if symmetry != "half":
+        return {name: name if name in meshed else meshed[0] for name in chambers}
+    _, (x, y) = part.planes[0]
+    found = {}
+    for name, centres in chambers.items():
+        a, b = centres[0]
+        along = a * x + b * y
+        image = 2 * along * x - a, 2 * along * y - b
+        others = {other: math.dist(image, chambers[other][0]) for other in meshed}
+        found[name] = name if name in meshed else min(others, key=lambda other: others[other])
+    return found

@@ -23,6 +23,7 @@ from sbafab.output.as_built.claims import (
     property_problems,
 )
 from sbafab.output.as_built.cut_files import CutPart, LayerFile, inside, read_layers
+from sbafab.output.as_built.joined import joined_findings
 from sbafab.output.as_built.measures import (
     fixture_problems,
     interface_problems,
@@ -39,13 +40,14 @@ from sbafab.output.as_built.records import (
     Problem,
     findings_of,
     is_job,
+    is_joined,
     read_claims,
     read_job,
 )
 from sbafab.output.as_built.sheets import Order, sheet_problems
 from sbafab.output.as_built.stack import laminate_of, stacked_layers
 from sbafab.output.settings import limits as limits_of
-from sbafab.rules import film_limits
+from sbafab.rules import film_limits, registration_yield
 from sbafab.rules.deck import RULES, Rule, run_rule
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits
@@ -82,7 +84,11 @@ def _findings(built: AsBuilt) -> tuple[Finding, ...]:
     if built.laminate is None:
         measured = _by_layer(built)
     else:
-        measured = tuple(f for rule in RULES for f in _measured(rule, built.laminate, built.limits))
+        measured = tuple(
+            finding
+            for rule in RULES
+            for finding in _measured(rule, built.laminate, _limits(rule, built))
+        )
     problems = [*built.problems, *_unsaid_waivers(measured, built.claims)]
     count = len(built.files)
     return (
@@ -95,7 +101,10 @@ def _findings(built: AsBuilt) -> tuple[Finding, ...]:
 
 
 def _check_job(folder: Path) -> tuple[Finding, ...]:
-    """What is found in every design of a job, its name before it, and on the job's sheets."""
+    """What is found in every design of a job, its name before it, and on the job's sheets.
+
+    In an assembly's folder, also what is found between its parts.
+    """
     job = read_job(folder)
     found: list[Finding] = []
     lots: list[Lot] = []
@@ -126,6 +135,10 @@ def _check_job(folder: Path) -> tuple[Finding, ...]:
             lots,
         ),
     )
+    if is_joined(job):
+        between, wrong = joined_findings(folder)
+        found += between
+        problems += wrong
     count = len(job.sheets)
     return (
         *found,
@@ -238,6 +251,11 @@ def _drawn_in_chords(design: Design) -> bool:
         return chorded_place(read_outline(design.folder / outline)) is not None
     except (DesignError, OSError):
         return False
+
+
+def _limits(rule: Rule, built: AsBuilt) -> Limits:
+    """Room for chords would make good builds of bad ones: these are counted at the true limits."""
+    return limits_of(built.design) if rule.name == registration_yield.NAME else built.limits
 
 
 def _within(limits: Limits, chord_error: float) -> Limits:
