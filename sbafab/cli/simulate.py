@@ -123,12 +123,12 @@ def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> N
     """Inflate a design in a simulator that is installed, and read back what it says.
 
     Into OUT/<name>/calculix/ come stroke, air and wall stress against pressure as table and plot,
-    the deformed shape as VTU and picture; into OUT/<name>/sofa/ or mujoco/ what it has read, and
-    the tip's record. Exit code 1 if a run stopped early: what it reached is kept.
+    the deformed shape as VTU and picture; into OUT/<name>/sofa/ or mujoco/ what it has read.
+    result.json holds what each found over time. Exit code 1 if a run stopped early: what it reached is kept.
     """
     from sbafab.actuators import load_design
     from sbafab.cli.printing import console, findings_table, print_json, shown_progress
-    from sbafab.output.manifest import checks
+    from sbafab.output.manifest import as_json, checks
     from sbafab.output.run import Extras, check, generate, with_folder
     from sbafab.rules.deck import has_failed
     from sbafab.simulators.simulator import Result, Wish
@@ -152,6 +152,8 @@ def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> N
             found = Result((), {})
         else:
             found = find(simulator).run(laminate, wish, folder, tell)
+            told = as_json({**found.figures, "stopped": found.stopped})
+            (folder / "result.json").write_text(told, encoding="utf-8", newline="\n")
         run = generate(design, request.out, (), tell, extras=Extras(also=with_folder(folder)))
     target = run.folder / simulator
     if request.as_json:

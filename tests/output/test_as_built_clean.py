@@ -103,3 +103,16 @@ def test_as_built_laminate_is_the_designed_one(clean: Path) -> None:
     assert [layer.pattern for layer in built.laminate.layers] == [
         layer.pattern for layer in drawn.layers
     ]
+
+
+def test_chords_make_no_better_builds(tmp_path: Path) -> None:
+    design = load_design("3dof-15mm", ("stack.balloons=1",))
+    run = generate(design, tmp_path, ("cut",), None, "chords", 0.05)
+    shares = [
+        next(f.measured for f in findings if f.rule == "registration-yield")
+        for findings in (run.findings, check_folder(run.folder))
+    ]
+    # Counted over the same 10,000 draws; edges lie up to 0.05 mm elsewhere before arcs are put back.
+    assert shares[0] is not None
+    assert 0.1 < shares[0] < 0.9
+    assert shares[1] == pytest.approx(shares[0], abs=0.03)

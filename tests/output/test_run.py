@@ -111,6 +111,18 @@ def test_parts_keep_what_is_of_the_same_design(tmp_path: Path) -> None:
     assert not (whole.folder / "layers").exists()
 
 
+def test_a_run_of_another_design_says_what_it_put_away(tmp_path: Path) -> None:
+    first = generate(load_design("1dof-5mm", ("stack.balloons=1",)), tmp_path)
+    assert first.dropped == ()
+    assert (
+        generate(load_design("1dof-5mm", ("stack.balloons=1",)), tmp_path, ("press",)).dropped == ()
+    )
+    other = load_design("1dof-5mm", ("stack.balloons=1", "press.temperature_c=140"))
+    dropped = generate(other, tmp_path, ("press",)).dropped
+    assert "traveller.html" in dropped
+    assert "press.json" not in dropped
+
+
 def test_a_run_that_dies_half_way_leaves_the_old_output(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -105,6 +105,7 @@ def test_simulate_command(tmp_path: Path) -> None:
         *(f"deformed.{suffix}" for suffix in ("vtu", "png")),
         "mesh.inp",
         "abaqus.inp",
+        "result.json",
     }
     listed = json.loads((folder / "manifest.json").read_text())["files"]
     assert {f"calculix/{name}" for name in made} <= set(listed)

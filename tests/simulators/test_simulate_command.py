@@ -139,3 +139,14 @@ def test_results_of_another_input_are_not_kept(tmp_path: Path) -> None:
     assert (folder / "sofa" / "tip.state").exists()
     assert CliRunner().invoke(app, ["simulate", *common, "--pressure", "2"]).exit_code == 0
     assert not (folder / "sofa" / "tip.state").exists()
+
+
+def test_a_run_leaves_what_it_found(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    arguments = ["simulate", "1dof-5mm", "--with", "mujoco", "--seconds", "1", "-o", str(tmp_path)]
+    result = CliRunner().invoke(app, [*arguments, "--set", "stack.balloons=1", "--json"])
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    found = json.loads((tmp_path / "1dof-5mm" / "mujoco" / "result.json").read_text())
+    assert found["stroke"] == told["stroke"] > 0.5
+    assert found["stopped"] is None
