@@ -10,10 +10,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sbafab.api import build, check, generate, load, schema, templates
+    from sbafab.api import assemble, build, check, generate, load, predict, schema, templates
 
 __version__ = "0.1.0"
-__all__ = ["build", "check", "generate", "load", "schema", "templates"]
+__all__ = ["assemble", "build", "check", "generate", "load", "predict", "schema", "templates"]
 
 
 def __dir__() -> list[str]:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel
+
 from sbafab.actuators import lobed, one_dof, radial
 from sbafab.design.reading import add_waivers, design_path, override, read_toml, validated
 from sbafab.design.records import Design
@@ -45,11 +47,11 @@ def build(design: Design) -> Laminate:
     return FAMILIES[design.family][1](design)
 
 
-def schema() -> dict[str, Any]:
-    """JSON schema of a design file of any family (draft 2020-12)."""
+def schema(*others: type[BaseModel]) -> dict[str, Any]:
+    """JSON schema of a design file of any family, or of ``others`` (draft 2020-12)."""
     from pydantic.json_schema import models_json_schema
 
-    records = [record for record, _ in FAMILIES.values()]
+    records = [*(record for record, _ in FAMILIES.values()), *others]
     _, definitions = models_json_schema([(record, "validation") for record in records])
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

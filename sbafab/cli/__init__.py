@@ -16,12 +16,26 @@ from sbafab.cli.kerf import kerf
 from sbafab.cli.mesh import mesh
 from sbafab.cli.nest import nest
 from sbafab.cli.new import new
+from sbafab.cli.predict import predict
 from sbafab.cli.press import press
 from sbafab.cli.schema import schema
 from sbafab.cli.simulate import simulate
 from sbafab.cli.templates import templates
 
-COMMANDS = (templates, new, generate, check, cut, press, mesh, nest, kerf, simulate, schema)
+COMMANDS = (
+    templates,
+    new,
+    generate,
+    check,
+    cut,
+    press,
+    mesh,
+    nest,
+    kerf,
+    predict,
+    simulate,
+    schema,
+)
 
 
 class InOrder(click.Group):

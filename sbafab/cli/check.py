@@ -11,7 +11,9 @@ from sbafab.cli.options import json_option, set_option, waive_option
 from sbafab.cli.working import RULE_FAILED
 
 if TYPE_CHECKING:
+    from sbafab.design.records import Design
     from sbafab.output.advice import Advice
+    from sbafab.output.shop import Progress
     from sbafab.rules.finding import Finding
 
 
@@ -60,6 +62,17 @@ def check(
         click.get_current_context().exit(RULE_FAILED)
 
 
+def _of_design(design: Design, progress: Progress) -> tuple[Finding, ...]:
+    """The findings; what the press cannot do is refused, as a run would refuse it."""
+    from sbafab.output.contents import Checked, schedule_of
+    from sbafab.output.run import check as run_check
+
+    checked = Checked(design, *run_check(design, progress))
+    if not checked.failed:
+        schedule_of(checked)
+    return checked.findings
+
+
 def _advice(source: str, assignments: tuple[str, ...], target: float) -> Advice:
     from sbafab.actuators import load_design
     from sbafab.output.advice import advise
@@ -75,12 +88,16 @@ def _findings(
     from sbafab.errors import DesignError
 
     if source in template_names() or not Path(source).is_dir():
-        from sbafab.actuators import load_design
-        from sbafab.output.run import check as run_check
+        from sbafab.assemblies.reading import load
+        from sbafab.assemblies.records import Assembly
 
-        design = load_design(source, assignments, waivers)
+        found = load(source, assignments, waivers)
         with shown_progress(quiet) as progress:
-            return "design", run_check(design, progress)[1]
+            if isinstance(found, Assembly):
+                from sbafab.output.assembly import check_assembly
+
+                return "design", check_assembly(found, progress).findings
+            return "design", _of_design(found, progress)
     if assignments or waivers:
         raise DesignError(
             "--set, --waive and --target-yield go with a design; a folder is checked as it lies, "

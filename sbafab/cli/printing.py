@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from sbafab.output.shop import Progress
     from sbafab.rules.finding import Finding
 
-DECKS = ("calculix/actuator.inp", "sofa/actuator.scn")
+DECKS = ("calculix/actuator.inp", "sofa/actuator.scn", "mujoco/actuator.xml")
 """What a simulator opens."""
 COLOURS = {"pass": "green", "fail": "bold red", "waived": "yellow", "warn": "yellow"}
 
@@ -126,7 +126,7 @@ def print_job(job: Job) -> None:
         verdict = "a rule failed" if one.failed else "every rule holds"
         made.add_row(one.design.name, Text(f"{one.design.order.copies} x, {verdict}{waived}{said}"))
     for film in job.manifest.get("films", ()):
-        sheets = _film_said(film, job.manifest["sheets"], 1)
+        sheets = film_said(film, job.manifest["sheets"], 1)
         made.add_row(f"{film['material']} film", Text(sheets))
     if not job.failed:
         made.add_row("folder", Text(str(job.folder)))
@@ -176,6 +176,12 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
         f"{len(lam.layers)} in {len(lam.patterns)} patterns: "
         + ", ".join(f"{count} {kind}" for kind, count in counts.items()),
     )
+    if run.dropped:
+        yield (
+            "replaced",
+            f"{len(run.dropped)} files of an earlier run with other settings are gone; "
+            "--set name=NAME gives a design a folder of its own",
+        )
     cut = [layer["file"] for layer in index["layers"] if layer["file"]]
     if cut:
         plate = f", and the pin plate {index['fixture']}" if index["fixture"] else ""
@@ -185,7 +191,7 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
         )
     for film in index["films"]:
         if "sheets" in film:
-            yield f"{film['material']} film", _film_said(film, index["sheets"], index["copies"])
+            yield f"{film['material']} film", film_said(film, index["sheets"], index["copies"])
     if run.schedule is not None:
         force = run.schedule.steps[0].force_n / 1000
         yield (
@@ -193,6 +199,18 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
             f"{len(run.schedule.steps)} steps, {run.schedule.total_press_minutes:g} min at "
             f"{run.schedule.steps[0].temperature_c:g} C, {force:.3f} kN; press.json, press.csv",
         )
+    yield from _for_simulation(run)
+    if cut:
+        yield "warning", PTFE_WARNING
+    for note in lam.notes:
+        yield "note", note
+    for warning in run.schedule.warnings if run.schedule is not None else ():
+        yield "warning", warning
+    yield "folder", str(run.folder)
+
+
+def _for_simulation(run: Run) -> Iterator[tuple[str, str]]:
+    index = run.manifest
     if index["meshes"]:
         names = ", ".join(mesh["file"] for mesh in index["meshes"])
         yield "meshes", names
@@ -206,16 +224,11 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
             f"least scaled Jacobian {figures['least_scaled_jacobian']:.3f}, worst aspect "
             f"{figures['worst_aspect']:.1f}, {figures['volume_mm3']:.3f} mm3",
         )
-    if cut:
-        yield "warning", PTFE_WARNING
-    for note in lam.notes:
-        yield "note", note
-    for warning in run.schedule.warnings if run.schedule is not None else ():
-        yield "warning", warning
-    yield "folder", str(run.folder)
+    for note in run.conforming.volume.notes if run.conforming else ():
+        yield "", note
 
 
-def _film_said(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], copies: int) -> str:
+def film_said(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], copies: int) -> str:
     """How a film is used: sheets, their size, density, waste and estimated time."""
     own = [sheet for sheet in sheets if sheet["material"] == film["material"]]
     count = f"{len(own)} sheet{'s' if len(own) > 1 else ''}"

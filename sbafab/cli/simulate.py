@@ -124,7 +124,8 @@ def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> N
 
     Into OUT/<name>/calculix/ come stroke, air and wall stress against pressure as table and plot,
     the deformed shape as VTU and picture; into OUT/<name>/sofa/ or mujoco/ what it has read.
-    result.json holds what each found over time. Exit code 1 if a run stopped early: what it reached is kept.
+    result.json holds what each found over time. Exit code 1 if a run stopped early: what it
+    reached is kept.
     """
     from sbafab.actuators import load_design
     from sbafab.cli.printing import console, findings_table, print_json, shown_progress

@@ -11,6 +11,7 @@ from sbafab.cli.options import Request
 
 if TYPE_CHECKING:
     from sbafab.cutting.dxf_write import DxfProfile
+    from sbafab.design.records import Design
     from sbafab.output.contents import Part
     from sbafab.output.run import Extras
 
@@ -26,10 +27,23 @@ def run_parts(
 ) -> None:
     """Generates the parts of a design and exits with 1 if a rule failed."""
     from sbafab.actuators import load_design
+
+    design = load_design(request.designs[0], request.assignments, request.waivers)
+    run_design(design, request, parts, dxf_profile, chord_error, extras)
+
+
+def run_design(
+    design: Design,
+    request: Request,
+    parts: Sequence[Part],
+    dxf_profile: DxfProfile,
+    chord_error: float,
+    extras: Extras | None,
+) -> None:
+    """The same with a design that is loaded."""
     from sbafab.cli.printing import print_json, print_run, run_json, shown_progress
     from sbafab.output.run import NONE, generate
 
-    design = load_design(request.designs[0], request.assignments, request.waivers)
     with shown_progress(request.as_json) as progress:
         run = generate(
             design, request.out, parts, progress, dxf_profile, chord_error, extras or NONE

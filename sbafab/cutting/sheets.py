@@ -7,12 +7,12 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 from sbafab.cutting.dxf_read import ReadBack
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.files import Progress
-from sbafab.cutting.lettering import strokes
-from sbafab.cutting.lettering import width as text_width
+from sbafab.cutting.label import label
 from sbafab.cutting.order import cutting_order, travel
 from sbafab.cutting.properties import CutSettings, kerf_suffix, sheet_properties
 from sbafab.cutting.svg_write import sheet_svg
@@ -25,9 +25,9 @@ from sbafab.nesting.check import check_placed
 from sbafab.nesting.records import Nest, Placement, Stock
 
 FOLDER = "sheets"
-LETTERS = 4.0
-"""Height of engraved letters in mm, less where the border is narrow."""
-LEAST_LETTERS = 1.5
+
+
+LabelState = Literal["engraved", "no room", "off"]
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,8 @@ class SheetFile:
 
     ``number`` counts from 1 within the material, and is the nest's sheet plus one. ``counts``
     says how many parts of each design and pattern lie on it: (design, pattern, count).
-    ``unsorted_travel`` is what the head would travel in the nest's own order.
+    ``unsorted_travel`` is what the head would travel in the nest's own order. ``label`` says
+    whether the sheet's label is engraved, or found no room in the border, or was not asked for.
     """
 
     path: str
@@ -63,6 +64,7 @@ class SheetFile:
     travel: float
     unsorted_travel: float
     minutes: float
+    label: LabelState = "engraved"
 
     @property
     def material(self) -> Material:
@@ -79,7 +81,7 @@ def write_sheets(
     folder: Path,
     settings: CutSettings,
     machine: Machine,
-    label: bool = True,
+    labelled: bool = True,
     progress: Progress | None = None,
 ) -> list[SheetFile]:
     """Writes ``sheets/<material>_<number>.dxf`` and ``.svg`` for every sheet of every nest.
@@ -93,20 +95,20 @@ def write_sheets(
     written: list[SheetFile] = []
     for nest in nests:
         for sheet in range(nest.sheets):
-            written.append(_write_sheet(nest, sheet, folder, settings, machine, label))
+            written.append(_write_sheet(nest, sheet, folder, settings, machine, labelled))
             if progress is not None:
                 progress(len(written), total)
     return written
 
 
 def _write_sheet(
-    nest: Nest, sheet: int, folder: Path, settings: CutSettings, machine: Machine, label: bool
+    nest: Nest, sheet: int, folder: Path, settings: CutSettings, machine: Machine, labelled: bool
 ) -> SheetFile:
     placements = nest.on_sheet(sheet)
     region = Region(tuple(c for p in placements for c in nest.region(p).contours))
     contours = cutting_order(region, machine.heat_distance)
     width, length = nest.stock.width, nest.length(sheet)
-    around = _surroundings(nest, sheet, (width, length), settings, label)
+    around = _surroundings(nest, sheet, (width, length), settings, labelled)
     properties = sheet_properties(
         settings, nest.material, f"{sheet + 1} of {nest.sheets}", _parts_said(nest, placements)
     )
@@ -140,6 +142,7 @@ def _write_sheet(
         travel=moved,
         unsorted_travel=travel((*region.holes, *region.outers)),
         minutes=_minutes(contours, cut_length, moved, machine),
+        label="engraved" if around.engraved else "no room" if labelled else "off",
     )
 
 
@@ -155,28 +158,23 @@ def _minutes(
 
 
 def _surroundings(
-    nest: Nest, sheet: int, size: tuple[float, float], settings: CutSettings, label: bool
+    nest: Nest, sheet: int, size: tuple[float, float], settings: CutSettings, labelled: bool
 ) -> Surroundings:
     width, length = size
     parting = ((0.0, length), (width, length))
-    engraved = _label(nest, sheet, settings) if label else ()
+    engraved = _label(nest, sheet, settings) if labelled else ()
     return Surroundings(engraved, (parting,) if nest.stock.roll else (), size)
 
 
 def _label(nest: Nest, sheet: int, settings: CutSettings) -> tuple[tuple[Point, ...], ...]:
-    """What is engraved into the lower border, if there is room for it between the pins."""
-    stock = nest.stock
+    """What is engraved into the border, if there is room for it between the pins."""
     kerf = kerf_suffix(settings.kerf_width(nest.material)).strip("_") or "kerf none"
     waived = f" waived: {', '.join(settings.waived)}" if settings.waived else ""
     text = (
         f"{settings.design} {nest.material} {sheet + 1}/{nest.sheets} "
         f"#{settings.design_sha256[:8]} {kerf}{waived}"
     )
-    room = stock.width - 2 * stock.border
-    height = min(LETTERS, stock.border / 2, LETTERS * room / max(text_width(text, LETTERS), 1e-9))
-    low = (stock.border - height) / 2
-    clear = all(y - d / 2 > low + height or y + d / 2 < low for _, y, d in stock.pins)
-    return strokes(text, (stock.border, low), height) if height >= LEAST_LETTERS and clear else ()
+    return label(text, nest.stock, nest.length(sheet))
 
 
 def _counts(nest: Nest, placements: Sequence[Placement]) -> tuple[tuple[str, str, int], ...]:

@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -16,6 +16,8 @@ from sbafab.design.records import Design
 from sbafab.errors import DesignError
 
 MOST_BYTES = 1_000_000
+ASSEMBLY = "assembly"
+"""The family of files that name several designs; :mod:`sbafab.assemblies` reads them."""
 DEEPEST = 8
 """Most parts of a dotted key; a design file needs three."""
 _PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*"""
@@ -132,15 +134,32 @@ def validated(
     family = data.get("family")
     if family is None:
         raise DesignError(f"family is missing; add family = one of {listed(families)}")
+    if family == ASSEMBLY:
+        raise DesignError(
+            f"{shown(data.get('name', folder.name))} is an assembly of several designs; it goes "
+            "with generate and check, and every other command takes one of its designs"
+        )
     if not isinstance(family, str) or family not in families:
         near = difflib.get_close_matches(shown(family).strip("'"), families, 1)
         hint = f"; did you mean {near[0]}?" if near else ""
         raise DesignError(f"family = {shown(family)} must be one of {listed(families)}{hint}")
-    record = families[family]
+    return checked(families[family], data, families).placed(folder)
+
+
+Record = TypeVar("Record", bound=BaseModel)
+
+
+def checked(
+    record: type[Record],
+    data: Mapping[str, Any],
+    families: Mapping[str, type[Design]],
+    prefix: str = "",
+) -> Record:
+    """The record of a table; ``prefix`` leads to it. Raises DesignError with one sentence."""
     try:
-        return record.model_validate(data).placed(folder)
+        return record.model_validate(data)
     except ValidationError as error:
-        raise DesignError(_sentence(error, record, families)) from None
+        raise DesignError(_sentence(error, record, families, prefix)) from None
 
 
 def listed(values: Iterable[object]) -> str:
@@ -151,6 +170,8 @@ def shown(value: object) -> str:
     """A value as it may appear in a message: short, on one line."""
     try:
         text = repr(str(value)) if isinstance(value, str | Path) else str(value)
+        if isinstance(value, bool):
+            text = text.lower()
     except ValueError:
         # Python does not write out integers of thousands of digits.
         text = "a number of thousands of digits"
@@ -159,20 +180,28 @@ def shown(value: object) -> str:
 
 
 def _sentence(
-    error: ValidationError, record: type[Design], families: Mapping[str, type[Design]]
+    error: ValidationError,
+    record: type[BaseModel],
+    families: Mapping[str, type[Design]],
+    prefix: str,
 ) -> str:
     problems = error.errors(include_url=False)
     unknown = [problem for problem in problems if problem["type"] == "extra_forbidden"]
     first = (unknown or problems)[0]
     # Alternatives of a union put their own name in the location; a key is what the file holds.
     where = [_plain(part) for part in first["loc"] if not _is_alternative(part)]
-    field = ".".join(where)
+    field = (prefix + ".".join(where)).rstrip(".")
     count = len({tuple(problem["loc"][:2]) for problem in problems}) - 1
     more = f" (and {count} more problem{'s' if count > 1 else ''} like it)" if count > 0 else ""
     if first["type"] == "extra_forbidden":
-        return _unknown_key(where, record, families) + more
+        return prefix + _unknown_key(where, record, families) + more
+    if first["type"] == "missing" and isinstance(first["loc"][-1], int):
+        short = ".".join(where[:-1])
+        return f"{short} is a list without value {first['loc'][-1] + 1}; add it{more}"
     if first["type"] == "missing":
         return f"{field} is missing; add it to the design file{more}"
+    if not where:
+        return f"{field} {_allowed(first)}{more}"
     return f"{field} = {shown(first['input'])} {_allowed(first)}{more}"
 
 
@@ -196,11 +225,16 @@ def _allowed(problem: Any) -> str:
         "greater_than_equal": "must be at least {ge}",
         "less_than": "must be less than {lt}",
         "less_than_equal": "must be at most {le}",
-        "literal_error": "must be {expected}",
         "string_too_long": "must have at most {max_length} letters",
         "too_long": "must have at most {max_length} entries",
         "too_short": "must have at least {min_length} entries",
     }
+    if kind == "literal_error":
+        near = difflib.get_close_matches(
+            str(problem["input"]), re.findall("'([^']*)'", context["expected"]), 1
+        )
+        hint = f"; did you mean {near[0]}?" if near else ""
+        return f"must be {context['expected']}{hint}"
     if kind in limits:
         return limits[kind].format(**context)
     plain = {
@@ -222,7 +256,7 @@ def _allowed(problem: Any) -> str:
 
 
 def _unknown_key(
-    where: Sequence[str], record: type[Design], families: Mapping[str, type[Design]]
+    where: Sequence[str], record: type[BaseModel], families: Mapping[str, type[Design]]
 ) -> str:
     field = ".".join(where)
     other = [name for name, model in families.items() if field in key_paths(model)]
@@ -281,5 +315,7 @@ def write_new(template: str, file: Path | None) -> Path:
     except FileExistsError:
         raise DesignError(f"{target} exists; choose another name or remove it first") from None
     except OSError as error:
-        raise DesignError(f"{target} cannot be written: {error.strerror or error}") from None
+        missing = f"; make the folder {target.parent} first"
+        hint = missing if isinstance(error, FileNotFoundError) else "; name another place"
+        raise DesignError(f"{target} cannot be written: {error.strerror or error}{hint}") from None
     return target

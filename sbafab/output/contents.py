@@ -41,13 +41,17 @@ class Conforming:
 
 @dataclass(frozen=True)
 class Made:
-    """What was made before the rest is written; None or empty for what was not asked for."""
+    """What was made before the rest is written; None or empty for what was not asked for.
+
+    Without ``traveller`` the folder gets none of its own: an assembly has one for all designs.
+    """
 
     cut: CutSet | None = None
     sheets: Sequence[SheetFile] = ()
     pressing: Schedule | None = None
     conforming: ConformingMeshes | None = None
     formats: tuple[str, ...] = ()
+    traveller: bool = True
 
 
 @dataclass(frozen=True)
@@ -102,7 +106,8 @@ def write_contents(
         meshes += write_conforming(made.conforming, folder, told, made.formats)
     if "preview" in wanted:
         _write_pictures(checked, folder, tell)
-    if made.cut is not None and made.pressing is not None and "preview" in wanted:
+    paged = made.traveller and "preview" in wanted
+    if paged and made.cut is not None and made.pressing is not None:
         page = _traveller(checked, made.cut, made.sheets, made.pressing, folder)
         write_text(folder / TRAVELLER, page)
     write_text(folder / "checks.json", as_json(checks(checked.findings, "design")))

@@ -123,6 +123,7 @@ def sheet_entry(sheet: SheetFile) -> dict[str, Any]:
         ],
         "parts_area": round(sheet.parts_area, 6),
         "density": round(sheet.density, 4),
+        "label": sheet.label,
         "contours": sheet.contours,
         "cut_length": round(sheet.cut_length, 3),
         "travel": round(sheet.travel, 3),

@@ -13,7 +13,14 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from sbafab.errors import DesignError
-from sbafab.laminate.assembly import AssemblyStep, Bond, StepName, assembly, distinct_layers
+from sbafab.laminate.assembly import (
+    AssemblyStep,
+    Bond,
+    StepName,
+    assembly,
+    distinct_layers,
+    stack_count,
+)
 from sbafab.laminate.laminate import Laminate
 
 TITLES: dict[StepName, str] = {
@@ -22,6 +29,12 @@ TITLES: dict[StepName, str] = {
     "flash_middle": "Middle layers",
     "bond_all": "Whole laminate",
 }
+TITLES_OF_SEVERAL = {
+    **TITLES,
+    "flash_bottom": "Bottom balloons, upper two layers of each",
+    "bond_bottom": "Bottom balloons, each with its base",
+}
+"""Where stacks are pressed beside each other."""
 
 SNIP = (
     "Snip off the ears along the outline, and the tails of the inlet strips at the tab's end; the "
@@ -121,7 +134,10 @@ def schedule(laminate: Laminate, press: PressSettings) -> Schedule:
     _refuse_temperature(laminate, press)
     *parts, last = assembly(laminate)
     after = f" {SNIP}" if laminate.registration == "ears" else ""
-    steps = (*(_step(part, press) for part in parts), _step(last, press, after))
+    steps = (
+        *(_step(laminate, part, press) for part in parts),
+        _step(laminate, last, press, after),
+    )
     total = sum(step.minutes for step in steps)
     return Schedule(
         steps,
@@ -133,10 +149,11 @@ def schedule(laminate: Laminate, press: PressSettings) -> Schedule:
     )
 
 
-def _step(part: AssemblyStep, press: PressSettings, after: str = "") -> Step:
+def _step(laminate: Laminate, part: AssemblyStep, press: PressSettings, after: str = "") -> Step:
+    count = stack_count(laminate, part.layers)
     return Step(
         step=part.number,
-        title=TITLES[part.name],
+        title=TITLES[part.name] if count == 1 else TITLES_OF_SEVERAL[part.name],
         bond=part.bond,
         layers=part.layers,
         adds=part.adds,
@@ -146,23 +163,25 @@ def _step(part: AssemblyStep, press: PressSettings, after: str = "") -> Step:
         force_n=round(press.force_n, 1),
         platen_mm=press.platen,
         minutes=press.minutes(part.name),
-        instructions=_instructions(part) + after,
+        instructions=_instructions(part, count) + after,
     )
 
 
-def _instructions(part: AssemblyStep) -> str:
+def _instructions(part: AssemblyStep, count: int) -> str:
+    """What to do in a step that makes ``count`` stacks beside each other."""
     pins = [pin.name for pin in part.pins]
     stacks = ", then ".join(_named(stack) for stack in part.stacks if stack)
     on_pins = f"on the pin{'s' if len(pins) > 1 else ''} {_listed(pins)}"
     if part.bond == "full":
-        how = on_pins if pins else "outline on outline, with no pin"
+        how = on_pins if pins else "by eye, with no pin"
         return (
             f"Lay down {stacks}, {how}. Press to the full bond and let the laminate cool flat"
             + (", then draw the pins." if pins else ".")
         )
     by = on_pins if pins else "by hand"
     after = "Press to the flash bond" + (" and draw the pins." if pins else ".")
-    return f"Lay {stacks} on each other {by}, lowest first, as a stack of their own. {after}"
+    own = "a stack" if count == 1 else f"{count} stacks"
+    return f"Lay {stacks} on each other {by}, lowest first, as {own} of their own. {after}"
 
 
 def _listed(words: Sequence[str]) -> str:

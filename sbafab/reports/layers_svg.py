@@ -9,9 +9,11 @@ from dataclasses import dataclass
 from sbafab.cutting.properties import PTFE_WARNING
 from sbafab.geometry.edges import Point
 from sbafab.geometry.svg import number
+from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.picture import INK
 from sbafab.reports import drawing as draw
+from sbafab.reports.features import balloons
 from sbafab.reports.pattern_card import Card, cells, drawn, pattern_card, pin_mark
 
 PAGE = (420.0, 297.0)  # A3: the most a drawing may fill
@@ -34,7 +36,8 @@ class Grid:
 
 def layers_svg(laminate: Laminate) -> str:
     """Every distinct pattern in plan at one scale, as a drawing for A3 (longer if need be)."""
-    cards = [pattern_card(laminate, layers) for layers in laminate.patterns.values()]
+    held = pins_when_added(laminate)
+    cards = [pattern_card(laminate, layers, held) for layers in laminate.patterns.values()]
     block = BLOCK + NOTE_ROW * max(0, len(laminate.notes) - 1)
     grid = _grid(cards, block)
     elements: list[str] = []
@@ -42,7 +45,7 @@ def layers_svg(laminate: Laminate) -> str:
         row, column = divmod(place, grid.columns)
         corner = MARGIN + column * grid.cell[0], MARGIN + row * grid.cell[1]
         elements += drawn(card, grid.scale, corner, grid.cell)
-    elements += _title_block(laminate, grid, block)
+    elements += _title_block(laminate, grid, block, any(card.pins for card in cards))
     return draw.document(*grid.page, f"{laminate.name}: layers", elements)
 
 
@@ -70,14 +73,14 @@ def _grid(cards: Sequence[Card], block: float) -> Grid:
     return Grid(SCALES[-1], 1, cell, page)
 
 
-def _title_block(laminate: Laminate, grid: Grid, block: float) -> list[str]:
+def _title_block(laminate: Laminate, grid: Grid, block: float, pinned: bool) -> list[str]:
     width, height = grid.page
     low = (MARGIN, height - MARGIN - block)
     x, y = low
     needed = len(laminate.layers)
     masked = any(layer.is_mask for layer in laminate.layers)
     facts = (
-        f"{laminate.family}: {_count(laminate.balloons, 'balloon')}, "
+        f"{laminate.family}: {balloons(laminate)}, "
         f"{_count(len(laminate.chambers), 'chamber')}, {needed} layers of "
         f"{len(laminate.patterns)} patterns, {number(laminate.thickness)} thick (nominal)"
     )
@@ -90,7 +93,7 @@ def _title_block(laminate: Laminate, grid: Grid, block: float) -> list[str]:
             for row, note in enumerate(laminate.notes or ("",))
         ),
         draw.text((x + 3.0, y + block - 2.1), PTFE_WARNING if masked else ""),
-        *_films(laminate, (width / 2 + 18.0, y)),
+        *_films(laminate, pinned, (width / 2 + 18.0, y)),
         *_scale_bar(grid.scale, (width - MARGIN - 4.0, y)),
     ]
 
@@ -99,7 +102,8 @@ def _count(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-def _films(laminate: Laminate, at: Point) -> list[str]:
+def _films(laminate: Laminate, pinned: bool, at: Point) -> list[str]:
+    """The key: films, and the mark of a pin where one is drawn."""
     parts: list[str] = []
     films = dict.fromkeys(layer.film for layer in laminate.layers)
     for row, film in enumerate(films):
@@ -111,7 +115,7 @@ def _films(laminate: Laminate, at: Point) -> list[str]:
         name = film.product if known else f"{film.material}, {film.product}"
         words = f"{name}, {number(film.thickness)} thick"
         parts.append(draw.text((x + 8.0, y + 2.8), words))
-    if laminate.pins:
+    if pinned:
         x, y = at[0] + 3.0, at[1] + 3.4 + 5.4 * len(films) + 1.4
         parts.append(pin_mark((x, y), 2.0))
         parts.append(draw.text((x + 5.0, y + 1.0), "dowel pin that holds the layer"))

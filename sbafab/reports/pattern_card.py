@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -46,7 +46,7 @@ class Frame:
 class Card:
     """One pattern with all that its drawing says; ``bounds`` holds phantom circles too.
 
-    ``pins`` are the dowel pins that hold the pattern.
+    ``pins`` are the dowel pins that hold all its layers when they are laid.
     """
 
     layers: tuple[Layer, ...]
@@ -82,8 +82,10 @@ class Card:
         return max(width, caption), CAPTION + height + UNDER + 2 * PAD
 
 
-def pattern_card(laminate: Laminate, layers: tuple[Layer, ...]) -> Card:
-    """The card of the layers that share one pattern."""
+def pattern_card(
+    laminate: Laminate, layers: tuple[Layer, ...], held: Mapping[int, Sequence[Pin]]
+) -> Card:
+    """The card of the layers that share one pattern; ``held`` says which pins hold each layer."""
     profile = layers[0].profile
     marks: list[Circle | Width] = [*circles(laminate, layers[0]), *radii(profile)]
     low_x, low_y, high_x, high_y = profile.bounds
@@ -99,7 +101,7 @@ def pattern_card(laminate: Laminate, layers: tuple[Layer, ...]) -> Card:
         )
     widths = inlet_width(laminate, layers[0]), piece_width(profile)
     marks += [width for width in widths if width is not None]
-    pins = laminate.pins_holding(layers[0])
+    pins = tuple(pin for pin in laminate.pins if all(pin in held[x.index] for x in layers))
     return Card(layers, pins, tuple(marks), (low_x, low_y, high_x, high_y))
 
 

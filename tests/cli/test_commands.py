@@ -69,9 +69,30 @@ def test_bad_input_is_one_sentence_and_exit_2(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("arguments", [[], ["frobnicate"], ["check"], ["check", "x", "--bogus"]])
-def test_bad_usage_is_exit_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("arguments", "command"),
+    [
+        (["frobnicate"], "sbafab"),
+        (["check"], "sbafab check"),
+        (["check", "x", "--bogus"], "sbafab check"),
+        (["generate", "x", "--copies", "1e3"], "sbafab generate"),
+        (["generate", "1dof-5mm", "--chord-error", "0.01"], "sbafab generate"),
+        (["kerf", "x.csv", "--resolution", "nan"], "sbafab kerf"),
+    ],
+)
+def test_bad_usage_is_one_sentence_and_exit_2(
+    arguments: list[str], command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     code, out, err = run(arguments, capsys)
+    assert code == 2
+    assert out == ""
+    assert err.startswith("sbafab: ")
+    assert err.endswith(f"; see {command} --help\n")
+    assert err.count("\n") == 1
+
+
+def test_no_command_is_exit_2_and_shows_the_help(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run([], capsys)
     assert code == 2
     assert "Usage: sbafab" in out + err
 
@@ -136,10 +157,12 @@ def test_templates_schema_and_new(
     monkeypatch.chdir(tmp_path)
     code, out, _ = run(["templates"], capsys)
     assert code == 0
-    assert len(out.splitlines()) == 4
+    assert len(out.splitlines()) == 7
     code, out, _ = run(["schema"], capsys)
     assert code == 0
-    assert {"OneDofDesign", "LobedDesign", "RadialDesign"} <= set(json.loads(out)["$defs"])
+    assert {"OneDofDesign", "LobedDesign", "RadialDesign", "Assembly"} <= set(
+        json.loads(out)["$defs"]
+    )
     code, out, _ = run(["new", "1dof-5mm"], capsys)
     assert code == 0
     code, _, _ = run(["check", "1dof-5mm.toml"], capsys)

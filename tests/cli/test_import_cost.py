@@ -7,7 +7,17 @@ import sys
 
 import pytest
 
-HEAVY = {"PIL", "ezdxf", "manifold3d", "numpy", "rich", "shapely", "svgelements", "trimesh"}
+HEAVY = {
+    "PIL",
+    "ezdxf",
+    "manifold3d",
+    "matplotlib",
+    "numpy",
+    "rich",
+    "shapely",
+    "svgelements",
+    "trimesh",
+}
 
 PROGRAM = """
 import contextlib, io, sys

@@ -7,12 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import shapely
 
 from sbafab.cutting import sheets as module
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.lettering import GLYPHS, strokes, width
 from sbafab.cutting.properties import CutSettings
-from sbafab.cutting.sheets import Machine, write_sheets
+from sbafab.cutting.sheets import Machine, SheetFile, write_sheets
 from sbafab.errors import OutputError
 from sbafab.geometry.shapes import disc, rectangle
 from sbafab.nesting.nest import nest
@@ -76,10 +77,55 @@ def test_the_label_is_engraved_in_the_border_alone(tmp_path: Path) -> None:
     assert "ENGRAVE" not in read_profile(tmp_path / plain.path).layers
 
 
-def test_no_label_where_a_pin_or_a_narrow_border_leaves_no_room(tmp_path: Path) -> None:
-    for stock in (replace(STOCK, border=2.0), replace(STOCK, pins=((30.0, 3.0, 3.0),))):
+def engraved_box(sheet: SheetFile, folder: Path) -> tuple[float, float, float, float]:
+    strokes = [
+        edges for layer, edges in read_profile(folder / sheet.path).strokes if layer == "ENGRAVE"
+    ]
+    ends = [p for edges in strokes for edge in edges for p in (edge.start, edge.end)]
+    return shapely.MultiPoint(ends).bounds
+
+
+def test_a_sheet_says_that_its_narrow_border_has_no_room_for_a_label(tmp_path: Path) -> None:
+    (sheet,) = write_sheets([ring_nest(1, replace(STOCK, border=2.0))], tmp_path, SETTINGS, MACHINE)
+    assert sheet.label == "no room"
+    assert "ENGRAVE" not in read_profile(tmp_path / sheet.path).layers
+    (plain,) = write_sheets([ring_nest(1)], tmp_path, SETTINGS, MACHINE, labelled=False)
+    assert plain.label == "off"
+
+
+def test_a_label_makes_way_for_pins(tmp_path: Path) -> None:
+    pins = [(30.0, 3.0, 3.0), (3.0, 40.0, 3.0), (30.0, 77.0, 3.0), (57.0, 40.0, 3.0)]
+    # Below, left, above, right: where the label is while the pins before are in its way.
+    sides = [(6, 0, 54, 6), (0, 6, 6, 74), (6, 74, 54, 80), (54, 6, 60, 74)]
+    for count, (low_x, low_y, high_x, high_y) in enumerate(sides):
+        stock = replace(STOCK, pins=tuple(pins[:count]))
         (sheet,) = write_sheets([ring_nest(1, stock)], tmp_path, SETTINGS, MACHINE)
-        assert "ENGRAVE" not in read_profile(tmp_path / sheet.path).layers
+        found = engraved_box(sheet, tmp_path)
+        assert low_x - 1e-6 <= found[0]
+        assert low_y - 1e-6 <= found[1]
+        assert found[2] <= high_x + 1e-6
+        assert found[3] <= high_y + 1e-6
+    (full,) = write_sheets(
+        [ring_nest(1, replace(STOCK, pins=tuple(pins)))], tmp_path, SETTINGS, MACHINE
+    )
+    assert full.label == "no room"
+
+
+def test_a_label_that_is_too_long_is_turned_or_wrapped(tmp_path: Path) -> None:
+    narrow = replace(STOCK, width=44.0, border=10.0, roll=True, length=900.0)
+    # One row of rings 1 mm apart: the long side has room for 1.5 mm letters, the short one not.
+    (tall,) = write_sheets([ring_nest(12, narrow)], tmp_path, SETTINGS, MACHINE)
+    low_x, low_y, high_x, high_y = engraved_box(tall, tmp_path)
+    assert 0 < low_x < high_x < 10
+    assert high_x - low_x >= 1.5
+    assert 10 - 1e-6 <= low_y < high_y <= tall.length - 10
+    (short,) = write_sheets([ring_nest(2, narrow)], tmp_path, SETTINGS, MACHINE)
+    low_x, low_y, high_x, high_y = engraved_box(short, tmp_path)
+    assert 0 < low_y < high_y < 10
+    # More than a line of at least 1.5 mm.
+    assert high_y - low_y > 2 * 1.5
+    assert 10 - 1e-6 <= low_x < high_x <= 34
+    assert tall.label == short.label == "engraved"
 
 
 def test_a_roll_is_cut_off_one_border_past_its_parts(tmp_path: Path) -> None:

@@ -28,7 +28,13 @@ def imported_modules(folder: Path) -> Iterator[str]:
                 yield node.module.partition(".")[0]
 
 
-OUR_OWN = {"sbafab", "benchmarks", "tests", *(path.stem for path in (ROOT / "tests").rglob("*.py"))}
+OUR_OWN = {
+    "sbafab",
+    "benchmarks",
+    "docs",
+    "tests",
+    *(path.stem for path in (ROOT / "tests").rglob("*.py")),
+}
 
 
 def names(requirements: list[str]) -> set[str]:

@@ -135,6 +135,25 @@ def test_page_is_in_true_millimetres_and_the_scale_is_the_one_drawn() -> None:
     assert high_x - low_x == pytest.approx(scale * (4.25 * 1.5 + 6.5), rel=1e-4)
 
 
+def pins_drawn(svg: str) -> dict[str, int]:
+    """Filled circles on each pattern's card."""
+    root = ElementTree.fromstring(svg.encode())
+    return {
+        group.attrib["id"]: sum(c.attrib["fill"] == "#1a1a1a" for c in group.iter(f"{SVG}circle"))
+        for group in root.iter(f"{SVG}g")
+    }
+
+
+def test_pins_are_drawn_where_they_are_in_when_the_layer_is_laid() -> None:
+    # Base P01 and cap P07 have the lumen's hole, but no pin is in when they are laid.
+    svg = layers_svg(laminate_of("3dof-15mm"))
+    assert pins_drawn(svg) == {"P01": 0, "P02": 3, "P03": 4, "P04": 1, "P05": 4, "P06": 3, "P07": 0}
+    assert "dowel pin that holds the layer" in svg
+    eared = build(load_design("3dof-15mm", ["registration.method=ears"]))
+    assert pins_drawn(layers_svg(eared))["P01"] == pins_drawn(layers_svg(eared))["P07"] == 2
+    assert "dowel pin" not in layers_svg(laminate_of("radial-15mm"))
+
+
 def test_a_name_with_markup_is_escaped() -> None:
     laminate = replace(laminate_of("1dof-5mm"), name='<Tom & "Jerry">')
     root = ElementTree.fromstring(layers_svg(laminate).encode())

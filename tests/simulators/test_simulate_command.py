@@ -143,7 +143,7 @@ def test_results_of_another_input_are_not_kept(tmp_path: Path) -> None:
 
 def test_a_run_leaves_what_it_found(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
-    arguments = ["simulate", "1dof-5mm", "--with", "mujoco", "--seconds", "1", "-o", str(tmp_path)]
+    arguments = ["simulate", "1dof-5mm", "--with", "mujoco", "--seconds", "2", "-o", str(tmp_path)]
     result = CliRunner().invoke(app, [*arguments, "--set", "stack.balloons=1", "--json"])
     assert result.exit_code == 0, result.output
     told = json.loads(result.stdout)

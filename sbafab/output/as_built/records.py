@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -12,7 +12,7 @@ from sbafab.errors import OutputError
 from sbafab.laminate.films import Material
 from sbafab.laminate.interfaces import InterfaceKind
 from sbafab.laminate.laminate import Role
-from sbafab.output.swap import JOB_SCHEMA, SCHEMA, read_manifest
+from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA, read_manifest
 from sbafab.rules.finding import Finding, Place, Verdict
 
 INTEGRITY = "file-integrity"
@@ -173,7 +173,7 @@ class DesignClaim(_Claim):
 class Job(_Claim):
     """The part of a job's ``manifest.json`` that a check compares with what lies on disk."""
 
-    schema_name: Literal["sbafab/job@1"] = Field(alias="schema")
+    schema_name: Literal["sbafab/job@1", "sbafab/assembly@1"] = Field(alias="schema")
     name: str
     units: Literal["mm"]
     designs_sha256: str
@@ -182,6 +182,13 @@ class Job(_Claim):
     films: tuple[FilmUseClaim, ...]
     sheets: Annotated[tuple[SheetClaim, ...], Field(max_length=2000)]
     files: dict[str, str]
+
+
+class Joined(Job):
+    """What the manifest of an assembly says beyond that of a job."""
+
+    design_sha256: str
+    parts: Annotated[tuple[dict[str, Any], ...], Field(max_length=1000)]
 
 
 def read_claims(folder: Path) -> Manifest:
@@ -194,13 +201,13 @@ def read_claims(folder: Path) -> Manifest:
 
 
 def is_job(folder: Path) -> bool:
-    """Whether a folder is one of several designs."""
+    """Whether a folder is one of several designs, of a job or an assembly."""
     path = folder / "manifest.json"
     try:
         is_small = path.is_file() and path.stat().st_size <= MOST_BYTES
     except OSError:
         return False
-    return is_small and (read_manifest(folder) or {}).get("schema") == JOB_SCHEMA
+    return is_small and (read_manifest(folder) or {}).get("schema") in (JOB_SCHEMA, ASSEMBLY_SCHEMA)
 
 
 def read_job(folder: Path) -> Job:
@@ -208,7 +215,17 @@ def read_job(folder: Path) -> Job:
     return _read(folder, Job, JOB_SCHEMA)
 
 
-Read = TypeVar("Read", Manifest, Job)
+def is_joined(job: Job) -> bool:
+    """Whether a job's designs are the parts of an assembly."""
+    return job.schema_name == ASSEMBLY_SCHEMA
+
+
+def read_joined(folder: Path) -> Joined:
+    """The manifest of an assembly's folder. Raises OutputError as ``read_claims`` does."""
+    return _read(folder, Joined, ASSEMBLY_SCHEMA)
+
+
+Read = TypeVar("Read", Manifest, Job, Joined)
 
 
 def _read(folder: Path, kind: type[Read], schema: str) -> Read:

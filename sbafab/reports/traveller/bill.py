@@ -46,7 +46,8 @@ def bill(work: Work) -> list[Item]:
         for diameter, number in sorted(pins.items())
     ]
     if job.fixture is not None:
-        items.append(Item("Pin plate", f"cut from {job.fixture}, holes reamed to the pins", "1"))
+        what = f"cut from {job.fixture}, holes reamed to the pins; a second one lies on top"
+        items.append(Item("Pin plate", f"{what} of longer pins", "1 or 2"))
     items.append(
         Item(
             "Release film",

@@ -12,10 +12,11 @@ from sbafab.cutting.fixture import fixture
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.svg import number, path_data
-from sbafab.laminate.assembly import AssemblyStep, distinct_layers
+from sbafab.laminate.assembly import AssemblyStep, distinct_layers, stack_count
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.reports import drawing as draw
 from sbafab.reports.features import layer_numbers
+from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.layup import Bed, Round, rounds
 from sbafab.reports.traveller.shapes import Picture, pattern_id
 
@@ -119,7 +120,8 @@ def _levels(laminate: Laminate, bed: Bed) -> Iterator[Level]:
     if bed.made_in is not None:
         shown = distinct_layers(laminate, bed.layers)[:4]
         words = f"layers {layer_numbers(bed.layers)}"
-        yield Level(shown, words, f"the stack from step {bed.made_in}", True)
+        many = stack_count(laminate, bed.layers)
+        yield Level(shown, words, f"the {say.stacks(many)} from step {bed.made_in}", True)
         return
     for turn in rounds([laminate.layer(index) for index in bed.layers]):
         for place in turn.places:

@@ -7,18 +7,22 @@ date of a print is written by the browser that prints.
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
+from string import ascii_uppercase
+from typing import TYPE_CHECKING, Any
 
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
+from sbafab.laminate.assembly import pins_when_added
+from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.models.sizes import sizes
 from sbafab.pressing.schedule import Schedule
 from sbafab.reports.drawing import TIMES
-from sbafab.reports.features import layer_numbers
+from sbafab.reports.features import balloons, layer_numbers
 from sbafab.reports.traveller import bill, notes, process, times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.cautions import cautions
@@ -26,12 +30,16 @@ from sbafab.reports.traveller.code import code_svg, code_text
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.layup import Round, rounds
 from sbafab.reports.traveller.shapes import definitions, pattern_regions
-from sbafab.reports.traveller.sheet_map import part_regions, sheet_map
+from sbafab.reports.traveller.sheet_map import is_long, marked, part_regions, rows_said, sheet_map
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 HERE = Path(__file__).parent
 TEMPLATE = "traveller.html.j2"
 STYLE = "traveller.css"
 SHORT_HASH = 12
+BY_HAND = "none (by hand)"
 
 BURST_KILOPASCALS = "367 ± 18"
 
@@ -44,10 +52,15 @@ def traveller_html(
     job: Job,
 ) -> str:
     """The whole page. ``schedule`` is this laminate's, ``sheets`` hold all its copies."""
+    work = Work(design, laminate, schedule, sheets, job)
+    return environment().get_template(TEMPLATE).render(context(work))
+
+
+def environment() -> Environment:
+    """The templates of this folder; what they are not given is an error."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    work = Work(design, laminate, schedule, sheets, job)
-    environment = Environment(
+    return Environment(
         loader=FileSystemLoader(HERE),
         autoescape=True,
         undefined=StrictUndefined,
@@ -55,41 +68,72 @@ def traveller_html(
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+
+
+def context(work: Work) -> dict[str, Any]:
+    """What the templates say of one design."""
+    laminate, job = work.laminate, work.job
     text = code_text(laminate.name, job.design_sha256, job.generator)
-    return environment.get_template(TEMPLATE).render(
-        work=work,
-        design=design,
-        laminate=laminate,
-        schedule=schedule,
-        job=job,
-        say=say,
-        notes=notes,
-        style=(HERE / STYLE).read_text(encoding="utf-8"),
-        running_head=css_string(f"{laminate.name}  {job.design_sha256[:SHORT_HASH]}"),
-        shapes=definitions(chain(pattern_regions(laminate), part_regions(sheets))),
-        family=family_words(laminate),
-        facts=_facts(work),
-        short_hash=job.design_sha256[:SHORT_HASH],
-        code=code_svg(text),
-        code_text=text,
-        solid=None if job.solid_png is None else b64encode(job.solid_png).decode("ascii"),
-        cautions=cautions(work),
-        bill=bill.bill(work),
-        sheet_rows=_sheet_rows(work),
-        cuts=bill.cut_list(work),
-        kerf=bill.kerf_states(job, list(dict.fromkeys(x.film.material for x in laminate.layers))),
-        laser_minutes=times.laser_minutes(work),
-        laser_basis=times.laser_basis(work),
-        lay_up=_lay_up(work),
-        step_pages=process.step_pages(work),
-        finishing=process.finishing(work),
-        tubing=process.tubing(work),
-        leak_test=process.leak_test(work),
-        wrapping=process.wrapping(work),
-        leak_kilopascals=process.LEAK_KILOPASCALS,
-        burst=BURST_KILOPASCALS,
-        times=times.times(work),
-    )
+    others = _others(work)
+    return {
+        **frame(laminate.name, job.design_sha256, job.generator),
+        "work": work,
+        "design": work.design,
+        "laminate": laminate,
+        "schedule": work.schedule,
+        "job": job,
+        "shapes": definitions(chain(pattern_regions(laminate), part_regions(work.sheets))),
+        "family": family_words(laminate),
+        "facts": _facts(work),
+        "code": code_svg(text),
+        "code_text": text,
+        "solid": None if job.solid_png is None else b64encode(job.solid_png).decode("ascii"),
+        "cautions": cautions(work),
+        "bill": bill.bill(work),
+        "others": others,
+        "sheet_rows": sheet_rows(work.sheets, {work.design.name: "", **others}),
+        "cuts": bill.cut_list(work),
+        "kerf": bill.kerf_states(job, materials(laminate)),
+        "laser_minutes": times.laser_minutes(work),
+        "laser_basis": times.laser_basis(work),
+        "lay_up": _lay_up(work),
+        "force_notes": process.force_notes(work),
+        "step_pages": process.step_pages(work),
+        "finishing": process.finishing(work),
+        "tubing": process.tubing(work),
+        "leak_test": process.leak_test(work),
+        "wrapping": process.wrapping(work),
+        "leak_kilopascals": process.LEAK_KILOPASCALS,
+        "burst": BURST_KILOPASCALS,
+        "times": times.times(work),
+        "kerf_notes": notes.kerf_notes(work),
+        "expected_sizes": notes.expected_sizes(work),
+    }
+
+
+def _others(work: Work) -> dict[str, str]:
+    """A letter for each other design that lies on the same sheets, so that labels stay short."""
+    designs = {design for sheet in work.sheets for design, _, _ in sheet.counts}
+    names = sorted(designs - {work.design.name})
+    return {name: ascii_uppercase[i % 26] for i, name in enumerate(names, 1)}
+
+
+def frame(title: str, sha256: str, generator: str) -> dict[str, Any]:
+    """What every page has: its style, and what stands at the head and foot of each sheet."""
+    short = sha256[:SHORT_HASH]
+    return {
+        "title": title,
+        "short_hash": short,
+        "generator": generator,
+        "running_head": css_string(f"{title}  {short}"),
+        "style": (HERE / STYLE).read_text(encoding="utf-8"),
+        "say": say,
+        "notes": notes,
+    }
+
+
+def materials(laminate: Laminate) -> list[Material]:
+    return list(dict.fromkeys(layer.film.material for layer in laminate.layers))
 
 
 def family_words(laminate: Laminate) -> str:
@@ -114,7 +158,7 @@ def _facts(work: Work) -> list[tuple[str, str]]:
     }
     return [
         ("Copies", str(work.job.copies)),
-        ("Balloons", str(laminate.balloons)),
+        ("Balloons", balloons(laminate)),
         ("Chambers", str(len(laminate.chambers))),
         ("Layers", f"{len(laminate.layers)} of {len(laminate.patterns)} patterns"),
         *(
@@ -127,36 +171,37 @@ def _facts(work: Work) -> list[tuple[str, str]]:
 
 @dataclass(frozen=True)
 class SheetRow:
-    """A sheet as it stands in the cut list."""
+    """A sheet as it stands in the cut list; ``said`` tells how a long one is drawn."""
 
     sheet: SheetFile
     picture: str
     counts: str
     size: str
     minutes: str
+    said: str
+    is_wide: bool
 
 
-def _sheet_rows(work: Work) -> list[SheetRow]:
+def sheet_rows(sheets: Sequence[SheetFile], marks: Mapping[str, str]) -> list[SheetRow]:
+    """The film sheets; patterns go with the mark of their design, or with the design's name."""
     rows = []
-    for number, sheet in enumerate(work.sheets, 1):
+    for number, sheet in enumerate(sheets, 1):
         counts = [
-            f"{count} {TIMES} {_part_name(work, design, pattern)}"
+            f"{count} {TIMES} {marked(design, pattern, marks)}"
             for design, pattern, count in sheet.counts
         ]
         rows.append(
             SheetRow(
                 sheet,
-                sheet_map(sheet, work.design.name, f"sheet-{number}"),
+                sheet_map(sheet, marks, f"sheet-{number}"),
                 ", ".join(counts),
                 say.size(sheet.width, sheet.length),
                 say.minutes(sheet.minutes),
+                rows_said(sheet),
+                is_long(sheet),
             )
         )
     return rows
-
-
-def _part_name(work: Work, design: str, pattern: str) -> str:
-    return pattern if design == work.design.name else f"{design} {pattern}"
 
 
 @dataclass(frozen=True)
@@ -173,13 +218,16 @@ class LayUpRow:
 
 def _lay_up(work: Work) -> list[LayUpRow]:
     """The layers bottom to top, rounds named once."""
-    return [row for turn in rounds(work.laminate.layers) for row in _round_rows(work, turn)]
+    held = {
+        index: say.listed([pin.name for pin in pins]) if pins else BY_HAND
+        for index, pins in pins_when_added(work.laminate).items()
+    }
+    return [row for turn in rounds(work.laminate.layers) for row in _round_rows(held, turn)]
 
 
-def _round_rows(work: Work, turn: Round) -> list[LayUpRow]:
+def _round_rows(held: Mapping[int, str], turn: Round) -> list[LayUpRow]:
     rows = []
     for place, layers in enumerate(turn.places):
-        pins = [pin.name for pin in work.laminate.pins_holding(layers[0])]
         repeat = "once"
         if turn.count > 1:
             repeat = (
@@ -190,7 +238,7 @@ def _round_rows(work: Work, turn: Round) -> list[LayUpRow]:
                 layer_numbers([layer.index for layer in layers]),
                 layers[0],
                 len(layers[0].profile.pieces),
-                say.listed(pins) if pins else "none",
+                "; ".join(dict.fromkeys(held[layer.index] for layer in layers)),
                 repeat,
                 len(turn.places) if place == 0 else 0,
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from sbafab.cutting.fixture import CHAMFER, fixture
@@ -21,6 +22,8 @@ FREE = 6.0
 """mm of air round a laminate that has no pin plate."""
 PLATE = "#f1f1ef"
 BESIDE = 2.2
+AT_DATUM = 1e-3
+"""mm from the datum within which a pin hides it."""
 
 
 class _View(NamedTuple):
@@ -73,7 +76,11 @@ def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: s
         picture.add(*_pin(pin, pin in step.pins, view))
     for inlet in inlets_in(laminate, step.layers):
         picture.add(*_inlet(inlet, _reach(laminate, inlet), view))
-    picture.add(*_datum(view), *_captions(view, plate is not None, bool(step.pins)))
+    at_datum = next((pin.name for pin in step.pins if math.hypot(*pin.centre) < AT_DATUM), None)
+    if at_datum is None:
+        picture.add(*_datum(view))
+    datum = "+ datum" if at_datum is None else f"the datum is the middle of pin {at_datum}"
+    picture.add(*_captions(view, plate is not None, bool(step.pins), datum))
     return picture.svg()
 
 
@@ -136,10 +143,10 @@ def _datum(view: _View) -> list[str]:
     ]
 
 
-def _captions(view: _View, plate: bool, pinned: bool) -> list[str]:
+def _captions(view: _View, plate: bool, pinned: bool, datum: str) -> list[str]:
     """What the marks mean, under the picture, and the plate's corner, above it."""
     y = view.height - 4.6
-    parts = [draw.text((EDGE, view.height - 1.2), "seen from above; + datum", size=2.2)]
+    parts = [draw.text((EDGE, view.height - 1.2), f"seen from above; {datum}", size=2.2)]
     if not plate:
         return parts
     mark = '<circle cx="{}" cy="{}" r="0.8" fill="{}" stroke="#1a1a1a" stroke-width="0.3"/>'

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from sbafab.actuators.radial import RadialDesign
-from sbafab.laminate.assembly import AssemblyStep, assembly
+from sbafab.laminate.assembly import AssemblyStep, assembly, stack_count
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.pressing.schedule import Step
 from sbafab.reports.features import layer_numbers
@@ -15,6 +15,7 @@ from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.exploded import exploded
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.layup import Bed, Round, beds, inlets_in, rounds
+from sbafab.reports.traveller.placing import Place, Things, pitch, places
 from sbafab.reports.traveller.plan import plan
 
 LEAK_KILOPASCALS = 5.0
@@ -39,11 +40,17 @@ class Action:
 
 @dataclass(frozen=True)
 class StepPage:
-    """One press step as it stands on the page; pictures are inline SVG."""
+    """One press step as it stands on the page; pictures are inline SVG.
+
+    ``places`` are those of pieces that are laid on a sheet by hand.
+    """
 
     step: Step
     bond: str
     dials: tuple[tuple[str, str], ...]
+    notes: tuple[str, ...]
+    places: tuple[Place, ...]
+    pitch: float | None
     plan: str
     exploded: str
     actions: tuple[Action, ...]
@@ -52,14 +59,19 @@ class StepPage:
 def step_pages(work: Work) -> list[StepPage]:
     """The press steps in order, each with its pictures, dial settings and actions."""
     parts = assembly(work.laminate)
+    first_pinned = next((part.number for part in parts if part.pins), None)
     found = []
     for part, step in zip(parts, work.schedule.steps, strict=True):
         lying = beds(parts, part)
+        placed = places(work.laminate, part, lying)
         found.append(
             StepPage(
                 step,
                 BONDS[step.bond],
                 _dials(step),
+                _pin_notes(work, part) if part.number == first_pinned else (),
+                placed,
+                pitch(placed),
                 plan(work.laminate, part, lying, f"plan-{step.step}"),
                 exploded(work.laminate, part, lying, f"exploded-{step.step}"),
                 tuple(_actions(work.laminate, part, step, lying)),
@@ -72,16 +84,47 @@ def _dials(step: Step) -> tuple[tuple[str, str], ...]:
     width, length = step.platen_mm
     return (
         ("Both platens", say.temperature(step.temperature_c)),
-        ("Force", say.force(step.force_n)),
+        ("Force on the whole platen", say.force(step.force_n)),
         (f"Pressure on {say.size(width, length)}", say.pressure(step.pressure_kpa)),
         ("Timer", say.minutes(step.minutes)),
         ("Pins", f"{len(step.pins)} in" if step.pins else "none"),
     )
 
 
+def force_notes(work: Work) -> tuple[str, ...]:
+    """What the force means: the paper gives only a pressure and an area."""
+    step = work.schedule.steps[0]
+    newtons, kilopascals = f"{step.force_n:.0f} N", f"{step.pressure_kpa:g} kPa"
+    top = work.laminate.layers[-1].profile.area
+    return (
+        f"The paper gives a pressure and a heated area, no force. {newtons} is {kilopascals} on "
+        f"the whole platen of {say.size(*step.platen_mm)}. It reaches the laminate as "
+        f"{kilopascals} only if something compliant that fills the platen, such as a silicone "
+        "sheet, spreads it (ours: the paper does not say what it used).",
+        f"Between bare platens the same force on the laminate alone ({top:.0f} mm² at its top) "
+        f"would be {step.force_n / top:.1f} MPa.",
+    )
+
+
+def _pin_notes(work: Work, part: AssemblyStep) -> tuple[str, ...]:
+    """How long pins may be and how they come out."""
+    twice = f"cut {work.job.fixture} twice" if work.job.fixture else "cut it twice"
+    return (
+        "Pins and plate (ours: the paper gives no sizes): a plate as the shop has, 3 mm or "
+        "thicker. Pins no longer than the plate and the stack of the step together, here the "
+        f"plate + {_height(work.laminate, part)}; or, with a second plate with the same holes on "
+        f"top ({twice}), no longer than both plates and the stack.",
+    )
+
+
+def _height(laminate: Laminate, part: AssemblyStep) -> str:
+    return say.millimetres(sum(laminate.layer(index).film.thickness for index in part.layers))
+
+
 def _actions(
     laminate: Laminate, part: AssemblyStep, step: Step, lying: Sequence[Bed]
 ) -> Iterator[Action]:
+    things = Things(laminate, lying)
     yield Action(
         f"Heat both platens to {say.temperature(step.temperature_c)}; set the force to "
         f"{say.force(step.force_n)}."
@@ -92,21 +135,26 @@ def _actions(
             "Prick a release film over them."
         )
     else:
-        yield Action("Lay a release film on a flat plate. No pins: lay edge on edge, by eye.")
+        yield Action("Lay a release film on a flat plate. No pins: lay by eye, as each line says.")
     for bed in lying:
-        yield from _lay(laminate, bed, part.pins)
-    stacked = sum(laminate.layer(index).film.thickness for index in part.layers)
+        yield from _lay(things, bed, part.pins)
+    many = stack_count(laminate, part.layers)
+    lies = "stack lies" if many == 1 else f"{many} stacks lie"
     yield Action(
         f"Check: {_tabs(laminate, part.layers)}edges lie as in the picture, nothing is folded, no "
-        f"dust or hair between the films, the stack lies flat (about {say.millimetres(stacked)})."
+        f"dust or hair between the films, the {lies} flat (about {_height(laminate, part)})."
     )
     if part.pins:
-        yield Action("Check: no pin stands so high that it keeps the platens apart.")
+        yield Action(
+            f"Check: no pin stands higher than the stack, {_height(laminate, part)} over the "
+            "plate, or a second plate with the same holes lies on top."
+        )
     yield Action("Cover with a release film.")
     yield Action(f"Close the press and start the timer: {say.minutes(step.minutes)}.")
     yield Action("Take it out: it is as hot as the platens. Let it cool flat before you touch it.")
     if part.pins:
-        yield Action(f"Pins out, straight up: {say.listed([pin.name for pin in part.pins])}.")
+        names = say.listed([pin.name for pin in part.pins])
+        yield Action(f"Pins out, pushed from below through the plate: {names}.")
     yield Action(f"Take off the release films. You now hold {_product(laminate, part)}.")
 
 
@@ -117,59 +165,72 @@ def _pins(pins: Sequence[Pin]) -> str:
     return "; ".join(f"⌀{say.millimetres(d)}: {say.listed(names)}" for d, names in sizes.items())
 
 
-def _lay(laminate: Laminate, bed: Bed, pins: Sequence[Pin]) -> Iterator[Action]:
+def _lay(things: Things, bed: Bed, pins: Sequence[Pin]) -> Iterator[Action]:
+    laminate = things.laminate
     if bed.made_in is not None:
         numbers = layer_numbers(bed.layers)
         lowest = laminate.layer(bed.layers[0])
+        many = say.stacks(stack_count(laminate, bed.layers))
         yield Action(
-            f"Lay the stack from step {bed.made_in} (layers {numbers}), layer {lowest.index}, the "
+            f"Lay the {many} from step {bed.made_in} (layers {numbers}), layer {lowest.index}, the "
             f"{lowest.film.material} {lowest.role.replace('-', ' ')}, down."
+            + ("" if pins else _along(things, lowest))
         )
         return
     turns = rounds([laminate.layer(index) for index in bed.layers])
     for repeats, group in groupby(turns, key=lambda turn: turn.count > 1):
         found = list(group)
         if repeats:
-            yield from (_lay_round(laminate, turn, pins) for turn in found)
+            yield from (_lay_round(things, turn, pins) for turn in found)
         elif len(found) > MOST_LINES:
-            yield _lay_many(laminate, [turn.first for turn in found], pins)
+            yield _lay_many(things, [turn.first for turn in found], pins)
         else:
             for layer in (turn.first for turn in found):
                 text = f"Lay layer {layer.index}: {_named(layer)}."
-                yield Action(text + _by_eye(laminate, [layer], pins), (layer.index,))
+                yield Action(text + _by_eye(things, [layer], pins), (layer.index,))
 
 
-def _lay_round(laminate: Laminate, turn: Round, pins: Sequence[Pin]) -> Action:
+def _lay_round(things: Things, turn: Round, pins: Sequence[Pin]) -> Action:
     """One box for every turn, so that nobody loses count."""
     order = ", then ".join(_named(layer) for layer in turn.turns[0])
     return Action(
         f"Lay layers {turn.first.index} to {turn.last.index}, {turn.count} times the same "
-        f"{len(turn.places)}, lowest first: {order}." + _by_eye(laminate, turn.turns[0], pins),
+        f"{len(turn.places)}, lowest first: {order}." + _by_eye(things, turn.turns[-1], pins),
         tuple(layer.index for layer in turn.layers),
         tuple(layer_numbers([layer.index for layer in part]) for part in turn.turns),
     )
 
 
-def _lay_many(laminate: Laminate, layers: Sequence[Layer], pins: Sequence[Pin]) -> Action:
+def _lay_many(things: Things, layers: Sequence[Layer], pins: Sequence[Pin]) -> Action:
     """Many layers that do not repeat, close together so that the step stays on its page."""
     return Action(
         f"Lay layers {layers[0].index} to {layers[-1].index} one by one, lowest first."
-        + _by_eye(laminate, layers, pins),
+        + _by_eye(things, layers, pins),
         tuple(layer.index for layer in layers),
         tuple(f"{layer.index}: {_named(layer)}" for layer in layers),
     )
 
 
-def _by_eye(laminate: Laminate, layers: Sequence[Layer], pins: Sequence[Pin]) -> str:
-    """A sentence on those of the layers that none of the pins in the plate holds."""
+def _by_eye(things: Things, layers: Sequence[Layer], pins: Sequence[Pin]) -> str:
+    """Sentences on those of the layers that none of the pins in the plate holds."""
     if not pins:
-        return ""
-    loose = [
-        layer.pattern
+        return "".join(_along(things, layer) for layer in layers[:1])
+    loose = {
+        layer.pattern: layer
         for layer in layers
-        if not set(pins).intersection(laminate.pins_holding(layer))
-    ]
-    return f" No pin holds {say.listed(loose)}: lay by eye." if loose else ""
+        if not set(pins).intersection(things.laminate.pins_holding(layer))
+    }
+    said = []
+    for pattern, layer in loose.items():
+        line = things.line_up(layer.index, numbered=False)
+        said.append(f" No pin holds {pattern}: lay by eye{', ' if line else ''}{line}.")
+    return "".join(said)
+
+
+def _along(things: Things, layer: Layer) -> str:
+    """A sentence on the edge along which a layer, or the stack over it, is laid."""
+    line = "" if things.is_lowest(layer.index) else things.line_up(layer.index)
+    return f" Lay {line}." if line else ""
 
 
 def _named(layer: Layer) -> str:
@@ -191,7 +252,10 @@ def _product(laminate: Laminate, part: AssemblyStep) -> str:
     if len(part.layers) == len(laminate.layers):
         return "the whole laminate"
     numbers = layer_numbers(part.layers)
-    return f"the stack from step {part.number}, layers {numbers}; keep it this side up"
+    many = stack_count(laminate, part.layers)
+    keep = "keep it" if many == 1 else "keep them"
+    made = f"the {say.stacks(many)} from step {part.number}, layers {numbers}"
+    return f"{made}; {keep} this side up"
 
 
 def finishing(work: Work) -> list[Action]:

@@ -59,6 +59,11 @@ def count(number: int, noun: str, plural: str = "") -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {plural or noun + 's'}"
 
 
+def stacks(number: int) -> str:
+    """After the definite article: the stack, the 3 stacks."""
+    return "stack" if number == 1 else f"{number} stacks"
+
+
 def listed(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 

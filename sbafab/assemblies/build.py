@@ -1,0 +1,233 @@
+"""An assembly put together: every part with its design, laminate and place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from sbafab.actuators import build
+from sbafab.actuators.radial import RadialDesign
+from sbafab.assemblies.poses import (
+    FLIPPED,
+    LYING,
+    OUTWARD,
+    Pose,
+    Vector,
+    about_axis,
+    along,
+    shifted,
+)
+from sbafab.assemblies.reading import part_design
+from sbafab.assemblies.records import AnyPart, Assembly, Base, Cup, Line, Magnet, Sba, Tube
+from sbafab.assemblies.tree import building_order
+from sbafab.assemblies.wrap import bent_point
+from sbafab.design.records import Design
+from sbafab.design.writing import design_sha256
+from sbafab.errors import DesignError
+from sbafab.geometry.boolean import GeometryError
+from sbafab.laminate.laminate import Inlet, Laminate
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+RESERVED = frozenset({"sheets", "mesh", "preview"})
+
+
+@dataclass(frozen=True)
+class PartDesign:
+    """A design that one or several parts are made from; ``design.order.copies`` counts them all."""
+
+    design: Design
+    laminate: Laminate
+    parts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class PlacedPart:
+    """A part in its place.
+
+    ``turn`` about its own axis comes first; ``radius`` is that of the tube which it is bent
+    round, None for what stays flat; ``pose`` is last. ``made`` is an SBA's design.
+    """
+
+    name: str
+    part: AnyPart
+    pose: Pose
+    radius: float | None = None
+    made: PartDesign | None = None
+
+    @property
+    def turn(self) -> float:
+        return self.part.turn
+
+    @property
+    def height(self) -> float:
+        """Size along its own axis, mm; of an SBA, that of the nominal films."""
+        part = self.part
+        if isinstance(part, Tube | Line):
+            return part.length
+        if isinstance(part, Magnet | Base):
+            return part.thickness
+        if isinstance(part, Cup):
+            return part.height
+        assert self.made is not None
+        return self.made.laminate.thickness
+
+    def at(self, p: Vector) -> Vector:
+        """Where a point of the part's own frame lies in the assembly."""
+        p = about_axis(self.turn).at(p)
+        return self.pose.at(p if self.radius is None else bent_point(p, self.radius))
+
+    def turned(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points (n, 3) turned about the part's own axis, before they are bent or placed."""
+        return about_axis(self.turn).points(points)
+
+
+@dataclass(frozen=True)
+class Assembled:
+    """An assembly with its parts in place, each after what it is fixed on."""
+
+    assembly: Assembly
+    designs: tuple[PartDesign, ...]
+    parts: tuple[PlacedPart, ...]
+
+    def __getitem__(self, name: str) -> PlacedPart:
+        return next(part for part in self.parts if part.name == name)
+
+    def on(self, placed: PlacedPart) -> PlacedPart | None:
+        """What a part is fixed on; None for the root."""
+        return None if placed.part.on is None else self[placed.part.on]
+
+
+def assemble(assembly: Assembly) -> Assembled:
+    """Every part with its laminate and its place. Raises DesignError where it cannot be."""
+    order = building_order(assembly.parts)
+    designs = _designs(assembly)
+    made = {name: one for one in designs for name in one.parts}
+    placed: dict[str, PlacedPart] = {}
+    for name in order:
+        part = assembly.parts[name]
+        own = made.get(name)
+        if part.on is None:
+            _check_root(name, own)
+            pose = LYING if assembly.pose == "lying" else Pose()
+            placed[name] = PlacedPart(name, part, pose, None, own)
+        else:
+            placed[name] = _placed(name, part, own, placed[part.on])
+    return Assembled(assembly, designs, tuple(placed.values()))
+
+
+def _designs(assembly: Assembly) -> tuple[PartDesign, ...]:
+    """The distinct designs of the parts, in the file's order, with names of their own."""
+    found: dict[str, tuple[Design, list[str]]] = {}
+    for name, part in assembly.parts.items():
+        if isinstance(part, Sba):
+            design = part_design(assembly, name, part)
+            found.setdefault(design_sha256(design), (design, []))[1].append(name)
+    if not found:
+        raise DesignError(
+            'an assembly needs a stacked balloon actuator; add a part of kind = "sba"'
+        )
+    names = [design.name for design, _ in found.values()]
+    made = []
+    for design, parts in found.values():
+        own = design.name
+        if names.count(own) > 1 or own in RESERVED or own == assembly.name:
+            own = f"{own}-{parts[0]}"
+        made.append(_made(design, own, parts, assembly))
+    return tuple(made)
+
+
+def _made(design: Design, name: str, parts: list[str], assembly: Assembly) -> PartDesign:
+    order = assembly.order.model_copy(update={"copies": len(parts) * assembly.order.copies})
+    named = design.model_copy(update={"name": name, "order": order})
+    try:
+        return PartDesign(named, build(named), tuple(parts))
+    except (DesignError, GeometryError) as error:
+        raise DesignError(f"parts.{parts[0]}: {error}") from None
+
+
+def _check_root(name: str, made: PartDesign | None) -> None:
+    if made is not None and isinstance(made.design, RadialDesign):
+        raise DesignError(
+            f'parts.{name} is a radial design; wrap it round a tube: on = a tube, at = "outside"'
+        )
+
+
+def _placed(name: str, part: AnyPart, made: PartDesign | None, other: PlacedPart) -> PlacedPart:
+    _check_kinds(name, part, made, other)
+    if part.at == "outside":
+        tube = other.part
+        assert isinstance(tube, Tube)
+        radius = tube.outer_diameter / 2
+        side = about_axis(part.angle)
+        if made is not None:
+            pose = _frame(other).then(side).then(shifted(0.0, 0.0, part.along))
+            return PlacedPart(name, part, pose, radius, made)
+        pose = _frame(other).then(side).then(shifted(radius, 0.0, part.along)).then(OUTWARD)
+        return PlacedPart(name, part, pose, None, made)
+    if part.at == "inlet":
+        assert isinstance(part, Line)
+        return PlacedPart(name, part, _at_inlet(name, part, other))
+    return PlacedPart(name, part, _frame(other).then(_on_axis(part, other)), None, made)
+
+
+def _frame(placed: PlacedPart) -> Pose:
+    """The frame that other parts are fixed in: turned with the part."""
+    return placed.pose.then(about_axis(placed.turn))
+
+
+def _on_axis(part: AnyPart, other: PlacedPart) -> Pose:
+    x, y = part.offset
+    if part.at == "lumen":
+        return shifted(0.0, 0.0, part.along)
+    if part.at in ("top", "end"):
+        return shifted(x, y, other.height)
+    return shifted(x, y, 0.0).then(FLIPPED)
+
+
+def _at_inlet(name: str, line: Line, other: PlacedPart) -> Pose:
+    """At the mouth of a chamber's inlet, pointing outward."""
+    inlet = inlet_of(name, line, other)
+    (x, y), (u, v) = inlet.mouth, inlet.direction
+    assert other.made is not None
+    middle = other.made.laminate.layers[0].film.thickness
+    start, beyond = other.at((x, y, middle)), other.at((x + 1e-4 * u, y + 1e-4 * v, middle))
+    way = [(b - a) / 1e-4 for a, b in zip(start, beyond, strict=True)]
+    size = sum(value * value for value in way) ** 0.5
+    return along((way[0] / size, way[1] / size, way[2] / size), start)
+
+
+def inlet_of(name: str, line: Line, other: PlacedPart) -> Inlet:
+    """The inlet that a line goes into. Raises DesignError where there is none."""
+    assert other.made is not None
+    inlets: Mapping[str, Inlet] = {inlet.chamber: inlet for inlet in other.made.laminate.inlets}
+    if line.chamber not in inlets:
+        raise DesignError(
+            f'parts.{name}.chamber = "{line.chamber}" has no inlet in {other.name}; it has '
+            f"{', '.join(inlets)}"
+        )
+    return inlets[line.chamber]
+
+
+def _check_kinds(name: str, part: AnyPart, made: PartDesign | None, other: PlacedPart) -> None:
+    """What a design's family allows beyond what its kind does."""
+    if made is not None and isinstance(made.design, RadialDesign):
+        if part.at != "outside":
+            _check_root(name, made)
+        if part.turn % 180 != 0:
+            raise DesignError(
+                f"parts.{name}.turn = {part.turn:g} turns a radial design out of line with its "
+                "tube; it must be 0 or 180"
+            )
+    if other.radius is not None and part.at != "inlet":
+        raise DesignError(
+            f'parts.{name}.on = "{other.name}", which is bent round a tube and has no flat face; '
+            "fix it on another part"
+        )
+    if part.at == "lumen" and other.made is not None and other.made.laminate.lumen is None:
+        raise DesignError(
+            f'parts.{name}.on = "{other.name}", which has no lumen; only lobed designs have one'
+        )

@@ -1,0 +1,159 @@
+"""Checks of the whole against its way: through an aperture, into a lumen, against the wall."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from sbafab.actuators.radial import RadialDesign
+from sbafab.assemblies.build import Assembled, PlacedPart
+from sbafab.assemblies.fits import WHOLE, found
+from sbafab.assemblies.records import Base, Cup, Line, Magnet, Tube
+from sbafab.models.folded import LOBES, folded_diameter
+from sbafab.models.sizes import deflated_diameter, inflated_diameter
+from sbafab.rules.finding import Finding
+from sbafab.rules.limits import holds
+
+PRESSED = 0.95 / 1.865
+"""Measured over nominal thickness of the paper's 15-balloon 3-DoF actuator (Sec. 4)."""
+
+
+class _Passage(NamedTuple):
+    """What a part needs of a hole: as nominal films add up, and as the paper's pressed ones do."""
+
+    name: str
+    nominal: float
+    pressed: float
+    how: str
+
+
+def aperture(assembled: Assembled) -> Iterator[Finding]:
+    """Whether each part passes the aperture, lobes folded and all else as it is.
+
+    Folded sizes are predicted: where only the thinner, pressed laminate passes, or the paper says
+    nothing of how a part folds, the verdict is a warning.
+    """
+    hole = assembled.assembly.deploy.aperture_diameter
+    if hole is None:
+        return
+    needs = [_passage(placed) for placed in assembled.parts]
+    worst = max(needs, key=lambda need: (need.pressed > hole, need.nominal))
+    message = f"{worst.name} {worst.how} needs {worst.nominal:.2f} of the aperture's {hole:g}"
+    if holds(hole, worst.nominal):
+        yield found("aperture", True, hole, worst.nominal, message)
+    elif holds(hole, worst.pressed):
+        message += (
+            f", or {worst.pressed:.2f} if pressed as thin as the paper's, which passed 9.25: try it"
+        )
+        yield Finding("aperture", "warn", hole, worst.nominal, "mm", WHOLE, message)
+    else:
+        message += "; use fewer balloons, smaller chambers or a smaller part"
+        yield found("aperture", False, hole, worst.pressed, message)
+
+
+def _passage(placed: PlacedPart) -> _Passage:
+    part = placed.part
+    if placed.made is None:
+        size = _girth(placed)
+        soft = isinstance(part, Cup)
+        return _Passage(
+            placed.name, size, 0.0 if soft else size, "squeezed" if soft else "as it is"
+        )
+    design, laminate = placed.made.design, placed.made.laminate
+    if isinstance(design, RadialDesign):
+        size = deflated_diameter(design, laminate)
+        return _Passage(placed.name, size, size, "deflated")
+    lobe = _lobe_width(placed)
+    if lobe is not None:
+        return _Passage(
+            placed.name,
+            folded_diameter(lobe, laminate.thickness),
+            folded_diameter(lobe, PRESSED * laminate.thickness),
+            "folded",
+        )
+    return _Passage(placed.name, _flat_diameter(placed), 0.0, "unfolded")
+
+
+def _lobe_width(placed: PlacedPart) -> float | None:
+    """Width in mm of a lobe of a three-lobed actuator; None for others."""
+    assert placed.made is not None
+    design = placed.made.design
+    chamber = getattr(design, "chamber", None)
+    if design.family != "lobed" or getattr(chamber, "count", 0) != LOBES:
+        return None
+    sizes = getattr(chamber, "diameter", None)
+    if getattr(chamber, "outline", None) is not None or sizes is None:
+        return None
+    widest: float = max(sizes) if isinstance(sizes, tuple | list) else sizes
+    return widest + 2 * design.bond.width
+
+
+def _flat_diameter(placed: PlacedPart) -> float:
+    """Circle round an SBA's axis that holds its topmost film, which has no tabs, mm."""
+    assert placed.made is not None
+    top = placed.made.laminate.layers[-1].profile
+    return 2 * max(edge.farthest_from((0.0, 0.0)) for edge in top.edges)
+
+
+def _girth(placed: PlacedPart) -> float:
+    """Diameter of the smallest round hole that a bought part passes, mm."""
+    part = placed.part
+    if isinstance(part, Tube | Line):
+        return part.outer_diameter
+    if isinstance(part, Magnet | Cup):
+        return part.diameter
+    assert isinstance(part, Base)
+    short, middle, _ = sorted((part.width, part.length, part.thickness))
+    return float((short**2 + middle**2) ** 0.5)
+
+
+def lumen_pass(assembled: Assembled) -> Iterator[Finding]:
+    """Whether the deflated assembly passes the lumen; inlet tabs fold and are not counted."""
+    lumen = assembled.assembly.deploy.lumen_diameter
+    if lumen is None:
+        return
+    sizes = [(_deflated(placed, assembled), placed.name) for placed in assembled.parts]
+    widest, name = max(sizes, key=lambda pair: pair[0])
+    good = widest < lumen
+    message = f"deflated, {name} is the widest part, {widest:.2f} in a lumen of {lumen:g}"
+    if not good:
+        message += "; make it narrower or its laminate thinner"
+    yield found("lumen-pass", good, lumen, widest, message)
+
+
+def _deflated(placed: PlacedPart, assembled: Assembled) -> float:
+    if placed.made is None:
+        return _girth(placed)
+    design, laminate = placed.made.design, placed.made.laminate
+    if isinstance(design, RadialDesign):
+        return deflated_diameter(design, laminate)
+    if placed.radius is not None:
+        return 2 * (placed.radius + laminate.thickness)
+    return _flat_diameter(placed)
+
+
+def lumen_brace(assembled: Assembled) -> Iterator[Finding]:
+    """Whether inflated radial parts reach the lumen's wall."""
+    lumen = assembled.assembly.deploy.lumen_diameter
+    if lumen is None:
+        return
+    sizes = [
+        (inflated_diameter(placed.made.design, placed.made.laminate), placed.name)
+        for placed in assembled.parts
+        if placed.made is not None
+        and isinstance(placed.made.design, RadialDesign)
+        and placed.made.design.chamber.outline is None
+    ]
+    if not sizes:
+        message = (
+            f"no part expands against a lumen of {lumen:g}; add a radial design, or leave out "
+            "deploy.lumen_diameter"
+        )
+        yield found("lumen-brace", False, lumen, None, message)
+        return
+    widest, name = max(sizes)
+    good = holds(widest, lumen)
+    message = f"inflated, {name} reaches {widest:.2f} free, and the lumen is {lumen:g}"
+    if not good:
+        message += "; use wider chambers, more balloons or a thicker tube"
+    yield found("lumen-brace", good, lumen, widest, message)

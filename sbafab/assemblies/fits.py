@@ -1,0 +1,157 @@
+"""Checks between two parts: tubes that are wrapped, lines in lumens and inlets, glued faces."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from sbafab.actuators.radial import RadialDesign
+from sbafab.assemblies.build import Assembled, PlacedPart, inlet_of
+from sbafab.assemblies.records import Line, Tube
+from sbafab.assemblies.shapes import face
+from sbafab.geometry.region import Region
+from sbafab.rules.finding import Finding, Place
+from sbafab.rules.limits import holds
+
+WHOLE = Place()
+
+
+def found(
+    rule: str,
+    good: bool,
+    limit: float | None,
+    measured: float | None,
+    message: str,
+    unit: str = "mm",
+) -> Finding:
+    return Finding(rule, "pass" if good else "fail", limit, measured, unit, WHOLE, message)
+
+
+def joints(assembled: Assembled) -> Iterator[tuple[PlacedPart, PlacedPart]]:
+    """Each part that hangs on another, with that other."""
+    for placed in assembled.parts:
+        other = assembled.on(placed)
+        if other is not None:
+            yield placed, other
+
+
+def tube_match(assembled: Assembled) -> Iterator[Finding]:
+    """What is bent round a tube was made for it, or at least goes round it once."""
+    tolerance = assembled.assembly.rules.tube_tolerance
+    for placed, other in joints(assembled):
+        if placed.radius is None or placed.made is None or not isinstance(other.part, Tube):
+            continue
+        outer = other.part.outer_diameter
+        design = placed.made.design
+        if isinstance(design, RadialDesign):
+            own = design.tube.outer_diameter
+            off = abs(own - outer)
+            good = holds(tolerance, off)
+            message = (
+                f"{placed.name}, made for a tube of {own:g}, goes round {other.name} of {outer:g}"
+            )
+            if not good:
+                message += (
+                    f"; set tube.outer_diameter = {outer:g} in its design, or change the tube"
+                )
+            yield found("tube-match", good, tolerance, off, message)
+            continue
+        walls = placed.made.laminate.layers[0].profile.turned(placed.turn)
+        width, room = walls.bounds[2] - walls.bounds[0], math.pi * outer
+        yield found(
+            "tube-match",
+            holds(room, width),
+            room,
+            width,
+            f"{placed.name} takes {width:.2f} of the {room:.2f} round {other.name}, tabs included"
+            + ("" if holds(room, width) else "; take a thicker tube or a smaller actuator"),
+        )
+
+
+def inlet_match(assembled: Assembled) -> Iterator[Finding]:
+    """A line in an inlet goes into the strip that is opened to it."""
+    for placed, other in joints(assembled):
+        if placed.part.at != "inlet" or not isinstance(placed.part, Line):
+            continue
+        inlet = inlet_of(placed.name, placed.part, other)
+        limit = 2 * inlet.width / math.pi
+        outer = placed.part.outer_diameter
+        yield found(
+            "inlet-match",
+            holds(limit, outer),
+            limit,
+            outer,
+            f"{placed.name} has an outer diameter of {outer:g}, and the inlet of {inlet.chamber} "
+            f"in {other.name}, {inlet.width:g} wide, opens to {limit:.3f}"
+            + ("" if holds(limit, outer) else "; set inlet.tube_outer_diameter in its design"),
+        )
+
+
+def line_clearance(assembled: Assembled) -> Iterator[Finding]:
+    """What is left round a line in the lumen or tube that it runs through."""
+    limit = assembled.assembly.rules.line_clearance
+    for placed, other in joints(assembled):
+        if placed.part.at != "lumen" or not isinstance(placed.part, Line):
+            continue
+        lumen = _opening(other)
+        left = lumen - placed.part.outer_diameter
+        good = holds(left, limit)
+        yield found(
+            "line-clearance",
+            good,
+            limit,
+            left,
+            f"{placed.name} of {placed.part.outer_diameter:g} in the lumen of {other.name}, "
+            f"{lumen:g}, leaves {left:.3f} in diameter"
+            + ("" if good else f"; take a line of at most {lumen - limit:g} or a wider lumen"),
+        )
+
+
+def _opening(placed: PlacedPart) -> float:
+    if isinstance(placed.part, Tube):
+        return placed.part.inner_diameter
+    assert placed.made is not None
+    lumen = placed.made.laminate.lumen
+    assert lumen is not None
+    return lumen
+
+
+def seat(assembled: Assembled) -> Iterator[Finding]:
+    """How much of the smaller of two glued faces lies on the other.
+
+    What is bent round its tube lies on it wholly, a line is held by its hole.
+    """
+    limit = assembled.assembly.rules.seat_share
+    for placed, other in joints(assembled):
+        if placed.radius is not None or isinstance(placed.part, Line):
+            continue
+        if placed.part.at == "outside":
+            message = (
+                f"{placed.name} is stiff and touches the round {other.name} in a line only; build "
+                "the joint up with adhesive"
+            )
+            yield Finding("seat", "warn", limit, 0.0, "", WHOLE, message)
+            continue
+        own, under = _lower_face(placed), _face_of(other, placed.part.at)
+        share = (own & under).area / min(own.area, under.area)
+        good = holds(share, limit)
+        message = f"{share:.0%} of the smaller face of {placed.name} on {other.name} is glued"
+        if not good:
+            message += "; move it with offset, or use a larger part: an opening lies under it"
+        yield found("seat", good, limit, share, message, "")
+
+
+def _lower_face(placed: PlacedPart) -> Region:
+    """The face that is glued on, as it lies on the other part's."""
+    part = placed.part
+    own = _face_of(placed, "bottom").turned(part.turn)
+    if part.at in ("bottom", "start"):
+        own = own.mirrored()
+    return own.moved(*part.offset)
+
+
+def _face_of(placed: PlacedPart, at: str | None) -> Region:
+    if placed.made is None:
+        return face(placed.part)
+    layers = placed.made.laminate.layers
+    return layers[-1 if at == "top" else 0].profile

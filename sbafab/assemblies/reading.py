@@ -1,0 +1,138 @@
+"""Assembly files in and out: TOML to records, and one clear sentence if not."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from sbafab.actuators import FAMILIES, load_design
+from sbafab.assemblies.records import FAMILY, KINDS, AnyPart, Assembly, Sba
+from sbafab.design.reading import (
+    add_waivers,
+    checked,
+    design_path,
+    listed,
+    override,
+    read_toml,
+    shown,
+    validated,
+)
+from sbafab.design.records import Design
+from sbafab.errors import DesignError
+
+
+def load(
+    source: str | Path, assignments: Iterable[str] = (), waivers: Sequence[str] = ()
+) -> Design | Assembly:
+    """A design or an assembly, whichever the file holds. Raises DesignError."""
+    assignments = list(assignments)
+    path = design_path(source)
+    data = override(read_toml(path), assignments)
+    if data.get("family") != FAMILY:
+        return load_design(source, assignments, waivers)
+    _start_where_the_user_stands(data, assignments)
+    return assembly_of(add_waivers(data, waivers), path)
+
+
+def load_assembly(
+    source: str | Path, assignments: Iterable[str] = (), waivers: Sequence[str] = ()
+) -> Assembly:
+    """An assembly from a template's name or a TOML file. Raises DesignError."""
+    found = load(source, assignments, waivers)
+    if isinstance(found, Assembly):
+        return found
+    raise DesignError(
+        f'{found.name} is no assembly; give a file with family = "{FAMILY}" and [parts.NAME] tables'
+    )
+
+
+def assembly_of(data: Mapping[str, Any], path: Path) -> Assembly:
+    """The record of an assembly file's tables. Raises DesignError with one sentence."""
+    tables = data.get("parts")
+    if not isinstance(tables, dict) or not tables:
+        raise DesignError(
+            "an assembly has a table for each part; add [parts.NAME] with kind = one of "
+            f"{listed(KINDS)}"
+        )
+    parts = {name: _part(name, table) for name, table in tables.items()}
+    whole = checked(Assembly, {"name": path.stem, **data, "parts": parts}, {})
+    return whole.placed(path.parent)
+
+
+def _part(name: str, table: object) -> AnyPart:
+    where = f"parts.{shown(name).strip(chr(39))}"
+    if not isinstance(table, dict):
+        raise DesignError(f"{where} = {shown(table)} must be a table of keys, [{where}]")
+    kind = table.get("kind")
+    if kind is None:
+        raise DesignError(f"{where}.kind is missing; add kind = one of {listed(KINDS)}")
+    if not isinstance(kind, str) or kind not in KINDS:
+        near = difflib.get_close_matches(shown(kind).strip("'"), KINDS, 1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise DesignError(f"{where}.kind = {shown(kind)} must be one of {listed(KINDS)}{hint}")
+    return checked(KINDS[kind], table, {}, f"{where}.")
+
+
+def part_design(assembly: Assembly, name: str, part: Sba) -> Design:
+    """The design of an SBA part, with the part's and the assembly's own keys set.
+
+    Raises DesignError that names the part.
+    """
+    try:
+        path = design_path(_place_of(part.design, assembly.folder))
+        data = _merged(_merged(read_toml(path), part.set), assembly.shared)
+        data.setdefault("name", path.stem)
+        _keep_outline(data, part, assembly.folder)
+        own = _waivers(data)
+        rules = [r for r in assembly.rules.waive if r in _deck_names() and r not in own]
+        records = {family: record for family, (record, _) in FAMILIES.items()}
+        return validated(add_waivers(data, rules), records, path.parent)
+    except DesignError as error:
+        raise DesignError(f"parts.{name}: {error}") from None
+
+
+def _place_of(design: str, folder: Path) -> str | Path:
+    """A bare word names a template; what looks like a path starts at the assembly's file."""
+    return folder / design if Path(design).name != design or "." in design else design
+
+
+def _waivers(data: Mapping[str, Any]) -> list[Any]:
+    """The rules that a design file's tables waive, as far as they are written as they should."""
+    rules = data.get("rules")
+    waived = rules.get("waive") if isinstance(rules, dict) else None
+    return waived if isinstance(waived, list) else []
+
+
+def _deck_names() -> frozenset[str]:
+    from sbafab.rules.deck import RULES
+
+    return frozenset(rule.name for rule in RULES)
+
+
+def _merged(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """``data`` with the values of ``changes`` in place of its own, table by table."""
+    merged = dict(data)
+    for key, value in changes.items():
+        own = merged.get(key)
+        both = isinstance(value, dict) and isinstance(own, dict)
+        merged[key] = _merged(own, value) if both else value  # type: ignore[arg-type]
+    return merged
+
+
+def _keep_outline(data: dict[str, Any], part: Sba, folder: Path) -> None:
+    """An outline that the assembly's file names lies beside that file, not beside the design."""
+    chamber = part.set.get("chamber")
+    if isinstance(chamber, dict) and isinstance(chamber.get("outline"), str):
+        data["chamber"]["outline"] = str((folder / chamber["outline"]).absolute())
+
+
+def _start_where_the_user_stands(data: dict[str, Any], assignments: Sequence[str]) -> None:
+    """A design's path typed on the command line starts there, not at the assembly's file."""
+    for assignment in assignments:
+        keys = [key.strip() for key in assignment.partition("=")[0].split(".")]
+        match keys:
+            case ["parts", name, "design"] if said := data["parts"][name].get("design"):
+                if isinstance(_place_of(str(said), Path()), Path):
+                    data["parts"][name]["design"] = str(Path(str(said)).absolute())

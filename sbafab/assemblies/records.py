@@ -1,0 +1,221 @@
+"""What an assembly file asks for: parts, what each is fixed on, and what the whole must fit.
+
+Defaults are the paper's (Sec. 2.1) where it gives a figure; else ours, and the field says so.
+Lengths are mm, angles degrees.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
+
+from sbafab.design.records import NAME_PATTERN, Laser, Order, Press, RuleName, Section, Sheets
+from sbafab.design.units import Length, LengthOrZero, millimetres
+
+FAMILY = "assembly"
+Place = Literal["top", "bottom", "start", "end", "outside", "lumen", "inlet"]
+CheckName = Literal[
+    "tube-match",
+    "inlet-match",
+    "line-clearance",
+    "seat",
+    "collision",
+    "aperture",
+    "lumen-pass",
+    "lumen-brace",
+]
+Degrees = Annotated[float, Field(ge=-360, le=360)]
+Shift = Annotated[float, BeforeValidator(millimetres), Field(ge=-1000, le=1000)]
+PartName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}$")]
+Words = Annotated[str, Field(max_length=120)]
+
+
+class Fixed(Section):
+    """Where a part is fixed. The root, which all others hang on, has no ``on``."""
+
+    on: str | None = None
+    """The part that this one is fixed on."""
+    at: Place | None = None
+    """Where on it: top or bottom (of an SBA, a magnet, a base), start, end or outside (of a tube),
+    lumen (lines only: of an SBA or a tube), inlet (lines only: of an SBA)."""
+    angle: Degrees = 0.0
+    """At the outside of a tube: how far round it."""
+    turn: Degrees = 0.0
+    """Turn of the part about its own axis before it is fixed."""
+    along: Shift = 0.0
+    """At the outside of a tube or in a lumen: how far from the start, to the part's own origin."""
+    offset: Annotated[tuple[Shift, Shift], Field(strict=False)] = (0.0, 0.0)
+    """At a top, bottom, start or end: how far off the axis, x and y."""
+    glue: Words | None = None
+    """The adhesive to order; none where the part is held otherwise."""
+    note: Annotated[str, Field(max_length=400)] = ""
+    """Printed with the part's step in the traveller."""
+
+
+class Sba(Fixed):
+    """A stacked balloon actuator, cut and pressed from a design of its own."""
+
+    kind: Literal["sba"]
+    design: Annotated[str, Field(max_length=1000)]
+    """A template's name, or a design file, relative to the assembly's file."""
+    set: dict[str, Any] = Field(default_factory=dict)
+    """Keys of that design to override, as tables."""
+
+
+class Tube(Fixed):
+    kind: Literal["tube"]
+    outer_diameter: Length = 15.0
+    inner_diameter: Length = 11.0
+    """Ours: the paper gives none."""
+    length: Length = 40.0
+    """Ours: the paper gives none."""
+    material: Words = "silicone"
+
+    @model_validator(mode="after")
+    def _has_a_wall(self) -> Self:
+        if self.inner_diameter >= self.outer_diameter:
+            raise ValueError("must have an inner_diameter smaller than its outer_diameter")
+        return self
+
+
+class Magnet(Fixed):
+    kind: Literal["magnet"]
+    diameter: Length = 1.5875
+    """1/16 in, as the seller's part numbers read: D, then sixteenths of an inch."""
+    thickness: Length = 1.5875
+    part: Words = "K&J Magnetics D11SH"
+    """What to order (paper, Sec. 2.1)."""
+
+
+class Cup(Fixed):
+    """A cast suction cup, a bell: its narrow end is glued on, its wide end is open."""
+
+    kind: Literal["cup"]
+    diameter: Length = 8.0
+    """Of the rim. Ours: the paper gives none."""
+    neck: Length = 5.0
+    """Diameter of the end that is glued on. Ours."""
+    height: Length = 4.0
+    """Ours."""
+    wall: Length = 1.0
+    """Ours."""
+    bore: Length = 1.1
+    """For the vacuum line. Ours."""
+    material: Words = "Ecoflex 00-30 silicone"
+
+    @model_validator(mode="after")
+    def _is_hollow(self) -> Self:
+        if self.neck - self.bore < 2 * self.wall or self.height <= self.wall:
+            raise ValueError("must have a neck wider than bore and two walls, and be higher than 1")
+        if self.diameter < self.neck:
+            raise ValueError("must not be narrower at its rim (diameter) than at its neck")
+        return self
+
+
+class Line(Fixed):
+    """A tube for vacuum or fluid that runs through a lumen or goes into an inlet."""
+
+    kind: Literal["line"]
+    outer_diameter: Length = 1.016
+    inner_diameter: Length = 0.635
+    length: Length = 60.0
+    tubing: Words = "Braintree RPT040"
+    chamber: Words = "chamber1"
+    """The chamber whose inlet it goes into, at an inlet."""
+
+    @model_validator(mode="after")
+    def _has_a_wall(self) -> Self:
+        if self.inner_diameter >= self.outer_diameter:
+            raise ValueError("must have an inner_diameter smaller than its outer_diameter")
+        return self
+
+
+class Base(Fixed):
+    """A flat piece that parts stand on."""
+
+    kind: Literal["base", "sheet"]
+    width: Length
+    length: Length
+    thickness: Length
+    material: Words
+
+
+AnyPart = Sba | Tube | Magnet | Cup | Line | Base
+KINDS: dict[str, type[AnyPart]] = {
+    "sba": Sba,
+    "tube": Tube,
+    "magnet": Magnet,
+    "cup": Cup,
+    "line": Line,
+    "base": Base,
+    "sheet": Base,
+}
+
+
+class Deploy(Section):
+    """The places that the assembly must fit; none by default."""
+
+    aperture_diameter: Length | None = None
+    """It must pass this hole, folded (paper, Sec. 5: 9.25)."""
+    lumen_diameter: Length | None = None
+    """It must pass this lumen deflated and hold in it inflated (paper, Sec. 5: 25.4)."""
+
+
+class AssemblyRules(Section):
+    line_clearance: LengthOrZero = 0.1
+    """Lumen less line, in diameter, at least (the paper gives none)."""
+    tube_tolerance: LengthOrZero = 0.05
+    """By how much a radial design's tube and the tube it is wrapped round may differ (ours)."""
+    seat_share: float = Field(default=0.25, ge=0, le=1)
+    """Least share of the smaller of two glued faces that lies on the other (ours)."""
+    waive: tuple[CheckName | RuleName, ...] = Field(default=(), strict=False)
+    """Checks and rules whose failure shall not stop the cut files; sheets, traveller and manifest
+    then say so."""
+
+
+class Assembly(Section):
+    """An assembly: a tree of parts with one root.
+
+    ``sheets``, ``laser`` and ``press``, where given, count for every part's design.
+    """
+
+    name: str = Field(pattern=NAME_PATTERN)
+    """Names the output folder."""
+    family: Literal["assembly"] = "assembly"
+    pose: Literal["upright", "lying"] = "upright"
+    """How pictures and the solid show it: the root's axis upright, or lying (angle 0 is down)."""
+    parts: Annotated[
+        dict[PartName, Annotated[AnyPart, Field(discriminator="kind")]],
+        Field(min_length=1, max_length=60),
+    ]
+    deploy: Deploy = Deploy()
+    rules: AssemblyRules = AssemblyRules()
+    order: Order = Order()
+    sheets: Sheets | None = None
+    laser: Laser | None = None
+    press: Press | None = None
+
+    _folder: Path = PrivateAttr(default=Path())
+
+    @property
+    def folder(self) -> Path:
+        """Where relative paths of part designs start: the folder of the assembly's file."""
+        return self._folder
+
+    def placed(self, folder: Path) -> Self:
+        """The same assembly with relative paths starting at ``folder``."""
+        copy = self.model_copy()
+        copy._folder = folder
+        return copy
+
+    @property
+    def shared(self) -> dict[str, Any]:
+        """The keys that are set here for every part's design."""
+        sections = {"sheets": self.sheets, "laser": self.laser, "press": self.press}
+        return {
+            name: section.model_dump(exclude_unset=True)
+            for name, section in sections.items()
+            if section is not None
+        }

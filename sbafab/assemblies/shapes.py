@@ -1,0 +1,106 @@
+"""The solids of parts, in their own frame and in place."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from sbafab.assemblies.build import PlacedPart
+from sbafab.assemblies.records import Base, Cup, Line, Magnet, Sba, Tube
+from sbafab.assemblies.wrap import bent
+from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import disc, rectangle
+from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.prisms import Slab, closed_surface
+from sbafab.meshing.solid import solid_slabs
+from sbafab.meshing.surface import Surface
+
+if TYPE_CHECKING:
+    from sbafab.assemblies.records import AnyPart
+
+SAGITTA = 0.02
+"""mm: an assembly is seen whole, so its arcs are coarser than a single solid's."""
+AROUND = 48
+"""Facets of a suction cup round its axis."""
+
+
+def placed_surface(placed: PlacedPart, filled: bool = False) -> Surface:
+    """The closed surface of a part in place; ``filled`` leaves out what films enclose."""
+    own = own_surface(placed, filled)
+    turned = Surface(placed.turned(own.points), own.faces)
+    if placed.radius is not None:
+        turned = bent(turned, placed.radius)
+    return Surface(placed.pose.points(turned.points), turned.faces)
+
+
+def own_surface(placed: PlacedPart, filled: bool = False) -> Surface:
+    """The closed surface of a part in its own frame."""
+    part = placed.part
+    if isinstance(part, Cup):
+        return _bell(part)
+    if placed.made is not None:
+        laminate = placed.made.laminate
+        slabs = filled_slabs(laminate) if filled else solid_slabs(laminate)
+    else:
+        slabs = [Slab(face(part), 0.0, placed.height)]
+    return closed_surface(f"parts.{placed.name}", slabs, SAGITTA)
+
+
+def filled_slabs(laminate: Laminate) -> list[Slab]:
+    """Films and all that lies between two of them, pockets included: what others bump into."""
+    slabs = [
+        Slab(layer.profile, layer.z, layer.z + layer.film.thickness)
+        for layer in laminate.tpe_layers
+    ]
+    slabs += [
+        Slab(interface.contact, interface.z, interface.z + interface.gap)
+        for interface in laminate.interfaces
+        if interface.masks
+    ]
+    return sorted(slabs, key=lambda slab: slab.bottom)
+
+
+def face(part: AnyPart) -> Region:
+    """The end face of a bought part, at its own origin."""
+    if isinstance(part, Tube | Line):
+        return _ring(part.outer_diameter, part.inner_diameter)
+    if isinstance(part, Magnet):
+        return disc((0.0, 0.0), part.diameter / 2)
+    if isinstance(part, Cup):
+        return _ring(part.neck, part.bore)
+    assert not isinstance(part, Sba)
+    assert isinstance(part, Base)
+    return rectangle((-part.width / 2, -part.length / 2), (part.width / 2, part.length / 2))
+
+
+def _ring(outer: float, inner: float) -> Region:
+    return disc((0.0, 0.0), outer / 2) - disc((0.0, 0.0), inner / 2)
+
+
+def _bell(cup: Cup) -> Surface:
+    """A cup's section, counter-clockwise from its bore, turned round its axis."""
+    import numpy as np
+
+    bore, neck, rim = cup.bore / 2, cup.neck / 2, cup.diameter / 2
+    inside = max(neck - cup.wall, bore)
+    section = np.array(
+        [
+            (bore, 0.0),
+            (neck, 0.0),
+            (rim, cup.height),
+            (rim - cup.wall / 2, cup.height),
+            (inside, cup.wall),
+            (bore, cup.wall),
+        ]
+    )
+    angles = np.arange(AROUND) * (2 * math.pi / AROUND)
+    r, z = section.T
+    points = np.concatenate([np.column_stack([r * np.cos(a), r * np.sin(a), z]) for a in angles])
+    count = len(section)
+    ring, place = np.divmod(np.arange(AROUND * count), count)
+    here = ring * count + place
+    up = ring * count + (place + 1) % count
+    on = (ring + 1) % AROUND * count + place
+    both = (ring + 1) % AROUND * count + (place + 1) % count
+    lower, upper = np.column_stack([here, on, both]), np.column_stack([here, both, up])
+    return Surface(points, np.concatenate([lower, upper]))

@@ -1,0 +1,65 @@
+"""What ``sbafab generate`` prints of an assembly."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sbafab.cli.printing import console, film_said, findings_table
+
+if TYPE_CHECKING:
+    from sbafab.output.assembly import AssemblyRun
+
+
+def print_assembly(run: AssemblyRun) -> None:
+    """What was made of an assembly, what the rules found, and the checks between its parts."""
+    from rich.table import Table
+    from rich.text import Text
+
+    out = console()
+    made = Table(box=None, pad_edge=False, show_header=False)
+    made.add_column(no_wrap=True, style="bold")
+    made.add_column(ratio=1)
+    index = run.manifest
+    parts = (f"{p['name']} ({p['design'] or p['kind']})" for p in index["parts"])
+    made.add_row("assembly", Text(f"{index['name']}, {index['design_sha256'][:12]}"))
+    made.add_row("parts", Text(", ".join(parts)))
+    for one in run.checked.designs:
+        warned = sorted({f.rule for f in one.findings if f.verdict == "warn"})
+        said = f"; warns: {', '.join(warned)}" if warned else ""
+        waived = f"; waived: {', '.join(one.waived)}" if one.waived else ""
+        verdict = "a rule failed" if one.failed else "every rule holds"
+        copies = one.design.order.copies
+        made.add_row(one.design.name, Text(f"{copies} x, {verdict}{waived}{said}"))
+    for film in index["films"]:
+        made.add_row(f"{film['material']} film", Text(film_said(film, index["sheets"], 1)))
+    for mesh in index["meshes"]:
+        made.add_row("solid", Text(f"{mesh['file']}, a node a part"))
+    made.add_row("folder", Text(str(run.folder)))
+    out.print(made)
+    out.print()
+    for one in run.checked.designs:
+        if one.failed:
+            out.print(Text(one.design.name, style="bold red"))
+            out.print(findings_table(one.findings))
+    out.print(findings_table(run.checked.between))
+    if run.failed:
+        failed = sorted({f.rule for f in run.findings if f.verdict == "fail"})
+        out.print()
+        out.print(
+            Text(
+                f"No cut files were written: {', '.join(failed)} failed. Change the assembly, or "
+                f"waive by name: {' '.join(f'--waive {name}' for name in failed)}",
+                style="bold red",
+            ),
+            soft_wrap=True,
+        )
+
+
+def assembly_json(run: AssemblyRun) -> dict[str, object]:
+    """The result of an assembly's run for programs."""
+    return {
+        "folder": str(run.folder),
+        "failed": run.failed,
+        "findings": [finding.as_dict() for finding in run.findings],
+        "files": sorted(run.manifest["files"]),
+    }

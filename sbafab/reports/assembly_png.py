@@ -1,0 +1,142 @@
+"""preview/assembled.png: an assembly at true proportions, a colour a part, with a scale bar."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from io import BytesIO
+from typing import TYPE_CHECKING
+
+from sbafab.assemblies.build import Assembled
+from sbafab.assemblies.colours import RGB, colours
+from sbafab.assemblies.shapes import placed_surface
+from sbafab.meshing.surface import Surface
+from sbafab.reports.canvas import INK
+from sbafab.reports.depth import Buffer, View, seen
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+    from PIL.Image import Image
+
+ELEVATION, AZIMUTH = 22.0, -58.0
+"""Degrees of the eye over the bench, and round it from x."""
+LAMP = (-0.35, 0.55, 0.76)
+ENLARGED = 2
+MARGIN, FOOT = 0.06, 0.17
+STEP_MM = 0.25
+"""Jump in depth that is drawn as an edge."""
+BARS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
+
+
+def assembly_png(
+    assembled: Assembled, note: str = "", width: int = 1040, height: int = 780
+) -> bytes:
+    """The assembly before inflation, seen from the front above, as PNG; ``note`` ends its caption.
+
+    Inlet tubes and what the films enclose are not shown.
+    """
+    surfaces = [placed_surface(placed, filled=True) for placed in assembled.parts]
+    # What lies inside a tube shows through nothing: no part is transparent.
+    view = _view(surfaces, width * ENLARGED, height * ENLARGED)
+    buffer = seen(surfaces, view, width * ENLARGED, height * ENLARGED, _unit(LAMP))
+    paints = colours(assembled)
+    picture = _coloured(buffer, [paints[placed.name] for placed in assembled.parts])
+    picture = picture.reduce(ENLARGED)
+    caption = f"{assembled.assembly.name}, before inflation, nominal films, true proportions"
+    _write(picture, f"{caption}{note}", _legend(assembled, paints), view.scale / ENLARGED)
+    out = BytesIO()
+    picture.save(out, "PNG", compress_level=6)
+    return out.getvalue()
+
+
+def _unit(v: Sequence[float]) -> list[float]:
+    size = math.hypot(*v)
+    return [value / size for value in v]
+
+
+def _view(surfaces: Sequence[Surface], width: int, height: int) -> View:
+    import numpy as np
+
+    e, a = math.radians(ELEVATION), math.radians(AZIMUTH)
+    toward = [math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)]
+    right = [-math.sin(a), math.cos(a), 0.0]
+    axes = np.array([right, np.cross(toward, right), toward])
+    points = np.concatenate([surface.points for surface in surfaces]) @ axes.T
+    (low_x, low_y, _), (high_x, high_y, _) = points.min(axis=0), points.max(axis=0)
+    room_x, room_y = width * (1 - 2 * MARGIN), height * (1 - 2 * MARGIN - FOOT)
+    scale = min(room_x / (high_x - low_x), room_y / (high_y - low_y))
+    centre = (
+        width / 2 - scale * (low_x + high_x) / 2,
+        height * (1 - FOOT) / 2 + scale * (low_y + high_y) / 2,
+    )
+    return View(axes, scale, centre)
+
+
+def _coloured(buffer: Buffer, paints: Sequence[RGB]) -> Image:
+    """Lit colours, darker where one body or one step ends against another."""
+    import numpy as np
+    from PIL import Image
+
+    palette = np.array([*paints, (255, 255, 255)], dtype=float)
+    light = np.where(buffer.body < 0, 1.0, buffer.light)
+    rgb = palette[buffer.body] * light[:, :, None]
+    rgb[_edges(buffer)] *= 0.45
+    return Image.fromarray(np.clip(np.rint(rgb), 0, 255).astype(np.uint8), "RGB")
+
+
+def _edges(buffer: Buffer) -> NDArray[np.bool_]:
+    import numpy as np
+
+    found = np.zeros(buffer.body.shape, dtype=bool)
+    depth = np.where(buffer.body < 0, -1e9, buffer.depth)
+    for axis in (0, 1):
+        other = np.diff(buffer.body, axis=axis) != 0
+        step = np.abs(np.diff(depth, axis=axis)) > STEP_MM
+        edge = other | step
+        found[tuple(slice(0, -1) if i == axis else slice(None) for i in (0, 1))] |= edge
+    return found
+
+
+def _legend(assembled: Assembled, paints: Mapping[str, RGB]) -> list[tuple[RGB, str]]:
+    """A line a colour: the parts that have it, and what they are."""
+    lines: dict[tuple[RGB, str], list[str]] = {}
+    for placed in assembled.parts:
+        what = placed.part.kind if placed.made is None else placed.made.design.name
+        lines.setdefault((paints[placed.name], what), []).append(placed.name)
+    return [
+        (colour, ", ".join(names) if [what] == names else f"{', '.join(names)} ({what})")
+        for (colour, what), names in lines.items()
+    ]
+
+
+def _write(
+    picture: Image, caption: str, legend: Sequence[tuple[RGB, str]], pixels_per_mm: float
+) -> None:
+    from PIL import ImageDraw, ImageFont
+
+    width, height = picture.size
+    size = max(10, round(height / 46))
+    font = ImageFont.load_default(size)
+    draw = ImageDraw.Draw(picture)
+    left = round(0.03 * width)
+    bar = max(step for step in BARS if step * pixels_per_mm <= width / 4 or step == BARS[0])
+    x, y = left, height - 2 * size
+    for colour, words in legend:
+        needed = round(3.4 * size + draw.textlength(words, font=font))
+        if x + needed > width - left:
+            x, y = left, y - round(1.5 * size)
+        draw.rectangle((x, y, x + 1.5 * size, y + size), fill=colour, outline=INK)
+        draw.text((x + 2 * size, y - 0.1 * size), words, fill=INK, font=font)
+        x += needed
+    y -= round(2 * size)
+    draw.text((left, y), caption, fill=INK, font=font)
+    end = width - left
+    start = end - bar * pixels_per_mm
+    y += round(0.6 * size)
+    words = f"{bar:g} mm"
+    draw.line((start, y, end, y), fill=INK, width=3)
+    for tick in (start, end):
+        draw.line((tick, y - 6, tick, y + 6), fill=INK, width=3)
+    middle = (start + end - draw.textlength(words, font=font)) / 2
+    draw.text((middle, y - 1.6 * size), words, fill=INK, font=font)

@@ -1,0 +1,147 @@
+"""Triangulated surfaces on a picture, nearest first: a depth buffer filled by sample points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from sbafab.meshing.surface import Surface
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+DENSITY = 1.25
+"""Samples a pixel along a triangle's side, so that none is missed."""
+MOST = 4_000_000
+"""Samples that are held at once."""
+AMBIENT = 0.58
+
+
+class View(NamedTuple):
+    """A parallel projection: mm to pixels, the three axes as rows (right, up, toward the eye)."""
+
+    axes: NDArray[np.float64]
+    scale: float
+    centre: tuple[float, float]
+
+    def flat(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points (n, 3) as pixels right and down, and mm toward the eye."""
+        import numpy as np
+
+        right, up, toward = (points @ self.axes.T).T
+        x = self.centre[0] + self.scale * right
+        y = self.centre[1] - self.scale * up
+        return np.column_stack([x, y, toward])
+
+
+class Buffer(NamedTuple):
+    """For each pixel the depth, the number of the surface seen (-1: none) and its light."""
+
+    depth: NDArray[np.float64]
+    body: NDArray[np.int16]
+    light: NDArray[np.float64]
+
+
+def seen(
+    surfaces: Sequence[Surface], view: View, width: int, height: int, lamp: Sequence[float]
+) -> Buffer:
+    """What the eye sees of the surfaces; ``lamp`` is the direction to the light, in the view."""
+    import numpy as np
+
+    size = width * height
+    buffer = Buffer(
+        np.full(size, -np.inf), np.full(size, -1, dtype=np.int16), np.zeros(size, dtype=np.float64)
+    )
+    for body, surface in enumerate(surfaces):
+        _paint(buffer, body, surface, view, (width, height), np.array(lamp))
+    depth, numbers, light = buffer
+    shape = height, width
+    return Buffer(depth.reshape(shape), numbers.reshape(shape), light.reshape(shape))
+
+
+def _paint(
+    buffer: Buffer,
+    body: int,
+    surface: Surface,
+    view: View,
+    size: tuple[int, int],
+    lamp: NDArray[np.float64],
+) -> None:
+    import numpy as np
+
+    corners = view.flat(surface.points)[surface.faces]
+    # Pixels count downward: what faces the eye runs clockwise there.
+    a, b, c = (corners[:, i, :2] for i in range(3))
+    twice = (c - a)[:, 0] * (b - a)[:, 1] - (c - a)[:, 1] * (b - a)[:, 0]
+    corners, twice = corners[twice > 1e-12], twice[twice > 1e-12]
+    light = _light(corners, view.scale, lamp)
+    corners, long = _longest_first(corners)
+    along = np.ceil(DENSITY * long).astype(np.int64) + 2
+    across = np.ceil(DENSITY * twice / np.maximum(long, 1e-9)).astype(np.int64) + 2
+    # Triangles of like size are sampled together.
+    grids = np.column_stack([_power_of_two(along), _power_of_two(across)])
+    for n, m in np.unique(grids, axis=0):
+        own = np.flatnonzero((grids == (n, m)).all(axis=1))
+        for part in np.array_split(own, max(1, len(own) * n * m // MOST)):
+            _sample(buffer, body, corners[part], light[part], (int(n), int(m)), size)
+
+
+def _light(
+    corners: NDArray[np.float64], scale: float, lamp: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """How light a triangle is, from its normal in the view (right, up, toward)."""
+    import numpy as np
+
+    true = corners * np.array([1 / scale, -1 / scale, 1.0])
+    normal = np.cross(true[:, 1] - true[:, 0], true[:, 2] - true[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    lit: NDArray[np.float64] = AMBIENT + (1 - AMBIENT) * np.clip(normal @ lamp, 0, 1)
+    return lit
+
+
+def _longest_first(
+    corners: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Corners turned so that the longest side comes first, and its length in pixels."""
+    import numpy as np
+
+    sides = np.roll(corners, -1, axis=1)[:, :, :2] - corners[:, :, :2]
+    lengths = np.hypot(sides[:, :, 0], sides[:, :, 1])
+    first = lengths.argmax(axis=1)
+    order = (first[:, None] + np.arange(3)) % 3
+    return np.take_along_axis(corners, order[:, :, None], axis=1), lengths.max(axis=1)
+
+
+def _power_of_two(counts: NDArray[np.int64]) -> NDArray[np.int64]:
+    import numpy as np
+
+    return 2 ** np.ceil(np.log2(counts)).astype(np.int64)
+
+
+def _sample(
+    buffer: Buffer,
+    body: int,
+    corners: NDArray[np.float64],
+    light: NDArray[np.float64],
+    grid: tuple[int, int],
+    size: tuple[int, int],
+) -> None:
+    """Points of each triangle: along its first side, and from there towards its third corner."""
+    import numpy as np
+
+    s = np.linspace(0, 1, grid[0])[None, :, None, None]
+    t = np.linspace(0, 1, grid[1])[None, None, :, None]
+    a, b, c = (corners[:, i][:, None, None, :] for i in range(3))
+    points = (1 - t) * (a + s * (b - a)) + t * c
+    shade = np.broadcast_to(light[:, None, None], points.shape[:3]).ravel()
+    x, y, depth = points.reshape(-1, 3).T
+    column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    inside = (column >= 0) & (column < size[0]) & (row >= 0) & (row < size[1])
+    place = row[inside] * size[0] + column[inside]
+    depth, shade = depth[inside], shade[inside]
+    np.maximum.at(buffer.depth, place, depth)
+    won = depth == buffer.depth[place]
+    place = place[won]
+    buffer.light[place] = shade[won]
+    buffer.body[place] = body

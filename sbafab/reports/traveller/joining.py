@@ -1,0 +1,278 @@
+"""What the technician does to put an assembly together, part by part, each with a box to tick."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from sbafab.actuators.radial import RadialDesign
+from sbafab.assemblies.build import Assembled, PlacedPart
+from sbafab.assemblies.records import Base, Cup, Line, Magnet, Tube
+from sbafab.models.sizes import inflated_diameter
+from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller.bill import Item
+from sbafab.reports.traveller.process import LEAK_KILOPASCALS, Action
+
+
+@dataclass(frozen=True)
+class JoinPage:
+    """One part's step."""
+
+    title: str
+    actions: tuple[Action, ...]
+
+
+def join_pages(assembled: Assembled) -> list[JoinPage]:
+    """A step for each part in building order: make it ready, then fix it."""
+    pages = []
+    for placed in assembled.parts:
+        other = assembled.on(placed)
+        what = _what(placed)
+        title = placed.name if what == placed.name else f"{placed.name} ({what})"
+        if other is not None:
+            title += f", {_where(placed)} of {other.name}"
+        actions = [*_ready(placed)]
+        if other is not None:
+            actions += _fix(placed, other)
+        if placed.part.note:
+            actions.append(Action(placed.part.note))
+        if actions:
+            pages.append(JoinPage(title, tuple(actions)))
+    return pages
+
+
+def _what(placed: PlacedPart) -> str:
+    if placed.made is not None:
+        return placed.made.design.name
+    names = {"line": "vacuum or fluid line", "cup": "suction cup"}
+    return names.get(placed.part.kind, placed.part.kind)
+
+
+def _where(placed: PlacedPart) -> str:
+    words = {"start": "at the start", "end": "at the end", "outside": "on the outside"}
+    at = str(placed.part.at)
+    return words.get(at, f"in the {at}" if at in ("lumen", "inlet") else f"on the {at}")
+
+
+def _ready(placed: PlacedPart) -> Iterator[Action]:
+    part = placed.part
+    if isinstance(part, Tube):
+        yield Action(
+            f"Cut {say.millimetres(part.length)} of {part.material} tube, outer diameter "
+            f"{say.millimetres(part.outer_diameter)}, inner "
+            f"{say.millimetres(part.inner_diameter)}, square. Mark its start, and a straight line "
+            "along it: that is angle 0."
+        )
+    elif isinstance(part, Base):
+        yield Action(
+            f"Have a {part.kind} of {part.material} ready, {say.size(part.width, part.length)}, "
+            f"{say.millimetres(part.thickness)} thick."
+        )
+    elif isinstance(part, Magnet):
+        yield Action(
+            f"Measure {part.part}: {say.millimetres(part.diameter)} across, "
+            f"{say.millimetres(part.thickness)} thick. If it differs, change the file and check."
+        )
+        yield Action(
+            "Hold it to the magnet that will hold it through the wall, and mark the face that is "
+            "drawn to it: that face goes outward."
+        )
+    elif isinstance(part, Cup):
+        yield Action(
+            f"Cast the cup in {part.material} as its package says: rim "
+            f"{say.millimetres(part.diameter)}, neck {say.millimetres(part.neck)}, height "
+            f"{say.millimetres(part.height)}, wall {say.millimetres(part.wall)}, hole for the line "
+            f"{say.millimetres(part.bore)}."
+        )
+    elif isinstance(part, Line):
+        yield Action(
+            f"Cut {part.tubing}, outer diameter {say.millimetres(part.outer_diameter)}, square and "
+            f"without burr; {say.millimetres(part.length)} are drawn, your rig may need more."
+        )
+    else:
+        yield Action(
+            f"Take a {_what(placed)} that has passed its leak test; its inlet tubes stay open."
+        )
+
+
+def _fix(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
+    part = placed.part
+    if isinstance(part, Line):
+        yield from _thread(placed, part, other)
+    elif placed.radius is not None:
+        yield from _bend(placed, other)
+    else:
+        yield Action(f"Lay it {_where(placed)} of {other.name}: {_spot(placed)}. Try it dry.")
+    yield from _glue(placed, other)
+
+
+def _spot(placed: PlacedPart) -> str:
+    part = placed.part
+    x, y = part.offset
+    words = []
+    if part.at == "outside":
+        words.append(f"{_round(part.angle)}, {say.millimetres(part.along)} from the tube's start")
+    elif x or y:
+        words.append(
+            f"its middle {say.millimetres(x)} along the other's x (an SBA's runs along the tab "
+            f"of chamber1) and {say.millimetres(y)} along its y"
+        )
+    else:
+        words.append("axis on axis")
+    if part.turn:
+        words.append(f"turned {part.turn:g} degrees about its own axis")
+    return ", ".join(words)
+
+
+def _round(angle: float) -> str:
+    if not angle:
+        return "on the marked line"
+    way = "anti-clockwise" if angle > 0 else "clockwise"
+    return f"{abs(angle):g} degrees {way} from the marked line, looking at the tube's end"
+
+
+def _bend(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
+    part = placed.part
+    assert placed.made is not None
+    design = placed.made.design
+    middle = say.millimetres(part.along)
+    if not isinstance(design, RadialDesign):
+        yield Action(
+            f"Bend it round {other.name}, base inward: its lumen {_round(part.angle)}, {middle} "
+            f"from the tube's start; {_tab(placed)}. Try it dry."
+        )
+        return
+    end = "start" if part.turn % 360 == 180 else "end"
+    count = design.chamber.count
+    yield Action(
+        f"Wrap the sheet round {other.name}, balloons outward, its straight edges along the tube: "
+        f"the middle of the SBAs {middle} from the tube's start, tabs toward its {end}, the middle "
+        f"SBA {_round(part.angle)}. Try it dry."
+    )
+    yield Action(
+        f"Check: the edges of the sheet meet, and the {count} SBAs lie {360 / count:g} degrees "
+        f"apart ({say.millimetres(design.pitch)} round the tube, measured on the sheet)."
+    )
+
+
+def _tab(placed: PlacedPart) -> str:
+    """Where chamber1's tab points: at no turn round the tube, then on toward the tube's end."""
+    turn = placed.part.turn % 360
+    plain = {
+        0: "round the tube, anti-clockwise as you look at its end",
+        90: "to the tube's end",
+        180: "round the tube, clockwise as you look at its end",
+        270: "to the tube's start",
+    }
+    if turn in plain:
+        return f"the tab of chamber1 points {plain[int(turn)]}"
+    return (
+        f"the tab of chamber1 points {turn:g} degrees from the anti-clockwise way round the tube, "
+        "by way of the tube's end"
+    )
+
+
+def _thread(placed: PlacedPart, line: Line, other: PlacedPart) -> Iterator[Action]:
+    if line.at == "inlet":
+        yield Action(
+            f"Push it into the inlet of {line.chamber} of {other.name}, beside the PTFE strip, in "
+            "place of a tube fitted earlier."
+        )
+        return
+    past = line.along + line.length - other.height
+    side = f"{say.millimetres(abs(past))} {'past' if past >= 0 else 'short of'} its far face"
+    yield Action(f"Thread it through the lumen of {other.name} until it ends {side}.")
+
+
+def _glue(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
+    glue = placed.part.glue
+    if glue is None:
+        if placed.part.at == "outside" or not isinstance(placed.part, Line):
+            yield Action("No adhesive is named for this joint: say how it holds, or it is loose.")
+        return
+    how = (
+        "a small drop"
+        if isinstance(placed.part, Magnet)
+        else "a bead round the line where it leaves its hole"
+        if isinstance(placed.part, Line)
+        else "a thin, even film"
+    )
+    yield Action(f"Glue: {glue}, {how}. Keep it out of lumen, bores, inlets and balloons.")
+    yield Action("Hold it in place and let it cure as the package says before the next step.")
+
+
+def final_checks(assembled: Assembled) -> list[Action]:
+    """What the finished assembly must do; figures are predictions."""
+    made = [placed for placed in assembled.parts if placed.made is not None]
+    deploy = assembled.assembly.deploy
+    actions = [
+        Action(
+            f"Raise each actuator to {LEAK_KILOPASCALS:g} kPa again: no leak, no joint opens.",
+            (),
+            tuple(placed.name for placed in made) if len(made) > 1 else (),
+        )
+    ]
+    if any(isinstance(placed.part, Line) for placed in assembled.parts):
+        actions.append(Action("Draw air through every line: it is open from end to end."))
+    if any(isinstance(placed.part, Cup) for placed in assembled.parts):
+        actions.append(Action("Press the cup on glass and draw vacuum: it holds on."))
+    if deploy.aperture_diameter is not None:
+        hole = say.millimetres(deploy.aperture_diameter)
+        actions.append(Action(f"Deflated and folded, it goes through a hole of {hole}."))
+    if deploy.lumen_diameter is not None:
+        lumen = say.millimetres(deploy.lumen_diameter)
+        actions.append(Action(f"Deflated, it slides through a tube of inner diameter {lumen}."))
+        actions += [
+            Action(
+                f"Inflated in the open, {placed.name} measures about {inflated:.1f} mm across; in "
+                f"the tube of {lumen} it holds against a pull."
+            )
+            for placed in made
+            if (inflated := _inflated(placed)) is not None
+        ]
+    if any(isinstance(placed.part, Magnet) for placed in assembled.parts):
+        actions.append(Action("The outer magnet draws and holds the base through the wall."))
+    return actions
+
+
+def _inflated(placed: PlacedPart) -> float | None:
+    assert placed.made is not None
+    design = placed.made.design
+    if not isinstance(design, RadialDesign) or design.chamber.outline is not None:
+        return None
+    return inflated_diameter(design, placed.made.laminate)
+
+
+def bought(assembled: Assembled, copies: int) -> list[Item]:
+    """Rows of the bill of materials for what is not cut from film."""
+    items = [_item(placed, copies) for placed in assembled.parts if placed.made is None]
+    glues = dict.fromkeys(p.part.glue for p in assembled.parts if p.part.glue is not None)
+    for glue in glues:
+        joints = [placed.name for placed in assembled.parts if placed.part.glue == glue]
+        items.append(Item("Adhesive", f"{glue}, for {say.listed(joints)}", "as needed"))
+    return items
+
+
+def _item(placed: PlacedPart, copies: int) -> Item:
+    part, name = placed.part, f"{placed.part.kind.capitalize()} “{placed.name}”"
+    if isinstance(part, Tube):
+        size = (
+            f"{part.material}, outer diameter {say.millimetres(part.outer_diameter)}, inner "
+            f"{say.millimetres(part.inner_diameter)}, {say.millimetres(part.length)} long"
+        )
+    elif isinstance(part, Magnet):
+        size = (
+            f"{part.part}, {say.millimetres(part.diameter)} across, "
+            f"{say.millimetres(part.thickness)} thick"
+        )
+    elif isinstance(part, Cup):
+        size = f"cast from {part.material}, rim {say.millimetres(part.diameter)}"
+    elif isinstance(part, Line):
+        size = (
+            f"{part.tubing}, outer diameter {say.millimetres(part.outer_diameter)}, "
+            f"{say.millimetres(part.length)}"
+        )
+    else:
+        assert isinstance(part, Base)
+        size = f"{part.material}, {say.size(part.width, part.length)}"
+    return Item(name, size, str(copies))

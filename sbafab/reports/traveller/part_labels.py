@@ -1,0 +1,103 @@
+"""Where the label of a part stands: on the part, off its holes and off other labels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.region import Region
+from sbafab.reports import drawing as draw
+
+LEGIBLE = 1.5
+"""mm on the page: smaller labels help nobody."""
+STEPS = 6
+"""Places tried from the middle of a part to each of its ends."""
+SIZES = (1.0, 0.8, 0.6)
+OVER = 1.1
+"""Share of its part's width that a label may take."""
+HIGH = 0.8
+"""Height of a label in sizes of its letters."""
+OUTSIDE, HOLE = 3.0, 1.0
+"""What a corner off the part costs, and a hole that is covered; distance from the middle, 1."""
+
+
+class PlacedLabel(NamedTuple):
+    """``at`` is the middle of the words' base line; ``size`` and ``box`` are mm on the page."""
+
+    at: Point
+    size: float
+    box: Bounds
+
+    def moved(self, dx: float, dy: float) -> PlacedLabel:
+        (x, y), (low_x, low_y, high_x, high_y) = self.at, self.box
+        box = low_x + dx, low_y + dy, high_x + dx, high_y + dy
+        return PlacedLabel((x + dx, y + dy), self.size, box)
+
+
+def labels(words: str, part: Region) -> list[PlacedLabel]:
+    """Where the words may stand on a part as it is drawn, the best place first.
+
+    Off its holes if they can, near its middle, as large as may be; empty where nobody could read
+    them.
+    """
+    low_x, _, high_x, _ = part.bounds
+    width = OVER * (high_x - low_x)
+    most = min(draw.SMALL * width / draw.text_width(words, draw.SMALL), draw.SMALL)
+    holes = [hole.bounds for hole in part.holes]
+    found: list[tuple[float, PlacedLabel]] = []
+    for share in SIZES:
+        if share * most < LEGIBLE:
+            break
+        for far, middle in _middles(part.bounds):
+            label = _label(words, middle, share * most)
+            covered = sum(_meet(label.box, hole) for hole in holes)
+            off = sum(not part.contains(p) for p in _sides(label.box, holes))
+            found.append((HOLE * covered + OUTSIDE * off + far + (1 - share), label))
+    return [label for _, label in sorted(found)]
+
+
+def first_free(
+    found: Iterable[PlacedLabel], page: Bounds, taken: Sequence[Bounds]
+) -> PlacedLabel | None:
+    """The first of the labels that stands on the page and off the boxes of other labels."""
+    return next(
+        (
+            label
+            for label in found
+            if _within(label.box, page) and not any(_meet(label.box, box) for box in taken)
+        ),
+        None,
+    )
+
+
+def _label(words: str, middle: Point, size: float) -> PlacedLabel:
+    x, y = middle
+    wide, high = draw.text_width(words, size) / 2, HIGH * size / 2
+    box = x - wide, y - high, x + wide, y + high
+    return PlacedLabel((x, y + 0.35 * size), size, box)
+
+
+def _middles(bounds: Bounds) -> Iterator[tuple[float, Point]]:
+    """Points of a part's box and how far off its middle they are, from 0 to 1; nearest first."""
+    low_x, low_y, high_x, high_y = bounds
+    x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
+    steps = range(-STEPS, STEPS + 1)
+    grid = [(i / (STEPS + 1), j / (STEPS + 1)) for i in steps for j in steps]
+    for u, v in sorted(grid, key=lambda p: (p[0] ** 2 + p[1] ** 2, p)):
+        off = ((u**2 + v**2) / 2) ** 0.5
+        yield off, (x + u * (high_x - low_x) / 2, y + v * (high_y - low_y) / 2)
+
+
+def _sides(box: Bounds, holes: Sequence[Bounds]) -> list[Point]:
+    """Corners and middles of the words' box, but for what stands on a hole of the part."""
+    points = [(x, y) for y in (box[1], box[3]) for x in (box[0], (box[0] + box[2]) / 2, box[2])]
+    return [p for p in points if not any(_meet((*p, *p), hole) for hole in holes)]
+
+
+def _meet(a: Bounds, b: Bounds) -> bool:
+    return a[0] < b[2] and a[2] > b[0] and a[1] < b[3] and a[3] > b[1]
+
+
+def _within(box: Bounds, page: Bounds) -> bool:
+    return box[0] >= page[0] and box[1] >= page[1] and box[2] <= page[2] and box[3] <= page[3]

@@ -1,0 +1,136 @@
+"""Every check has a faulty assembly that it alone catches."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, get_args
+
+import pytest
+
+from sbafab.assemblies.build import Assembled
+from sbafab.assemblies.checks import CHECKS, run_checks
+from sbafab.assemblies.records import CheckName
+from sbafab.rules.finding import Finding
+
+Together = Callable[[dict[str, Any]], Assembled]
+Tables = Callable[[str], dict[str, Any]]
+
+INLET = {
+    "kind": "line",
+    "on": "arm",
+    "at": "inlet",
+    "chamber": "chamber2",
+    "outer_diameter": 1.2,
+    "length": 20,
+}
+FAULTS: dict[CheckName, tuple[str, dict[str, Any]]] = {
+    "tube-match": ("brace", {"tube": {"outer_diameter": 14.9}}),
+    "inlet-match": ("brace", {"feed": INLET}),
+    "line-clearance": ("brace", {"vacuum": {"outer_diameter": 1.95}, "cup": {"bore": 2.5}}),
+    "seat": ("aperture", {"magnet": {"offset": [0, 0]}}),
+    "collision": ("standing", {"right": {"along": 25, "angle": -40}}),
+    "aperture": ("aperture", {"arm": {"set": {"chamber": {"diameter": 6}}}}),
+    "lumen-pass": ("brace", {"cup": {"diameter": 26}}),
+    "lumen-brace": ("brace", {"grip": {"set": {"chamber": {"width": 9}}}}),
+}
+
+
+def changed(data: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    for name, keys in changes.items():
+        data["parts"].setdefault(name, {}).update(keys)
+    return data
+
+
+def test_every_check_has_a_fault() -> None:
+    assert list(CHECKS) == list(get_args(CheckName)) == list(FAULTS)
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_caught_by_its_check_alone(
+    name: CheckName, tables: Tables, put_together: Together
+) -> None:
+    template, changes = FAULTS[name]
+    findings = run_checks(put_together(changed(tables(template), changes)))
+    failed = [finding for finding in findings if finding.verdict == "fail"]
+    assert {finding.rule for finding in failed} == {name}
+    assert all("; " in finding.message for finding in failed), "no remedy"
+
+
+@pytest.mark.parametrize("template", ["aperture", "brace", "standing"])
+def test_templates_hold(template: str, tables: Tables, put_together: Together) -> None:
+    findings = run_checks(put_together(tables(template)))
+    verdicts = {finding.rule: finding.verdict for finding in findings}
+    assert set(verdicts.values()) <= {"pass", "warn"}
+    assert [rule for rule, verdict in verdicts.items() if verdict == "warn"] == (
+        ["aperture"] if template == "aperture" else []
+    )
+
+
+def test_a_waived_check_says_so(tables: Tables, put_together: Together) -> None:
+    data = changed(tables("aperture"), FAULTS["seat"][1])
+    data["rules"] = {"waive": ["seat"]}
+    seat = one(run_checks(put_together(data)), "seat")
+    assert (seat.verdict, seat.by_user) == ("waived", True)
+    assert seat.message.startswith("waived by the assembly: ")
+
+
+def one(findings: tuple[Finding, ...], rule: str) -> Finding:
+    (found,) = [finding for finding in findings if finding.rule == rule]
+    return found
+
+
+def test_a_magnet_half_over_the_lumen_is_half_glued(tables: Tables, put_together: Together) -> None:
+    # A magnet as wide as the lumen, half a lumen off: what is open is the lens of two circles.
+    data = changed(tables("aperture"), {"magnet": {"diameter": 2, "offset": [1, 0]}})
+    lens = 2 * (math.pi / 3 - math.sqrt(3) / 4)
+    seat = one(run_checks(put_together(data)), "seat")
+    assert seat.measured == pytest.approx(1 - lens / math.pi, abs=1e-6)
+
+
+def test_shared_space_is_measured(tables: Tables, put_together: Together) -> None:
+    # A line 0.4 thicker than the cup's bore, as far as it runs into the cup's bottom.
+    data = tables("brace")
+    changed(data, {"vacuum": {"outer_diameter": 1.5}})
+    found = one(run_checks(put_together(data)), "collision")
+    inside = 50 - 47.5 - 1.865
+    expected = math.pi / 4 * (1.5**2 - 1.1**2) * inside
+    assert found.measured == pytest.approx(expected, rel=0.01)
+
+
+def test_parts_that_touch_do_not_collide(put_together: Together) -> None:
+    data = {
+        "name": "stacked",
+        "family": "assembly",
+        "parts": {
+            "plate": {
+                "kind": "base",
+                "width": 60,
+                "length": 30,
+                "thickness": 2,
+                "material": "acrylic",
+            },
+            "one": {**leg(), "offset": [-14, 0]},
+            "two": {**leg(), "offset": [14, 0], "turn": 180},
+        },
+    }
+    assert one(run_checks(put_together(data)), "collision").verdict == "pass"
+
+
+def leg() -> dict[str, Any]:
+    return {"kind": "sba", "design": "1dof-10mm", "on": "plate", "at": "top"}
+
+
+def test_a_stiff_part_on_a_round_one_warns(tables: Tables, put_together: Together) -> None:
+    data = tables("standing")
+    data["parts"]["tag"] = {"kind": "magnet", "on": "tube", "at": "outside", "angle": 180}
+    seats = [f for f in run_checks(put_together(data)) if f.rule == "seat"]
+    assert sorted(f.verdict for f in seats) == ["pass", "warn"]
+
+
+def test_nothing_to_hold_with_fails(tables: Tables, put_together: Together) -> None:
+    data = tables("standing")
+    data["deploy"] = {"lumen_diameter": 25.4}
+    brace = one(run_checks(put_together(data)), "lumen-brace")
+    assert brace.verdict == "fail"
+    assert "no part expands" in brace.message

@@ -1,0 +1,144 @@
+"""Assembly files: what is refused is refused in one sentence that names the field."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sbafab.actuators import load_design
+from sbafab.assemblies.build import Assembled, assemble
+from sbafab.assemblies.reading import load, load_assembly
+from sbafab.design.records import Design
+from sbafab.errors import DesignError
+
+Together = Callable[[dict[str, Any]], Assembled]
+Tables = Callable[[str], dict[str, Any]]
+
+
+def put(data: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
+    *tables, key = path.split(".")
+    table = data
+    for name in tables:
+        table = table.setdefault(name, {})
+    if value is None:
+        del table[key]
+    else:
+        table[key] = value
+    return data
+
+
+FAULTS: list[tuple[str, dict[str, Any], str]] = [
+    ("brace", {"parts": {}}, "add [parts.NAME]"),
+    ("brace", {"parts.arm": 3}, "parts.arm = 3 must be a table"),
+    ("brace", {"parts.arm.kind": None}, "parts.arm.kind is missing"),
+    ("brace", {"parts.arm.kind": "sbaa"}, "did you mean sba?"),
+    ("brace", {"parts.arm.desgin": "x"}, "parts.arm.desgin is not a key"),
+    ("brace", {"parts.arm.design": "3dof-15"}, "parts.arm: .*did you mean 3dof-15mm?"),
+    ("brace", {"parts.arm.design": "own.toml"}, "own.toml' is neither a template"),
+    ("brace", {"parts.arm.design": "standing"}, "parts.arm: 'standing' is an assembly"),
+    ("brace", {"parts.arm.set": {"bond": {"widht": 1}}}, "parts.arm: .*did you mean bond.width"),
+    ("brace", {"parts.arm.set": {"bore": {"diameter": 9}}}, "parts.arm: bore.diameter"),
+    ("brace", {"parts.arm.on": "tubs"}, "parts.arm.on = 'tubs' .*did you mean tube?"),
+    ("brace", {"parts.arm.at": None}, "parts.arm.at is missing; .*start"),
+    ("brace", {"parts.arm.at": "top"}, 'parts.arm.at = "top"; .*"start", "end", "outside"'),
+    ("brace", {"parts.arm.at": "botom"}, "parts.arm.at = 'botom' must be"),
+    ("brace", {"parts.arm.at": "lumen"}, "is fixed on a tube at one of"),
+    ("brace", {"parts.cup.on": "vacuum"}, "no cup can be fixed on a line"),
+    ("brace", {"parts.tube.at": "end"}, "needs parts.tube.on"),
+    ("brace", {"parts.arm.on": None, "parts.arm.at": None}, '"tube", "arm" hang on nothing'),
+    ("brace", {"parts.tube.on": "arm", "parts.tube.at": "top"}, '"tube", "arm" hang on each other'),
+    ("brace", {"parts.arm.on": "arm", "parts.arm.at": "top"}, '"arm" hang on each other'),
+    ("brace", {"parts.tube.inner_diameter": 15}, "parts.tube must have an inner_diameter smaller"),
+    ("brace", {"parts.tube.length": "long"}, "parts.tube.length = 'long' must be a length"),
+    ("brace", {"parts.tube.length": -4}, "parts.tube.length = -4 must be"),
+    ("brace", {"parts.grip.turn": 90}, "parts.grip.turn = 90 .*must be 0 or 180"),
+    ("brace", {"parts.grip.at": "end"}, "parts.grip is a radial design; wrap it round a tube"),
+    ("brace", {"parts.cup.on": "grip"}, "which is bent round a tube and has no flat face"),
+    ("brace", {"parts.cup.bore": 4.5}, "parts.cup must have a neck wider"),
+    ("brace", {"parts.arm.design": "1dof-5mm"}, "which has no lumen"),
+    ("brace", {"parts.vacuum.at": "inlet", "parts.vacuum.chamber": "x"}, "has no inlet in arm"),
+    ("brace", {"deploy.lumen": 3}, "deploy.lumen is not a key"),
+    ("brace", {"rules.waive": ["seats"]}, "rules.waive"),
+    ("brace", {"name": "../x"}, "name = '../x' must be"),
+    ("brace", {"sheets": {"tpe": {"width": -1}}}, "sheets.tpe.width = -1"),
+    ("brace", {"parts.1x": {"kind": "tube"}}, "parts.1x"),
+]
+
+
+@pytest.mark.parametrize(("template", "changes", "said"), FAULTS, ids=lambda value: str(value)[:50])
+def test_what_is_wrong_is_said_in_one_sentence(
+    template: str, changes: dict[str, Any], said: str, tables: Tables, put_together: Together
+) -> None:
+    data = tables(template)
+    for path, value in changes.items():
+        put(data, path, value)
+    pattern = said.replace("[", r"\[").replace("?", r"\?")
+    with pytest.raises(DesignError, match=pattern) as caught:
+        put_together(data)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_assembly_without_an_actuator_is_refused(put_together: Together) -> None:
+    data = {"name": "x", "family": "assembly", "parts": {"tube": {"kind": "tube"}}}
+    with pytest.raises(DesignError, match='add a part of kind = "sba"'):
+        put_together(data)
+
+
+def test_a_design_is_no_assembly_and_the_other_way_round() -> None:
+    with pytest.raises(DesignError, match="is no assembly"):
+        load_assembly("3dof-15mm")
+    with pytest.raises(DesignError, match="'brace' is an assembly of several designs"):
+        load_design("brace")
+    assert isinstance(load("3dof-15mm"), Design)
+
+
+def test_keys_are_set_by_assignment_and_in_tables() -> None:
+    whole = load_assembly("brace", ["parts.arm.set.stack.balloons=4", "parts.tube.length=5 cm"])
+    made = assemble(whole)
+    arm = made["arm"].made
+    assert arm is not None
+    assert arm.laminate.balloons == 4
+    assert made["tube"].height == 50
+
+
+def test_a_part_may_be_a_design_file_beside_the_assembly(tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text('family = "1dof"\nstack.balloons = 2\n', encoding="utf-8")
+    whole = tmp_path / "mine.toml"
+    whole.write_text(
+        'family = "assembly"\n[parts.a]\nkind = "sba"\ndesign = "own.toml"\n', encoding="utf-8"
+    )
+    made = assemble(load_assembly(whole))
+    assert made.assembly.name == "mine"
+    assert [one.design.name for one in made.designs] == ["own"]
+
+
+def test_a_typed_path_starts_where_the_user_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "own.toml").write_text('family = "1dof"\nstack.balloons = 2\n', encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    made = assemble(load_assembly("aperture", ["parts.arm.design=own.toml"]))
+    assert [one.design.name for one in made.designs] == ["own"]
+
+
+def test_equal_parts_share_a_design_and_others_get_names_of_their_own() -> None:
+    standing = assemble(load_assembly("standing", ["order.copies=2"]))
+    assert [(d.design.name, d.design.order.copies) for d in standing.designs] == [("3dof-15mm", 6)]
+    mixed = assemble(load_assembly("standing", ["parts.head.set.stack.balloons=5"]))
+    names = {d.design.name: (d.parts, d.design.order.copies) for d in mixed.designs}
+    assert names == {"3dof-15mm-left": (("left", "right"), 2), "3dof-15mm-head": (("head",), 1)}
+
+
+def test_machine_and_films_of_the_assembly_count_for_every_part() -> None:
+    made = assemble(load_assembly("brace", ["sheets.tpe.width=300", "laser.kerf_tpe=0.1"]))
+    assert [one.design.sheets.tpe.width for one in made.designs] == [300, 300]
+    assert [one.design.laser.kerf_tpe for one in made.designs] == [0.1, 0.1]
+    assert {one.design.sheets.tpe.length for one in made.designs} == {152.4}
+
+
+def test_a_waived_rule_of_the_deck_reaches_the_designs() -> None:
+    made = assemble(load_assembly("brace", (), ["tube-fit", "seat"]))
+    assert [one.design.rules.waive for one in made.designs] == [("tube-fit",), ("tube-fit",)]

@@ -1,0 +1,99 @@
+"""Where parts come to lie, and what bending round a tube keeps."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from sbafab.actuators import build, load_design
+from sbafab.assemblies.build import assemble
+from sbafab.assemblies.poses import FLIPPED, LYING, OUTWARD, Pose, about_axis, along, shifted
+from sbafab.assemblies.reading import load_assembly
+from sbafab.assemblies.shapes import placed_surface
+from sbafab.assemblies.wrap import bent, cut_along
+from sbafab.geometry.shapes import rectangle
+from sbafab.meshing.prisms import Slab, fuse
+from sbafab.meshing.surface import open_edges
+
+
+@pytest.mark.parametrize(
+    "pose", [FLIPPED, LYING, OUTWARD, about_axis(30), along((0.6, 0.0, 0.8), (1, 2, 3))]
+)
+def test_poses_turn_and_do_not_mirror(pose: Pose) -> None:
+    rows = np.array(pose.rows)
+    assert np.allclose(rows @ rows.T, np.eye(3))
+    assert np.linalg.det(rows) == pytest.approx(1)
+
+
+def test_poses_follow_each_other_as_matrices_do() -> None:
+    outer, inner = shifted(1, 2, 3).then(about_axis(40)), FLIPPED.then(shifted(0.3, 0.2, 0.1))
+    point = (0.7, -0.4, 2.0)
+    assert outer.then(inner).at(point) == pytest.approx(outer.at(inner.at(point)))
+    assert outer.points(np.array([point]))[0] == pytest.approx(outer.at(point))
+
+
+def test_a_bent_slab_is_closed_and_has_the_volume_of_its_ring_sector() -> None:
+    slab = fuse([Slab(rectangle((-6, -4), (8, 5)), 0.1, 0.6)], 0.01)
+    curved = bent(slab, 7.5, 0.0005)
+    assert len(open_edges(curved)) == 0
+    inner, outer = 7.6, 8.1
+    assert curved.volume == pytest.approx((14 / 7.5) / 2 * (outer**2 - inner**2) * 9, rel=1e-3)
+    radii = np.hypot(curved.points[:, 0], curved.points[:, 1])
+    assert radii.min() == pytest.approx(inner)
+    assert radii.max() == pytest.approx(outer)
+
+
+def test_a_cut_adds_edges_and_changes_no_shape() -> None:
+    laminate = build(load_design("radial-15mm"))
+    from sbafab.meshing.solid import solid
+
+    before = solid(laminate, 0.02)
+    after = cut_along(before, 3.21)
+    assert len(after.faces) > len(before.faces)
+    assert after.volume == pytest.approx(before.volume, rel=1e-9)
+    corners = after.points[after.faces][:, :, 0] - 3.21
+    assert not ((corners.min(axis=1) < -1e-2) & (corners.max(axis=1) > 1e-2)).any()
+    assert len(open_edges(after)) == 0
+
+
+def test_parts_stand_where_the_file_says() -> None:
+    made = assemble(load_assembly("brace"))
+    thickness = 30 * 0.038 + 29 * 0.025
+    assert made["arm"].at((0, 0, 0)) == pytest.approx((0, 0, 40))
+    assert made["cup"].at((0, 0, 0)) == pytest.approx((0, 0, 40 + thickness))
+    assert made["vacuum"].at((0, 0, 50)) == pytest.approx((0, 0, 42.5))
+    # The middle of the sheet, half a turn about its own axis: tabs point to the tube's start.
+    assert made["grip"].at((0, 0, 0)) == pytest.approx((7.5, 0, 18))
+    assert made["grip"].at((0, 5, 0)) == pytest.approx((7.5, 0, 13))
+
+
+def test_a_magnet_hangs_under_its_base() -> None:
+    box = placed_surface(assemble(load_assembly("aperture"))["magnet"]).points
+    assert box[:, 2].min() == pytest.approx(-25.4 / 16)
+    assert box[:, 2].max() == pytest.approx(0)
+    assert box[:, 0].mean() == pytest.approx(4.25, abs=1e-6)
+
+
+def test_a_line_leaves_its_inlet_outward() -> None:
+    feed = [f"parts.feed.{k}={v}" for k, v in {"kind": "line", "on": "arm", "at": "inlet"}.items()]
+    made = assemble(load_assembly("aperture", [*feed, "parts.feed.chamber=chamber2"]))
+    start, end = made["feed"].at((0, 0, 0)), made["feed"].at((0, 0, 10))
+    # Chamber 2 lies at 120 degrees; its tab ends 5 mm past the outline.
+    assert math.degrees(math.atan2(start[1], start[0])) == pytest.approx(120)
+    assert math.hypot(*start[:2]) == pytest.approx(7.5 + 5)
+    assert math.hypot(*end[:2]) == pytest.approx(7.5 + 5 + 10, abs=1e-3)
+
+
+@pytest.mark.parametrize("template", ["aperture", "brace", "standing"])
+def test_every_solid_in_place_keeps_its_volume(template: str) -> None:
+    for placed in assemble(load_assembly(template)).parts:
+        volume = placed_surface(placed).volume
+        flat = placed.made and sum(
+            layer.profile.area * layer.film.thickness for layer in placed.made.laminate.tpe_layers
+        )
+        assert volume > 0
+        if flat:
+            # Films and bonds: bent ones are stretched outside the tube by at most their height.
+            assert volume > flat

@@ -1,0 +1,207 @@
+"""An assembly's folder: one nest, one traveller, one solid; read back and checked as built."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+import trimesh
+from lxml import html as lxml_html
+
+from sbafab.assemblies.build import assemble
+from sbafab.assemblies.reading import load_assembly
+from sbafab.assemblies.writing import assembly_sha256
+from sbafab.cutting.dxf_read import read_profile
+from sbafab.output.as_built.check import check_folder
+from sbafab.output.assembly import AssemblyRun, generate_assembly
+from sbafab.output.manifest import file_hashes
+
+SMALL = [f"parts.{name}.set.stack.balloons=2" for name in ("left", "right", "head")]
+BRACE = ["parts.arm.set.stack.balloons=2"]
+
+
+@pytest.fixture(scope="module")
+def standing(tmp_path_factory: pytest.TempPathFactory) -> AssemblyRun:
+    return generate_assembly(load_assembly("standing", SMALL), tmp_path_factory.mktemp("out"))
+
+
+@pytest.fixture(scope="module")
+def brace(tmp_path_factory: pytest.TempPathFactory) -> AssemblyRun:
+    return generate_assembly(load_assembly("brace", BRACE), tmp_path_factory.mktemp("out"))
+
+
+def test_a_folder_for_each_design_and_one_page_for_all(brace: AssemblyRun) -> None:
+    assert not brace.failed
+    assert {path.name for path in brace.folder.iterdir()} == {
+        *("radial-15mm", "3dof-15mm", "sheets", "mesh", "preview"),
+        *("traveller.html", "checks.json", "design.toml", "manifest.json"),
+    }
+    assert not list(brace.folder.glob("*/traveller.html"))
+    assert (brace.folder / "preview" / "assembled.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_design_used_three_times_is_drawn_once_and_cut_three_times(
+    standing: AssemblyRun,
+) -> None:
+    layers = list((standing.folder / "3dof-15mm" / "layers").glob("*.dxf"))
+    assert len(layers) == 4 + 3
+    for material in ("TPE", "PTFE"):
+        one = sum(read_profile(path).region.area for path in layers if material in path.name)
+        cut = sum(
+            read_profile(path).region.area
+            for path in (standing.folder / "sheets").glob(f"{material}_*.dxf")
+        )
+        assert cut == pytest.approx(3 * one, abs=1e-3)
+
+
+def test_the_solid_has_a_node_a_part_at_true_size(brace: AssemblyRun) -> None:
+    scene = trimesh.load(brace.folder / "mesh" / "assembled.glb")
+    names = {"tube", "grip", "arm", "cup", "vacuum"}
+    assert set(scene.graph.nodes_geometry) == names
+    # Metres, y up: the tube is 15 wide and 40 high.
+    transform, geometry = scene.graph["tube"]
+    low, high = scene.geometry[geometry].copy().apply_transform(transform).bounds
+    assert (high - low) * 1000 == pytest.approx([15, 40, 15], abs=0.05)
+    told = {n["name"]: n for m in brace.manifest["meshes"] for n in m["nodes"]}
+    assert told["tube"]["volume_mm3"] == pytest.approx(3267.26, rel=1e-4)
+    assert set(told) == names
+
+
+def test_the_manifest_tells_parts_and_places(brace: AssemblyRun) -> None:
+    told = json.loads((brace.folder / "manifest.json").read_text(encoding="utf-8"))
+    assert told["schema"] == "sbafab/assembly@1"
+    parts = {part["name"]: part for part in told["parts"]}
+    assert parts["arm"]["shift"] == [0, 0, 40]
+    assert parts["grip"]["bent_radius"] == 7.5
+    assert parts["grip"]["design"] == "radial-15mm"
+    found = file_hashes(brace.folder)
+    found.pop("manifest.json")
+    assert told["files"] == found
+
+
+def test_the_written_design_builds_the_same_assembly(brace: AssemblyRun) -> None:
+    again = assemble(load_assembly(brace.folder / "design.toml"))
+    assert assembly_sha256(again) == brace.manifest["design_sha256"]
+
+
+def test_the_same_assembly_gives_the_same_bytes(standing: AssemblyRun, tmp_path: Path) -> None:
+    again = generate_assembly(load_assembly("standing", SMALL), tmp_path)
+    assert file_hashes(again.folder) == file_hashes(standing.folder)
+
+
+def words(node: Any) -> str:
+    return " ".join(node.text_content().split())
+
+
+def test_the_page_makes_every_design_and_joins_every_part(brace: AssemblyRun) -> None:
+    page = (brace.folder / "traveller.html").read_text(encoding="utf-8")
+    tree = lxml_html.fromstring(page)
+    ids = [node.get("id") for node in tree.iter() if node.get("id")]
+    assert [name for name, count in Counter(ids).items() if count > 1] == []
+    links = [
+        value.removeprefix("#")
+        for node in tree.iter()
+        for name, value in node.attrib.items()
+        if name in ("href", "aria-labelledby") and not value.startswith("data:")
+    ]
+    assert set(links) <= set(ids)
+    assert [words(h) for h in tree.findall(".//h2[@class='design']")] == [
+        "Make 1 copy of radial-15mm (A)",
+        "Make 1 copy of 3dof-15mm (B)",
+    ]
+    joined = [words(a.find("h3")) for a in tree.iterfind(".//article") if "join" in a.get("class")]
+    assert [title.split()[1] for title in joined] == ["tube", "grip", "arm", "cup", "vacuum"]
+    assert "laminated at once, as in the paper" in page
+    assert "Not together: radial-15mm and 3dof-15mm" in page
+    assert "3M 1587" in page
+
+
+def test_three_copies_share_a_lamination(standing: AssemblyRun) -> None:
+    page = (standing.folder / "traveller.html").read_text(encoding="utf-8")
+    assert "3dof-15mm, 3 copies: 1 lamination, all at once" in page
+    assert "45 min in the press instead of 135" in page
+
+
+def test_a_failed_check_leaves_findings_and_nothing_to_cut(tmp_path: Path) -> None:
+    keys = [*BRACE, "parts.tube.outer_diameter=14"]
+    run = generate_assembly(load_assembly("brace", keys), tmp_path)
+    assert run.failed
+    assert not list(run.folder.rglob("*.dxf"))
+    assert not (run.folder / "traveller.html").exists()
+    told = json.loads((run.folder / "checks.json").read_text(encoding="utf-8"))
+    failed = {f["rule"] for f in told["findings"] if f["verdict"] == "fail"}
+    assert failed == {"tube-match"}
+
+
+def test_a_failed_rule_of_one_design_stops_all(tmp_path: Path) -> None:
+    keys = [*BRACE, "parts.arm.set.bond.width=0.4"]
+    run = generate_assembly(load_assembly("brace", keys), tmp_path)
+    assert run.failed
+    assert {f.rule for f in run.checked.between if f.verdict == "fail"} == set()
+    assert not list(run.folder.rglob("*.dxf"))
+
+
+def test_a_waived_check_is_said_on_sheets_page_and_manifest(tmp_path: Path) -> None:
+    whole = load_assembly("aperture", ["parts.arm.set.stack.balloons=2", *OFF], ["seat"])
+    run = generate_assembly(whole, tmp_path)
+    assert not run.failed
+    assert run.manifest["waived"] == ["seat"]
+    sheet = (run.folder / "sheets" / "TPE_1.dxf").read_text(encoding="utf-8")
+    assert "seat" in sheet
+    assert "Waived checks" in (run.folder / "traveller.html").read_text(encoding="utf-8")
+    assert not [f for f in check_folder(run.folder) if f.verdict == "fail"]
+
+
+OFF = ["parts.magnet.offset=[0, 0]"]
+
+
+def test_the_folder_is_found_as_it_was_built(standing: AssemblyRun) -> None:
+    findings = check_folder(standing.folder)
+    assert [f.message for f in findings if f.verdict == "fail"] == []
+    assert {"collision", "seat", "tube-match", "bond-width", "manifest-claims"} <= {
+        f.rule for f in findings
+    }
+
+
+def doctored(run: AssemblyRun, folder: Path) -> Path:
+    return Path(shutil.copytree(run.folder, folder / run.folder.name))
+
+
+def claims_failed(folder: Path) -> str:
+    failed = [f for f in check_folder(folder) if f.verdict == "fail"]
+    return " / ".join(f"{f.rule}: {f.message}" for f in failed)
+
+
+def test_a_moved_part_is_found(standing: AssemblyRun, tmp_path: Path) -> None:
+    folder = doctored(standing, tmp_path)
+    path = folder / "manifest.json"
+    told = json.loads(path.read_text(encoding="utf-8"))
+    told["parts"][1]["shift"][0] += 1
+    path.write_text(json.dumps(told), encoding="utf-8")
+    said = claims_failed(folder)
+    assert said == "manifest-claims: parts or their places are not those of design.toml"
+
+
+def test_another_design_file_is_found(standing: AssemblyRun, tmp_path: Path) -> None:
+    folder = doctored(standing, tmp_path)
+    path = folder / "design.toml"
+    path.write_text(path.read_text("utf-8").replace("angle = 60.0", "angle = 30.0"), "utf-8")
+    said = claims_failed(folder)
+    assert "design_sha256 is not that of design.toml" in said
+    assert "design.toml was changed" in said
+
+
+def test_a_broken_design_file_is_found(standing: AssemblyRun, tmp_path: Path) -> None:
+    folder = doctored(standing, tmp_path)
+    (folder / "design.toml").write_text("family = 1", encoding="utf-8")
+    assert "the parts were not put together" in claims_failed(folder)
+
+
+def test_a_lost_sheet_is_found(standing: AssemblyRun, tmp_path: Path) -> None:
+    folder = doctored(standing, tmp_path)
+    (folder / "sheets" / "TPE_1.dxf").unlink()
+    assert "sheets/TPE_1.dxf" in claims_failed(folder)

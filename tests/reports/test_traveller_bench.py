@@ -1,0 +1,239 @@
+"""traveller.html at the bench: what a technician could not do with it before."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import pytest
+import shapely
+from lxml import html as lxml_html
+
+from sbafab.actuators import build, load_design
+from sbafab.design.records import Design
+from sbafab.laminate.laminate import Laminate
+from sbafab.nesting.records import Nest
+from sbafab.output.settings import press_settings
+from sbafab.pressing.schedule import schedule
+from sbafab.reports.traveller.job import Job, Work
+from sbafab.reports.traveller.page import traveller_html
+from sbafab.reports.traveller.sheet_map import sheet_map
+
+SHA = hashlib.sha256(b"design").hexdigest()
+TPE, PTFE, BOND, OVERHANG = 0.038, 0.025, 0.75, 0.5
+
+
+@cache
+def built(template: str, *assignments: str) -> tuple[Design, Laminate]:
+    design = load_design(template, assignments)
+    return design, build(design)
+
+
+def page(sheet_files: Any, template: str, *assignments: str) -> Any:
+    design, laminate = built(template, *assignments)
+    plan = schedule(laminate, press_settings(design))
+    fixture = "sheets/fixture.dxf" if laminate.pins else None
+    job = Job(SHA, "sbafab 1.0.0", fixture=fixture)
+    work = Work(design, laminate, plan, sheet_files(laminate), job)
+    return lxml_html.fromstring(traveller_html(*(getattr(work, name) for name in FIELDS)))
+
+
+FIELDS = ("design", "laminate", "schedule", "sheets", "job")
+
+
+def words_of(node: Any) -> str:
+    return " ".join(node.text_content().split())
+
+
+def steps(tree: Any) -> list[str]:
+    return [words_of(step) for step in tree.findall(".//article")]
+
+
+def lay_up(tree: Any) -> dict[str, str]:
+    """Pins by pattern, as the lay-up table has them."""
+    rows = tree.get_element_by_id("lay-up").getparent().findall(".//tbody/tr")
+    cells = [[words_of(cell) for cell in row][-6:] for row in rows]
+    return {row[1]: row[-1] for row in cells}
+
+
+def test_a_pin_counts_only_in_the_step_that_adds_the_layer(sheet_files: Any) -> None:
+    held = lay_up(page(sheet_files, "3dof-15mm"))
+    # Base and cap have the lumen, and join in steps without pins.
+    assert held["P01"] == held["P07"] == "none (by hand)"
+    assert held["P04"] == "lumen"
+    assert held["P05"] == "chamber1, chamber2, chamber3 and lumen"
+    with_ears = lay_up(page(sheet_files, "3dof-15mm", 'registration.method="ears"'))
+    assert with_ears["P01"] == with_ears["P07"] == "film1 and film2"
+
+
+@pytest.mark.parametrize("template", ["1dof-5mm", "3dof-15mm", "radial-15mm"])
+def test_what_the_force_means_is_said(sheet_files: Any, template: str) -> None:
+    words = words_of(page(sheet_files, template).get_element_by_id("press").getparent())
+    _, laminate = built(template)
+    top = sum(
+        shapely.Polygon(rings[0], rings[1:]).area
+        for rings in laminate.layers[-1].profile.polygons(1e-4)
+    )
+    assert "2555 N is 110 kPa on the whole platen of 152.4" in words
+    assert "the paper does not say what it used" in words
+    found = re.search(r"\((\d+) mm² at its top\) would be ([\d.]+) MPa", words)
+    assert found is not None
+    assert float(found[1]) == pytest.approx(top, abs=0.51)
+    assert float(found[2]) == pytest.approx(110e-3 * 152.4**2 / top, abs=0.051)
+
+
+def test_pins_are_no_longer_than_plate_and_stack(sheet_files: Any) -> None:
+    first, second, third, fourth = steps(page(sheet_files, "3dof-15mm"))
+    middle = 27 * TPE + 28 * PTFE
+    assert f"here the plate + {TPE + PTFE:g} mm" in first
+    assert "cut sheets/fixture.dxf twice" in first
+    assert f"stands higher than the stack, {TPE + PTFE:g} mm over the plate" in first
+    assert f"stands higher than the stack, {round(middle, 3):g} mm over the plate" in third
+    assert "pushed from below through the plate" in first
+    for without in (second, fourth):
+        assert "plate +" not in without
+        assert "higher than the stack" not in without
+
+
+def test_without_pins_each_edge_is_laid_along_another(sheet_files: Any) -> None:
+    _, second, _, fourth = steps(page(sheet_files, "3dof-15mm"))
+    assert "edge (layer 3) on that of the TPE base below (layer 1), all round." in second
+    outside = f"{OVERHANG:g} mm outside that of the TPE wall below (layer 3), all round but"
+    assert f"Lay its edge (layer 4) {outside} for the tabs." in fourth
+    inside = f"{OVERHANG:g} mm inside that of the PTFE separator mask below (layer 56), all round."
+    assert f"Lay its edge on that of the TPE wall below (layer 57), {inside}" in fourth
+    first, *_ = steps(page(sheet_files, "radial-15mm"))
+    assert f"Lay each edge {BOND:g} mm outside that of the PTFE chamber mask below" in first
+
+
+def test_every_piece_on_a_sheet_has_its_place(sheet_files: Any) -> None:
+    tree = page(sheet_files, "radial-15mm")
+    (table,) = tree.findall(".//table[@class='places']")
+    rows = [[words_of(cell) for cell in row] for row in table.findall("./tbody/tr")]
+    pitch = 15 * math.pi / 3
+    assert f"from piece to piece {pitch:.3f}" in steps(tree)[-1]
+    expected = [
+        (what, piece, (piece - 0.5) * pitch, out)
+        for what, out in (
+            ("layer 2, PTFE separator mask", OVERHANG),
+            ("stack of layers 3, 4, 5", 0.0),
+        )
+        for piece in (1, 2, 3)
+    ]
+    assert [(row[0], int(row[1])) for row in rows] == [(e[0], e[1]) for e in expected]
+    # 1 mm of sheet past the SBAs, which are 11.5 wide and 20 long.
+    for row, (_, _, x, out) in zip(rows, expected, strict=True):
+        told = [float(cell) for cell in row[2:]]
+        assert told == pytest.approx([x, 11.0, x - 5.75 - out, 1.0 - out], abs=0.0051)
+    assert "edge on edge" not in words_of(tree)
+    for other in (("3dof-15mm",), ("radial-15mm", 'registration.method="ears"')):
+        assert page(sheet_files, *other).findall(".//table[@class='places']") == []
+
+
+def test_several_stacks_are_not_one(sheet_files: Any) -> None:
+    tree = page(sheet_files, "radial-15mm")
+    first, second, third = steps(tree)
+    assert "Bottom balloons, upper two layers of each" in first
+    assert "the 3 stacks lie flat" in first
+    assert "You now hold the 3 stacks from step 1" in first
+    assert "Lay the 3 stacks from step 1" in second
+    assert "the stack lies flat" in third
+    assert "the stack from" not in first + second + third
+    facts = tree.find(".//dl[@class='facts']")
+    told = dict(zip(map(words_of, facts[::2]), map(words_of, facts[1::2]), strict=True))
+    assert told["Balloons"] == "3 stacks of 1 balloon"
+    whole = words_of(page(sheet_files, "3dof-15mm"))
+    assert "stacks" not in whole
+    joined = page(sheet_files, "radial-15mm", "inlet.manifold=true")
+    assert "Bottom balloon, upper two layers" in steps(joined)[0]
+
+
+def test_the_legend_names_the_cross_only_where_it_is_seen(sheet_files: Any) -> None:
+    for template, pin in (("3dof-15mm", "lumen"), ("1dof-5mm", "chamber1")):
+        plans = [step.findall(".//svg")[0] for step in page(sheet_files, template).iter("article")]
+        said = [words_of(plan) for plan in plans]
+        assert [f"middle of pin {pin}" in words for words in said] == [True, False] * 2
+        assert ["+ datum" in words for words in said] == [False, True] * 2
+    eared = page(sheet_files, "1dof-5mm", "stack.balloons=1", 'registration.method="ears"')
+    assert all("+ datum" in step for step in steps(eared))
+
+
+def boxes(svg: Any) -> list[Any]:
+    """What the labels of a picture cover, by Helvetica's widest letters in them: 0.667 em."""
+    found = []
+    for text in svg.iter("text"):
+        x, y, size = (float(text.get(key)) for key in ("x", "y", "font-size"))
+        half = size * sum(0.278 if c in " .-" else 0.56 for c in text.text) / 2
+        found.append(shapely.box(x - half, y - 0.7 * size, x + half, y))
+    return found
+
+
+def test_labels_do_not_lie_over_each_other_or_windows(sheet_files: Any) -> None:
+    _, laminate = built("radial-15mm")
+    for template in ("3dof-15mm", "radial-15mm"):
+        for sheet in sheet_files(built(template)[1]):
+            # Two designs on a sheet: every label begins with the design's name.
+            for marks in ({template: ""}, {template: "B"}):
+                svg = lxml_html.fromstring(sheet_map(sheet, marks, "sheet-1"))
+                covered = boxes(svg)
+                assert len(covered) > 4
+                for i, box in enumerate(covered):
+                    assert all(box.intersection(other).area < 0.05 for other in covered[:i])
+    masks = [sheet for sheet in sheet_files(laminate) if sheet.material == "PTFE"]
+    for sheet in masks:
+        scale = 84.0 / sheet.width
+        svg = lxml_html.fromstring(sheet_map(sheet, {"radial-15mm": ""}, "sheet-1"))
+        for placement in sheet.nest.on_sheet(sheet.number - 1):
+            for hole in sheet.nest.region(placement).holes:
+                points = [
+                    (0.5 + scale * x, 0.5 + scale * (sheet.length - y)) for x, y in hole.polygon()
+                ]
+                window = shapely.Polygon(points)
+                hidden = sum(box.intersection(window).area for box in boxes(svg))
+                assert hidden < 0.2 * window.area
+
+
+def test_a_long_sheet_is_drawn_in_rows_across_the_page(sheet_files: Any) -> None:
+    _, laminate = built("1dof-5mm")
+    sheet = sheet_files(laminate)[0]
+    nest = sheet.nest
+    stock = replace(nest.stock, width=60.0, length=900.0, roll=True, pins=())
+    part = nest.parts[0]
+    low_x, low_y, high_x, high_y = part.region.bounds
+    step = high_y - low_y + 1
+    places = tuple(
+        replace(nest.placements[0], part=0, turn=0, sheet=0, shift=(20 - low_x, 10 - low_y + y))
+        for y in (step * i for i in range(70))
+    )
+    long = replace(
+        sheet, width=60.0, length=581.0, nest=Nest("bottom-left", "TPE", stock, nest.parts, places)
+    )
+    svg = lxml_html.fromstring(sheet_map(long, {"1dof-5mm": ""}, "sheet-1"))
+    rows = svg.findall(".//svg")
+    sizes = [(float(row.get("width")), float(row.get("height"))) for row in rows]
+    across, high = sizes[0]
+    scale = high / 60
+    assert scale > 84 / 152.4
+    assert sum(size[0] for size in sizes) == pytest.approx(581 * scale)
+    assert across <= 186
+    # Every part is in a row, the first at the left end, its lower side to the left.
+    assert sum(len(row.findall(".//use")) for row in rows) >= 70
+    first = rows[0].find(".//use")
+    a, b, c, d, e, f = map(float, re.findall(r"-?[\d.]+", first.get("transform")))
+    points = [p for ring in part.region.polygons(1e-3)[0] for p in ring]
+    moved = shapely.MultiPoint([(a * x + c * y + e, b * x + d * y + f) for x, y in points])
+    assert moved.bounds == pytest.approx(
+        (
+            0.5 + 10 * scale,
+            0.5 + 20 * scale,
+            0.5 + (10 + high_y - low_y) * scale,
+            0.5 + (20 + high_x - low_x) * scale,
+        ),
+        abs=0.01,
+    )
+    # Turned, not mirrored: the page's y points down, so the determinant stays negative.
+    assert a * d - b * c < 0

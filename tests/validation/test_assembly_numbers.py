@@ -1,0 +1,58 @@
+"""The paper's assemblies (Sec. 2.1 and 5): 15.33 deflated, about 28 inflated, 120 degrees apart."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from sbafab.assemblies.build import assemble
+from sbafab.assemblies.checks import run_checks
+from sbafab.assemblies.reading import load_assembly
+
+
+def measured(template: str, rule: str) -> tuple[float | None, float | None, str]:
+    (found,) = [f for f in run_checks(assemble(load_assembly(template))) if f.rule == rule]
+    return found.measured, found.limit, found.verdict
+
+
+def test_the_brace_passes_the_lumen_deflated_and_holds_in_it_inflated() -> None:
+    deflated, lumen, verdict = measured("brace", "lumen-pass")
+    assert lumen == 25.4
+    assert deflated == pytest.approx(15.33, abs=0.005)
+    assert verdict == "pass"
+    inflated, lumen, verdict = measured("brace", "lumen-brace")
+    assert lumen == 25.4
+    # Half the flat pocket's perimeter over pi twice, on both sides, and 0.164 of films.
+    assert inflated == pytest.approx(15 + 2 * (2 * 10 / math.pi + 0.164), abs=1e-6)
+    assert inflated == pytest.approx(28, abs=0.1)
+    assert verdict == "pass"
+
+
+def test_the_balloons_of_the_brace_lie_120_degrees_apart_on_the_tube() -> None:
+    made = assemble(load_assembly("brace"))
+    grip = made["grip"]
+    assert grip.made is not None
+    chambers = grip.made.laminate.chambers
+    places = [grip.at((*centre, 0.0)) for chamber in chambers for centre in chamber.centres]
+    assert [math.hypot(x, y) for x, y, _ in places] == pytest.approx([7.5] * 3)
+    angles = sorted(math.degrees(math.atan2(y, x)) % 360 for x, y, _ in places)
+    assert [b - a for a, b in zip(angles, angles[1:], strict=False)] == pytest.approx([120, 120])
+
+
+def test_the_aperture_lies_between_the_two_predictions() -> None:
+    nominal, hole, verdict = measured("aperture", "aperture")
+    assert hole == 9.25
+    # Lobes 6.5 wide as chords of a circle round a triangle, 1.865 thick.
+    assert nominal == pytest.approx(2 * math.hypot(6.5 / (2 * math.sqrt(3)) + 1.865, 3.25))
+    assert verdict == "warn"
+
+
+def test_three_actuators_of_one_design_stand() -> None:
+    made = assemble(load_assembly("standing"))
+    assert [one.design.order.copies for one in made.designs] == [3]
+    assert made["left"].radius == made["right"].radius == 7.5
+    legs = [made[name].at((0, 0, 0)) for name in ("left", "right")]
+    angles = [math.degrees(math.atan2(y, -z)) for _, y, z in legs]
+    assert abs(angles[0] - angles[1]) == pytest.approx(120)
+    assert made["head"].at((0, 0, 0)) == pytest.approx((60, 0, 0))
