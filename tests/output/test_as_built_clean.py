@@ -112,7 +112,7 @@ def test_chords_make_no_better_builds(tmp_path: Path) -> None:
         next(f.measured for f in findings if f.rule == "registration-yield")
         for findings in (run.findings, check_folder(run.folder))
     ]
-    # Counted over the same 10,000 draws; edges lie up to 0.05 mm elsewhere before arcs are put back.
+    # Counted over the same draws; edges lie up to 0.05 mm elsewhere before arcs are put back.
     assert shares[0] is not None
     assert 0.1 < shares[0] < 0.9
     assert shares[1] == pytest.approx(shares[0], abs=0.03)
