@@ -35,7 +35,8 @@ def passes(name: str, arguments: list[str]) -> bool:
 def main() -> int:
     """Every check runs; pytest comes last, so that its counts close the output."""
     failed = [name for name, arguments in CHECKS.items() if not passes(name, arguments)]
-    workers = ["-n", str(os.cpu_count() or 1)]
+    # Neighbours share what their module made once.
+    workers = ["-n", str(os.cpu_count() or 1), "--dist", "worksteal"]
     tests = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", *workers, *sys.argv[1:]], cwd=ROOT, check=False
     )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -51,7 +52,12 @@ def moved(region: Region, symmetry: Callable[[Point], Point]) -> Region:
     return region.mapped(symmetry, 1.0, mirror=mirror)
 
 
-def eared(name: str, assignments: list[str]) -> Laminate:
+def eared(name: str, assignments: Sequence[str]) -> Laminate:
+    return _eared(name, tuple(assignments))
+
+
+@cache
+def _eared(name: str, assignments: tuple[str, ...]) -> Laminate:
     return build(load_design(name, [*assignments, 'registration.method="ears"']))
 
 

@@ -16,7 +16,7 @@ from tests.faults.specimen import Specimen, failing
 from tests.output.doctoring import Doctor
 
 TEMPLATES = ("1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm")
-BALLOONS = 3
+BALLOONS = 2
 KINDS: tuple[Kind, ...] = (
     layers.KIND,
     holes.KIND,

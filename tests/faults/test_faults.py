@@ -1,4 +1,8 @@
-"""Every fault is caught by the rule named for it, and ``docs/faults.md`` says what was found."""
+"""Every fault is caught by the rule named for it, and ``docs/faults.md`` says what was found.
+
+Of ``1dof-10mm``, which is a wider ``1dof-5mm``, every fourth is run; ``python -m tests.faults`` runs
+all of them and writes the page.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +18,15 @@ from tests.faults.specimen import LEFT_OUT, failing
 from tests.faults.table import PAGE, cells_of, text
 
 
-@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
-@pytest.mark.parametrize("template", TEMPLATES)
+WIDER = "1dof-10mm"
+CASES = [
+    pytest.param(fault, template, id=f"{template}-{fault.name}")
+    for template in TEMPLATES
+    for fault in (FAULTS[::4] if template == WIDER else FAULTS)
+]
+
+
+@pytest.mark.parametrize(("fault", "template"), CASES)
 def test_the_rule_named_for_a_fault_catches_it(
     fault: Fault, template: str, goods: Goods, tmp_path: Path
 ) -> None:

@@ -21,7 +21,7 @@ from sbafab.output.swap import replaced_folder
 if TYPE_CHECKING:
     from conftest import Output, Runs
 
-KILLS = int(os.environ.get("SBAFAB_KILLS", "8"))
+KILLS = int(os.environ.get("SBAFAB_KILLS", "5"))
 OTHER = {"0.8": "0.75", "0.75": "0.8"}
 ON_MESH = """
 import os, sys

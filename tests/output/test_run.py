@@ -141,10 +141,10 @@ def test_a_run_that_dies_half_way_leaves_the_old_output(
 
 @pytest.mark.parametrize("name", ["3dof-15mm", "radial-15mm"])
 def test_same_input_same_bytes(name: str, tmp_path: Path) -> None:
-    here = hashes(generate(load_design(name), tmp_path / "here").folder)
+    here = hashes(generate(load_design(name, ["stack.balloons=2"]), tmp_path / "here").folder)
     script = (
         "import sys; from pathlib import Path; import sbafab\n"
-        "sbafab.generate(sys.argv[1], out=sys.argv[2])\n"
+        "sbafab.generate(sys.argv[1], 'stack.balloons=2', out=sys.argv[2])\n"
     )
     environment = {**os.environ, "PYTHONHASHSEED": "4711", "TZ": "Pacific/Kiritimati"}
     subprocess.run(
