@@ -1,7 +1,7 @@
 """Every fault is caught by the rule named for it, and ``docs/faults.md`` says what was found.
 
-Of ``1dof-10mm``, which is a wider ``1dof-5mm``, every fourth is run; ``python -m tests.faults`` runs
-all of them and writes the page.
+Of ``1dof-10mm``, which is a wider ``1dof-5mm``, every fourth is run; ``python -m tests.faults``
+runs all of them and writes the page.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from tests.faults.catalogue import FAULTS, KINDS, TEMPLATES, Goods, caught_by, c
 from tests.faults.record import Fault
 from tests.faults.specimen import LEFT_OUT, failing
 from tests.faults.table import PAGE, cells_of, text
-
 
 WIDER = "1dof-10mm"
 CASES = [

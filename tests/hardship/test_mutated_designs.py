@@ -26,7 +26,7 @@ from sbafab.errors import SbafabError
 from sbafab.output.assembly import check_assembly
 from sbafab.output.run import check
 
-COUNT = int(os.environ.get("SBAFAB_MUTATIONS", "96"))
+COUNT = int(os.environ.get("SBAFAB_MUTATIONS", "160"))
 BATCHES = 8
 LONGEST_SECONDS = 30
 VALUES = [
