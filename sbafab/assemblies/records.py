@@ -9,10 +9,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from sbafab.design.records import NAME_PATTERN, Laser, Order, Press, RuleName, Section, Sheets
-from sbafab.design.units import Length, LengthOrZero, millimetres
+from sbafab.design.units import Length, LengthOrZero, Millimetres
 
 FAMILY = "assembly"
 Place = Literal["top", "bottom", "start", "end", "outside", "lumen", "inlet"]
@@ -27,7 +27,7 @@ CheckName = Literal[
     "lumen-brace",
 ]
 Degrees = Annotated[float, Field(ge=-360, le=360)]
-Shift = Annotated[float, BeforeValidator(millimetres), Field(ge=-1000, le=1000)]
+Shift = Annotated[float, Millimetres(-1000, 1000)]
 PartName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}$")]
 Words = Annotated[str, Field(max_length=120)]
 

@@ -44,9 +44,7 @@ def check(
     from sbafab.output.manifest import checks
     from sbafab.rules.deck import has_failed
 
-    if target_yield is not None:
-        assignments = (*assignments, f"rules.target_yield={target_yield}")
-    kind, findings = _findings(source, assignments, waivers, as_json)
+    kind, findings = _findings(source, assignments, waivers, target_yield, as_json)
     advice = None if target_yield is None else _advice(source, assignments, target_yield)
     if as_json:
         said = {"advice": advice.as_dict()} if advice else {}
@@ -77,17 +75,26 @@ def _advice(source: str, assignments: tuple[str, ...], target: float) -> Advice:
     from sbafab.actuators import load_design
     from sbafab.output.advice import advise
 
-    return advise(load_design(source, assignments), target)
+    return advise(load_design(source, _asking(assignments, target)), target)
+
+
+def _asking(assignments: tuple[str, ...], target: float) -> tuple[str, ...]:
+    return (*assignments, f"rules.target_yield={target}")
 
 
 def _findings(
-    source: str, assignments: tuple[str, ...], waivers: tuple[str, ...], quiet: bool
+    source: str,
+    assignments: tuple[str, ...],
+    waivers: tuple[str, ...],
+    target: float | None,
+    quiet: bool,
 ) -> tuple[str, tuple[Finding, ...]]:
     from sbafab.cli.printing import shown_progress
     from sbafab.design.reading import template_names
     from sbafab.errors import DesignError
 
     if source in template_names() or not Path(source).is_dir():
+        from sbafab.actuators import load_design
         from sbafab.assemblies.reading import load
         from sbafab.assemblies.records import Assembly
 
@@ -96,9 +103,16 @@ def _findings(
             if isinstance(found, Assembly):
                 from sbafab.output.assembly import check_assembly
 
+                if target is not None:
+                    raise DesignError(
+                        "--target-yield goes with a design, and this is an assembly; check its "
+                        "parts' designs one by one"
+                    )
                 return "design", check_assembly(found, progress).findings
+            if target is not None:
+                found = load_design(source, _asking(assignments, target), waivers)
             return "design", _of_design(found, progress)
-    if assignments or waivers:
+    if assignments or waivers or target is not None:
         raise DesignError(
             "--set, --waive and --target-yield go with a design; a folder is checked as it lies, "
             "so leave them out"

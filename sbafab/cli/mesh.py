@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from sbafab.cli.options import Request, run_options
+from sbafab.cli.quantities import VOLUME, OfChamber, by_chamber
 from sbafab.cli.working import run_parts
 
 if TYPE_CHECKING:
@@ -24,22 +25,11 @@ def _positive(ctx: click.Context, param: click.Parameter, value: float) -> float
 
 
 def _fill(
-    ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
+    ctx: click.Context, param: click.Parameter, values: tuple[tuple[str, float], ...]
 ) -> float | dict[str, float] | None:
-    """One volume for every balloon, or NAME=VOLUME for the balloons of a chamber."""
-    found: dict[str, float] = {}
-    for value in values:
-        name, equals, text = value.rpartition("=")
-        try:
-            volume = float(text.strip().removesuffix("ul").strip())
-        except ValueError:
-            volume = math.nan
-        if not math.isfinite(volume) or (equals and not name.strip()):
-            raise click.BadParameter(
-                f"{value!r} must be microlitres a balloon, such as 5ul or chamber1=5ul", ctx, param
-            )
-        found[name.strip()] = volume
-    if "" in found and len(values) > 1:
+    """One volume for every balloon, or one for the balloons of each chamber."""
+    found = by_chamber(ctx, param, values)
+    if "" in found and len(found) > 1:
         raise click.BadParameter("give one volume for all, or one for each chamber", ctx, param)
     return found.get("", found) if found else None
 
@@ -73,6 +63,7 @@ def _fill(
 @click.option(
     "--fill",
     multiple=True,
+    type=OfChamber(VOLUME, all_chambers=True).read,
     callback=_fill,
     metavar="UL|CHAMBER=UL",
     help="Air in each balloon, e.g. 5ul. Repeatable for chambers.  [default: flat]",

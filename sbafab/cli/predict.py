@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sbafab.cli.options import Request, run_options
+from sbafab.cli.quantities import FLOW, PRESSURE, VOLUME
 from sbafab.cli.working import RULE_FAILED
 
 if TYPE_CHECKING:
@@ -16,11 +17,9 @@ if TYPE_CHECKING:
     from sbafab.models.figures import Prediction
 
 
-def _finite(
-    ctx: click.Context, param: click.Parameter, value: float | tuple[float, ...]
-) -> float | tuple[float, ...]:
+def _finite(ctx: click.Context, param: click.Parameter, value: float) -> float:
     # Any float option lets nan and inf through.
-    if not all(map(math.isfinite, value if isinstance(value, tuple) else (value,))):
+    if not math.isfinite(value):
         raise click.BadParameter("must be a number", ctx, param)
     return value
 
@@ -30,29 +29,26 @@ def _finite(
 @click.option(
     "--pressure",
     "pressures",
-    type=float,
+    type=PRESSURE.read,
     multiple=True,
-    callback=_finite,
-    metavar="KPA",
-    help="Force and work at this pressure. Repeatable.  [default: 10, 100]",
+    metavar="P",
+    help="Force and work at this pressure, kPa or with a unit. Repeatable.  [default: 10, 100]",
 )
 @click.option(
     "--flow",
-    type=float,
-    default=35.0,
+    type=FLOW.read,
+    default="35 ml/min",
     show_default=True,
-    callback=_finite,
-    metavar="ML/MIN",
-    help="Time to actuate at this flow.",
+    metavar="Q",
+    help="Time to actuate at this flow, ml/min or with a unit.",
 )
 @click.option(
     "--volume",
     "volumes",
-    type=float,
+    type=VOLUME.read,
     multiple=True,
-    callback=_finite,
-    metavar="UL",
-    help="Stroke with this much in each balloon. Repeatable.",
+    metavar="V",
+    help="Stroke with this much in each balloon, ul or with a unit. Repeatable.",
 )
 @click.option(
     "--press-factor",

@@ -235,10 +235,12 @@ def film_said(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], copi
     sizes = dict.fromkeys(f"{sheet['width']:g} x {sheet['length']:g}" for sheet in own)
     minutes = sum(sheet["estimated_minutes"] for sheet in own)
     many = f" for {copies} copies" if copies > 1 else ""
+    bare = any(sheet["label"] == "no room" for sheet in own)
+    unlabelled = "; the border has no room for labels, so write on them what they are"
     return (
         f"{count} of {', '.join(sizes)} mm{many}, {film['density']:.0%} used, "
         f"{film['waste'] / 100:.0f} cm2 waste, about {minutes:.1f} min of cutting; "
-        f"{', '.join(sheet['file'] for sheet in own)}"
+        f"{', '.join(sheet['file'] for sheet in own)}{unlabelled if bare else ''}"
     )
 
 

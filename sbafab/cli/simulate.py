@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import re
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sbafab.cli.options import Request, run_options
+from sbafab.cli.quantities import PRESSURE, VOLUME, OfChamber, by_chamber
 from sbafab.cli.working import RULE_FAILED
 
 if TYPE_CHECKING:
@@ -18,50 +17,7 @@ if TYPE_CHECKING:
 
 SIMULATORS = ("calculix", "sofa", "mujoco")
 """As in ``sbafab.simulators.simulator``, whose imports would slow ``--help`` down."""
-KILOPASCALS = {"Pa": 0.001, "kPa": 1.0, "MPa": 1000.0, "mbar": 0.1, "bar": 100.0, "psi": 6.894757}
-MICROLITRES = {"ul": 1.0, "ml": 1000.0, "mm3": 1.0}
 MOST_MINUTES = 10_000
-
-
-def _measure(value: str, units: dict[str, float], usual: str, what: str) -> float:
-    """A quantity from a number in the usual unit, or a text with a unit."""
-    written = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*([A-Za-z]\w*)?\s*", value)
-    try:
-        if written is not None and math.isfinite(number := float(written[1])):
-            return number * units[written[2] or usual]
-    except (KeyError, ValueError):
-        pass
-    raise click.BadParameter(f"{value!r} must be a {what}; the units are {', '.join(units)}")
-
-
-def _kilopascals(value: str) -> float:
-    return _measure(value, KILOPASCALS, "kPa", 'pressure such as 6, "6 kPa" or "60 mbar"')
-
-
-def _pressure(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
-    return None if value is None else _kilopascals(value)
-
-
-def _named(value: str, example: str) -> tuple[str, str]:
-    name, equals, text = value.partition("=")
-    if not equals or not name.strip():
-        raise click.BadParameter(f"{value!r} must be {example}")
-    return name.strip(), text
-
-
-def _chambers(
-    ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
-) -> dict[str, float]:
-    pairs = [_named(value, "NAME=PRESSURE, such as chamber1=6") for value in values]
-    return {name: _kilopascals(text) for name, text in pairs}
-
-
-def _volumes(
-    ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
-) -> dict[str, float] | None:
-    pairs = [_named(value, "NAME=VOLUME, such as chamber1=80") for value in values]
-    what = 'volume such as 80 or "0.08 ml"'
-    return {name: _measure(text, MICROLITRES, "ul", what) for name, text in pairs} or None
 
 
 @click.command()
@@ -71,14 +27,15 @@ def _volumes(
 )
 @click.option(
     "--pressure",
-    callback=_pressure,
+    type=PRESSURE.read,
     metavar="P",
     help='In every chamber, kPa or with a unit ("60 mbar").  [default: calculix 6, others 5]',
 )
 @click.option(
     "--chamber",
     "chambers",
-    callback=_chambers,
+    type=OfChamber(PRESSURE).read,
+    callback=by_chamber,
     multiple=True,
     metavar="NAME=P",
     help="Pressure in one chamber; without --pressure the others have none. Repeatable.",
@@ -114,7 +71,8 @@ def _volumes(
 @click.option(
     "--volume",
     "volumes",
-    callback=_volumes,
+    type=OfChamber(VOLUME).read,
+    callback=by_chamber,
     multiple=True,
     metavar="NAME=UL",
     help="sofa, scene volume: what a chamber is given above its start. Repeatable.",

@@ -22,6 +22,7 @@ DEEPEST = 8
 """Most parts of a dotted key; a design file needs three."""
 _PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*"""
 _TOO_DEEP = re.compile(rf"(?<![A-Za-z0-9_-])(?:{_PART}){{{DEEPEST}}}")
+_AT_LINE = re.compile(r"\(at line (\d+), column \d+\)")
 
 
 def templates_folder() -> Path:
@@ -79,7 +80,12 @@ def read_toml(path: Path) -> dict[str, Any]:
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
         reason = str(error) or "nested too deeply"
-        raise DesignError(f"{path} is not valid TOML: {reason[:1].lower()}{reason[1:]}") from None
+        # The parser names no key, but its line shows it.
+        number = _AT_LINE.search(reason)
+        line = text.split("\n")[int(number[1]) - 1] if number else text.rstrip().split("\n")[-1]
+        raise DesignError(
+            f"{path} is not valid TOML: {reason[:1].lower()}{reason[1:]}, {shown(line.strip())}"
+        ) from None
 
 
 def override(data: Mapping[str, Any], assignments: Iterable[str]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator
 
-from sbafab.design.units import Length, LengthOrZero, millimetres
+from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
 from sbafab.geometry.beam import Kerf, is_kerf
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
@@ -43,7 +43,7 @@ class Section(BaseModel):
 class TpeFilm(Section):
     product: str = Field(default="Stretchlon 200", max_length=80)
     """What to order."""
-    thickness: Annotated[Length, Field(le=1)] = 0.038
+    thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.038
     """Thickness of the structural film."""
     density: float = Field(default=1122.0, gt=0, le=20000)
     """kg/m3, measured (paper Sec. 3.2.1)."""
@@ -54,7 +54,7 @@ class TpeFilm(Section):
 class PtfeFilm(Section):
     product: str = Field(default="PTFE film", max_length=80)
     """What to order."""
-    thickness: Annotated[Length, Field(le=1)] = 0.025
+    thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.025
     """Thickness of the mask film."""
     density: float = Field(default=2200.0, gt=0, le=20000)
     """kg/m3, handbook value."""
@@ -111,11 +111,11 @@ class Registration(Section):
     paper's). "ears": tooling holes outside the outline, pinned in every press step."""
     pin_diameter: Length = 1.5
     """Dowel pins of the ears."""
-    cutting_error: Annotated[LengthOrZero, Field(le=1)] = 0.1
+    cutting_error: Annotated[float, Millimetres(0, 1)] = 0.1
     """The most by which a cut edge lies off its place (paper Sec. 2)."""
-    pin_error: Annotated[LengthOrZero, Field(le=1)] = 0.004
+    pin_error: Annotated[float, Millimetres(0, 1)] = 0.004
     """The most by which a layer on its pins lies off its place (paper Sec. 2)."""
-    hand_placement: Annotated[LengthOrZero, Field(le=5)] = 0.2
+    hand_placement: Annotated[float, Millimetres(0, 5)] = 0.2
     """The most by which what no pin holds lies off what it is laid on (the paper gives none)."""
     hand_turn: float = Field(default=1.0, ge=0, le=10)
     """Degrees: the most by which what fewer than two pins hold is turned (the paper gives none)."""
@@ -184,15 +184,15 @@ SheetPin = Annotated[tuple[LengthOrZero, LengthOrZero, Length], Field(strict=Fal
 class Sheet(Section):
     """Film to cut from, as it lies on the machine."""
 
-    width: Annotated[Length, Field(le=10000)] = 152.4
+    width: Annotated[float, Millimetres(SHORTEST, 10000)] = 152.4
     """Size along x; the heated area of the paper's press."""
-    length: Annotated[Length, Field(le=10000)] = 152.4
+    length: Annotated[float, Millimetres(SHORTEST, 10000)] = 152.4
     """Size along y; of a roll, the most that is unrolled for one sheet."""
     roll: bool = False
     """Whether it comes off a roll: a sheet then ends where its parts do."""
     border: LengthOrZero = 10.0
     """What is left free along every edge of the sheet."""
-    spacing: Annotated[Length, Field(le=100)] = 1.0
+    spacing: Annotated[float, Millimetres(SHORTEST, 100)] = 1.0
     """Least distance between two parts' cuts, and to pins."""
     pins: tuple[SheetPin, ...] = Field(default=(), max_length=100, strict=False)
     """What holds the sheet down: x, y from its lower left corner, and diameter."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated
+from dataclasses import dataclass
+from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic import GetCoreSchemaHandler, PlainValidator
 
 MILLIMETRES = {
     "um": 0.001,
@@ -45,24 +46,41 @@ def millimetres(value: object) -> float:
     return length
 
 
+@dataclass(frozen=True)
+class Millimetres:
+    """How a length in mm is read, and the range it must lie in.
+
+    To be used as ``Annotated[float, Millimetres(least, most)]``; the JSON schema has the same range
+    for numbers, and texts with a unit.
+    """
+
+    least: float
+    most: float
+
+    def read(self, value: object) -> float:
+        """Raises ValueError with a sentence that says what is allowed."""
+        length = millimetres(value)
+        if length < self.least:
+            raise ValueError(f"must be at least {self.least:g} mm")
+        if length > self.most:
+            raise ValueError(f"must be at most {self.most:g} mm")
+        return length
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> Any:
+        return PlainValidator(self.read).__get_pydantic_core_schema__(source, handler)
+
+    def __get_pydantic_json_schema__(self, schema: object, handler: object) -> dict[str, object]:
+        units = "|".join(MILLIMETRES)
+        sign = r"[-+]?" if self.least < 0 else r"\+?"
+        number = {"type": "number", "minimum": self.least, "maximum": self.most}
+        text = {"type": "string", "pattern": rf"^\s*{sign}{_NUMBER}\s*({units})?\s*$"}
+        return {"anyOf": [number, text]}
+
+
 SHORTEST, LONGEST = 0.001, 1000.0
 
-
-def _json_schema(number: dict[str, float]) -> WithJsonSchema:
-    units = "|".join(MILLIMETRES)
-    text = {"type": "string", "pattern": rf"^\s*\+?{_NUMBER}\s*({units})?\s*$"}
-    return WithJsonSchema({"anyOf": [{"type": "number", **number, "maximum": LONGEST}, text]})
-
-
-Length = Annotated[
-    float,
-    BeforeValidator(millimetres),
-    Field(ge=SHORTEST, le=LONGEST),
-    _json_schema({"minimum": SHORTEST}),
-]
+Length = Annotated[float, Millimetres(SHORTEST, LONGEST)]
 """A length in mm between 1 um and 1 m."""
 
-LengthOrZero = Annotated[
-    float, BeforeValidator(millimetres), Field(ge=0, le=LONGEST), _json_schema({"minimum": 0})
-]
+LengthOrZero = Annotated[float, Millimetres(0, LONGEST)]
 """A length in mm that may be 0."""

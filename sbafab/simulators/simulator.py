@@ -37,13 +37,13 @@ class Wish:
     procedure: str | None = None
     scene: str | None = None
     seconds: float | None = None
-    volumes: Mapping[str, float] | None = None
+    volumes: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def given(self) -> list[str]:
         """Names of the fields that not every simulator knows and that were said."""
         names = ("h", "symmetry", "procedure", "scene", "seconds", "volumes")
-        return [name for name in names if getattr(self, name) is not None]
+        return [name for name in names if getattr(self, name) not in (None, {})]
 
 
 @dataclass(frozen=True)

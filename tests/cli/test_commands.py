@@ -167,3 +167,11 @@ def test_templates_schema_and_new(
     assert code == 0
     code, _, _ = run(["check", "1dof-5mm.toml"], capsys)
     assert code == 0
+
+
+def test_a_sheet_without_room_for_its_label_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    narrow = ["--set", "sheets.tpe.border=1"]
+    _, out, _ = run(["generate", "1dof-5mm", "-o", str(tmp_path), *narrow], capsys)
+    assert " ".join(out.split()).count("the border has no room for labels") == 1

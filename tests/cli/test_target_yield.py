@@ -34,3 +34,10 @@ def test_a_reached_target_passes(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_share_of_one_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert run([*SMALL, "--target-yield", "1"], capsys)[0] == 2
+
+
+def test_an_assembly_has_no_yield_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["check", "brace", "--target-yield", "0.9"])
+    assert ended.value.code == 2
+    assert "check its parts' designs one by one" in capsys.readouterr().err

@@ -22,17 +22,17 @@ def why_not(laminate: Laminate) -> str | None:
 
 def export(laminate: Laminate, wish: Wish, folder: Path) -> None:
     """All the scenes."""
-    write_scenes(laminate, folder, _pressures(laminate, wish), wish.volumes)
+    write_scenes(laminate, folder, _pressures(laminate, wish), wish.volumes or None)
 
 
 def run(laminate: Laminate, wish: Wish, folder: Path, tell: Progress) -> Result:
     """All the scenes; one of them run with runSofa."""
-    if wish.volumes is not None and wish.scene != "volume":
+    if wish.volumes and wish.scene != "volume":
         raise DesignError("--volume is for --scene volume; the other scenes are told pressures")
     pressures = _pressures(laminate, wish)
     seconds = USUAL.seconds if wish.seconds is None else wish.seconds
     scene = cast(Scene, wish.scene or USUAL.scene)
-    job = SofaJob(scene, seconds, 60 * wish.minutes, wish.volumes)
+    job = SofaJob(scene, seconds, 60 * wish.minutes, wish.volumes or None)
     found = simulate(laminate, folder, pressures, job, tell)
     x, y, z = found.last.place
     rows = [] if scene == "volume" else [(name, p, "kPa") for name, p in pressures.items()]

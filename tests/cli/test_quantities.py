@@ -1,0 +1,51 @@
+"""Pressures, volumes and flows on the command line."""
+
+from __future__ import annotations
+
+import click
+import pytest
+
+from sbafab.cli.quantities import FLOW, PRESSURE, VOLUME, OfChamber, Quantity, by_chamber
+
+OPTION = click.Option(["--volume"], multiple=True)
+CONTEXT = click.Context(click.Command("any"))
+
+
+@pytest.mark.parametrize(
+    ("quantity", "written", "value"),
+    [
+        (PRESSURE, "6", 6),
+        (PRESSURE, " 60 mbar ", 6),
+        (PRESSURE, "1psi", 6.894757),
+        (PRESSURE, ".5 bar", 50),
+        (VOLUME, "5ul", 5),
+        (VOLUME, "5e-3 ml", 5),
+        (FLOW, "35", 35),
+        (FLOW, "0.5 ml/s", 30),
+        (FLOW, "0.035 l/min", 35),
+    ],
+)
+def test_units(quantity: Quantity, written: str, value: float) -> None:
+    assert quantity.read(written) == pytest.approx(value)
+
+
+@pytest.mark.parametrize("written", ["", "kPa", "6 kpa", "6 7", "nan", "inf", "1_0", "6 kPa x"])
+def test_anything_else_is_refused_with_the_units(written: str) -> None:
+    with pytest.raises(click.BadParameter, match="the units are kPa, Pa, MPa, mbar, bar, psi"):
+        PRESSURE.read(written)
+
+
+def test_too_large_a_number_is_refused() -> None:
+    with pytest.raises(click.BadParameter, match="finite"):
+        VOLUME.read("1e999")
+
+
+def test_chambers() -> None:
+    assert OfChamber(VOLUME).read("chamber1 = 5 ul") == ("chamber1", 5)
+    assert OfChamber(VOLUME, all_chambers=True).read("5ul") == ("", 5)
+    for written in ("5ul", "=5ul"):
+        with pytest.raises(click.BadParameter, match="chamber1=5"):
+            OfChamber(VOLUME).read(written)
+    assert by_chamber(CONTEXT, OPTION, (("a", 1.0), ("b", 2.0))) == {"a": 1.0, "b": 2.0}
+    with pytest.raises(click.BadParameter, match="more than once"):
+        by_chamber(CONTEXT, OPTION, (("a", 1.0), ("a", 2.0)))
