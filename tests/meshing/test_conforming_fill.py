@@ -12,7 +12,6 @@ from sbafab.errors import DesignError
 from sbafab.geometry.shapes import disc
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.meshes import conforming_meshes
-from sbafab.meshing.conforming.pockets import largest_fill
 from sbafab.meshing.conforming.settings import MeshSettings
 
 AXIS = (0.0, 0.0)
@@ -22,11 +21,6 @@ FILM = 0.038
 @pytest.fixture(scope="module")
 def one_balloon() -> Laminate:
     return build("1dof-5mm", "stack.balloons=1")
-
-
-def test_the_largest_fill_is_the_paraboloid_pair_of_constant_length() -> None:
-    assert largest_fill(2.5) == pytest.approx(16.95, abs=0.005)
-    assert largest_fill(5.0) == pytest.approx(8 * largest_fill(2.5), rel=1e-9)
 
 
 def test_a_balloon_rises_as_the_paraboloid(one_balloon: Laminate) -> None:

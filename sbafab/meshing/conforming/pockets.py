@@ -14,6 +14,7 @@ from sbafab.geometry.edges import Arc, Point
 from sbafab.laminate.interfaces import Interface
 from sbafab.meshing.conforming.layup import Layup
 from sbafab.meshing.conforming.poisson import Lift, lift
+from sbafab.models.parabola import fullest
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -143,17 +144,17 @@ def _largest(
 ) -> float:
     """Most air in ul that a balloon can hold, of which ``share`` is meshed.
 
-    A round pocket's is that of :func:`largest_fill`; any other holds as much more than the disc
-    in it as the even lift of equal height does.
+    A round pocket's is that of two paraboloids whose meridian keeps its length (paper Eqs. 1 to
+    3); any other holds as much more than the disc in it as the even lift of equal height does.
     """
     radius = _round_radius(interface, places[0])
     if radius is not None:
-        return largest_fill(radius)
+        return 2 * fullest(radius).volume
     offsets = stack.plane.points[held][:, None] - np.array(places)
     half = float(np.linalg.norm(offsets, axis=2).min())
     disc = math.pi * half**2 / 2
     wider = float(even.volumes[0] / even.shapes[0].max()) / disc
-    return largest_fill(half) * wider / len(places) / share
+    return 2 * fullest(half).volume * wider / len(places) / share
 
 
 def _round_radius(interface: Interface, centre: Point) -> float | None:
@@ -165,23 +166,3 @@ def _round_radius(interface: Interface, centre: Point) -> float | None:
                 radius = round(edge.radius, 6)
                 turns[radius] = turns.get(radius, 0.0) + abs(edge.sweep)
     return next((radius for radius, turn in sorted(turns.items()) if turn > math.pi), None)
-
-
-def largest_fill(half: float) -> float:
-    """Most air in ul between two paraboloids over a disc of radius ``half`` mm, films unstretched.
-
-    The meridian keeps its length while the edge is drawn in (paper Eqs. 1 to 3).
-    """
-
-    def volume(slope: float) -> float:
-        radius = 2 * half / (math.sqrt(1 + slope**2) + math.asinh(slope) / slope)
-        return math.pi * radius**3 * slope / 2
-
-    low, high = 0.1, 10.0
-    for _ in range(80):
-        third = (high - low) / 3
-        if volume(low + third) < volume(high - third):
-            low += third
-        else:
-            high -= third
-    return volume((low + high) / 2)
