@@ -80,8 +80,10 @@ def predict(
     """
     from sbafab.actuators import load_design
     from sbafab.cli.printing import print_json, shown_progress
+    from sbafab.errors import OutputError
     from sbafab.models.figures import Asked, Calibration
     from sbafab.models.prediction import predict as predicted
+    from sbafab.output.earlier import PREDICTION
     from sbafab.output.predicting import prediction_json, with_prediction
     from sbafab.output.run import Extras, generate
 
@@ -89,8 +91,14 @@ def predict(
     wish = Asked(pressures or Asked.pressures_kpa, flow, volumes, Calibration(**factors))
     found = predicted(design, wish)
     with shown_progress(request.as_json) as tell:
-        extras = Extras(also=with_prediction(design, found))
-        run = generate(design, request.out, (), tell, extras=extras)
+        extras = Extras(also=with_prediction(design, found), own=PREDICTION)
+        try:
+            run = generate(design, request.out, (), tell, extras=extras)
+        except OutputError:
+            # What was asked is known, only not written.
+            if not request.as_json:
+                _print(found)
+            raise
     failed = sorted({finding.rule for finding in run.findings if finding.verdict == "fail"})
     if request.as_json:
         print_json({**prediction_json(design, found), "failed": failed, "folder": str(run.folder)})

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 
 DECKS = ("calculix/actuator.inp", "sofa/actuator.scn", "mujoco/actuator.xml")
 """What a simulator opens."""
+LEFT_AS_IT_WAS = (
+    "is left as it was: what lies there is of an earlier design or version, not of this one; with "
+    "--set name=NAME this one gets its findings and pictures into a folder of its own"
+)
 COLOURS = {"pass": "green", "fail": "bold red", "waived": "yellow", "warn": "yellow"}
 
 
@@ -89,13 +93,14 @@ def print_run(run: Run) -> None:
     from rich.text import Text
 
     out = console()
-    made = Table(box=None, pad_edge=False, show_header=False)
-    made.add_column(no_wrap=True, style="bold")
-    made.add_column(ratio=1)
-    for label, text in _made(run):
-        made.add_row(label, Text(text))
-    out.print(made)
-    out.print()
+    if not run.kept:
+        made = Table(box=None, pad_edge=False, show_header=False)
+        made.add_column(no_wrap=True, style="bold")
+        made.add_column(ratio=1)
+        for label, text in _made(run):
+            made.add_row(label, Text(text))
+        out.print(made)
+        out.print()
     out.print(findings_table(run.findings))
     if run.failed:
         failed = sorted({f.rule for f in run.findings if f.verdict == "fail"})
@@ -108,6 +113,8 @@ def print_run(run: Run) -> None:
             ),
             soft_wrap=True,
         )
+        if run.kept:
+            out.print(Text(f"{run.folder} {LEFT_AS_IT_WAS}"), soft_wrap=True)
 
 
 def print_job(job: Job) -> None:
@@ -128,6 +135,8 @@ def print_job(job: Job) -> None:
     for film in job.manifest.get("films", ()):
         sheets = film_said(film, job.manifest["sheets"], 1)
         made.add_row(f"{film['material']} film", Text(sheets))
+    for label, text in replaced(job.dropped):
+        made.add_row(label, Text(text))
     if not job.failed:
         made.add_row("folder", Text(str(job.folder)))
     out.print(made)
@@ -176,12 +185,7 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
         f"{len(lam.layers)} in {len(lam.patterns)} patterns: "
         + ", ".join(f"{count} {kind}" for kind, count in counts.items()),
     )
-    if run.dropped:
-        yield (
-            "replaced",
-            f"{len(run.dropped)} files of an earlier run with other settings are gone; "
-            "--set name=NAME gives a design a folder of its own",
-        )
+    yield from replaced(run.dropped)
     cut = [layer["file"] for layer in index["layers"] if layer["file"]]
     if cut:
         plate = f", and the pin plate {index['fixture']}" if index["fixture"] else ""
@@ -207,6 +211,18 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
     for warning in run.schedule.warnings if run.schedule is not None else ():
         yield "warning", warning
     yield "folder", str(run.folder)
+
+
+def replaced(dropped: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """The row on what went with an earlier run, if there was any."""
+    if dropped:
+        count = "1 file" if len(dropped) == 1 else f"{len(dropped)} files"
+        names = ", ".join(dict.fromkeys(path.partition("/")[0] for path in dropped))
+        yield (
+            "replaced",
+            f"of an earlier run with other settings {count} went ({names}); "
+            "--set name=NAME gives a design a folder of its own",
+        )
 
 
 def _for_simulation(run: Run) -> Iterator[tuple[str, str]]:
@@ -250,5 +266,5 @@ def run_json(run: Run) -> dict[str, object]:
         "folder": str(run.folder),
         "failed": run.failed,
         "findings": [finding.as_dict() for finding in run.findings],
-        "files": sorted(run.manifest["files"]),
+        "files": [] if run.kept else sorted(run.manifest["files"]),
     }

@@ -4,18 +4,46 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sbafab.cli.printing import console, film_said, findings_table
+from sbafab.cli.printing import LEFT_AS_IT_WAS, console, film_said, findings_table, replaced
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from sbafab.output.assembly import AssemblyRun
 
 
 def print_assembly(run: AssemblyRun) -> None:
     """What was made of an assembly, what the rules found, and the checks between its parts."""
-    from rich.table import Table
     from rich.text import Text
 
     out = console()
+    if not run.kept:
+        out.print(_made(run))
+        out.print()
+    for one in run.checked.designs:
+        if one.failed:
+            out.print(Text(one.design.name, style="bold red"))
+            out.print(findings_table(one.findings))
+    out.print(findings_table(run.checked.between))
+    if run.failed:
+        failed = sorted({f.rule for f in run.findings if f.verdict == "fail"})
+        out.print()
+        out.print(
+            Text(
+                f"No cut files were written: {', '.join(failed)} failed. Change the assembly, or "
+                f"waive by name: {' '.join(f'--waive {name}' for name in failed)}",
+                style="bold red",
+            ),
+            soft_wrap=True,
+        )
+        if run.kept:
+            out.print(Text(f"{run.folder} {LEFT_AS_IT_WAS}"), soft_wrap=True)
+
+
+def _made(run: AssemblyRun) -> Table:
+    from rich.table import Table
+    from rich.text import Text
+
     made = Table(box=None, pad_edge=False, show_header=False)
     made.add_column(no_wrap=True, style="bold")
     made.add_column(ratio=1)
@@ -34,25 +62,10 @@ def print_assembly(run: AssemblyRun) -> None:
         made.add_row(f"{film['material']} film", Text(film_said(film, index["sheets"], 1)))
     for mesh in index["meshes"]:
         made.add_row("solid", Text(f"{mesh['file']}, a node a part"))
+    for label, text in replaced(run.dropped):
+        made.add_row(label, Text(text))
     made.add_row("folder", Text(str(run.folder)))
-    out.print(made)
-    out.print()
-    for one in run.checked.designs:
-        if one.failed:
-            out.print(Text(one.design.name, style="bold red"))
-            out.print(findings_table(one.findings))
-    out.print(findings_table(run.checked.between))
-    if run.failed:
-        failed = sorted({f.rule for f in run.findings if f.verdict == "fail"})
-        out.print()
-        out.print(
-            Text(
-                f"No cut files were written: {', '.join(failed)} failed. Change the assembly, or "
-                f"waive by name: {' '.join(f'--waive {name}' for name in failed)}",
-                style="bold red",
-            ),
-            soft_wrap=True,
-        )
+    return made
 
 
 def assembly_json(run: AssemblyRun) -> dict[str, object]:
@@ -61,5 +74,5 @@ def assembly_json(run: AssemblyRun) -> dict[str, object]:
         "folder": str(run.folder),
         "failed": run.failed,
         "findings": [finding.as_dict() for finding in run.findings],
-        "files": sorted(run.manifest["files"]),
+        "files": [] if run.kept else sorted(run.manifest["files"]),
     }

@@ -87,9 +87,10 @@ def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> N
     """
     from sbafab.actuators import load_design
     from sbafab.cli.printing import console, findings_table, print_json, shown_progress
-    from sbafab.output.manifest import as_json, checks
+    from sbafab.output.contents import Checked
+    from sbafab.output.earlier import refuse_to_put_away
+    from sbafab.output.manifest import as_json, checks, identity
     from sbafab.output.run import Extras, check, generate, with_folder
-    from sbafab.rules.deck import has_failed
     from sbafab.simulators.simulator import Result, Wish
     from sbafab.simulators.simulator import simulator as find
 
@@ -97,23 +98,28 @@ def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> N
     _refuse_unused(simulator, wish)
     design = load_design(request.designs[0], request.assignments, request.waivers)
     with shown_progress(request.as_json) as tell, tempfile.TemporaryDirectory() as place:
-        laminate, findings = check(design, tell)
-        if has_failed(findings):
+        checked = Checked(design, *check(design, tell))
+        if checked.failed:
             if request.as_json:
-                print_json(checks(findings, "design"))
+                print_json(checks(checked.findings, "design"))
             else:
-                console().print(findings_table(findings))
+                console().print(findings_table(checked.findings))
             click.get_current_context().exit(RULE_FAILED)
+        # Said before a run of hours, not after it.
+        refuse_to_put_away(
+            request.out / design.name, identity(design, checked.waived), (simulator,)
+        )
         # A folder in the temporary one has the usual rights, the temporary one itself has not.
         folder = Path(place) / simulator
         if export:
-            find(simulator).export(laminate, wish, folder)
+            find(simulator).export(checked.laminate, wish, folder)
             found = Result((), {})
         else:
-            found = find(simulator).run(laminate, wish, folder, tell)
+            found = find(simulator).run(checked.laminate, wish, folder, tell)
             told = as_json({**found.figures, "stopped": found.stopped})
             (folder / "result.json").write_text(told, encoding="utf-8", newline="\n")
-        run = generate(design, request.out, (), tell, extras=Extras(also=with_folder(folder)))
+        extras = Extras(also=with_folder(folder), own=(simulator,))
+        run = generate(design, request.out, (), tell, extras=extras)
     target = run.folder / simulator
     if request.as_json:
         print_json({"folder": str(target), **found.figures, "stopped": found.stopped})

@@ -36,10 +36,11 @@ from sbafab.output.contents import (
     write_contents,
     write_text,
 )
+from sbafab.output.earlier import no_longer, puts_away
 from sbafab.output.manifest import as_json, checks
 from sbafab.output.settings import GENERATOR, kerf_widths, limits
 from sbafab.output.shop import Progress
-from sbafab.output.swap import ASSEMBLY_SCHEMA, replaced_folder
+from sbafab.output.swap import ASSEMBLY_SCHEMA, listed_files, replaced_folder
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding
 
@@ -84,6 +85,10 @@ class AssemblyRun:
     checked: CheckedAssembly
     folder: Path
     manifest: dict[str, Any]
+    dropped: tuple[str, ...] = ()
+    """Files of an earlier run in the folder that this one put away."""
+    kept: bool = False
+    """Whether something failed and ``folder`` was left to an earlier run that is worth more."""
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -120,18 +125,22 @@ def generate_assembly(
 ) -> AssemblyRun:
     """Writes ``out/<name>/``: a folder for each design, shared film sheets, one traveller.
 
-    Where a rule or a check between parts fails, findings and pictures are written, and nothing to
-    cut. Raises DesignError or OutputError; the old folder is then whole.
+    Where a rule or a check between parts fails, findings and pictures are written, and nothing
+    to cut; an earlier run with more than that stays as it is (``AssemblyRun.kept``). Raises
+    DesignError or OutputError; the old folder is then whole.
     """
     tell = progress or (lambda what, done, total: None)
     checked = check_assembly(assembly, tell)
     target = out / assembly.name
     batch = None
+    if checked.failed and puts_away(target, None):
+        return AssemblyRun(checked, target, {}, kept=True)
     if not checked.failed:
         drawing = Drawing(dxf_profile, chord_error)
         batch = plan_batch(
             checked.designs, assembly.name, target, drawing, tell, waived=checked.waived
         )
+    listed = listed_files(target)
     with replaced_folder(target) as folder:
         written = None
         if batch is not None:
@@ -140,7 +149,7 @@ def generate_assembly(
             _write_uncut(checked, folder, tell)
         index = _write_whole(checked, batch, written, folder, tell)
         close_folder(folder, index)
-    return AssemblyRun(checked, target, index)
+    return AssemblyRun(checked, target, index, no_longer(listed, index))
 
 
 def _write_uncut(checked: CheckedAssembly, folder: Path, tell: Progress) -> None:

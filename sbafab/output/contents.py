@@ -14,14 +14,12 @@ from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256, design_toml, outline_file
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.files import MeshFile, write_meshes
-from sbafab.output.manifest import as_json, carried_over, checks, file_hashes, manifest
+from sbafab.output.manifest import as_json, checks, file_hashes, manifest
 from sbafab.output.settings import GENERATOR, kerf_widths, press_settings
 from sbafab.output.shop import CutSet, Progress
-from sbafab.output.swap import read_manifest
 from sbafab.pressing.schedule import Schedule, press_csv, press_json, schedule
 from sbafab.rules.deck import has_failed
 from sbafab.rules.finding import Finding
-from sbafab.simulators.simulator import NAMES as SIMULATORS
 
 if TYPE_CHECKING:
     from sbafab.meshing.conforming.meshes import ConformingMeshes
@@ -189,42 +187,3 @@ def _write_design(design: Design, folder: Path) -> None:
         chamber = design.chamber.model_copy(update={"outline": name})  # type: ignore[attr-defined]
         design = design.model_copy(update={"chamber": chamber})
     write_text(folder / "design.toml", design_toml(design))
-
-
-def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
-    """Keeps files of the old run that this one did not make, if they are of the same design."""
-    old = read_manifest(old_folder)
-    if old is None or not carried_over(old, index):
-        return
-    made = file_hashes(folder)
-    files = old.get("files")
-    kept = file_hashes(old_folder)
-    carried: set[str] = set()
-    # Results belong to the input beside them: such a folder is kept whole or not at all.
-    anew = {name for name in SIMULATORS if (folder / name).exists()}
-    for path, digest in (files if isinstance(files, dict) else {}).items():
-        if path not in made and kept.get(path) == digest and path.partition("/")[0] not in anew:
-            target = folder / path
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(old_folder / path, target)
-            carried.add(path)
-    layers, meshes, plate = old.get("layers"), old.get("meshes"), old.get("fixture")
-    if _are_files(layers, carried):
-        index["layers"] = layers
-        index["fixture"] = plate if plate in carried else None
-        if _are_files(old.get("sheets"), carried):
-            index["sheets"], index["films"] = old["sheets"], old.get("films")
-    if isinstance(meshes, list):
-        kept_meshes = [mesh for mesh in meshes if _are_files([mesh], carried)]
-        index["meshes"] += kept_meshes
-        if any(mesh.get("kind") == "volume" for mesh in kept_meshes):
-            index["mesh_statistics"] = old.get("mesh_statistics", {})
-
-
-def _are_files(entries: object, carried: set[str]) -> bool:
-    """Whether manifest entries name files that were all carried over."""
-    return (
-        isinstance(entries, list)
-        and bool(entries)
-        and all(isinstance(entry, dict) and entry.get("file") in carried for entry in entries)
-    )

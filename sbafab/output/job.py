@@ -13,9 +13,10 @@ from sbafab.design.records import NAME_PATTERN, Design
 from sbafab.errors import DesignError
 from sbafab.output.batch import Drawing, batch_manifest, plan_batch, refuse_unlike, write_batch
 from sbafab.output.contents import Checked, Part, close_folder
+from sbafab.output.earlier import no_longer
 from sbafab.output.run import check
 from sbafab.output.shop import Progress
-from sbafab.output.swap import JOB_SCHEMA, replaced_folder
+from sbafab.output.swap import JOB_SCHEMA, listed_files, replaced_folder
 
 PARTS: tuple[Part, ...] = ("press", "mesh", "preview")
 
@@ -27,6 +28,8 @@ class Job:
     checked: tuple[Checked, ...]
     folder: Path
     manifest: dict[str, Any]
+    dropped: tuple[str, ...] = ()
+    """Files of an earlier run in the folder that this one put away."""
 
     @property
     def failed(self) -> bool:
@@ -55,11 +58,12 @@ def generate_job(
     if any(one.failed for one in checked):
         return Job(checked, target, {})
     batch = plan_batch(checked, name, target, Drawing(dxf_profile, chord_error), tell)
+    listed = listed_files(target)
     with replaced_folder(target) as folder:
         written = write_batch(batch, folder, PARTS, True, tell)
         index = batch_manifest(JOB_SCHEMA, name, checked, batch, written.sheets)
         close_folder(folder, index)
-    return Job(checked, target, index)
+    return Job(checked, target, index, no_longer(listed, index))
 
 
 def _refuse_names(names: Sequence[str], name: str) -> None:

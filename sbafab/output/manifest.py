@@ -196,6 +196,12 @@ def file_hashes(folder: Path) -> dict[str, str]:
     }
 
 
+def identity(design: Design, waived: Sequence[str]) -> dict[str, Any]:
+    """What a manifest says of the design and version that its files are of."""
+    sha256 = design_sha256(design)
+    return {"design_sha256": sha256, "generator": GENERATOR, "waived": list(waived)}
+
+
 def carried_over(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
     """Whether files of the old run still belong to the new one's design and version."""
     return all(old.get(key) == new.get(key) for key in ("design_sha256", "generator", "waived"))

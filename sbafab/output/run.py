@@ -20,11 +20,20 @@ from sbafab.output.contents import (
     Conforming,
     Made,
     Part,
-    carry_over,
     close_folder,
     schedule_of,
     write_contents,
 )
+from sbafab.output.earlier import (
+    CUT,
+    MESH,
+    PRESS,
+    carry_over,
+    no_longer,
+    puts_away,
+    refuse_to_put_away,
+)
+from sbafab.output.manifest import identity
 from sbafab.output.settings import cut_settings, limits
 from sbafab.output.shop import (
     CutSet,
@@ -45,17 +54,20 @@ if TYPE_CHECKING:
 Also = Callable[[Laminate, Path], None]
 """Writes something of its own for a laminate into the folder of a run."""
 EVERYTHING: tuple[Part, ...] = ("cut", "press", "mesh", "preview")
+OWN: dict[Part, tuple[str, ...]] = {"cut": CUT, "press": PRESS, "mesh": MESH, "preview": ()}
+"""What of an earlier run is made anew with a part."""
 
 
 class Extras(NamedTuple):
     """What a run may be asked for beside its parts.
 
-    ``conforming``: volume and shell meshes, which take the extra "mesh"; ``also`` writes what it
-    likes into the folder of a design that holds.
+    ``conforming``: volume and shell meshes, which take the extra "mesh"; ``also`` writes files and
+    folders with the names ``own`` into the folder of a design that holds.
     """
 
     conforming: Conforming | None = None
     also: Also | None = None
+    own: tuple[str, ...] = ()
 
 
 NONE = Extras()
@@ -74,6 +86,8 @@ class Run:
     conforming: ConformingMeshes | None = None
     dropped: tuple[str, ...] = ()
     """Files of an older run of another design or version that this one put away."""
+    kept: bool = False
+    """Whether the design fails and ``folder`` was left to an older run of another one."""
 
     @property
     def failed(self) -> bool:
@@ -102,17 +116,25 @@ def generate(
     """Writes ``out/<design name>/`` and returns what was made.
 
     A design that breaks a rule gets its findings and pictures, but no cut files, schedule or
-    meshes. With some of the ``parts`` only, the others stay if they are of the same design.
-    Raises DesignError or OutputError; the old folder is then whole.
+    meshes; where another design's lie, it gets nothing and they stay (``Run.kept``). With some of
+    the ``parts`` only, the others stay if they are of the same design.
+    Raises DesignError or OutputError, also where other parts are another design's; the old folder
+    is then whole.
     """
     tell = progress or (lambda what, done, total: None)
     checked = Checked(design, *check(design, tell))
     wanted = set(parts)
+    target = out / design.name
     if checked.failed:
+        kept = puts_away(target, identity(design, checked.waived))
+        if kept:
+            return Run(design, checked.laminate, checked.findings, target, {}, None, kept=True)
         wanted &= {"preview"}
+    elif wanted < set(EVERYTHING):
+        own = [name for part in wanted for name in OWN[part]]
+        refuse_to_put_away(target, identity(design, checked.waived), (*own, *extras.own))
     # Schedule, nest and meshes are made before anything is written: they may refuse the design.
     pressing = schedule_of(checked) if "press" in wanted else None
-    target = out / design.name
     settings = cut_settings(design, checked.waived, dxf_profile, chord_error)
     plan = plan_cuts(checked.laminate, design.order.copies, settings) if "cut" in wanted else None
     nests = find_nests(plan.parts, design, target, tell) if plan is not None else ()
@@ -132,7 +154,7 @@ def generate(
                 extras.also(checked.laminate, folder)
             carry_over(target, folder, index)
         close_folder(folder, index)
-    dropped = tuple(path for path in listed if path not in index["files"])
+    dropped = no_longer(listed, index)
     return Run(design, checked.laminate, checked.findings, target, index, pressing, meshes, dropped)
 
 

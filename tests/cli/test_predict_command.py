@@ -64,9 +64,13 @@ def test_twice_the_same_bytes_and_a_later_run_keeps_them(
     assert a == b
     kept = generate(sbafab.load("1dof-5mm"), tmp_path / "a", ("press",))
     assert {"predict.json", "predict/force.svg", "press.json"} <= set(kept.manifest["files"])
-    other = sbafab.load("1dof-5mm", "stack.balloons=3")
-    dropped = generate(other, tmp_path / "a", ("press",))
-    assert "predict.json" not in dropped.manifest["files"]
+    code, out, err = run(
+        ["1dof-5mm", "-o", str(tmp_path / "a"), "--set", "stack.balloons=3"], capsys
+    )
+    assert code == 2
+    assert "full stroke" in out
+    assert "press.json" in err
+    assert "predict.json" not in err
 
 
 def test_failing_design_is_predicted_but_not_written(

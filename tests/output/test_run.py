@@ -77,12 +77,6 @@ def test_a_failing_design_writes_no_cut_files(tmp_path: Path) -> None:
     assert "fail" in {finding["verdict"] for finding in findings}
 
 
-def test_a_failing_run_leaves_no_older_cut_files(tmp_path: Path) -> None:
-    generate(load_design("1dof-5mm"), tmp_path)
-    run = generate(load_design("1dof-5mm", ["bond.width=0.72"]), tmp_path)
-    assert not (run.folder / "layers").exists()
-
-
 def test_waivers_stand_in_every_file(tmp_path: Path) -> None:
     waive = 'rules.waive=["bond-width", "tube-fit"]'
     run = generate(load_design("1dof-5mm", ["bond.width=0.72", waive]), tmp_path)
@@ -107,20 +101,6 @@ def test_parts_keep_what_is_of_the_same_design(tmp_path: Path) -> None:
     before = hashes(whole.folder)
     generate(load_design("1dof-5mm"), tmp_path, ["press"])
     assert hashes(whole.folder) == before
-    generate(load_design("1dof-5mm", ["bond.width=0.8"]), tmp_path, ["press"])
-    assert not (whole.folder / "layers").exists()
-
-
-def test_a_run_of_another_design_says_what_it_put_away(tmp_path: Path) -> None:
-    first = generate(load_design("1dof-5mm", ("stack.balloons=1",)), tmp_path)
-    assert first.dropped == ()
-    assert (
-        generate(load_design("1dof-5mm", ("stack.balloons=1",)), tmp_path, ("press",)).dropped == ()
-    )
-    other = load_design("1dof-5mm", ("stack.balloons=1", "press.temperature_c=140"))
-    dropped = generate(other, tmp_path, ("press",)).dropped
-    assert "traveller.html" in dropped
-    assert "press.json" not in dropped
 
 
 def test_a_run_that_dies_half_way_leaves_the_old_output(

@@ -1,0 +1,105 @@
+"""The earlier run that lies where a new one is to be written: what of it stays, and when."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from sbafab.errors import OutputError
+from sbafab.output.manifest import carried_over, file_hashes
+from sbafab.output.swap import listed_files, read_manifest
+from sbafab.simulators.simulator import NAMES as SIMULATORS
+
+CUT = ("layers", "sheets", "traveller.html")
+PRESS = ("press.json", "press.csv")
+MESH = ("mesh",)
+PREDICTION = ("predict", "predict.json")
+RESULTS = "result.json"
+"""Of a simulator's folder: what a run has found, not only what the simulator reads."""
+WORTH_KEEPING = {*CUT, *PRESS, *MESH, *PREDICTION, *SIMULATORS}
+"""Files and folders that a design which breaks a rule does not get."""
+
+
+def puts_away(target: Path, mine: Mapping[str, Any] | None, own: Collection[str] = ()) -> list[str]:
+    """Files worth keeping of another design's run in ``target`` that a new run would lose.
+
+    ``mine`` says in a manifest's words which design and version the new run is of; ``own`` are the
+    files and folders that it writes itself.
+    """
+    old = read_manifest(target)
+    if old is None or (mine is not None and carried_over(old, mine)):
+        return []
+    worth = WORTH_KEEPING - set(own)
+    return [path for path in listed_files(target) if worth & set(path.split("/"))]
+
+
+def no_longer(listed: Sequence[str], index: Mapping[str, Any]) -> tuple[str, ...]:
+    """What an earlier run listed in ``swap.listed_files`` and the new run's manifest does not."""
+    return tuple(path for path in listed if path not in index["files"])
+
+
+def refuse_to_put_away(target: Path, mine: Mapping[str, Any], own: Collection[str]) -> None:
+    """Raises OutputError where a run that writes ``own`` would lose another design's files."""
+    lost = puts_away(target, mine, own)
+    if lost:
+        names = dict.fromkeys(path.partition("/")[0] for path in lost)
+        raise OutputError(
+            f"{target} holds {', '.join(names)} of a run with other settings or of another "
+            "version of sbafab; give this one a folder of its own with --set name=NAME or -o, or "
+            "run sbafab generate on it first, which replaces all that is there"
+        )
+
+
+def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
+    """Keeps files of the old run that this one did not make, if they are of the same design.
+
+    Raises OutputError where results of a simulator would be lost to input of other settings.
+    """
+    old = read_manifest(old_folder)
+    if old is None or not carried_over(old, index):
+        return
+    made = file_hashes(folder)
+    files = old.get("files")
+    kept = file_hashes(old_folder)
+    carried: set[str] = set()
+    # Results belong to the input beside them: with other input they go, whole.
+    anew = {name for name in SIMULATORS if _differs(name, made, kept)}
+    for name in anew:
+        if f"{name}/{RESULTS}" in kept and f"{name}/{RESULTS}" not in made:
+            raise OutputError(
+                f"{old_folder / name} holds results of other settings than these; choose another "
+                "folder with -o, or remove that one"
+            )
+    for path, digest in (files if isinstance(files, dict) else {}).items():
+        if path not in made and kept.get(path) == digest and path.partition("/")[0] not in anew:
+            target = folder / path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(old_folder / path, target)
+            carried.add(path)
+    layers, meshes, plate = old.get("layers"), old.get("meshes"), old.get("fixture")
+    if _are_files(layers, carried):
+        index["layers"] = layers
+        index["fixture"] = plate if plate in carried else None
+        if _are_files(old.get("sheets"), carried):
+            index["sheets"], index["films"] = old["sheets"], old.get("films")
+    if isinstance(meshes, list):
+        kept_meshes = [mesh for mesh in meshes if _are_files([mesh], carried)]
+        index["meshes"] += kept_meshes
+        if any(mesh.get("kind") == "volume" for mesh in kept_meshes):
+            index["mesh_statistics"] = old.get("mesh_statistics", {})
+
+
+def _differs(name: str, made: Mapping[str, str], kept: Mapping[str, str]) -> bool:
+    """Whether a new run wrote a folder ``name`` with other files in it than the old run's."""
+    return any(kept.get(path) != made[path] for path in made if path.startswith(f"{name}/"))
+
+
+def _are_files(entries: object, carried: set[str]) -> bool:
+    """Whether manifest entries name files that were all carried over."""
+    return (
+        isinstance(entries, list)
+        and bool(entries)
+        and all(isinstance(entry, dict) and entry.get("file") in carried for entry in entries)
+    )

@@ -1,0 +1,100 @@
+"""What of an earlier run in the same folder stays, and what goes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from sbafab.actuators import load_design
+from sbafab.assemblies.reading import load
+from sbafab.assemblies.records import Assembly
+from sbafab.errors import OutputError
+from sbafab.laminate.laminate import Laminate
+from sbafab.output.assembly import generate_assembly
+from sbafab.output.contents import Part
+from sbafab.output.manifest import file_hashes
+from sbafab.output.run import Extras, generate
+
+SMALL = ("stack.balloons=1",)
+OTHER = (*SMALL, "press.temperature_c=140")
+WRONG = (*SMALL, "bond.width=0.72")
+
+
+def results(found: str, mesh: str = "mesh") -> Extras:
+    """As a simulator leaves them; with nothing found, as an export does."""
+
+    def put(_: Laminate, folder: Path) -> None:
+        own = folder / "calculix"
+        own.mkdir()
+        (own / "mesh.inp").write_text(mesh)
+        if found:
+            (own / "result.json").write_text(found)
+
+    return Extras(also=put, own=("calculix",))
+
+
+def test_a_failing_design_leaves_another_ones_run_as_it_was(tmp_path: Path) -> None:
+    good = generate(load_design("1dof-5mm", SMALL), tmp_path)
+    before = file_hashes(good.folder)
+    run = generate(load_design("1dof-5mm", WRONG), tmp_path)
+    assert run.failed
+    assert run.kept
+    assert file_hashes(good.folder) == before
+
+
+def test_a_failing_design_takes_the_place_of_a_failed_one(tmp_path: Path) -> None:
+    generate(load_design("1dof-5mm", WRONG), tmp_path)
+    run = generate(load_design("1dof-5mm", (*SMALL, "bond.width=0.71")), tmp_path)
+    assert run.failed
+    assert not run.kept
+    assert "0.71" in (run.folder / "design.toml").read_text()
+    assert {"checks.json", "preview/layers.svg"} <= set(run.manifest["files"])
+
+
+@pytest.mark.parametrize("part", ["cut", "press", "mesh", "preview"])
+def test_a_part_alone_does_not_put_away_another_designs_files(part: Part, tmp_path: Path) -> None:
+    good = generate(load_design("1dof-5mm", SMALL), tmp_path)
+    before = file_hashes(good.folder)
+    with pytest.raises(OutputError, match="--set name=NAME"):
+        generate(load_design("1dof-5mm", OTHER), tmp_path, (part,))
+    assert file_hashes(good.folder) == before
+
+
+def test_a_part_made_anew_for_another_design_takes_the_old_ones_place(tmp_path: Path) -> None:
+    generate(load_design("1dof-5mm", SMALL), tmp_path, ("press",))
+    run = generate(load_design("1dof-5mm", OTHER), tmp_path, ("press",))
+    assert "140" in (run.folder / "press.json").read_text()
+
+
+def test_a_whole_run_of_another_design_says_what_it_put_away(tmp_path: Path) -> None:
+    generate(load_design("1dof-5mm", SMALL), tmp_path, (), extras=results("1.6"))
+    run = generate(load_design("1dof-5mm", OTHER), tmp_path)
+    assert run.dropped == ("calculix/mesh.inp", "calculix/result.json")
+
+
+def test_results_stay_while_what_they_come_from_is_the_same(tmp_path: Path) -> None:
+    design = load_design("1dof-5mm", SMALL)
+    ran = generate(design, tmp_path, (), extras=results("1.6"))
+    before = file_hashes(ran.folder)
+    assert generate(design, tmp_path, (), extras=results("")).dropped == ()
+    assert file_hashes(ran.folder) == before
+    with pytest.raises(OutputError, match="holds results of other settings"):
+        generate(design, tmp_path, (), extras=results("", mesh="finer"))
+    assert file_hashes(ran.folder) == before
+    again = generate(design, tmp_path, (), extras=results("1.7", mesh="finer"))
+    assert (again.folder / "calculix" / "result.json").read_text() == "1.7"
+
+
+def test_a_failing_assembly_leaves_an_earlier_run_as_it_was(tmp_path: Path) -> None:
+    def brace(*assignments: str) -> Assembly:
+        found = load("brace", ("parts.arm.set.stack.balloons=1", *assignments))
+        assert isinstance(found, Assembly)
+        return found
+
+    good = generate_assembly(brace(), tmp_path)
+    before = file_hashes(good.folder)
+    run = generate_assembly(brace("deploy.lumen_diameter=15"), tmp_path)
+    assert run.failed
+    assert run.kept
+    assert file_hashes(good.folder) == before
