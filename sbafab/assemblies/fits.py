@@ -10,6 +10,7 @@ from sbafab.assemblies.build import Assembled, PlacedPart, inlet_of
 from sbafab.assemblies.records import Line, Tube
 from sbafab.assemblies.shapes import face
 from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import rectangle
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import holds
 
@@ -119,26 +120,65 @@ def _opening(placed: PlacedPart) -> float:
 def seat(assembled: Assembled) -> Iterator[Finding]:
     """How much of the smaller of two glued faces lies on the other.
 
-    What is bent round its tube lies on it wholly, a line is held by its hole.
+    What is laid round a tube must lie on it, and a line in a lumen must run through it; a line in
+    an inlet is held by its strip.
     """
     limit = assembled.assembly.rules.seat_share
     for placed, other in joints(assembled):
-        if placed.radius is not None or isinstance(placed.part, Line):
-            continue
-        if placed.part.at == "outside":
-            message = (
-                f"{placed.name} is stiff and touches the round {other.name} in a line only; build "
-                "the joint up with adhesive"
-            )
-            yield Finding("seat", "warn", limit, 0.0, "", WHOLE, message)
-            continue
-        own, under = _lower_face(placed), _face_of(other, placed.part.at)
-        share = (own & under).area / min(own.area, under.area)
-        good = holds(share, limit)
-        message = f"{share:.0%} of the smaller face of {placed.name} on {other.name} is glued"
-        if not good:
-            message += "; move it with offset, or use a larger part: an opening lies under it"
-        yield found("seat", good, limit, share, message, "")
+        if placed.part.at == "lumen":
+            yield _through(placed, other, limit)
+        elif placed.part.at == "outside":
+            yield _around(placed, other, limit)
+        elif placed.part.at != "inlet":
+            own, under = _lower_face(placed), _face_of(other, placed.part.at)
+            share = (own & under).area / min(own.area, under.area)
+            good = holds(share, limit)
+            message = f"{share:.0%} of the smaller face of {placed.name} on {other.name} is glued"
+            if not good:
+                message += "; move it with offset, or use a larger part: an opening lies under it"
+            yield found("seat", good, limit, share, message, "")
+
+
+def _through(placed: PlacedPart, other: PlacedPart, limit: float) -> Finding:
+    """A line in the lumen of another part, both along that part's axis."""
+    start, end = placed.part.along, placed.part.along + placed.height
+    inside = max(0.0, min(end, other.height) - max(start, 0.0))
+    share = inside / min(placed.height, other.height)
+    good = holds(share, limit)
+    message = f"{inside:.3f} of {placed.name} lie in the lumen of {other.name}"
+    if not good:
+        message += (
+            f", which reaches from 0 to {other.height:.3f}; along = {start:g} puts the line from "
+            f"{start:g} to {end:g}"
+        )
+    return found("seat", good, limit, share, message, "")
+
+
+def _around(placed: PlacedPart, other: PlacedPart, limit: float) -> Finding:
+    """A part on the side of a tube, whose face lies from ``along`` both ways."""
+    own = _face_of(placed, "bottom").turned(placed.turn)
+    x0, y0, x1, y1 = own.bounds
+    along, length = placed.part.along, other.height
+    low, high = max(y0, -along), min(y1, length - along)
+    share = (own & rectangle((x0, low), (x1, high))).area / own.area if low < high else 0.0
+    if not holds(share, limit):
+        message = (
+            f"{share:.0%} of {placed.name} lies on {other.name}, which is {length:g} long; "
+            f"along = {along:g} puts it from {along + y0:.2f} to {along + y1:.2f}"
+        )
+        return found("seat", False, limit, share, message, "")
+    if placed.radius is None:
+        message = (
+            f"{placed.name} is stiff and touches the round {other.name} in a line only; build "
+            "the joint up with adhesive"
+        )
+        return Finding("seat", "warn", limit, 0.0, "", WHOLE, message)
+    message = f"{share:.0%} of {placed.name} lies on {other.name}"
+    if holds(share, 1.0):
+        return found("seat", True, limit, share, message, "")
+    message += f", the rest hangs past its end; along = {along:g} puts it from "
+    message += f"{along + y0:.2f} to {along + y1:.2f} of {length:g}"
+    return Finding("seat", "warn", limit, share, "", WHOLE, message)
 
 
 def _lower_face(placed: PlacedPart) -> Region:
