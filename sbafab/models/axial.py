@@ -85,7 +85,7 @@ def forces(actuator: Actuator, asked: Asked) -> Iterator[Figure]:
             at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
             for k in actuator.kinematics:
                 value = _force(actuator, k, pressure, share * actuator.full_stroke, asked)
-                name = f"force at {pressure:g} kPa, {at}"
+                name = f"force{_each(actuator)} at {pressure:g} kPa, {at}"
                 yield Figure("force", name, float(value), "N", _force_model(actuator, k, asked))
 
 
@@ -96,10 +96,17 @@ def _force(
     stroke: ArrayLike,
     asked: Asked,
 ) -> NDArray[np.float64]:
-    # Stacks round a tube push apart, each on its own; lobes push together.
-    together = actuator.stacks if isinstance(actuator.design, LobedDesign) else 1
-    factor = together * asked.calibration.contact_factor
+    factor = _together(actuator) * asked.calibration.contact_factor
     return factor * force(pressure, k.rate(stroke))
+
+
+def _together(actuator: Actuator) -> int:
+    """Stacks that push one way: all lobes, but one alone of those round a tube."""
+    return actuator.stacks if isinstance(actuator.design, LobedDesign) else 1
+
+
+def _each(actuator: Actuator) -> str:
+    return "" if _together(actuator) == actuator.stacks else " of one SBA"
 
 
 def _force_model(actuator: Actuator, k: Kinematics, asked: Asked) -> Model:
@@ -149,12 +156,13 @@ def power(actuator: Actuator, asked: Asked, mass_g: float) -> Iterator[Figure]:
 def _power_density(actuator: Actuator, asked: Asked, time: float, mass_g: float) -> Figure:
     highest = max(asked.pressures_kpa)
     push = float(_force(actuator, actuator.kinematics[0], highest, 0.0, asked))
+    pushes = actuator.stacks / _together(actuator)
     model = Model(
         "F v / m",
         "Sec. 7",
         "largest force times mean speed, as in the paper; the two never occur together",
     ).times("contact factor", asked.calibration.contact_factor)
-    watts = push * actuator.full_stroke / 1000 / time
+    watts = pushes * push * actuator.full_stroke / 1000 / time
     return Figure(
         "actuation",
         f"power density, flat force at {highest:g} kPa and {asked.flow_ml_min:g} ml/min",
@@ -213,7 +221,7 @@ def force_relation(actuator: Actuator, asked: Asked) -> Relation:
         label = f"paper: {name}, {paper.FORCE_KPA:g} kPa"
         y, errors = [m.value for m in values_at], [m.error for m in values_at]
         points.append(Points(label, places, y, errors))
-    each = "" if isinstance(actuator.design, LobedDesign) or actuator.stacks == 1 else " of one SBA"
+    each = _each(actuator)
     return Relation(
         "force",
         f"Force{each} against height, by virtual work",

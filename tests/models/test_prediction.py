@@ -64,6 +64,21 @@ def test_radial_is_15_33_flat_and_about_28_inflated() -> None:
     assert 27 < around.lines[0].y[-1] < 28.06
 
 
+@pytest.mark.parametrize(("template", "pushes"), [("3dof-15mm", 1), ("radial-15mm", 3)])
+def test_power_density_by_hand(template: str, pushes: int) -> None:
+    found = sbafab.predict(template)
+    force = "force at" if pushes == 1 else "force of one SBA at"
+    watts = (
+        pushes
+        * found.value(f"{force} 100 kPa, flat")
+        * found.value("full stroke")
+        / 1000
+        / found.value("time to full stroke at 35 ml/min")
+    )
+    told = found.value("power density, flat force at 100 kPa and 35 ml/min")
+    assert told == pytest.approx(watts / (found.value("mass") / 1000))
+
+
 def test_mass_of_a_lone_balloon_by_hand() -> None:
     found = sbafab.predict("1dof-10mm", "stack.balloons=1", "inlet.tab_length=5")
     laminate = sbafab.build("1dof-10mm", "stack.balloons=1", "inlet.tab_length=5")
