@@ -80,6 +80,8 @@ def stopped_by_signals() -> Iterator[None]:
     """Lets a polite kill and a closed terminal stop a run as Ctrl-C does: tidied up."""
 
     def stop(number: int, frame: FrameType | None) -> None:
+        # Batch systems ask twice; what is being kept then must not be lost to the second time.
+        signal.signal(number, signal.SIG_IGN)
         raise KeyboardInterrupt(number)
 
     names = [name for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from sbafab.cli.options import Request, run_options
+from sbafab.cli.options import Request, finite, run_options
 from sbafab.cli.quantities import FLOW, PRESSURE, VOLUME
 from sbafab.cli.working import RULE_FAILED
 
@@ -15,13 +14,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from sbafab.models.figures import Prediction
-
-
-def _finite(ctx: click.Context, param: click.Parameter, value: float) -> float:
-    # Any float option lets nan and inf through.
-    if not math.isfinite(value):
-        raise click.BadParameter("must be a number", ctx, param)
-    return value
 
 
 @click.command()
@@ -54,7 +46,7 @@ def _finite(ctx: click.Context, param: click.Parameter, value: float) -> float:
     "--press-factor",
     type=float,
     default=1.0,
-    callback=_finite,
+    callback=finite,
     metavar="F",
     help="Thickness after pressing over that of the films, if measured.  [default: 1, off]",
 )
@@ -62,7 +54,7 @@ def _finite(ctx: click.Context, param: click.Parameter, value: float) -> float:
     "--contact-factor",
     type=float,
     default=1.0,
-    callback=_finite,
+    callback=finite,
     metavar="F",
     help="Measured force over the predicted one, if measured.  [default: 1, off]",
 )

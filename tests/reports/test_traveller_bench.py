@@ -80,7 +80,7 @@ def test_what_the_force_means_is_said(sheet_files: Any, template: str) -> None:
     )
     assert "2555 N is 110 kPa on the whole platen of 152.4" in words
     assert "the paper does not say what it used" in words
-    found = re.search(r"\((\d+) mm² at its top\) would be ([\d.]+) MPa", words)
+    found = re.search(r"\((\d+) mm² at the top\) would be ([\d.]+) MPa", words)
     assert found is not None
     assert float(found[1]) == pytest.approx(top, abs=0.51)
     assert float(found[2]) == pytest.approx(110e-3 * 152.4**2 / top, abs=0.051)

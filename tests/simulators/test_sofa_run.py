@@ -181,6 +181,14 @@ def test_a_program_that_cannot_start_is_an_error(tmp_path: Path) -> None:
         run_scene(str(tmp_path / "nowhere"), tmp_path / "actuator.scn", 0.2, 0.02)
 
 
+def test_a_run_that_takes_too_long_keeps_what_it_has_reached(tmp_path: Path, fake: Fake) -> None:
+    fake(writing(RECORD) + "\nexec sleep 60")
+    found = run(tmp_path, SofaJob(seconds=0.9, limit=0.6))
+    assert found.last.time == pytest.approx(0.2)
+    assert found.stopped is not None
+    assert "ran to 0.2 of 0.9 s: it was stopped after 0.01 minutes" in found.stopped
+
+
 def test_what_runs_below_the_program_is_ended_with_it(tmp_path: Path, fake: Fake) -> None:
     fake("sleep 60 &\necho $! > process\nwait")
     with pytest.raises(OutputError, match="longer than"):

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+EDGE = 1e-3
+"""mm"""
 MOST_ELEMENTS = 3_000_000
 
 
@@ -163,7 +165,7 @@ def layup(laminate: Laminate, settings: MeshSettings) -> Layup:
 def _check_size(laminate: Laminate, settings: MeshSettings) -> None:
     """Raises DesignError if h is larger than the narrowest ring, or far too small."""
     h = settings.h
-    width, place = min(_rings(laminate), default=(h, ""))
+    width, place = min([*_rings(laminate)] or _open_rings(laminate), default=(h, ""))
     if not 0 < h <= width * (1 + 1e-6):
         raise DesignError(
             f"h = {h:g} mm is larger than {place}, which is {width:.3f} mm wide; "
@@ -192,6 +194,21 @@ def _rings(laminate: Laminate) -> Iterator[tuple[float, str]]:
                 left, low, right, high = hole.bounds
                 width = min(left - low_x, low - low_y, high_x - right, high_y - high)
                 yield width, f"{ring} {layers}"
+
+
+def _open_rings(laminate: Laminate) -> Iterator[tuple[float, str]]:
+    """What is left of the films beside each pocket, on the side where that is least.
+
+    No ring is closed where a lone balloon's inlet leaves it.
+    """
+    for interface in laminate.interfaces:
+        low_x, low_y, high_x, high_y = interface.contact.bounds
+        for outer in interface.unbonded.outers:
+            left, low, right, high = outer.bounds
+            sides = (left - low_x, low - low_y, high_x - right, high_y - high)
+            layers = f"between layers {interface.below.index} and {interface.above.index}"
+            # The inlet's strip runs to the edge of the films.
+            yield from ((s, f"the bond beside the pocket {layers}") for s in sides if s > EDGE)
 
 
 def _bond(laminate: Laminate, interface: Interface) -> Region:

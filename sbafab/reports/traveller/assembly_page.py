@@ -16,7 +16,7 @@ from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
 from sbafab.pressing.together import Runs, press_runs
 from sbafab.reports.drawing import TIMES
-from sbafab.reports.traveller import bill, joining, notes, times
+from sbafab.reports.traveller import bill, joining, notes, process, times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.cautions import cautions
 from sbafab.reports.traveller.code import code_svg, code_text
@@ -89,6 +89,7 @@ def assembly_html(job: AssemblyJob) -> str:
             code_text=text,
             picture=b64encode(job.picture).decode("ascii"),
             parts=_parts(job),
+            tested=[name for made in job.assembled.designs for name in made.parts],
             cautions=_cautions(job),
             bill=_bill(job),
             kerf=bill.kerf_states(works[0].job, films),
@@ -117,6 +118,7 @@ def _chapter(one: DesignWork, number: int, mark: str) -> str:
     said["shapes"] = definitions(pattern_regions(one.work.laminate))
     # The sheet goes round its tube when the assembly is put together.
     said["wrapping"] = []
+    said["force_notes"] = process.force_notes(one.work, one.runs.together)
     html = (
         environment()
         .get_template(CHAPTER)

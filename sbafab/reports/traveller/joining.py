@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from sbafab.actuators.radial import RadialDesign
 from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Tube
+from sbafab.laminate.laminate import Inlet
 from sbafab.models.sizes import inflated_diameter
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.bill import Item
@@ -23,22 +25,45 @@ class JoinPage:
 
 
 def join_pages(assembled: Assembled) -> list[JoinPage]:
-    """A step for each part in building order: make it ready, then fix it."""
+    """A step for each part: make it ready, then fix it."""
     pages = []
-    for placed in assembled.parts:
+    for placed in _in_order(assembled):
         other = assembled.on(placed)
         what = _what(placed)
         title = placed.name if what == placed.name else f"{placed.name} ({what})"
+        lines = [line.name for line in _lines_through(assembled, placed)]
+        early = bool(lines) and other is not None
+        actions = list(_ready(placed))
+        if early:
+            actions = [Action(f"Take {placed.name} with {say.listed(lines)} in it.")]
         if other is not None:
             title += f", {_where(placed)} of {other.name}"
-        actions = [*_ready(placed)]
-        if other is not None:
+            if early and isinstance(other.part, Tube):
+                actions.append(Action(f"Lead {say.listed(lines)} through {other.name}."))
             actions += _fix(placed, other)
         if placed.part.note:
             actions.append(Action(placed.part.note))
         if actions:
             pages.append(JoinPage(title, tuple(actions)))
     return pages
+
+
+def _in_order(assembled: Assembled) -> Iterator[PlacedPart]:
+    """Building order, but a line goes through a lumen while both its ends can still be reached."""
+    parts = assembled.parts
+    for placed in parts:
+        if placed.made is not None and placed.part.on is not None:
+            yield from _lines_through(assembled, placed)
+        other = assembled.on(placed)
+        early = placed.part.at == "lumen" and other is not None and other.made is not None
+        if not (early and other is not None and other.part.on is not None):
+            yield placed
+
+
+def _lines_through(assembled: Assembled, placed: PlacedPart) -> list[PlacedPart]:
+    return [
+        part for part in assembled.parts if part.part.at == "lumen" and part.part.on == placed.name
+    ]
 
 
 def _what(placed: PlacedPart) -> str:
@@ -102,11 +127,13 @@ def _fix(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
     elif placed.radius is not None:
         yield from _bend(placed, other)
     else:
-        yield Action(f"Lay it {_where(placed)} of {other.name}: {_spot(placed)}. Try it dry.")
+        yield Action(
+            f"Lay it {_where(placed)} of {other.name}: {_spot(placed, other)}. Try it dry."
+        )
     yield from _glue(placed, other)
 
 
-def _spot(placed: PlacedPart) -> str:
+def _spot(placed: PlacedPart, other: PlacedPart) -> str:
     part = placed.part
     x, y = part.offset
     words = []
@@ -114,14 +141,48 @@ def _spot(placed: PlacedPart) -> str:
         words.append(f"{_round(part.angle)}, {say.millimetres(part.along)} from the tube's start")
     elif x or y:
         words.append(
-            f"its middle {say.millimetres(x)} along the other's x (an SBA's runs along the tab "
-            f"of chamber1) and {say.millimetres(y)} along its y"
+            f"its middle {say.millimetres(x)} along the other's x ({_x_of(other)}) and "
+            f"{say.millimetres(y)} along its y"
         )
     else:
         words.append("axis on axis")
-    if part.turn:
-        words.append(f"turned {part.turn:g} degrees about its own axis")
+    if placed.made is not None:
+        words.append(_heading(placed, other))
+    elif part.turn:
+        words.append(f"turned {part.turn:g} degrees anti-clockwise, looking at its outer face")
     return ", ".join(words)
+
+
+def _x_of(placed: PlacedPart) -> str:
+    """Where a part's x runs, in words for the bench."""
+    if placed.made is not None:
+        return f"where the tab of {placed.made.laminate.inlets[0].chamber} points"
+    if isinstance(placed.part, Tube):
+        return "the marked line"
+    return "along its width" if isinstance(placed.part, Base) else "any side"
+
+
+def _heading(placed: PlacedPart, other: PlacedPart) -> str:
+    """Which face of an SBA is glued, and where its first tab points: that is where it bends."""
+    assert placed.made is not None
+    inlet = placed.made.laminate.inlets[0]
+    turn = _angle(inlet) + placed.turn
+    from_mark = 0.0 if other.made is None else _angle(other.made.laminate.inlets[0])
+    # On a lower face the part lies upside down, and is looked at from below.
+    turn += from_mark - 180 if placed.part.at in ("bottom", "start") else -from_mark
+    turn = round(turn, 6) % 360
+    mark = {"tube": "the marked line", "sba": f"the first tab of {other.name}"}.get(
+        other.part.kind, f"the width of {other.name}"
+    )
+    way = f"over {mark}" if turn == 0 else f"{turn:g} degrees anti-clockwise from {mark}"
+    return (
+        f"base down on it, the tab of {inlet.chamber} {way}, looking at the face that it is "
+        "glued to"
+    )
+
+
+def _angle(inlet: Inlet) -> float:
+    return math.degrees(math.atan2(inlet.direction[1], inlet.direction[0]))
 
 
 def _round(angle: float) -> str:
@@ -179,8 +240,11 @@ def _thread(placed: PlacedPart, line: Line, other: PlacedPart) -> Iterator[Actio
             "place of a tube fitted earlier."
         )
         return
+    if other.part.on is not None and other.made is not None:
+        yield Action(f"Take {other.name}, not fixed yet: a {_what(other)} without leaks.")
     past = line.along + line.length - other.height
-    side = f"{say.millimetres(abs(past))} {'past' if past >= 0 else 'short of'} its far face"
+    face = "top" if other.made is not None else "end"
+    side = f"{say.millimetres(abs(past))} {'past' if past >= 0 else 'short of'} its {face}"
     yield Action(f"Thread it through the lumen of {other.name} until it ends {side}.")
 
 
@@ -193,11 +257,12 @@ def _glue(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
     how = (
         "a small drop"
         if isinstance(placed.part, Magnet)
-        else "a bead round the line where it leaves its hole"
+        else "a thin bead round the line at each face that it comes out of"
         if isinstance(placed.part, Line)
         else "a thin, even film"
     )
-    yield Action(f"Glue: {glue}, {how}. Keep it out of lumen, bores, inlets and balloons.")
+    clear = "the line" if isinstance(placed.part, Line) else "lumen"
+    yield Action(f"Glue: {glue}, {how}. Keep it out of {clear}, bores, inlets and balloons.")
     yield Action("Hold it in place and let it cure as the package says before the next step.")
 
 
@@ -224,8 +289,8 @@ def final_checks(assembled: Assembled) -> list[Action]:
         actions.append(Action(f"Deflated, it slides through a tube of inner diameter {lumen}."))
         actions += [
             Action(
-                f"Inflated in the open, {placed.name} measures about {inflated:.1f} mm across; in "
-                f"the tube of {lumen} it holds against a pull."
+                f"Inflated in the open until its films are taut, {placed.name} measures about "
+                f"{inflated:.1f} mm across at most; in the tube of {lumen} it holds against a pull."
             )
             for placed in made
             if (inflated := _inflated(placed)) is not None

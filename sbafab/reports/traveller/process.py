@@ -91,17 +91,20 @@ def _dials(step: Step) -> tuple[tuple[str, str], ...]:
     )
 
 
-def force_notes(work: Work) -> tuple[str, ...]:
-    """What the force means: the paper gives only a pressure and an area."""
+def force_notes(work: Work, together: int = 1) -> tuple[str, ...]:
+    """What the force means, with so many laminates in the press: the paper gives only a pressure
+    and an area.
+    """
     step = work.schedule.steps[0]
     newtons, kilopascals = f"{step.force_n:.0f} N", f"{step.pressure_kpa:g} kPa"
-    top = work.laminate.layers[-1].profile.area
+    top = together * work.laminate.layers[-1].profile.area
+    alone = "the laminate alone" if together == 1 else f"the {together} laminates alone"
     return (
         f"The paper gives a pressure and a heated area, no force. {newtons} is {kilopascals} on "
         f"the whole platen of {say.size(*step.platen_mm)}. It reaches the laminate as "
         f"{kilopascals} only if something compliant that fills the platen, such as a silicone "
         "sheet, spreads it (ours: the paper does not say what it used).",
-        f"Between bare platens the same force on the laminate alone ({top:.0f} mm² at its top) "
+        f"Between bare platens the same force on {alone} ({top:.0f} mm² at the top) "
         f"would be {step.force_n / top:.1f} MPa.",
     )
 

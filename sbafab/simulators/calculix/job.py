@@ -23,6 +23,7 @@ from sbafab.simulators.calculix.run import (
     DIVERGED,
     INTERRUPTED,
     LOG,
+    OUT_OF_TIME,
     Ending,
     Progress,
     find_ccx,
@@ -111,6 +112,8 @@ def _place(time: float, settings: DeckSettings) -> str:
 def _advice(ending: Ending, settings: DeckSettings) -> str:
     if ending.stopped == INTERRUPTED:
         return "run it again for the rest"
+    if ending.stopped != DIVERGED and not str(ending.stopped).startswith(OUT_OF_TIME):
+        return "see whether ccx runs on this machine; a larger --h takes less memory"
     if ending.stopped != DIVERGED:
         return "give it more --minutes or a larger --h, or less to do with --symmetry"
     if settings.procedure == "static":

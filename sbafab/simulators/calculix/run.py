@@ -22,6 +22,7 @@ LOG = "ccx.log"
 LOOK_EVERY = 0.2
 STOP_WITHIN = 10.0
 INTERRUPTED = "it was interrupted"
+OUT_OF_TIME = "it was stopped after"
 DIVERGED = "its iterations no longer converge, however small the step"
 
 
@@ -55,9 +56,15 @@ def run_ccx(
     started = time.monotonic()
     environment = {"OMP_NUM_THREADS": "1", **os.environ}
     with (folder / LOG).open("wb") as log:
-        process = subprocess.Popen(
-            command, cwd=folder, stdout=log, stderr=subprocess.STDOUT, env=environment
-        )
+        try:
+            process = subprocess.Popen(
+                command, cwd=folder, stdout=log, stderr=subprocess.STDOUT, env=environment
+            )
+        except OSError as reason:
+            raise OutputError(
+                f"{command[0]} could not be started ({reason.strerror}); see whether it is a "
+                "program that runs on this machine"
+            ) from reason
         stopped: str | None = None
         try:
             while process.poll() is None and stopped is None:
@@ -66,7 +73,7 @@ def run_ccx(
                 if tell is not None:
                     tell("ccx, percent of the load", int(100 * reached / end), 100)
                 if time.monotonic() - started >= timeout:
-                    stopped = f"it was stopped after {timeout / 60:g} minutes"
+                    stopped = f"{OUT_OF_TIME} {timeout / 60:g} minutes"
         except KeyboardInterrupt:
             # Hours of computing are not thrown away with the rest of them.
             stopped = INTERRUPTED

@@ -36,7 +36,8 @@ class MujocoRun:
     """A run that can be believed: what the tip did, and how it ended.
 
     ``stroke`` in mm is by how much the films' centres at both ends have parted upward since flat;
-    ``volumes`` in ul by chamber; ``rate`` in steps per s of real time.
+    ``volumes`` in ul by chamber; ``rate`` in steps per s of real time; ``stopped`` is one sentence
+    if it was stopped early.
     """
 
     model: Path
@@ -45,6 +46,7 @@ class MujocoRun:
     volumes: tuple[tuple[str, float], ...]
     steps: int
     rate: float
+    stopped: str | None = None
 
     @property
     def last(self) -> Tip:
@@ -99,10 +101,10 @@ def find_mujoco() -> Any:
 def run_model(
     folder: Path, seconds: float, tell: Progress | None = None, limit: float | None = None
 ) -> MujocoRun:
-    """Inflates the model in a folder.
+    """Inflates the model in a folder, for at most ``limit`` s of real time or until Ctrl-C.
 
-    Raises OutputError if the model does not load, a step is unstable or not solved, or it all
-    takes longer than ``limit`` s; the sentence says how far the tip was known.
+    Raises OutputError if the model does not load, or a step is unstable or not solved; the
+    sentence says how far the tip was known.
     """
     mujoco = find_mujoco()
     path = folder / MODEL
@@ -116,21 +118,33 @@ def run_model(
         steps = round(seconds / model.opt.timestep)
         every = max(1, round(TIP_PERIOD / model.opt.timestep))
         tips = [inflation.tip()]
+        stopped: str | None = None
+        step = 0
         started = time.monotonic()
-        for step in range(1, steps + 1):
-            inflation.step()
+        while step < steps and stopped is None:
+            try:
+                inflation.step()
+            except KeyboardInterrupt:
+                stopped = "it was interrupted"
+                break
+            step += 1
             why = inflation.trouble(said)
-            if why is None and limit is not None and time.monotonic() - started > limit:
-                why = f"it took longer than {limit:g} s"
             if why is not None:
                 known = f"the tip is known to {tips[-1].time:g} s"
                 raise OutputError(f"{MODEL} did not run to its end: {why}; {known}")
-            if step % every == 0 or step == steps:
+            if limit is not None and time.monotonic() - started > limit and step < steps:
+                stopped = f"it was stopped after {limit / 60:g} minutes"
+            if step % every == 0 or step == steps or stopped is not None:
                 tips.append(inflation.tip())
                 if tell is not None:
                     tell("mujoco", step, steps)
-    rate = steps / max(time.monotonic() - started, 1e-9)
-    return MujocoRun(path, tuple(tips), inflation.stroke(), inflation.volumes(), steps, rate)
+    rate = step / max(time.monotonic() - started, 1e-9)
+    said_so = None
+    if stopped is not None:
+        reached = tips[-1].time
+        said_so = f"{MODEL} ran to {reached:g} of {seconds:g} s: {stopped}; what it reached is kept"
+    found = inflation.stroke(), inflation.volumes()
+    return MujocoRun(path, tuple(tips), *found, step, rate, said_so)
 
 
 class _Inflation:

@@ -7,7 +7,7 @@ from pathlib import Path
 from sbafab.laminate.laminate import Laminate
 from sbafab.simulators.coarse.actuator import PRESSURE
 from sbafab.simulators.mujoco.files import why_no_model, write_model
-from sbafab.simulators.mujoco.run import SECONDS, simulate
+from sbafab.simulators.mujoco.run import RAMP, SECONDS, simulate
 from sbafab.simulators.simulator import Progress, Result, Wish, chamber_pressures
 
 USES = ("seconds",)
@@ -29,14 +29,16 @@ def run(laminate: Laminate, wish: Wish, folder: Path, tell: Progress) -> Result:
     seconds = SECONDS if wish.seconds is None else wish.seconds
     found = simulate(laminate, folder, pressures, seconds, tell, limit=60 * wish.minutes)
     x, y, z = found.last.place
-    rows = [(name, value, "kPa") for name, value in pressures.items()]
+    share = min(1.0, found.last.time / RAMP)
+    rows = [(name, share * value, "kPa") for name, value in pressures.items()]
     rows += [("tip x", x, "mm"), ("tip y", y, "mm"), ("tip z", z, "mm")]
     rows += [("tilt", found.last.tilt, "degrees"), ("stroke", found.stroke, "mm")]
     rows += [(f"air {name}", value, "ul") for name, value in found.volumes]
     rows += [("drift in 0.5 s", found.drift, "mm"), ("rate", found.rate, "steps/s")]
     tips = [{"time": tip.time, "place": tip.place, "tilt": tip.tilt} for tip in found.tips]
     figures = {"stroke": found.stroke, "volumes": dict(found.volumes), "tips": tips}
-    return Result(tuple(rows), {**figures, "drift": found.drift, "rate": found.rate})
+    figures |= {"drift": found.drift, "rate": found.rate}
+    return Result(tuple(rows), figures, found.stopped)
 
 
 def _pressures(laminate: Laminate, wish: Wish) -> dict[str, float]:

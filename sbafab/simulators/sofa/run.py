@@ -59,13 +59,17 @@ USUAL = SofaJob()
 
 @dataclass(frozen=True)
 class SofaRun:
-    """A run that can be believed: what the tip did, steps done, s they took, steps per s."""
+    """A run that can be believed: what the tip did, steps done, s they took, steps per s.
+
+    ``stopped`` is one sentence if it was stopped early.
+    """
 
     scene: Path
     tips: tuple[Tip, ...]
     steps: int
     seconds: float | None
     rate: float | None
+    stopped: str | None = None
 
     @property
     def last(self) -> Tip:
@@ -120,8 +124,8 @@ def run_scene(
 ) -> SofaRun:
     """Runs a scene for so many s in steps of ``dt``; its log stays beside it in runSofa.log.
 
-    Raises OutputError if it ends by itself, is killed, takes longer than ``limit`` s, or logs what
-    makes it void; the sentence says how far the tip was known.
+    It is stopped after ``limit`` s of real time. Raises OutputError if it ends by itself, is
+    killed, or logs what makes it void; the sentence says how far the tip was known.
     """
     folder = scene.parent
     state = folder / TIP_FILE
@@ -137,6 +141,12 @@ def run_scene(
             _end(process)
     log = read_log(log_path.read_text(encoding="utf-8", errors="replace"))
     tips = read_tips(state)
+    if not in_time and tips and log.trouble is None:
+        stopped = (
+            f"{scene.name} ran to {tips[-1].time:g} of {seconds:g} s: it was stopped after "
+            f"{(limit or 0) / 60:g} minutes; what it reached is kept"
+        )
+        return SofaRun(scene, tuple(tips), round(tips[-1].time / dt), None, None, stopped)
     why = _trouble(process.returncode, in_time, limit, log, tips, seconds)
     if why is not None:
         known = (

@@ -40,7 +40,8 @@ def run(laminate: Laminate, wish: Wish, folder: Path, tell: Progress) -> Result:
     rows += [("tilt", found.last.tilt, "degrees")]
     rows += [] if found.rate is None else [("rate", found.rate, "steps/s")]
     tips = [{"time": tip.time, "place": tip.place, "tilt": tip.tilt} for tip in found.tips]
-    return Result(tuple(rows), {"scene": found.scene.name, "tips": tips, "rate": found.rate})
+    figures = {"scene": found.scene.name, "tips": tips, "rate": found.rate}
+    return Result(tuple(rows), figures, found.stopped)
 
 
 def _pressures(laminate: Laminate, wish: Wish) -> dict[str, float]:
