@@ -32,6 +32,8 @@ ROUNDING = 1e-9
 
 
 class LobedChamber(RoundChamber):
+    """Round chambers in a circle about the lumen, or drawn ones."""
+
     count: int = Field(default=3, ge=2, le=8)
     """Chambers round the lumen."""
     axis_radius: Length | None = None
@@ -39,6 +41,8 @@ class LobedChamber(RoundChamber):
 
 
 class Lumen(Section):
+    """The open channel in the middle."""
+
     diameter: Length = 2.0
     """The central channel, open in every layer."""
 
@@ -47,6 +51,7 @@ class LobedDesign(Design):
     """Two to eight chambers in parallel round a central lumen."""
 
     family: Literal["lobed"]
+    """Which kind of actuator this is."""
     chamber: LobedChamber = LobedChamber()
     lumen: Lumen = Lumen()
 

@@ -28,6 +28,7 @@ class OneDofDesign(Design):
     """A stack of round balloons on one axis."""
 
     family: Literal["1dof"]
+    """Which kind of actuator this is."""
     chamber: RoundChamber = RoundChamber()
 
 

@@ -36,6 +36,8 @@ from sbafab.laminate.laminate import Inlet as LaminateInlet
 
 
 class OblongChamber(Section):
+    """Oblong pockets, or one drawn outline."""
+
     count: int = Field(default=3, ge=1, le=12)
     """Oblong SBAs round the tube, at equal pitch."""
     width: Length = 11.5
@@ -47,11 +49,15 @@ class OblongChamber(Section):
 
 
 class Tube(Section):
+    """What the sheet is wrapped round."""
+
     outer_diameter: Length = 15.0
     """The tube that the sheet is wrapped round."""
 
 
 class SheetSection(Section):
+    """The sheet that carries the SBAs."""
+
     overlap: LengthOrZero = 0.0
     """Extra length at one end of the sheet, to close it round the tube."""
     margin: Length = 1.0
@@ -59,6 +65,8 @@ class SheetSection(Section):
 
 
 class Window(Section):
+    """The bond between sheet and SBA."""
+
     width: Length | None = None
     """Bond between sheet and SBA, round the tube; by default two bond widths."""
     length: Length | None = None
@@ -66,11 +74,15 @@ class Window(Section):
 
 
 class RadialInlet(Inlet):
+    """Tab, strip and tube, or one inlet for all SBAs."""
+
     manifold: bool = False
     """One shared inlet: the bottom pockets joined by strips."""
 
 
 class RadialStack(StackSection):
+    """How high each SBA is."""
+
     balloons: int = Field(default=1, ge=1, le=1000)
     """Balloons in each SBA."""
 
@@ -79,6 +91,7 @@ class RadialDesign(Design):
     """Oblong SBAs bonded to one sheet that is wrapped round a tube."""
 
     family: Literal["radial"]
+    """Which kind of actuator this is."""
     stack: RadialStack = RadialStack()
     inlet: RadialInlet = RadialInlet()
     chamber: OblongChamber = OblongChamber()

@@ -58,6 +58,7 @@ class Sba(Fixed):
     """A stacked balloon actuator, cut and pressed from a design of its own."""
 
     kind: Literal["sba"]
+    """A stacked balloon actuator, from a design."""
     design: Annotated[str, Field(max_length=1000)]
     """A template's name, or a design file, relative to the assembly's file."""
     set: dict[str, Any] = Field(default_factory=dict)
@@ -66,12 +67,15 @@ class Sba(Fixed):
 
 class Tube(Fixed):
     kind: Literal["tube"]
+    """A tube."""
     outer_diameter: Length = 15.0
+    """As in the paper, Sec. 2.1."""
     inner_diameter: Length = 11.0
     """Ours: the paper gives none."""
     length: Length = 40.0
     """Ours: the paper gives none."""
     material: Words = "silicone"
+    """Printed on the traveller."""
 
     @model_validator(mode="after")
     def _has_a_wall(self) -> Self:
@@ -82,9 +86,11 @@ class Tube(Fixed):
 
 class Magnet(Fixed):
     kind: Literal["magnet"]
+    """A disc magnet."""
     diameter: Length = 1.5875
     """1/16 in, as the seller's part numbers read: D, then sixteenths of an inch."""
     thickness: Length = 1.5875
+    """Likewise 1/16 in."""
     part: Words = "K&J Magnetics D11SH"
     """What to order (paper, Sec. 2.1)."""
 
@@ -93,6 +99,7 @@ class Cup(Fixed):
     """A cast suction cup, a bell: its narrow end is glued on, its wide end is open."""
 
     kind: Literal["cup"]
+    """A cast suction cup."""
     diameter: Length = 8.0
     """Of the rim. Ours: the paper gives none."""
     neck: Length = 5.0
@@ -104,6 +111,7 @@ class Cup(Fixed):
     bore: Length = 1.1
     """For the vacuum line. Ours."""
     material: Words = "Ecoflex 00-30 silicone"
+    """What it is cast from (paper, Sec. 2.1)."""
 
     @model_validator(mode="after")
     def _is_hollow(self) -> Self:
@@ -118,10 +126,15 @@ class Line(Fixed):
     """A tube for vacuum or fluid that runs through a lumen or goes into an inlet."""
 
     kind: Literal["line"]
+    """Tubing for vacuum or fluid."""
     outer_diameter: Length = 1.016
+    """Of the paper's tubing."""
     inner_diameter: Length = 0.635
+    """Of the paper's tubing."""
     length: Length = 60.0
+    """What is drawn of it. Ours."""
     tubing: Words = "Braintree RPT040"
+    """What to order (paper, Sec. 2.1)."""
     chamber: Words = "chamber1"
     """The chamber whose inlet it goes into, at an inlet."""
 
@@ -136,10 +149,15 @@ class Base(Fixed):
     """A flat piece that parts stand on."""
 
     kind: Literal["base", "sheet"]
+    """A flat piece."""
     width: Length
+    """Along x."""
     length: Length
+    """Along y."""
     thickness: Length
+    """How high it is."""
     material: Words
+    """Printed on the traveller."""
 
 
 AnyPart = Sba | Tube | Magnet | Cup | Line | Base
@@ -164,6 +182,8 @@ class Deploy(Section):
 
 
 class AssemblyRules(Section):
+    """Limits of the checks between parts, and what is waived."""
+
     line_clearance: LengthOrZero = 0.1
     """Lumen less line, in diameter, at least (the paper gives none)."""
     tube_tolerance: LengthOrZero = 0.05
@@ -184,18 +204,23 @@ class Assembly(Section):
     name: str = Field(pattern=NAME_PATTERN)
     """Names the output folder."""
     family: Literal["assembly"] = "assembly"
+    """That this is an assembly."""
     pose: Literal["upright", "lying"] = "upright"
     """How pictures and the solid show it: the root's axis upright, or lying (angle 0 is down)."""
     parts: Annotated[
         dict[PartName, Annotated[AnyPart, Field(discriminator="kind")]],
         Field(min_length=1, max_length=60),
     ]
+    """The parts by name; each but the root names what it is fixed on."""
     deploy: Deploy = Deploy()
     rules: AssemblyRules = AssemblyRules()
     order: Order = Order()
     sheets: Sheets | None = None
+    """Sheets for all parts' designs, in place of their own."""
     laser: Laser | None = None
+    """The laser for all parts' designs."""
     press: Press | None = None
+    """The press for all parts' designs."""
 
     _folder: Path = PrivateAttr(default=Path())
 

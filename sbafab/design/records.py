@@ -41,6 +41,8 @@ class Section(BaseModel):
 
 
 class TpeFilm(Section):
+    """The structural film that is bonded."""
+
     product: str = Field(default="Stretchlon 200", max_length=80)
     """What to order."""
     thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.038
@@ -52,6 +54,8 @@ class TpeFilm(Section):
 
 
 class PtfeFilm(Section):
+    """The film of the masks, which nothing bonds to."""
+
     product: str = Field(default="PTFE film", max_length=80)
     """What to order."""
     thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.025
@@ -63,31 +67,43 @@ class PtfeFilm(Section):
 
 
 class Films(Section):
+    """What the layers are cut from."""
+
     tpe: TpeFilm = TpeFilm()
     ptfe: PtfeFilm = PtfeFilm()
 
 
 class Bond(Section):
+    """Where two structural films melt together."""
+
     width: Length = 0.75
     """Width of every bonded ring, web and strip edge."""
 
 
 class Mask(Section):
+    """The Teflon that keeps films apart."""
+
     overhang: Length = 0.5
     """How far a mask reaches past the edges of the TPE layers it keeps apart."""
 
 
 class Bore(Section):
+    """The channel along the axis of a chamber."""
+
     diameter: Length = 1.0
     """Channel between the balloons of a chamber, and its dowel pin (the paper gives none)."""
 
 
 class Fillet(Section):
+    """Rounded corners."""
+
     radius: LengthOrZero = 1.0
     """Rounding of the concave corners of outlines (the paper gives none); 0 leaves them sharp."""
 
 
 class Inlet(Section):
+    """Tab, strip and tube through which a chamber is filled."""
+
     tube: str = Field(default="Braintree RPT040", max_length=80)
     """The tubing to order."""
     tube_outer_diameter: Length = 1.016
@@ -106,6 +122,8 @@ class Inlet(Section):
 
 
 class Registration(Section):
+    """What keeps the layers in register, and how far off they may lie."""
+
     method: Literal["channel-pin", "ears"] = "channel-pin"
     """"channel-pin": dowel pins in the channel bores, and in the lumen if there is one (the
     paper's). "ears": tooling holes outside the outline, pinned in every press step."""
@@ -122,6 +140,8 @@ class Registration(Section):
 
 
 class Press(Section):
+    """The heat press: temperature, pressure, minutes, platen."""
+
     temperature_c: float = Field(default=135.0, gt=0, le=500)
     """C; between the TPE's melting point and the PTFE's limit."""
     pressure_kpa: float = Field(default=110.0, gt=0, le=10000)
@@ -144,6 +164,8 @@ KerfWidth = LengthOrZero | tuple[LengthOrZero, LengthOrZero] | Literal["uncalibr
 
 
 class Laser(Section):
+    """The laser: what it can cut, its kerf, speeds for estimates."""
+
     least_feature: Length = 0.2
     """The narrowest slot or web the laser cuts well."""
     cut_speed: float = Field(default=20.0, gt=0, le=5000)
@@ -201,6 +223,8 @@ class Sheet(Section):
 
 
 class Sheets(Section):
+    """The film sheets to cut from, and how parts are placed on them."""
+
     tpe: Sheet = Sheet()
     ptfe: Sheet = Sheet()
     engine: Literal["bottom-left", "spyrrow"] = "bottom-left"
@@ -212,6 +236,8 @@ class Sheets(Section):
 
 
 class Order(Section):
+    """How many, for whom."""
+
     copies: int = Field(default=1, ge=1, le=1000)
     """How many of the actuator are cut."""
     made_for: str = Field(default="", max_length=120)
@@ -221,6 +247,8 @@ class Order(Section):
 
 
 class Rules(Section):
+    """Limits of the rule deck, and what is waived."""
+
     bond_width: Length = 0.75
     """Every bond must be at least this wide."""
     mask_overhang: Length = 0.5
@@ -240,6 +268,8 @@ class Rules(Section):
 
 
 class Stack(Section):
+    """How high the actuator is."""
+
     balloons: int = Field(default=6, ge=1, le=1000)
     """Balloons in each chamber, bottom to top."""
 
@@ -250,6 +280,7 @@ class Design(Section):
     name: str = Field(pattern=NAME_PATTERN)
     """Names the output folder: letters, digits, dot, dash, underscore."""
     family: str
+    """Which kind of actuator this is."""
     stack: Stack = Stack()
     bond: Bond = Bond()
     mask: Mask = Mask()

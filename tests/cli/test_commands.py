@@ -160,9 +160,15 @@ def test_templates_schema_and_new(
     assert len(out.splitlines()) == 7
     code, out, _ = run(["schema"], capsys)
     assert code == 0
-    assert {"OneDofDesign", "LobedDesign", "RadialDesign", "Assembly"} <= set(
-        json.loads(out)["$defs"]
-    )
+    records = json.loads(out)["$defs"]
+    assert {"OneDofDesign", "LobedDesign", "RadialDesign", "Assembly"} <= set(records)
+    unsaid = [
+        f"{name}.{key}"
+        for name, record in records.items()
+        for key, value in record["properties"].items()
+        if not (value | records.get(value.get("$ref", "").split("/")[-1], {})).get("description")
+    ]
+    assert unsaid == []
     code, out, _ = run(["new", "1dof-5mm"], capsys)
     assert code == 0
     code, _, _ = run(["check", "1dof-5mm.toml"], capsys)
