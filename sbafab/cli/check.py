@@ -11,6 +11,7 @@ from sbafab.cli.options import json_option, set_option, waive_option
 from sbafab.cli.working import RULE_FAILED
 
 if TYPE_CHECKING:
+    from sbafab.assemblies.records import Assembly
     from sbafab.design.records import Design
     from sbafab.output.advice import Advice
     from sbafab.output.shop import Progress
@@ -61,13 +62,25 @@ def check(
 
 
 def _of_design(design: Design, progress: Progress) -> tuple[Finding, ...]:
-    """The findings; what the press cannot do is refused, as a run would refuse it."""
-    from sbafab.output.contents import Checked, schedule_of
+    """The findings; what press and film sheets cannot do is refused, as a run would refuse it."""
+    from sbafab.output.batch import refuse_undoable
+    from sbafab.output.contents import Checked
     from sbafab.output.run import check as run_check
 
     checked = Checked(design, *run_check(design, progress))
     if not checked.failed:
-        schedule_of(checked)
+        refuse_undoable([checked])
+    return checked.findings
+
+
+def _of_assembly(assembly: Assembly, progress: Progress) -> tuple[Finding, ...]:
+    """Those of its designs and between its parts, likewise."""
+    from sbafab.output.assembly import check_assembly
+    from sbafab.output.batch import refuse_undoable
+
+    checked = check_assembly(assembly, progress)
+    if not checked.failed:
+        refuse_undoable(checked.designs)
     return checked.findings
 
 
@@ -101,14 +114,12 @@ def _findings(
         found = load(source, assignments, waivers)
         with shown_progress(quiet) as progress:
             if isinstance(found, Assembly):
-                from sbafab.output.assembly import check_assembly
-
                 if target is not None:
                     raise DesignError(
                         "--target-yield goes with a design, and this is an assembly; check its "
                         "parts' designs one by one"
                     )
-                return "design", check_assembly(found, progress).findings
+                return "design", _of_assembly(found, progress)
             if target is not None:
                 found = load_design(source, _asking(assignments, target), waivers)
             return "design", _of_design(found, progress)

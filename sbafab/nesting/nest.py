@@ -31,6 +31,14 @@ def nest(
     return tuple(nests)
 
 
+def refuse_unfit(parts: Sequence[Part], stocks: Mapping[Material, Stock]) -> None:
+    """Raises DesignError where no search is needed to see that the sheets are too small or few."""
+    for material in MATERIALS:
+        chosen = of_material(parts, material)
+        if chosen:
+            _check_fit(material, chosen, stocks[material])
+
+
 def of_material(parts: Sequence[Part], material: Material) -> tuple[Part, ...]:
     return tuple(part for part in parts if part.material == material and part.count > 0)
 
@@ -43,10 +51,6 @@ def _nest(
     seconds: float,
 ) -> Nest:
     _check_fit(material, parts, stock)
-    total = sum(part.count for part in parts)
-    least = _least_sheets(parts, stock)
-    if least > stock.most:
-        raise too_many(material, total, f"at least {least} sheets", stock)
     if engine == "spyrrow":
         from sbafab.nesting.strip import strip
 
@@ -57,6 +61,7 @@ def _nest(
         placements = bottom_left(parts, stock)
     found = Nest(engine, material, stock, parts, placements)
     if found.sheets > stock.most:
+        total = sum(part.count for part in parts)
         raise too_many(material, total, f"{found.sheets} sheets", stock)
     return found
 
@@ -73,6 +78,10 @@ def _check_fit(material: Material, parts: Sequence[Part], stock: Stock) -> None:
         standing = 1 in stock.turns and height <= across and width <= along
         if not (lying or standing):
             raise too_large(part, stock)
+    least = _least_sheets(parts, stock)
+    if least > stock.most:
+        total = sum(part.count for part in parts)
+        raise too_many(material, total, f"at least {least} sheets", stock)
 
 
 def _least_sheets(parts: Sequence[Part], stock: Stock) -> int:

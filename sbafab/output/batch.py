@@ -14,10 +14,11 @@ from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError
+from sbafab.nesting.nest import refuse_unfit
 from sbafab.nesting.records import Nest
 from sbafab.output.contents import Checked, Made, Part, close_folder, schedule_of, write_contents
 from sbafab.output.manifest import sheet_entry
-from sbafab.output.settings import GENERATOR, cut_settings, kerf_widths
+from sbafab.output.settings import GENERATOR, cut_settings, kerf_widths, stocks
 from sbafab.output.shop import (
     CutPlan,
     CutSet,
@@ -99,6 +100,15 @@ def plan_batch(
     parts = [part for one in designs for part in one.plan.parts]
     nests = find_nests(parts, checked[0].design, old_folder, tell)
     return Batch(tuple(designs), _settings(checked, name, drawing, waived), nests)
+
+
+def refuse_undoable(checked: Sequence[Checked]) -> None:
+    """Raises DesignError where press, kerf or film sheets cannot do designs that hold."""
+    for one in checked:
+        design = one.design
+        schedule_of(one)
+        plan = plan_cuts(one.laminate, design.order.copies, cut_settings(design, one.waived))
+        refuse_unfit(plan.parts, stocks(design))
 
 
 def _settings(

@@ -47,7 +47,10 @@ def limits(design: Design) -> Limits:
 
 
 def cut_settings(
-    design: Design, waived: tuple[str, ...], profile: DxfProfile, chord_error: float
+    design: Design,
+    waived: tuple[str, ...],
+    profile: DxfProfile = "bulges",
+    chord_error: float = 0.005,
 ) -> CutSettings:
     return CutSettings(
         design=design.name,

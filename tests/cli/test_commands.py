@@ -181,3 +181,22 @@ def test_a_sheet_without_room_for_its_label_says_so(
     narrow = ["--set", "sheets.tpe.border=1"]
     _, out, _ = run(["generate", "1dof-5mm", "-o", str(tmp_path), *narrow], capsys)
     assert " ".join(out.split()).count("the border has no room for labels") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["1dof-5mm", "--set", "sheets.tpe.width=25"], "does not fit the usable 5.0 x 132.4 mm"),
+        (["brace", "--set", "sheets.tpe.width=30"], "does not fit the usable 10.0 x 132.4 mm"),
+        (["1dof-5mm", "--set", "order.copies=900"], "sheets.tpe.most allows 20"),
+    ],
+)
+def test_check_refuses_what_generate_would_refuse(
+    arguments: list[str], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, said_by_check = run(["check", *arguments], capsys)
+    assert (code, out) == (2, "")
+    assert says in said_by_check
+    code, _, said_by_generate = run(["generate", *arguments, "-o", str(tmp_path)], capsys)
+    assert code == 2
+    assert said_by_generate == said_by_check
