@@ -82,7 +82,13 @@ def part_design(assembly: Assembly, name: str, part: Sba) -> Design:
     """
     try:
         path = design_path(_place_of(part.design, assembly.folder))
-        data = _merged(_merged(read_toml(path), part.set), assembly.shared)
+        table = read_toml(path)
+        if table.get("family") == FAMILY:
+            raise DesignError(
+                f"design = {shown(part.design)} is an assembly; a part is made from the design of "
+                "one actuator"
+            )
+        data = _merged(_merged(table, part.set), assembly.shared)
         data.setdefault("name", path.stem)
         _keep_outline(data, part, assembly.folder)
         own = _waivers(data)

@@ -190,7 +190,7 @@ class AssemblyRules(Section):
     """By how much a radial design's tube and the tube it is wrapped round may differ (ours)."""
     seat_share: float = Field(default=0.25, ge=0, le=1)
     """Least share of the smaller of two glued faces that lies on the other (ours)."""
-    waive: tuple[CheckName | RuleName, ...] = Field(default=(), strict=False)
+    waive: tuple[Literal[CheckName, RuleName], ...] = Field(default=(), strict=False)
     """Checks and rules whose failure shall not stop the cut files; sheets, traveller and manifest
     then say so."""
 

@@ -45,9 +45,10 @@ def building_order(parts: Mapping[str, AnyPart]) -> tuple[str, ...]:
     for name in order:
         order += [other for other, part in parts.items() if part.on == name]
     if len(order) < len(parts):
+        circle = _circle(parts, order)
+        how = "hang on each other in a circle" if circle[1:] else "hangs on itself"
         raise DesignError(
-            f"{listed(_circle(parts, order))} hang on each other in a circle; leave out on and at "
-            "in the part that all others hang on"
+            f"{listed(circle)} {how}; leave out on and at in the part that all others hang on"
         )
     return tuple(order)
 
