@@ -18,6 +18,17 @@ if TYPE_CHECKING:
 SIMULATORS = ("calculix", "sofa", "mujoco")
 """As in ``sbafab.simulators.simulator``, whose imports would slow ``--help`` down."""
 MOST_MINUTES = 10_000
+UNITS = {
+    "length": "mm",
+    "pressure": "kPa",
+    "volume": "ul",
+    "stress": "MPa",
+    "work": "uJ",
+    "angle": "degrees",
+    "time": "s",
+    "rate": "steps/s",
+}
+"""Of what ``result.json`` holds."""
 
 
 @click.command()
@@ -121,7 +132,7 @@ def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> N
             found = Result((), {})
         else:
             found = find(simulator).run(checked.laminate, wish, folder, tell)
-            told = as_json({**found.figures, "stopped": found.stopped})
+            told = as_json({"units": UNITS, **found.figures, "stopped": found.stopped})
             (folder / "result.json").write_text(told, encoding="utf-8", newline="\n")
         extras = Extras(also=with_folder(folder), own=(simulator,))
         run = generate(design, request.out, (), tell, extras=extras)

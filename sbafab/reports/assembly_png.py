@@ -13,6 +13,7 @@ from sbafab.assemblies.shapes import placed_surface
 from sbafab.meshing.surface import Surface
 from sbafab.reports.canvas import INK
 from sbafab.reports.depth import Buffer, View, seen
+from sbafab.reports.length_bar import draw_length_bar
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,7 +27,6 @@ ENLARGED = 2
 MARGIN, FOOT = 0.06, 0.17
 STEP_MM = 0.25
 """Jump in depth that is drawn as an edge."""
-BARS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
 
 
 def assembly_png(
@@ -120,7 +120,6 @@ def _write(
     font = ImageFont.load_default(size)
     draw = ImageDraw.Draw(picture)
     left = round(0.03 * width)
-    bar = max(step for step in BARS if step * pixels_per_mm <= width / 4 or step == BARS[0])
     x, y = left, height - 2 * size
     for colour, words in legend:
         needed = round(3.4 * size + draw.textlength(words, font=font))
@@ -131,12 +130,5 @@ def _write(
         x += needed
     y -= round(2 * size)
     draw.text((left, y), caption, fill=INK, font=font)
-    end = width - left
-    start = end - bar * pixels_per_mm
     y += round(0.6 * size)
-    words = f"{bar:g} mm"
-    draw.line((start, y, end, y), fill=INK, width=3)
-    for tick in (start, end):
-        draw.line((tick, y - 6, tick, y + 6), fill=INK, width=3)
-    middle = (start + end - draw.textlength(words, font=font)) / 2
-    draw.text((middle, y - 1.6 * size), words, fill=INK, font=font)
+    draw_length_bar(draw, width - left, y, width / 4, pixels_per_mm, font)

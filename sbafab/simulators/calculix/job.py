@@ -12,7 +12,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.form import flat
 from sbafab.meshing.conforming.layup import layup
 from sbafab.meshing.conforming.model import Mesh
-from sbafab.meshing.conforming.settings import MeshSettings
+from sbafab.meshing.conforming.settings import MeshSettings, Symmetry
 from sbafab.meshing.conforming.volume_mesh import volume_mesh
 from sbafab.simulators.calculix.deck import JOB, started, write_deck
 from sbafab.simulators.calculix.frd import SAME_TIME, Frame, read_frd
@@ -78,7 +78,7 @@ def simulate(
             f"{ending.stopped}; {_advice(ending, settings)}"
         )
     states = history(run_mesh, laminate, mesh_settings.symmetry, settings, frames)
-    _write_results(run_mesh, laminate.name, states, frames[-1], folder)
+    _write_results(run_mesh, laminate.name, mesh_settings.symmetry, states, frames[-1], folder)
     _tidy(folder)
     stopped = None if ending.stopped is None else _stopped(ending, states, settings)
     return Simulated(tuple(states), stopped)
@@ -122,11 +122,17 @@ def _advice(ending: Ending, settings: DeckSettings) -> str:
 
 
 def _write_results(
-    mesh: Mesh, name: str, states: Sequence[State], last: Frame, folder: Path
+    mesh: Mesh,
+    name: str,
+    symmetry: Symmetry,
+    states: Sequence[State],
+    last: Frame,
+    folder: Path,
 ) -> None:
     reached = states[-1]
     pressures = ", ".join(f"{c} {value:.3g} kPa" for c, value in reached.pressures.items())
-    caption = f"{name}: {pressures}, stroke {reached.stroke:.3f} mm, true to scale"
+    part = "" if symmetry == "full" else f", a {symmetry} of it"
+    caption = f"{name}{part}: {pressures}, stroke {reached.stroke:.3f} mm, true to scale"
     (folder / HISTORY).write_text(history_csv(states), encoding="utf-8", newline="\n")
     plot = history_svg(f"{name}, CalculiX", states)
     (folder / "history.svg").write_text(plot, encoding="utf-8", newline="\n")

@@ -10,6 +10,7 @@ import numpy as np
 from sbafab.meshing.conforming.cavities import flat_triangles
 from sbafab.meshing.conforming.elements import CORNERS, FACES
 from sbafab.meshing.conforming.model import Mesh
+from sbafab.reports.length_bar import draw_length_bar
 from sbafab.simulators.calculix.frd import Frame
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def deformed_png(mesh: Mesh, frame: Frame, caption: str) -> bytes:
         colour = _colour(float(tones[number]), float(shades[number]))
         draw.polygon([tuple(place) for place in places[faces[number]].tolist()], fill=colour)
     picture = image.reduce(ENLARGED)
-    _write_key(ImageDraw.Draw(picture), caption, most)
+    _write_key(ImageDraw.Draw(picture), caption, most, scale / ENLARGED)
     out = BytesIO()
     picture.save(out, "PNG", compress_level=6)
     return out.getvalue()
@@ -95,11 +96,12 @@ def _colour(part: float, shade: float = 1.0) -> tuple[int, int, int]:
     return r, g, b
 
 
-def _write_key(draw: Draw, caption: str, most: float) -> None:
+def _write_key(draw: Draw, caption: str, most: float, pixels_per_mm: float) -> None:
     from PIL import ImageFont
 
     font = ImageFont.load_default(20)
-    _, height = SIZE
+    width, height = SIZE
+    draw_length_bar(draw, width - MARGIN, height - 40, width / 4, pixels_per_mm, font)
     draw.text((MARGIN, height - 100), caption, fill=INK, font=font)
     left, right, top = MARGIN, MARGIN + 400, height - 64
     for x in range(left, right):
