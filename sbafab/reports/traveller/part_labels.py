@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from heapq import heapify, heappop, heappush
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Bounds, Point
@@ -35,26 +36,35 @@ class PlacedLabel(NamedTuple):
         return PlacedLabel((x + dx, y + dy), self.size, box)
 
 
-def labels(words: str, part: Region) -> list[PlacedLabel]:
+def labels(words: str, part: Region) -> Iterator[PlacedLabel]:
     """Where the words may stand on a part as it is drawn, the best place first.
 
-    Off its holes if they can, near its middle, as large as may be; empty where nobody could read
-    them.
+    Off its holes if they can, near its middle, as large as may be; none where nobody could read
+    them. A place is measured when its turn has come: the first one is nearly always taken.
     """
     low_x, _, high_x, _ = part.bounds
     width = OVER * (high_x - low_x)
     most = min(draw.SMALL * width / draw.text_width(words, draw.SMALL), draw.SMALL)
     holes = [hole.bounds for hole in part.holes]
-    found: list[tuple[float, PlacedLabel]] = []
-    for share in SIZES:
-        if share * most < LEGIBLE:
-            break
-        for far, middle in _middles(part.bounds):
-            label = _label(words, middle, share * most)
-            covered = sum(_meet(label.box, hole) for hole in holes)
-            off = sum(not part.contains(p) for p in _sides(label.box, holes))
-            found.append((HOLE * covered + OUTSIDE * off + far + (1 - share), label))
-    return [label for _, label in sorted(found)]
+    waiting = [
+        (far + (1 - share), _label(words, middle, share * most), False)
+        for share in SIZES
+        if share * most >= LEGIBLE
+        for far, middle in _middles(part.bounds)
+    ]
+    heapify(waiting)
+    while waiting:
+        cost, label, is_measured = heappop(waiting)
+        if is_measured:
+            yield label
+        else:
+            heappush(waiting, (cost + _in_the_way(label, part, holes), label, True))
+
+
+def _in_the_way(label: PlacedLabel, part: Region, holes: Sequence[Bounds]) -> float:
+    covered = sum(_meet(label.box, hole) for hole in holes)
+    off = sum(not part.contains(p) for p in _sides(label.box, holes))
+    return HOLE * covered + OUTSIDE * off
 
 
 def first_free(

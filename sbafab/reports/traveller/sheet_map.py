@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import tee
 from typing import NamedTuple
 
 from sbafab.cutting.sheets import SheetFile
@@ -179,7 +180,7 @@ def _label(
     seen: Sequence[tuple[Placement, Region]],
 ) -> None:
     """Every part's pattern; parts that lie alike are labelled alike unless labels would meet."""
-    known: dict[tuple[int, int], tuple[Bounds, list[PlacedLabel]]] = {}
+    known: dict[tuple[int, int], tuple[Bounds, Iterator[PlacedLabel]]] = {}
     taken: list[Bounds] = []
     page = (*strip.corner, *_far(strip))
     for placement, region in seen:
@@ -190,6 +191,8 @@ def _label(
             shape = region.mapped(strip.at, strip.scale, mirror=True)
             known[alike] = region.bounds, labels(words, shape)
         bounds, places = known[alike]
+        places, kept = tee(places)
+        known[alike] = bounds, kept
         (x, y), (first_x, first_y) = strip.at(region.bounds[:2]), strip.at(bounds[:2])
         moved = (place.moved(x - first_x, y - first_y) for place in places)
         found = first_free(moved, page, taken)
