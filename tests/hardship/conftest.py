@@ -126,8 +126,8 @@ class Output:
     def run_folder(self) -> Path:
         return self.folder / "1dof-5mm"
 
-    def arguments(self, width: str) -> list[str]:
-        return ["generate", "1dof-5mm", "-o", str(self.folder), "--set", f"bond.width={width}"]
+    def arguments(self, width: str, command: str = "generate") -> list[str]:
+        return [command, "1dof-5mm", "-o", str(self.folder), "--set", f"bond.width={width}"]
 
     def held(self) -> str | None:
         """The bond width whose whole run lies in the folder, None of anything else."""

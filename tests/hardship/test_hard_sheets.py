@@ -88,7 +88,7 @@ PLACES: dict[str, Change] = {
 @pytest.mark.parametrize("name", PLACES)
 def test_bad_saved_places_are_searched_anew(name: str, runs: Runs, output: Output) -> None:
     PLACES[name](output.run_folder / "sheets" / "nest.json")
-    ended = runs.run(output.arguments("0.8"), output.folder, BOUNDED)
+    ended = runs.run(output.arguments("0.8", "cut"), output.folder, BOUNDED)
     assert (ended.code, ended.err) == (0, "")
     assert output.held() == "0.8"
 

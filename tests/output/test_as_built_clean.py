@@ -28,22 +28,21 @@ ROLLS = ("sheets.tpe.roll=true", "sheets.ptfe.roll=true", "sheets.tpe.length=400
 SMALL = ("sheets.tpe.width=70", "sheets.tpe.length=50", "sheets.label=false")
 
 CLEAN: list[tuple[str, tuple[str, ...], DxfProfile]] = [
-    ("1dof-5mm", (), "bulges"),
     ("1dof-5mm", ("stack.balloons=1",), "arcs"),
     ("1dof-5mm", ("chamber.diameter=[6, 5, 4.5]", "stack.balloons=3"), "chords"),
     ("1dof-5mm", ("stack.balloons=21",), "bulges"),
     ("1dof-10mm", ("stack.balloons=2",), "chords"),
     ("1dof-10mm", ("chamber.outline=drop.svg", "stack.balloons=2"), "bulges"),
     ("1dof-10mm", ("chamber.outline=drop.svg", "stack.balloons=1"), "chords"),
-    ("3dof-15mm", (), "bulges"),
+    ("3dof-15mm", ("stack.balloons=6",), "bulges"),
     ("3dof-15mm", ("stack.balloons=2",), "arcs"),
     ("3dof-15mm", ("stack.balloons=2", *KERF), "chords"),
     ("3dof-15mm", ("fillet.radius=0", "stack.balloons=2", *KERF), "bulges"),
     *(("3dof-15mm", (f"chamber.count={n}", "stack.balloons=1"), "bulges") for n in (5, 8)),
     *(("3dof-15mm", (f"chamber.count={n}", "stack.balloons=2"), "bulges") for n in (2, 4)),
     ("radial-15mm", (), "bulges"),
-    ("radial-15mm", ("chamber.count=2", "stack.balloons=2", *KERF), "arcs"),
-    ("radial-15mm", ("inlet.manifold=true", "stack.balloons=2"), "chords"),
+    ("radial-15mm", ("chamber.count=2", *KERF), "arcs"),
+    ("radial-15mm", ("inlet.manifold=true",), "chords"),
     ("1dof-5mm", ("rules.bond_width=0.8", 'rules.waive=["bond-width", "tube-fit"]'), "bulges"),
     *(
         (name, ("stack.balloons=2", "registration.method=ears"), "bulges")
@@ -54,7 +53,7 @@ CLEAN: list[tuple[str, tuple[str, ...], DxfProfile]] = [
     ("1dof-10mm", ("stack.balloons=2", UNEVEN, "registration.method=ears"), "arcs"),
     ("1dof-5mm", ("stack.balloons=2", *ROLLS, "order.copies=3", *KERF), "arcs"),
     ("1dof-10mm", ("stack.balloons=1", *ROLLS, "order.copies=3"), "chords"),
-    ("radial-15mm", ("stack.balloons=2", *SMALL, "order.copies=3"), "bulges"),
+    ("radial-15mm", (*SMALL, "order.copies=3"), "bulges"),
 ]
 
 
