@@ -13,6 +13,8 @@ SAME = 1e-4
 """Ends of edges nearer than this, in mm, are one point."""
 AREA_ERROR = 1e-4
 MILLIMETRES = 4
+MARKS = "REFERENCE"
+"""Layer of what is not cut."""
 
 Edge = tuple[complex, complex, float]
 """Start, end and bulge."""
@@ -57,13 +59,15 @@ def _file_complaint(path: Path, expected: float) -> str | None:
 
 
 def _loops(path: Path) -> list[list[Edge]]:
-    """Closed contours of a file; raises ValueError where one stays open."""
+    """Closed contours of a file, marks aside; raises ValueError where one stays open."""
     import ezdxf
 
     loops: list[list[Edge]] = []
     loose: list[Edge] = []
     for entity in ezdxf.filemanagement.readfile(path).modelspace():
         kind = entity.dxftype()
+        if entity.dxf.layer == MARKS:
+            continue
         if kind == "LWPOLYLINE":
             if not entity.closed:
                 raise ValueError("has an open polyline")

@@ -23,7 +23,7 @@ def profile(plate: Plate) -> Region:
 
 def main(folder: Path) -> None:
     for index, plate in enumerate(plates()):
-        text = dxf_text(cutting_order(profile(plate)), {}, datum=False)
+        text = dxf_text(cutting_order(profile(plate)), {})
         (folder / file_name(index)).write_text(text)
 
 
