@@ -168,18 +168,18 @@ def _write_whole(
     tell: Progress,
 ) -> dict[str, Any]:
     """What is the assembly's own; its manifest, without the files' hashes."""
-    from sbafab.reports.assembly_png import assembly_png
+    from sbafab.reports.assembly_png import assembly_pngs
 
     assembled = checked.assembled
     tell("assembled", 0, 1)
     (folder / "preview").mkdir()
-    picture = assembly_png(assembled, _note(checked))
+    picture, bare = assembly_pngs(assembled, _note(checked))
     (folder / PICTURE).write_bytes(picture)
     index = _manifest(checked, batch, written)
     if batch is not None and written is not None:
         (folder / "mesh").mkdir()
         index["meshes"] = [_write_solid(assembled, folder)]
-        write_text(folder / TRAVELLER, _traveller(checked, batch, written, picture))
+        write_text(folder / TRAVELLER, _traveller(checked, batch, written, bare))
     write_text(folder / "checks.json", as_json(checks(checked.findings, "design")))
     write_text(folder / DESIGN_FILE, assembly_toml(assembled))
     return index

@@ -36,6 +36,13 @@ def assembly_png(
 
     Inlet tubes and what the films enclose are not shown.
     """
+    return assembly_pngs(assembled, note, width, height)[0]
+
+
+def assembly_pngs(
+    assembled: Assembled, note: str = "", width: int = 1040, height: int = 780
+) -> tuple[bytes, bytes]:
+    """The same, and once more without caption and legend, for a page that says those itself."""
     surfaces = [placed_surface(placed, filled=True) for placed in assembled.parts]
     # What lies inside a tube shows through nothing: no part is transparent.
     view = _view(surfaces, width * ENLARGED, height * ENLARGED)
@@ -43,11 +50,28 @@ def assembly_png(
     paints = colours(assembled)
     picture = _coloured(buffer, [paints[placed.name] for placed in assembled.parts])
     picture = picture.reduce(ENLARGED)
+    bare = picture.crop((0, 0, width, round((1 - FOOT / 2) * height)))
+    scale = view.scale / ENLARGED
+    _write_bar(bare, scale)
     caption = f"{assembled.assembly.name}, before inflation, nominal films, true proportions"
-    _write(picture, f"{caption}{note}", _legend(assembled, paints), view.scale / ENLARGED)
+    _write(picture, f"{caption}{note}", _legend(assembled, paints), scale)
+    return _png(picture), _png(bare)
+
+
+def _png(picture: Image) -> bytes:
     out = BytesIO()
     picture.save(out, "PNG", compress_level=6)
     return out.getvalue()
+
+
+def _write_bar(picture: Image, pixels_per_mm: float) -> None:
+    """A length bar alone, with letters that are read when the picture is printed small."""
+    from PIL import ImageDraw, ImageFont
+
+    width, height = picture.size
+    font = ImageFont.load_default(round(width / 32))
+    draw = ImageDraw.Draw(picture)
+    draw_length_bar(draw, 0.97 * width, 0.96 * height, width / 4, pixels_per_mm, font)
 
 
 def _unit(v: Sequence[float]) -> list[float]:

@@ -11,6 +11,7 @@ from typing import Any
 
 from sbafab.actuators.radial import RadialDesign
 from sbafab.assemblies.build import Assembled
+from sbafab.assemblies.colours import colours
 from sbafab.cutting.fixture import fixture
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
@@ -127,14 +128,15 @@ def _chapter(one: DesignWork, number: int, mark: str) -> str:
     return _NAMES.sub(rf"\g<1>d{number}-", html)
 
 
-def _parts(job: AssemblyJob) -> list[tuple[str, str, str]]:
-    """Name, what it is, and where it goes, of each part."""
+def _parts(job: AssemblyJob) -> list[tuple[str, str, str, str]]:
+    """Name, what it is, where it goes, and its colour in the picture, of each part."""
     rows = []
+    paints = colours(job.assembled)
     for placed in job.assembled.parts:
         what = placed.part.kind if placed.made is None else f"SBA {placed.made.design.name}"
         on = placed.part.on
         where = "all else hangs on it" if on is None else f"{on}, {placed.part.at}"
-        rows.append((placed.name, what, where))
+        rows.append((placed.name, what, where, f"#{bytes(paints[placed.name]).hex()}"))
     return rows
 
 
