@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import click
 
 from sbafab.cli.options import Request, run_options
-from sbafab.cli.quantities import VOLUME, OfChamber, by_chamber
+from sbafab.cli.quantities import LENGTH, VOLUME, OfChamber, by_chamber
 from sbafab.cli.working import run_parts
 
 if TYPE_CHECKING:
@@ -18,8 +17,7 @@ FORMATS = ("vtu", "vtk", "msh", "inp", "stl", "obj", "ply")
 
 
 def _positive(ctx: click.Context, param: click.Parameter, value: float) -> float:
-    # A range lets nan through: it is neither below nor above.
-    if not (math.isfinite(value) and value > 0):
+    if value <= 0:
         raise click.BadParameter("must be a length above 0 mm", ctx, param)
     return value
 
@@ -39,9 +37,9 @@ def _fill(
 @click.option(
     "--h",
     "size",
-    type=float,
+    type=LENGTH.read,
     callback=_positive,
-    default=0.35,
+    default="0.35",
     show_default=True,
     metavar="MM",
     help="Side of the triangles.",

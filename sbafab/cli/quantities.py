@@ -34,6 +34,7 @@ class Quantity:
         return number
 
 
+LENGTH = Quantity("length", {"mm": 1.0, "um": 0.001, "cm": 10.0, "in": 25.4}, '0.35 or "350 um"')
 PRESSURE = Quantity(
     "pressure",
     {"kPa": 1.0, "Pa": 0.001, "MPa": 1000.0, "mbar": 0.1, "bar": 100.0, "psi": 6.894757},

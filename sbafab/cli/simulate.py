@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sbafab.cli.options import Request, finite, run_options
-from sbafab.cli.quantities import PRESSURE, VOLUME, OfChamber, by_chamber
+from sbafab.cli.quantities import LENGTH, PRESSURE, VOLUME, OfChamber, by_chamber
 from sbafab.cli.working import RULE_FAILED
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ UNITS = {
     help="Stop then, and keep what has been reached.",
 )
 @click.option("--export", is_flag=True, help="Write what the simulator reads, and run nothing.")
-@click.option("--h", type=float, metavar="MM", help="calculix: mesh size.  [default: 0.35]")
+@click.option("--h", type=LENGTH.read, metavar="MM", help="calculix: mesh size.  [default: 0.35]")
 @click.option(
     "--symmetry",
     type=click.Choice(["full", "half", "quarter", "sector"]),
