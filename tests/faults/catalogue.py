@@ -7,7 +7,10 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
+from filelock import FileLock
+
 from sbafab.actuators import load_design
+from sbafab.design.writing import design_sha256
 from sbafab.output.as_built.check import read_folder
 from sbafab.output.run import generate
 from tests.faults import claims, files, holes, layers, masks, sheets
@@ -33,13 +36,20 @@ Goods = Callable[[str, tuple[str, ...]], Specimen]
 
 
 def good_folders(root: Path) -> Goods:
-    """Good folders of BALLOONS balloons under ``root``, each written when first asked for."""
+    """Good folders of BALLOONS balloons under ``root``, each written when first asked for.
+
+    Several processes may share a root.
+    """
 
     @cache
     def good(template: str, settings: tuple[str, ...]) -> Specimen:
         few = (f"stack.balloons={BALLOONS}", "rules.yield_builds=100")
-        out = root / f"{template}-{len(list(root.iterdir()))}"
-        folder = generate(load_design(template, [*few, *settings]), out, ("cut",)).folder
+        design = load_design(template, [*few, *settings])
+        out = root / design_sha256(design)
+        folder = out / design.name
+        with FileLock(out.with_suffix(".lock")):
+            if not folder.exists():
+                generate(design, out, ("cut",))
         clean = read_folder(folder).laminate
         assert clean is not None
         return Specimen(Doctor(folder), clean)

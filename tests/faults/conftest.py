@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 
 import pytest
@@ -13,7 +14,13 @@ from tests.faults.specimen import quick
 
 @pytest.fixture(scope="session")
 def goods(tmp_path_factory: pytest.TempPathFactory) -> Goods:
-    return good_folders(tmp_path_factory.mktemp("good"))
+    root = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        # All workers have folders of their own in one, and can share what stays unchanged.
+        root = root.parent
+    root = root / "good"
+    root.mkdir(exist_ok=True)
+    return good_folders(root)
 
 
 @pytest.fixture(scope="session")

@@ -15,14 +15,12 @@ import pytest
 from sbafab.actuators import load_design
 from sbafab.cli import main
 from sbafab.errors import OutputError
-from sbafab.geometry.edges import unit
 from sbafab.geometry.offset import grow, shrink
-from sbafab.geometry.shapes import disc, rectangle, strip
 from sbafab.output.as_built.check import check_folder, read_folder
 from sbafab.output.run import generate
 from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding
-from tests.output.doctoring import Doctor, flipped, scaled
+from tests.output.doctoring import Doctor
 
 
 def failed(folder: Path) -> dict[str, Finding]:
@@ -32,73 +30,6 @@ def failed(folder: Path) -> dict[str, Finding]:
         if finding.verdict == "fail":
             found.setdefault(finding.rule, finding)
     return found
-
-
-AXES = [(4.25 * x, 4.25 * y) for x, y in (unit(0), unit(120), unit(240))]
-FIRST, SECOND, THIRD = AXES
-PINHOLES = [disc(axis, 0.5) for axis in AXES]
-ASIDE = (FIRST[0] + 0.15, FIRST[1])
-
-Fault = tuple[str, int, Callable[..., object], str]
-FAULTS: list[Fault] = [
-    ("wall shifted", 5, lambda r: r.moved(0.15, 0.0), "registration-nominal"),
-    ("base shifted", 1, lambda r: r.moved(0.1, 0.11), "registration-nominal"),
-    ("mask shifted", 6, lambda r: r.moved(0.15, 0.0), "bond-width"),
-    ("wall turned", 5, lambda r: r.turned(2.0), "registration-nominal"),
-    ("wall turned over", 3, flipped, "registration-nominal"),
-    ("inches for mm", 5, lambda r: scaled(r, 25.4), "press-fit"),
-    ("scaled by 1.002", 5, lambda r: scaled(r, 1.002), "registration-nominal"),
-    ("bore missing", 5, lambda r: r | disc(FIRST, 0.6), "sealing"),
-    ("bore missing in mask", 6, lambda r: r | disc(FIRST, 0.6), "channel-clear"),
-    ("bore moved", 5, lambda r: (r | disc(FIRST, 0.6)) - disc(ASIDE, 0.5), "registration-nominal"),
-    ("bore too small", 5, lambda r: (r | disc(FIRST, 0.6)) - disc(FIRST, 0.4), "channel-clear"),
-    ("bore extra", 1, lambda r: r - disc(SECOND, 0.5), "sealing"),
-    ("separator too small", 4, lambda r: shrink(r, 0.1), "mask-overhang"),
-    ("bond of 0.74", 6, lambda r: grow(r, 0.01), "bond-width"),
-    ("neck ring cut through", 4, lambda r: r | strip((4.7, 0.0), (7.0, 0.0), 0.3), "sealing"),
-    ("neck ring missing", 4, lambda r: r | (disc(FIRST, 1.5) - disc(FIRST, 0.5)), "sealing"),
-    (
-        "chamber joined to its neighbour",
-        6,
-        lambda r: (r | strip(FIRST, SECOND, 0.5)) - PINHOLES[0] - PINHOLES[1],
-        "sealing",
-    ),
-    (
-        "chamber joined to its neighbour at the inlets",
-        2,
-        lambda r: (r | strip(FIRST, SECOND, 0.5)) - PINHOLES[0] - PINHOLES[1],
-        "sealing",
-    ),
-    ("chamber joined to lumen", 6, lambda r: r | strip((0.5, 0.0), (3.0, 0.0), 0.5), "sealing"),
-    ("chamber joined to outside", 6, lambda r: r | strip((6.0, 0.0), (9.0, 0.0), 0.5), "sealing"),
-    ("chamber missing", 6, lambda r: r - disc(THIRD, 3.0), "piece-count"),
-    ("chamber missing at its inlet", 2, lambda r: r - disc(THIRD, 3.0), "sealing"),
-    ("strip cut short", 2, lambda r: r - rectangle((11.0, -2.0), (20.0, 2.0)), "tube-fit"),
-    (
-        "strip too narrow",
-        2,
-        lambda r: r - rectangle((7.5, 0.6), (20.0, 2.0)) - rectangle((7.5, -2.0), (20.0, -0.6)),
-        "tube-fit",
-    ),
-    ("tab missing", 1, lambda r: r - rectangle((7.6, -3.0), (20.0, 3.0)), "registration-nominal"),
-    ("lumen blocked", 15, lambda r: r | disc((0.0, 0.0), 1.2), "channel-clear"),
-    ("stray island", 5, lambda r: r | disc((30.0, 30.0), 1.0), "piece-count"),
-    ("slit", 5, lambda r: r - rectangle((-0.05, 2.0), (0.05, 2.4)), "film-limits"),
-]
-
-
-@pytest.mark.parametrize(
-    ("layer", "change", "rule"), [f[1:] for f in FAULTS], ids=[f[0] for f in FAULTS]
-)
-def test_faults_in_one_profile_are_caught(
-    layer: int, change: Callable[..., object], rule: str, lobed: Doctor
-) -> None:
-    lobed.redraw(layer, change)  # type: ignore[arg-type]
-    lobed.rehash()
-    found = failed(lobed.folder)
-    assert rule in found
-    assert "manifest-claims" in found
-    assert "file-integrity" not in found
 
 
 def test_a_finding_names_the_faulty_layer(lobed: Doctor) -> None:
