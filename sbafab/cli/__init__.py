@@ -60,7 +60,8 @@ def app() -> None:
 
     DESIGN is a template's name or a TOML file. Start with: sbafab generate 3dof-15mm
 
-    Exit codes: 0 done, 1 a rule failed, 2 bad input or usage, 130 stopped by Ctrl-C.
+    Exit codes: 0 done, 1 a rule failed or a simulation stopped early, 2 bad input or usage,
+    130 stopped by Ctrl-C.
     """
 
 

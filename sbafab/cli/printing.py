@@ -143,8 +143,18 @@ def print_job(job: Job) -> None:
     for one in job.checked:
         if one.failed:
             out.print()
-            out.print(Text(f"{one.design.name}: nothing was written", style="bold red"))
+            out.print(Text(one.design.name, style="bold red"))
             out.print(findings_table(one.findings))
+    if job.failed:
+        failed = sorted(
+            {f.rule for one in job.checked for f in one.findings if f.verdict == "fail"}
+        )
+        out.print()
+        words = (
+            f"Nothing was written: {', '.join(failed)} failed. {job.folder} is as it was. Change "
+            f"the designs, or waive by name: {' '.join(f'--waive {name}' for name in failed)}"
+        )
+        out.print(Text(words, style="bold red"), soft_wrap=True)
 
 
 def job_json(job: Job) -> dict[str, object]:

@@ -47,8 +47,8 @@ def refuse_to_put_away(target: Path, mine: Mapping[str, Any], own: Collection[st
         names = dict.fromkeys(path.partition("/")[0] for path in lost)
         raise OutputError(
             f"{target} holds {', '.join(names)} of a run with other settings or of another "
-            "version of sbafab; give this one a folder of its own with --set name=NAME or -o, or "
-            "run sbafab generate on it first, which replaces all that is there"
+            f"version of sbafab; take {target / 'design.toml'} for the design that was run there, "
+            "or give this one a folder of its own with --set name=NAME or -o"
         )
 
 
@@ -65,13 +65,16 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
     kept = file_hashes(old_folder)
     carried: set[str] = set()
     # Results belong to the input beside them: with other input they go, whole.
-    anew = {name for name in SIMULATORS if _differs(name, made, kept)}
+    anew: set[str] = {name for name in SIMULATORS if _differs(name, made, kept)}
     for name in anew:
         if f"{name}/{RESULTS}" in kept and f"{name}/{RESULTS}" not in made:
             raise OutputError(
                 f"{old_folder / name} holds results of other settings than these; choose another "
                 "folder with -o, or remove that one"
             )
+    old_meshes = old.get("mesh_statistics")
+    if "mesh_statistics" in index and old_meshes not in (None, index["mesh_statistics"]):
+        anew.update(MESH)
     for path, digest in (files if isinstance(files, dict) else {}).items():
         if path not in made and kept.get(path) == digest and path.partition("/")[0] not in anew:
             target = folder / path

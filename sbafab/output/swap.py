@@ -92,6 +92,12 @@ def _tidy_up(target: Path) -> None:
 
 
 def _refuse_foreign(target: Path) -> None:
+    around = read_manifest(target.parent)
+    if around is not None and around["schema"] != SCHEMA:
+        raise OutputError(
+            f"{target.parent} holds several designs made together, and its manifest lists all that "
+            f"lies in it; choose another folder with -o than for {target.name} in there"
+        )
     if target.is_symlink():
         raise OutputError(f"{target} is a link; remove it or choose another folder with -o")
     if not target.exists():

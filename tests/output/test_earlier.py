@@ -11,8 +11,9 @@ from sbafab.assemblies.reading import load
 from sbafab.assemblies.records import Assembly
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.conforming.settings import MeshSettings
 from sbafab.output.assembly import generate_assembly
-from sbafab.output.contents import Part
+from sbafab.output.contents import Conforming, Part
 from sbafab.output.manifest import file_hashes
 from sbafab.output.run import Extras, generate
 
@@ -98,3 +99,29 @@ def test_a_failing_assembly_leaves_an_earlier_run_as_it_was(tmp_path: Path) -> N
     assert run.failed
     assert run.kept
     assert file_hashes(good.folder) == before
+
+
+def test_a_design_of_an_assembly_is_not_written_into(tmp_path: Path) -> None:
+    found = load("brace", ("parts.arm.set.stack.balloons=1",))
+    assert isinstance(found, Assembly)
+    brace = generate_assembly(found, tmp_path).folder
+    before = file_hashes(brace)
+    arm = load_design(brace / "3dof-15mm" / "design.toml")
+    with pytest.raises(OutputError, match="several designs made together"):
+        generate(arm, brace, ("press",))
+    assert file_hashes(brace) == before
+
+
+def test_meshes_of_another_fill_are_not_mixed(tmp_path: Path) -> None:
+    design = load_design("1dof-5mm", SMALL)
+
+    def meshed(fill: float | None, *formats: str) -> set[str]:
+        settings = MeshSettings(h=0.7, fill_ul=fill)
+        extras = Extras(Conforming(settings, formats))
+        return set(generate(design, tmp_path, ("mesh",), extras=extras).manifest["files"])
+
+    assert "mesh/volume.vtu" in meshed(5.0, "vtu")
+    assert {"mesh/volume.vtu", "mesh/cavity_chamber1_conforming.stl"} <= meshed(5.0, "stl")
+    flat = meshed(None, "stl")
+    assert "mesh/volume.vtu" not in flat
+    assert "mesh/cavity_chamber1_conforming.stl" in flat

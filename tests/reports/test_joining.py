@@ -64,12 +64,29 @@ def test_the_tab_points_where_the_words_say(end: str, turn: float) -> None:
     x, y = (sum(a * b for a, b in zip(at, axis, strict=True)) for axis in (x_axis, y_axis))
     drawn = math.degrees(math.atan2(y, x)) * (1 if end == "end" else -1) % 360
     said = words(assembled, "head")
-    found = re.search(r"tab of chamber1 ([\d.]+) degrees anti-clockwise from the marked", said)
-    told = 0.0 if "the tab of chamber1 over the marked line" in said else float(found[1])  # type: ignore[index]
+    found = re.search(r"glued, the tab of chamber1 ([\d.]+) degrees anti-clockwise", said)
+    told = 0.0 if "glued, the tab of chamber1 over the marked line" in said else float(found[1])  # type: ignore[index]
     assert math.cos(math.radians(told - drawn)) == pytest.approx(1)
 
 
 def test_stacked_actuators_go_by_each_others_tabs() -> None:
     second = {"kind": "sba", "design": "1dof-5mm", "on": "arm", "at": "top", "turn": 90}
     said = words(together("aperture", second=second), "second")
-    assert "90 degrees anti-clockwise from the first tab of arm" in said
+    assert "with the tab of chamber1 to the right" in said
+    assert "its base glued, the tab of chamber1 90 degrees anti-clockwise from there" in said
+
+
+@pytest.mark.parametrize(("at", "way"), [("top", "5 mm up"), ("bottom", "5 mm down")])
+def test_a_place_on_a_plate_is_said_as_it_is_seen(at: str, way: str) -> None:
+    plate = {"kind": "base", "width": 60, "length": 30, "thickness": 2, "material": "acrylic"}
+    two = {"kind": "sba", "design": "1dof-5mm", "on": "plate", "at": at, "offset": [-15, 5]}
+    tables = {"name": "own", "family": "assembly", "parts": {"plate": plate, "two": two}}
+    own = assemble(assembly_of(tables, templates_folder() / "some.toml"))
+    assert f"with the arrow to the right, its middle 15 mm left and {way}" in words(own, "two")
+    assert "arrow along the 60 mm" in words(own, "plate")
+
+
+def test_a_tube_on_an_actuator_says_its_end_and_its_line() -> None:
+    tube = {"kind": "tube", "on": "arm", "at": "top", "turn": 30}
+    said = words(together("aperture", tube=tube), "tube")
+    assert "its start glued, the marked line 30 degrees anti-clockwise from there" in said

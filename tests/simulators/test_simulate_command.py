@@ -67,6 +67,9 @@ def test_pressures_that_cannot_be(wish: Wish, words: str) -> None:
         (["--with", "sofa", "--volume", "chamber1=1 kg"], "must be a volume"),
         (["--with", "sofa", "--volume", "chamber1=8"], "--volume is for --scene volume"),
         (["--with", "sofa", "--seconds", "-1"], "simulated time = -1 s"),
+        (["--with", "sofa", "--export", "--seconds", "nan"], "simulated time = nan s"),
+        (["--with", "mujoco", "--export", "--seconds", "1"], "simulated time = 1 s"),
+        (["--with", "calculix", "--minutes", "nan"], "must be a finite number"),
         (["--with", "ansys"], "calculix"),
     ],
 )

@@ -11,6 +11,7 @@ from sbafab.laminate.laminate import Layer
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.job import Job, Work
+from sbafab.reports.traveller.process import pin_lengths
 from sbafab.reports.traveller.shapes import thumbnail
 
 ADHESIVE = "Loctite Vinyl, Fabric & Plastic Flexible Adhesive"
@@ -42,7 +43,7 @@ def bill(work: Work) -> list[Item]:
         items.append(Item("Tube to wrap", what, str(job.copies)))
     pins = Counter(pin.diameter for pin in laminate.pins)
     items += [
-        Item("Dowel pins", f"⌀{say.millimetres(diameter)}", str(number))
+        Item("Dowel pins", f"⌀{say.millimetres(diameter)}; {pin_lengths(work)}", str(number))
         for diameter, number in sorted(pins.items())
     ]
     if job.fixture is not None:

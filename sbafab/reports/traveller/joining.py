@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 from sbafab.actuators.radial import RadialDesign
 from sbafab.assemblies.build import Assembled, PlacedPart
-from sbafab.assemblies.records import Base, Cup, Line, Magnet, Tube
-from sbafab.laminate.laminate import Inlet
+from sbafab.assemblies.records import Base, Cup, Line, Magnet, Sba, Tube
 from sbafab.models.sizes import inflated_diameter
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.bill import Item
@@ -91,7 +90,8 @@ def _ready(placed: PlacedPart) -> Iterator[Action]:
     elif isinstance(part, Base):
         yield Action(
             f"Have a {part.kind} of {part.material} ready, {say.size(part.width, part.length)}, "
-            f"{say.millimetres(part.thickness)} thick."
+            f"{say.millimetres(part.thickness)} thick. Mark its top, and on both faces an arrow "
+            f"along the {say.millimetres(part.width)}, the same way."
         )
     elif isinstance(part, Magnet):
         yield Action(
@@ -134,55 +134,59 @@ def _fix(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
 
 
 def _spot(placed: PlacedPart, other: PlacedPart) -> str:
+    """Where the middle of a part lies, and which way the part is turned."""
     part = placed.part
     x, y = part.offset
-    words = []
     if part.at == "outside":
-        words.append(f"{_round(part.angle)}, {say.millimetres(part.along)} from the tube's start")
-    elif x or y:
-        words.append(
-            f"its middle {say.millimetres(x)} along the other's x ({_x_of(other)}) and "
-            f"{say.millimetres(y)} along its y"
-        )
+        spot = f"{_round(part.angle)}, {say.millimetres(part.along)} from the tube's start"
+        return spot if not part.turn else f"{spot}, turned {part.turn:g} degrees anti-clockwise"
+    words = [f"looking at that face, with {_mark(other)} to the right"]
+    if x or y:
+        # What is up on an upper face is down on a lower one, looked at from below.
+        up = -y if _is_below(placed) else y
+        sides = [_aside(x, "right", "left"), _aside(up, "up", "down")]
+        words.append(f"its middle {' and '.join(filter(None, sides))}")
     else:
         words.append("axis on axis")
-    if placed.made is not None:
+    if isinstance(part, Sba | Tube | Base):
         words.append(_heading(placed, other))
-    elif part.turn:
-        words.append(f"turned {part.turn:g} degrees anti-clockwise, looking at its outer face")
     return ", ".join(words)
 
 
-def _x_of(placed: PlacedPart) -> str:
-    """Where a part's x runs, in words for the bench."""
+def _is_below(placed: PlacedPart) -> bool:
+    """Whether a part is fixed on a lower face, upside down."""
+    return placed.part.at in ("bottom", "start")
+
+
+def _aside(value: float, plus: str, minus: str) -> str:
+    return f"{say.millimetres(abs(value))} {plus if value > 0 else minus}" if value else ""
+
+
+def _mark(placed: PlacedPart) -> str:
+    """What shows a part's direction x."""
     if placed.made is not None:
-        return f"where the tab of {placed.made.laminate.inlets[0].chamber} points"
-    if isinstance(placed.part, Tube):
-        return "the marked line"
-    return "along its width" if isinstance(placed.part, Base) else "any side"
+        return f"the tab of {placed.made.laminate.inlets[0].chamber}"
+    marks = {"tube": "the marked line", "base": "the arrow", "sheet": "the arrow"}
+    return marks.get(placed.part.kind, "any side")
 
 
 def _heading(placed: PlacedPart, other: PlacedPart) -> str:
-    """Which face of an SBA is glued, and where its first tab points: that is where it bends."""
-    assert placed.made is not None
-    inlet = placed.made.laminate.inlets[0]
-    turn = _angle(inlet) + placed.turn
-    from_mark = 0.0 if other.made is None else _angle(other.made.laminate.inlets[0])
+    """Which face of a part is glued, and which way its mark points: an SBA bends by its tabs."""
+    face = {"sba": "base", "tube": "start"}.get(placed.part.kind, "underside")
     # On a lower face the part lies upside down, and is looked at from below.
-    turn += from_mark - 180 if placed.part.at in ("bottom", "start") else -from_mark
+    turn = _angle(placed) + placed.turn
+    turn += _angle(other) - 180 if _is_below(placed) else -_angle(other)
     turn = round(turn, 6) % 360
-    mark = {"tube": "the marked line", "sba": f"the first tab of {other.name}"}.get(
-        other.part.kind, f"the width of {other.name}"
-    )
-    way = f"over {mark}" if turn == 0 else f"{turn:g} degrees anti-clockwise from {mark}"
-    return (
-        f"base down on it, the tab of {inlet.chamber} {way}, looking at the face that it is "
-        "glued to"
-    )
+    way = f"over {_mark(other)}" if turn == 0 else f"{turn:g} degrees anti-clockwise from there"
+    return f"its {face} glued, {_mark(placed)} {way}"
 
 
-def _angle(inlet: Inlet) -> float:
-    return math.degrees(math.atan2(inlet.direction[1], inlet.direction[0]))
+def _angle(placed: PlacedPart) -> float:
+    """Degrees from a part's x to its mark."""
+    if placed.made is None:
+        return 0.0
+    x, y = placed.made.laminate.inlets[0].direction
+    return math.degrees(math.atan2(y, x))
 
 
 def _round(angle: float) -> str:

@@ -149,8 +149,9 @@ def _actions(
     )
     if part.pins:
         yield Action(
-            f"Check: no pin stands higher than the stack, {_height(laminate, part)} over the "
-            "plate, or a second plate with the same holes lies on top."
+            "Check: every pin reaches through the highest layer that has its hole, and none stands "
+            f"higher than the stack, {_height(laminate, part)} over the plate, or a second plate "
+            "with the same holes lies on top."
         )
     yield Action("Cover with a release film.")
     yield Action(f"Close the press and start the timer: {say.minutes(step.minutes)}.")
@@ -272,6 +273,17 @@ def finishing(work: Work) -> list[Action]:
     ]
 
 
+def pin_lengths(work: Work) -> str:
+    """How long pins are in each step that has any; no one length suits a thin and a high stack."""
+    laminate = work.laminate
+    found = [
+        f"plate + {_height(laminate, part)} in step {part.number}"
+        for part in assembly(laminate)
+        if part.pins
+    ]
+    return say.listed(found)
+
+
 def tubing(work: Work) -> list[Action]:
     """The paper's step 5, one box an inlet where it is done for each of them."""
     inlets = work.laminate.inlets
@@ -280,7 +292,11 @@ def tubing(work: Work) -> list[Action]:
     names = _apart([inlet.chamber for inlet in inlets])
     diameter = say.millimetres(inlets[0].tube_diameter)
     straight = say.millimetres(min(inlet.length for inlet in inlets))
+    first = f"the tab of {inlets[0].chamber}" if len(inlets) > 1 else "the tab"
     return [
+        Action(
+            f"Mark {first} with a pen, on the side that lay up in the press: the base is below."
+        ),
         Action(
             f"Cut {say.count(len(inlets), 'piece')} of {work.design.inlet.tube}, outer diameter "
             f"{diameter}, square and without burr, as long as your rig needs."

@@ -74,13 +74,18 @@ def simulate(
     make a ring; ``limit`` is the most real time in s. Raises DesignError where no such model can
     be made of the laminate, OutputError where mujoco is missing or its run cannot be believed.
     """
+    refuse_time(seconds)
+    find_mujoco()
+    write_model(laminate, folder, pressures, sectors)
+    return run_model(folder, seconds, tell, limit)
+
+
+def refuse_time(seconds: float) -> None:
+    """Raises DesignError for a simulated time out of range."""
     if not 2 * RAMP <= seconds <= LONGEST:
         raise DesignError(
             f"simulated time = {seconds:g} s must lie between {2 * RAMP:g} and {LONGEST:g} s"
         )
-    find_mujoco()
-    write_model(laminate, folder, pressures, sectors)
-    return run_model(folder, seconds, tell, limit)
 
 
 def find_mujoco() -> Any:

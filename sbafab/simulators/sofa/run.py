@@ -90,10 +90,7 @@ def simulate(
     it ran cannot be believed.
     """
     name, dt = SCENES[job.scene]
-    if not TIP_PERIOD <= job.seconds <= LONGEST:
-        raise DesignError(
-            f"simulated time = {job.seconds:g} s must lie between {TIP_PERIOD:g} and {LONGEST:g} s"
-        )
+    refuse_time(job.seconds)
     program = find_program()
     if folder / name not in write_scenes(laminate, folder, pressures, job.volumes):
         raise DesignError(
@@ -101,6 +98,14 @@ def simulate(
             f"{len(laminate.chambers)}; take scene shell"
         )
     return run_scene(program, folder / name, job.seconds, dt, job.limit, tell)
+
+
+def refuse_time(seconds: float) -> None:
+    """Raises DesignError for a simulated time out of range."""
+    if not TIP_PERIOD <= seconds <= LONGEST:
+        raise DesignError(
+            f"simulated time = {seconds:g} s must lie between {TIP_PERIOD:g} and {LONGEST:g} s"
+        )
 
 
 def find_program() -> str:
