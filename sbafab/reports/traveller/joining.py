@@ -140,7 +140,10 @@ def _spot(placed: PlacedPart, other: PlacedPart) -> str:
     if part.at == "outside":
         spot = f"{_round(part.angle)}, {say.millimetres(part.along)} from the tube's start"
         return spot if not part.turn else f"{spot}, turned {part.turn:g} degrees anti-clockwise"
+    has_mark = isinstance(part, Sba | Tube | Base)
     words = [f"looking at that face, with {_mark(other)} to the right"]
+    if not (x or y or has_mark):
+        return "axis on axis"
     if x or y:
         # What is up on an upper face is down on a lower one, looked at from below.
         up = -y if _is_below(placed) else y
@@ -148,7 +151,7 @@ def _spot(placed: PlacedPart, other: PlacedPart) -> str:
         words.append(f"its middle {' and '.join(filter(None, sides))}")
     else:
         words.append("axis on axis")
-    if isinstance(part, Sba | Tube | Base):
+    if has_mark:
         words.append(_heading(placed, other))
     return ", ".join(words)
 
