@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -80,6 +80,30 @@ def findings_table(findings: Sequence[Finding]) -> Table:
     return table
 
 
+def facts_table() -> Table:
+    """Without rows yet: a bold label and what is said of it."""
+    from rich.table import Table
+
+    made = Table(box=None, pad_edge=False, show_header=False)
+    made.add_column(no_wrap=True, style="bold")
+    made.add_column(ratio=1)
+    return made
+
+
+def print_failed(findings: Iterable[Finding], written: str, change: str) -> None:
+    """What failed, what was ``written`` all the same, and the two ways on."""
+    from rich.text import Text
+
+    failed = sorted({finding.rule for finding in findings if finding.verdict == "fail"})
+    words = (
+        f"{written}: {', '.join(failed)} failed. Change the {change}, or waive by name: "
+        f"{' '.join(f'--waive {name}' for name in failed)}"
+    )
+    out = console()
+    out.print()
+    out.print(Text(words, style="bold red"), soft_wrap=True)
+
+
 def _figure(value: float | None, unit: str) -> str:
     if value is None:
         return ""
@@ -89,43 +113,28 @@ def _figure(value: float | None, unit: str) -> str:
 
 def print_run(run: Run) -> None:
     """The closing table of a run: sizes, what was made, what the rules found."""
-    from rich.table import Table
     from rich.text import Text
 
     out = console()
     if not run.kept:
-        made = Table(box=None, pad_edge=False, show_header=False)
-        made.add_column(no_wrap=True, style="bold")
-        made.add_column(ratio=1)
+        made = facts_table()
         for label, text in _made(run):
             made.add_row(label, Text(text))
         out.print(made)
         out.print()
     out.print(findings_table(run.findings))
     if run.failed:
-        failed = sorted({f.rule for f in run.findings if f.verdict == "fail"})
-        out.print()
-        out.print(
-            Text(
-                f"No cut files were written: {', '.join(failed)} failed. Change the design, or "
-                f"waive by name: {' '.join(f'--waive {name}' for name in failed)}",
-                style="bold red",
-            ),
-            soft_wrap=True,
-        )
+        print_failed(run.findings, "No cut files were written", "design")
         if run.kept:
             out.print(Text(f"{run.folder} {LEFT_AS_IT_WAS}"), soft_wrap=True)
 
 
 def print_job(job: Job) -> None:
     """What a job made; for a design that a rule stopped, what the rules found."""
-    from rich.table import Table
     from rich.text import Text
 
     out = console()
-    made = Table(box=None, pad_edge=False, show_header=False)
-    made.add_column(no_wrap=True, style="bold")
-    made.add_column(ratio=1)
+    made = facts_table()
     for one in job.checked:
         warned = sorted({f.rule for f in one.findings if f.verdict == "warn"})
         said = f"; warns: {', '.join(warned)}" if warned else ""
@@ -146,15 +155,8 @@ def print_job(job: Job) -> None:
             out.print(Text(one.design.name, style="bold red"))
             out.print(findings_table(one.findings))
     if job.failed:
-        failed = sorted(
-            {f.rule for one in job.checked for f in one.findings if f.verdict == "fail"}
-        )
-        out.print()
-        words = (
-            f"Nothing was written: {', '.join(failed)} failed. {job.folder} is as it was. Change "
-            f"the designs, or waive by name: {' '.join(f'--waive {name}' for name in failed)}"
-        )
-        out.print(Text(words, style="bold red"), soft_wrap=True)
+        every = (finding for one in job.checked for finding in one.findings)
+        print_failed(every, f"Nothing was written, {job.folder} is as it was", "designs")
 
 
 def job_json(job: Job) -> dict[str, object]:

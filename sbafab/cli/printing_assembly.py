@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sbafab.cli.printing import LEFT_AS_IT_WAS, console, film_said, findings_table, replaced
+from sbafab.cli.printing import (
+    LEFT_AS_IT_WAS,
+    console,
+    facts_table,
+    film_said,
+    findings_table,
+    print_failed,
+    replaced,
+)
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -26,27 +34,15 @@ def print_assembly(run: AssemblyRun) -> None:
             out.print(findings_table(one.findings))
     out.print(findings_table(run.checked.between))
     if run.failed:
-        failed = sorted({f.rule for f in run.findings if f.verdict == "fail"})
-        out.print()
-        out.print(
-            Text(
-                f"No cut files were written: {', '.join(failed)} failed. Change the assembly, or "
-                f"waive by name: {' '.join(f'--waive {name}' for name in failed)}",
-                style="bold red",
-            ),
-            soft_wrap=True,
-        )
+        print_failed(run.findings, "No cut files were written", "assembly")
         if run.kept:
             out.print(Text(f"{run.folder} {LEFT_AS_IT_WAS}"), soft_wrap=True)
 
 
 def _made(run: AssemblyRun) -> Table:
-    from rich.table import Table
     from rich.text import Text
 
-    made = Table(box=None, pad_edge=False, show_header=False)
-    made.add_column(no_wrap=True, style="bold")
-    made.add_column(ratio=1)
+    made = facts_table()
     index = run.manifest
     parts = (f"{p['name']} ({p['design'] or p['kind']})" for p in index["parts"])
     made.add_row("assembly", Text(f"{index['name']}, {index['design_sha256'][:12]}"))

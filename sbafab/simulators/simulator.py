@@ -16,6 +16,8 @@ Progress = Callable[[str, int, int], None]
 """Told what is being done, and how much of how much is."""
 Name = Literal["calculix", "sofa", "mujoco"]
 NAMES: tuple[Name, ...] = ("calculix", "sofa", "mujoco")
+LONGEST = 1e5
+"""s of simulated time."""
 MOST_PRESSURE = 1000.0
 """kPa: nearly three times what bursts the paper's actuators."""
 
@@ -100,6 +102,14 @@ def chamber_pressures(
     if not any(found.values()):
         raise DesignError("pressure is 0 kPa in every chamber; give one of them more")
     return found
+
+
+def refuse_time(seconds: float, least: float) -> None:
+    """Raises DesignError for a simulated time out of range."""
+    if not least <= seconds <= LONGEST:
+        raise DesignError(
+            f"simulated time = {seconds:g} s must lie between {least:g} and {LONGEST:g} s"
+        )
 
 
 def refuse_unknown(names: Sequence[str], given: Mapping[str, float], what: str) -> None:

@@ -35,7 +35,10 @@ def failed(folder: Path) -> dict[str, Finding]:
 def test_a_finding_names_the_faulty_layer(lobed: Doctor) -> None:
     lobed.redraw(9, lambda r: r.moved(0.15, 0.0))
     lobed.rehash()
-    finding = failed(lobed.folder)["registration-nominal"]
+    found = failed(lobed.folder)
+    assert "manifest-claims" in found
+    assert "file-integrity" not in found
+    finding = found["registration-nominal"]
     assert 9 in finding.where.layers
     assert finding.measured == pytest.approx(0.15, abs=1e-6)
 

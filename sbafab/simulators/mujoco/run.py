@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sbafab.errors import DesignError, OutputError
+from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.simulators.coarse.tip import Tip, tip_at
 from sbafab.simulators.mujoco.files import DATA, MODEL, SECTORS, write_model
+from sbafab.simulators.simulator import refuse_time
 
 Progress = Callable[[str, int, int], None]
 """Told what is being done, and how much of how much is."""
@@ -22,10 +23,9 @@ Progress = Callable[[str, int, int], None]
 SECONDS = 5.0
 RAMP = 1.0
 """s in which a pressure rises from 0."""
+LEAST_TIME = 2 * RAMP
 TIP_PERIOD = 0.1
 """s between two records of the tip."""
-LONGEST = 1e5
-"""s of simulated time."""
 OLDEST = 4
 """Up to version 3.17 a flex of dimension 2 stretches with a quarter of its modulus."""
 INSTALL = 'install it with: pip install "sbafab[mujoco]"'
@@ -74,18 +74,10 @@ def simulate(
     make a ring; ``limit`` is the most real time in s. Raises DesignError where no such model can
     be made of the laminate, OutputError where mujoco is missing or its run cannot be believed.
     """
-    refuse_time(seconds)
+    refuse_time(seconds, LEAST_TIME)
     find_mujoco()
     write_model(laminate, folder, pressures, sectors)
     return run_model(folder, seconds, tell, limit)
-
-
-def refuse_time(seconds: float) -> None:
-    """Raises DesignError for a simulated time out of range."""
-    if not 2 * RAMP <= seconds <= LONGEST:
-        raise DesignError(
-            f"simulated time = {seconds:g} s must lie between {2 * RAMP:g} and {LONGEST:g} s"
-        )
 
 
 def find_mujoco() -> Any:

@@ -7,8 +7,8 @@ from pathlib import Path
 from sbafab.laminate.laminate import Laminate
 from sbafab.simulators.coarse.actuator import PRESSURE
 from sbafab.simulators.mujoco.files import why_no_model, write_model
-from sbafab.simulators.mujoco.run import RAMP, SECONDS, refuse_time, simulate
-from sbafab.simulators.simulator import Progress, Result, Wish, chamber_pressures
+from sbafab.simulators.mujoco.run import LEAST_TIME, RAMP, SECONDS, simulate
+from sbafab.simulators.simulator import Progress, Result, Wish, chamber_pressures, refuse_time
 
 USES = ("seconds",)
 
@@ -20,7 +20,7 @@ def why_not(laminate: Laminate) -> str | None:
 
 def export(laminate: Laminate, wish: Wish, folder: Path) -> None:
     """The model and a script that inflates it."""
-    refuse_time(SECONDS if wish.seconds is None else wish.seconds)
+    refuse_time(SECONDS if wish.seconds is None else wish.seconds, LEAST_TIME)
     write_model(laminate, folder, _pressures(laminate, wish))
 
 

@@ -15,6 +15,7 @@ from typing import BinaryIO, Literal
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.simulators.coarse.tip import Tip
+from sbafab.simulators.simulator import refuse_time
 from sbafab.simulators.sofa.files import BEAM, FRAMES, SHELL, VOLUME, write_scenes
 from sbafab.simulators.sofa.frames import BEAM_DT, FRAMES_DT
 from sbafab.simulators.sofa.parts import TIP_FILE, TIP_PERIOD
@@ -34,8 +35,6 @@ SCENES: dict[Scene, tuple[str, float]] = {
 """File and time step in s of each scene."""
 
 LOG_FILE = "runSofa.log"
-LONGEST = 1e5
-"""s of simulated time."""
 PAUSE = 0.1
 """s between two looks at how far the run is."""
 
@@ -90,7 +89,7 @@ def simulate(
     it ran cannot be believed.
     """
     name, dt = SCENES[job.scene]
-    refuse_time(job.seconds)
+    refuse_time(job.seconds, TIP_PERIOD)
     program = find_program()
     if folder / name not in write_scenes(laminate, folder, pressures, job.volumes):
         raise DesignError(
@@ -98,14 +97,6 @@ def simulate(
             f"{len(laminate.chambers)}; take scene shell"
         )
     return run_scene(program, folder / name, job.seconds, dt, job.limit, tell)
-
-
-def refuse_time(seconds: float) -> None:
-    """Raises DesignError for a simulated time out of range."""
-    if not TIP_PERIOD <= seconds <= LONGEST:
-        raise DesignError(
-            f"simulated time = {seconds:g} s must lie between {TIP_PERIOD:g} and {LONGEST:g} s"
-        )
 
 
 def find_program() -> str:

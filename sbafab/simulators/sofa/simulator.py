@@ -8,9 +8,10 @@ from typing import cast
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.simulators.coarse.actuator import PRESSURE
-from sbafab.simulators.simulator import Progress, Result, Wish, chamber_pressures
+from sbafab.simulators.simulator import Progress, Result, Wish, chamber_pressures, refuse_time
 from sbafab.simulators.sofa.files import why_no_scene, write_scenes
-from sbafab.simulators.sofa.run import USUAL, Scene, SofaJob, refuse_time, simulate
+from sbafab.simulators.sofa.parts import TIP_PERIOD
+from sbafab.simulators.sofa.run import USUAL, Scene, SofaJob, simulate
 
 USES = ("scene", "seconds", "volumes")
 
@@ -22,7 +23,7 @@ def why_not(laminate: Laminate) -> str | None:
 
 def export(laminate: Laminate, wish: Wish, folder: Path) -> None:
     """All the scenes."""
-    refuse_time(USUAL.seconds if wish.seconds is None else wish.seconds)
+    refuse_time(USUAL.seconds if wish.seconds is None else wish.seconds, TIP_PERIOD)
     write_scenes(laminate, folder, _pressures(laminate, wish), wish.volumes or None)
 
 
