@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 import sbafab
+from docs.validation_table import NONE, Row, exact, table
 from sbafab.models import paper, parabola, printed
 from sbafab.models.figures import Prediction
 from sbafab.models.flow import seconds
@@ -16,7 +16,6 @@ from sbafab.output.settings import press_settings
 from sbafab.pressing.schedule import schedule
 
 PATH = Path(__file__).parent / "validation.md"
-NONE = "none"
 
 HEAD = """# The paper's figures beside the predictions
 
@@ -37,20 +36,6 @@ every actuator, so that one number would only move the residuals about.
 | factor | from | value |
 |---|---|---|
 """
-
-
-class Row(NamedTuple):
-    """A figure of the paper; ``predicted`` None where no model knows it."""
-
-    what: str
-    measured: paper.Measured
-    predicted: float | None
-    model: str
-    why: str
-
-
-def exact(value: float, unit: str, where: str) -> paper.Measured:
-    return paper.Measured(value, 0.0, unit, where)
 
 
 def process() -> Iterator[Row]:
@@ -372,32 +357,6 @@ def calibration(one: Prediction, three: Prediction) -> Iterator[str]:
             ]
             shown = ", ".join(f"{factor:.2f}" for factor in factors)
             yield f"| contact factor, {model} | {name} at 100 kPa: flat, 25 %, 75 % | {shown} |"
-
-
-def table(title: str, rows: Sequence[Row]) -> Iterator[str]:
-    yield f"## {title}\n"
-    yield "| figure | paper | | predicted | residual | model | why they part |"
-    yield "|---|---|---|---|---|---|---|"
-    for row in rows:
-        measured = str(row.measured) if row.measured.unit else ""
-        yield (
-            f"| {row.what} | {measured} | {row.measured.where} | {_predicted(row)} | "
-            f"{_residual(row)} | {row.model} | {row.why} |"
-        )
-    yield ""
-
-
-def _predicted(row: Row) -> str:
-    return "not" if row.predicted is None else f"{row.predicted:.4g} {row.measured.unit}"
-
-
-def _residual(row: Row) -> str:
-    if row.predicted is None:
-        return ""
-    apart = row.predicted - row.measured.value
-    share = f"{apart:+.3g}, {apart / row.measured.value:+.1%}"
-    errors = f" ({abs(apart) / row.measured.error:.1f} errors)" if row.measured.error else ""
-    return f"{share}{errors}"
 
 
 def validation() -> str:
