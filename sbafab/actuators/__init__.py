@@ -2,24 +2,65 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import BaseModel
 
 from sbafab.actuators import lobed, one_dof, radial
 from sbafab.design.reading import add_waivers, design_path, override, read_toml, validated
 from sbafab.design.records import Design
+from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 
-FAMILIES: dict[str, tuple[type[Design], Callable[[Any], Laminate]]] = {
-    "1dof": (one_dof.OneDofDesign, one_dof.build),
-    "lobed": (lobed.LobedDesign, lobed.build),
-    "radial": (radial.RadialDesign, radial.build),
-}
 
+class Family(NamedTuple):
+    """A family's design record, and the function that builds the laminate of a design."""
+
+    record: type[Design]
+    build: Callable[[Any], Laminate]
+
+
+FAMILIES = {
+    "1dof": Family(one_dof.OneDofDesign, one_dof.build),
+    "lobed": Family(lobed.LobedDesign, lobed.build),
+    "radial": Family(radial.RadialDesign, radial.build),
+}
+PLUGINS = "sbafab.families"
+"""Entry points by which an installed package adds families, each a ``Family``."""
 OUTLINE = "chamber.outline"
+
+
+@cache
+def families() -> Mapping[str, Family]:
+    """All families by name: those here, then those of installed packages.
+
+    Raises DesignError where a package's family cannot be loaded or takes a name that is in use.
+    """
+    from importlib.metadata import entry_points
+
+    found = dict(FAMILIES)
+    for entry in sorted(entry_points(group=PLUGINS), key=lambda entry: entry.name):
+        try:
+            family = entry.load()
+        except Exception as error:
+            raise DesignError(
+                f"family {entry.name} of the installed package {entry.value.partition(':')[0]} "
+                f"cannot be loaded ({error}); repair or uninstall that package"
+            ) from error
+        if entry.name in found:
+            raise DesignError(
+                f"family {entry.name} is there already; uninstall one of the packages that add it"
+            )
+        found[entry.name] = family
+    return found
+
+
+def records() -> dict[str, type[Design]]:
+    """The design record of every family."""
+    return {name: family.record for name, family in families().items()}
 
 
 def load_design(
@@ -38,24 +79,23 @@ def load_design(
         # A path typed on the command line starts where the user stands, not at the design file.
         chamber = data["chamber"]
         chamber["outline"] = str(Path(str(chamber["outline"])).absolute())
-    records = {family: record for family, (record, _) in FAMILIES.items()}
-    return validated(data, records, path.parent)
+    return validated(data, records(), path.parent)
 
 
 def build(design: Design) -> Laminate:
     """The laminate of a design of any family. Raises DesignError where parts do not fit."""
-    return FAMILIES[design.family][1](design)
+    return families()[design.family].build(design)
 
 
 def schema(*others: type[BaseModel]) -> dict[str, Any]:
     """JSON schema of a design file of any family, or of ``others`` (draft 2020-12)."""
     from pydantic.json_schema import models_json_schema
 
-    records = [*(record for record, _ in FAMILIES.values()), *others]
-    _, definitions = models_json_schema([(record, "validation") for record in records])
+    every = [*records().values(), *others]
+    _, definitions = models_json_schema([(record, "validation") for record in every])
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "sbafab design",
-        "oneOf": [{"$ref": f"#/$defs/{record.__name__}"} for record in records],
+        "oneOf": [{"$ref": f"#/$defs/{record.__name__}"} for record in every],
         **definitions,
     }

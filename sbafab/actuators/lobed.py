@@ -14,10 +14,12 @@ from sbafab.actuators.pockets import (
     check_neck,
     pocket_shapes,
     reach,
+    round_pockets,
     tab_and_strip,
 )
 from sbafab.actuators.stacking import BalloonShape, Stack, balloon_cuts, layers
 from sbafab.actuators.tails import tails
+from sbafab.design.form import Form, degrees_of_freedom
 from sbafab.design.records import Design, Section
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
@@ -54,6 +56,11 @@ class LobedDesign(Design):
     """Which kind of actuator this is."""
     chamber: LobedChamber = LobedChamber()
     lumen: Lumen = Lumen()
+
+    @property
+    def form(self) -> Form:
+        pockets, count = round_pockets(self, self.chamber), self.chamber.count
+        return Form(degrees_of_freedom(count), count, pockets, lumen=self.lumen.diameter)
 
 
 def axis_radius(design: LobedDesign, pockets: list[Region]) -> tuple[float, str | None]:

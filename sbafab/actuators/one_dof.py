@@ -10,10 +10,12 @@ from sbafab.actuators.pockets import (
     bonded,
     check_neck,
     pocket_shapes,
+    round_pockets,
     tab_and_strip,
 )
 from sbafab.actuators.stacking import BalloonShape, Stack, balloon_cuts, layers
 from sbafab.actuators.tails import tails
+from sbafab.design.form import Form, degrees_of_freedom
 from sbafab.design.records import Design
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import unit
@@ -30,6 +32,10 @@ class OneDofDesign(Design):
     family: Literal["1dof"]
     """Which kind of actuator this is."""
     chamber: RoundChamber = RoundChamber()
+
+    @property
+    def form(self) -> Form:
+        return Form(degrees_of_freedom(1), 1, round_pockets(self, self.chamber))
 
 
 def build(design: OneDofDesign) -> Laminate:

@@ -8,7 +8,8 @@ from typing import Annotated
 from pydantic import Field
 
 from sbafab.actuators.ears import film_setback
-from sbafab.design.records import Design, Section
+from sbafab.design.form import Discs, Drawn
+from sbafab.design.records import Chamber, Design
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
@@ -21,13 +22,11 @@ MOST_SIZES = 40
 """Different pockets in a stack: twice the balloons that have been built (paper Sec. 6)."""
 
 
-class RoundChamber(Section):
+class RoundChamber(Chamber):
     """The chamber of a family whose pockets are discs, or one drawn outline."""
 
     diameter: Length | Annotated[tuple[Length, ...], Field(strict=False, min_length=1)] = 5.0
     """Pocket diameter; a list gives one a balloon, bottom to top (a tapered stack)."""
-    outline: str | None = Field(default=None, max_length=1000)
-    """DXF or SVG file with one closed path, drawn round (0, 0), in place of the disc."""
 
 
 def diameters(design: Design, chamber: RoundChamber) -> tuple[float, ...]:
@@ -42,16 +41,28 @@ def diameters(design: Design, chamber: RoundChamber) -> tuple[float, ...]:
     return chamber.diameter
 
 
+def round_pockets(design: Design, chamber: RoundChamber) -> Discs | Drawn:
+    """The form of these pockets."""
+    return Drawn() if chamber.outline is not None else Discs(diameters(design, chamber))
+
+
+def drawn_pocket(design: Design) -> Region | None:
+    """The pocket that the user drew, if any. Raises DesignError for what cannot be read."""
+    if design.drawing is None:
+        return None
+    from sbafab.design.outline import read_outline
+
+    return read_outline(design.drawing)
+
+
 def pocket_shapes(design: Design, chamber: RoundChamber) -> tuple[list[Region], tuple[int, ...]]:
     """The distinct pockets round (0, 0), and the index of each balloon's own."""
-    if chamber.outline is not None:
-        if not isinstance(chamber.diameter, float):
-            raise DesignError(
-                "chamber.outline and a list in chamber.diameter exclude each other; remove one"
-            )
-        from sbafab.design.outline import read_outline
-
-        drawn = read_outline(design.folder / chamber.outline)
+    if chamber.outline is not None and not isinstance(chamber.diameter, float):
+        raise DesignError(
+            "chamber.outline and a list in chamber.diameter exclude each other; remove one"
+        )
+    drawn = drawn_pocket(design)
+    if drawn is not None:
         return [drawn], (0,) * design.stack.balloons
     sizes = diameters(design, chamber)
     distinct = list(dict.fromkeys(sizes))

@@ -19,9 +19,11 @@ from sbafab.actuators.ears import (
     with_mask_ears,
     with_sheet_ears,
 )
-from sbafab.actuators.pockets import bonded, check_neck, tab_and_strip
+from sbafab.actuators.pockets import bonded, check_neck, drawn_pocket, tab_and_strip
 from sbafab.actuators.stacking import BalloonShape, Cut, Stack, balloon_cuts, layers
 from sbafab.actuators.tails import head_reach, tails
+from sbafab.design.form import Drawn, Form, Slots, Wrap
+from sbafab.design.records import Chamber as ChamberSection
 from sbafab.design.records import Design, Inlet, Section
 from sbafab.design.records import Stack as StackSection
 from sbafab.design.units import Length, LengthOrZero
@@ -35,7 +37,7 @@ from sbafab.laminate.laminate import Bore, Chamber, Laminate, Pin
 from sbafab.laminate.laminate import Inlet as LaminateInlet
 
 
-class OblongChamber(Section):
+class OblongChamber(ChamberSection):
     """Oblong pockets, or one drawn outline."""
 
     count: int = Field(default=3, ge=1, le=12)
@@ -44,8 +46,6 @@ class OblongChamber(Section):
     """Outline of one SBA round the tube, bonds included."""
     length: Length = 20.0
     """Outline of one SBA along the tube, bonds included."""
-    outline: str | None = Field(default=None, max_length=1000)
-    """DXF or SVG file with one closed path, drawn round (0, 0): the pocket, not the outline."""
 
 
 class Tube(Section):
@@ -103,6 +103,15 @@ class RadialDesign(Design):
     def pitch(self) -> float:
         """Distance between neighbouring SBAs round the tube."""
         return math.pi * self.tube.outer_diameter / self.chamber.count
+
+    @property
+    def form(self) -> Form:
+        drawn = self.chamber.outline is not None
+        width, length = _slot(self)
+        pockets = Drawn() if drawn else Slots(width, length - width)
+        wrap = Wrap(self.tube.outer_diameter, self.pitch)
+        words = "radial expansion stacked balloon actuator"
+        return Form(words, self.chamber.count, pockets, wrap=wrap)
 
     def completed(self) -> Self:
         """The same design with inlet and window sizes filled in."""
@@ -169,20 +178,26 @@ def build(design: RadialDesign) -> Laminate:
     )
 
 
-def _pocket(design: RadialDesign) -> Region:
-    if design.chamber.outline is not None:
-        from sbafab.design.outline import read_outline
+def _slot(design: RadialDesign) -> tuple[float, float]:
+    """Width and length of an oblong pocket, the smaller one first."""
+    sides = design.chamber.width, design.chamber.length
+    width, length = sorted(side - 2 * design.bond.width for side in sides)
+    return width, length
 
-        return read_outline(design.folder / design.chamber.outline)
+
+def _pocket(design: RadialDesign) -> Region:
+    drawn = drawn_pocket(design)
+    if drawn is not None:
+        return drawn
     bond = design.bond.width
-    width, length = design.chamber.width - 2 * bond, design.chamber.length - 2 * bond
-    if min(width, length) <= 0:
+    width, length = _slot(design)
+    if width <= 0:
         raise DesignError(
             f"chamber.width = {design.chamber.width:g} and chamber.length = "
             f"{design.chamber.length:g} must both exceed two bond widths, {2 * bond:g}"
         )
-    pocket = stadium((0.0, 0.0), min(width, length), max(width, length))
-    return pocket if width <= length else pocket.turned(90)
+    pocket = stadium((0.0, 0.0), width, length)
+    return pocket if design.chamber.width <= design.chamber.length else pocket.turned(90)
 
 
 def _check_pitch(design: RadialDesign, outline: Region) -> None:

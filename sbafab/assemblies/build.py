@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sbafab.actuators import build
-from sbafab.actuators.radial import RadialDesign
 from sbafab.assemblies.poses import (
     FLIPPED,
     LYING,
@@ -150,7 +149,7 @@ def _made(design: Design, name: str, parts: list[str], assembly: Assembly) -> Pa
 
 
 def _check_root(name: str, made: PartDesign | None) -> None:
-    if made is not None and isinstance(made.design, RadialDesign):
+    if made is not None and made.design.form.wrap is not None:
         raise DesignError(
             f'parts.{name} is a radial design; wrap it round a tube: on = a tube, at = "outside"'
         )
@@ -214,7 +213,7 @@ def inlet_of(name: str, line: Line, other: PlacedPart) -> Inlet:
 
 def _check_kinds(name: str, part: AnyPart, made: PartDesign | None, other: PlacedPart) -> None:
     """What a design's family allows beyond what its kind does."""
-    if made is not None and isinstance(made.design, RadialDesign):
+    if made is not None and made.design.form.wrap is not None:
         if part.at != "outside":
             _check_root(name, made)
         if part.turn % 180 != 0:

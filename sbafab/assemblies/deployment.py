@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from sbafab.actuators.radial import RadialDesign
 from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.fits import WHOLE, found
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Tube
+from sbafab.design.form import Discs
 from sbafab.models.folded import LOBES, folded_diameter
 from sbafab.models.sizes import deflated_diameter, inflated_diameter
 from sbafab.rules.finding import Finding
@@ -59,9 +59,9 @@ def _passage(placed: PlacedPart) -> _Passage:
         return _Passage(
             placed.name, size, 0.0 if soft else size, "squeezed" if soft else "as it is"
         )
-    design, laminate = placed.made.design, placed.made.laminate
-    if isinstance(design, RadialDesign):
-        size = deflated_diameter(design, laminate)
+    form, laminate = placed.made.design.form, placed.made.laminate
+    if form.wrap is not None:
+        size = deflated_diameter(form.wrap, laminate)
         return _Passage(placed.name, size, size, "deflated")
     lobe = _lobe_width(placed)
     if lobe is not None:
@@ -78,14 +78,10 @@ def _lobe_width(placed: PlacedPart) -> float | None:
     """Width in mm of a lobe of a three-lobed actuator; None for others."""
     assert placed.made is not None
     design = placed.made.design
-    chamber = getattr(design, "chamber", None)
-    if design.family != "lobed" or getattr(chamber, "count", 0) != LOBES:
+    form = design.form
+    if not form.is_parallel or form.stacks != LOBES or not isinstance(form.pockets, Discs):
         return None
-    sizes = getattr(chamber, "diameter", None)
-    if getattr(chamber, "outline", None) is not None or sizes is None:
-        return None
-    widest: float = max(sizes) if isinstance(sizes, tuple | list) else sizes
-    return widest + 2 * design.bond.width
+    return max(form.pockets.diameters) + 2 * design.bond.width
 
 
 def _flat_diameter(placed: PlacedPart) -> float:
@@ -124,9 +120,9 @@ def lumen_pass(assembled: Assembled) -> Iterator[Finding]:
 def _deflated(placed: PlacedPart, assembled: Assembled) -> float:
     if placed.made is None:
         return _girth(placed)
-    design, laminate = placed.made.design, placed.made.laminate
-    if isinstance(design, RadialDesign):
-        return deflated_diameter(design, laminate)
+    wrap, laminate = placed.made.design.form.wrap, placed.made.laminate
+    if wrap is not None:
+        return deflated_diameter(wrap, laminate)
     if placed.radius is not None:
         return 2 * (placed.radius + laminate.thickness)
     return _flat_diameter(placed)
@@ -138,11 +134,10 @@ def lumen_brace(assembled: Assembled) -> Iterator[Finding]:
     if lumen is None:
         return
     sizes = [
-        (inflated_diameter(placed.made.design, placed.made.laminate), placed.name)
+        (inflated, placed.name)
         for placed in assembled.parts
         if placed.made is not None
-        and isinstance(placed.made.design, RadialDesign)
-        and placed.made.design.chamber.outline is None
+        and (inflated := inflated_diameter(placed.made.design.form, placed.made.laminate))
     ]
     if not sizes:
         message = (

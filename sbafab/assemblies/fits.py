@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from sbafab.actuators.radial import RadialDesign
 from sbafab.assemblies.build import Assembled, PlacedPart, inlet_of
 from sbafab.assemblies.records import Line, Tube
 from sbafab.assemblies.shapes import face
@@ -43,9 +42,9 @@ def tube_match(assembled: Assembled) -> Iterator[Finding]:
         if placed.radius is None or placed.made is None or not isinstance(other.part, Tube):
             continue
         outer = other.part.outer_diameter
-        design = placed.made.design
-        if isinstance(design, RadialDesign):
-            own = design.tube.outer_diameter
+        wrap = placed.made.design.form.wrap
+        if wrap is not None:
+            own = wrap.tube_diameter
             off = abs(own - outer)
             good = holds(tolerance, off)
             message = (

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sbafab.actuators import FAMILIES, load_design
+from sbafab.actuators import load_design, records
 from sbafab.assemblies.records import FAMILY, KINDS, AnyPart, Assembly, Sba
 from sbafab.design.reading import (
     add_waivers,
@@ -93,8 +93,7 @@ def part_design(assembly: Assembly, name: str, part: Sba) -> Design:
         _keep_outline(data, part, assembly.folder)
         own = _waivers(data)
         rules = [r for r in assembly.rules.waive if r in _deck_names() and r not in own]
-        records = {family: record for family, (record, _) in FAMILIES.items()}
-        return validated(add_waivers(data, rules), records, path.parent)
+        return validated(add_waivers(data, rules), records(), path.parent)
     except DesignError as error:
         raise DesignError(f"parts.{name}: {error}") from None
 

@@ -7,11 +7,13 @@ and says so. Lengths are mm.
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator
 
+from sbafab.design.form import Form
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
 from sbafab.geometry.beam import Kerf, is_kerf
 
@@ -274,8 +276,16 @@ class Stack(Section):
     """Balloons in each chamber, bottom to top."""
 
 
+class Chamber(Section):
+    """The pockets of one chamber; a family adds their sizes."""
+
+    outline: str | None = Field(default=None, max_length=1000)
+    """DXF or SVG file with one closed path, drawn round (0, 0): the pocket, in place of the shape
+    that the family gives it."""
+
+
 class Design(Section):
-    """The sections that all families share; a family adds its own and sets ``family``."""
+    """The sections that all families share; a family adds its own, sets ``family`` and ``form``."""
 
     name: str = Field(pattern=NAME_PATTERN)
     """Names the output folder: letters, digits, dot, dash, underscore."""
@@ -294,6 +304,7 @@ class Design(Section):
     sheets: Sheets = Sheets()
     order: Order = Order()
     rules: Rules = Rules()
+    chamber: Chamber = Chamber()
 
     _folder: Path = PrivateAttr(default=Path())
 
@@ -301,6 +312,16 @@ class Design(Section):
     def folder(self) -> Path:
         """Where relative paths of the design start: the folder of its file."""
         return self._folder
+
+    @property
+    def drawing(self) -> Path | None:
+        """The file of the pockets' drawn outline, if there is one."""
+        return None if self.chamber.outline is None else self.folder / self.chamber.outline
+
+    @property
+    @abstractmethod
+    def form(self) -> Form:
+        """What the actuator is like, for models, checks and pages. Raises DesignError."""
 
     def completed(self) -> Self:
         """The same design with every default that depends on another value filled in."""

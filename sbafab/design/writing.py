@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from pathlib import Path
 from typing import Any
 
 from sbafab.design.records import Design
@@ -30,17 +29,10 @@ def design_toml(design: Design) -> str:
     return tomli_w.dumps(resolved(design))
 
 
-def outline_file(design: Design) -> Path | None:
-    """The drawn outline that the design names, if any."""
-    name = getattr(getattr(design, "chamber", None), "outline", None)
-    return None if name is None else design.folder / name
-
-
 def design_sha256(design: Design) -> str:
     """Hash of all that decides the output; a drawn outline counts by its content, not its path."""
     table = resolved(design)
-    drawn = outline_file(design)
-    if drawn is not None:
-        table["chamber"]["outline"] = hashlib.sha256(drawn.read_bytes()).hexdigest()
+    if design.drawing is not None:
+        table["chamber"]["outline"] = hashlib.sha256(design.drawing.read_bytes()).hexdigest()
     text = json.dumps(table, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()

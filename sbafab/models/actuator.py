@@ -5,10 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from sbafab.actuators.lobed import LobedDesign
-from sbafab.actuators.one_dof import OneDofDesign
-from sbafab.actuators.pockets import diameters
-from sbafab.actuators.radial import RadialDesign
+from sbafab.design.form import Discs, Form, Slots
 from sbafab.design.records import Design
 from sbafab.geometry.edges import Point
 from sbafab.laminate.laminate import Laminate
@@ -26,7 +23,7 @@ NO_OUTLINE = "no model knows the form of a drawn pocket outline; simulate the de
 class Actuator:
     """A design as the models see it.
 
-    ``stacks`` work side by side, each of ``balloons``; ``radii`` (mm, bottom to top) are those of
+    Stacks work side by side, each of ``balloons``; ``radii`` (mm, bottom to top) are those of
     round pockets, empty for oblong ones. ``kinematics`` begins with the model that sets the pace;
     it is empty for drawn outlines. ``full_stroke`` mm is what counts as full actuation.
     ``full_height`` mm is its height then; ``thickness`` mm the flat laminate's, the press factor
@@ -34,9 +31,9 @@ class Actuator:
     """
 
     design: Design
+    form: Form
     laminate: Laminate
     balloons: int
-    stacks: int
     radii: tuple[float, ...]
     kinematics: tuple[Kinematics, ...]
     full_stroke: float
@@ -56,38 +53,29 @@ class Actuator:
     def is_tapered(self) -> bool:
         return len(set(self.radii)) > 1
 
-    def is_like_paper(self, family: type[Design], radius: float) -> bool:
-        """Whether the paper measured balloons of this kind."""
-        return (
-            isinstance(self.design, family)
-            and set(self.radii) == {radius}
-            and self.stacks == (3 if family is LobedDesign else 1)
-        )
+    def is_like_paper(self, stacks: int, radius: float) -> bool:
+        """Whether the paper measured so many stacks of such balloons on common plates: its 1-DoF
+        actuators have one, its 3-DoF actuator three.
+        """
+        return self.form.wrap is None and self.form.stacks == stacks and set(self.radii) == {radius}
 
 
 def actuator(design: Design, laminate: Laminate, calibration: Calibration) -> Actuator:
     """The actuator of a design of any family."""
-    balloons = design.stack.balloons
-    stacks = 1
+    balloons, form = design.stack.balloons, design.form
     radii: tuple[float, ...] = ()
     kinematics: tuple[Kinematics, ...] = ()
     full = full_height = 0.0
     thickness = laminate.thickness * calibration.press_factor
-    if isinstance(design, RadialDesign):
-        stacks = design.chamber.count
-        if design.chamber.outline is None:
-            sides = (design.chamber.width, design.chamber.length)
-            width, length = (side - 2 * design.bond.width for side in sorted(sides))
-            kinematics = slot_stack(width, length - width, balloons)
-            full = kinematics[0].largest_stroke
-            full_height = thickness + full
-    elif isinstance(design, LobedDesign | OneDofDesign):
-        stacks = design.chamber.count if isinstance(design, LobedDesign) else 1
-        if design.chamber.outline is None:
-            radii = tuple(d / 2 for d in diameters(design, design.chamber))
-            kinematics = round_stack(radii)
-            # The paper divides its whole height by its balloons (Sec. 4.6: 1.2 mm each).
-            full = full_height = full_stroke(radii)
+    if isinstance(form.pockets, Slots):
+        kinematics = slot_stack(form.pockets.width, form.pockets.run, balloons)
+        full = kinematics[0].largest_stroke
+        full_height = thickness + full
+    elif isinstance(form.pockets, Discs):
+        radii = tuple(d / 2 for d in form.pockets.diameters)
+        kinematics = round_stack(radii)
+        # The paper divides its whole height by its balloons (Sec. 4.6: 1.2 mm each).
+        full = full_height = full_stroke(radii)
     return Actuator(
-        design, laminate, balloons, stacks, radii, kinematics, full, full_height, thickness
+        design, form, laminate, balloons, radii, kinematics, full, full_height, thickness
     )

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sbafab.actuators.lobed import LobedDesign
-from sbafab.actuators.one_dof import OneDofDesign
 from sbafab.errors import DesignError
 from sbafab.models import paper
 from sbafab.models.actuator import Actuator
@@ -96,17 +94,12 @@ def _force(
     stroke: ArrayLike,
     asked: Asked,
 ) -> NDArray[np.float64]:
-    factor = _together(actuator) * asked.calibration.contact_factor
+    factor = actuator.form.pushing * asked.calibration.contact_factor
     return factor * force(pressure, k.rate(stroke))
 
 
-def _together(actuator: Actuator) -> int:
-    """Stacks that push one way: all lobes, but one alone of those round a tube."""
-    return actuator.stacks if isinstance(actuator.design, LobedDesign) else 1
-
-
 def _each(actuator: Actuator) -> str:
-    return "" if _together(actuator) == actuator.stacks else " of one SBA"
+    return "" if actuator.form.pushing == actuator.form.stacks else " of one SBA"
 
 
 def _force_model(actuator: Actuator, k: Kinematics, asked: Asked) -> Model:
@@ -124,7 +117,7 @@ def power(actuator: Actuator, asked: Asked, mass_g: float) -> Iterator[Figure]:
     """Time, work, speed and power density, all of it at the volume of the full stroke."""
     first = actuator.kinematics[0]
     chamber = actuator.balloons * float(first.volume(actuator.full_stroke))
-    whole = chamber * actuator.stacks
+    whole = chamber * actuator.form.stacks
     yield Figure("actuation", "volume of all chambers at full stroke", whole, "ul", first.model)
     flow = Model(
         f"{first.model.name} over flow",
@@ -136,7 +129,7 @@ def power(actuator: Actuator, asked: Asked, mass_g: float) -> Iterator[Figure]:
     name = f"time to full stroke at {asked.flow_ml_min:g} ml/min"
     yield Figure("actuation", name, time, "s", flow)
     for volume in asked.volumes_ul:
-        held = volume * actuator.balloons * actuator.stacks
+        held = volume * actuator.balloons * actuator.form.stacks
         name = f"time to {volume:g} ul a balloon at {asked.flow_ml_min:g} ml/min"
         plain = Model("volume over flow", "Sec. 7", flow.trust)
         yield Figure("actuation", name, float(seconds(held, asked.flow_ml_min)), "s", plain)
@@ -156,7 +149,7 @@ def power(actuator: Actuator, asked: Asked, mass_g: float) -> Iterator[Figure]:
 def _power_density(actuator: Actuator, asked: Asked, time: float, mass_g: float) -> Figure:
     highest = max(asked.pressures_kpa)
     push = float(_force(actuator, actuator.kinematics[0], highest, 0.0, asked))
-    pushes = actuator.stacks / _together(actuator)
+    pushes = actuator.form.stacks / actuator.form.pushing
     model = Model(
         "F v / m",
         "Sec. 7",
@@ -179,13 +172,13 @@ def stroke_relation(actuator: Actuator) -> Relation:
         stroke = np.linspace(0, k.largest_stroke, SAMPLES)
         lines.append(Line(k.model.name, k.volume(stroke).tolist(), stroke.tolist(), k.model))
     points = []
-    if actuator.is_like_paper(OneDofDesign, paper.VALID_RADIUS):
+    if actuator.is_like_paper(1, paper.VALID_RADIUS):
         first = actuator.kinematics[0]
         for fluid, volume, error in paper.VALID:
             label = f"paper: Eq. 4 within {error.value:g} mm a balloon to here ({fluid})"
             at, slack = float(first.stroke(volume)), error.value * actuator.balloons
             points.append(Points(label, [volume], [at], [slack]))
-    if actuator.is_like_paper(LobedDesign, 2.5) and actuator.balloons == paper.BALLOONS:
+    if actuator.is_like_paper(3, 2.5) and actuator.balloons == paper.BALLOONS:
         ends = [0.0, max(k.largest_volume for k in actuator.kinematics)]
         label = f"paper: {paper.FULL_HEIGHT.value:g} mm high when full"
         lines.append(Line(label, ends, [paper.FULL_HEIGHT.value] * 2))
@@ -210,9 +203,9 @@ def force_relation(actuator: Actuator, asked: Asked) -> Relation:
             label = f"{k.model.name}, {pressure:g} kPa"
             lines.append(Line(label, stroke.tolist(), values.tolist(), model))
     measured = None
-    if actuator.is_like_paper(OneDofDesign, 2.5):
+    if actuator.is_like_paper(1, 2.5):
         measured = "1-DoF", paper.FORCE_1DOF
-    elif actuator.is_like_paper(LobedDesign, 2.5):
+    elif actuator.is_like_paper(3, 2.5):
         measured = "3-DoF", paper.FORCE_3DOF
     points = []
     if measured is not None:

@@ -73,9 +73,9 @@ def bending(actuator: Actuator) -> Iterator[Figure | LeftOut]:
 
 def folding(actuator: Actuator, asked: Asked) -> Figure | LeftOut:
     """Diameter of the channel that three folded lobes pass."""
-    if actuator.stacks != LOBES:
+    if actuator.form.stacks != LOBES:
         reason = f"the model is of {LOBES} lobes folded into a triangle"
-        return LeftOut("folded diameter", f"{reason}; this design has {actuator.stacks}")
+        return LeftOut("folded diameter", f"{reason}; this design has {actuator.form.stacks}")
     model = Model(
         "three lobes as chords of a circle",
         "our geometry; the paper reports 9.25",
@@ -102,7 +102,7 @@ def bending_relation(actuator: Actuator, asked: Asked) -> Relation:
         label = f"{_chambers(path.chambers)} inflated, the others flat"
         lines.append(Line(label, time.tolist(), np.degrees(path.angle).tolist(), model))
     points = []
-    if actuator.is_like_paper(type(actuator.design), 2.5) and actuator.balloons == paper.BALLOONS:
+    if actuator.is_like_paper(3, 2.5) and actuator.balloons == paper.BALLOONS:
         ends = [0.0, max(max(line.x) for line in lines)]
         largest = paper.LARGEST_BEND
         if asked.flow_ml_min == paper.WATER_FLOW:
@@ -131,7 +131,7 @@ def workspace_relation(actuator: Actuator) -> Relation:
             label = f"{_chambers(path.chambers)}, the others {rest}"
             lines.append(Line(label, path.aside.tolist(), path.height.tolist(), CURVATURE))
     points = []
-    if actuator.is_like_paper(type(actuator.design), 2.5) and actuator.balloons == paper.BALLOONS:
+    if actuator.is_like_paper(3, 2.5) and actuator.balloons == paper.BALLOONS:
         label = f"paper: all full, {paper.FULL_HEIGHT.value:g} mm"
         points.append(Points(label, [0.0], [paper.FULL_HEIGHT.value], [0.0]))
     return Relation(

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sbafab.actuators import build
-from sbafab.actuators.lobed import LobedDesign
-from sbafab.actuators.radial import RadialDesign
+from sbafab.design.form import Slots, Wrap
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import GeometryError
@@ -30,6 +29,8 @@ from sbafab.models.sizes import sizes
 from sbafab.models.stiffness import second_moments, tip_stiffness
 
 GEOMETRY = Model("plain geometry", "of the cut files", "exact for what is cut")
+PAPER_SLOTS = Slots(width=10.0, run=8.5)
+"""The paper's SBAs of 11.5 x 20 mm less a bond of 0.75 all round (Sec. 2.1)."""
 NOMINAL = Model(
     "sum of the films",
     "Sec. 2",
@@ -64,7 +65,7 @@ def predict(
 def _all(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
     mass = _mass(one.laminate)
     yield from _sizes(one, asked)
-    if one.kinematics and isinstance(one.design, LobedDesign):
+    if one.kinematics and one.form.is_parallel:
         yield lobes.folding(one, asked)
     yield Figure("size", "mass", mass.value, mass.unit, mass.model)
     yield from _tubes(one)
@@ -75,7 +76,7 @@ def _all(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
     yield from axial.strokes(one, asked)
     yield from axial.forces(one, asked)
     yield from axial.power(one, asked, mass.value)
-    if isinstance(one.design, LobedDesign):
+    if one.form.is_parallel:
         yield from lobes.bending(one)
     yield from _stiffness(one)
 
@@ -86,11 +87,11 @@ def _relations(one: Actuator, asked: Asked) -> Iterator[Relation]:
     yield axial.stroke_relation(one)
     if asked.pressures_kpa:
         yield axial.force_relation(one, asked)
-    if isinstance(one.design, LobedDesign):
+    if one.form.is_parallel:
         yield lobes.bending_relation(one, asked)
         yield lobes.workspace_relation(one)
-    if isinstance(one.design, RadialDesign):
-        yield _diameter_relation(one, one.design)
+    if one.form.wrap is not None:
+        yield _diameter_relation(one, one.form.wrap)
 
 
 def _sizes(one: Actuator, asked: Asked) -> Iterator[Figure]:
@@ -156,8 +157,7 @@ def _stiffness(one: Actuator) -> Iterator[Figure | LeftOut]:
     if plate is None:
         yield LeftOut(name, "the topmost film is not the plain outline: it has tabs or ears")
         return
-    lobed = isinstance(one.design, LobedDesign)
-    measured = paper.MODULUS_3DOF if lobed else paper.MODULUS_1DOF
+    measured = paper.MODULUS_3DOF if one.form.is_parallel else paper.MODULUS_1DOF
     least, _ = second_moments(plate)
     yield Figure("stiffness", "second moment of area of the plate", least, "mm4", GEOMETRY)
     model = Model(
@@ -170,15 +170,14 @@ def _stiffness(one: Actuator) -> Iterator[Figure | LeftOut]:
     yield Figure("stiffness", name, value, "N/mm", model)
 
 
-def _diameter_relation(one: Actuator, design: RadialDesign) -> Relation:
+def _diameter_relation(one: Actuator, wrap: Wrap) -> Relation:
     """Diameter round the tube against the air in a balloon."""
     k = one.kinematics[0]
     stroke = np.linspace(0, k.largest_stroke, axial.SAMPLES)
-    around = design.tube.outer_diameter + 2 * (one.thickness + stroke)
+    around = wrap.tube_diameter + 2 * (one.thickness + stroke)
     lines = [Line(k.model.name, k.volume(stroke).tolist(), around.tolist(), k.model)]
     label = f"paper: about {paper.RADIAL_FULL.value:g} mm inflated"
-    chamber = design.chamber
-    if (chamber.width, chamber.length, one.balloons) == (11.5, 20.0, 1):
+    if (one.form.pockets, one.balloons) == (PAPER_SLOTS, 1):
         lines.append(Line(label, [0.0, k.largest_volume], [paper.RADIAL_FULL.value] * 2))
     return Relation(
         "diameter",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sbafab.actuators.radial import RadialDesign
+from sbafab.design.form import Form, Slots, Wrap
 from sbafab.design.records import Design
 from sbafab.laminate.laminate import Laminate
 
@@ -20,13 +20,13 @@ def sizes(design: Design, laminate: Laminate) -> dict[str, float]:
         "width": high_x - low_x,
         "length": high_y - low_y,
     }
-    if isinstance(design, RadialDesign):
-        found |= {
-            "pitch": design.pitch,
-            "deflated_diameter": deflated_diameter(design, laminate),
-        }
-        if design.chamber.outline is None:
-            found["inflated_diameter"] = inflated_diameter(design, laminate)
+    form = design.form
+    if form.wrap is not None:
+        found["pitch"] = form.wrap.pitch
+        found["deflated_diameter"] = deflated_diameter(form.wrap, laminate)
+        inflated = inflated_diameter(form, laminate)
+        if inflated is not None:
+            found["inflated_diameter"] = inflated
     elif laminate.balloons > 1 and laminate.registration != "ears":
         found["outline_diameter"] = outline_diameter(laminate)
     return found
@@ -41,16 +41,18 @@ def outline_diameter(laminate: Laminate) -> float:
     return 2 * max(edge.farthest_from((0.0, 0.0)) for wall in walls for edge in wall.profile.edges)
 
 
-def deflated_diameter(design: RadialDesign, laminate: Laminate) -> float:
+def deflated_diameter(wrap: Wrap, laminate: Laminate) -> float:
     """Tube plus the flat laminate on both sides; the paper gives 15.33 (Sec. 2.1)."""
-    return design.tube.outer_diameter + 2 * laminate.thickness
+    return wrap.tube_diameter + 2 * laminate.thickness
 
 
-def inflated_diameter(design: RadialDesign, laminate: Laminate) -> float:
+def inflated_diameter(form: Form, laminate: Laminate) -> float | None:
     """Tube plus fully inflated SBAs; the paper gives about 28 (Sec. 2.1).
 
-    A flat pocket of width w whose films do not stretch becomes a cylinder of diameter 2 w / pi.
+    None without a tube, or for pockets of another shape. A flat pocket of width w whose films do
+    not stretch becomes a cylinder of diameter 2 w / pi.
     """
-    pocket = min(design.chamber.width, design.chamber.length) - 2 * design.bond.width
-    height = design.stack.balloons * 2 * pocket / math.pi
-    return design.tube.outer_diameter + 2 * (height + laminate.thickness)
+    if form.wrap is None or not isinstance(form.pockets, Slots):
+        return None
+    height = laminate.balloons * 2 * form.pockets.width / math.pi
+    return form.wrap.tube_diameter + 2 * (height + laminate.thickness)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
-from sbafab.design.writing import design_sha256, design_toml, outline_file
+from sbafab.design.writing import design_sha256, design_toml
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.files import MeshFile, write_meshes
 from sbafab.output.manifest import as_json, checks, file_hashes, manifest
@@ -180,10 +180,9 @@ def _write_pictures(checked: Checked, folder: Path, tell: Progress) -> None:
 
 
 def _write_design(design: Design, folder: Path) -> None:
-    drawn = outline_file(design)
-    if drawn is not None:
-        name = f"outline{drawn.suffix.lower()}"
-        shutil.copyfile(drawn, folder / name)
-        chamber = design.chamber.model_copy(update={"outline": name})  # type: ignore[attr-defined]
+    if design.drawing is not None:
+        name = f"outline{design.drawing.suffix.lower()}"
+        shutil.copyfile(design.drawing, folder / name)
+        chamber = design.chamber.model_copy(update={"outline": name})
         design = design.model_copy(update={"chamber": chamber})
     write_text(folder / "design.toml", design_toml(design))

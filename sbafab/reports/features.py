@@ -40,7 +40,8 @@ def balloons(laminate: Laminate) -> str:
     """How many balloons there are: 15 balloons, or 3 stacks of 1 balloon side by side."""
     high = f"{laminate.balloons} balloon{'s' if laminate.balloons > 1 else ''}"
     stacks = sum(len(chamber.centres) for chamber in laminate.chambers)
-    return f"{stacks} stacks of {high}" if laminate.family == "radial" and stacks > 1 else high
+    on_sheet = any(layer.role == "sheet" for layer in laminate.layers)
+    return f"{stacks} stacks of {high}" if on_sheet and stacks > 1 else high
 
 
 def length(value: float) -> str:

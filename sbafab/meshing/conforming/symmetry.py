@@ -48,8 +48,9 @@ class Sector(NamedTuple):
 def sector(laminate: Laminate, symmetry: Symmetry) -> Sector | None:
     """The part of the laminate to mesh, None for all of it.
 
-    Half: one side of the plane y = 0, or else of x = 0. Quarter: of a 1-DoF actuator, the one at
-    x < 0, y > 0, away from the inlet, which is left out so. Sector: one lobe with its inlet.
+    Half: one side of the plane y = 0, or else of x = 0. Quarter: of a stack on the axis, the one at
+    x < 0, y > 0, away from the inlet, which is left out so. Sector: one of several stacks round
+    the axis, with its inlet.
     Raises DesignError where the laminate is not symmetric.
     """
     if symmetry == "full":
@@ -65,18 +66,21 @@ def sector(laminate: Laminate, symmetry: Symmetry) -> Sector | None:
             return Sector(box, (("symmetry_x", (0.0, 1.0)),), 2)
     elif symmetry == "quarter":
         box = polygon([(-far, 0.0), (0.0, 0.0), (0.0, far), (-far, far)])
-        if laminate.family == "1dof" and all(_is_quarter(laminate, layer) for layer in regions):
+        if _is_on_axis(laminate) and all(_is_quarter(laminate, layer) for layer in regions):
             return Sector(box, (("symmetry_x", (0.0, 1.0)), ("symmetry_y", (-1.0, 0.0))), 4)
     else:
         count = len(laminate.chambers)
-        if laminate.family == "lobed" and all(
-            _covers(region.turned(360 / count), region) for region in regions
-        ):
+        if count > 1 and all(_covers(region.turned(360 / count), region) for region in regions):
             return _lobe(count, far)
     raise DesignError(
         f"mesh symmetry {symmetry} is not this laminate's: a profile differs from its image; "
         "use full, or leave out what is on one side only, such as ears and inlet tabs"
     )
+
+
+def _is_on_axis(laminate: Laminate) -> bool:
+    """Whether there is one stack, on the axis: a quarter of it then is a quarter of its chamber."""
+    return [chamber.centres for chamber in laminate.chambers] == [((0.0, 0.0),)]
 
 
 def _regions(laminate: Laminate) -> Sequence[Region]:

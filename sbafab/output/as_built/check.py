@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sbafab.actuators import FAMILIES, load_design
+from sbafab.actuators import load_design, records
 from sbafab.design.reading import validated
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
@@ -231,9 +231,8 @@ def _design(folder: Path, claims: Manifest) -> tuple[Design, list[Problem]]:
         digest = design_sha256(design)
     except (DesignError, OSError) as error:
         said = str(error) or type(error).__name__
-        records = {family: record for family, (record, _) in FAMILIES.items()}
         try:
-            design = validated({"name": "unknown", "family": claims.family}, records, folder)
+            design = validated({"name": "unknown", "family": claims.family}, records(), folder)
         except DesignError as unknown:
             raise OutputError(f"manifest.json: {unknown}") from None
         return design, [claim(f"checked against default limits, for {said}")]
@@ -242,13 +241,12 @@ def _design(folder: Path, claims: Manifest) -> tuple[Design, list[Problem]]:
 
 def _drawn_in_chords(design: Design) -> bool:
     """Whether the user drew the outline itself with chords for arcs."""
-    outline = getattr(getattr(design, "chamber", None), "outline", None)
-    if outline is None:
+    if design.drawing is None:
         return False
     from sbafab.design.outline import read_outline
 
     try:
-        return chorded_place(read_outline(design.folder / outline)) is not None
+        return chorded_place(read_outline(design.drawing)) is not None
     except (DesignError, OSError):
         return False
 

@@ -17,12 +17,6 @@ from sbafab.output.as_built.openings import ORIGIN, bores, tooling
 from sbafab.output.as_built.records import Manifest
 
 
-def stated_lumen(design: Design) -> float | None:
-    """The lumen's diameter that the design states, mm; None for a family without one."""
-    lumen = getattr(design, "lumen", None)
-    return None if lumen is None else float(lumen.diameter)
-
-
 def laminate_of(files: Sequence[LayerFile], claims: Manifest, design: Design) -> Laminate:
     """The laminate of files that could all be read.
 
@@ -38,7 +32,7 @@ def laminate_of(files: Sequence[LayerFile], claims: Manifest, design: Design) ->
         bores=(),
         inlets=(),
         pins=(),
-        lumen=stated_lumen(design),
+        lumen=design.form.lumen,
         balloons=sum(layer.role == "chamber-mask" for layer in layers),
         registration=design.registration.method,
     )

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from string import ascii_uppercase
 from typing import Any
 
-from sbafab.actuators.radial import RadialDesign
 from sbafab.assemblies.build import Assembled
 from sbafab.assemblies.colours import colours
 from sbafab.cutting.fixture import fixture
@@ -223,8 +222,8 @@ def _press_words(one: DesignWork) -> str:
         )
     else:
         words += f"{say.count(runs.count, 'lamination')}, {runs.count * minutes:g} min in the press"
-    if isinstance(design, RadialDesign) and design.chamber.count > 1:
-        words += f". Its {design.chamber.count} SBAs lie on one sheet and are laminated at once"
+    if design.form.wrap is not None and design.form.stacks > 1:
+        words += f". Its {design.form.stacks} SBAs lie on one sheet and are laminated at once"
         words += ", as in the paper"
     return f"{words}."
 

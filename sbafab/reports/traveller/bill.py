@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sbafab.actuators.radial import RadialDesign
 from sbafab.laminate.laminate import Layer
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
@@ -37,8 +36,9 @@ def bill(work: Work) -> list[Item]:
         items.append(Item("Tube", f"{tube}, outer diameter {diameter}", say.count(number, "piece")))
         drops = say.count(number, "small drop")
         items.append(Item("Adhesive", ADHESIVE, drops))
-    if isinstance(work.design, RadialDesign):
-        diameter = say.millimetres(work.design.tube.outer_diameter)
+    wrap = work.design.form.wrap
+    if wrap is not None:
+        diameter = say.millimetres(wrap.tube_diameter)
         what = f"to wrap the sheet round, outer diameter {diameter}"
         items.append(Item("Tube to wrap", what, str(job.copies)))
     pins = Counter(pin.diameter for pin in laminate.pins)

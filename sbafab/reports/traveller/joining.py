@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from sbafab.actuators.radial import RadialDesign
 from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Sba, Tube
 from sbafab.models.sizes import inflated_diameter
@@ -202,24 +201,23 @@ def _round(angle: float) -> str:
 def _bend(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
     part = placed.part
     assert placed.made is not None
-    design = placed.made.design
+    form = placed.made.design.form
     middle = say.millimetres(part.along)
-    if not isinstance(design, RadialDesign):
+    if form.wrap is None:
         yield Action(
             f"Bend it round {other.name}, base inward: its lumen {_round(part.angle)}, {middle} "
             f"from the tube's start; {_tab(placed)}. Try it dry."
         )
         return
     end = "start" if part.turn % 360 == 180 else "end"
-    count = design.chamber.count
     yield Action(
         f"Wrap the sheet round {other.name}, balloons outward, its straight edges along the tube: "
         f"the middle of the SBAs {middle} from the tube's start, tabs toward its {end}, the middle "
         f"SBA {_round(part.angle)}. Try it dry."
     )
     yield Action(
-        f"Check: the edges of the sheet meet, and the {count} SBAs lie {360 / count:g} degrees "
-        f"apart ({say.millimetres(design.pitch)} round the tube, measured on the sheet)."
+        f"Check: the edges of the sheet meet, and the {form.stacks} SBAs lie {360 / form.stacks:g} "
+        f"degrees apart ({say.millimetres(form.wrap.pitch)} round the tube, measured on the sheet)."
     )
 
 
@@ -309,10 +307,7 @@ def final_checks(assembled: Assembled) -> list[Action]:
 
 def _inflated(placed: PlacedPart) -> float | None:
     assert placed.made is not None
-    design = placed.made.design
-    if not isinstance(design, RadialDesign) or design.chamber.outline is not None:
-        return None
-    return inflated_diameter(design, placed.made.laminate)
+    return inflated_diameter(placed.made.design.form, placed.made.laminate)
 
 
 def bought(assembled: Assembled, copies: int) -> list[Item]:

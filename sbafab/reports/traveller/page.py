@@ -83,7 +83,7 @@ def context(work: Work) -> dict[str, Any]:
         "schedule": work.schedule,
         "job": job,
         "shapes": definitions(chain(pattern_regions(laminate), part_regions(work.sheets))),
-        "family": family_words(laminate),
+        "family": work.design.form.words,
         "facts": _facts(work),
         "code": code_svg(text),
         "code_text": text,
@@ -134,15 +134,6 @@ def frame(title: str, sha256: str, generator: str) -> dict[str, Any]:
 
 def materials(laminate: Laminate) -> list[Material]:
     return list(dict.fromkeys(layer.film.material for layer in laminate.layers))
-
-
-def family_words(laminate: Laminate) -> str:
-    """The family as a technician would say it."""
-    if laminate.family == "radial":
-        return "radial expansion stacked balloon actuator"
-    chambers = len(laminate.chambers)
-    freedoms = {1: " (1-DoF)", 3: " (3-DoF)"}.get(chambers, "")
-    return f"stacked balloon actuator with {say.count(chambers, 'chamber')}{freedoms}"
 
 
 def _facts(work: Work) -> list[tuple[str, str]]:

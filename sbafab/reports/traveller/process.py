@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from sbafab.actuators.radial import RadialDesign
 from sbafab.laminate.assembly import AssemblyStep, assembly, stack_count
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.pressing.schedule import Step
@@ -324,14 +323,14 @@ def _apart(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def wrapping(work: Work) -> list[Action]:
-    """A radial laminate goes round its tube in the end; empty for other families."""
-    design = work.design
-    if not isinstance(design, RadialDesign):
+    """Some laminates go round a tube in the end; empty for others."""
+    wrap = work.design.form.wrap
+    if wrap is None:
         return []
     return [
         Action(
             f"Wrap the sheet round its tube, outer diameter "
-            f"{say.millimetres(design.tube.outer_diameter)}, balloons outward, its straight edges "
+            f"{say.millimetres(wrap.tube_diameter)}, balloons outward, its straight edges "
             "along the tube. The paper does not say what holds it there."
         )
     ]

@@ -15,7 +15,7 @@ from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
 
 ON_AXIS = 1e-6
-SUPPORTED = "the coarse shell is made for stacks of round pockets, families 1dof and lobed"
+SUPPORTED = "the coarse shell is made for stacks of round pockets on common plates"
 NECK_SHARE, BORE_SHARE = 0.5, 0.2
 """Neck ring and bore of the paper's 5 mm pocket, for a single balloon, which has neither."""
 
@@ -54,8 +54,8 @@ def round_stack(laminate: Laminate) -> RoundStack:
     """The stack of a laminate. Raises DesignError where its pockets are not round."""
     if any(layer.role == "sheet" for layer in laminate.layers):
         raise DesignError(
-            f"{SUPPORTED}; {laminate.name} is of family {laminate.family}, whose oblong pockets on "
-            "a sheet need the conforming shell mesh"
+            f"{SUPPORTED}; the pockets of {laminate.name} lie on a sheet and need the conforming "
+            "shell mesh"
         )
     axes = tuple(chamber.centres[0] for chamber in laminate.chambers)
     rooms = [gap for gap in laminate.interfaces if gap.kind == "chamber"]

@@ -1,0 +1,158 @@
+"""A family that an installed package adds in one file gets all that the families here have."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import sbafab
+from sbafab.actuators import FAMILIES, one_dof
+
+TWIN = (
+    inspect.getsource(one_dof)
+    .replace("OneDofDesign", "TwinDesign")
+    .replace('Literal["1dof"]', 'Literal["twin"]')
+    + "\n\nfrom sbafab.actuators import Family\n\nFAMILY = Family(TwinDesign, build)\n"
+)
+SMALL = "[stack]\nballoons = 2\n[rules]\nyield_builds = 100\n"
+ASSEMBLY = """\
+name = "standing"
+family = "assembly"
+[parts.base]
+kind = "base"
+width = 30
+length = 30
+thickness = 3
+material = "acrylic"
+[parts.arm]
+kind = "sba"
+design = "{design}"
+on = "base"
+at = "top"
+"""
+
+
+def installed(folder: Path, module: str = TWIN) -> Path:
+    """A folder on the path that holds the package as pip would lay it out."""
+    (folder / "twin.py").write_text(module, encoding="utf-8")
+    record = folder / "twin-1.0.dist-info"
+    record.mkdir()
+    (record / "METADATA").write_text("Metadata-Version: 2.1\nName: twin\nVersion: 1.0\n")
+    (record / "entry_points.txt").write_text("[sbafab.families]\ntwin = twin:FAMILY\n")
+    return folder
+
+
+def sbafab_run(site: Path, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    root = Path(sbafab.__file__).parents[1]
+    paths = [str(site), str(root), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
+    code = "import sys; from sbafab.cli import main; sys.exit(main())"
+    return subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return installed(tmp_path_factory.mktemp("site"))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same design of both families, under one name."""
+    folder = tmp_path_factory.mktemp("work")
+    for family in ("1dof", "twin"):
+        text = f'name = "small"\nfamily = "{family}"\n{SMALL}'
+        (folder / f"{family}.toml").write_text(text)
+        text = ASSEMBLY.format(design=f"./{family}.toml")
+        (folder / f"{family}-standing.toml").write_text(text)
+    return folder
+
+
+def answers(site: Path, folder: Path, command: str, *options: str) -> list[str]:
+    """What a command writes for the design of either family, its family's name aside."""
+    said = []
+    for family in ("1dof", "twin"):
+        run = sbafab_run(site, folder, command, f"{family}.toml", *options)
+        assert run.returncode == 0, run.stderr
+        said.append(run.stdout.replace('"twin"', '"1dof"'))
+    return said
+
+
+def test_its_predictions_are_those_of_its_form(site: Path, folder: Path) -> None:
+    plain, added = (
+        json.loads(said)["figures"]
+        for said in answers(site, folder, "predict", "--json")
+    )
+    assert added == plain
+    assert len(added) > 30
+
+
+def test_it_has_the_symmetries_of_its_shape(site: Path, folder: Path) -> None:
+    for family in ("1dof", "twin"):
+        options = ("--symmetry", "quarter", "--h", "0.7", "-o", family)
+        run = sbafab_run(site, folder, "mesh", f"{family}.toml", *options)
+        assert run.returncode == 0, run.stderr
+    meshes = [(folder / f / "small" / "mesh" / "volume.vtu").read_bytes() for f in ("1dof", "twin")]
+    assert meshes[0] == meshes[1]
+
+
+def test_it_gets_files_pages_and_decks_and_passes_as_built(site: Path, folder: Path) -> None:
+    runs = [
+        sbafab_run(site, folder, "generate", f"{family}.toml", "--decks", "-o", f"all-{family}")
+        for family in ("1dof", "twin")
+    ]
+    assert [run.returncode for run in runs] == [0, 0], [run.stderr for run in runs]
+    plain, added = (
+        {p.relative_to(top).as_posix() for p in top.rglob("*") if p.is_file()}
+        for top in (folder / f"all-{family}" / "small" for family in ("1dof", "twin"))
+    )
+    assert added == plain
+    assert added >= {"traveller.html", "press.json", "preview/stack.svg", "mesh/solid.stl"}
+    checked = sbafab_run(site, folder, "check", "all-twin/small")
+    assert checked.returncode == 0, checked.stdout
+
+
+def test_assemblies_and_the_schema_know_it(site: Path, folder: Path) -> None:
+    found = [
+        sbafab_run(site, folder, "check", f"{family}-standing.toml", "--json").stdout
+        for family in ("1dof", "twin")
+    ]
+    assert found[0] == found[1] != ""
+    assert "TwinDesign" in sbafab_run(site, folder, "schema").stdout
+
+
+def test_a_family_that_cannot_be_loaded_is_named(tmp_path: Path, folder: Path) -> None:
+    broken = installed(tmp_path, "raise RuntimeError('no such film')\n")
+    run = sbafab_run(broken, folder, "check", "1dof.toml")
+    assert run.returncode == 2
+    assert "family twin of the installed package twin cannot be loaded (no such film)" in run.stderr
+    assert "Traceback" not in run.stderr
+
+
+def modules_outside_the_families() -> list[Path]:
+    top = Path(sbafab.__file__).parent
+    return [p for p in sorted(top.rglob("*.py")) if "actuators" not in p.relative_to(top).parts]
+
+
+def test_no_room_but_actuators_asks_a_familys_name() -> None:
+    own = {"one_dof", "lobed", "radial"}
+    for path in modules_outside_the_families():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            said = node.value if isinstance(node, ast.Constant) else None
+            assert said not in FAMILIES, f"{path.name}:{node.lineno} names the family {said}"
+            if isinstance(node, ast.ImportFrom) and node.module:
+                assert own.isdisjoint(node.module.split(".")), f"{path.name}:{node.lineno}"
+                names = {alias.name for alias in node.names}
+                assert node.module != "sbafab.actuators" or own.isdisjoint(names), path.name
