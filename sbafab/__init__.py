@@ -1,7 +1,7 @@
 """Fabrication CAD for soft Stacked Balloon Actuators.
 
 >>> import sbafab
->>> laminate = sbafab.build("3dof-15mm", "stack.balloons=6")
+>>> laminate = sbafab.build("3dof-15mm", stack={"balloons": 6})
 >>> run = sbafab.generate("3dof-15mm", out="out")
 """
 
@@ -10,10 +10,46 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sbafab.api import assemble, build, check, generate, load, predict, schema, templates
+    from sbafab.api import (
+        assemble,
+        build,
+        check,
+        check_folder,
+        cut,
+        drawing,
+        generate,
+        kerf,
+        load,
+        mesh,
+        nest,
+        predict,
+        press,
+        schema,
+        simulate,
+        solid,
+        templates,
+    )
 
 __version__ = "0.1.0"
-__all__ = ["assemble", "build", "check", "generate", "load", "predict", "schema", "templates"]
+__all__ = [
+    "assemble",
+    "build",
+    "check",
+    "check_folder",
+    "cut",
+    "drawing",
+    "generate",
+    "kerf",
+    "load",
+    "mesh",
+    "nest",
+    "predict",
+    "press",
+    "schema",
+    "simulate",
+    "solid",
+    "templates",
+]
 
 
 def __dir__() -> list[str]:

@@ -1,28 +1,42 @@
-"""The program from Python: the commands' names, a line each.
+"""The program from Python: the commands' names, each a function.
 
 >>> import sbafab
->>> laminate = sbafab.build("3dof-15mm", "stack.balloons=6")
+>>> laminate = sbafab.build("3dof-15mm", stack={"balloons": 6})
 >>> run = sbafab.generate("3dof-15mm", out="out")
+
+A design is given as a template's name, a TOML file, or a ``Design``. Keys are changed by texts,
+``"stack.balloons=6"``, by dicts, ``{"stack.balloons": 6}``, or by keywords, ``stack={"balloons":
+6}``. Bad input raises ``sbafab.errors.DesignError``, a folder that cannot be written
+``OutputError``, each with one sentence.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sbafab import actuators
-from sbafab.design.reading import template_names
+from sbafab.design.reading import Change, template_names
 from sbafab.design.records import Design
 
 if TYPE_CHECKING:
+    from ezdxf.document import Drawing
+
     from sbafab.assemblies.build import Assembled
     from sbafab.assemblies.records import Assembly
-    from sbafab.laminate.laminate import Laminate
+    from sbafab.cutting.calibration import Calibration
+    from sbafab.cutting.dxf_write import DxfProfile
+    from sbafab.laminate.laminate import Laminate, Layer
+    from sbafab.meshing.surface import Surface
     from sbafab.models.figures import Prediction
     from sbafab.output.assembly import AssemblyRun
+    from sbafab.output.job import Job
     from sbafab.output.run import Run
-    from sbafab.rules.finding import Finding
+    from sbafab.output.simulating import Simulated
+    from sbafab.rules.finding import Findings
+    from sbafab.simulators.simulator import Name
 
 Source = Design | str | Path
 
@@ -32,68 +46,161 @@ def templates() -> list[str]:
     return template_names()
 
 
-def load(source: Source, *assignments: str) -> Design:
-    """A design from a template's name or a TOML file, with ``"key=value"`` texts applied."""
+def load(source: Source, *changes: Change, **tables: Any) -> Design:
+    """A design, with keys changed. Raises DesignError."""
     if isinstance(source, Design):
-        if assignments:
-            raise TypeError("assignments go with a name or a file, not with a loaded design")
-        return source
-    return actuators.load_design(source, assignments)
+        return source.with_(*changes, **tables) if changes or tables else source
+    return actuators.load_design(source, [*changes, tables])
 
 
-def build(source: Source, *assignments: str) -> Laminate:
+def build(source: Source, *changes: Change, **tables: Any) -> Laminate:
     """The laminate of a design; in a notebook it shows itself as a picture."""
-    return actuators.build(load(source, *assignments))
+    return actuators.build(load(source, *changes, **tables))
 
 
-def assemble(source: str | Path, *assignments: str) -> Assembled:
+def assemble(source: str | Path, *changes: Change, **tables: Any) -> Assembled:
     """An assembly from a template's name or a TOML file: its parts with designs and places."""
     from sbafab.assemblies.build import assemble as put_together
     from sbafab.assemblies.reading import load_assembly
 
-    return put_together(load_assembly(source, assignments))
+    return put_together(load_assembly(source, [*changes, tables]))
 
 
-def check(source: Source, *assignments: str) -> tuple[Finding, ...]:
+def check(source: Source, *changes: Change, **tables: Any) -> Findings:
     """What the rule deck finds in a design; of an assembly, also what is found between parts."""
     from sbafab.assemblies.records import Assembly
     from sbafab.output.assembly import check_assembly
     from sbafab.output.run import check as run_check
+    from sbafab.rules.finding import Findings
 
-    found = _loaded(source, assignments)
+    found = _loaded(source, changes, tables)
     if isinstance(found, Assembly):
-        return check_assembly(found).findings
-    return run_check(found)[1]
+        return Findings(check_assembly(found).findings)
+    return Findings(run_check(found)[1])
 
 
-def generate(source: Source, *assignments: str, out: str | Path = "out") -> Run | AssemblyRun:
+def check_folder(folder: str | Path) -> Findings:
+    """What the rule deck finds in the cut files of an output folder as they lie on disk."""
+    from sbafab.output.as_built.check import check_folder as read_and_check
+    from sbafab.rules.finding import Findings
+
+    return Findings(read_and_check(Path(folder)))
+
+
+def generate(
+    source: Source, *changes: Change, out: str | Path = "out", **tables: Any
+) -> Run | AssemblyRun:
     """Writes everything into ``out/<name>/``; the run tells whether a rule failed."""
     from sbafab.assemblies.records import Assembly
     from sbafab.output.assembly import generate_assembly
     from sbafab.output.run import generate as run_generate
 
-    found = _loaded(source, assignments)
+    found = _loaded(source, changes, tables)
     if isinstance(found, Assembly):
         return generate_assembly(found, Path(out))
     return run_generate(found, Path(out))
 
 
-def _loaded(source: Source, assignments: Sequence[str]) -> Design | Assembly:
+def _loaded(
+    source: Source, changes: Sequence[Change], tables: Mapping[str, Any]
+) -> Design | Assembly:
     from sbafab.assemblies.reading import load as load_either
 
     if isinstance(source, Design):
-        return load(source, *assignments)
-    return load_either(source, assignments)
+        return load(source, *changes, **tables)
+    return load_either(source, [*changes, tables])
+
+
+def cut(
+    source: Source,
+    *changes: Change,
+    out: str | Path = "out",
+    dxf_profile: DxfProfile = "bulges",
+    chord_error: float = 0.005,
+    **tables: Any,
+) -> Run:
+    """Writes the cut files and film sheets; ``chord_error`` mm counts for the profile "chords"."""
+    from sbafab.output.run import generate as run_generate
+
+    design = load(source, *changes, **tables)
+    return run_generate(design, Path(out), ("cut",), None, dxf_profile, chord_error)
+
+
+def press(source: Source, *changes: Change, out: str | Path = "out", **tables: Any) -> Run:
+    """Writes the heat-press schedule, ``press.json`` and ``press.csv``."""
+    from sbafab.output.run import generate as run_generate
+
+    return run_generate(load(source, *changes, **tables), Path(out), ("press",))
+
+
+def mesh(
+    source: Source,
+    *changes: Change,
+    out: str | Path = "out",
+    formats: Sequence[str] = ("vtu",),
+    **asked: Any,
+) -> Run:
+    """Writes solid, cavities and conforming meshes; the latter stand in the run's ``conforming``.
+
+    ``asked`` holds fields of ``MeshSettings``, such as ``h`` mm, ``symmetry`` and ``fill_ul``,
+    beside tables of the design. Takes the extra "mesh".
+    """
+    from sbafab.meshing.conforming.settings import MeshSettings
+    from sbafab.output.contents import Conforming
+    from sbafab.output.run import Extras
+    from sbafab.output.run import generate as run_generate
+
+    settings, tables = _parted(asked, MeshSettings)
+    extras = Extras(Conforming(MeshSettings(**settings), tuple(formats)))
+    return run_generate(load(source, *changes, **tables), Path(out), ("mesh",), extras=extras)
+
+
+def _parted(asked: Mapping[str, Any], record: type) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What of the keywords are fields of the record, and what are tables of a design."""
+    names = {field.name for field in fields(record)}
+    return (
+        {name: value for name, value in asked.items() if name in names},
+        {name: value for name, value in asked.items() if name not in names},
+    )
+
+
+def nest(sources: Sequence[Source], name: str = "job", out: str | Path = "out") -> Job:
+    """Writes several designs into ``out/<name>/``, cut from the same film sheets."""
+    from sbafab.output.job import generate_job
+
+    return generate_job([load(source) for source in sources], name, Path(out))
+
+
+def simulate(
+    source: Source,
+    *changes: Change,
+    simulator: Name,
+    out: str | Path = "out",
+    export: bool = False,
+    **asked: Any,
+) -> Simulated:
+    """Runs a simulator that is installed into ``out/<name>/<simulator>/``.
+
+    ``asked`` holds fields of ``simulators.simulator.Wish``, such as ``pressure`` kPa, ``chambers``
+    and ``minutes``, beside tables of the design. ``export`` writes what it reads and runs nothing.
+    """
+    from sbafab.output.simulating import simulate as run
+    from sbafab.simulators.simulator import Wish
+
+    wish, tables = _parted(asked, Wish)
+    design = load(source, *changes, **tables)
+    return run(design, simulator, Wish(**wish), Path(out), export=export)
 
 
 def predict(
     source: Source,
-    *assignments: str,
+    *changes: Change,
     pressures_kpa: Sequence[float] = (10.0, 100.0),
     flow_ml_min: float = 35.0,
     volumes_ul: Sequence[float] = (),
     press_factor: float = 1.0,
     contact_factor: float = 1.0,
+    **tables: Any,
 ) -> Prediction:
     """What a design will do, by closed formulas; each figure names its model and its trust.
 
@@ -104,7 +211,36 @@ def predict(
 
     factors = Calibration(press_factor, contact_factor)
     asked = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), factors)
-    return model_predict(load(source, *assignments), asked)
+    return model_predict(load(source, *changes, **tables), asked)
+
+
+def kerf(measurements: str | Path, resolution: float = 0.01) -> Calibration:
+    """The kerf from a filled ``coupon.csv``; ``resolution`` mm is the least step measured."""
+    from sbafab.cutting.calibration import calibrated, read_measurements
+
+    return calibrated(read_measurements(Path(measurements)), resolution)
+
+
+def solid(source: Source | Laminate, *changes: Change, **tables: Any) -> Surface:
+    """The closed surface of the flat actuator, for example for ``solid(...).trimesh()``."""
+    from sbafab.laminate.laminate import Laminate
+    from sbafab.meshing.solid import solid as surface_of
+
+    flat = source if isinstance(source, Laminate) else build(source, *changes, **tables)
+    return surface_of(flat)
+
+
+def drawing(layer: Layer) -> Drawing:
+    """A layer as an ezdxf document: nominal edges as in its cut file, no kerf taken off."""
+    from io import StringIO
+
+    from ezdxf.filemanagement import read
+
+    from sbafab.cutting.dxf_write import dxf_text
+    from sbafab.cutting.order import cutting_order
+
+    text = dxf_text(cutting_order(layer.profile), {"PATTERN": layer.pattern, "UNITS": "mm"})
+    return read(StringIO(text))
 
 
 def schema() -> dict[str, Any]:

@@ -10,7 +10,15 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from sbafab.actuators import lobed, one_dof, radial
-from sbafab.design.reading import add_waivers, design_path, override, read_toml, validated
+from sbafab.design.reading import (
+    Change,
+    add_waivers,
+    design_path,
+    override,
+    read_toml,
+    start_where_the_user_stands,
+    validated,
+)
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
@@ -30,7 +38,6 @@ FAMILIES = {
 }
 PLUGINS = "sbafab.families"
 """Entry points by which an installed package adds families, each a ``Family``."""
-OUTLINE = "chamber.outline"
 
 
 @cache
@@ -64,21 +71,18 @@ def records() -> dict[str, type[Design]]:
 
 
 def load_design(
-    source: str | Path, assignments: Iterable[str] = (), waivers: Sequence[str] = ()
+    source: str | Path, changes: Iterable[Change] = (), waivers: Sequence[str] = ()
 ) -> Design:
-    """A design from a template's name or a TOML file, with ``key=value`` assignments applied.
+    """A design from a template's name or a TOML file, with changes made to its keys.
 
     ``waivers`` are rule names added to those that the file waives. Raises DesignError with one
     sentence where it cannot be built.
     """
     path = design_path(source)
-    assignments = list(assignments)
-    data = add_waivers(override(read_toml(path), assignments), waivers)
+    changes = list(changes)
+    data = add_waivers(override(read_toml(path), changes), waivers)
     data.setdefault("name", path.stem)
-    if any(assignment.partition("=")[0].strip() == OUTLINE for assignment in assignments):
-        # A path typed on the command line starts where the user stands, not at the design file.
-        chamber = data["chamber"]
-        chamber["outline"] = str(Path(str(chamber["outline"])).absolute())
+    start_where_the_user_stands(data, changes)
     return validated(data, records(), path.parent)
 
 

@@ -10,7 +10,9 @@ from typing import Any
 from sbafab.actuators import load_design, records
 from sbafab.assemblies.records import FAMILY, KINDS, AnyPart, Assembly, Sba
 from sbafab.design.reading import (
+    Change,
     add_waivers,
+    changed_keys,
     checked,
     design_path,
     listed,
@@ -24,23 +26,23 @@ from sbafab.errors import DesignError
 
 
 def load(
-    source: str | Path, assignments: Iterable[str] = (), waivers: Sequence[str] = ()
+    source: str | Path, changes: Iterable[Change] = (), waivers: Sequence[str] = ()
 ) -> Design | Assembly:
     """A design or an assembly, whichever the file holds. Raises DesignError."""
-    assignments = list(assignments)
+    changes = list(changes)
     path = design_path(source)
-    data = override(read_toml(path), assignments)
+    data = override(read_toml(path), changes)
     if data.get("family") != FAMILY:
-        return load_design(source, assignments, waivers)
-    _start_where_the_user_stands(data, assignments)
+        return load_design(source, changes, waivers)
+    _start_where_the_user_stands(data, changes)
     return assembly_of(add_waivers(data, waivers), path)
 
 
 def load_assembly(
-    source: str | Path, assignments: Iterable[str] = (), waivers: Sequence[str] = ()
+    source: str | Path, changes: Iterable[Change] = (), waivers: Sequence[str] = ()
 ) -> Assembly:
     """An assembly from a template's name or a TOML file. Raises DesignError."""
-    found = load(source, assignments, waivers)
+    found = load(source, changes, waivers)
     if isinstance(found, Assembly):
         return found
     raise DesignError(
@@ -88,7 +90,7 @@ def part_design(assembly: Assembly, name: str, part: Sba) -> Design:
                 f"design = {shown(part.design)} is an assembly; a part is made from the design of "
                 "one actuator"
             )
-        data = _merged(_merged(table, part.set), assembly.shared)
+        data = override(table, [part.set, assembly.shared])
         data.setdefault("name", path.stem)
         _keep_outline(data, part, assembly.folder)
         own = _waivers(data)
@@ -116,16 +118,6 @@ def _deck_names() -> frozenset[str]:
     return frozenset(rule.name for rule in RULES)
 
 
-def _merged(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """``data`` with the values of ``changes`` in place of its own, table by table."""
-    merged = dict(data)
-    for key, value in changes.items():
-        own = merged.get(key)
-        both = isinstance(value, dict) and isinstance(own, dict)
-        merged[key] = _merged(own, value) if both else value  # type: ignore[arg-type]
-    return merged
-
-
 def _keep_outline(data: dict[str, Any], part: Sba, folder: Path) -> None:
     """An outline that the assembly's file names lies beside that file, not beside the design."""
     chamber = part.set.get("chamber")
@@ -133,11 +125,10 @@ def _keep_outline(data: dict[str, Any], part: Sba, folder: Path) -> None:
         data["chamber"]["outline"] = str((folder / chamber["outline"]).absolute())
 
 
-def _start_where_the_user_stands(data: dict[str, Any], assignments: Sequence[str]) -> None:
+def _start_where_the_user_stands(data: dict[str, Any], changes: Sequence[Change]) -> None:
     """A design's path typed on the command line starts there, not at the assembly's file."""
-    for assignment in assignments:
-        keys = [key.strip() for key in assignment.partition("=")[0].split(".")]
-        match keys:
+    for key in changed_keys(changes):
+        match key.split("."):
             case ["parts", name, "design"] if said := data["parts"][name].get("design"):
                 if isinstance(_place_of(str(said), Path()), Path):
                     data["parts"][name]["design"] = str(Path(str(said)).absolute())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,17 +17,6 @@ if TYPE_CHECKING:
 SIMULATORS = ("calculix", "sofa", "mujoco")
 """As in ``sbafab.simulators.simulator``, whose imports would slow ``--help`` down."""
 MOST_MINUTES = 10_000
-UNITS = {
-    "length": "mm",
-    "pressure": "kPa",
-    "volume": "ul",
-    "stress": "MPa",
-    "work": "uJ",
-    "angle": "degrees",
-    "time": "s",
-    "rate": "steps/s",
-}
-"""Of what ``result.json`` holds."""
 
 
 @click.command()
@@ -103,44 +91,26 @@ def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> N
     from sbafab.actuators import load_design
     from sbafab.cli.printing import console, findings_table, print_json, shown_progress
     from sbafab.models.force import BURST_KPA
-    from sbafab.output.contents import Checked
-    from sbafab.output.earlier import refuse_to_put_away
-    from sbafab.output.manifest import as_json, checks, identity
-    from sbafab.output.run import Extras, check, generate, with_folder
-    from sbafab.simulators.simulator import Result, Wish
-    from sbafab.simulators.simulator import simulator as find
+    from sbafab.output.manifest import checks
+    from sbafab.output.simulating import simulate as run
+    from sbafab.simulators.simulator import Wish
 
     wish = Wish(**asked)
     _refuse_unused(simulator, wish)
     design = load_design(request.designs[0], request.assignments, request.waivers)
-    with shown_progress(request.as_json) as tell, tempfile.TemporaryDirectory() as place:
-        checked = Checked(design, *check(design, tell))
-        if checked.failed:
-            if request.as_json:
-                print_json(checks(checked.findings, "design"))
-            else:
-                console().print(findings_table(checked.findings))
-            click.get_current_context().exit(RULE_FAILED)
-        # Said before a run of hours, not after it.
-        refuse_to_put_away(
-            request.out / design.name, identity(design, checked.waived), (simulator,)
-        )
-        # A folder in the temporary one has the usual rights, the temporary one itself has not.
-        folder = Path(place) / simulator
-        if export:
-            find(simulator).export(checked.laminate, wish, folder)
-            found = Result((), {})
+    with shown_progress(request.as_json) as tell:
+        made = run(design, simulator, wish, request.out, tell, export)
+    if made.folder is None:
+        if request.as_json:
+            print_json(checks(made.findings, "design"))
         else:
-            found = find(simulator).run(checked.laminate, wish, folder, tell)
-            told = as_json({"units": UNITS, **found.figures, "stopped": found.stopped})
-            (folder / "result.json").write_text(told, encoding="utf-8", newline="\n")
-        extras = Extras(also=with_folder(folder), own=(simulator,))
-        run = generate(design, request.out, (), tell, extras=extras)
-    target = run.folder / simulator
+            console().print(findings_table(made.findings))
+        click.get_current_context().exit(RULE_FAILED)
+    found = made.result
     if request.as_json:
-        print_json({"folder": str(target), **found.figures, "stopped": found.stopped})
+        print_json({"folder": str(made.folder), **found.figures, "stopped": found.stopped})
     else:
-        _print(found, target)
+        _print(found, made.folder)
     most = max(wish.pressure or 0.0, *wish.chambers.values(), 0.0)
     if most > BURST_KPA:
         click.echo(

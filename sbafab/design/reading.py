@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,8 +13,14 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from sbafab.design.records import Design
+from sbafab.design.writing import plain_tables
 from sbafab.errors import DesignError
 
+Change = str | Mapping[str, Any]
+"""A key to set: "key.path=value", or a table of keys, which may be dotted, with their values."""
+OUTLINE = "chamber.outline"
+Record = TypeVar("Record", bound=BaseModel)
+AnyDesign = TypeVar("AnyDesign", bound=Design)
 MOST_BYTES = 1_000_000
 ASSEMBLY = "assembly"
 """The family of files that name several designs; :mod:`sbafab.assemblies` reads them."""
@@ -88,25 +94,74 @@ def read_toml(path: Path) -> dict[str, Any]:
         ) from None
 
 
-def override(data: Mapping[str, Any], assignments: Iterable[str]) -> dict[str, Any]:
-    """``data`` with every ``key.path=value`` set; the value is TOML, or else plain text."""
+def override(data: Mapping[str, Any], changes: Iterable[Change]) -> dict[str, Any]:
+    """``data`` with every change made: keys set by ``key.path=value`` texts or by tables.
+
+    The value in a text is TOML, or else plain text. Raises DesignError for what is no change.
+    """
     changed = _copied(data)
-    for assignment in assignments:
-        key, equals, text = assignment.partition("=")
-        parts = [part.strip() for part in key.split(".")]
-        if not equals or not all(parts) or len(parts) > DEEPEST:
-            raise DesignError(
-                f"--set {shown(assignment)} is not KEY=VALUE; write for example "
-                "--set chamber.diameter=6"
-            )
-        table = changed
-        for part in parts[:-1]:
-            inner = table.setdefault(part, {})
-            if not isinstance(inner, dict):
-                raise DesignError(f"--set {key}: {part} is a value, not a table")
-            table = inner
-        table[parts[-1]] = _value(text.strip())
+    for change in changes:
+        if isinstance(change, str):
+            key, equals, text = change.partition("=")
+            if not equals or not all(_key_parts(key)):
+                raise DesignError(
+                    f"--set {shown(change)} is not KEY=VALUE; write for example "
+                    "--set chamber.diameter=6"
+                )
+            _set(changed, key, _value(text.strip()))
+        else:
+            for key, value in change.items():
+                _set(changed, key, value)
     return changed
+
+
+def changed_keys(changes: Iterable[Change]) -> Iterator[str]:
+    """Every dotted key that the changes set."""
+    for change in changes:
+        if isinstance(change, str):
+            yield ".".join(_key_parts(change.partition("=")[0]))
+            continue
+        for key, value in change.items():
+            inner = changed_keys([value]) if isinstance(value, Mapping) else ()
+            yield from (f"{key}.{name}" for name in inner)
+            yield key
+
+
+def _key_parts(key: str) -> list[str]:
+    return [part.strip() for part in key.split(".")]
+
+
+def _set(table: dict[str, Any], key: str, value: Any) -> None:
+    """Sets a dotted key; a table as value changes only the keys that it holds."""
+    parts = _key_parts(key)
+    if len(parts) > DEEPEST:
+        raise DesignError(f"--set {shown(key)} has {len(parts)} parts; a design's keys have three")
+    for part in parts[:-1]:
+        inner = table.setdefault(part, {})
+        if not isinstance(inner, dict):
+            raise DesignError(f"--set {key}: {part} is a value, not a table")
+        table = inner
+    own = table.get(parts[-1])
+    if isinstance(value, Mapping):
+        table[parts[-1]] = override(own if isinstance(own, dict) else {}, [value])
+    else:
+        table[parts[-1]] = list(value) if isinstance(value, tuple) else value
+
+
+def start_where_the_user_stands(data: dict[str, Any], changes: Iterable[Change]) -> None:
+    """A drawing's path that a change names starts there, not at the design file."""
+    if OUTLINE in changed_keys(changes):
+        chamber = data["chamber"]
+        chamber["outline"] = str(Path(str(chamber["outline"])).absolute())
+
+
+def changed(design: AnyDesign, changes: Iterable[Change]) -> AnyDesign:
+    """The same design with changes made to its keys. Raises DesignError with one sentence."""
+    changes = list(changes)
+    data = override(plain_tables(design), changes)
+    start_where_the_user_stands(data, changes)
+    family = type(design)
+    return checked(family, data, {design.family: family}).placed(design.folder)
 
 
 def add_waivers(data: dict[str, Any], waivers: Sequence[str]) -> dict[str, Any]:
@@ -150,9 +205,6 @@ def validated(
         hint = f"; did you mean {near[0]}?" if near else ""
         raise DesignError(f"family = {shown(family)} must be one of {listed(families)}{hint}")
     return checked(families[family], data, families).placed(folder)
-
-
-Record = TypeVar("Record", bound=BaseModel)
 
 
 def checked(

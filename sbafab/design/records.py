@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator
 
 from sbafab.design.form import Form
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
 from sbafab.geometry.beam import Kerf, is_kerf
+from sbafab.notebook import table_html
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
 UNCALIBRATED: Literal["uncalibrated"] = "uncalibrated"
@@ -322,6 +324,24 @@ class Design(Section):
     @abstractmethod
     def form(self) -> Form:
         """What the actuator is like, for models, checks and pages. Raises DesignError."""
+
+    def with_(self, *changes: str | Mapping[str, Any], **tables: Any) -> Self:
+        """The same design with keys changed, checked like a design file.
+
+        ``design.with_("stack.balloons=6")``, ``design.with_({"stack.balloons": 6})`` and
+        ``design.with_(stack={"balloons": 6})`` say the same. Raises DesignError with one sentence.
+        """
+        from sbafab.design.reading import changed
+
+        return changed(self, [*changes, tables])
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.name!r}, {self.stack.balloons} balloons)"
+
+    def _repr_html_(self) -> str:
+        from sbafab.design.writing import keys_of
+
+        return table_html(("key", "value", "default"), keys_of(self), self.name)
 
     def completed(self) -> Self:
         """The same design with every default that depends on another value filled in."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterator
 from typing import Any
 
 from sbafab.design.records import Design
@@ -14,12 +15,35 @@ def resolved(design: Design) -> dict[str, Any]:
     return _without_none(design.completed().model_dump(mode="json"))
 
 
+def plain_tables(design: Design) -> dict[str, Any]:
+    """The design as tables of a TOML file, defaults that depend on other values left open."""
+    return _without_none(design.model_dump(mode="json"))
+
+
 def _without_none(table: dict[str, Any]) -> dict[str, Any]:
     return {
         key: _without_none(value) if isinstance(value, dict) else value
         for key, value in table.items()
         if value is not None
     }
+
+
+def keys_of(design: Design) -> list[tuple[str, object, object]]:
+    """Dotted key, value and default of every key, the default only where the value differs."""
+    plain = type(design).model_validate({"name": design.name, "family": design.family})
+    usual = dict(_dotted(resolved(plain)))
+    return [
+        (key, value, usual.get(key) if usual.get(key) != value else None)
+        for key, value in _dotted(resolved(design))
+    ]
+
+
+def _dotted(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, object]]:
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _dotted(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
 
 
 def design_toml(design: Design) -> str:

@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from sbafab.geometry.edges import (
     EPSILON,
@@ -23,6 +24,9 @@ from sbafab.geometry.edges import (
     unit,
 )
 from sbafab.geometry.nearby import EdgeIndex
+
+if TYPE_CHECKING:
+    import shapely
 
 MANY = 32
 """Edges from which on filing them by place is worth its cost."""
@@ -322,6 +326,19 @@ class Region:
     def mirrored(self) -> Region:
         """The region flipped over: x becomes -x."""
         return self.mapped(lambda p: (-p[0], p[1]), 1.0, True)
+
+    def shapely(self, chord_error: float = 0.001) -> shapely.MultiPolygon:
+        """The region for shapely; chords stay within ``chord_error`` mm of the arcs."""
+        import shapely
+
+        pieces = self.polygons(chord_error)
+        return shapely.MultiPolygon([(outer, holes) for outer, *holes in pieces])
+
+    @property
+    def __geo_interface__(self) -> dict[str, object]:
+        """A MultiPolygon in the terms of GeoJSON; chords stay within 1 um of the arcs."""
+        rings = [[[*ring, ring[0]] for ring in piece] for piece in self.polygons()]
+        return {"type": "MultiPolygon", "coordinates": rings}
 
     def polygons(self, sagitta: float = 0.001) -> list[list[list[Point]]]:
         """Each piece as rings of points, outer first; chords within ``sagitta`` of the arcs."""

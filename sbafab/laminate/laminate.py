@@ -22,7 +22,7 @@ LOOSE = 0.2
 """mm by which a hole may miss its pin in place or diameter and still be the pin's."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Layer:
     """One film cut to one profile.
 
@@ -46,14 +46,17 @@ class Layer:
         """File stem, for example ``003_TPE_wall``."""
         return f"{self.index:03d}_{self.film.material}_{self.role}"
 
+    def __repr__(self) -> str:
+        return f"Layer({self.name!r}, {self.pattern!r}, {self.profile.area:.3f} mm2)"
+
     @property
     def is_mask(self) -> bool:
         return self.film.material == "PTFE"
 
-    def _repr_svg_(self) -> str:
-        from sbafab.laminate.picture import layer_svg
+    def _repr_html_(self) -> str:
+        from sbafab.laminate.picture import layer_html
 
-        return layer_svg(self)
+        return layer_html(self)
 
 
 @dataclass(frozen=True)
@@ -191,10 +194,10 @@ class Laminate:
             )
         )
 
-    def _repr_svg_(self) -> str:
-        from sbafab.laminate.picture import laminate_svg
+    def _repr_html_(self) -> str:
+        from sbafab.laminate.picture import laminate_html
 
-        return laminate_svg(self)
+        return laminate_html(self)
 
 
 __all__ = [

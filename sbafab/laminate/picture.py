@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 from xml.sax.saxutils import escape
 
 from sbafab.geometry.edges import Bounds
 from sbafab.geometry.svg import number, path_data
+from sbafab.notebook import table_html
 
 if TYPE_CHECKING:
     from sbafab.laminate.films import Material
@@ -27,6 +29,47 @@ INK: dict[Material, Ink] = {
 }
 
 SHOWN_MM = 80.0
+BARS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
+
+
+def laminate_html(laminate: Laminate) -> str:
+    """The laminate in plan, with what each colour is, a scale and its layers in order."""
+    rows = [
+        (f"{layers[0].pattern}", layers[0].film.material, layers[0].role, _numbers(layers))
+        for layers in laminate.patterns.values()
+    ]
+    table = table_html(("pattern", "film", "role", "layers, bottom to top"), rows)
+    return laminate_svg(laminate) + _legend(laminate.bounds, laminate.layers) + table
+
+
+def layer_html(layer: Layer) -> str:
+    """The layer in plan, with what its colour is and a scale."""
+    return layer_svg(layer) + _legend(layer.profile.bounds, (layer,))
+
+
+def _numbers(layers: Sequence[Layer]) -> str:
+    """Layer indices, many of them as first, second ... last."""
+    indices = [str(layer.index) for layer in layers]
+    return ", ".join(indices if len(indices) < 6 else [*indices[:2], "...", indices[-1]])
+
+
+def _legend(bounds: Bounds, layers: Iterable[Layer]) -> str:
+    """A scale bar in HTML, and a swatch for each film."""
+    low_x, low_y, high_x, high_y = bounds
+    longer = 1.06 * max(high_x - low_x, high_y - low_y)
+    bar = max((step for step in BARS if step < longer / 3), default=BARS[0])
+    films = dict.fromkeys(layer.film for layer in layers)
+    swatches = "".join(
+        f'<span style="background:{INK[film.material].fill};border:1px solid '
+        f'{INK[film.material].line}">&emsp;</span> {film.material}, {escape(film.product)}, '
+        f"{number(film.thickness)} mm &ensp; "
+        for film in films
+    )
+    width = number(bar * SHOWN_MM / longer)
+    return (
+        f'<div><span style="display:inline-block;width:{width}mm;border-top:2px solid">'
+        f"{bar:g} mm</span> &ensp; {swatches}</div>"
+    )
 
 
 def layer_svg(layer: Layer) -> str:

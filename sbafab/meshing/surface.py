@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from sbafab.errors import DesignError
+
 if TYPE_CHECKING:
     import numpy as np
+    import trimesh
     from numpy.typing import NDArray
 
 
@@ -26,6 +29,15 @@ class Surface(NamedTuple):
 
         a, b, c = (self.points[self.faces[:, corner]] for corner in range(3))
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+    def trimesh(self) -> trimesh.Trimesh:
+        """The surface for trimesh (extra "python"). Raises DesignError where it is missing."""
+        try:
+            import trimesh
+        except ImportError as error:
+            hint = 'add it with pip install "sbafab[python]"'
+            raise DesignError(f"trimesh is not installed; {hint}") from error
+        return trimesh.Trimesh(self.points, self.faces, process=False)
 
 
 def open_edges(surface: Surface) -> NDArray[np.float64]:

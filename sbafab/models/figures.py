@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from sbafab.errors import DesignError
+from sbafab.notebook import table_html
 
 
 @dataclass(frozen=True)
@@ -146,7 +148,7 @@ class Asked:
     calibration: Calibration = field(default_factory=Calibration)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Prediction:
     """All that is predicted of one design."""
 
@@ -156,11 +158,35 @@ class Prediction:
     left_out: tuple[LeftOut, ...]
 
     def value(self, name: str, model: str = "") -> float:
-        """The value of the figure with this name, by the model whose title begins so."""
-        for figure in self.figures:
-            if figure.name == name and figure.model.title.startswith(model):
-                return figure.value
-        raise KeyError(f"no figure {name!r} by {model!r}")
+        """The value of the figure with this name, by the model whose title begins so.
+
+        Raises KeyError where there is none, or where several models give one and none is named.
+        """
+        named = [figure for figure in self.figures if figure.name == name]
+        found = [figure for figure in named if figure.model.title.startswith(model)]
+        if not named:
+            near = difflib.get_close_matches(name, [figure.name for figure in self.figures], 3)
+            hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
+            raise KeyError(f"no figure is named {name!r}{hint}")
+        if len(found) != 1:
+            titles = ", ".join(repr(figure.model.title) for figure in found or named)
+            raise KeyError(f"{name!r} is given by {titles}; name one of these models")
+        return found[0].value
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """A row a figure, for example for ``pandas.DataFrame(prediction.rows)``."""
+        return [figure.as_dict() for figure in self.figures]
+
+    def __repr__(self) -> str:
+        left = f", {len(self.left_out)} left out" if self.left_out else ""
+        return f"Prediction({len(self.figures)} figures, {len(self.relations)} curves{left})"
+
+    def _repr_html_(self) -> str:
+        head = ("", "", "unit", "model", "validity")
+        rows = [(f.name, f.value, f.unit, f.model.title, f.model.trust) for f in self.figures]
+        left = [(left.name, None, "", "not predicted", left.reason) for left in self.left_out]
+        return table_html(head, [*rows, *left])
 
     def as_dict(self) -> dict[str, Any]:
         """What ``predict.json`` holds of it."""

@@ -15,6 +15,7 @@ from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import GeometryError
 from sbafab.laminate.laminate import Laminate
+from sbafab.notebook import table_html
 from sbafab.output.contents import (
     Checked,
     Conforming,
@@ -46,7 +47,7 @@ from sbafab.output.shop import (
 from sbafab.output.swap import listed_files, replaced_folder
 from sbafab.pressing.schedule import Schedule
 from sbafab.rules.deck import has_failed, run_deck
-from sbafab.rules.finding import Finding
+from sbafab.rules.finding import Finding, Findings
 
 if TYPE_CHECKING:
     from sbafab.meshing.conforming.meshes import ConformingMeshes
@@ -73,7 +74,7 @@ class Extras(NamedTuple):
 NONE = Extras()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Run:
     """What a run made. ``findings`` tell whether the design holds; without cut files if not."""
 
@@ -93,6 +94,14 @@ class Run:
     def failed(self) -> bool:
         """Whether a rule failed that the design does not waive; no cut file was written then."""
         return has_failed(self.findings)
+
+    def __repr__(self) -> str:
+        return f"Run({str(self.folder)!r}, {'failed' if self.failed else 'holds'})"
+
+    def _repr_html_(self) -> str:
+        files = [(str(self.folder / name),) for name in self.manifest.get("files", ())]
+        table = table_html(("files written",), files)
+        return self.laminate._repr_html_() + Findings(self.findings)._repr_html_() + table
 
 
 def check(design: Design, progress: Progress | None = None) -> tuple[Laminate, tuple[Finding, ...]]:

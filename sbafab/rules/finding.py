@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
+
+from sbafab.notebook import table_html
 
 Verdict = Literal["pass", "fail", "waived", "warn"]
 
@@ -35,13 +38,18 @@ class Finding:
     message: str
     by_user: bool = False
 
+    def __post_init__(self) -> None:
+        # Limits are in um: what arithmetic leaves below 1 nm says nothing.
+        if self.measured is not None:
+            object.__setattr__(self, "measured", round(self.measured, 6))
+
     def as_dict(self) -> dict[str, object]:
         """The finding as ``checks.json`` holds it."""
         return {
             "rule": self.rule,
             "verdict": self.verdict,
             "limit": self.limit,
-            "measured": None if self.measured is None else round(self.measured, 6),
+            "measured": self.measured,
             "unit": self.unit,
             "where": {
                 "interface": self.where.interface,
@@ -51,3 +59,41 @@ class Finding:
             },
             "message": self.message,
         }
+
+
+class Findings(tuple[Finding, ...]):
+    """What the deck found, in its order: a tuple that shows itself as a table."""
+
+    __slots__ = ()
+
+    @property
+    def failed(self) -> tuple[Finding, ...]:
+        """The failures that nobody waived; without any the design may be cut."""
+        return tuple(finding for finding in self if finding.verdict == "fail")
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """A flat row a finding, for example for ``pandas.DataFrame(findings.rows)``."""
+        return [
+            {
+                "rule": f.rule,
+                "verdict": f.verdict,
+                "measured": f.measured,
+                "limit": f.limit,
+                "unit": f.unit,
+                "interface": f.where.interface,
+                "layers": list(f.where.layers),
+                "x": f.where.x,
+                "y": f.where.y,
+                "message": f.message,
+            }
+            for f in self
+        ]
+
+    def __repr__(self) -> str:
+        counts = Counter(finding.verdict for finding in self)
+        return f"Findings({', '.join(f'{number} {verdict}' for verdict, number in counts.items())})"
+
+    def _repr_html_(self) -> str:
+        rows = [(f.rule, f.verdict, f.measured, f.limit, f.unit, f.message) for f in self]
+        return table_html(("rule", "verdict", "measured", "limit", "", ""), rows)

@@ -98,8 +98,17 @@ def test_a_name_with_markup_is_escaped(laminate: Laminate) -> None:
 
 
 def test_notebooks_get_the_same_pictures(laminate: Laminate) -> None:
-    assert laminate._repr_svg_() == laminate_svg(laminate)
-    assert laminate.layer(2)._repr_svg_() == layer_svg(laminate.layer(2))
+    assert laminate._repr_html_().startswith(laminate_svg(laminate))
+    assert laminate.layer(2)._repr_html_().startswith(layer_svg(laminate.layer(2)))
+
+
+def test_notebooks_get_a_scale_and_a_legend(laminate: Laminate) -> None:
+    # The longer side of 23.317 mm and its margins, 1.06 times that, are shown 80 mm wide.
+    page = laminate._repr_html_()
+    [width] = re.findall(r"width:([\d.]+)mm;border-top", page)
+    assert float(width) == pytest.approx(5 * 80 / (1.06 * 23.317), rel=1e-4)
+    assert "5 mm</span>" in page
+    assert "TPE, Stretchlon 200, 0.038 mm" in page
 
 
 def test_tpe_and_ptfe_have_different_fills(laminate: Laminate) -> None:

@@ -11,7 +11,9 @@ from sbafab.meshing.conforming.sweep import split_wedges
 from sbafab.meshing.surface import Surface
 
 if TYPE_CHECKING:
+    import meshio
     import numpy as np
+    import pyvista
     from numpy.typing import NDArray
 
 
@@ -49,6 +51,18 @@ class Mesh:
 
         nodes, faces = np.unique(self.cavities[name], return_inverse=True)
         return Surface(self.points[nodes], faces.reshape(-1, 3)), nodes
+
+    def meshio(self) -> meshio.Mesh:
+        """The mesh for meshio (extra "python"): second-order cells, fields and sets."""
+        from sbafab.meshing.conforming.exchange import as_meshio
+
+        return as_meshio(self)
+
+    def pyvista(self) -> pyvista.UnstructuredGrid:
+        """The mesh for PyVista (extra "python"), with the fields that a VTU file has."""
+        from sbafab.meshing.conforming.exchange import as_pyvista
+
+        return as_pyvista(self)
 
     def linear(self) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
         """Points, and tetrahedra or triangles of first order through the corners; the cell of each.

@@ -26,19 +26,28 @@ def write_vtu(mesh: Mesh, path: Path) -> None:
     The cell field ``part`` counts films and bonds, or a shell's sections, from 1 in their order;
     node sets other than bonds are point fields of 0 and 1, face sets cell fields.
     """
-    part = np.zeros(len(mesh.cells), dtype=np.int32)
-    for number, cells in enumerate(mesh.parts.values(), start=1):
-        part[cells] = number
-    nodes = {
+    fields = node_fields(mesh), cell_fields(mesh)
+    _write(path, mesh.kind, mesh.points, mesh.cells, *fields, mesh.notes)
+
+
+def node_fields(mesh: Mesh) -> dict[str, NDArray[np.uint8]]:
+    """Node sets other than bonds, each as 0 or 1 a node."""
+    return {
         name: _marked(len(mesh.points), chosen)
         for name, chosen in mesh.node_sets.items()
         if not name.startswith("bond_")
     }
+
+
+def cell_fields(mesh: Mesh) -> dict[str, NDArray[np.int32] | NDArray[np.uint8]]:
+    """``part``, the number of each cell's part from 1, and face sets, each as 0 or 1 a cell."""
+    part = np.zeros(len(mesh.cells), dtype=np.int32)
+    for number, cells in enumerate(mesh.parts.values(), start=1):
+        part[cells] = number
     faces = {
         name: _marked(len(mesh.cells), chosen[:, 0]) for name, chosen in mesh.face_sets.items()
     }
-    cell_fields: dict[str, NDArray[np.int32] | NDArray[np.uint8]] = {"part": part, **faces}
-    _write(path, mesh.kind, mesh.points, mesh.cells, nodes, cell_fields, mesh.notes)
+    return {"part": part, **faces}
 
 
 def write_cavity_vtu(mesh: Mesh, cavity: str, path: Path) -> None:
@@ -58,8 +67,8 @@ def _write(
     kind: str,
     points: NDArray[np.float64],
     cells: NDArray[np.int64],
-    point_fields: Mapping[str, NDArray[np.int64] | NDArray[np.uint8]],
-    cell_fields: Mapping[str, NDArray[np.int32] | NDArray[np.uint8]],
+    of_points: Mapping[str, NDArray[np.int64] | NDArray[np.uint8]],
+    of_cells: Mapping[str, NDArray[np.int32] | NDArray[np.uint8]],
     notes: Sequence[str] = (),
 ) -> None:
     count, size = cells.shape
@@ -76,9 +85,9 @@ def _write(
         _array("offsets", np.arange(size, size * count + 1, size, dtype=np.int64)),
         _array("types", np.full(count, VTK_TYPES[kind], dtype=np.uint8)),
         "</Cells><PointData>",
-        *(_array(name, values) for name, values in point_fields.items()),
+        *(_array(name, values) for name, values in of_points.items()),
         "</PointData><CellData>",
-        *(_array(name, values) for name, values in cell_fields.items()),
+        *(_array(name, values) for name, values in of_cells.items()),
         "</CellData></Piece></UnstructuredGrid></VTKFile>",
         "",
     ]

@@ -1,0 +1,77 @@
+"""A simulator run on a design, its results in the design's folder."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sbafab.design.records import Design
+from sbafab.output.contents import Checked
+from sbafab.output.earlier import refuse_to_put_away
+from sbafab.output.manifest import as_json, identity
+from sbafab.output.run import Extras, check, generate, with_folder
+from sbafab.output.shop import Progress
+from sbafab.rules.finding import Finding
+from sbafab.simulators.simulator import Name, Result, Wish, simulator
+
+UNITS = {
+    "length": "mm",
+    "pressure": "kPa",
+    "volume": "ul",
+    "stress": "MPa",
+    "work": "uJ",
+    "angle": "degrees",
+    "time": "s",
+    "rate": "steps/s",
+}
+"""Of what ``result.json`` holds."""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What a simulator found; nothing, and no folder, where a rule ``failed`` before."""
+
+    findings: Sequence[Finding]
+    folder: Path | None
+    result: Result
+
+    @property
+    def failed(self) -> bool:
+        """Whether a rule failed that the design does not waive; no simulator ran then."""
+        return self.folder is None
+
+
+def simulate(
+    design: Design,
+    name: Name,
+    wish: Wish,
+    out: Path = Path("out"),
+    progress: Progress | None = None,
+    export: bool = False,
+) -> Simulated:
+    """Runs the simulator into ``out/<design name>/<name>/``; ``export`` only writes its input.
+
+    Raises DesignError or OutputError for what it cannot do, before it starts where that can be
+    told.
+    """
+    tell = progress or (lambda what, done, total: None)
+    found = Result((), {})
+    with tempfile.TemporaryDirectory() as place:
+        checked = Checked(design, *check(design, tell))
+        if checked.failed:
+            return Simulated(checked.findings, None, found)
+        # Said before a run of hours, not after it.
+        refuse_to_put_away(out / design.name, identity(design, checked.waived), (name,))
+        # A folder in the temporary one has the usual rights, the temporary one itself has not.
+        folder = Path(place) / name
+        if export:
+            simulator(name).export(checked.laminate, wish, folder)
+        else:
+            found = simulator(name).run(checked.laminate, wish, folder, tell)
+            told = as_json({"units": UNITS, **found.figures, "stopped": found.stopped})
+            (folder / "result.json").write_text(told, encoding="utf-8", newline="\n")
+        extras = Extras(also=with_folder(folder), own=(name,))
+        run = generate(design, out, (), tell, extras=extras)
+    return Simulated(checked.findings, run.folder / name, found)

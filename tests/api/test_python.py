@@ -1,0 +1,166 @@
+"""The program from Python: changes in three ways, results in the types of other libraries."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pandas as pd
+import pytest
+import shapely
+
+import sbafab
+from sbafab.errors import DesignError
+from sbafab.output.run import Run
+from sbafab.rules.finding import Finding, Place
+
+SMALL = {"stack.balloons": 2, "rules": {"yield_builds": 100}}
+
+
+def test_texts_dicts_and_keywords_say_the_same() -> None:
+    by_text = sbafab.load("1dof-5mm", "stack.balloons=3", "chamber.diameter=[5, 6, 7]")
+    by_dict = sbafab.load("1dof-5mm", {"stack.balloons": 3, "chamber": {"diameter": [5, 6, 7]}})
+    by_name = sbafab.load("1dof-5mm", stack={"balloons": 3}, chamber={"diameter": (5, 6, 7)})
+    assert by_text == by_dict == by_name
+    assert by_text.with_("stack.balloons=3") == by_text
+
+
+def test_with_keeps_the_rest_and_checks_like_a_design_file() -> None:
+    design = sbafab.load("1dof-5mm", inlet={"tube_outer_diameter": 0.8})
+    wide = design.with_(bond={"width": 0.9})
+    assert (wide.bond.width, wide.inlet.tube_outer_diameter) == (0.9, 0.8)
+    assert wide.inlet.width is None, "what follows from the tube stays open"
+    assert wide.folder == design.folder
+    with pytest.raises(DesignError, match=r"stack\.baloons .* did you mean stack\.balloons"):
+        design.with_(stack={"baloons": 3})
+    with pytest.raises(DesignError, match=r"family = 'lobed' must be '1dof'"):
+        design.with_(family="lobed")
+
+
+def test_a_drawing_that_a_change_names_lies_where_the_user_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "o.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="9mm" height="9mm" viewBox="0 0 9 9">'
+        '<circle r="3"/></svg>'
+    )
+    monkeypatch.chdir(tmp_path)
+    design = sbafab.load("1dof-5mm").with_(chamber={"outline": "o.svg"})
+    assert design.drawing == tmp_path / "o.svg"
+    mask = sbafab.build(design).layer(6).profile
+    assert mask.area == pytest.approx(math.pi * (3**2 - 0.5**2), rel=1e-6)
+
+
+def test_regions_are_shapely_geometries_within_the_chord_error() -> None:
+    plate = sbafab.build("3dof-15mm", SMALL).layer(3).profile
+    length = sum(contour.length for contour in plate.contours)
+    for error in (0.01, 0.001):
+        shape = plate.shapely(error)
+        assert shape.is_valid
+        assert abs(shape.area - plate.area) < error * length
+    assert shapely.geometry.shape(plate).equals(plate.shapely())
+
+
+def test_layers_are_ezdxf_documents_of_the_same_area() -> None:
+    layer = sbafab.build("1dof-5mm", SMALL).layer(5)
+    circles = sbafab.drawing(layer).modelspace().query("CIRCLE")
+    assert sorted(circle.dxf.radius for circle in circles) == pytest.approx([0.5, 3.25])
+
+
+def test_solid_and_meshes_are_objects_of_other_libraries(tmp_path: Path) -> None:
+    laminate = sbafab.build("1dof-5mm", SMALL)
+    solid = sbafab.solid(laminate).trimesh()
+    films = sum(layer.profile.area * layer.film.thickness for layer in laminate.tpe_layers)
+    bonds = sum(gap.bond.area * gap.gap for gap in laminate.interfaces)
+    assert solid.is_watertight
+    assert solid.volume == pytest.approx(films + bonds, rel=1e-3)
+    run = sbafab.mesh("1dof-5mm", SMALL, h=0.7, formats=("inp",), out=tmp_path)
+    assert run.conforming is not None
+    volume = run.conforming.volume
+    grid = volume.pyvista()
+    assert grid.n_cells == len(volume.cells)
+    # Without gaps films lie on each other, and the volume is that of the films alone.
+    assert abs(grid.compute_cell_sizes()["Volume"].sum()) == pytest.approx(films, rel=2e-3)
+    assert set(grid.point_data) == {name for name in volume.node_sets if "bond_" not in name}
+    [block] = volume.meshio().cells
+    assert (block.type, len(block)) == ("wedge", len(volume.cells))
+    [block] = run.conforming.shell.meshio().cells
+    assert (block.type, len(block)) == ("triangle6", len(run.conforming.shell.cells))
+
+
+def test_findings_and_figures_are_rows() -> None:
+    findings = sbafab.check("1dof-5mm", SMALL)
+    table = pd.DataFrame(findings.rows)
+    assert list(table["rule"]) == [finding.rule for finding in findings]
+    assert table.set_index("rule").loc["bond-width", "measured"] == 0.75
+    assert findings.failed == ()
+    bad = sbafab.check("1dof-5mm", SMALL, bond={"width": 0.7})
+    assert "bond-width" in {finding.rule for finding in bad.failed}
+    figures = pd.DataFrame(sbafab.predict("1dof-5mm").rows)
+    assert {"name", "value", "unit", "model"} <= set(figures.columns)
+
+
+def test_a_measured_value_is_shown_as_what_it_is_compared_as() -> None:
+    found = Finding("bond-width", "pass", 0.75, 0.7499999999, "mm", Place(), "")
+    assert (found.measured, found.as_dict()["measured"]) == (0.75, 0.75)
+    short = Finding("bond-width", "fail", 0.75, 0.748, "mm", Place(), "")
+    assert short.measured == 0.748
+
+
+def test_a_figure_of_two_models_wants_one_named() -> None:
+    found = sbafab.predict("1dof-5mm")
+    with pytest.raises(KeyError, match=r"given by .*Eq\. 4.*Eqs\. 1-3.*name one"):
+        found.value("largest volume a balloon")
+    assert found.value("largest volume a balloon", "Eqs. 1-3") == pytest.approx(16.95, abs=0.01)
+    with pytest.raises(KeyError, match="did you mean 'full stroke'"):
+        found.value("full strok")
+
+
+def test_cut_press_and_nest_write_their_parts(tmp_path: Path) -> None:
+    run = sbafab.cut("1dof-5mm", SMALL, out=tmp_path, dxf_profile="arcs")
+    assert sorted(path.name for path in (run.folder / "layers").iterdir())[0].startswith("001_TPE")
+    assert not [finding for finding in sbafab.check_folder(run.folder) if finding.verdict == "fail"]
+    assert (sbafab.press("1dof-5mm", SMALL, out=tmp_path).folder / "press.csv").is_file()
+    designs = [sbafab.load(name, SMALL) for name in ("1dof-5mm", "1dof-10mm")]
+    job = sbafab.nest(designs, "both", tmp_path)
+    assert {path.name for path in job.folder.iterdir()} >= {"1dof-5mm", "1dof-10mm", "sheets"}
+
+
+def test_simulate_exports_a_deck_and_refuses_what_is_no_key(tmp_path: Path) -> None:
+    wish = {"simulator": "sofa", "export": True, "out": tmp_path}
+    made = sbafab.simulate("1dof-5mm", stack={"balloons": 2}, pressure=3.0, **wish)
+    assert made.folder is not None
+    assert list(made.folder.glob("*.scn"))
+    with pytest.raises(DesignError, match="presure"):
+        sbafab.simulate("1dof-5mm", presure=3.0, **wish)
+
+
+@pytest.mark.parametrize("what", ["design", "laminate", "layer", "findings", "prediction", "run"])
+def test_notebooks_show_tables_and_pictures(what: str, tmp_path: Path) -> None:
+    design = sbafab.load("1dof-5mm", SMALL)
+    laminate = sbafab.build(design)
+    shown: dict[str, object] = {
+        "design": design,
+        "laminate": laminate,
+        "layer": laminate.layer(2),
+        "findings": sbafab.check(design),
+        "prediction": sbafab.predict(design),
+    }
+    if what == "run":
+        run = sbafab.press(design, out=tmp_path)
+        assert isinstance(run, Run)
+        shown["run"] = run
+    found = shown[what]
+    page = found._repr_html_()  # type: ignore[attr-defined]
+    ElementTree.fromstring(f"<div>{page.replace('&emsp;', ' ').replace('&ensp;', ' ')}</div>")
+    assert len(repr(found)) < 100
+    said = {
+        "design": "stack.balloons",
+        "laminate": "separator-mask",
+        "layer": "PTFE film, 0.025 mm",
+        "findings": "bond-width",
+        "prediction": "Eqs. 1-3",
+        "run": "press.json",
+    }
+    assert said[what] in page
