@@ -58,7 +58,7 @@ def process() -> Iterator[Row]:
     )
     yield Row(
         "burst pressure",
-        paper.Measured(367, 18, "kPa", "Sec. 4"),
+        paper.BURST,
         None,
         NONE,
         "the strength of films and bonds is not known; taken as the end of the pressure range",

@@ -115,8 +115,10 @@ class Cup(Fixed):
 
     @model_validator(mode="after")
     def _is_hollow(self) -> Self:
-        if self.neck - self.bore < 2 * self.wall or self.height <= self.wall:
-            raise ValueError("must have a neck wider than bore and two walls, and be higher than 1")
+        if self.neck - self.bore < 2 * self.wall:
+            raise ValueError("must have a neck at least as wide as its bore and two walls together")
+        if self.height <= self.wall:
+            raise ValueError("must be higher than its wall is thick")
         if self.diameter < self.neck:
             raise ValueError("must not be narrower at its rim (diameter) than at its neck")
         return self

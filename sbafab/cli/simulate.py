@@ -90,7 +90,7 @@ def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> N
     """
     from sbafab.actuators import load_design
     from sbafab.cli.printing import console, findings_table, print_json, shown_progress
-    from sbafab.models.force import BURST_KPA
+    from sbafab.models.paper import BURST
     from sbafab.output.manifest import checks
     from sbafab.output.simulating import simulate as run
     from sbafab.simulators.simulator import Wish
@@ -112,10 +112,10 @@ def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> N
     else:
         _print(found, made.folder)
     most = max(wish.pressure or 0.0, *wish.chambers.values(), 0.0)
-    if most > BURST_KPA:
+    if most > BURST.value:
         click.echo(
-            f"sbafab: the paper's actuators burst at {BURST_KPA:g} kPa; no film tears or yields in "
-            f"a simulation, so at {most:g} kPa it shows what will not be",
+            f"sbafab: the paper's actuators burst at {BURST.value:g} kPa; no film tears or yields "
+            f"in a simulation, so at {most:g} kPa it shows what will not be",
             err=True,
         )
     if found.stopped is not None:

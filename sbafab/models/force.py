@@ -7,22 +7,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sbafab.errors import DesignError
+from sbafab.models.paper import BURST
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
-
-BURST_KPA = 367.0
-"""Where the paper's actuators burst, +- 18 (Sec. 4)."""
 
 
 def force(pressure_kpa: ArrayLike, rate: ArrayLike) -> NDArray[np.float64]:
     """Newtons from a pressure and dv/dh in mm2. Raises DesignError past the burst pressure."""
     pressure = np.asarray(pressure_kpa, dtype=float)
-    good = (pressure >= 0) & (pressure <= BURST_KPA)
+    good = (pressure >= 0) & (pressure <= BURST.value)
     if not good.all():
         raise DesignError(
             f"pressure = {float(pressure[~good].flat[0]):g} kPa is out of range; give 0 to "
-            f"{BURST_KPA:g} kPa, where the paper's actuators burst"
+            f"{BURST.value:g} kPa, where the paper's actuators burst"
         )
     return np.asarray(pressure * np.asarray(rate, dtype=float) / 1000)
 

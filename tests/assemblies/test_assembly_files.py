@@ -62,7 +62,7 @@ FAULTS: list[tuple[str, dict[str, Any], str]] = [
     ("brace", {"parts.grip.turn": 90}, "parts.grip.turn = 90 .*must be 0 or 180"),
     ("brace", {"parts.grip.at": "end"}, "parts.grip is a radial design; wrap it round a tube"),
     ("brace", {"parts.cup.on": "grip"}, "which is bent round a tube and has no flat face"),
-    ("brace", {"parts.cup.bore": 4.5}, "parts.cup must have a neck wider"),
+    ("brace", {"parts.cup.bore": 4.5}, "parts.cup must have a neck at least as wide as"),
     ("brace", {"parts.arm.design": "1dof-5mm"}, "which has no lumen"),
     ("brace", {"parts.vacuum.at": "inlet", "parts.vacuum.chamber": "x"}, "has no inlet in arm"),
     ("brace", {"deploy.lumen": 3}, "deploy.lumen is not a key"),

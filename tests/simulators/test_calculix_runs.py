@@ -113,7 +113,7 @@ def test_simulate_command(tmp_path: Path) -> None:
 
 def test_no_ccx(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(OutputError, match=r"ccx is not here; .* calculix-ccx"):
+    with pytest.raises(OutputError, match=r"ccx was not found; .* calculix-ccx"):
         inflated(tmp_path / "run", DeckSettings({"chamber1": 1.0}), 0.75)
     assert not (tmp_path / "run").exists()
 

@@ -15,6 +15,8 @@ from sbafab.meshing.conforming.model import Mesh
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    Field = NDArray[np.float64] | NDArray[np.int64] | NDArray[np.int32] | NDArray[np.uint8]
+
 VTK_TYPES = {"triangle": 5, "triangle6": 22, "tetra10": 24, "wedge15": 26}
 TYPE_NAMES = {"f8": "Float64", "i8": "Int64", "i4": "Int32", "u1": "UInt8"}
 FAST = 1
@@ -27,7 +29,7 @@ def write_vtu(mesh: Mesh, path: Path) -> None:
     node sets other than bonds are point fields of 0 and 1, face sets cell fields.
     """
     fields = node_fields(mesh), cell_fields(mesh)
-    _write(path, mesh.kind, mesh.points, mesh.cells, *fields, mesh.notes)
+    write_fields(path, mesh.kind, mesh.points, mesh.cells, *fields, mesh.notes)
 
 
 def node_fields(mesh: Mesh) -> dict[str, NDArray[np.uint8]]:
@@ -53,7 +55,7 @@ def cell_fields(mesh: Mesh) -> dict[str, NDArray[np.int32] | NDArray[np.uint8]]:
 def write_cavity_vtu(mesh: Mesh, cavity: str, path: Path) -> None:
     """Write a cavity's surface; the point field ``node`` is the mesh's node, from 0."""
     surface, nodes = mesh.cavity(cavity)
-    _write(path, "triangle", surface.points, surface.faces, {"node": nodes}, {})
+    write_fields(path, "triangle", surface.points, surface.faces, {"node": nodes}, {})
 
 
 def _marked(count: int, chosen: NDArray[np.int64]) -> NDArray[np.uint8]:
@@ -62,15 +64,16 @@ def _marked(count: int, chosen: NDArray[np.int64]) -> NDArray[np.uint8]:
     return marks
 
 
-def _write(
+def write_fields(
     path: Path,
     kind: str,
     points: NDArray[np.float64],
     cells: NDArray[np.int64],
-    of_points: Mapping[str, NDArray[np.int64] | NDArray[np.uint8]],
-    of_cells: Mapping[str, NDArray[np.int32] | NDArray[np.uint8]],
+    of_points: Mapping[str, Field],
+    of_cells: Mapping[str, Field],
     notes: Sequence[str] = (),
 ) -> None:
+    """Write points, cells of one kind, and a field (n,) or (n, k) of points or cells by name."""
     count, size = cells.shape
     lines = [
         '<?xml version="1.0"?>',
@@ -94,15 +97,13 @@ def _write(
     path.write_text("\n".join(lines), encoding="ascii", newline="\n")
 
 
-def _array(
-    name: str,
-    values: NDArray[np.float64] | NDArray[np.int64] | NDArray[np.int32] | NDArray[np.uint8],
-) -> str:
+def _array(name: str, values: Field) -> str:
     """A data array in one compressed block."""
     content = np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<")).tobytes()
     packed = zlib.compress(content, FAST)
     header = np.array([1, len(content), len(content), len(packed)], dtype="<u8").tobytes()
-    width = f' NumberOfComponents="{values.shape[1]}"' if name == "points" else ""
+    is_field = values.ndim > 1 and name != "connectivity"
+    width = f' NumberOfComponents="{values.shape[1]}"' if is_field else ""
     kind = TYPE_NAMES[f"{values.dtype.kind}{values.dtype.itemsize}"]
     text = (base64.b64encode(header) + base64.b64encode(packed)).decode("ascii")
     return f'<DataArray type="{kind}" Name="{name}"{width} format="binary">{text}</DataArray>'

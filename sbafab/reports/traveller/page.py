@@ -19,6 +19,7 @@ from sbafab.design.records import Design
 from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.models.paper import BURST
 from sbafab.models.sizes import sizes
 from sbafab.pressing.schedule import Schedule
 from sbafab.reports.drawing import TIMES
@@ -40,8 +41,6 @@ TEMPLATE = "traveller.html.j2"
 STYLE = "traveller.css"
 SHORT_HASH = 12
 BY_HAND = "none (by hand)"
-
-BURST_KILOPASCALS = "367 ± 18"
 
 
 def traveller_html(
@@ -104,7 +103,7 @@ def context(work: Work) -> dict[str, Any]:
         "leak_test": process.leak_test(work),
         "wrapping": process.wrapping(work),
         "leak_kilopascals": process.LEAK_KILOPASCALS,
-        "burst": BURST_KILOPASCALS,
+        "burst": f"{BURST.value:g} ± {BURST.error:g}",
         "times": times.times(work),
         "kerf_notes": notes.kerf_notes(work),
         "expected_sizes": notes.expected_sizes(work),

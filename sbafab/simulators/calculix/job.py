@@ -21,9 +21,7 @@ from sbafab.simulators.calculix.picture import deformed_png
 from sbafab.simulators.calculix.plot import history_svg
 from sbafab.simulators.calculix.run import (
     DIVERGED,
-    INTERRUPTED,
     LOG,
-    OUT_OF_TIME,
     Ending,
     Progress,
     find_ccx,
@@ -31,6 +29,7 @@ from sbafab.simulators.calculix.run import (
 )
 from sbafab.simulators.calculix.settings import DeckSettings
 from sbafab.simulators.calculix.vtu import write_deformed
+from sbafab.simulators.program import INTERRUPTED, OUT_OF_TIME
 
 HISTORY = "history.csv"
 KEPT = (".inp", ".frd", ".sta", ".dat")

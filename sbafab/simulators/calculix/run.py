@@ -1,28 +1,19 @@
-"""Running ``ccx``: started, watched, stopped when it takes too long, its ending understood."""
+"""Running ``ccx``: to which load it came, and what stopped it."""
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
-import subprocess
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from sbafab.errors import OutputError
 from sbafab.simulators.calculix.frd import SAME_TIME, read_sta
+from sbafab.simulators.program import program_path, run_program
 
 Progress = Callable[[str, int, int], None]
 """Told what is being done, and how much of how much is."""
 
-PROGRAM = "ccx"
 LOG = "ccx.log"
-LOOK_EVERY = 0.2
-STOP_WITHIN = 10.0
-INTERRUPTED = "it was interrupted"
-OUT_OF_TIME = "it was stopped after"
 DIVERGED = "its iterations no longer converge, however small the step"
 
 
@@ -35,13 +26,10 @@ class Ending(NamedTuple):
 
 def find_ccx() -> str:
     """Path of the solver. Raises OutputError where it is not installed."""
-    found = shutil.which(PROGRAM)
-    if found is None:
-        raise OutputError(
-            f"{PROGRAM} is not here; install CalculiX: on Debian and Ubuntu the package "
-            "calculix-ccx (apt install calculix-ccx)"
-        )
-    return found
+    return program_path(
+        "ccx",
+        "install CalculiX; on Debian and Ubuntu: apt install calculix-ccx",
+    )
 
 
 def run_ccx(
@@ -49,55 +37,24 @@ def run_ccx(
 ) -> Ending:
     """Runs a deck in its folder to the time ``end``, for at most ``timeout`` seconds.
 
-    Ctrl-C ends the run, not the program. What ccx prints goes to ``ccx.log`` there. One thread,
-    unless OMP_NUM_THREADS says otherwise.
+    What ccx prints goes to ``ccx.log`` there.
     """
-    command = [find_ccx(), "-i", job]
-    started = time.monotonic()
-    environment = {"OMP_NUM_THREADS": "1", **os.environ}
-    with (folder / LOG).open("wb") as log:
-        try:
-            process = subprocess.Popen(
-                command, cwd=folder, stdout=log, stderr=subprocess.STDOUT, env=environment
-            )
-        except OSError as reason:
-            raise OutputError(
-                f"{command[0]} could not be started ({reason.strerror}); see whether it is a "
-                "program that runs on this machine"
-            ) from reason
-        stopped: str | None = None
-        try:
-            while process.poll() is None and stopped is None:
-                time.sleep(LOOK_EVERY)
-                reached = _reached(folder / f"{job}.sta")
-                if tell is not None:
-                    tell("ccx, percent of the load", int(100 * reached / end), 100)
-                if time.monotonic() - started >= timeout:
-                    stopped = f"{OUT_OF_TIME} {timeout / 60:g} minutes"
-        except KeyboardInterrupt:
-            # Hours of computing are not thrown away with the rest of them.
-            stopped = INTERRUPTED
-        finally:
-            _stop(process)
-    reached = _reached(folder / f"{job}.sta")
+    sta = folder / f"{job}.sta"
+
+    def look() -> None:
+        if tell is not None:
+            tell("ccx, percent of the load", int(100 * _reached(sta) / end), 100)
+
+    code, stopped = run_program([find_ccx(), "-i", job], folder / LOG, timeout, look)
+    reached = _reached(sta)
     if stopped is not None:
         return Ending(reached, stopped)
     is_there = reached >= end * (1 - SAME_TIME)
-    return Ending(reached, _complaint(folder / LOG, process.returncode, is_there))
+    return Ending(reached, _complaint(folder / LOG, code, is_there))
 
 
 def _reached(sta: Path) -> float:
     return max(read_sta(sta), default=0.0)
-
-
-def _stop(process: subprocess.Popen[bytes]) -> None:
-    if process.poll() is None:
-        process.terminate()
-        try:
-            process.wait(STOP_WITHIN)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
 
 
 def _complaint(log: Path, code: int, is_there: bool) -> str | None:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import signal
-import subprocess
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, Literal
+from typing import Literal
 
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.simulators.coarse.tip import Tip
+from sbafab.simulators.program import Ended, program_path, run_program
 from sbafab.simulators.simulator import refuse_time
 from sbafab.simulators.sofa.files import BEAM, FRAMES, SHELL, VOLUME, write_scenes
 from sbafab.simulators.sofa.frames import BEAM_DT, FRAMES_DT
@@ -35,8 +32,6 @@ SCENES: dict[Scene, tuple[str, float]] = {
 """File and time step in s of each scene."""
 
 LOG_FILE = "runSofa.log"
-PAUSE = 0.1
-"""s between two looks at how far the run is."""
 
 
 @dataclass(frozen=True)
@@ -101,13 +96,11 @@ def simulate(
 
 def find_program() -> str:
     """The path of runSofa. Raises OutputError with what to do where it is not there."""
-    program = shutil.which("runSofa")
-    if program is None:
-        raise OutputError(
-            "runSofa was not found; install SOFA 25.06 (https://www.sofa-framework.org) and put "
-            "the folder that holds runSofa on PATH"
-        )
-    return program
+    return program_path(
+        "runSofa",
+        "install SOFA 25.06 (https://www.sofa-framework.org) and put the folder that holds runSofa "
+        "on PATH",
+    )
 
 
 def run_scene(
@@ -129,21 +122,17 @@ def run_scene(
     # The tip is written at the beginning of a step: one more step writes the last.
     steps = round(seconds / dt) + 1
     log_path = folder / LOG_FILE
-    with log_path.open("wb") as log_file:
-        process = _started([program, "-g", "batch", "-n", str(steps), scene.name], folder, log_file)
-        try:
-            in_time = _watched(process, limit, lambda: _report(state, dt, steps, tell))
-        finally:
-            _end(process)
+    command = [program, "-g", "batch", "-n", str(steps), scene.name]
+    ended = run_program(command, log_path, limit, lambda: _report(state, dt, steps, tell))
     log = read_log(log_path.read_text(encoding="utf-8", errors="replace"))
     tips = read_tips(state)
-    if not in_time and tips and log.trouble is None:
+    if ended.stopped is not None and tips and log.trouble is None:
         stopped = (
-            f"{scene.name} ran to {tips[-1].time:g} of {seconds:g} s: it was stopped after "
-            f"{(limit or 0) / 60:g} minutes; what it reached is kept"
+            f"{scene.name} ran to {tips[-1].time:g} of {seconds:g} s: {ended.stopped}; what it "
+            "reached is kept"
         )
         return SofaRun(scene, tuple(tips), round(tips[-1].time / dt), None, None, stopped)
-    why = _trouble(process.returncode, in_time, limit, log, tips, seconds)
+    why = _trouble(ended, log, tips, seconds)
     if why is not None:
         known = (
             f"the tip is known to {tips[-1].time:g} s" if tips else "nothing is known of the tip"
@@ -154,50 +143,6 @@ def run_scene(
     return SofaRun(scene, tuple(tips), log.steps or steps, log.seconds, log.rate)
 
 
-def _started(command: list[str], folder: Path, log: BinaryIO) -> subprocess.Popen[bytes]:
-    """The program in a session of its own: runSofa may be a script that starts the real one."""
-    try:
-        return subprocess.Popen(
-            command,
-            cwd=folder,
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
-    except OSError as reason:
-        raise OutputError(
-            f"{command[0]} could not be started ({reason.strerror}); "
-            "see whether it is a program that runs on this machine"
-        ) from reason
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    if process.poll() is not None:
-        return
-    if hasattr(os, "killpg"):
-        os.killpg(process.pid, signal.SIGKILL)
-    else:
-        process.kill()
-    process.wait()
-
-
-def _watched(
-    process: subprocess.Popen[bytes], limit: float | None, report: Callable[[], None]
-) -> bool:
-    """Waits for the end; False if it did not come in time."""
-    started = time.monotonic()
-    while True:
-        try:
-            process.wait(PAUSE)
-        except subprocess.TimeoutExpired:
-            if limit is not None and time.monotonic() - started > limit:
-                return False
-            report()
-        else:
-            return True
-
-
 def _report(state: Path, dt: float, steps: int, tell: Progress | None) -> None:
     if tell is not None:
         tips = read_tips(state)
@@ -205,12 +150,11 @@ def _report(state: Path, dt: float, steps: int, tell: Progress | None) -> None:
             tell("runSofa", min(steps, round(tips[-1].time / dt)), steps)
 
 
-def _trouble(
-    code: int, in_time: bool, limit: float | None, log: Log, tips: list[Tip], seconds: float
-) -> str | None:
+def _trouble(ended: Ended, log: Log, tips: list[Tip], seconds: float) -> str | None:
     """Why a run cannot be believed."""
-    if not in_time:
-        return f"it took longer than {limit:g} s"
+    code = ended.code
+    if ended.stopped is not None:
+        return ended.stopped
     if code < 0:
         return f"runSofa was killed by signal {-code} ({signal.Signals(-code).name})"
     if log.trouble is not None:
