@@ -186,14 +186,14 @@ def energy() -> Iterator[Row]:
     yield Row(
         "energy in at 1 kPa, 6 balloons, d = 10",
         exact(0.531, "mJ", "Sec. 4.1"),
-        found.value("work put in at 1 kPa"),
+        found.value("pneumatic input work at 1 kPa"),
         p_v,
         "an upper bound: as if all the water went in at the end pressure",
     )
     yield Row(
         "energy in at 10 kPa",
         exact(45.3, "mJ", "Sec. 4.1"),
-        found.value("work put in at 10 kPa"),
+        found.value("pneumatic input work at 10 kPa"),
         p_v,
         "far past the geometric regime: stretched films take in several times the volume",
     )
@@ -253,7 +253,7 @@ def heights() -> list[str]:
 
 
 def force(found: Prediction, at: str, model: str) -> float:
-    return found.value(f"force at 100 kPa, {at}", f"virtual work on {model}")
+    return found.value(f"blocked force at 100 kPa, {at}", f"virtual work on {model}")
 
 
 def motion(three: Prediction) -> Iterator[Row]:
@@ -301,7 +301,7 @@ def stiffness(one: Prediction, three: Prediction) -> Iterator[Row]:
         ("1-DoF", one, paper.MODULUS_1DOF),
         ("3-DoF", three, paper.MODULUS_3DOF),
     ):
-        tip = found.value("stiffness of the tip across, full")
+        tip = found.value("lateral tip stiffness, inflated")
         yield Row(
             f"cantilever modulus, {name}",
             value,
@@ -316,8 +316,8 @@ def stiffness(one: Prediction, three: Prediction) -> Iterator[Row]:
         None,
         "F v / m",
         "the table's figures are not in the text we have; "
-        f"{three.value('power density, flat force at 100 kPa and 35 ml/min'):.0f} W/kg for the "
-        "3-DoF with water",
+        f"{three.value('power density, blocked force flat at 100 kPa and 35 ml/min'):.0f} W/kg for "
+        "the 3-DoF with water",
     )
 
 

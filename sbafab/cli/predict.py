@@ -117,7 +117,7 @@ def _print(found: Prediction) -> None:
     out = console()
     out.print(_table(found, models))
     out.print()
-    out.print(Text("Models, and how far they are trusted", style="bold"))
+    out.print(Text("Models and validity", style="bold"))
     notes = _grid()
     for number, model in enumerate(models, start=1):
         notes.add_row(Text(f"[{number}]"), Text(f"{model.title}: {model.trust}"))

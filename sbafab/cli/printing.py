@@ -226,13 +226,13 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
 
 
 def replaced(dropped: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """The row on what went with an earlier run, if there was any."""
+    """The row on the files of an earlier run that were removed, if there were any."""
     if dropped:
         count = "1 file" if len(dropped) == 1 else f"{len(dropped)} files"
         names = ", ".join(dict.fromkeys(path.partition("/")[0] for path in dropped))
         yield (
             "replaced",
-            f"of an earlier run with other settings {count} went ({names}); "
+            f"removed {count} of an earlier run with other settings ({names}); "
             "--set name=NAME gives a design a folder of its own",
         )
 

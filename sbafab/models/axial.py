@@ -77,13 +77,13 @@ def _stroke(k: Kinematics, volume: float) -> Figure | LeftOut:
 
 
 def forces(actuator: Actuator, asked: Asked) -> Iterator[Figure]:
-    """Force at the pressures asked for, held flat and at the paper's shares of the full stroke."""
+    """Blocked force at the pressures asked for, flat and at the paper's shares of full stroke."""
     for pressure in asked.pressures_kpa:
         for share in SHARES:
             at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
             for k in actuator.kinematics:
                 value = _force(actuator, k, pressure, share * actuator.full_stroke, asked)
-                name = f"force{_each(actuator)} at {pressure:g} kPa, {at}"
+                name = f"blocked force{_each(actuator)} at {pressure:g} kPa, {at}"
                 yield Figure("force", name, float(value), "N", _force_model(actuator, k, asked))
 
 
@@ -140,7 +140,7 @@ def power(actuator: Actuator, asked: Asked, mass_g: float) -> Iterator[Figure]:
         "films stretch and take in more",
     )
     for pressure in asked.pressures_kpa:
-        name = f"work put in at {pressure:g} kPa"
+        name = f"pneumatic input work at {pressure:g} kPa"
         yield Figure("actuation", name, work_uj(pressure, whole) / 1000, "mJ", bound)
     if asked.pressures_kpa:
         yield _power_density(actuator, asked, time, mass_g)
@@ -158,7 +158,7 @@ def _power_density(actuator: Actuator, asked: Asked, time: float, mass_g: float)
     watts = pushes * push * actuator.full_stroke / 1000 / time
     return Figure(
         "actuation",
-        f"power density, flat force at {highest:g} kPa and {asked.flow_ml_min:g} ml/min",
+        f"power density, blocked force flat at {highest:g} kPa and {asked.flow_ml_min:g} ml/min",
         watts / (mass_g / 1000),
         "W/kg",
         model,
@@ -217,9 +217,9 @@ def force_relation(actuator: Actuator, asked: Asked) -> Relation:
     each = _each(actuator)
     return Relation(
         "force",
-        f"Force{each} against height, by virtual work",
-        "stroke at which it is held, mm above flat",
-        f"force{each}, N",
+        f"Blocked force{each} against stroke, by virtual work",
+        "stroke at which it is blocked, mm",
+        f"blocked force{each}, N",
         tuple(lines),
         tuple(points),
     )

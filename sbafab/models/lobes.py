@@ -68,7 +68,7 @@ def bending(actuator: Actuator) -> Iterator[Figure | LeftOut]:
             yield Figure("bending", name, math.degrees(path.angle[-1]), "deg", CURVATURE)
     every = [*all_paths, *paths(actuator, others_full=True)]
     reach = max(float(path.aside.max()) for path in every)
-    yield Figure("bending", "farthest reach of the tip aside", reach, "mm", CURVATURE)
+    yield Figure("bending", "maximum lateral tip displacement", reach, "mm", CURVATURE)
 
 
 def folding(actuator: Actuator, asked: Asked) -> Figure | LeftOut:

@@ -149,7 +149,7 @@ def _plate(one: Actuator) -> Region | None:
 
 def _stiffness(one: Actuator) -> Iterator[Figure | LeftOut]:
     """Bending stiffness of a full actuator by the paper's cantilever formula."""
-    name = "stiffness of the tip across, full"
+    name = "lateral tip stiffness, inflated"
     plate = _plate(one)
     if not one.radii:
         yield LeftOut(name, "the paper measured no modulus of oblong balloons")

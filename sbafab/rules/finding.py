@@ -40,7 +40,7 @@ class Finding:
 
     def __post_init__(self) -> None:
         # Limits are in um: what arithmetic leaves below 1 nm says nothing.
-        if self.measured is not None:
+        if isinstance(self.measured, float):
             object.__setattr__(self, "measured", round(self.measured, 6))
 
     def as_dict(self) -> dict[str, object]:

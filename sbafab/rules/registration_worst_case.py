@@ -65,7 +65,7 @@ def least_remaining(laminate: Laminate, limits: Limits) -> list[Remaining]:
 
 
 def check(laminate: Laminate, limits: Limits) -> list[Finding]:
-    """The least remaining bond and overhang, each with its place and what costs most there."""
+    """The least remaining bond and overhang, each with its place and the largest contribution."""
     found = least_remaining(laminate, limits)
     return [
         _finding("bond", limits.worst_bond_width, found, limits, laminate),
@@ -119,7 +119,7 @@ def _finding(
 
 
 def _message(worst: Remaining, tolerances: Tolerances) -> str:
-    """The value, its place and what costs most there."""
+    """The value, its place and the largest contribution there."""
     where = f"{interface_name(worst.interfaces[0])}{worst.alike.others}"
     text = (
         f"at worst {_mm(worst.worst)} is left of the {worst.margin.nominal:.3f} mm "
@@ -129,7 +129,7 @@ def _message(worst: Remaining, tolerances: Tolerances) -> str:
     if not bodies:
         return f"{text}; cutting takes {2 * tolerances.cutting:.3f} mm and nothing can move"
     freedom, cost = bodies[0]
-    return f"{text}; of what moves {_what_it_does(freedom)}, costs most, {cost:.3f} mm"
+    return f"{text}; largest contribution: {_source(freedom)}, {cost:.3f} mm"
 
 
 def costs(found: Iterable[Push]) -> list[tuple[Freedom, float]]:
@@ -142,17 +142,12 @@ def costs(found: Iterable[Push]) -> list[tuple[Freedom, float]]:
     return sorted(total.values(), key=lambda entry: -round(entry[1], 9))
 
 
-def _what_it_does(freedom: Freedom) -> str:
+def _source(freedom: Freedom) -> str:
+    """What may move which layers, and in which press step."""
     one = freedom.lowest == freedom.highest
-    what = (
-        f"layer {freedom.lowest}"
-        if one
-        else f"the stack of layers {freedom.lowest} to {freedom.highest}"
-    )
-    how = {0: "laid by hand", 1: "which can turn about its only pin"}.get(
-        freedom.pins, "on its pins"
-    )
-    return f"{what}, {how} in step {freedom.step}"
+    what = f"layer {freedom.lowest}" if one else f"layers {freedom.lowest} to {freedom.highest}"
+    how = {0: "hand placement", 1: "turn about the only pin"}.get(freedom.pins, "play on the pins")
+    return f"{how} of {what} in step {freedom.step}"
 
 
 def _why(pinned: float) -> str:

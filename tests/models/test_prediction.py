@@ -29,11 +29,11 @@ def test_3dof_takes_0_935_s_of_water(three: Prediction) -> None:
 
 def test_3dof_forces_are_three_times_one_balloon_s(three: Prediction) -> None:
     flat = 3 * 100e-3 * math.pi * 2.5**2
-    by_eq_4 = three.value("force at 100 kPa, flat", "virtual work on Eq. 4")
-    by_eqs_1_to_3 = three.value("force at 100 kPa, flat", "virtual work on Eqs. 1-3")
+    by_eq_4 = three.value("blocked force at 100 kPa, flat", "virtual work on Eq. 4")
+    by_eqs_1_to_3 = three.value("blocked force at 100 kPa, flat", "virtual work on Eqs. 1-3")
     assert by_eq_4 == pytest.approx(flat * 2 / 3)
     assert by_eqs_1_to_3 == pytest.approx(flat / 2)
-    held = three.value("force at 100 kPa, at 75 % of full stroke", "virtual work on Eq. 4")
+    held = three.value("blocked force at 100 kPa, at 75 % of full stroke", "virtual work on Eq. 4")
     assert held == pytest.approx(3 * 0.1 * float(printed.rate(0.75 * 17.5 / 15, 2.5)))
 
 
@@ -67,7 +67,7 @@ def test_radial_is_15_33_flat_and_about_28_inflated() -> None:
 @pytest.mark.parametrize(("template", "pushes"), [("3dof-15mm", 1), ("radial-15mm", 3)])
 def test_power_density_by_hand(template: str, pushes: int) -> None:
     found = sbafab.predict(template)
-    force = "force at" if pushes == 1 else "force of one SBA at"
+    force = "blocked force at" if pushes == 1 else "blocked force of one SBA at"
     model = "virtual work on Eq. 4" if pushes == 1 else ""
     watts = (
         pushes
@@ -76,7 +76,7 @@ def test_power_density_by_hand(template: str, pushes: int) -> None:
         / 1000
         / found.value("time to full stroke at 35 ml/min")
     )
-    told = found.value("power density, flat force at 100 kPa and 35 ml/min")
+    told = found.value("power density, blocked force flat at 100 kPa and 35 ml/min")
     assert told == pytest.approx(watts / (found.value("mass") / 1000))
 
 

@@ -179,7 +179,7 @@ def test_what_is_short_as_drawn_only_warns_here(good: Good, spoil: Spoil) -> Non
 def test_templates_are_short_by_the_hand_only(template: str, good: Good) -> None:
     bond, overhang = check(good(template), Limits())
     assert {bond.verdict, overhang.verdict} == {"warn"}
-    assert "by hand" in bond.message
+    assert "hand placement of" in bond.message
     assert "in step" in bond.message
     assert 'registration.method = "ears" pins it' in bond.message
     steady = check(good(template), Limits(tolerances=Tolerances(placement=0, turn=0)))
@@ -209,7 +209,7 @@ def test_ears_leave_nothing_to_the_hand(design: tuple[str, ...], good: Good) -> 
 def test_without_its_tails_pin_the_strip_turns(good: Good) -> None:
     bond, overhang = check(without_tails(good("3dof-15mm", EARS)), Limits())
     assert (bond.verdict, overhang.verdict) == ("warn", "pass")
-    assert "layer 2, which can turn about its only pin in step 1" in bond.message
+    assert "turn about the only pin of layer 2 in step 1" in bond.message
     assert "at 1 interface," in bond.message
     assert "ears" not in bond.message
 
