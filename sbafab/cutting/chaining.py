@@ -60,15 +60,18 @@ def check_clear(contours: Sequence[Contour]) -> None:
     ]
     for i, j in close_pairs([edge.bounds for edge, *_ in owned], EPSILON):
         (a, owner_a, place_a), (b, owner_b, place_b) = owned[i], owned[j]
+        steps = (place_a - place_b) % len(contours[owner_a].edges)
+        neighbours = owner_a == owner_b and steps in (1, len(contours[owner_a].edges) - 1)
+        along = same_support(a, b) or same_support(a, b.reversed())
+        # Neighbours meet at their common end; where they run along each other is what matters.
+        if neighbours and not along:
+            continue
         points = meeting_points(a, b)
         if not points:
             continue
         x, y = points[0]
-        along = same_support(a, b) or same_support(a, b.reversed())
         if along and max(math.dist(points[0], p) for p in points) > 2 * EPSILON:
             raise OutputError(f"edge drawn twice at x {x:.3f}, y {y:.3f}; remove one.")
-        steps = (place_a - place_b) % len(contours[owner_a].edges)
-        neighbours = owner_a == owner_b and steps in (1, len(contours[owner_a].edges) - 1)
         if not neighbours:
             raise OutputError(f"contours touch or cross at x {x:.3f}, y {y:.3f}; part them.")
 
@@ -97,20 +100,13 @@ def nested_region(inner: Sequence[Contour], outer: Sequence[Contour]) -> Region:
 
 
 def _depths(contours: Sequence[Contour]) -> list[int]:
-    """How many of the others hold each contour, by a sweep along x."""
+    """How many of the others hold each contour."""
+    count = len(contours)
     places = [contour.edges[0].at(0.5) for contour in contours]
-    coming = sorted(range(len(contours)), key=lambda i: contours[i].bounds[0], reverse=True)
-    depths = [0] * len(contours)
-    active: list[int] = []
-    for here in sorted(range(len(contours)), key=lambda i: places[i][0]):
-        p = places[here]
-        while coming and contours[coming[-1]].bounds[0] <= p[0]:
-            active.append(coming.pop())
-        active = [i for i in active if contours[i].bounds[2] >= p[0]]
-        depths[here] = sum(_holds(contours[i], p) for i in active if i != here)
+    depths = [0] * count
+    boxes = [*(contour.bounds for contour in contours), *((*p, *p) for p in places)]
+    for pair in close_pairs(boxes, 0.0):
+        holder, held = min(pair), max(pair) - count
+        if holder < count and held >= 0 and held != holder:
+            depths[held] += contours[holder].winding(places[held]) != 0
     return depths
-
-
-def _holds(contour: Contour, p: Point) -> bool:
-    low_x, low_y, high_x, high_y = contour.bounds
-    return low_x <= p[0] <= high_x and low_y <= p[1] <= high_y and contour.winding(p) != 0

@@ -22,7 +22,7 @@ from sbafab.geometry.edges import (
     distance_to,
     unit,
 )
-from sbafab.geometry.nearby import EdgeIndex
+from sbafab.geometry.nearby import EdgeIndex, close_pairs
 
 MANY = 32
 """Edges from which on filing them by place is worth its cost."""
@@ -231,13 +231,20 @@ class Region:
         if len(self.outers) == 1:
             return (self,)
         held: list[list[Contour]] = [[outer] for outer in self.outers]
-        for hole in self.holes:
+        places = [hole.edges[0].at(0.5) for hole in self.holes]
+        boxes = [*(outer.bounds for outer in self.outers), *((*p, *p) for p in places)]
+        near: list[list[int]] = [[] for _ in places]
+        for pair in close_pairs(boxes, 0.0):
+            outer, hole = min(pair), max(pair) - len(held)
+            if outer < len(held) and hole >= 0:
+                near[hole].append(outer)
+        for contour, place, numbers in zip(self.holes, places, near, strict=True):
             inside = [
-                group
-                for group in held
-                if group[0].winding(hole.edges[0].at(0.5)) != 0 and group[0].area > -hole.area
+                held[number]
+                for number in sorted(numbers)
+                if held[number][0].winding(place) != 0 and held[number][0].area > -contour.area
             ]
-            min(inside, key=lambda group: group[0].area).append(hole)
+            min(inside, key=lambda group: group[0].area).append(contour)
         return tuple(Region(tuple(group)) for group in held)
 
     @cached_property
