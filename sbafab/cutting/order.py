@@ -50,8 +50,12 @@ def _short(contours: Iterable[Contour], here: Point) -> list[Contour]:
     path: list[Contour] = []
     place = here
     while len(path) < len(rest):
-        # Rounding lets equal ways stay equal on every machine; the first of them wins.
-        number = remaining.take(place, lambda i, p=place: round(math.dist(p, starts[i]), 6))
+
+        def way(number: int, place: Point = place) -> float:
+            # Rounding lets equal ways stay equal on every machine; the first of them wins.
+            return round(math.dist(place, starts[number]), 6)
+
+        number = remaining.take(place, way)
         path.append(rest[number])
         place = starts[number]
     for _ in range(SWEEPS):

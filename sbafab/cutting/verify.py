@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import Surroundings
 from sbafab.cutting.remaining import Remaining
 from sbafab.errors import OutputError
-from sbafab.geometry.edges import Edge, Line, Point, distance_to
+from sbafab.geometry.edges import Bounds, Edge, Line, Point, distance_to
 from sbafab.geometry.region import Contour, Region
 
 TOLERANCE = 0.001
@@ -110,11 +110,7 @@ def check_contours(found: Region, expected: Region, tolerance: float) -> None:
     ):
         if len(ours) != len(theirs):
             raise OutputError(f"it has {len(theirs)} {kind}, not {len(ours)}.")
-        rest = Remaining([contour.bounds[:2] for contour in theirs])
-        for contour in ours:
-            box = contour.bounds
-            number = rest.take(box[:2], lambda i: math.dist(theirs[i].bounds, box))
-            nearest = theirs[number]
+        for contour, nearest in _paired(ours, theirs):
             if _same(contour, nearest):
                 continue
             off, (x, y) = max(_deviation(contour, nearest), _deviation(nearest, contour))
@@ -123,6 +119,21 @@ def check_contours(found: Region, expected: Region, tolerance: float) -> None:
                     f"an edge is {off:.6f} mm off at x {x:.3f}, y {y:.3f}, "
                     f"where {tolerance:g} is allowed."
                 )
+
+
+def _paired(
+    ours: Sequence[Contour], theirs: Sequence[Contour]
+) -> Iterator[tuple[Contour, Contour]]:
+    """Each of our contours with that of theirs, not yet taken, whose box is most like its own."""
+    boxes = [contour.bounds for contour in theirs]
+    rest = Remaining([box[:2] for box in boxes])
+    for contour in ours:
+        box = contour.bounds
+
+        def unlike(number: int, box: Bounds = box) -> float:
+            return math.dist(boxes[number], box)
+
+        yield contour, theirs[rest.take(box[:2], unlike)]
 
 
 def _same(contour: Contour, other: Contour) -> bool:
