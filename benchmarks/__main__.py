@@ -101,7 +101,7 @@ def stacks(rounds: int) -> None:
 
 
 def many_copies(rounds: int) -> None:
-    """Nesting, cutting order, writing and reading back grow with the parts, not with their pairs."""
+    """Nesting, cutting order, writing and reading back grow with the parts, not their pairs."""
     print(f"\nCut files and {copies.SHEET} mm film sheets of many {copies.DESIGN}")
     times: dict[int, list[float]] = {1: [], 10: [], 50: [], 100: []}
     for turn in range(rounds + 1):

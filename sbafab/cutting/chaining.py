@@ -94,7 +94,13 @@ def _check_own(contour: Contour) -> None:
 
 
 def _check_two(one: Contour, other: Contour) -> None:
-    ours, theirs = _reaching(one, other), _reaching(other, one)
+    # The one of more edges first: of a plate hardly one comes near a hole.
+    if len(one.edges) < len(other.edges):
+        one, other = other, one
+    ours = _reaching(one, other)
+    theirs = _reaching(other, one) if ours else []
+    if not theirs:
+        return
     edges = [*ours, *theirs]
     for pair in close_pairs([edge.bounds for edge in edges], EPSILON):
         if min(pair) < len(ours) <= max(pair):

@@ -30,11 +30,11 @@ NOWHERE: Bounds = (math.inf, math.inf, -math.inf, -math.inf)
 
 
 def _join(bounds: Iterable[Bounds]) -> Bounds:
-    low_x, low_y, high_x, high_y = NOWHERE
-    for box in bounds:
-        low_x, low_y = min(low_x, box[0]), min(low_y, box[1])
-        high_x, high_y = max(high_x, box[2]), max(high_y, box[3])
-    return low_x, low_y, high_x, high_y
+    boxes = tuple(bounds)
+    if not boxes:
+        return NOWHERE
+    left, bottom, right, top = zip(*boxes, strict=True)
+    return min(left), min(bottom), max(right), max(top)
 
 
 @dataclass(frozen=True)

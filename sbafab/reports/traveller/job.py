@@ -21,7 +21,8 @@ class Job:
 
     ``kerf`` by material, ``fixture`` the path of the pin plate's cut file, ``solid_png`` the bytes
     of the picture of the solid. ``lowered`` are limits below the usual ones. ``extras`` are further
-    rows of the bill of materials: item and quantity. Empty ``made_for`` leaves a blank to fill in by hand.
+    rows of the bill of materials: item and quantity. Empty ``made_for`` leaves a blank to fill in
+    by hand.
     """
 
     design_sha256: str
