@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from benchmarks import checking, scaling
+from benchmarks import checking, copies, scaling
 from benchmarks.timing import HEAD, ROOT, by_turns, keep_to_one_core, row
 
 RIVALS = {"foldable": "foldable-robotics==0.0.37", "build123d": "build123d"}
@@ -28,6 +28,7 @@ def main() -> None:
     keep_to_one_core()
     plates(arguments.rivals, arguments.rounds)
     stacks(arguments.rounds)
+    many_copies(arguments.rounds)
     commands(arguments.rounds)
 
 
@@ -97,6 +98,22 @@ def stacks(rounds: int) -> None:
     for balloons, taken in times.items():
         print(row(f"{balloons} balloons", taken))
     print(f"  ratio of the least: {min(times[150]) / min(times[15]):.2f}")
+
+
+def many_copies(rounds: int) -> None:
+    """Nesting, cutting order, writing and reading back grow with the parts, not their pairs."""
+    print(f"\nCut files and {copies.SHEET} mm film sheets of many {copies.DESIGN}")
+    times: dict[int, list[float]] = {1: [], 10: [], 50: [], 100: []}
+    for turn in range(rounds + 1):
+        for number, taken in times.items():
+            measured = copies.nested_and_cut(number)
+            if turn:
+                taken.append(measured)
+    print(HEAD)
+    for number, taken in times.items():
+        print(row(f"{number} copies", taken))
+    many = {number: min(taken) for number, taken in times.items() if number >= 10}
+    print(f"  time grows with the copies to the power of {copies.exponent(many):.2f}")
 
 
 def commands(rounds: int) -> None:

@@ -153,6 +153,7 @@ def build(design: LobedDesign) -> Laminate:
         balloons=design.stack.balloons,
         registration=design.registration.method,
         notes=(*((note,) if note else ()), *((NOTE,) if ears else ())),
+        outline=plates,
     )
 
 

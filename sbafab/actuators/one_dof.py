@@ -75,6 +75,7 @@ def build(design: OneDofDesign) -> Laminate:
         balloons=balloons,
         registration=design.registration.method,
         notes=(NOTE,) if ears else (),
+        outline=plates,
     )
 
 

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 from sbafab.assemblies import collisions, deployment, fits
 from sbafab.assemblies.build import Assembled
-from sbafab.assemblies.records import CheckName
+from sbafab.assemblies.records import AssemblyRules, CheckName
 from sbafab.rules.finding import Finding
+from sbafab.rules.lowered import weakened
 
 CHECKS: Mapping[CheckName, Callable[[Assembled], Iterator[Finding]]] = {
     "tube-match": fits.tube_match,
@@ -24,12 +25,33 @@ CHECKS: Mapping[CheckName, Callable[[Assembled], Iterator[Finding]]] = {
 
 def run_checks(assembled: Assembled) -> tuple[Finding, ...]:
     """What every check finds, in their order; failures that the assembly waives say so."""
-    waive = assembled.assembly.rules.waive
+    rules = assembled.assembly.rules
     return tuple(
-        _waived(finding) if name in waive and finding.verdict == "fail" else finding
+        _waived(finding) if name in rules.waive and finding.verdict == "fail" else finding
         for name, check in CHECKS.items()
-        for finding in check(assembled)
+        for finding in (_against(lowered_checks(rules, name), found) for found in check(assembled))
     )
+
+
+def lowered_checks(rules: AssemblyRules, name: str | None = None) -> tuple[str, ...]:
+    """Each limit (of one check) that an assembly weakens, with its value and the usual one."""
+    usual = AssemblyRules()
+    keys = (
+        ("line-clearance", "line_clearance", rules.line_clearance < usual.line_clearance),
+        ("tube-match", "tube_tolerance", rules.tube_tolerance > usual.tube_tolerance),
+        ("seat", "seat_share", rules.seat_share < usual.seat_share),
+    )
+    return tuple(
+        weakened(key, getattr(rules, key), getattr(usual, key), "default")
+        for check, key, is_weaker in keys
+        if is_weaker and name in (None, check)
+    )
+
+
+def _against(weak: tuple[str, ...], finding: Finding) -> Finding:
+    if not weak:
+        return finding
+    return replace(finding, message=f"{finding.message}; limits lowered: {', '.join(weak)}")
 
 
 def _waived(finding: Finding) -> Finding:

@@ -10,7 +10,7 @@ from sbafab.assemblies.fits import WHOLE, found
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Tube
 from sbafab.design.form import Discs
 from sbafab.models.folded import LOBES, folded_diameter
-from sbafab.models.sizes import deflated_diameter, inflated_diameter
+from sbafab.models.sizes import deflated_diameter, inflated_diameter, outline_diameter
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import holds
 
@@ -85,10 +85,9 @@ def _lobe_width(placed: PlacedPart) -> float | None:
 
 
 def _flat_diameter(placed: PlacedPart) -> float:
-    """Circle round an SBA's axis that holds its topmost film, which has no tabs, mm."""
+    """Circle round an SBA's axis that holds its widest film, tabs and ears taken off, mm."""
     assert placed.made is not None
-    top = placed.made.laminate.layers[-1].profile
-    return 2 * max(edge.farthest_from((0.0, 0.0)) for edge in top.edges)
+    return outline_diameter(placed.made.laminate)
 
 
 def _girth(placed: PlacedPart) -> float:

@@ -9,10 +9,14 @@ from collections.abc import Sequence
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
 from sbafab.geometry.boolean import LEAST_AREA, PointPool, tidy
-from sbafab.geometry.edges import EPSILON, Edge, Point
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Point
 from sbafab.geometry.intersect import meeting_points
-from sbafab.geometry.nearby import close_pairs
+from sbafab.geometry.nearby import close_pairs, widened
 from sbafab.geometry.region import Contour, Region, same_support
+from sbafab.geometry.shapes import circle
+
+CLEAR = 10 * EPSILON
+"""mm between two circles from which on they surely do not touch."""
 
 
 def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
@@ -53,24 +57,77 @@ def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
 
 def check_clear(contours: Sequence[Contour]) -> None:
     """Raises OutputError where an edge is drawn twice or contours touch or cross."""
-    owned = [
-        (edge, number, place)
-        for number, contour in enumerate(contours)
-        for place, edge in enumerate(contour.edges)
+    rounds = [_full_circle(contour) for contour in contours]
+    for contour, circled in zip(contours, rounds, strict=True):
+        if circled is None:
+            _check_own(contour)
+    for i, j in close_pairs([contour.bounds for contour in contours], EPSILON):
+        if not _are_clear(rounds[i], rounds[j]):
+            _check_two(contours[i], contours[j])
+
+
+def _full_circle(contour: Contour) -> tuple[Point, float] | None:
+    """Centre and radius of a contour that is one circle, run through once, so clear of itself."""
+    if contour.circle is None:
+        return None
+    turn = sum(edge.sweep for edge in contour.edges if isinstance(edge, Arc))
+    return contour.circle if abs(abs(turn) - math.tau) < 1e-6 else None
+
+
+def _are_clear(a: tuple[Point, float] | None, b: tuple[Point, float] | None) -> bool:
+    """Whether two circles surely do not meet: one within the other, or each aside of the other."""
+    if a is None or b is None:
+        return False
+    between = math.dist(a[0], b[0])
+    return between > a[1] + b[1] + CLEAR or between < abs(a[1] - b[1]) - CLEAR
+
+
+def _check_own(contour: Contour) -> None:
+    count = len(contour.edges)
+    for i, j in close_pairs([edge.bounds for edge in contour.edges], EPSILON):
+        a, b = contour.edges[i], contour.edges[j]
+        neighbours = (i - j) % count in (1, count - 1)
+        # One goes on where the other ends, and neither is more than half a turn: of neighbours,
+        # only those that turn back run along each other.
+        if not neighbours or same_support(a, b.reversed()):
+            _check_edges(a, b, neighbours)
+
+
+def _check_two(one: Contour, other: Contour) -> None:
+    # The one of more edges first: of a plate hardly one comes near a hole.
+    if len(one.edges) < len(other.edges):
+        one, other = other, one
+    ours = _reaching(one, other)
+    theirs = _reaching(other, one) if ours else []
+    if not theirs:
+        return
+    edges = [*ours, *theirs]
+    for pair in close_pairs([edge.bounds for edge in edges], EPSILON):
+        if min(pair) < len(ours) <= max(pair):
+            _check_edges(edges[pair[0]], edges[pair[1]], False)
+
+
+def _reaching(one: Contour, other: Contour) -> list[Edge]:
+    """The edges of a contour that reach into the box of another."""
+    left, bottom, right, top = widened(other.bounds, EPSILON)
+    return [
+        edge
+        for edge in one.edges
+        for low_x, low_y, high_x, high_y in (edge.bounds,)
+        if low_x <= right and high_x >= left and low_y <= top and high_y >= bottom
     ]
-    for i, j in close_pairs([edge.bounds for edge, *_ in owned], EPSILON):
-        (a, owner_a, place_a), (b, owner_b, place_b) = owned[i], owned[j]
-        points = meeting_points(a, b)
-        if not points:
-            continue
-        x, y = points[0]
-        along = same_support(a, b) or same_support(a, b.reversed())
-        if along and max(math.dist(points[0], p) for p in points) > 2 * EPSILON:
-            raise OutputError(f"edge drawn twice at x {x:.3f}, y {y:.3f}; remove one.")
-        steps = (place_a - place_b) % len(contours[owner_a].edges)
-        neighbours = owner_a == owner_b and steps in (1, len(contours[owner_a].edges) - 1)
-        if not neighbours:
-            raise OutputError(f"contours touch or cross at x {x:.3f}, y {y:.3f}; part them.")
+
+
+def _check_edges(a: Edge, b: Edge, neighbours: bool) -> None:
+    points = meeting_points(a, b)
+    if not points:
+        return
+    x, y = points[0]
+    along = same_support(a, b) or same_support(a, b.reversed())
+    if along and max(math.dist(points[0], p) for p in points) > 2 * EPSILON:
+        raise OutputError(f"edge drawn twice at x {x:.3f}, y {y:.3f}; remove one.")
+    if not neighbours:
+        raise OutputError(f"contours touch or cross at x {x:.3f}, y {y:.3f}; part them.")
 
 
 def nested_region(inner: Sequence[Contour], outer: Sequence[Contour]) -> Region:
@@ -92,25 +149,26 @@ def nested_region(inner: Sequence[Contour], outer: Sequence[Contour]) -> Region:
         if abs(contour.area) < LEAST_AREA:
             raise OutputError(f"contour at x {x:.3f}, y {y:.3f} encloses nothing; remove it.")
         right = contour if contour.is_hole == is_hole else contour.reversed()
-        turned.append(tidy(right.edges) or right)
+        turned.append(_tidied(right))
     return Region(tuple(turned))
 
 
+def _tidied(contour: Contour) -> Contour:
+    if contour.circle is not None:
+        whole = circle(*contour.circle)
+        whole = whole.reversed() if contour.is_hole else whole
+        return contour if contour.edges == whole.edges else whole
+    return tidy(contour.edges) or contour
+
+
 def _depths(contours: Sequence[Contour]) -> list[int]:
-    """How many of the others hold each contour, by a sweep along x."""
+    """How many of the others hold each contour."""
+    count = len(contours)
     places = [contour.edges[0].at(0.5) for contour in contours]
-    coming = sorted(range(len(contours)), key=lambda i: contours[i].bounds[0], reverse=True)
-    depths = [0] * len(contours)
-    active: list[int] = []
-    for here in sorted(range(len(contours)), key=lambda i: places[i][0]):
-        p = places[here]
-        while coming and contours[coming[-1]].bounds[0] <= p[0]:
-            active.append(coming.pop())
-        active = [i for i in active if contours[i].bounds[2] >= p[0]]
-        depths[here] = sum(_holds(contours[i], p) for i in active if i != here)
+    depths = [0] * count
+    boxes = [*(contour.bounds for contour in contours), *((*p, *p) for p in places)]
+    for pair in close_pairs(boxes, 0.0):
+        holder, held = min(pair), max(pair) - count
+        if holder < count and held >= 0 and held != holder:
+            depths[held] += contours[holder].winding(places[held]) != 0
     return depths
-
-
-def _holds(contour: Contour, p: Point) -> bool:
-    low_x, low_y, high_x, high_y = contour.bounds
-    return low_x <= p[0] <= high_x and low_y <= p[1] <= high_y and contour.winding(p) != 0

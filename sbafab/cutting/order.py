@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
+from sbafab.cutting.remaining import Remaining
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Contour, Region
 
@@ -14,6 +16,8 @@ SWEEPS = 6
 """How often a path is looked through for crossings to undo."""
 LOOKED_AHEAD = 40
 """Contours along the path that one end of a crossing may lie from the other."""
+SHORTER = 1e-6
+"""mm by which a path has to become shorter to be turned round."""
 
 
 def cutting_order(region: Region, heat_distance: float = 0.0) -> tuple[Contour, ...]:
@@ -41,13 +45,19 @@ def _start(contour: Contour) -> Point:
 def _short(contours: Iterable[Contour], here: Point) -> list[Contour]:
     """A short path through all contours: on to the nearest, then crossings undone."""
     rest = list(contours)
+    starts = [_start(contour) for contour in rest]
+    remaining = Remaining(starts)
     path: list[Contour] = []
     place = here
-    while rest:
-        # Rounding lets equal ways stay equal on every machine; the first of them wins.
-        ways = [round(math.dist(place, _start(contour)), 6) for contour in rest]
-        path.append(rest.pop(ways.index(min(ways))))
-        place = _start(path[-1])
+    while len(path) < len(rest):
+
+        def way(number: int, place: Point = place) -> float:
+            # Rounding lets equal ways stay equal on every machine; the first of them wins.
+            return round(math.dist(place, starts[number]), 6)
+
+        number = remaining.take(place, way)
+        path.append(rest[number])
+        place = starts[number]
     for _ in range(SWEEPS):
         if not _undo_crossings(path, here):
             break
@@ -59,25 +69,50 @@ def _undo_crossings(path: list[Contour], here: Point) -> bool:
     shorter = False
     stops = [here, *map(_start, path)]
     count = len(path)
+    worth = _worth_a_look(stops)
+    changed = -1
     for i in range(count - 1):
+        if i > changed and not worth[i]:
+            continue
         for j in range(i + 1, min(count, i + LOOKED_AHEAD)):
             before = math.dist(stops[i], stops[i + 1])
             after = math.dist(stops[i], stops[j + 1])
             if j + 1 < count:
                 before += math.dist(stops[j + 1], stops[j + 2])
                 after += math.dist(stops[i + 1], stops[j + 2])
-            if after < before - 1e-6:
+            if after < before - SHORTER:
                 path[i : j + 1] = path[i : j + 1][::-1]
                 stops[i + 1 : j + 2] = stops[i + 1 : j + 2][::-1]
                 shorter = True
+                changed = max(changed, j + 1)
     return shorter
+
+
+def _worth_a_look(stops: Sequence[Point]) -> list[bool]:
+    """For each stop whether turning a stretch after it may shorten the path, as it is now.
+
+    All stretches at once; what is told apart by less than half of ``SHORTER`` is worth a look.
+    """
+    import numpy as np
+
+    count = len(stops) - 1
+    xy = np.array(stops)
+    worth = np.zeros(count, dtype=bool)
+    steps = np.hypot(*(xy[1:] - xy[:-1]).T)
+    for ahead in range(1, min(LOOKED_AHEAD, count)):
+        # The stretch from stop i + 1 to stop i + ahead + 1; the last one has nothing behind it.
+        saved = steps[: count - ahead] - np.hypot(*(xy[ahead + 1 :] - xy[: count - ahead]).T)
+        saved[:-1] += steps[ahead + 1 :] - np.hypot(*(xy[ahead + 2 :] - xy[1 : count - ahead]).T)
+        worth[: count - ahead] |= saved > SHORTER / 2
+    found: list[bool] = worth.tolist()
+    return found
 
 
 def _spread(path: Sequence[Contour], heat_distance: float) -> list[Contour]:
     """The path with the next contour that is not near the last one, time after time."""
     if heat_distance <= 0.0:
         return list(path)
-    rest = list(path)
+    rest = deque(path)
     spread: list[Contour] = []
     while rest:
         last = spread[-1].bounds if spread else None
@@ -89,7 +124,8 @@ def _spread(path: Sequence[Contour], heat_distance: float) -> list[Contour]:
             ),
             0,
         )
-        spread.append(rest.pop(index))
+        spread.append(rest[index])
+        del rest[index]
     return spread
 
 

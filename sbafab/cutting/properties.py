@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from sbafab.cutting.dxf_write import DxfProfile
@@ -13,6 +13,7 @@ from sbafab.laminate.films import Material
 
 UNCALIBRATED = "uncalibrated: nominal edges"
 COMPENSATED = "compensated"
+LIMITS = "LIMITS"
 CHORDS = "chords within"
 FOLDER = "layers"
 PTFE_WARNING = (
@@ -27,7 +28,8 @@ class CutSettings:
 
     ``kerf_widths``: full width in mm (or along x and along y) by material, None or absent where
     it was not measured.
-    ``waived``: names of the waived rules. ``chord_error`` in mm counts for profile "chords" only.
+    ``waived``: names of the waived rules; ``lowered``: limits below the usual ones, as
+    ``rules.lowered`` says them. ``chord_error`` in mm counts for profile "chords" only.
     ``generator``: program and version, for example ``sbafab 1.0.0``.
     """
 
@@ -35,6 +37,7 @@ class CutSettings:
     design_sha256: str
     kerf_widths: Mapping[str, Kerf | None] = field(default_factory=dict)
     waived: tuple[str, ...] = ()
+    lowered: tuple[str, ...] = ()
     profile: DxfProfile = "bulges"
     chord_error: float = 0.005
     generator: str = "sbafab"
@@ -92,9 +95,15 @@ def _properties(
         "UNITS": "mm",
         **kerf_properties(kerf),
         "WAIVED": ", ".join(settings.waived) or "none",
+        **limit_properties(settings.lowered),
         "GENERATOR": settings.generator,
         **_curves(settings),
     }
+
+
+def limit_properties(lowered: Sequence[str]) -> dict[str, str]:
+    """What a cut file says of lowered limits: nothing where there are none."""
+    return {LIMITS: ", ".join(lowered)} if lowered else {}
 
 
 def kerf_properties(kerf: Kerf | None) -> dict[str, str]:

@@ -170,9 +170,10 @@ def _label(nest: Nest, sheet: int, settings: CutSettings) -> tuple[tuple[Point, 
     """What is engraved into the border, if there is room for it between the pins."""
     kerf = kerf_suffix(settings.kerf_width(nest.material)).strip("_") or "kerf none"
     waived = f" waived: {', '.join(settings.waived)}" if settings.waived else ""
+    lowered = f" limits: {', '.join(settings.lowered)}" if settings.lowered else ""
     text = (
         f"{settings.design} {nest.material} {sheet + 1}/{nest.sheets} "
-        f"#{settings.design_sha256[:8]} {kerf}{waived}"
+        f"#{settings.design_sha256[:8]} {kerf}{waived}{lowered}"
     )
     return label(text, nest.stock, nest.length(sheet))
 

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 
 from sbafab.cutting.cut_layers import CUT_SEQUENCE, CUT_SHEET, ENGRAVE, REFERENCE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import Surroundings
+from sbafab.cutting.remaining import Remaining
 from sbafab.errors import OutputError
-from sbafab.geometry.edges import Line, Point, distance_to
+from sbafab.geometry.edges import Bounds, Edge, Line, Point, distance_to
 from sbafab.geometry.region import Contour, Region
 
 TOLERANCE = 0.001
 """Written contours lie within this of the exact ones, in mm."""
+ROUNDING = TOLERANCE / 1000
+"""Edges that agree to this, in mm, are the same edge, written and read."""
 AREA_TOLERANCE = 1e-4
 """Share of the area that a written file may be off by."""
 
@@ -63,11 +66,25 @@ def check_surroundings(found: ReadBack, expected: Surroundings) -> None:
             ):
                 x, y = run[0]
                 raise OutputError(f"the stroke on {layer} at x {x:.3f}, y {y:.3f} is another.")
-    for name, edges in found.strokes:
-        for edge in edges if name == ENGRAVE else ():
-            if found.region.contains(edge.at(0.5)) or found.region.contains(edge.start):
-                x, y = edge.start
-                raise OutputError(f"engraving at x {x:.3f}, y {y:.3f} lies in a part.")
+    engraved = [edge for name, edges in found.strokes if name == ENGRAVE for edge in edges]
+    near = _near(found.region, engraved)
+    for edge in engraved:
+        if near.contains(edge.at(0.5)) or near.contains(edge.start):
+            x, y = edge.start
+            raise OutputError(f"engraving at x {x:.3f}, y {y:.3f} lies in a part.")
+
+
+def _near(region: Region, edges: Sequence[Edge]) -> Region:
+    """The contours of a region that reach into the box round some edges: no others hold a point."""
+    left, bottom, right, top = Region((Contour(tuple(edges)),)).bounds
+    return Region(
+        tuple(
+            contour
+            for contour in region.contours
+            for low_x, low_y, high_x, high_y in (contour.bounds,)
+            if low_x <= right and high_x >= left and low_y <= top and high_y >= bottom
+        )
+    )
 
 
 def _check_properties(found: Mapping[str, str], expected: Mapping[str, str]) -> None:
@@ -93,16 +110,58 @@ def check_contours(found: Region, expected: Region, tolerance: float) -> None:
     ):
         if len(ours) != len(theirs):
             raise OutputError(f"it has {len(theirs)} {kind}, not {len(ours)}.")
-        rest = list(theirs)
-        for contour in ours:
-            nearest = min(rest, key=lambda other: math.dist(other.bounds, contour.bounds))
-            rest.remove(nearest)
+        for contour, nearest in _paired(ours, theirs):
+            if _same(contour, nearest):
+                continue
             off, (x, y) = max(_deviation(contour, nearest), _deviation(nearest, contour))
             if off > tolerance:
                 raise OutputError(
                     f"an edge is {off:.6f} mm off at x {x:.3f}, y {y:.3f}, "
                     f"where {tolerance:g} is allowed."
                 )
+
+
+def _paired(
+    ours: Sequence[Contour], theirs: Sequence[Contour]
+) -> Iterator[tuple[Contour, Contour]]:
+    """Each of our contours with that of theirs, not yet taken, whose box is most like its own."""
+    boxes = [contour.bounds for contour in theirs]
+    rest = Remaining([box[:2] for box in boxes])
+    for contour in ours:
+        box = contour.bounds
+
+        def unlike(number: int, box: Bounds = box) -> float:
+            return math.dist(boxes[number], box)
+
+        yield contour, theirs[rest.take(box[:2], unlike)]
+
+
+def _same(contour: Contour, other: Contour) -> bool:
+    """Whether two contours have the same edges, from whichever vertex, all but for rounding.
+
+    Ends, centres and radii within ``ROUNDING`` leave no point of an edge farther than a few times
+    that from the other: what is not the same so is sampled.
+    """
+    ours, theirs = contour.edges, other.edges
+    if len(ours) != len(theirs):
+        return False
+    start = ours[0].start
+    first = min(range(len(theirs)), key=lambda i: math.dist(theirs[i].start, start))
+    return all(
+        _same_edge(a, b) for a, b in zip(ours, (*theirs[first:], *theirs[:first]), strict=True)
+    )
+
+
+def _same_edge(a: Edge, b: Edge) -> bool:
+    if math.dist(a.start, b.start) > ROUNDING or math.dist(a.end, b.end) > ROUNDING:
+        return False
+    if isinstance(a, Line) or isinstance(b, Line):
+        return isinstance(a, Line) and isinstance(b, Line)
+    return (
+        a.ccw == b.ccw
+        and abs(a.radius - b.radius) <= ROUNDING
+        and math.dist(a.centre, b.centre) <= ROUNDING
+    )
 
 
 def _check_area(found: Region, expected: Region, chord_error: float) -> None:
@@ -145,6 +204,6 @@ def _nearest(contour: Contour, p: Point, hint: int) -> tuple[float, int]:
         distance = distance_to(contour.edges[index], p)
         if distance < best:
             best, where = distance, index
-            if best < TOLERANCE / 1000:
+            if best < ROUNDING:
                 break
     return best, where

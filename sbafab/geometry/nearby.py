@@ -14,15 +14,36 @@ def widened(box: Bounds, margin: float) -> Bounds:
 
 
 def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
-    """Numbers of the boxes that come within ``reach`` of each other, by a sweep along x."""
-    active: list[int] = []
-    for i in sorted(range(len(boxes)), key=lambda i: boxes[i][0]):
+    """Numbers of the boxes that come within ``reach`` of each other, by a sweep along x.
+
+    The sweep runs in bands along y as high as a box is on average, so its time grows with the boxes
+    and the pairs alone.
+    """
+    order = sorted(range(len(boxes)), key=lambda i: boxes[i][0])
+    height = reach + sum(box[3] - box[1] for box in boxes) / max(1, len(boxes)) or 1.0
+    active: dict[int, list[tuple[int, int, int]]] = {}
+    for rank, i in enumerate(order):
         left, low, _, high = boxes[i]
-        active = [j for j in active if boxes[j][2] >= left - reach]
-        for j in active:
-            if boxes[j][1] <= high + reach and boxes[j][3] >= low - reach:
-                yield j, i
-        active.append(i)
+        first, last = math.floor((low - reach) / height), math.floor((high + reach) / height)
+        found = []
+        for band in range(first, last + 1):
+            filed = active.get(band)
+            if not filed:
+                continue
+            filed = active[band] = [it for it in filed if boxes[it[1]][2] >= left - reach]
+            for before, j, bottom in filed:
+                # Two boxes may share several bands; they meet in the lowest of them.
+                if (
+                    band == max(first, bottom)
+                    and boxes[j][1] <= high + reach
+                    and boxes[j][3] >= low - reach
+                ):
+                    found.append((before, j))
+        for _, j in sorted(found):
+            yield j, i
+        bottom, top = math.floor(low / height), math.floor(high / height)
+        for band in range(bottom, top + 1):
+            active.setdefault(band, []).append((rank, i, bottom))
 
 
 class EdgeIndex:

@@ -23,7 +23,7 @@ from sbafab.geometry.edges import (
     distance_to,
     unit,
 )
-from sbafab.geometry.nearby import EdgeIndex
+from sbafab.geometry.nearby import EdgeIndex, close_pairs
 
 if TYPE_CHECKING:
     import shapely
@@ -34,11 +34,11 @@ NOWHERE: Bounds = (math.inf, math.inf, -math.inf, -math.inf)
 
 
 def _join(bounds: Iterable[Bounds]) -> Bounds:
-    low_x, low_y, high_x, high_y = NOWHERE
-    for box in bounds:
-        low_x, low_y = min(low_x, box[0]), min(low_y, box[1])
-        high_x, high_y = max(high_x, box[2]), max(high_y, box[3])
-    return low_x, low_y, high_x, high_y
+    boxes = tuple(bounds)
+    if not boxes:
+        return NOWHERE
+    left, bottom, right, top = zip(*boxes, strict=True)
+    return min(left), min(bottom), max(right), max(top)
 
 
 @dataclass(frozen=True)
@@ -235,13 +235,20 @@ class Region:
         if len(self.outers) == 1:
             return (self,)
         held: list[list[Contour]] = [[outer] for outer in self.outers]
-        for hole in self.holes:
+        places = [hole.edges[0].at(0.5) for hole in self.holes]
+        boxes = [*(outer.bounds for outer in self.outers), *((*p, *p) for p in places)]
+        near: list[list[int]] = [[] for _ in places]
+        for pair in close_pairs(boxes, 0.0):
+            outer, hole = min(pair), max(pair) - len(held)
+            if outer < len(held) and hole >= 0:
+                near[hole].append(outer)
+        for contour, place, numbers in zip(self.holes, places, near, strict=True):
             inside = [
-                group
-                for group in held
-                if group[0].winding(hole.edges[0].at(0.5)) != 0 and group[0].area > -hole.area
+                held[number]
+                for number in sorted(numbers)
+                if held[number][0].winding(place) != 0 and held[number][0].area > -contour.area
             ]
-            min(inside, key=lambda group: group[0].area).append(hole)
+            min(inside, key=lambda group: group[0].area).append(contour)
         return tuple(Region(tuple(group)) for group in held)
 
     @cached_property

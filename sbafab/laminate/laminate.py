@@ -18,6 +18,7 @@ from sbafab.laminate.interfaces import Interface, InterfaceKind, interface_regio
 
 Role = Literal["base", "wall", "cap", "sheet", "chamber-mask", "separator-mask"]
 
+NOTHING = Region()
 LOOSE = 0.2
 """mm by which a hole may miss its pin in place or diameter and still be the pin's."""
 
@@ -108,7 +109,11 @@ class Pin:
 
 @dataclass(frozen=True, repr=False)
 class Laminate:
-    """A stack of layers, bottom to top, with what the layers alone do not tell."""
+    """A stack of layers, bottom to top, with what the layers alone do not tell.
+
+    ``outline`` is that of the films of all balloons laid over each other, without inlet tabs and
+    ears; empty where only the layers are known.
+    """
 
     name: str
     family: str
@@ -121,6 +126,7 @@ class Laminate:
     balloons: int
     registration: str
     notes: tuple[str, ...] = ()
+    outline: Region = NOTHING
 
     def __repr__(self) -> str:
         return f"Laminate({self.name!r}, {self.family!r}, {len(self.layers)} layers)"

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from sbafab.design.form import Form, Slots, Wrap
 from sbafab.design.records import Design
+from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 
 
 def sizes(design: Design, laminate: Laminate) -> dict[str, float]:
     """Sizes in mm by name: of the flat laminate and, for radial designs, round the tube.
 
-    Width and length are those of all that is cut: inlet tabs and ears belong to them.
+    Width, length and overall diameter are those of all that is cut: masks, inlet tabs and ears
+    belong to them. The outline diameter is that of the films without tabs and ears.
     """
     low_x, low_y, high_x, high_y = laminate.bounds
     found = {
@@ -27,18 +30,32 @@ def sizes(design: Design, laminate: Laminate) -> dict[str, float]:
         inflated = inflated_diameter(form, laminate)
         if inflated is not None:
             found["inflated_diameter"] = inflated
-    elif laminate.balloons > 1 and laminate.registration != "ears":
-        found["outline_diameter"] = outline_diameter(laminate)
+    else:
+        if not laminate.outline.is_empty:
+            found["outline_diameter"] = outline_diameter(laminate)
+        found["overall_diameter"] = overall_diameter(laminate)
     return found
 
 
 def outline_diameter(laminate: Laminate) -> float:
-    """Diameter of the circle round the axis that holds the second balloon, which has no tabs.
+    """Diameter of the circle round the axis that holds all films, tabs and ears taken off.
 
-    The paper's 3-DoF actuator fits 15 (Sec. 2).
+    The paper's 3-DoF actuator fits 15 (Sec. 2). Measured on every film as it is cut: what of it
+    lies within the laminate's outline.
     """
-    walls = [layer for layer in laminate.tpe_layers if layer.balloon == 2]
-    return 2 * max(edge.farthest_from((0.0, 0.0)) for wall in walls for edge in wall.profile.edges)
+    films = {layer.pattern: layer.profile for layer in laminate.tpe_layers}
+    return _round_axis(Region(film.outers) & laminate.outline for film in films.values())
+
+
+def overall_diameter(laminate: Laminate) -> float:
+    """Diameter of the circle round the axis that holds every layer, with tabs, tails and ears."""
+    return _round_axis(layers[0].profile for layers in laminate.patterns.values())
+
+
+def _round_axis(regions: Iterable[Region]) -> float:
+    return 2 * max(
+        (edge.farthest_from((0.0, 0.0)) for region in regions for edge in region.edges), default=0.0
+    )
 
 
 def deflated_diameter(wrap: Wrap, laminate: Laminate) -> float:

@@ -62,8 +62,9 @@ def check_placed(regions: Sequence[tuple[str, Region]], stock: Stock, slack: flo
         for x, y, diameter in stock.pins
     ]
     entries = [*regions, *pins]
+    rounds = [_round(region) for _, region in entries]
     for i, j in close_pairs([region.bounds for _, region in entries], stock.spacing):
-        if min(i, j) >= len(regions):
+        if min(i, j) >= len(regions) or _apart(rounds[i], rounds[j]) >= stock.spacing:
             continue
         gap = least_distance(entries[i][1], entries[j][1], stock.spacing)
         if gap.value < stock.spacing - slack:
@@ -73,6 +74,18 @@ def check_placed(regions: Sequence[tuple[str, Region]], stock: Stock, slack: flo
                 f"{one} and {other} {how} at x {x:.3f}, y {y:.3f}, where {stock.spacing:g} mm is "
                 "asked for; nest again."
             )
+
+
+def _round(region: Region) -> tuple[Point, float]:
+    """Centre and radius of a circle that holds the region: of a disc its own."""
+    low_x, low_y, high_x, high_y = region.bounds
+    centre = (low_x + high_x) / 2, (low_y + high_y) / 2
+    return centre, max(edge.farthest_from(centre) for edge in region.edges)
+
+
+def _apart(a: tuple[Point, float], b: tuple[Point, float]) -> float:
+    """The gap between two circles: what they hold is no nearer."""
+    return math.dist(a[0], b[0]) - a[1] - b[1]
 
 
 def least_distance(a: Region, b: Region, beyond: float) -> Gap:

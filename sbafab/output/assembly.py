@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from sbafab.assemblies.build import Assembled, PlacedPart, assemble
-from sbafab.assemblies.checks import run_checks
+from sbafab.assemblies.checks import lowered_checks, run_checks
 from sbafab.assemblies.colours import colours, linear
 from sbafab.assemblies.records import Assembly
 from sbafab.assemblies.shapes import placed_surface
@@ -72,6 +72,11 @@ class CheckedAssembly:
     def waived(self) -> tuple[str, ...]:
         """Checks between parts that fail and that the assembly waives by name."""
         return tuple(dict.fromkeys(finding.rule for finding in self.between if finding.by_user))
+
+    @property
+    def lowered(self) -> tuple[str, ...]:
+        """The limits of the checks between parts that the assembly weakens."""
+        return lowered_checks(self.assembled.assembly.rules)
 
 
 def _named(one: Checked) -> list[Finding]:
@@ -138,7 +143,13 @@ def generate_assembly(
     if not checked.failed:
         drawing = Drawing(dxf_profile, chord_error)
         batch = plan_batch(
-            checked.designs, assembly.name, target, drawing, tell, waived=checked.waived
+            checked.designs,
+            assembly.name,
+            target,
+            drawing,
+            tell,
+            waived=checked.waived,
+            lowered=checked.lowered,
         )
     listed = listed_files(target)
     with replaced_folder(target) as folder:
@@ -248,6 +259,7 @@ def _uncut_manifest(name: str, designs: Sequence[Checked]) -> dict[str, Any]:
         "units": "mm",
         "generator": GENERATOR,
         "waived": [],
+        "lowered_limits": [],
         "designs": [
             {
                 "name": one.design.name,
@@ -273,6 +285,7 @@ def _traveller(checked: CheckedAssembly, batch: Batch, written: Written, picture
             design_sha256=design_sha256(one.design),
             generator=GENERATOR,
             waived=one.waived,
+            lowered=one.lowered,
             findings=one.findings,
             fixture=cut.fixture and f"{name}/{cut.fixture}",
             kerf=kerf_widths(one.design),
@@ -290,6 +303,7 @@ def _traveller(checked: CheckedAssembly, batch: Batch, written: Written, picture
             sheets=written.sheets,
             findings=checked.between,
             waived=checked.waived,
+            lowered=batch.settings.lowered,
             picture=picture,
             copies=order.copies,
             made_for=order.made_for,

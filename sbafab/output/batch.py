@@ -86,8 +86,11 @@ def plan_batch(
     drawing: Drawing,
     tell: Progress,
     waived: Sequence[str] = (),
+    lowered: Sequence[str] = (),
 ) -> Batch:
-    """Cut paths, schedules and places on film sheets; ``waived`` is said on the sheets as well.
+    """Cut paths, schedules and places on film sheets.
+
+    ``waived`` checks and ``lowered`` limits are said on the sheets as well.
 
     Film, kerf and machine are those of the first design. Raises DesignError where a design or a
     sheet refuses.
@@ -99,7 +102,7 @@ def plan_batch(
         designs.append(Planned(one, settings, plan, schedule_of(one)))
     parts = [part for one in designs for part in one.plan.parts]
     nests = find_nests(parts, checked[0].design, old_folder, tell)
-    return Batch(tuple(designs), _settings(checked, name, drawing, waived), nests)
+    return Batch(tuple(designs), _settings(checked, name, drawing, waived, lowered), nests)
 
 
 def refuse_undoable(checked: Sequence[Checked]) -> None:
@@ -112,9 +115,13 @@ def refuse_undoable(checked: Sequence[Checked]) -> None:
 
 
 def _settings(
-    checked: Sequence[Checked], name: str, drawing: Drawing, waived: Sequence[str]
+    checked: Sequence[Checked],
+    name: str,
+    drawing: Drawing,
+    waived: Sequence[str],
+    lowered: Sequence[str],
 ) -> CutSettings:
-    """Those of the shared sheets: one hash over all designs, every waiver of any."""
+    """Those of the shared sheets: one hash over all designs, every waiver and limit of any."""
     hashes = "".join(design_sha256(one.design) for one in checked)
     own = (rule for one in checked for rule in one.waived)
     return CutSettings(
@@ -122,6 +129,9 @@ def _settings(
         design_sha256=hashlib.sha256(hashes.encode()).hexdigest(),
         kerf_widths=kerf_widths(checked[0].design),
         waived=tuple(dict.fromkeys([*own, *waived])),
+        lowered=tuple(
+            dict.fromkeys([*(said for one in checked for said in one.lowered), *lowered])
+        ),
         profile=drawing.profile,
         chord_error=drawing.chord_error,
         generator=GENERATOR,
@@ -165,6 +175,7 @@ def batch_manifest(
         "designs_sha256": batch.settings.design_sha256,
         "generator": GENERATOR,
         "waived": list(batch.settings.waived),
+        "lowered_limits": list(batch.settings.lowered),
         "designs": [
             {
                 "name": one.design.name,

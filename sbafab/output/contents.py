@@ -15,11 +15,12 @@ from sbafab.design.writing import design_sha256, design_toml
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.files import MeshFile, write_meshes
 from sbafab.output.manifest import as_json, checks, file_hashes, manifest
-from sbafab.output.settings import GENERATOR, kerf_widths, press_settings
+from sbafab.output.settings import GENERATOR, kerf_widths, limits, press_settings
 from sbafab.output.shop import CutSet, Progress
 from sbafab.pressing.schedule import Schedule, press_csv, press_json, schedule
 from sbafab.rules.deck import has_failed
 from sbafab.rules.finding import Finding
+from sbafab.rules.lowered import CHECKED_AGAINST, lowered
 
 if TYPE_CHECKING:
     from sbafab.meshing.conforming.meshes import ConformingMeshes
@@ -70,16 +71,27 @@ class Checked:
         """The rules that fail and that the design waives by name."""
         return tuple(dict.fromkeys(finding.rule for finding in self.findings if finding.by_user))
 
+    @property
+    def lowered(self) -> tuple[str, ...]:
+        """The limits that the design sets below the usual ones."""
+        return lowered(limits(self.design))
+
 
 def schedule_of(checked: Checked) -> Schedule:
-    """The press schedule; its first step and its warnings name waived rules."""
+    """The press schedule; its first step and its warnings name waived rules and lowered limits."""
     made = schedule(checked.laminate, press_settings(checked.design))
-    if not checked.waived:
+    said = []
+    if checked.waived:
+        rules = ", ".join(checked.waived)
+        said.append(f"made although it breaks rules that the design waives: {rules}")
+    if checked.lowered:
+        said.append(f"{CHECKED_AGAINST}{', '.join(checked.lowered)}")
+    if not said:
         return made
-    said = f"made although it breaks rules that the design waives: {', '.join(checked.waived)}"
     first, *others = made.steps
-    marked = replace(first, instructions=f"{said[:1].upper()}{said[1:]}. {first.instructions}")
-    return replace(made, steps=(marked, *others), warnings=(said, *made.warnings))
+    words = " ".join(f"{one[:1].upper()}{one[1:]}." for one in said)
+    marked = replace(first, instructions=f"{words} {first.instructions}")
+    return replace(made, steps=(marked, *others), warnings=(*said, *made.warnings))
 
 
 def write_contents(
@@ -143,6 +155,7 @@ def _traveller(
         design_sha256=design_sha256(design),
         generator=GENERATOR,
         waived=checked.waived,
+        lowered=checked.lowered,
         findings=checked.findings,
         fixture=cut.fixture,
         kerf=kerf_widths(design),
@@ -155,10 +168,11 @@ def _traveller(
 
 
 def _marked(checked: Checked) -> Laminate:
-    """The laminate with a note for its pictures where a rule failed or is waived."""
+    """The laminate with notes for its pictures: failed and waived rules, lowered limits."""
     failed = dict.fromkeys(f.rule for f in checked.findings if f.verdict == "fail")
     notes = [f"not to be built, failed: {', '.join(failed)}"] if failed else []
     notes += [f"waived: {', '.join(checked.waived)}"] if checked.waived else []
+    notes += [f"limits lowered: {', '.join(checked.lowered)}"] if checked.lowered else []
     laminate = checked.laminate
     return replace(laminate, notes=(*laminate.notes, *notes)) if notes else laminate
 

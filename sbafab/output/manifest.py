@@ -16,10 +16,11 @@ from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.meshing.files import MeshFile
 from sbafab.models.sizes import sizes
-from sbafab.output.settings import GENERATOR, kerf_widths
+from sbafab.output.settings import GENERATOR, kerf_widths, limits
 from sbafab.output.shop import CutSet, film_use
 from sbafab.output.swap import SCHEMA
 from sbafab.rules.finding import Finding
+from sbafab.rules.lowered import lowered
 
 
 def as_json(value: object) -> str:
@@ -61,6 +62,7 @@ def manifest(
             for material, width in kerf_widths(design).items()
         },
         "waived": list(waived),
+        "lowered_limits": list(lowered(limits(design))),
         "sizes": {name: round(value, 6) for name, value in sizes(design, laminate).items()},
         "notes": list(laminate.notes),
         "copies": design.order.copies,

@@ -13,6 +13,7 @@ from sbafab.laminate.films import Material
 from sbafab.nesting.records import TURNS, Stock
 from sbafab.pressing.schedule import PressSettings
 from sbafab.rules.limits import Limits, Tolerances
+from sbafab.rules.lowered import lowered
 
 GENERATOR = f"sbafab {__version__}"
 
@@ -57,6 +58,7 @@ def cut_settings(
         design_sha256=design_sha256(design),
         kerf_widths=kerf_widths(design),
         waived=waived,
+        lowered=lowered(limits(design)),
         profile=profile,
         chord_error=chord_error,
         generator=GENERATOR,

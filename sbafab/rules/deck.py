@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -22,6 +22,7 @@ from sbafab.rules import (
 )
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import Limits
+from sbafab.rules.lowered import lowered
 
 Progress = Callable[[str, int, int], None]
 """Told which rule runs next, and how many of how many are done."""
@@ -62,10 +63,11 @@ def run_deck(
 
 
 def run_rule(rule: Rule, laminate: Laminate, limits: Limits) -> list[Finding]:
-    """What one rule finds; failures the user waived say so."""
+    """What one rule finds; failures the user waived and weakened limits say so."""
+    weak = lowered(limits, rule.name)
     return [
         _waived(finding) if rule.name in limits.waive and finding.verdict == "fail" else finding
-        for finding in rule.check(laminate, limits)
+        for finding in (_against(weak, found) for found in rule.check(laminate, limits))
     ]
 
 
@@ -76,6 +78,13 @@ def has_failed(findings: Iterable[Finding]) -> bool:
 
 def rule_names() -> tuple[str, ...]:
     return tuple(rule.name for rule in RULES)
+
+
+def _against(weak: Sequence[str], finding: Finding) -> Finding:
+    """The finding with the limits that the design lowers; a rule's own waivers need none."""
+    if not weak or finding.verdict == "waived":
+        return finding
+    return replace(finding, message=f"{finding.message}; limits lowered: {', '.join(weak)}")
 
 
 def _waived(finding: Finding) -> Finding:

@@ -65,6 +65,16 @@ def file_hash(specimen: Specimen) -> None:
     )
 
 
+def limit_unsaid(specimen: Specimen) -> None:
+    """A wall's file without its property LIMITS, and nothing else changed."""
+    path = specimen.doctor.path(wall(specimen.clean).index)
+    head, name, tail = path.read_text().partition("$CUSTOMPROPERTYTAG\n  1\nLIMITS\n")
+    assert name
+    value = tail.index("  9\n", tail.index("$CUSTOMPROPERTY\n"))
+    path.write_text(head.removesuffix("  9\n") + tail[value:], newline="\n")
+    specimen.doctor.rehash()
+
+
 KIND = Kind(
     "Manifests",
     "The cut files are as they were written; in the first row one is missing as well.",
@@ -91,6 +101,19 @@ KIND = Kind(
         told("kerf", lambda m: m["kerf"]["TPE"].update(state="compensated", width=0.1)),
         told("design", lambda m: m.update(design_sha256="0" * 64)),
         told("waiver", lambda m: m.update(waived=["sealing"])),
+        told("lowered limit", lambda m: m.update(lowered_limits=["bond_width 0.3 (paper 0.75)"])),
+        Fault(
+            "lowered limit that the manifest does not name",
+            "manifest-claims",
+            lambda s: s.doctor.set_manifest(lambda m: m.update(lowered_limits=[])),
+            settings=("rules.bond_width=0.7",),
+        ),
+        Fault(
+            "lowered limit that a file does not name",
+            "manifest-claims",
+            limit_unsaid,
+            settings=("rules.bond_width=0.7",),
+        ),
         Fault(
             "wrong lumen",
             "manifest-claims",

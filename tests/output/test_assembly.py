@@ -156,6 +156,22 @@ def test_a_waived_check_is_said_on_sheets_page_and_manifest(tmp_path: Path) -> N
     assert not [f for f in check_folder(run.folder) if f.verdict == "fail"]
 
 
+def test_lowered_limits_of_parts_and_checks_are_said(tmp_path: Path) -> None:
+    keys = ["parts.arm.set.stack.balloons=2", "parts.arm.set.rules.bond_width=0.7"]
+    whole = load_assembly("aperture", [*keys, "rules.seat_share=0.1"])
+    run = generate_assembly(whole, tmp_path)
+    assert not run.failed
+    said = ["bond_width 0.7 (paper 0.75)", "seat_share 0.1 (default 0.25)"]
+    assert run.manifest["lowered_limits"] == said
+    assert ", ".join(said) in (run.folder / "sheets" / "TPE_1.dxf").read_text(encoding="utf-8")
+    page = (run.folder / "traveller.html").read_text(encoding="utf-8")
+    assert page.count(said[1]) >= 2
+    assert not [f for f in check_folder(run.folder) if f.verdict == "fail"]
+    path = run.folder / "manifest.json"
+    path.write_text(path.read_text().replace(said[1], "seat_share 0.2 (default 0.25)"))
+    assert any(said[1] in f.message for f in check_folder(run.folder) if f.verdict == "fail")
+
+
 OFF = ["parts.magnet.offset=[0, 0]"]
 
 

@@ -15,6 +15,7 @@ from sbafab.actuators import build, load_design
 from sbafab.design.writing import design_sha256
 from sbafab.meshing.conforming.settings import MeshSettings
 from sbafab.output import contents
+from sbafab.output.as_built.check import check_folder
 from sbafab.output.contents import Conforming
 from sbafab.output.run import Extras, generate
 
@@ -88,6 +89,37 @@ def test_waivers_stand_in_every_file(tmp_path: Path) -> None:
     assert manifest_of(run.folder)["waived"] == ["bond-width", "tube-fit"]
     for path in ("press.json", "preview/layers.svg"):
         assert "bond-width, tube-fit" in (run.folder / path).read_text(), path
+
+
+def test_lowered_limits_stand_in_every_file(tmp_path: Path) -> None:
+    settings = ["bond.width=0.6", "rules.bond_width=0.6", "rules.worst_bond_width=0"]
+    run = generate(load_design("1dof-5mm", [*settings, "stack.balloons=2"]), tmp_path)
+    assert not run.failed
+    said = ["bond_width 0.6 (paper 0.75)", "worst_bond_width 0 (default 0.5)"]
+    manifest = manifest_of(run.folder)
+    assert (manifest["waived"], manifest["lowered_limits"]) == ([], said)
+    cut = [*(run.folder / "layers").iterdir(), *(run.folder / "sheets").glob("*.dxf")]
+    assert len(cut) == 7 + 3
+    for path in cut:
+        text = path.read_text()
+        assert f"LIMITS\n  9\n$CUSTOMPROPERTY\n  1\n{', '.join(said)}\n" in text, path.name
+        assert "WAIVED\n  9\n$CUSTOMPROPERTY\n  1\nnone\n" in text, path.name
+    names = ("layers.svg", "stack.svg")
+    others = ["press.json", "press.csv", "checks.json", *(f"preview/{name}" for name in names)]
+    for name in (*others, "traveller.html"):
+        assert said[0] in (run.folder / name).read_text(), name
+    # In the head of the traveller, among its warnings, and at the first step.
+    assert (run.folder / "traveller.html").read_text().count(said[0]) >= 3
+    assert not [f for f in check_folder(run.folder) if f.verdict == "fail"]
+
+
+def test_usual_limits_are_not_spoken_of(tmp_path: Path) -> None:
+    run = generate(load_design("1dof-5mm", ["stack.balloons=2"]), tmp_path, ["cut", "press"])
+    assert manifest_of(run.folder)["lowered_limits"] == []
+    for path in run.folder.rglob("*.*"):
+        if path.suffix in (".dxf", ".csv") or path.name in ("press.json", "checks.json"):
+            assert "LIMITS" not in path.read_text(), path.name
+            assert "lowered" not in path.read_text(), path.name
 
 
 def test_a_waiver_that_was_not_needed_is_not_claimed(tmp_path: Path) -> None:

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sbafab.actuators import load_design, records
+from sbafab.actuators import build, load_design, records
 from sbafab.design.reading import validated
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError, OutputError
+from sbafab.geometry.boolean import GeometryError
+from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.models.sizes import sizes
 from sbafab.output.as_built.chords import chorded_place
@@ -19,11 +21,12 @@ from sbafab.output.as_built.claims import (
     design_problems,
     file_problems,
     height_problems,
+    lowered_problems,
     order_problems,
     property_problems,
 )
 from sbafab.output.as_built.cut_files import CutPart, LayerFile, inside, read_layers
-from sbafab.output.as_built.joined import joined_findings
+from sbafab.output.as_built.joined import joined_findings, lowered_between
 from sbafab.output.as_built.measures import (
     fixture_problems,
     interface_problems,
@@ -51,6 +54,7 @@ from sbafab.rules import film_limits, registration_yield
 from sbafab.rules.deck import RULES, Rule, run_rule
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits
+from sbafab.rules.lowered import lowered
 
 BY_LAYER = (film_limits.NAME,)
 """Rules that need no layer but the one they look at."""
@@ -110,9 +114,11 @@ def _check_job(folder: Path) -> tuple[Finding, ...]:
     lots: list[Lot] = []
     problems: list[Problem] = []
     first: AsBuilt | None = None
+    weak: list[str] = []
     for told in job.designs:
         built = read_folder(inside(folder, told.folder), of_job=True)
         first = first or built
+        weak += lowered(limits_of(built.design))
         found += [replace(f, message=f"{told.name}: {f.message}") for f in _findings(built)]
         lots.append(Lot(told.name, told.copies, built.files))
         own = (built.claims.name, built.claims.copies, built.claims.design_sha256)
@@ -129,6 +135,7 @@ def _check_job(folder: Path) -> tuple[Finding, ...]:
             first.design,
             first.claims.kerf,
             job.waived,
+            job.lowered_limits,
             job.films,
             job.sheets,
             job.files,
@@ -136,9 +143,11 @@ def _check_job(folder: Path) -> tuple[Finding, ...]:
         ),
     )
     if is_joined(job):
+        weak += lowered_between(folder)
         between, wrong = joined_findings(folder)
         found += between
         problems += wrong
+    problems += lowered_problems(job.lowered_limits, weak)
     count = len(job.sheets)
     return (
         *found,
@@ -179,13 +188,22 @@ def read_folder(folder: Path, of_job: bool = False) -> AsBuilt:
             laminate = laminate_of(files, claims, design)
             problems += _laminate_problems(folder, laminate, claims, parts, chord_error)
             room = TOLERANCE + 2 * chord_error
-            problems += size_problems(claims, sizes(design, laminate), room)
+            outlined = replace(laminate, outline=_outline(design))
+            problems += size_problems(claims, sizes(design, outlined), room)
         except UNMEASURED as error:
             laminate = None
             message = f"the layers do not lie over each other as films of one stack ({error})"
             problems.append(Problem(INTEGRITY, message))
     limits = _within(limits_of(design), chord_error)
     return AsBuilt(claims, design, limits, tuple(files), laminate, tuple(problems))
+
+
+def _outline(design: Design) -> Region:
+    """Where the design has its films without tabs and ears; empty if it cannot be built."""
+    try:
+        return build(design).outline
+    except (DesignError, GeometryError, OSError):
+        return Region()
 
 
 def _own_sheet_problems(
@@ -202,6 +220,7 @@ def _own_sheet_problems(
             design,
             claims.kerf,
             claims.waived,
+            claims.lowered_limits,
             claims.films,
             claims.sheets,
             claims.files,

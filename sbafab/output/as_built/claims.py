@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from sbafab.cutting.properties import kerf_properties, layer_path
+from sbafab.cutting.properties import LIMITS, kerf_properties, layer_path, limit_properties
 from sbafab.design.records import Design
 from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Layer
 from sbafab.output.as_built.cut_files import LayerFile
 from sbafab.output.as_built.records import CLAIMS, Job, KerfClaim, LayerClaim, Manifest, Problem
 from sbafab.output.manifest import file_hashes
-from sbafab.output.settings import kerf_widths
+from sbafab.output.settings import kerf_widths, limits
+from sbafab.rules.lowered import lowered
 
 HEIGHT = 1e-6
 """mm to which heights and thicknesses agree."""
@@ -165,10 +166,21 @@ def design_problems(claims: Manifest, design: Design, digest: str) -> list[Probl
                     f"{_kerf(wanted)} by design.toml"
                 )
             )
+    problems += lowered_problems(claims.lowered_limits, lowered(limits(design)))
     for rule in claims.waived:
         if rule not in design.rules.waive:
             problems.append(claim(f"{rule} is waived in the manifest and not in design.toml"))
     return problems
+
+
+def lowered_problems(told: Sequence[str], own: Sequence[str]) -> list[Problem]:
+    """Where the manifest names other lowered limits than design.toml sets."""
+    missing = [said for said in own if said not in told]
+    added = [said for said in told if said not in own]
+    return [
+        *(claim(f"design.toml lowers {said}, which the manifest does not say") for said in missing),
+        *(claim(f"{said} is lowered in the manifest and not in design.toml") for said in added),
+    ]
 
 
 def _material(name: str) -> Material:
@@ -198,7 +210,7 @@ def property_problems(files: Iterable[LayerFile], claims: Manifest) -> list[Prob
     return problems
 
 
-def _properties(layer: LayerClaim, claims: Manifest) -> dict[str, str]:
+def _properties(layer: LayerClaim, claims: Manifest) -> dict[str, str | None]:
     kerf = claims.kerf.get(layer.material)
     width = kerf.width if kerf is not None else None
     return {
@@ -208,5 +220,13 @@ def _properties(layer: LayerClaim, claims: Manifest) -> dict[str, str]:
         "MATERIAL": layer.material,
         "UNITS": "mm",
         **kerf_properties(width),
+        **waiver_properties(claims),
+    }
+
+
+def waiver_properties(claims: Manifest) -> dict[str, str | None]:
+    """What every cut file must say of waived rules and lowered limits; None for nothing."""
+    return {
         "WAIVED": ", ".join(claims.waived) or "none",
+        LIMITS: limit_properties(claims.lowered_limits).get(LIMITS),
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sbafab.assemblies.build import Assembled, assemble
-from sbafab.assemblies.checks import run_checks
+from sbafab.assemblies.checks import lowered_checks, run_checks
 from sbafab.assemblies.reading import load_assembly
 from sbafab.assemblies.writing import DESIGN_FILE, assembly_sha256, part_entry
 from sbafab.design.writing import design_sha256
@@ -30,6 +30,14 @@ def joined_findings(folder: Path) -> tuple[tuple[Finding, ...], list[Problem]]:
         *_assembly_problems(claims, assembled),
         *_unsaid_waivers(claims, between),
     ]
+
+
+def lowered_between(folder: Path) -> tuple[str, ...]:
+    """The limits between parts that the assembly in a folder weakens; none if it is unreadable."""
+    try:
+        return lowered_checks(load_assembly(folder / DESIGN_FILE).rules)
+    except (DesignError, OSError):
+        return ()
 
 
 def _assembly_problems(claims: Joined, assembled: Assembled) -> list[Problem]:

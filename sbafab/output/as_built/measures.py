@@ -10,7 +10,7 @@ from sbafab.errors import OutputError
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.output.as_built.claims import claim
+from sbafab.output.as_built.claims import claim, waiver_properties
 from sbafab.output.as_built.cut_files import CutPart, LayerFile, read_part
 from sbafab.output.as_built.records import CLAIMS, INTEGRITY, Manifest, Problem
 from sbafab.rules.limits import TOLERANCE, at
@@ -167,7 +167,7 @@ def size_problems(claims: Manifest, sizes: Mapping[str, float], room: float) -> 
             f"the {name.replace('_', ' ')} is {claims.sizes.get(name, math.nan):g} mm in the "
             f"manifest and {size:g} as cut"
         )
-        for name, size in sizes.items()
+        for name, size in (dict.fromkeys(claims.sizes, math.nan) | dict(sizes)).items()
         if not abs(claims.sizes.get(name, math.nan) - size) <= room
     ]
 
@@ -220,6 +220,10 @@ def fixture_problems(folder: Path, laminate: Laminate, claims: Manifest) -> list
     holes = [("hole", c[0], 2 * c[1]) for c in circles if c is not None]
     pins = [("hole", pin.centre, pin.diameter) for pin in laminate.pins]
     room = TOLERANCE + part.chord_error
+    for name, stated in waiver_properties(claims).items():
+        found = part.properties.get(name)
+        if found != stated:
+            return [claim(f"{claims.fixture}: custom property {name} is {found!r}, not {stated!r}")]
     problems = _unmatched("pin's hole of the plate", pins, holes, room)
     if problems or len(circles) != len(pins):
         return [claim(f"{claims.fixture} has other holes than the laminate has pins")]

@@ -150,6 +150,7 @@ class Manifest(_Claim):
     registration: RegistrationClaim
     kerf: dict[Material, KerfClaim]
     waived: tuple[str, ...]
+    lowered_limits: tuple[str, ...] = ()
     copies: Annotated[int, Field(ge=1, le=1000)] = 1
     sizes: dict[str, float]
     films: tuple[FilmClaim, ...]
@@ -178,6 +179,7 @@ class Job(_Claim):
     units: Literal["mm"]
     designs_sha256: str
     waived: tuple[str, ...]
+    lowered_limits: tuple[str, ...] = ()
     designs: Annotated[tuple[DesignClaim, ...], Field(min_length=1, max_length=100)]
     films: tuple[FilmUseClaim, ...]
     sheets: Annotated[tuple[SheetClaim, ...], Field(max_length=2000)]

@@ -9,7 +9,13 @@ from pathlib import Path, PurePosixPath
 from sbafab.cutting.cut_layers import ENGRAVE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.properties import chord_error_of, kerf_properties, kerf_suffix
+from sbafab.cutting.properties import (
+    LIMITS,
+    chord_error_of,
+    kerf_properties,
+    kerf_suffix,
+    limit_properties,
+)
 from sbafab.cutting.sheets import FOLDER
 from sbafab.cutting.verify import TOLERANCE, check_surroundings
 from sbafab.design.records import Design
@@ -49,6 +55,7 @@ class Order:
     design: Design
     kerf: Mapping[Material, KerfClaim]
     waived: Sequence[str]
+    lowered: Sequence[str]
     films: Sequence[FilmUseClaim]
     sheets: Sequence[SheetClaim]
     files: Mapping[str, str]
@@ -193,6 +200,7 @@ def _property_problems(
         "UNITS": "mm",
         **kerf_properties(_kerf(order, told.material)),
         "WAIVED": ", ".join(order.waived) or "none",
+        LIMITS: limit_properties(order.lowered).get(LIMITS),
         "PARTS": ", ".join(f"{part.count} x {part.design} {part.pattern}" for part in told.parts),
         "CURVES": curves,
     }

@@ -25,6 +25,7 @@ from sbafab.reports.traveller.page import context, environment, frame, materials
 from sbafab.reports.traveller.shapes import definitions, pattern_regions
 from sbafab.reports.traveller.sheet_map import part_regions
 from sbafab.rules.finding import Finding
+from sbafab.rules.lowered import CHECKED_AGAINST
 
 PAGE, CHAPTER = "assembly.html.j2", "chapter.html.j2"
 _NAMES = re.compile(r'(\b(?:id|aria-labelledby)="|\bhref="#|url\(#)')
@@ -48,7 +49,10 @@ class DesignWork:
 
 @dataclass(frozen=True)
 class AssemblyJob:
-    """The order behind an assembly's traveller; ``findings`` are those between parts."""
+    """The order behind an assembly's traveller; ``findings`` are those between parts.
+
+    ``lowered`` are limits below the usual ones, of the checks between parts and of all designs.
+    """
 
     assembled: Assembled
     sha256: str
@@ -57,6 +61,7 @@ class AssemblyJob:
     sheets: Sequence[SheetFile]
     findings: Sequence[Finding]
     waived: Sequence[str]
+    lowered: Sequence[str]
     picture: bytes
     copies: int = 1
     made_for: str = ""
@@ -147,6 +152,8 @@ def _cautions(job: AssemblyJob) -> list[tuple[str, str]]:
             f"made although the assembly waives {', '.join(job.waived)}. What they found: {said}"
         )
         found.append(("Waived checks", words))
+    if job.lowered:
+        found.append(("Lowered limits", f"{CHECKED_AGAINST}{', '.join(job.lowered)}."))
     found += [
         (f"Check {finding.rule} warns", finding.message)
         for finding in job.findings
@@ -154,7 +161,7 @@ def _cautions(job: AssemblyJob) -> list[tuple[str, str]]:
     ]
     for one in job.works:
         for title, text in cautions(one.work):
-            is_own = title.startswith(("Rule", "Press", "Waived"))
+            is_own = title.startswith(("Rule", "Press", "Waived", "Lowered"))
             found.append((f"{title} ({one.name})" if is_own else title, text))
     if any(placed.part.kind == "magnet" for placed in job.assembled.parts):
         words = "small and brittle, they snap together; keep them from what a magnet harms."

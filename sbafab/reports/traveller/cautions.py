@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from sbafab.cutting.properties import PTFE_WARNING
 from sbafab.reports.traveller.bill import kerf_states
 from sbafab.reports.traveller.job import Work
+from sbafab.rules.lowered import CHECKED_AGAINST
 
 
 def cautions(work: Work) -> list[tuple[str, str]]:
@@ -25,6 +26,12 @@ def _all(work: Work) -> Iterator[tuple[str, str]]:
             f"made although the design waives {', '.join(job.waived)}. What they found: "
             + " / ".join(f.message for f in job.findings if f.by_user),
         )
+    if job.lowered:
+        yield (
+            "Lowered limits",
+            f"{CHECKED_AGAINST}{', '.join(job.lowered)}. What holds here may fail the usual "
+            "limits: make sure that this is meant.",
+        )
     for material, _, measured in kerf_states(job, materials):
         if not measured:
             yield (
@@ -37,5 +44,5 @@ def _all(work: Work) -> Iterator[tuple[str, str]]:
         if finding.verdict == "warn":
             yield f"Rule {finding.rule} warns", finding.message
     for warning in schedule.warnings:
-        if not (job.waived and warning.startswith("made although")):
+        if not warning.startswith(("made although", CHECKED_AGAINST)):
             yield "Press schedule", warning

@@ -20,13 +20,15 @@ class Job:
     """The order behind a traveller.
 
     ``kerf`` by material, ``fixture`` the path of the pin plate's cut file, ``solid_png`` the bytes
-    of the picture of the solid. ``extras`` are further rows of the bill of materials: item and
-    quantity. Empty ``made_for`` leaves a blank to fill in by hand.
+    of the picture of the solid. ``lowered`` are limits below the usual ones. ``extras`` are further
+    rows of the bill of materials: item and quantity. Empty ``made_for`` leaves a blank to fill in
+    by hand.
     """
 
     design_sha256: str
     generator: str
     waived: Sequence[str] = ()
+    lowered: Sequence[str] = ()
     findings: Sequence[Finding] = ()
     fixture: str | None = None
     kerf: Mapping[str, Kerf] = field(default_factory=dict)

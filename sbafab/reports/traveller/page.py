@@ -137,11 +137,13 @@ def materials(laminate: Laminate) -> list[Material]:
 
 def _facts(work: Work) -> list[tuple[str, str]]:
     laminate = work.laminate
+    extras = "tabs and ears" if laminate.registration == "ears" else "tabs"
     names = {
         "thickness": "Thickness, flat (nominal films)",
-        "width": "Width of all that is cut, with tabs",
-        "length": "Length of all that is cut, with tabs",
-        "outline_diameter": "Fits a circle of",
+        "width": f"Width of all that is cut, with {extras}",
+        "length": f"Length of all that is cut, with {extras}",
+        "outline_diameter": f"Films without {extras} fit a circle round the axis of",
+        "overall_diameter": f"All that is cut, with {extras}, fits one of",
         "pitch": "Pitch round the tube",
         "deflated_diameter": "Diameter on its tube, deflated",
         "inflated_diameter": "Diameter on its tube, inflated (computed)",
