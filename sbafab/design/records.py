@@ -24,6 +24,7 @@ RuleName = Literal[
     "channel-clear",
     "tube-fit",
     "piece-count",
+    "pin-holes",
     "film-limits",
     "press-fit",
     "registration-nominal",
