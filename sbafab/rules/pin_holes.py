@@ -28,7 +28,7 @@ class _Miss(NamedTuple):
 def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     """How many pins miss a hole, meet film, or leave a layer that they should hold."""
     del limits
-    found = [*_idle(laminate), *_unholed(laminate), *_loose(laminate), *_blocked(laminate)]
+    found = [*_unholed(laminate), *_loose(laminate), *_blocked(laminate), *_idle(laminate)]
     if found:
         first = found[0]
         message = f"{first.what}; draw pins and holes from the same outline"
@@ -52,10 +52,7 @@ def _idle(laminate: Laminate) -> Iterator[_Miss]:
 
 def _unholed(laminate: Laminate) -> Iterator[_Miss]:
     """Layers without the hole that others of their kind have at a tooling pin."""
-    axes = [channel.centre for channel in channels(laminate)]
-    for pin in laminate.pins:
-        if any(math.dist(pin.centre, axis) < LOOSE for axis in axes):
-            continue
+    for pin in _tooling_pins(laminate):
         for roles in ALIKE:
             holed: dict[bool, list[Layer]] = {True: [], False: []}
             for layers in laminate.patterns.values():
@@ -92,12 +89,13 @@ def _loose(laminate: Laminate) -> Iterator[_Miss]:
 
 
 def _blocked(laminate: Laminate) -> Iterator[_Miss]:
-    """Pins that film stands in the way of in a step that lays a layer on them."""
+    """Tooling pins that film stands in the way of in a step that lays a layer on them.
+
+    The channels' pins have the channels' room, which channel-clear measures.
+    """
     for step in assembly(laminate):
-        if step.bond == "full" and laminate.registration != "ears":
-            continue
         added = distinct_layers(laminate, step.adds)
-        for pin in laminate.pins:
+        for pin in _tooling_pins(laminate):
             held = next((layer for layer in added if pin in laminate.pins_holding(layer)), None)
             if held is not None or pin in step.pins:
                 yield from _in_the_way(pin, held, step, laminate)
@@ -118,6 +116,14 @@ def _in_the_way(
                 f"{at(pin.centre)}{whose} in step {step.number}"
             )
             yield _Miss(what, pin.centre, (layer.index,))
+
+
+def _tooling_pins(laminate: Laminate) -> list[Pin]:
+    """The pins that stand in no bore and not in the lumen."""
+    axes = [channel.centre for channel in channels(laminate)]
+    return [
+        pin for pin in laminate.pins if all(math.dist(pin.centre, axis) > LOOSE for axis in axes)
+    ]
 
 
 def _listed(pins: list[Pin]) -> str:
