@@ -40,7 +40,8 @@ ROUNDING = 1e-6
 class Ray:
     """Where an ear may stand: it starts inside the part and runs outward.
 
-    ``long`` is the second ear of its part.
+    ``long`` is the second ear of its part. A mask ear that starts beside its mask is joined to it
+    from ``joint``, a point of the mask.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Ray:
     start: Point
     direction: Point
     long: bool
+    joint: Point | None = None
 
     def at(self, distance: float) -> Point:
         return (
@@ -92,10 +94,17 @@ def placed(rays: Sequence[Ray], body: Region, plates: Region, design: Design) ->
     """Ears on their rays, their roots clear of ``body``: all that is cut, without ears.
 
     ``plates`` are the films that masks keep apart; their fillets beside the ears end at the root
-    too. Raises DesignError where two ears come nearer to each other than one overhang, or where
-    fillets fill all the room beside an ear.
+    too. Raises DesignError where a film ear starts outside the films, where two ears come nearer to
+    each other than one overhang, or where fillets fill all the room beside an ear.
     """
     overhang, radius = design.mask.overhang, design.fillet.radius
+    for ray in rays:
+        if ray.holder == "film" and not plates.contains(ray.start):
+            x, y = ray.start
+            raise DesignError(
+                f"the ear {ray.name} starts at x {x:.3f}, y {y:.3f}, outside the films; make the "
+                'chamber larger there, or use registration.method = "channel-pin"'
+            )
     roots = [_reach(ray, body, design) + radius + overhang + _longer(ray) for ray in rays]
     ears = [_ear(ray, root, design) for ray, root in zip(rays, roots, strict=True)]
     # Between an ear and what stands at a sharp angle to it a fillet reaches farther out.
@@ -167,12 +176,13 @@ def with_mask_ears(mask: Region, ears: Sequence[Ear], overhang: float) -> Region
         for ear in ears
         if ear.ray.holder == "film"
     ]
-    own = [
-        strip(ear.ray.start, ear.ray.at(ear.end), ear.width)
-        for ear in ears
-        if ear.ray.holder == "mask"
-    ]
-    return union([mask - union(beyond), *own]) - _holes(ears, "mask")
+    own = [ear for ear in ears if ear.ray.holder == "mask"]
+    bars = [strip(e.ray.joint, e.ray.start, e.width) for e in own if e.ray.joint]
+    eared = union([mask - union(beyond), *(ear.strip for ear in own), *bars])
+    if bars:
+        # No slot is left between a bar and the mask.
+        eared = fillet(eared, overhang) - union(beyond)
+    return eared - _holes(ears, "mask")
 
 
 def with_sheet_ears(sheet: Region, ears: Sequence[Ear], radius: float) -> Region:

@@ -19,6 +19,7 @@ from sbafab.actuators.ears import (
     with_mask_ears,
     with_sheet_ears,
 )
+from sbafab.actuators.feet import film_feet, mask_feet
 from sbafab.actuators.pockets import bonded, check_neck, drawn_pocket, tab_and_strip
 from sbafab.actuators.stacking import BalloonShape, Cut, Stack, balloon_cuts, layers
 from sbafab.actuators.tails import head_reach, tails
@@ -138,7 +139,7 @@ def build(design: RadialDesign) -> Laminate:
     shape = BalloonShape(outlines, pockets, count, count)
     bottom, inlets = _bottom(design, shape, outline, centres)
     sheet = _sheet(design, outline)
-    ears = _ears(design, bottom, sheet, centres)
+    ears = _ears(design, bottom, sheet, outline, centres)
     held = tails(inlets, bottom.outline, ears, design, sheet)
     stack = Stack(bottom, (shape,), (0,) * design.stack.balloons, centres, ears=ears, tails=held)
     window = _window(design, pocket, outline)
@@ -273,7 +274,11 @@ def _bottom(
 
 
 def _ears(
-    design: RadialDesign, bottom: BalloonShape, sheet: Region, centres: tuple[Point, ...]
+    design: RadialDesign,
+    bottom: BalloonShape,
+    sheet: Region,
+    outline: Region,
+    centres: tuple[Point, ...],
 ) -> tuple[Ear, ...]:
     """Two film ears at the lower end of each SBA, two mask ears beside its tab, two of the sheet.
 
@@ -282,25 +287,16 @@ def _ears(
     if design.registration.method != "ears":
         return ()
     low_x, low_y, high_x, high_y = sheet.bounds
-    beside_film = design.chamber.width / 4
-    tab = max(design.inlet.strip_width / 2 + design.bond.width, head_reach(design))
-    ear = design.registration.pin_diameter / 2 + design.bond.width
-    beside_mask = tab + 2 * design.mask.overhang + ear
+    films, masks = film_feet(design, outline), mask_feet(design, outline, head_reach(design))
     rays = []
     for number, (x, _) in enumerate(centres, start=1):
-        y = design.chamber.length / 4
-        for end, side in ((1, -1), (2, 1)):
+        for end, film, (mask, joint) in zip((1, 2), films, masks, strict=True):
+            long = end == 2
+            foot, start = (x + film[0], film[1]), (x + mask[0], mask[1])
+            joined = joint and (x + joint[0], joint[1])
             rays += [
-                Ray(
-                    f"film{number}.{end}",
-                    "film",
-                    (x + side * beside_film, -y),
-                    (0.0, -1.0),
-                    end == 2,
-                ),
-                Ray(
-                    f"mask{number}.{end}", "mask", (x + side * beside_mask, y), (0.0, 1.0), end == 2
-                ),
+                Ray(f"film{number}.{end}", "film", foot, (0.0, -1.0), long),
+                Ray(f"mask{number}.{end}", "mask", start, (0.0, 1.0), long, joined),
             ]
     middle, off = (low_y + high_y) / 2, (high_y - low_y) / 6
     rays += [

@@ -28,6 +28,7 @@ RuleName = Literal[
     "channel-clear",
     "tube-fit",
     "piece-count",
+    "pin-holes",
     "film-limits",
     "press-fit",
     "registration-nominal",

@@ -8,34 +8,35 @@ in closed form, is drawn through its points by arcs.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
-from sbafab.geometry.biarc import ellipse, fit_arcs
-from sbafab.geometry.boolean import left_turn
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, distance_to, edge_from_bulge
+from sbafab.geometry.biarc import biarc, ellipse
+from sbafab.geometry.boolean import GeometryError, left_turn
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, distance_to
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.tracks import TOLERANCE, Track, arcs_along, crossing
 from sbafab.geometry.width import least_gap
 
 Kerf = float | tuple[float, float]
 """Full width of the cut, mm: the same everywhere, or measured along x and along y."""
 Fate = Literal["vanishes", "splits in parts", "runs into another"]
 
-TOLERANCE = 0.0001
-"""Farthest an arc of the path may lie from the exact curve, in mm."""
 FINE = 0.00005
-"""The same for the stretched region, whose path only tells where the pieces of the path end."""
-STEP, CORNER_STEP = math.radians(15), math.radians(30)
-"""Most that one arc turns along a curve, and round a corner."""
-LEAST_ARCS = 3
-"""So many arcs follow every curve: four points tell the circle it was, when the kerf is undone."""
-SHORT = 1e-3
+"""Farthest a stretched arc may lie off, mm: it tells where the pieces of the path end."""
+SHORTEST = 4 * EPSILON
+"""An arc shorter than this is stretched as a line."""
+STRETCHED_STEP, MOST_PIECES = math.radians(30), 1000
+"""Most that two arcs turn along a stretched curve, and more of them than any curve takes."""
 SMOOTH = 1e-3
 """Radians: a curve that turns more at once crosses itself there, or another."""
+PROJECTIONS, BEND = 3, 0.01
+"""Steps to the point of a track nearest to another; its radius (mm) where its way counts as much.
+"""
 SHARP = 15.0
 """Degrees: notches sharper than this are no slots."""
 
@@ -79,18 +80,22 @@ def beam_path(region: Region, kerf: Kerf) -> BeamPath:
     # Stretched so that the beam is round, in arcs a twentieth of a micrometre off the ellipses.
     rounds = [[_stretched(edge, sx, sy) for edge in c.edges] for c in region.contours]
     wide = Region(tuple(Contour(tuple(e for part in c for e in part)) for c in rounds))
-    sources = [
-        edge
-        for contour, parts in zip(region.contours, rounds, strict=True)
-        for edge, part in zip(contour.edges, parts, strict=True)
-        for _ in part
-    ]
     grown = grow(wide, reach)
     lost = _lost(region.contours, wide.contours, grown, reach)
-    near = EdgeIndex(wide.edges)
+    sources = _Sources(
+        EdgeIndex(wide.edges),
+        [
+            _Source(edge, part is parts[0], part is parts[-1])
+            for contour, pieces in zip(region.contours, rounds, strict=True)
+            for edge, parts in zip(contour.edges, pieces, strict=True)
+            for part in parts
+        ],
+        (a, b),
+        reach,
+    )
     contours = []
     for contour in grown.contours:
-        tracks = [_track(edge, near, sources, (a, b), reach) for edge in contour.edges]
+        tracks = [_track(edge, sources) for edge in contour.edges]
         contours.append(_drawn(contour.edges, tracks, (sx, sy)))
     return BeamPath(Region(tuple(contours)), lost)
 
@@ -105,54 +110,57 @@ def place_of(region: Region, lost: Lost, kerf: Kerf) -> Point:
     return (low_x + high_x) / 2, (low_y + high_y) / 2
 
 
-def rim(a: float, b: float, angle: float) -> Point:
-    """The point of a beam's rim (half widths ``a`` and ``b``) with this angle of its normal."""
-    x, y = math.cos(angle), math.sin(angle)
-    size = math.hypot(a * x, b * y)
-    return a * a * x / size, b * b * y / size
+class _Source(NamedTuple):
+    """The true edge that a piece of the stretched region is of; whether it starts or ends it."""
+
+    edge: Edge
+    is_first: bool
+    is_last: bool
 
 
-class _Track(NamedTuple):
-    """What the beam follows: an arc of ``turn`` times ``radius`` (0: a corner), or a straight edge.
+class _Sources(NamedTuple):
+    """The stretched region's edges by place, and what each is of."""
 
-    Its points are parameters of the outward normal's angle; of the straight edge's length.
-    """
-
+    near: EdgeIndex
+    of: Sequence[_Source]
     beam: tuple[float, float]
-    centre: Point
-    radius: float
-    turn: int
-    line: Line | None = None
-
-    def at(self, t: float) -> Point:
-        if self.line is not None:
-            ux, uy = self.line.direction(self.line.start)
-            (x, y), (ex, ey) = self.line.start, rim(*self.beam, math.atan2(-ux, uy))
-            return x + ex + t * ux, y + ey + t * uy
-        (cx, cy), (ex, ey) = self.centre, rim(*self.beam, t)
-        r = self.turn * self.radius
-        return cx + r * math.cos(t) + ex, cy + r * math.sin(t) + ey
-
-    def rate(self, t: float) -> Point:
-        step = 1e-6
-        (x0, y0), (x1, y1) = self.at(t - step), self.at(t + step)
-        return (x1 - x0) / (2 * step), (y1 - y0) / (2 * step)
+    reach: float
 
 
-def _stretched(edge: Edge, sx: float, sy: float) -> tuple[Edge, ...]:
+def _stretched(edge: Edge, sx: float, sy: float) -> list[Edge]:
+    """Edges within FINE of the stretched edge, without kinks: a kink would be taken for a corner.
+
+    The ends are those of the edge, exactly; what is too short to turn is a line.
+    """
     start, end = ((p[0] * sx, p[1] * sy) for p in (edge.start, edge.end))
-    if isinstance(edge, Line):
-        return (Line(start, end),)
-    (cx, cy), r, first = edge.centre, edge.radius, edge.start_angle
+    if isinstance(edge, Line) or math.dist(start, end) < SHORTEST:
+        return [Line(start, end)]
+    (cx, cy), r, first, sweep = edge.centre, edge.radius, edge.start_angle, edge.sweep
     curve = ellipse((cx * sx, cy * sy), (r * sx, 0.0), (0.0, r * sy))
-    low, high = sorted((first, first + edge.sweep))
-    fitted = fit_arcs(curve, low, high, FINE)
-    if not edge.ccw:
-        fitted = tuple(e.reversed() for e in reversed(fitted))
-    if not fitted:
-        return (Line(start, end),)
-    ends = [start, *(e.end for e in fitted[:-1]), end]
-    return tuple(e.part(*stops) for e, stops in zip(fitted, pairwise(ends), strict=True))
+    count = math.ceil(abs(sweep) / STRETCHED_STEP)
+    while count < MOST_PIECES:
+        angles = [first + sweep * k / count for k in range(count + 1)]
+        points = [start, *(curve(t)[0] for t in angles[1:-1]), end]
+        ways = [_unit(curve(t)[1], sweep) for t in angles]
+        pieces = [
+            biarc(p, u, q, v, 0.0)
+            for (p, q), (u, v) in zip(pairwise(points), pairwise(ways), strict=True)
+        ]
+        # A biarc lies farthest from its curve at a sixth of its way and at five sixths.
+        if all(
+            pair and distance_to(pair[half], curve(s + (t - s) * share)[0]) < FINE
+            for pair, (s, t) in zip(pieces, pairwise(angles), strict=True)
+            for half, share in ((0, 1 / 6), (1, 5 / 6))
+        ):
+            return [piece for pair in pieces for piece in pair]
+        count *= 2
+    x, y = edge.start
+    raise GeometryError(f"the arc at x {x:.6f}, y {y:.6f} cannot be stretched to the kerf")
+
+
+def _unit(way: Point, sign: float) -> Point:
+    size = math.copysign(math.hypot(*way), sign)
+    return way[0] / size, way[1] / size
 
 
 def _nearest(near: EdgeIndex, p: Point, reach: float) -> int:
@@ -181,25 +189,23 @@ def _lost(
     return None
 
 
-def _track(
-    edge: Edge, near: EdgeIndex, sources: Sequence[Edge], beam: tuple[float, float], reach: float
-) -> _Track:
+def _track(edge: Edge, sources: _Sources) -> Track:
     """What a piece of the stretched path follows, in true measure."""
-    number = _nearest(near, edge.at(0.5), reach)
-    source = sources[number]
+    near, reach = sources.near, sources.reach
     if isinstance(edge, Arc) and edge.ccw and abs(edge.radius - reach) < EPSILON:
-        for stretched, true in (
-            (near.edges[number].start, source.start),
-            (near.edges[number].end, source.end),
-        ):
-            if math.dist(stretched, edge.centre) < 2 * EPSILON:
-                return _Track(beam, true, 0.0, 1)
+        for number in near.numbers(widened((*edge.centre, *edge.centre), 2 * EPSILON)):
+            piece, (source, is_first, is_last) = near.edges[number], sources.of[number]
+            if is_first and math.dist(piece.start, edge.centre) < 2 * EPSILON:
+                return Track(sources.beam, source.start, 0.0, 1)
+            if is_last and math.dist(piece.end, edge.centre) < 2 * EPSILON:
+                return Track(sources.beam, source.end, 0.0, 1)
+    source = sources.of[_nearest(near, edge.at(0.5), reach)].edge
     if isinstance(source, Line):
-        return _Track(beam, source.start, 0.0, 0, source)
-    return _Track(beam, source.centre, source.radius, 1 if source.ccw else -1)
+        return Track(sources.beam, source.start, 0.0, 0, source)
+    return Track(sources.beam, source.centre, source.radius, 1 if source.ccw else -1)
 
 
-def _drawn(edges: Sequence[Edge], tracks: Sequence[_Track], scale: tuple[float, float]) -> Contour:
+def _drawn(edges: Sequence[Edge], tracks: Sequence[Track], scale: tuple[float, float]) -> Contour:
     """A contour of the path from its stretched image and what each of its edges follows."""
     count = len(edges)
     starts = [
@@ -210,106 +216,86 @@ def _drawn(edges: Sequence[Edge], tracks: Sequence[_Track], scale: tuple[float, 
     if not starts:
         track = tracks[0]
         start = _parameter(track, edges[0], edges[0].start, scale)
-        return Contour(tuple(_arcs(track, start, start + track.turn * math.tau)))
-    spans: list[tuple[_Track, float, float]] = []
-    for i, after in zip(starts, [*starts[1:], starts[0]], strict=True):
-        track, last = tracks[i], edges[after - 1]
-        t0 = _parameter(track, edges[i], edges[i].start, scale)
-        t1 = _parameter(track, last, last.end, scale)
-        spans.append((track, t0, _onward(track, t0, t1)))
+        return Contour(tuple(arcs_along(track, start, start + track.turn * math.tau)))
+    spans: list[tuple[Track, float, float]] = []
+    for i, after in zip(starts, [*starts[1:], starts[0] + count], strict=True):
+        own = [edges[k % count] for k in range(i, max(after, i + 1))]
+        t0 = _parameter(tracks[i], own[0], own[0].start, scale)
+        stops = _cut_where_wide(tracks[i], t0, _last(tracks[i], t0, own, scale))
+        # Where the beam moves back from end to end, the pieces beside cross each other.
+        spans += [
+            (tracks[i], s, t)
+            for s, t in pairwise(stops)
+            if any(tracks[i].runs_on(s + share * (t - s)) for share in (0.0, 0.5, 1.0))
+        ]
     return Contour(tuple(_joined(spans)))
 
 
-def _parameter(track: _Track, edge: Edge, p: Point, scale: tuple[float, float]) -> float:
+def _cut_where_wide(track: Track, t0: float, t1: float) -> list[float]:
+    """Both ends, and between them where the beam's flat side moves back, for it crosses itself."""
+    flat = 0.0 if track.beam[1] > track.beam[0] else math.pi / 2
+    low, high = sorted((t0, t1))
+    sides = [
+        flat + math.pi * k
+        for k in range(math.ceil((low - flat) / math.pi), math.floor((high - flat) / math.pi) + 1)
+    ]
+    back = [t for t in sides if low < t < high and not track.runs_on(t)]
+    return [t0, *sorted(back, reverse=t1 < t0), t1]
+
+
+def _parameter(track: Track, edge: Edge, p: Point, scale: tuple[float, float]) -> float:
     sx, sy = scale
     if track.line is not None:
         (x0, y0), (ux, uy) = track.at(0.0), track.line.direction(track.line.start)
         return (p[0] / sx - x0) * ux + (p[1] / sy - y0) * uy
     ux, uy = edge.direction(p)
-    return math.atan2(-ux * sy, uy * sx)
+    t = math.atan2(-ux * sy, uy * sx)
+    for _ in range(PROJECTIONS):
+        # The way tells the parameter, and the place more precisely where the track bends little.
+        (x, y), (rx, ry) = track.at(t), track.rate(t)
+        t += ((p[0] / sx - x) * rx + (p[1] / sy - y) * ry) / (rx * rx + ry * ry + BEND**2)
+    return t
 
 
-def _onward(track: _Track, t0: float, t1: float) -> float:
-    """The later parameter, on from the earlier one the way the track turns."""
+def _last(track: Track, t0: float, own: Sequence[Edge], scale: tuple[float, float]) -> float:
+    """The parameter at the end of a track's own edges, on from ``t0`` the way the track turns."""
+    t1 = _parameter(track, own[-1], own[-1].end, scale)
     if track.line is not None:
         return t1
-    ahead = (t1 - t0) * track.turn % math.tau
-    return t0 + track.turn * (0.0 if ahead > math.tau - 1e-6 else ahead)
+    # No edge turns by more than a half: their turns tell how often the normal has come round.
+    turn = sum(
+        math.remainder(
+            _parameter(track, e, e.end, scale) - _parameter(track, e, e.start, scale), math.tau
+        )
+        for e in own
+    )
+    t1 += math.tau * round((t0 + turn - t1) / math.tau)
+    return t1 if (t1 - t0) * track.turn > 0 else t0
 
 
-def _joined(spans: Sequence[tuple[_Track, float, float]]) -> Iterator[Edge]:
+def _joined(spans: Sequence[tuple[Track, float, float]]) -> Iterator[Edge]:
     """Edges along the tracks, which end where they cross the next."""
     starts, ends = [t0 for _, t0, _ in spans], [t1 for _, _, t1 in spans]
-    corners: list[Point] = []
-    for i, (track, _, _) in enumerate(spans):
-        before = spans[i - 1][0]
-        ends[i - 1], starts[i] = _crossing(before, ends[i - 1], track, starts[i])
-        corners.append(track.at(starts[i]))
-    for i, (track, _, _) in enumerate(spans):
-        start, end = corners[i], corners[(i + 1) % len(corners)]
+    for i, span in enumerate(spans):
+        ends[i - 1], starts[i] = crossing(spans[i - 1], span)
+    seen = [
+        i
+        for i, (track, _, _) in enumerate(spans)
+        if math.dist(track.at(starts[i]), track.at(ends[i])) > EPSILON
+    ]
+    for i, following in zip(seen, [*seen[1:], *seen[:1]], strict=True):
+        track = spans[i][0]
+        start, end = track.at(starts[i]), spans[following][0].at(starts[following])
+        miss = math.dist(end, track.at(ends[i]))
+        if miss > TOLERANCE:
+            raise GeometryError(
+                f"the edges that meet at x {end[0]:.6f}, y {end[1]:.6f} miss each other by "
+                f"{miss:.6f} mm once the kerf is added; change a size there by 0.001 mm"
+            )
         edges: list[Edge] = [Line(start, end)]
         if track.line is None:
-            edges = _arcs(track, starts[i], ends[i])
-        if edges and math.dist(start, end) > EPSILON:
+            edges = arcs_along(track, starts[i], ends[i])
+        if edges:
             edges[0] = edges[0].part(start, edges[0].end)
             edges[-1] = edges[-1].part(edges[-1].start, end)
             yield from edges
-
-
-def _crossing(one: _Track, s: float, other: _Track, t: float) -> tuple[float, float]:
-    """The parameters at which two tracks meet, from near ones, by Newton's steps."""
-    for _ in range(6):
-        (x, y), (u, v) = one.at(s), other.at(t)
-        if math.hypot(u - x, v - y) < 1e-10:
-            break
-        (px, py), (qx, qy) = one.rate(s), other.rate(t)
-        det = px * qy - py * qx
-        if abs(det) < 1e-3 * math.hypot(px, py) * math.hypot(qx, qy):
-            break
-        s += ((u - x) * qy - (v - y) * qx) / det
-        t += ((u - x) * py - (v - y) * px) / det
-    return s, t
-
-
-def _arcs(track: _Track, t0: float, t1: float) -> list[Edge]:
-    """Arcs through points of the track, as many as keep within the tolerance."""
-    step, tolerance = (STEP, TOLERANCE) if track.radius else (CORNER_STEP, TOLERANCE / 10)
-    count = max(1, math.ceil(abs(t1 - t0) / step - 1e-9))
-    if track.radius * abs(t1 - t0) > SHORT:
-        count = max(LEAST_ARCS, count)
-    return through(track.at, t0, t1, count, tolerance)
-
-
-def through(
-    curve: Callable[[float], Point], t0: float, t1: float, count: int, tolerance: float
-) -> list[Edge]:
-    """Arcs through ``count`` + 1 points of the curve, or through twice as many, and so on."""
-    while True:
-        stops = [t0 + (t1 - t0) * k / count for k in range(count + 1)]
-        points = [curve(t) for t in stops]
-        if math.dist(points[0], points[-1]) < EPSILON:
-            points[-1] = points[0]
-        edges = [
-            _through(p, curve((s + t) / 2), q)
-            for (s, t), (p, q) in zip(pairwise(stops), pairwise(points), strict=True)
-        ]
-        off = max(
-            distance_to(edge, curve(s + (t - s) * share))
-            for edge, (s, t) in zip(edges, pairwise(stops), strict=True)
-            for share in (0.2, 0.8)
-        )
-        if off <= tolerance or count > 1000:
-            return [edge for edge in edges if math.dist(edge.start, edge.end) > EPSILON]
-        count *= 2
-
-
-def _through(start: Point, middle: Point, end: Point) -> Edge:
-    """The arc from start through a point half way to the end."""
-    (ax, ay), (bx, by) = (
-        (middle[0] - start[0], middle[1] - start[1]),
-        (end[0] - middle[0], end[1] - middle[1]),
-    )
-    half = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
-    if abs(half) * math.dist(start, end) < EPSILON / 10:
-        return Line(start, end)
-    return edge_from_bulge(start, end, math.tan(half / 2))

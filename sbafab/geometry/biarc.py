@@ -19,6 +19,8 @@ SAMPLES = 24
 """Points of a span that are compared with its two arcs."""
 STRAIGHT = 1e-6
 """An arc that bulges less than this, in mm, is written as a line."""
+LEAST_TURN = 1e-7
+"""Radians: what turns less is a line. No offset tells it from one, and its centre is far away."""
 MOST_ARCS = 2000
 MOST_TRIALS = 40
 """Doublings and halvings of one span: more than these leave nothing of any curve."""
@@ -127,6 +129,21 @@ def _biarc(curve: Curve, first: float, last: float, tolerance: float) -> list[Ed
     """Two edges that touch the curve at both parameters; none if they stray from it between."""
     start, u = curve(first)[0], _unit_tangent(curve, first, last)
     end, v = curve(last)[0], _unit_tangent(curve, last, first)
+    edges = biarc(start, u, end, v)
+    if not edges:
+        return []
+    for k in range(1, SAMPLES):
+        p = curve(first + (last - first) * k / SAMPLES)[0]
+        if min(distance_to(edge, p) for edge in edges) > 0.99 * tolerance:
+            return []
+    return edges
+
+
+def biarc(start: Point, u: Point, end: Point, v: Point, straight: float = STRAIGHT) -> list[Edge]:
+    """Two edges from start along ``u`` to end along ``v``; none where these turn too far apart.
+
+    An arc that bulges less than ``straight`` mm is a line, which leaves a kink where they join.
+    """
     # One tangent length d on both sides: |end - start - d (u + v)| = 2 d, solved so that it
     # keeps its digits where the tangents are parallel.
     chord = end[0] - start[0], end[1] - start[1]
@@ -146,18 +163,13 @@ def _biarc(curve: Curve, first: float, last: float, tolerance: float) -> list[Ed
     other = _angle((end[0] - joint[0], end[1] - joint[1]), v)
     if max(abs(turn), abs(other)) > LARGEST_TURN / 2:
         return []
-    edges = [_edge(start, joint, turn), _edge(joint, end, other)]
-    for k in range(1, SAMPLES):
-        p = curve(first + (last - first) * k / SAMPLES)[0]
-        if min(distance_to(edge, p) for edge in edges) > 0.99 * tolerance:
-            return []
-    return edges
+    return [_edge(start, joint, turn, straight), _edge(joint, end, other, straight)]
 
 
-def _edge(start: Point, end: Point, turn: float) -> Edge:
+def _edge(start: Point, end: Point, turn: float, straight: float) -> Edge:
     """The arc from start to end whose tangent at the start is ``turn`` right of the chord."""
     bulge = math.tan(turn / 2)
-    if abs(bulge) * math.dist(start, end) / 2 < STRAIGHT:
+    if abs(bulge) * math.dist(start, end) / 2 < straight or abs(turn) < LEAST_TURN:
         return Line(start, end)
     return edge_from_bulge(start, end, bulge)
 

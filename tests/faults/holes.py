@@ -7,7 +7,7 @@ import math
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, rectangle
-from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.laminate import Laminate, Pin, Role
 from tests.faults.record import Fault, Kind, no_lumen, redrawn
 from tests.faults.specimen import Change, Pick, Specimen, base, cap, mask, separator, wall
 
@@ -59,17 +59,22 @@ def lumen_of(radius: float) -> Change:
     return lambda region, laminate: (region | disc(ORIGIN, 1.2)) - disc(ORIGIN, radius)
 
 
+def first_pin(region: Region, laminate: Laminate) -> Pin:
+    """The first pin of the ears that a layer has a hole for."""
+    bores = {b.centre for b in laminate.bores}
+    return next(
+        pin
+        for pin in laminate.pins
+        if pin.centre not in bores
+        and any(hole.circle and hole.circle[0] == pin.centre for hole in region.holes)
+    )
+
+
 def tooling_hole(name: str, pick: Pick, by: float | None) -> Fault:
     """A layer's first tooling hole closed, or moved."""
 
     def change(region: Region, laminate: Laminate) -> Region:
-        bores = {b.centre for b in laminate.bores}
-        pin = next(
-            pin
-            for pin in laminate.pins
-            if pin.centre not in bores
-            and any(hole.circle and hole.circle[0] == pin.centre for hole in region.holes)
-        )
+        pin = first_pin(region, laminate)
         closed = region | disc(pin.centre, pin.diameter / 2 + 0.1)
         return closed if by is None else closed - disc(aside(pin.centre, by), pin.diameter / 2)
 
@@ -78,6 +83,21 @@ def tooling_hole(name: str, pick: Pick, by: float | None) -> Fault:
         specimen.agree()
 
     return Fault(name, NOMINAL, put, settings=EARS)
+
+
+def all_without_hole(name: str, *roles: Role) -> Fault:
+    """The first tooling hole closed in every layer of the roles; the plate has its pin."""
+
+    def change(region: Region, laminate: Laminate) -> Region:
+        pin = first_pin(region, laminate)
+        return region | disc(pin.centre, pin.diameter / 2 + 0.1)
+
+    def put(specimen: Specimen) -> None:
+        layers = [layer for layer in specimen.clean.layers if layer.role in roles]
+        specimen.redraw(layers, change)
+        specimen.agree()
+
+    return Fault(name, "pin-holes", put, settings=EARS)
 
 
 KIND = Kind(
@@ -123,5 +143,7 @@ EARS_KIND = Kind(
         tooling_hole("tooling hole moved by 0.15 in a wall", wall, 0.15),
         tooling_hole("tooling hole missing in a separator", separator, None),
         tooling_hole("tooling hole moved by 0.15 in a separator", separator, 0.15),
+        all_without_hole("tooling hole missing in all films", "base", "wall", "cap"),
+        all_without_hole("tooling hole missing in all separators", "separator-mask"),
     ),
 )

@@ -16,6 +16,7 @@ from sbafab.geometry.shapes import disc, rectangle, strip
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.deck import has_failed, rule_names, run_deck
 from sbafab.rules.limits import Limits, Tolerances
+from tests.rules.conftest import built
 
 AXIS = (0.0, 0.0)
 # Layers of one chamber of three balloons: 1 base, 2 chamber mask, 3 wall, 4 separator mask, 5 wall,
@@ -23,6 +24,7 @@ AXIS = (0.0, 0.0)
 ONE = ("1dof-5mm", "stack.balloons=3")
 LOBED = ("3dof-15mm", "stack.balloons=3")
 RADIAL = ("radial-15mm", "stack.balloons=2")
+EARS = 'registration.method="ears"'
 
 
 class Fault(NamedTuple):
@@ -121,6 +123,26 @@ FAULTS = {
         0.02,
     ),
 }
+# One layer of its kind: no other tells that its hole is missing.
+FAULTS |= {
+    "sheet without a tooling hole": Fault(
+        "pin-holes", ("radial-15mm", EARS), 1, lambda sheet: closed(sheet, "sheet1"), 2.0
+    ),
+    "sheet's separator without a tooling hole": Fault(
+        "pin-holes", ("radial-15mm", EARS), 2, lambda mask: closed(mask, "mask2.1"), 2.0
+    ),
+    "tail without its hole": Fault(
+        "pin-holes", (*ONE, EARS), 2, lambda mask: closed(mask, "strip1", ONE), 2.0
+    ),
+}
+
+
+def closed(part: Region, pin: str, design: tuple[str, ...] = ("radial-15mm",)) -> Region:
+    """The part without the hole that it has at a pin."""
+    pins = built(*design, EARS).pins
+    (centre,) = (p.centre for p in pins if p.name == pin)
+    assert not part.contains(centre)
+    return part | disc(centre, 0.8)
 
 
 def bores() -> Region:

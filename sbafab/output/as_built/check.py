@@ -34,6 +34,7 @@ from sbafab.output.as_built.measures import (
     pattern_problems,
     place_problems,
     size_problems,
+    with_plate_pins,
 )
 from sbafab.output.as_built.pieces import Lot
 from sbafab.output.as_built.records import (
@@ -190,6 +191,7 @@ def read_folder(folder: Path, of_job: bool = False) -> AsBuilt:
             room = TOLERANCE + 2 * chord_error
             outlined = replace(laminate, outline=_outline(design))
             problems += size_problems(claims, sizes(design, outlined), room)
+            laminate = with_plate_pins(folder, laminate, claims)
         except UNMEASURED as error:
             laminate = None
             message = f"the layers do not lie over each other as films of one stack ({error})"

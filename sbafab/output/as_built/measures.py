@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
-from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
 from sbafab.output.as_built.claims import claim, waiver_properties
 from sbafab.output.as_built.cut_files import CutPart, LayerFile, read_part
 from sbafab.output.as_built.records import CLAIMS, INTEGRITY, Manifest, Problem
@@ -228,3 +229,23 @@ def fixture_problems(folder: Path, laminate: Laminate, claims: Manifest) -> list
     if problems or len(circles) != len(pins):
         return [claim(f"{claims.fixture} has other holes than the laminate has pins")]
     return []
+
+
+def with_plate_pins(folder: Path, laminate: Laminate, claims: Manifest) -> Laminate:
+    """The laminate with a pin in every hole of the plate, whatever holes its layers have."""
+    if claims.fixture is None or claims.fixture not in claims.files:
+        return laminate
+    try:
+        holes = read_part(folder / claims.fixture).region.holes
+    except OutputError:
+        return laminate
+    names = {(pin.x, pin.y): pin.name for pin in claims.registration.pins}
+    pins = list(laminate.pins)
+    for number, (centre, radius) in enumerate((h.circle for h in holes if h.circle), start=1):
+        if not any(
+            math.dist(pin.centre, centre) < LOOSE and abs(pin.diameter - 2 * radius) < LOOSE
+            for pin in pins
+        ):
+            near = [name for place, name in names.items() if math.dist(place, centre) < LOOSE]
+            pins.append(Pin(near[0] if near else f"plate{number}", centre, 2 * radius))
+    return replace(laminate, pins=tuple(pins))

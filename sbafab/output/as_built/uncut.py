@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 from sbafab.cutting.chaining import check_clear
 from sbafab.errors import OutputError
-from sbafab.geometry.beam import Kerf, rim, widths
+from sbafab.geometry.beam import Kerf, widths
 from sbafab.geometry.boolean import tidy
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
 from sbafab.geometry.offset import shrink
 from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.tracks import rim
 from sbafab.output.as_built.chords import with_short_chords_rounded
 
 KINK = 0.05
