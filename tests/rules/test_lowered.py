@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.design.records import Design, Laser, Rules
+from sbafab.actuators.one_dof import OneDofDesign
+from sbafab.design.records import Laser, Rules
 from sbafab.output.settings import limits
 from sbafab.rules.deck import run_deck
 from sbafab.rules.limits import Limits
@@ -63,7 +64,7 @@ def test_every_key_of_rules_and_laser_is_decided_on() -> None:
 
 def test_a_design_s_own_limits_are_the_usual_ones() -> None:
     """What is usual stands in the rules; the design's defaults agree with it."""
-    design = Design(name="any", family="any")
+    design = OneDofDesign(name="any", family="1dof")
     assert limits(design) == Limits()
 
 
