@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -43,8 +44,18 @@ def load_design(
 
 
 def build(design: Design) -> Laminate:
-    """The laminate of a design of any family. Raises DesignError where parts do not fit."""
-    return FAMILIES[design.family][1](design)
+    """The laminate of a design of any family. Raises DesignError where parts do not fit.
+
+    Its notes say what size a drawn outline was understood to have.
+    """
+    laminate = FAMILIES[design.family][1](design)
+    outline = getattr(getattr(design, "chamber", None), "outline", None)
+    if outline is None:
+        return laminate
+    from sbafab.design.outline import understood
+
+    said = understood(design.folder / outline).said
+    return replace(laminate, notes=(said, *laminate.notes))
 
 
 def schema(*others: type[BaseModel]) -> dict[str, Any]:

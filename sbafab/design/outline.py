@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
-from sbafab.design.strands import JOIN, Strand, counted, joined, sealed, widest_gap
+from sbafab.design.strands import JOIN, Strand, Traced, counted, joined, sealed, widest_gap
 from sbafab.errors import DesignError
 from sbafab.geometry.biarc import FitError
 from sbafab.geometry.boolean import PointPool, split_edges, tidy
@@ -16,6 +16,14 @@ MOST_BYTES = 2_000_000
 LARGEST = 150.0
 SMALLEST = 1.0
 """Bounds of the outline's extent, in mm."""
+LONGEST_NAME = 40
+
+
+class Outline(NamedTuple):
+    """A drawn outline, and one sentence on the size that was understood."""
+
+    region: Region
+    said: str
 
 
 def read_outline(path: Path) -> Region:
@@ -26,16 +34,30 @@ def read_outline(path: Path) -> Region:
     and its y axis is turned upward, so that the outline looks as it is drawn. Ellipses, Béziers
     and splines become arcs within 0.5 um. Raises DesignError.
     """
+    return understood(path).region
+
+
+def understood(path: Path) -> Outline:
+    """The same with the size that was understood, in words. Raises DesignError."""
     try:
-        loop = _one_loop(list(counted(_strands(path))))
-        return _checked(sealed(loop))
+        strands, scale = _traced(path)
+        region = _checked(sealed(_one_loop(list(counted(strands)))))
     except FitError as error:
         raise DesignError(f"outline {path} has a {error}; round it off") from None
     except DesignError as error:
         raise DesignError(f"outline {path} {error}") from None
+    low_x, low_y, high_x, high_y = region.bounds
+    size = f"{high_x - low_x:.3f} x {high_y - low_y:.3f} mm"
+    return Outline(region, f"outline {_short(path.name)}: {size}, {scale}")
 
 
-def _strands(path: Path) -> Iterator[Strand]:
+def _short(name: str) -> str:
+    """A file's name as it may stand in a drawing: printable, and not long."""
+    plain = "".join(letter if letter.isprintable() else "?" for letter in name)
+    return plain if len(plain) <= LONGEST_NAME else f"...{plain[3 - LONGEST_NAME :]}"
+
+
+def _traced(path: Path) -> Traced:
     try:
         is_file = path.is_file()
         size = path.stat().st_size if is_file else 0

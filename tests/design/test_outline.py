@@ -319,7 +319,7 @@ BAD_DXF: dict[str, tuple[Callable[[Any], object], str]] = {
         lambda m: m.add_lwpolyline([(math.cos(k), math.sin(k)) for k in range(2001)]),
         "more than 500 edges",
     ),
-    "blocks are not followed": (lambda m: m.add_blockref("POCKET", (0, 0)), "no closed path"),
+    "blocks are not followed": (lambda m: m.add_blockref("POCKET", (0, 0)), "entity INSERT"),
 }
 
 
@@ -345,11 +345,11 @@ BAD_SVG = {
     "cusp": ('<path d="M-2.5-2C2.5 3-2.5 3 2.5-2z"/>', PAGE, r"cusp near x -?0\.0000, y -1\.7500"),
     "flattened": ('<ellipse rx="2" ry="3" transform="scale(2 1e-9)"/>', PAGE, "cusp near"),
     "overflow": ('<circle r="1e400"/>', PAGE, "coordinate"),
-    "garbage": ('<path d="garbage"/>', PAGE, "no closed path"),
+    "garbage": ('<path d="garbage"/>', PAGE, "does not begin with a move"),
     "no view": ('<circle r="2"/>', 'width="4mm" viewBox="0 0 0 1"', "viewBox"),
     "no width": ('<circle r="2"/>', 'width="0mm" viewBox="0 0 1 1"', "width or height"),
     "many elements": ("<g/>" * 2001, PAGE, "more than 2000 elements"),
-    "nested deeply": ("<g>" * 1500 + "</g>" * 1500, PAGE, "RecursionError"),
+    "nested deeply": ("<g>" * 1500 + "</g>" * 1500, PAGE, "no closed path"),
     "long path": (f'<path d="M0 0{"c1 1 2 2 3 3" * 3000}"/>', PAGE, "more than 500 edges"),
     "broken": ("<circle", PAGE, "not valid SVG"),
 }
