@@ -17,7 +17,6 @@ PER_PIXEL = {
     "in": 96.0,
     "pt": 96 / 72,
     "pc": 16.0,
-    "Q": 24 / 25.4,
 }
 """User units to one of a physical unit, as CSS has it: 96 an inch."""
 FARTHEST_PAGE = 1e9

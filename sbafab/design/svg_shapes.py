@@ -140,21 +140,34 @@ def _commands(text: str) -> Iterator[str]:
             raise DesignError(
                 f'has <path> with d that is damaged at "{letter}{body.strip()[:20]}"; draw it anew'
             )
-        yield letter
-        yield from found
+        if takes == 7:
+            yield from _arcs(letter, found)
+        else:
+            yield letter
+            yield from found
+
+
+def _arcs(letter: str, found: list[str]) -> Iterator[str]:
+    """Arcs one by one; those without a radius are lines."""
+    for first in range(0, len(found), 7):
+        rx, ry, *rest = found[first : first + 7]
+        if float(rx) == 0 or float(ry) == 0:
+            yield from ("L" if letter == "A" else "l", *rest[-2:])
+        else:
+            yield from (letter, rx, ry, *rest)
 
 
 def _numbers(text: str, arcs: bool) -> Iterator[str]:
     """The numbers after a path command; the flags of arcs need nothing between them."""
     place, count = len(text) - len(text.lstrip()), 0
     while place < len(text):
-        kind = _FLAGS_OF_ARC if arcs and count % 7 in FLAGS else _NUMBER
-        match = kind.match(text, place)
+        is_flag = arcs and count % 7 in FLAGS
+        match = (_FLAGS_OF_ARC if is_flag else _NUMBER).match(text, place)
         if match is None:
             raise DesignError(
                 f'has <path> with d that is damaged at "{text[place : place + 20]}"; draw it anew'
             )
-        yield match[0]
+        yield match[0] if is_flag else repr(float(match[0]))
         count += 1
         between = _SPACE.match(text, match.end())
         place = between.end() if between else match.end()
