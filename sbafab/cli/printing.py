@@ -82,8 +82,16 @@ def findings_table(findings: Sequence[Finding]) -> Table:
 
 
 def notes_of(checked: Iterable[Checked]) -> list[str]:
-    """What is to be known of several designs, each sentence once."""
-    return list(dict.fromkeys(note for one in checked for note in one.laminate.notes))
+    """What is to be known of several designs: each sentence once, with the names it is true of."""
+    names: dict[str, list[str]] = {}
+    designs = list(checked)
+    for one in designs:
+        for note in one.laminate.notes:
+            names.setdefault(note, []).append(one.design.name)
+    return [
+        note if len(of) == len(designs) else f"{', '.join(of)}: {note}"
+        for note, of in names.items()
+    ]
 
 
 def facts_table() -> Table:

@@ -16,7 +16,6 @@ MOST_BYTES = 2_000_000
 LARGEST = 150.0
 SMALLEST = 1.0
 """Bounds of the outline's extent, in mm."""
-LONGEST_NAME = 40
 
 
 class Outline(NamedTuple):
@@ -48,13 +47,8 @@ def understood(path: Path) -> Outline:
         raise DesignError(f"outline {path} {error}") from None
     low_x, low_y, high_x, high_y = region.bounds
     size = f"{high_x - low_x:.3f} x {high_y - low_y:.3f} mm"
-    return Outline(region, f"outline {_short(path.name)}: {size}, {scale}")
-
-
-def _short(name: str) -> str:
-    """A file's name as it may stand in a drawing: printable, and not long."""
-    plain = "".join(letter if letter.isprintable() else "?" for letter in name)
-    return plain if len(plain) <= LONGEST_NAME else f"...{plain[3 - LONGEST_NAME :]}"
+    # Without the file's name: a design is the same wherever its drawing lies.
+    return Outline(region, f"drawn outline: {size}, {scale}")
 
 
 def _traced(path: Path) -> Traced:

@@ -119,7 +119,7 @@ def test_the_size_that_is_understood_is_said(tmp_path: Path, unit: int, said: st
         with pytest.raises(DesignError, match=r"measures 152\.4 x 152\.4 mm"):
             understood(path)
     else:
-        assert understood(path).said.startswith(f"outline outline.dxf: {said}")
+        assert understood(path).said.startswith(f"drawn outline: {said}")
 
 
 def test_a_circle_from_behind_lies_on_the_other_side(tmp_path: Path) -> None:

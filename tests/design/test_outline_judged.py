@@ -243,14 +243,14 @@ def test_mm_without_a_page_are_mm_and_plain_numbers_beside_them_pixels(tmp_path:
 
 
 def test_how_large_a_unit_is_is_said(tmp_path: Path) -> None:
-    path = tmp_path / f"{'o' * 90}.svg"
+    path = tmp_path / "outline.svg"
     for page, said in (
         (PAGE, "4.000 x 4.000 mm, read at 1 mm a unit"),
         ("", "4.000 x 4.000 mm, read at 1 mm a unit, for the page has no size in mm"),
         ('width="9mm"', "1.058 x 1.058 mm, read at 0.264583 mm a unit, 96 units an inch"),
     ):
         path.write_text(drawing(page, '<circle r="2"/>'))
-        assert understood(path).said == f"outline ...{'o' * 33}.svg: {said}"
+        assert understood(path).said == f"drawn outline: {said}"
 
 
 def a_length(dice: random.Random, units: float, whole: float) -> str:
