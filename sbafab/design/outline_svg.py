@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 from sbafab.design.strands import MOST_EDGES, Strand, Traced, place, refuse_more_than_limit
-from sbafab.design.svg_lengths import Page, numbers, page_of, with_physical_lengths
+from sbafab.design.svg_lengths import WHITE, Page, numbers, page_of, with_physical_lengths
 from sbafab.design.svg_shapes import SHAPES, Sized, path_of, sized
 from sbafab.design.svg_style import (
     is_displayed,
@@ -59,7 +59,7 @@ TRANSFORMS = {
     "translate": (1, 2),
 }
 """By name, how many numbers each may take."""
-_TRANSFORM = re.compile(r"\s*(?:,\s*)?([A-Za-z]+)\s*\(([^()]*)\)\s*")
+_TRANSFORM = re.compile(r"\s*(?:,\s*)?([A-Za-z]+)\s*\(([^()]*)\)\s*", re.ASCII)
 MARK = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[A-Za-z]")
 """What a path is written with: numbers, and letters for its commands."""
 
@@ -180,7 +180,7 @@ def _refuse_undrawn(root: ElementTree.Element) -> None:
 
 def _transform(text: str) -> Matrix:
     """The matrix of a transform attribute. Raises DesignError where it is damaged."""
-    if text.strip() in ("", "none"):
+    if text.strip(WHITE) in ("", "none"):
         return UNIT
     if len(text) > LONGEST_TRANSFORM:
         raise DesignError("has a very long transform; apply it to the path")

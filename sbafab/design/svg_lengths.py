@@ -20,11 +20,15 @@ PER_PIXEL = {
 }
 """User units to one of a physical unit, as CSS has it: 96 an inch."""
 FARTHEST_PAGE = 1e9
+WHITE = " \t\r\n"
+"""What SVG takes for space, and no more."""
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_LENGTH = re.compile(rf"\s*({NUMBER})(%|[A-Za-z]*)\s*")
-_FIT = re.compile(r"\s*(?:defer\s+)?(none|x(?:Min|Mid|Max)Y(?:Min|Mid|Max))(?:\s+(meet|slice))?\s*")
-_NUMBER = re.compile(NUMBER)
-_BETWEEN = re.compile(r"\s*(?:,\s*)?")
+_LENGTH = re.compile(rf"\s*({NUMBER})(%|[A-Za-z]*)\s*", re.ASCII)
+_FIT = re.compile(
+    r"\s*(?:defer\s+)?(none|x(?:Min|Mid|Max)Y(?:Min|Mid|Max))(?:\s+(meet|slice))?\s*", re.ASCII
+)
+_NUMBER = re.compile(NUMBER, re.ASCII)
+_BETWEEN = re.compile(r"\s*(?:,\s*)?", re.ASCII)
 
 
 class Page(NamedTuple):
@@ -64,7 +68,7 @@ class Length(NamedTuple):
 
 def numbers(text: str) -> Iterator[str]:
     """The numbers of a list parted by spaces or commas. Raises ValueError for anything else."""
-    place = len(text) - len(text.lstrip())
+    place = len(text) - len(text.lstrip(WHITE))
     while place < len(text):
         match = _NUMBER.match(text, place)
         if match is None:
@@ -157,7 +161,7 @@ def with_physical_lengths(page: Page) -> Page:
 
 
 def _size(root: ElementTree.Element, name: str) -> Length | None:
-    text = root.get(name, "").strip()
+    text = root.get(name, "").strip(WHITE)
     return None if text in ("", "auto") else length(text, f"a {name} of")
 
 

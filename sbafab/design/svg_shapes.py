@@ -7,7 +7,16 @@ from collections.abc import Iterator
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-from sbafab.design.svg_lengths import NUMBER, Length, Page, diagonal, length, numbers, user_units
+from sbafab.design.svg_lengths import (
+    NUMBER,
+    WHITE,
+    Length,
+    Page,
+    diagonal,
+    length,
+    numbers,
+    user_units,
+)
 from sbafab.design.svg_style import local
 from sbafab.errors import DesignError
 
@@ -24,13 +33,16 @@ DOWN = frozenset({"cy", "ry", "height", "y", "y1", "y2"})
 SIZES = frozenset({"height", "r", "rx", "ry", "width"})
 TAKES = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 """How many numbers a path command takes, over and over."""
+UNLIKE = frozenset({"CT", "ST", "QS", "TS"})
+"""Smooth curves after curves of the other degree: these begin without a tangent to go on with. The
+library would mirror one, which a line of no length between them keeps it from."""
 FLAGS = (3, 4)
 """Which of an arc's seven are 0 or 1, and may stand without a space after them."""
 
 _COMMANDS = re.compile(r"([MmLlHhVvCcSsQqTtAaZz])")
 _FLAGS_OF_ARC = re.compile(r"[01]")
-_NUMBER = re.compile(NUMBER)
-_SPACE = re.compile(r"\s*(?:,\s*)?")
+_NUMBER = re.compile(NUMBER, re.ASCII)
+_SPACE = re.compile(r"\s*(?:,\s*)?", re.ASCII)
 
 
 class Sized(NamedTuple):
@@ -51,7 +63,7 @@ def sized(element: ElementTree.Element) -> Sized:
     name = local(element)
     found: dict[str, Length | None] = {}
     for key in LENGTHS.get(name, ()):
-        text = element.get(key, "").strip()
+        text = element.get(key, "").strip(WHITE)
         absent = text == "" or (text == "auto" and key in SIZES)
         found[key] = None if absent else length(text, f"<{name}> with {key}")
     for key, value in found.items():
@@ -127,19 +139,21 @@ def _corners(text: str, name: str) -> str:
 
 def _commands(text: str) -> Iterator[str]:
     """Path data with every command and number apart. Raises DesignError where it is damaged."""
-    if text.strip() in ("", "none"):
+    if text.strip(WHITE) in ("", "none"):
         return
-    before, *rest = _COMMANDS.split(text)
+    start, *rest = _COMMANDS.split(text)
     letters, bodies = rest[::2], rest[1::2]
-    if before.strip() or not letters or letters[0] not in "Mm":
+    if start.strip(WHITE) or not letters or letters[0] not in "Mm":
         raise DesignError("has <path> with d that does not begin with a move; draw it anew")
-    for letter, body in zip(letters, bodies, strict=True):
+    for before, letter, body in zip(["", *letters], letters, bodies, strict=False):
         takes = TAKES[letter.upper()]
         found = list(_numbers(body, takes == 7))
         if (takes == 0 and found) or (takes and (not found or len(found) % takes)):
             raise DesignError(
                 f'has <path> with d that is damaged at "{letter}{body.strip()[:20]}"; draw it anew'
             )
+        if before.upper() + letter.upper() in UNLIKE:
+            yield from ("l", "0", "0")
         if takes == 7:
             yield from _arcs(letter, found)
         else:
@@ -159,7 +173,7 @@ def _arcs(letter: str, found: list[str]) -> Iterator[str]:
 
 def _numbers(text: str, arcs: bool) -> Iterator[str]:
     """The numbers after a path command; the flags of arcs need nothing between them."""
-    place, count = len(text) - len(text.lstrip()), 0
+    place, count = len(text) - len(text.lstrip(WHITE)), 0
     while place < len(text):
         is_flag = arcs and count % 7 in FLAGS
         match = (_FLAGS_OF_ARC if is_flag else _NUMBER).match(text, place)

@@ -106,8 +106,17 @@ def _refuse_effect(name: str, key: str, value: str) -> None:
 
 def _set(element: ElementTree.Element, name: str) -> str:
     """A property's value: by the style, or else by the attribute of that name."""
+    _refuse_capitals(element, element.get(name, ""))
     values = [value for key, value in _declared(element) if key == name]
     return values[-1] if values else element.get(name, "").strip().lower()
+
+
+def _refuse_capitals(element: ElementTree.Element, text: str) -> None:
+    if text != text.lower():
+        raise DesignError(
+            f'writes "{text.strip()[:40]}" on <{local(element)}> in capitals, which programs read '
+            "differently; write it in small letters"
+        )
 
 
 def _declared(element: ElementTree.Element) -> Iterator[tuple[str, str]]:
@@ -117,7 +126,10 @@ def _declared(element: ElementTree.Element) -> Iterator[tuple[str, str]]:
         raise DesignError(f"holds a long or escaped style on <{local(element)}>; save plain SVG")
     for part in _COMMENT.sub(" ", text).split(";"):
         key, _, value = part.partition(":")
-        yield key.strip().lower(), value.lower().replace("!important", "").strip()
+        name = key.strip().lower()
+        if name in HIDING:
+            _refuse_capitals(element, part)
+        yield name, value.lower().replace("!important", "").strip()
 
 
 def local(element: ElementTree.Element) -> str:

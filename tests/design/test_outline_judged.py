@@ -101,6 +101,12 @@ READ = {
     "moves that are lines": (PAGE, '<path d="m-5-3 10 0 0 6-10 0z"/>'),
     "smooth curves": (PAGE, '<path d="M-6 0C-6-6-2-5 0-4S5-3 6 0 2 5 0 5-6 4-6 0z"/>'),
     "smooth quadratics": (PAGE, '<path d="M-6 0Q-3-6 0-3T6 0T0 4T-6 0z"/>'),
+    "a smooth curve after another kind": (
+        PAGE,
+        '<path d="M-5-3L5-3S8 4 0 5T-5 3z"/>',
+    ),
+    "a smooth curve after a quadratic": (PAGE, '<path d="M-5-3Q0-6 5-3S8 4 0 5T-6 5-5 0z"/>'),
+    "a smooth curve after a cubic": (PAGE, '<path d="m-5-3c1-2 9-1 10 0t0 6q-1 2-5 2s-2-1-5 0z"/>'),
     "flags without spaces": (PAGE, '<path d="M-4-3H4A3 3 0 014 3H-4A3 3 0 01-4-3z"/>'),
     "arcs that are too small": (PAGE, '<path d="M-4 0A1 2 0 0 1 4 0A4 3 0 0 1-4 0z"/>'),
     "turned arcs": (PAGE, '<path d="M-4 0A5 3 30 1 1 4 1A5 6-20 0 1-4 0z"/>'),
@@ -197,6 +203,9 @@ REFUSED = {
     "short path": ('<path d="M-5-3h10v6C1 2 3 4 5H-5z"/>', 'damaged at "C1 2 3 4 5"'),
     "bad transform": ('<circle r="4" transform="scale(2) rotate(1 2)"/>', "damaged at"),
     "units in a transform": ('<circle r="4" transform="rotate(90deg)"/>', "damaged at"),
+    "capital style": (f'<g style="DISPLAY:NONE">{RECT}</g>{DISC}', "capitals"),
+    "capital attribute": (f'<g display="NONE">{RECT}</g>{DISC}', "capitals"),
+    "space of another kind": ('<circle r="4\u00a0"/>', "write a number"),
     "hidden only": ('<circle r="4" visibility="hidden"/>', "hidden paths only"),
 }
 
