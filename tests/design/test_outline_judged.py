@@ -278,7 +278,7 @@ def a_shape(dice: random.Random, size: float, wide: float, high: float) -> str:
     def y(value: float) -> str:
         return a_length(dice, value * size, high)
 
-    kind = dice.randrange(5)
+    kind = dice.randrange(7)
     if kind == 0:
         r = a_length(dice, size / 2, math.hypot(wide, high) / math.sqrt(2))
         return f'<circle cx="{x(0.1)}" cy="{y(-0.1)}" r="{r}"/>'
@@ -291,8 +291,44 @@ def a_shape(dice: random.Random, size: float, wide: float, high: float) -> str:
         return (
             f'<path d="M{-s} {-s / 2}h{2 * s}a{s / 2} {s} {dice.randrange(90)} 0 1 0,{s}H{-s}z"/>'
         )
+    if kind > 4:
+        return a_path(dice, size / 2)
     s = size
     return f'<polygon points="{-s / 2},{-s / 2} {s / 2},{-s / 3} {s / 4} {s / 2}"/>'
+
+
+def a_path(dice: random.Random, radius: float) -> str:
+    """A closed path round the origin of commands by chance."""
+    stops = [
+        (radius * math.cos(turn), radius * math.sin(turn))
+        for turn in (k * math.tau / 7 + dice.uniform(-0.2, 0.2) for k in range(7))
+    ]
+
+    def near(k: int) -> str:
+        return " ".join(f"{v * dice.uniform(0.9, 1.3):.6f}" for v in stops[k % 7])
+
+    parts = []
+    for k in range(1, 7):
+        x, y = stops[k]
+        far = (x - stops[k - 1][0], y - stops[k - 1][1])
+        arc = f"{radius * 1.5:.6f} {radius * 2:.6f} {dice.randrange(180)} 0{dice.randrange(2)}"
+        end = f"{x:.6f},{y:.6f}"
+        parts.append(
+            dice.choice(
+                (
+                    f"L{end}",
+                    f"l{far[0]:.6f} {far[1]:.6f}",
+                    f"H{x:.6f}V{y:.6f}",
+                    f"C{near(k - 1)} {near(k)} {end}",
+                    f"S{near(k)} {end}",
+                    f"Q{near(k)} {end}",
+                    f"T{end}",
+                    f"A{arc}{end}",
+                    f"a{arc} {far[0]:.6f}{far[1]:+.6f}",
+                )
+            )
+        )
+    return f'<path d="M{stops[0][0]:.6f} {stops[0][1]:.6f}{"".join(parts)}z"/>'
 
 
 def a_transform(dice: random.Random, size: float) -> str:
@@ -342,8 +378,10 @@ def test_random_drawings_are_read_as_they_are_drawn(tmp_path: Path) -> None:
         try:
             region = understood_as(tmp_path, drawing(page, body))
         except DesignError as error:
-            assert "origin" in str(error), (number, page, body)  # noqa: PT017
+            said = str(error)
+            known = ("origin", "crosses or touches itself", "cusp")
+            assert any(word in said for word in known), (number, page, body, said)
             continue
         read += 1
         assert_same(region, page, body)
-    assert read > 0.8 * DRAWINGS
+    assert read > 0.7 * DRAWINGS
