@@ -7,9 +7,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
+# The module of this name takes longer to load than what is below; a type checker knows it anyway.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from sbafab.api import (
         assemble,
         build,

@@ -216,7 +216,8 @@ def predict(
 
 def kerf(measurements: str | Path, resolution: float = 0.01) -> Calibration:
     """The kerf from a filled ``coupon.csv``; ``resolution`` mm is the least step measured."""
-    from sbafab.cutting.calibration import calibrated, read_measurements
+    from sbafab.cutting.calibration import calibrated
+    from sbafab.cutting.measured_table import read_measurements
 
     return calibrated(read_measurements(Path(measurements)), resolution)
 

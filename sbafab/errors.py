@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+BY_SIGNAL = 128
+"""Added to a signal's number, as shells do: the exit code of a command that it stopped."""
+STOPPED = "stopped; the output folder is whole, as it was before or as the run made it"
+
 
 class SbafabError(Exception):
     """Base of every error whose message is meant for the user."""

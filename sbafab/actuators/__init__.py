@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -87,8 +88,17 @@ def load_design(
 
 
 def build(design: Design) -> Laminate:
-    """The laminate of a design of any family. Raises DesignError where parts do not fit."""
-    return families()[design.family].build(design)
+    """The laminate of a design of any family. Raises DesignError where parts do not fit.
+
+    Its notes say what size a drawn outline was understood to have.
+    """
+    laminate = families()[design.family].build(design)
+    if design.drawing is None:
+        return laminate
+    from sbafab.design.outline import understood
+
+    said = understood(design.drawing).said
+    return replace(laminate, notes=(said, *laminate.notes))
 
 
 def schema(*others: type[BaseModel]) -> dict[str, Any]:

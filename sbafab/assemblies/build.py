@@ -31,7 +31,13 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-RESERVED = frozenset({"sheets", "mesh", "preview"})
+RESERVED = frozenset(
+    {
+        *("sheets", "mesh", "preview"),
+        *("checks.json", "design.toml", "manifest.json", "traveller.html"),
+    }
+)
+"""What lies in an assembly's folder beside the folders of its designs."""
 
 
 @dataclass(frozen=True)
@@ -129,11 +135,13 @@ def _designs(assembly: Assembly) -> tuple[PartDesign, ...]:
         raise DesignError(
             'an assembly needs a stacked balloon actuator; add a part of kind = "sba"'
         )
-    names = [design.name for design, _ in found.values()]
+    # Some systems hold names that differ in small and capital letters for one.
+    names = [design.name.lower() for design, _ in found.values()]
     made = []
     for design, parts in found.values():
         own = design.name
-        if names.count(own) > 1 or own in RESERVED or own == assembly.name:
+        plain = own.lower()
+        if names.count(plain) > 1 or plain in RESERVED or plain == assembly.name.lower():
             own = f"{own}-{parts[0]}"
         made.append(_made(design, own, parts, assembly))
     return tuple(made)

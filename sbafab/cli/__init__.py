@@ -11,7 +11,7 @@ import click
 from sbafab import __version__
 from sbafab.cli.check import check
 from sbafab.cli.cut import cut
-from sbafab.cli.ending import BAD_INPUT, ended_plainly, prepared_streams, say, stopped_by_signals
+from sbafab.cli.ending import BAD_INPUT, ended_plainly, prepared_streams, say
 from sbafab.cli.generate import generate
 from sbafab.cli.kerf import kerf
 from sbafab.cli.mesh import mesh
@@ -74,5 +74,4 @@ def main(arguments: list[str] | None = None) -> None:
     if any("\0" in argument for argument in arguments or ()):
         say("an argument holds a NUL character; no path or value can")
         sys.exit(BAD_INPUT)
-    with stopped_by_signals():
-        app(arguments, prog_name="sbafab")
+    app(arguments, prog_name="sbafab")

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from sbafab.output.shop import Progress
     from sbafab.rules.finding import Finding
 
+    Told = tuple[str, tuple[Finding, ...], list[str]]
+    """What was checked ("design" or "as-built"), what was found, and notes on the designs."""
+
 
 @click.command()
 @click.argument("source", metavar="DESIGN|FOLDER")
@@ -45,15 +48,17 @@ def check(
     from sbafab.output.manifest import checks
     from sbafab.rules.deck import has_failed
 
-    kind, findings = _findings(source, assignments, waivers, target_yield, as_json)
+    kind, findings, notes = _findings(source, assignments, waivers, target_yield, as_json)
     advice = None if target_yield is None else _advice(source, assignments, target_yield)
     if as_json:
         said = {"advice": advice.as_dict()} if advice else {}
-        print_json({**checks(findings, kind), **said})
+        print_json({**checks(findings, kind), "notes": notes, **said})
     else:
         out = console()
         if kind == "as-built":
             out.print(f"as built: {source}", markup=False, soft_wrap=True)
+        for note in notes:
+            out.print(f"note: {note}", markup=False, soft_wrap=True)
         out.print(findings_table(findings))
         if advice:
             out.print(advice.sentence, markup=False, soft_wrap=True)
@@ -61,8 +66,9 @@ def check(
         click.get_current_context().exit(RULE_FAILED)
 
 
-def _of_design(design: Design, progress: Progress) -> tuple[Finding, ...]:
-    """The findings; what press and film sheets cannot do is refused, as a run would refuse it."""
+def _of_design(design: Design, progress: Progress) -> Told:
+    """The findings and notes; what press and sheets cannot do is refused, as a run would do."""
+    from sbafab.cli.printing import notes_of
     from sbafab.output.batch import refuse_undoable
     from sbafab.output.contents import Checked
     from sbafab.output.run import check as run_check
@@ -70,18 +76,19 @@ def _of_design(design: Design, progress: Progress) -> tuple[Finding, ...]:
     checked = Checked(design, *run_check(design, progress))
     if not checked.failed:
         refuse_undoable([checked])
-    return checked.findings
+    return "design", checked.findings, notes_of([checked])
 
 
-def _of_assembly(assembly: Assembly, progress: Progress) -> tuple[Finding, ...]:
+def _of_assembly(assembly: Assembly, progress: Progress) -> Told:
     """Those of its designs and between its parts, likewise."""
+    from sbafab.cli.printing import notes_of
     from sbafab.output.assembly import check_assembly
     from sbafab.output.batch import refuse_undoable
 
     checked = check_assembly(assembly, progress)
     if not checked.failed:
         refuse_undoable(checked.designs)
-    return checked.findings
+    return "design", checked.findings, notes_of(checked.designs)
 
 
 def _advice(source: str, assignments: tuple[str, ...], target: float) -> Advice:
@@ -101,7 +108,7 @@ def _findings(
     waivers: tuple[str, ...],
     target: float | None,
     quiet: bool,
-) -> tuple[str, tuple[Finding, ...]]:
+) -> Told:
     from sbafab.cli.printing import shown_progress
     from sbafab.design.reading import template_names
     from sbafab.errors import DesignError
@@ -119,10 +126,10 @@ def _findings(
                         "--target-yield goes with a design, and this is an assembly; check its "
                         "parts' designs one by one"
                     )
-                return "design", _of_assembly(found, progress)
+                return _of_assembly(found, progress)
             if target is not None:
                 found = load_design(source, _asking(assignments, target), waivers)
-            return "design", _of_design(found, progress)
+            return _of_design(found, progress)
     if assignments or waivers or target is not None:
         raise DesignError(
             "--set, --waive and --target-yield go with a design; a folder is checked as it lies, "
@@ -134,4 +141,4 @@ def _findings(
 
     # A broken file is told of in a finding; what ezdxf logs of it would stand in between.
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())
-    return "as-built", check_folder(Path(source))
+    return "as-built", check_folder(Path(source)), []

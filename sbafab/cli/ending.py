@@ -6,6 +6,7 @@ import io
 import os
 import signal
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -13,11 +14,11 @@ from types import FrameType
 
 import click
 
-from sbafab.errors import SbafabError
+from sbafab.errors import BY_SIGNAL, STOPPED, SbafabError
 
 BAD_INPUT = 2
-BY_SIGNAL = 128
-"""Added to a signal's number, as shells do."""
+LATER = 0.01
+"""Seconds after which an interrupt that got lost is raised once more."""
 
 
 def say(sentence: str) -> None:
@@ -38,10 +39,15 @@ def prepared_streams() -> None:
 @contextmanager
 def ended_plainly() -> Iterator[None]:
     """Turns what may stop a command into one sentence and an exit code."""
+    asked: list[int] = []
     try:
         try:
-            yield
+            with _stopped_by_signals(asked):
+                yield
         finally:
+            # An interrupt amid an import or a callback may come out as any error, or as none.
+            if asked:
+                raise KeyboardInterrupt(asked[0])
             sys.stdout.flush()
     except click.UsageError as error:
         help_of = f"; see {error.ctx.command_path} --help" if error.ctx is not None else ""
@@ -51,7 +57,7 @@ def ended_plainly() -> Iterator[None]:
         say(str(error))
         sys.exit(BAD_INPUT)
     except KeyboardInterrupt as stop:
-        say("stopped; the output folder is whole, as it was before or as the run made it")
+        say(STOPPED)
         sys.exit(BY_SIGNAL + (stop.args[0] if stop.args else signal.SIGINT))
     except BrokenPipeError:
         # The reader of standard output has seen enough (``| head``); the files are written.
@@ -76,21 +82,35 @@ def _silence() -> None:
 
 
 @contextmanager
-def stopped_by_signals() -> Iterator[None]:
-    """Lets a polite kill and a closed terminal stop a run as Ctrl-C does: tidied up."""
+def _stopped_by_signals(asked: list[int]) -> Iterator[None]:
+    """Lets Ctrl-C, a polite kill and a closed terminal stop a run alike: tidied up.
+
+    ``asked`` receives the numbers of the signals that came.
+    """
 
     def stop(number: int, frame: FrameType | None) -> None:
-        # Batch systems ask twice; what is being kept then must not be lost to the second time.
-        signal.signal(number, signal.SIG_IGN)
+        asked.append(number)
+        if number != signal.SIGINT:
+            # Batch systems ask twice; what is being kept then must not be lost to the second time.
+            signal.signal(number, signal.SIG_IGN)
         raise KeyboardInterrupt(number)
 
-    names = [name for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    def lost(unraisable: sys.UnraisableHookArgs) -> None:
+        if issubclass(unraisable.exc_type, KeyboardInterrupt):
+            threading.Timer(LATER, signal.raise_signal, [signal.SIGINT]).start()
+        else:
+            sys.__unraisablehook__(unraisable)
+
+    numbers = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
     # One that is ignored (nohup) stays so.
-    numbers = [s for s in (getattr(signal, n) for n in names) if signal.getsignal(s) == 0]
-    for number in numbers:
-        signal.signal(number, stop)
+    before = {n: signal.getsignal(n) for n in numbers if signal.getsignal(n) != signal.SIG_IGN}
+    hook = sys.unraisablehook
     try:
+        sys.unraisablehook = lost
+        for number in before:
+            signal.signal(number, stop)
         yield
     finally:
-        for number in numbers:
-            signal.signal(number, signal.SIG_DFL)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        sys.unraisablehook = hook

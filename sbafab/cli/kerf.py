@@ -38,7 +38,8 @@ def kerf(
 ) -> None:
     """Compute the kerf from a filled coupon.csv (see: sbafab new coupon)."""
     from sbafab.cli.printing import print_json
-    from sbafab.cutting.calibration import calibrated, read_measurements
+    from sbafab.cutting.calibration import calibrated
+    from sbafab.cutting.measured_table import read_measurements
     from sbafab.errors import DesignError
 
     found = calibrated(read_measurements(measurements), resolution)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from sbafab.output.contents import Checked
     from sbafab.output.job import Job
     from sbafab.output.run import Run
     from sbafab.output.shop import Progress
@@ -80,6 +81,19 @@ def findings_table(findings: Sequence[Finding]) -> Table:
     return table
 
 
+def notes_of(checked: Iterable[Checked]) -> list[str]:
+    """What is to be known of several designs: each sentence once, with the names it is true of."""
+    names: dict[str, list[str]] = {}
+    designs = list(checked)
+    for one in designs:
+        for note in one.laminate.notes:
+            names.setdefault(note, []).append(one.design.name)
+    return [
+        note if len(of) == len(designs) else f"{', '.join(of)}: {note}"
+        for note, of in names.items()
+    ]
+
+
 def facts_table() -> Table:
     """Without rows yet: a bold label and what is said of it."""
     from rich.table import Table
@@ -141,6 +155,8 @@ def print_job(job: Job) -> None:
         waived = f"; waived: {', '.join(one.waived)}" if one.waived else ""
         verdict = "a rule failed" if one.failed else "every rule holds"
         made.add_row(one.design.name, Text(f"{one.design.order.copies} x, {verdict}{waived}{said}"))
+    for note in notes_of(job.checked):
+        made.add_row("note", Text(note))
     for film in job.manifest.get("films", ()):
         sheets = film_said(film, job.manifest["sheets"], 1)
         made.add_row(f"{film['material']} film", Text(sheets))
@@ -169,6 +185,7 @@ def job_json(job: Job) -> dict[str, object]:
                 "name": one.design.name,
                 "failed": one.failed,
                 "findings": [finding.as_dict() for finding in one.findings],
+                "notes": notes_of([one]),
             }
             for one in job.checked
         ],
@@ -278,5 +295,6 @@ def run_json(run: Run) -> dict[str, object]:
         "folder": str(run.folder),
         "failed": run.failed,
         "findings": [finding.as_dict() for finding in run.findings],
+        "notes": list(run.laminate.notes),
         "files": [] if run.kept else sorted(run.manifest["files"]),
     }

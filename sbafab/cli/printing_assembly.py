@@ -10,6 +10,7 @@ from sbafab.cli.printing import (
     facts_table,
     film_said,
     findings_table,
+    notes_of,
     print_failed,
     replaced,
 )
@@ -54,6 +55,8 @@ def _made(run: AssemblyRun) -> Table:
         verdict = "a rule failed" if one.failed else "every rule holds"
         copies = one.design.order.copies
         made.add_row(one.design.name, Text(f"{copies} x, {verdict}{waived}{said}"))
+    for note in notes_of(run.checked.designs):
+        made.add_row("note", Text(note))
     for film in index["films"]:
         made.add_row(f"{film['material']} film", Text(film_said(film, index["sheets"], 1)))
     for mesh in index["meshes"]:
@@ -70,5 +73,6 @@ def assembly_json(run: AssemblyRun) -> dict[str, object]:
         "folder": str(run.folder),
         "failed": run.failed,
         "findings": [finding.as_dict() for finding in run.findings],
+        "notes": notes_of(run.checked.designs),
         "files": [] if run.kept else sorted(run.manifest["files"]),
     }

@@ -7,23 +7,18 @@ interval.
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from statistics import mean, stdev
 from typing import Literal, NamedTuple
 
-from sbafab.cutting.coupon import COLUMNS
 from sbafab.errors import DesignError
 
-MOST_BYTES = 1_000_000
 MOST_DEGREES = 200
 """Degrees of freedom from which on Student's t is taken as if there were no more."""
 LARGEST = 1.0
 """mm; a wider kerf is a mistake in the table."""
-LONGEST = 10_000.0
 WORST_SCALE = 0.1
 """Of measured over nominal sizes: no machine is so far off, another unit is."""
 LARGEST_SLIP = 0.25
@@ -204,63 +199,3 @@ def _within(t: float, degrees: int) -> float:
         total += term
         term *= cosine**2 * k / (k + 1)
     return 2 / math.pi * (angle + total) if odd else total
-
-
-def read_measurements(path: Path) -> list[Measurement]:
-    """The filled rows of a table with the coupon's columns; ``#`` begins a remark.
-
-    Semicolons may part the columns, then commas are decimal. Raises DesignError.
-    """
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise DesignError(
-                f"{path} is larger than {MOST_BYTES:,} bytes; give the coupon's table"
-            )
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise DesignError(f"{path} cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise DesignError(f"{path} is not a text file in UTF-8; save it as CSV") from None
-    numbered = [
-        (number, line)
-        for number, line in enumerate(text.splitlines(), start=1)
-        if line.strip(' ,;\t"') and not line.lstrip(' "').startswith("#")
-    ]
-    header = numbered[0][1] if numbered else ""
-    separator = ";" if ";" in header else ","
-    names = [name.strip().lower() for name in header.split(separator)]
-    for column in COLUMNS:
-        if column not in names:
-            raise DesignError(
-                f"{path} has no column {column}; keep the columns {', '.join(COLUMNS)}"
-            )
-    rows = csv.reader((line for _, line in numbered[1:]), delimiter=separator)
-    found = []
-    for (number, _), cells in zip(numbered[1:], rows, strict=False):
-        row = dict(zip(names, (cell.strip() for cell in cells), strict=False))
-        if row.get("measured_mm"):
-            found.append(_measurement(row, f"{path}, line {number}"))
-    return found
-
-
-def _measurement(row: dict[str, str], where: str) -> Measurement:
-    words = row.get("feature", "").lower().split()
-    axis = row.get("axis", "").lower()
-    kind: Kind = "window" if "window" in words else "outer"
-    if kind not in words:
-        raise DesignError(f"{where}: feature must end in outer or window")
-    if axis not in ("x", "y"):
-        raise DesignError(f"{where}: axis must be x or y")
-    nominal, measured = (_size(row, name, where) for name in ("nominal_mm", "measured_mm"))
-    return Measurement(kind, "x" if axis == "x" else "y", nominal, measured)
-
-
-def _size(row: dict[str, str], column: str, where: str) -> float:
-    text = row.get(column, "")
-    try:
-        size = float(text.replace(",", "."))
-    except ValueError:
-        raise DesignError(f"{where}: {column} is {text[:40]!r}, not a number") from None
-    if not 0 < size <= LONGEST:
-        raise DesignError(f"{where}: {column} is {text[:40]}; it must be a size in mm above 0")
-    return size

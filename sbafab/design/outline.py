@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
-from sbafab.design.strands import JOIN, Strand, counted, joined, sealed, widest_gap
+from sbafab.design.strands import JOIN, Strand, Traced, counted, joined, sealed, widest_gap
 from sbafab.errors import DesignError
 from sbafab.geometry.biarc import FitError
 from sbafab.geometry.boolean import PointPool, split_edges, tidy
@@ -18,6 +18,13 @@ SMALLEST = 1.0
 """Bounds of the outline's extent, in mm."""
 
 
+class Outline(NamedTuple):
+    """A drawn outline, and one sentence on the size that was understood."""
+
+    region: Region
+    said: str
+
+
 def read_outline(path: Path) -> Region:
     """The one closed path of a DXF or SVG file as lines and arcs, in mm, counter-clockwise.
 
@@ -26,16 +33,25 @@ def read_outline(path: Path) -> Region:
     and its y axis is turned upward, so that the outline looks as it is drawn. Ellipses, Béziers
     and splines become arcs within 0.5 um. Raises DesignError.
     """
+    return understood(path).region
+
+
+def understood(path: Path) -> Outline:
+    """The same with the size that was understood, in words. Raises DesignError."""
     try:
-        loop = _one_loop(list(counted(_strands(path))))
-        return _checked(sealed(loop))
+        strands, scale = _traced(path)
+        region = _checked(sealed(_one_loop(list(counted(strands)))))
     except FitError as error:
         raise DesignError(f"outline {path} has a {error}; round it off") from None
     except DesignError as error:
         raise DesignError(f"outline {path} {error}") from None
+    low_x, low_y, high_x, high_y = region.bounds
+    size = f"{high_x - low_x:.3f} x {high_y - low_y:.3f} mm"
+    # Without the file's name: a design is the same wherever its drawing lies.
+    return Outline(region, f"drawn outline: {size}, {scale}")
 
 
-def _strands(path: Path) -> Iterator[Strand]:
+def _traced(path: Path) -> Traced:
     try:
         is_file = path.is_file()
         size = path.stat().st_size if is_file else 0

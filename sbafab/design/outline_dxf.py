@@ -9,7 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sbafab.design.strands import Strand, place, polyline, refuse_more_than_limit
+from sbafab.design.strands import Strand, Traced, place, polyline, refuse_more_than_limit
 from sbafab.errors import DesignError
 from sbafab.geometry.biarc import FitError, elliptical_arc, fit_arcs
 from sbafab.geometry.edges import EPSILON, Edge, Line, Point
@@ -21,6 +21,22 @@ if TYPE_CHECKING:
 
 MM_PER_UNIT = {0: 1.0, 1: 25.4, 4: 1.0, 5: 10.0, 6: 1000.0}
 """By $INSUNITS: none (taken as mm), inch, mm, cm, m."""
+SCALES = {
+    0: "read at 1 mm a unit, for the file names no unit ($INSUNITS)",
+    1: "drawn in inches",
+    4: "drawn in mm",
+    5: "drawn in cm",
+    6: "drawn in m",
+}
+NO_PATHS = frozenset(
+    {
+        *("ACAD_TABLE", "ACIDBLOCKREFERENCE", "ARC_DIMENSION", "ATTDEF", "ATTRIB", "DIMENSION"),
+        *("HATCH", "IMAGE", "LARGE_RADIAL_DIMENSION", "LEADER", "LIGHT", "MLEADER", "MPOLYGON"),
+        *("MTEXT", "MULTILEADER", "OLE2FRAME", "OLEFRAME", "PDFUNDERLAY", "POINT", "SUN", "TEXT"),
+        *("TOLERANCE", "VIEWPORT", "WIPEOUT"),
+    }
+)
+"""Lettering, dimensions, fills and pictures: no outline, whatever they show."""
 COMPENSATED = "compensated"
 """What a cut file's custom property KERF_STATE says where its edges are moved."""
 LEVEL = 1e-6
@@ -29,10 +45,11 @@ MOST_ITEMS = 20_000
 """Entities, table entries and flags of a drawing; the reader's time grows faster than these."""
 
 
-def dxf_strands(path: Path) -> Iterator[Strand]:
-    """Every line, arc, circle, polyline, ellipse and spline of the model space, in its order.
+def dxf_strands(path: Path) -> Traced:
+    """Every line, arc, circle, polyline, ellipse and spline that the model space shows.
 
-    Block references are left alone, whatever they hold. Raises DesignError.
+    They must lie in one plane at one height. Raises DesignError, also for what draws by other
+    means, such as block references.
     """
     content = path.read_bytes()
     _refuse_excess(content)
@@ -45,10 +62,39 @@ def dxf_strands(path: Path) -> Iterator[Strand]:
             f"has $INSUNITS {unit}; save it in millimetres (4), centimetres (5), metres (6) or "
             "inches (1)"
         )
-    factor = MM_PER_UNIT[unit]
-    for entity in space:
-        if entity.dxftype() in READERS:
-            yield _read(entity, factor)
+    return Traced(_strands(drawing, space, MM_PER_UNIT[unit]), SCALES[unit])
+
+
+def _strands(drawing: Drawing, space: Modelspace, factor: float) -> Iterator[Strand]:
+    level: float | None = None
+    drawn = [entity for entity in space if entity.dxftype() not in NO_PATHS]
+    shown = [entity for entity in drawn if _is_shown(entity, drawing)]
+    if drawn and not shown:
+        raise DesignError("holds hidden entities only; thaw and switch on the outline's layer")
+    for entity in shown:
+        kind = entity.dxftype()
+        if kind not in READERS:
+            raise DesignError(
+                f"holds an entity {kind}, which is not read; explode blocks and the like to lines, "
+                "arcs and curves, or delete it"
+            )
+        for height in _heights(entity):
+            level = height if level is None else level
+            if not abs(height - level) * factor <= LEVEL:
+                raise DesignError(
+                    f"holds a {kind} at z {height:g} where another point is at z {level:g}; lay "
+                    "the whole outline flat"
+                )
+        yield _read(entity, factor)
+
+
+def _is_shown(entity: Any, drawing: Drawing) -> bool:
+    """Whether a program shows the entity: it is visible, and its layer on and thawed."""
+    name = str(entity.dxf.get("layer", "0"))
+    if entity.dxf.get("invisible", 0) or name not in drawing.layers:
+        return not entity.dxf.get("invisible", 0)
+    layer = drawing.layers.get(name)
+    return not (layer.is_off() or layer.is_frozen())
 
 
 def _refuse_excess(content: bytes) -> None:
@@ -98,6 +144,31 @@ def _read(entity: Any, factor: float) -> Strand:
         raise DesignError(f"holds a damaged {entity.dxftype()}; draw it anew") from None
 
 
+def _heights(entity: Any) -> list[float]:
+    """The z of every point that an entity is drawn by, in its own units."""
+    try:
+        return [float(z) for z in HEIGHTS[entity.dxftype()](entity)]
+    except Exception:
+        raise DesignError(f"holds a damaged {entity.dxftype()}; draw it anew") from None
+
+
+def _facing(entity: Any) -> float:
+    """1, or -1 where an entity's own z runs down."""
+    return -1.0 if entity.dxf.extrusion.z < 0 else 1.0
+
+
+def _polyline_heights(entity: Any) -> list[float]:
+    if entity.is_2d_polyline:
+        elevation = entity.dxf.get("elevation")
+        return [_facing(entity) * elevation.z if elevation is not None else 0.0]
+    return [vertex.dxf.location.z for vertex in entity.vertices]
+
+
+def _spline_heights(entity: Any) -> list[float]:
+    points = [*entity.control_points, *entity.fit_points]
+    return [float(point[2]) for point in points]
+
+
 def _side(entity: Any) -> float:
     """1, or -1 for an entity drawn on the back of the plane (its x runs the other way)."""
     x, y, z = entity.dxf.extrusion
@@ -141,7 +212,7 @@ def _light_polyline(entity: Any, factor: float) -> Strand:
 
 def _heavy_polyline(entity: Any, factor: float) -> Strand:
     if not (entity.is_2d_polyline or entity.is_3d_polyline):
-        return ()
+        raise DesignError("holds a POLYLINE that is a mesh; draw the outline alone")
     # Flag 16 marks the frame points of a curve-fitted polyline, which it does not pass through.
     points = [
         (vertex.dxf.location.x, vertex.dxf.location.y, vertex.dxf.get("bulge", 0.0))
@@ -215,3 +286,14 @@ READERS = {
     "ELLIPSE": _ellipse,
     "SPLINE": _spline,
 }
+HEIGHTS = {
+    "LINE": lambda e: [e.dxf.start.z, e.dxf.end.z],
+    "ARC": lambda e: [_facing(e) * e.dxf.center.z],
+    "CIRCLE": lambda e: [_facing(e) * e.dxf.center.z],
+    "LWPOLYLINE": lambda e: [_facing(e) * e.dxf.get("elevation", 0.0)],
+    "POLYLINE": _polyline_heights,
+    # Both lie in the coordinates of the world; an axis that rises is an ellipse that is tilted.
+    "ELLIPSE": lambda e: [e.dxf.center.z, e.dxf.center.z + e.dxf.major_axis.z],
+    "SPLINE": _spline_heights,
+}
+"""By type of entity, where its points lie."""

@@ -1,54 +1,106 @@
-"""The strands of an SVG drawing, in mm and with y upward."""
+"""The strands of an SVG drawing, in mm and with y upward.
+
+What SVG 2 defines and programs agree on is read; an element or property that they read differently
+is refused by its name.
+"""
 
 from __future__ import annotations
 
-import io
 import math
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
-from sbafab.design.strands import MOST_EDGES, Strand, place, refuse_more_than_limit
+from sbafab.design.strands import MOST_EDGES, Strand, Traced, place, refuse_more_than_limit
+from sbafab.design.svg_lengths import WHITE, Page, numbers, page_of, with_physical_lengths
+from sbafab.design.svg_shapes import SHAPES, Sized, path_of, sized
+from sbafab.design.svg_style import (
+    is_displayed,
+    is_visible,
+    local,
+    refuse_effects,
+    refuse_style_sheet,
+)
 from sbafab.errors import DesignError
 from sbafab.geometry.biarc import bezier, elliptical_arc, fit_arcs
 from sbafab.geometry.edges import EPSILON, Edge, Line, Point
 
-MM_PER_UNIT = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6, "q": 0.25}
-MM_PER_PIXEL = 25.4 / 96
 MOST_ELEMENTS = 2000
-LONGEST_STYLE = 10_000
-Placement = Callable[[Any], Point]
-NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-MARK = re.compile(rf"{NUMBER.pattern}|[A-Za-z]")
+LONGEST_TRANSFORM = 10_000
+NAMESPACES = ("{http://www.w3.org/2000/svg}", "")
+GROUPS = frozenset({"a", "g"})
+UNDRAWN = frozenset(
+    {
+        *("clipPath", "cursor", "defs", "desc", "filter", "font", "font-face", "hatch"),
+        *("linearGradient", "marker", "mask", "meshgradient", "metadata", "pattern"),
+        *("radialGradient", "solidcolor", "style", "symbol", "title", "view"),
+    }
+)
+"""Never drawn where they stand, whatever they hold."""
+NO_PATHS = frozenset({"foreignObject", "image", "text"})
+"""Drawn, but no outline: lettering and pictures beside it, as in a DXF."""
+CHANGING = frozenset({"animate", "animateMotion", "animateTransform", "script", "set", "link"})
+REMEDIES = {
+    "use": "holds a clone (use); unlink it, so that the path itself is there",
+    "svg": "holds an svg in the svg; move what is in it to the outer one",
+    "switch": "holds a switch; ungroup it and keep the outline alone",
+}
+Matrix = tuple[float, float, float, float, float, float]
+"""a to f, as SVG's matrix() has them."""
+UNIT: Matrix = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+TRANSFORMS = {
+    "matrix": (6,),
+    "rotate": (1, 3),
+    "scale": (1, 2),
+    "skewX": (1,),
+    "skewY": (1,),
+    "translate": (1, 2),
+}
+"""By name, how many numbers each may take."""
+_TRANSFORM = re.compile(r"\s*(?:,\s*)?([A-Za-z]+)\s*\(([^()]*)\)\s*", re.ASCII)
+MARK = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[A-Za-z]")
 """What a path is written with: numbers, and letters for its commands."""
 
 
-def svg_strands(path: Path) -> Iterator[Strand]:
+class Drawn(NamedTuple):
+    """A shape and what takes it to the drawing's user units."""
+
+    shape: Sized
+    matrix: Matrix
+
+
+def svg_strands(path: Path) -> Traced:
     """Every path and basic shape that is drawn, transforms applied. Raises DesignError.
 
-    The origin is that of the user coordinates, wherever the viewBox begins. A drawing whose width
-    and height carry no physical unit (none, px or %) is read as 1 unit = 1 mm.
+    The origin is that of the user coordinates, wherever the viewBox begins. A page without a size
+    in mm, cm or the like is read as 1 unit = 1 mm, unless lengths in it have such a unit: then 96
+    units are an inch, as SVG says.
     """
-    from svgelements import SVG, Shape
-
     root = _root(path)
-    across, down = _scales(root)
-    for name in ("width", "height", "viewBox"):
-        root.attrib.pop(name, None)
-    try:
-        text = ElementTree.tostring(root, encoding="unicode")
-        drawing = SVG.parse(io.StringIO(text), reify=False, ppi=96.0)
-        shapes = [element for element in drawing.elements() if isinstance(element, Shape)]
-        drawn = [(shape.transform, list(shape.segments(transformed=False))) for shape in shapes]
-    except Exception as error:
-        # A damaged attribute fails anywhere in the parser, with any of the built-in errors.
-        raise DesignError(
-            f"holds a shape that cannot be read ({type(error).__name__}); save it as plain SVG"
-        ) from None
-    for matrix, segments in drawn:
-        yield from _subpaths(segments, _placement(matrix, across, -down))
+    drawn = list(_drawn(root))
+    page = page_of(root)
+    if any(shape.is_physical for shape, _ in drawn):
+        page = with_physical_lengths(page)
+    if not drawn:
+        _refuse_undrawn(root)
+    return Traced(_strands(drawn, page), page.said)
+
+
+def _strands(drawn: list[Drawn], page: Page) -> Iterator[Strand]:
+    from svgelements import Path as PathData
+
+    for shape, matrix in drawn:
+        text = path_of(shape, page)
+        try:
+            segments = list(PathData(text))
+        except Exception as error:
+            # Numbers out of all bounds fail anywhere in the library, with any built-in error.
+            raise DesignError(
+                f"holds a <{shape.name}> that cannot be read ({type(error).__name__}); draw it anew"
+            ) from None
+        yield from _subpaths(segments, _placement(matrix, page.across, -page.down))
 
 
 def _root(path: Path) -> ElementTree.Element:
@@ -58,88 +110,135 @@ def _root(path: Path) -> ElementTree.Element:
         raise DesignError("is not text in UTF-8; save it as plain SVG") from None
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise DesignError("declares a DOCTYPE or entities; save it as plain SVG without them")
+    if "<?xml-stylesheet" in text:
+        raise DesignError("refers to a style sheet of another file; save it as plain SVG")
     try:
         root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError, RecursionError) as error:
         raise DesignError(f"is not valid SVG ({error}); save it as plain SVG") from None
-    if root.tag.rpartition("}")[2] != "svg":
+    if root.tag not in {f"{space}svg" for space in NAMESPACES}:
         raise DesignError("is not an SVG drawing; its outermost element is not svg")
     _refuse_excess(root)
     return root
 
 
 def _refuse_excess(root: ElementTree.Element) -> None:
-    """Raises DesignError for a drawing that would take long to read."""
-    elements = numbers = 0
-    for element in root.iter():
-        elements += 1
-        if str(element.tag).rpartition("}")[2] == "use":
-            raise DesignError("holds a clone (use); unlink it, so that the path itself is there")
-        if (
-            str(element.tag).rpartition("}")[2] == "style"
-            and len(element.text or "") > LONGEST_STYLE
-        ):
-            raise DesignError("holds a long style sheet; save it as plain SVG")
-        for name in ("d", "points"):
-            numbers += len(MARK.findall(element.get(name, "")))
-    if elements > MOST_ELEMENTS:
-        raise DesignError(
-            f"has more than {MOST_ELEMENTS} elements; save a drawing of the outline alone"
-        )
+    """Raises DesignError for a drawing that would take long to read, or that changes itself."""
+    count = 0
+    for elements, element in enumerate(root.iter(), start=1):
+        if elements > MOST_ELEMENTS:
+            raise DesignError(
+                f"has more than {MOST_ELEMENTS} elements; save a drawing of the outline alone"
+            )
+        name = local(element)
+        if name in CHANGING:
+            raise DesignError(f"holds <{name}>, which may change what is drawn; remove it")
+        if name == "style":
+            refuse_style_sheet("{" + "".join(element.itertext()))
+        for key in ("d", "points"):
+            count += len(MARK.findall(element.get(key, "")))
     # A letter and seven numbers make the longest segment, an arc.
-    if numbers > 8 * MOST_EDGES:
-        refuse_more_than_limit(numbers)
+    if count > 8 * MOST_EDGES:
+        refuse_more_than_limit(count)
 
 
-def _scales(root: ElementTree.Element) -> tuple[float, float]:
-    """Millimetres a user unit, across and down."""
-    sizes = [_physical(root.get(name, "")) for name in ("width", "height")]
-    if sizes == [None, None]:
-        return 1.0, 1.0
-    view = [float(number) for number in NUMBER.findall(root.get("viewBox", ""))]
-    if not view:
-        return MM_PER_PIXEL, MM_PER_PIXEL
-    if len(view) != 4 or not (0 < view[2] < 1e9 and 0 < view[3] < 1e9):
-        raise DesignError("has a viewBox that is not four numbers with a positive size")
-    scales = [size / span for size, span in zip(sizes, view[2:], strict=True) if size]
-    if root.get("preserveAspectRatio", "").startswith("none") and len(scales) == 2:
-        return scales[0], scales[1]
-    return min(scales), min(scales)
+def _drawn(root: ElementTree.Element) -> Iterator[Drawn]:
+    """The shapes that are drawn, in their order."""
+    if "transform" in root.attrib:
+        raise DesignError("has a transform on svg, which programs read differently; put it on a g")
+    space = root.tag.removesuffix("svg")
+    # Outermost last, so that the next one to look at is the last of the list.
+    waiting = [(root, UNIT, True)]
+    while waiting:
+        element, outer, shown = waiting.pop()
+        name = local(element)
+        if element.tag != space + name or name in UNDRAWN | NO_PATHS or not is_displayed(element):
+            continue
+        is_group = name in GROUPS or element is root
+        if name in REMEDIES and not is_group:
+            raise DesignError(REMEDIES[name])
+        if not is_group and name not in SHAPES:
+            raise DesignError(f"holds <{name}>, which is not read; remove it, or draw it as a path")
+        refuse_effects(element)
+        shown = is_visible(element, shown)
+        matrix = _product(outer, _transform(element.get("transform", "")))
+        if is_group:
+            waiting += [(inner, matrix, shown) for inner in reversed(element)]
+        elif shown:
+            yield Drawn(sized(element), matrix)
 
 
-def _physical(text: str) -> float | None:
-    """A width or height in mm, None where it has no physical unit."""
-    match = re.fullmatch(rf"\s*({NUMBER.pattern})\s*([a-zA-Z]+)\s*", text)
-    if match is None or match[2].lower() not in MM_PER_UNIT:
-        return None
-    size = float(match[1]) * MM_PER_UNIT[match[2].lower()]
-    if not 0 < size < 1e9:
-        raise DesignError(f"has a width or height of {text.strip()}; it must be positive")
-    return size
+def _refuse_undrawn(root: ElementTree.Element) -> None:
+    """Raises DesignError for a drawing whose shapes all stand where nothing is drawn."""
+    for element in root.iter():
+        if local(element) in UNDRAWN and any(local(inner) in SHAPES for inner in element.iter()):
+            name = local(element)
+            raise DesignError(f"holds paths in <{name}> only, which is not drawn; move them out")
+    if any(local(element) in SHAPES for element in root.iter()):
+        raise DesignError("holds hidden paths only; show the outline")
 
 
-def _placement(matrix: Any, across: float, up: float) -> Placement:
+def _transform(text: str) -> Matrix:
+    """The matrix of a transform attribute. Raises DesignError where it is damaged."""
+    if text.strip(WHITE) in ("", "none"):
+        return UNIT
+    if len(text) > LONGEST_TRANSFORM:
+        raise DesignError("has a very long transform; apply it to the path")
+    from svgelements import Matrix as ReadMatrix
+
+    matrix, end = UNIT, 0
+    while end < len(text):
+        match = _TRANSFORM.match(text, end)
+        try:
+            values = list(numbers(match[2])) if match else []
+        except ValueError:
+            values = []
+        if match is None or len(values) not in TRANSFORMS.get(match[1], ()):
+            raise DesignError(
+                f'has a transform that is damaged at "{text[end : end + 20]}"; apply it to the path'
+            )
+        one = ReadMatrix(f"{match[1]}({' '.join(values)})")
+        matrix = _product(matrix, (one.a, one.b, one.c, one.d, one.e, one.f))
+        end = match.end()
+    return matrix
+
+
+def _product(outer: Matrix, inner: Matrix) -> Matrix:
+    """What takes a point by ``inner`` and then by ``outer``."""
+    a, b, c, d, e, f = outer
+    x, y, z, w, u, v = inner
+    return (
+        *(a * x + c * y, b * x + d * y),
+        *(a * z + c * w, b * z + d * w),
+        *(a * u + c * v + e, b * u + d * v + f),
+    )
+
+
+Placement = Callable[[Any], Point]
+
+
+def _placement(matrix: Matrix, across: float, up: float) -> Placement:
     """Takes a point of a shape to mm: by the shape's own transform, then by the drawing's scale."""
+    a, b, c, d, e, f = matrix
 
     def point(p: Any) -> Point:
-        x = matrix.a * p.x + matrix.c * p.y + matrix.e
-        y = matrix.b * p.x + matrix.d * p.y + matrix.f
-        return place(across * x, up * y)
+        return place(across * (a * p.x + c * p.y + e), up * (b * p.x + d * p.y + f))
 
     return point
 
 
 def _subpaths(segments: list[Any], point: Placement) -> Iterator[Strand]:
-    """One strand from every move to the next."""
+    """One strand from every move to the next, or to where the path is closed."""
     edges: list[Edge] = []
     for segment in segments:
-        if type(segment).__name__ == "Move":
+        kind = type(segment).__name__
+        if kind != "Move":
+            edges += _edges(segment, point)
+            refuse_more_than_limit(len(edges))
+        if kind in ("Move", "Close"):
             if edges:
                 yield tuple(edges)
             edges = []
-        else:
-            edges += _edges(segment, point)
-            refuse_more_than_limit(len(edges))
     if edges:
         yield tuple(edges)
 

@@ -304,6 +304,7 @@ def _allowed(problem: Any) -> str:
         "int_parsing_size": "is out of range",
         "float_type": "must be a number",
         "string_type": "must be a text in quotes",
+        "string_unicode": "must be plain text; remove what is no letter in it",
         "bool_type": "must be true or false",
         "model_type": "must be a table of keys",
         "model_attributes_type": "must be a table of keys",

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import EPSILON, Edge, Line, Point, edge_from_bulge
@@ -18,6 +19,13 @@ JOIN = 0.001
 MOST_EDGES = 500
 FARTHEST = 10_000.0
 """No coordinate of a drawing may be larger, in mm."""
+
+
+class Traced(NamedTuple):
+    """What a drawing holds, in mm, and in words how large its unit was taken to be."""
+
+    strands: Iterator[Strand]
+    scale: str
 
 
 def place(x: float, y: float) -> Point:

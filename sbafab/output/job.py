@@ -18,6 +18,11 @@ from sbafab.output.run import check
 from sbafab.output.shop import Progress
 from sbafab.output.swap import JOB_SCHEMA, listed_files, replaced_folder
 
+RESERVED = {
+    "sheets": "the job's folder of film sheets",
+    "manifest.json": "the job's index",
+}
+"""What lies in a job's folder beside those of its designs."""
 PARTS: tuple[Part, ...] = ("press", "mesh", "preview")
 
 
@@ -77,5 +82,19 @@ def _refuse_names(names: Sequence[str], name: str) -> None:
         raise DesignError(
             f"two designs are named {twice}; give each a name of its own, or say --copies"
         )
-    if name in (*names, "sheets"):
+    folders = {own.lower(): own for own in reversed(names)}
+    # Some systems hold names that differ in small and capital letters for one.
+    alike = next((own for own in names if folders[own.lower()] != own), None)
+    if alike is not None:
+        raise DesignError(
+            f"two designs are named {folders[alike.lower()]} and {alike}, which is one folder on "
+            "some machines; give one of them another name"
+        )
+    kept = next((own for own in names if own.lower() in RESERVED), None)
+    if kept is not None:
+        raise DesignError(
+            f"a design is named {kept}, as {RESERVED[kept.lower()]} is; give it another name in "
+            "its design file"
+        )
+    if name.lower() in (*folders, *RESERVED):
         raise DesignError(f"the job is named {name} as one of its folders; choose another --name")

@@ -11,10 +11,10 @@ import pytest
 import shapely
 import svgelements
 
-from sbafab.cutting.calibration import read_measurements
 from sbafab.cutting.coupon import SIZE, coupon, write_coupon
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings
+from sbafab.cutting.measured_table import read_measurements
 from sbafab.cutting.svg_write import sheet_svg
 from sbafab.errors import DesignError
 from sbafab.geometry.shapes import disc, stadium

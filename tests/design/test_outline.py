@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import ezdxf
 import pytest
 import shapely
 
-from sbafab.design.outline import read_outline
+from sbafab.design.outline import read_outline, understood
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Arc, Line
 from sbafab.geometry.region import Region
@@ -20,6 +21,8 @@ from sbafab.geometry.shapes import disc, stadium
 SLOT = stadium((0, 0), 4, 10).turned(90)
 PAGE = 'width="40mm" height="40mm" viewBox="-20 -20 40 40"'
 ARROW = [(6, 0), (6, 5), (0, 2), (-5, 5), (-6, 0), (-5, -5), (0, -3), (5, -5)]
+
+RISING = [(-3, -2, 0), (3, -2, 0), (0, 4, 3), (-3, -2, 0)]
 
 
 def dxf(
@@ -87,6 +90,44 @@ def test_a_slot_is_read_exactly_however_it_is_drawn(tmp_path: Path, name: str) -
         assert edge.end == after.start
 
 
+def test_what_is_hidden_or_lettering_is_no_outline(tmp_path: Path) -> None:
+    def draw(space: Any) -> None:
+        space.doc.layers.add("OFF").off()
+        space.doc.layers.add("FROZEN").freeze()
+        for layer in ("OFF", "FROZEN"):
+            space.add_circle((0, 0), 9, dxfattribs={"layer": layer})
+        space.add_blockref("B", (0, 0), dxfattribs={"layer": "OFF"})
+        space.add_circle((0, 0), 3, dxfattribs={"layer": "not in the table"})
+        space.add_text("pocket")
+        space.add_point((0, 0, 7))
+
+    assert same_shape(read_outline(dxf(tmp_path, draw)), disc((0, 0), 3))
+
+
+@pytest.mark.parametrize(
+    ("unit", "said"),
+    [
+        (0, "6.000 x 6.000 mm, read at 1 mm a unit, for the file names no unit"),
+        (1, "152.400"),
+        (4, "6.000 x 6.000 mm, drawn in mm"),
+        (5, "60.000 x 60.000 mm, drawn in cm"),
+    ],
+)
+def test_the_size_that_is_understood_is_said(tmp_path: Path, unit: int, said: str) -> None:
+    path = dxf(tmp_path, lambda m: m.add_circle((0, 0), 3), unit)
+    if unit == 1:
+        with pytest.raises(DesignError, match=r"measures 152\.4 x 152\.4 mm"):
+            understood(path)
+    else:
+        assert understood(path).said.startswith(f"drawn outline: {said}")
+
+
+def test_a_circle_from_behind_lies_on_the_other_side(tmp_path: Path) -> None:
+    back = {"extrusion": (0, 0, -1)}
+    drawn = dxf(tmp_path, lambda m: m.add_circle((1, 0.5), 4, dxfattribs=back))
+    assert same_shape(read_outline(drawn), disc((-1, 0.5), 4))
+
+
 def test_r12_without_units_is_millimetres(tmp_path: Path) -> None:
     region = read_outline(dxf(tmp_path, SLOTS["heavy polyline"], version="R12"))
     assert same_shape(region, SLOT)
@@ -120,6 +161,7 @@ CURVED: dict[str, Callable[[Any], Any]] = {
     "ellipse from behind": lambda m: m.add_ellipse(
         (0.5, 0), (5, 1), 0.4, dxfattribs={"extrusion": (0, 0, -1)}
     ),
+    "spline at a height": lambda m: m.add_open_spline([(*p, 5) for p in [*ARROW, ARROW[0]]]),
     "fit points": lambda m: m.add_spline([(5, 0, 0), (0, 5, 0), (-5, 0, 0), (0, -5, 0), (5, 0, 0)]),
     "clamped": lambda m: m.add_open_spline([(*p, 0) for p in [*ARROW, ARROW[0]]]),
 }
@@ -319,7 +361,59 @@ BAD_DXF: dict[str, tuple[Callable[[Any], object], str]] = {
         lambda m: m.add_lwpolyline([(math.cos(k), math.sin(k)) for k in range(2001)]),
         "more than 500 edges",
     ),
-    "blocks are not followed": (lambda m: m.add_blockref("POCKET", (0, 0)), "no closed path"),
+    "line that rises": (
+        lambda m: [m.add_line(a, b) for a, b in pairwise(RISING)],
+        "LINE at z 3 where another point is at z 0; lay the whole outline flat",
+    ),
+    "polyline that rises": (lambda m: m.add_polyline3d(RISING), "POLYLINE at z 3"),
+    "spline that rises": (
+        lambda m: m.add_open_spline([(*p, p[0]) for p in [*ARROW, ARROW[0]]]),
+        "SPLINE at z",
+    ),
+    "spline through points that rise": (
+        lambda m: m.add_spline([(*p, p[0]) for p in [*ARROW, ARROW[0]]]),
+        "SPLINE at z",
+    ),
+    "half at a height": (
+        lambda m: (
+            m.add_arc((0, 0), 4, 0, 180),
+            m.add_arc((0, 0, 5), 4, 180, 360),
+        ),
+        "ARC at z 5 where another point is at z 0",
+    ),
+    "half at a height, from behind": (
+        lambda m: (
+            m.add_arc((0, 0, 5), 4, 0, 180),
+            m.add_arc((0, 0, 5), 4, 0, 180, dxfattribs={"extrusion": (0, 0, -1)}),
+        ),
+        "ARC at z -5 where another point is at z 5",
+    ),
+    "light polyline at another height": (
+        lambda m: (
+            m.add_lwpolyline([(-3, -2), (3, -2)], dxfattribs={"elevation": 1}),
+            m.add_lwpolyline([(3, -2), (0, 4), (-3, -2)]),
+        ),
+        "LWPOLYLINE at z 0",
+    ),
+    "ellipse that rises": (lambda m: m.add_ellipse((0, 0), (5, 1, 2), 0.4), "ELLIPSE at z 2"),
+    "mesh": (lambda m: m.add_polymesh((3, 3)), "POLYLINE that is a mesh"),
+    "construction line": (
+        lambda m: (m.add_circle((0, 0), 3), m.add_xline((0, 0), (1, 0))),
+        "entity XLINE, which is not read; explode",
+    ),
+    "block beside the outline": (
+        lambda m: (m.add_circle((0, 0), 3), m.add_blockref("POCKET", (0, 0))),
+        "entity INSERT",
+    ),
+    "invisible": (
+        lambda m: m.add_circle((0, 0), 3, dxfattribs={"invisible": 1}),
+        "hidden entities only",
+    ),
+    "layer that is off": (
+        lambda m: (m.doc.layers.add("A").off(), m.add_circle((0, 0), 3, dxfattribs={"layer": "A"})),
+        "hidden entities only",
+    ),
+    "blocks are not followed": (lambda m: m.add_blockref("POCKET", (0, 0)), "entity INSERT"),
 }
 
 
@@ -345,11 +439,11 @@ BAD_SVG = {
     "cusp": ('<path d="M-2.5-2C2.5 3-2.5 3 2.5-2z"/>', PAGE, r"cusp near x -?0\.0000, y -1\.7500"),
     "flattened": ('<ellipse rx="2" ry="3" transform="scale(2 1e-9)"/>', PAGE, "cusp near"),
     "overflow": ('<circle r="1e400"/>', PAGE, "coordinate"),
-    "garbage": ('<path d="garbage"/>', PAGE, "no closed path"),
+    "garbage": ('<path d="garbage"/>', PAGE, "does not begin with a move"),
     "no view": ('<circle r="2"/>', 'width="4mm" viewBox="0 0 0 1"', "viewBox"),
     "no width": ('<circle r="2"/>', 'width="0mm" viewBox="0 0 1 1"', "width or height"),
     "many elements": ("<g/>" * 2001, PAGE, "more than 2000 elements"),
-    "nested deeply": ("<g>" * 1500 + "</g>" * 1500, PAGE, "RecursionError"),
+    "nested deeply": ("<g>" * 1500 + "</g>" * 1500, PAGE, "no closed path"),
     "long path": (f'<path d="M0 0{"c1 1 2 2 3 3" * 3000}"/>', PAGE, "more than 500 edges"),
     "broken": ("<circle", PAGE, "not valid SVG"),
 }

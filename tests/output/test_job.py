@@ -101,6 +101,26 @@ def test_unfit_names_are_refused(others: list[str], name: str, said: str, tmp_pa
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("own", "name", "said"),
+    [
+        ("sheets", "batch", "a design is named sheets, as the job's folder of film sheets is"),
+        ("SHEETS", "batch", "a design is named SHEETS, as the job's folder of film sheets is"),
+        ("manifest.json", "batch", "a design is named manifest.json, as the job's index is"),
+        ("1DOF-5mm", "batch", "two designs are named 1dof-5mm and 1DOF-5mm, which is one folder"),
+        ("other", "OTHER", "the job is named OTHER as one of its folders; choose another --name"),
+        ("other", "Sheets", "the job is named Sheets as one of its folders"),
+    ],
+)
+def test_a_name_that_the_job_needs_is_refused(
+    own: str, name: str, said: str, tmp_path: Path
+) -> None:
+    both = [load_design("1dof-5mm"), load_design("1dof-10mm", [f"name={own}"])]
+    with pytest.raises(DesignError, match=said):
+        generate_job(both, name, tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("key", ["sheets.tpe.width=300", "laser.kerf_tpe=0.1"])
 def test_designs_of_other_films_or_machines_are_not_cut_together(key: str, tmp_path: Path) -> None:
     with pytest.raises(DesignError, match=key.partition(".")[0]):

@@ -13,6 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 INSTALLED_AS = {
     "PIL": "pillow",
     "netgen": "netgen-mesher",
+    "resvg_py": "resvg-py",
     "tomli_w": "tomli-w",
     "zxingcpp": "zxing-cpp",
 }
