@@ -20,6 +20,7 @@ UNCALIBRATED: Literal["uncalibrated"] = "uncalibrated"
 RuleName = Literal[
     "bond-width",
     "mask-overhang",
+    "facing-films",
     "sealing",
     "channel-clear",
     "tube-fit",
