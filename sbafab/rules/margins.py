@@ -114,12 +114,14 @@ def interface_margins(
 ) -> list[InterfaceMargins]:
     """Every interface's narrow places: all that could become the least under the tolerances.
 
-    Films that face each other past a smaller balloon count as an interface of their own.
+    Films that face each other past a smaller balloon count as an interface of their own; where no
+    mask lies between them, facing-films tells of it.
     """
     groups: dict[object, list[Interface]] = {}
-    faced = [pair.gap for pair in facing_films(laminate) if pair.gap.unbonded.contours]
+    faced = [pair.gap for pair in facing_films(laminate) if pair.bare.is_empty]
     for interface in (*laminate.interfaces, *faced):
-        groups.setdefault((interface.pattern, _signature(interface, moves)), []).append(interface)
+        key = interface.pattern, interface.unbonded, _signature(interface, moves)
+        groups.setdefault(key, []).append(interface)
     return [
         InterfaceMargins(
             tuple(group),
