@@ -19,7 +19,7 @@ from sbafab.rules.limits import TOLERANCE
 
 
 class Facing(NamedTuple):
-    """Two films with no film between them over some area outside the channels.
+    """Two films with no film between them over some area outside pins' openings.
 
     ``gap`` holds both, the masks it takes to cover that area from above, and as its unbonded
     region what they cover; its index is that of the interface just below the upper film. ``bare``
@@ -39,7 +39,7 @@ class _Seen(NamedTuple):
 
 @lru_cache(maxsize=1)
 def facing_films(laminate: Laminate) -> tuple[Facing, ...]:
-    """Every pair of films, not next to each other, that face each other outside the channels.
+    """Every pair of films, not next to each other, that face each other but in pins' openings.
 
     Lowest upper film first. Equal shapes are laid on each other once. Cached: three rules use it.
     """
@@ -66,7 +66,7 @@ class _Shapes:
 
     def __init__(self, laminate: Laminate) -> None:
         self.laminate = laminate
-        self.openings = channel_openings(laminate)
+        self.openings = pin_openings(laminate)
         self.laid = cache(self._laid)
         self.minus = cache(self._minus)
         self.both = cache(Region.__and__)
@@ -107,12 +107,13 @@ def _union(regions: tuple[Region, ...]) -> Region:
     return union(regions)
 
 
-def channel_openings(laminate: Laminate) -> Region:
-    """Where bores and lumen are open, as wide as a hole may be and still be its pin's."""
+def pin_openings(laminate: Laminate) -> Region:
+    """Where bores, lumen and tooling holes are open, as wide as holes that are still a pin's."""
     places = [(bore.centre, bore.diameter) for bore in laminate.bores]
+    places += [(pin.centre, pin.diameter) for pin in laminate.pins]
     if laminate.lumen is not None:
         places.append(((0.0, 0.0), laminate.lumen))
-    return union(disc(centre, (diameter + LOOSE) / 2) for centre, diameter in places)
+    return union(disc(centre, (width + LOOSE) / 2) for centre, width in dict.fromkeys(places))
 
 
 def without_slivers(region: Region) -> Region:
