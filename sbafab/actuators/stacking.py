@@ -97,16 +97,21 @@ def balloon_cuts(stack: Stack, design: Design) -> list[Cut]:
         return (pockets if shape else with_tails(pockets, stack.tails)) - round_axes(radius)
 
     @cache
-    def separator_mask(below: int, above: int) -> Region:
+    def separator_mask(below: frozenset[int], above: int) -> Region:
+        """The mask under a balloon: it reaches as far as any balloon of ``below`` faces that one.
+
+        Past a smaller neighbour a film would meet the next but one, or the inlet tabs.
+        """
         shared = eared(above)
-        # The bottom balloon covers a plain one of its size; a larger one would cross its tabs.
-        if below != above and (below > 0 or above != stack.shape_of[0] + 1):
-            shared = shared & eared(below)
+        # The bottom balloon covers a plain one of its size.
+        if above not in below and above != stack.shape_of[0] + 1:
+            shared = shared & union(eared(shape) for shape in sorted(below))
         rings = round_axes(radius + back + design.bond.width)
         grown = grow(shared, design.mask.overhang)
         return with_mask_ears(grown, ears, design.mask.overhang) - union([lumen(0.0), rings])
 
     cuts: list[Cut] = []
+    below = frozenset([0])
     for number in range(1, count + 1):
         shape = 0 if number == 1 else stack.shape_of[number - 1] + 1
         parts = shapes[shape].outline_pieces
@@ -119,7 +124,8 @@ def balloon_cuts(stack: Stack, design: Design) -> list[Cut]:
             cuts.append(Cut("cap", plate(shape), number, parts))
         else:
             cuts.append(Cut("wall", wall(shape), number, parts))
-            mask = separator_mask(shape, stack.shape_of[number] + 1)
+            below = below | {shape}
+            mask = separator_mask(below, stack.shape_of[number] + 1)
             cuts.append(Cut("separator-mask", mask, number, stack.shapes[0].outline_pieces))
     return cuts
 

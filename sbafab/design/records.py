@@ -25,6 +25,7 @@ UNCALIBRATED: Literal["uncalibrated"] = "uncalibrated"
 RuleName = Literal[
     "bond-width",
     "mask-overhang",
+    "facing-films",
     "sealing",
     "channel-clear",
     "tube-fit",

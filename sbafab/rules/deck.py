@@ -10,6 +10,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.rules import (
     bond_width,
     channel_clear,
+    facing_films,
     film_limits,
     mask_overhang,
     piece_count,
@@ -39,6 +40,7 @@ class Rule(NamedTuple):
 RULES = (
     Rule(bond_width.NAME, bond_width.check),
     Rule(mask_overhang.NAME, mask_overhang.check),
+    Rule(facing_films.NAME, facing_films.check),
     Rule(sealing.NAME, sealing.check),
     Rule(channel_clear.NAME, channel_clear.check),
     Rule(tube_fit.NAME, tube_fit.check),

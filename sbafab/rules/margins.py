@@ -21,6 +21,7 @@ from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate, Pin
 from sbafab.rules.bond_width import SHARP
 from sbafab.rules.boundary import edges_along, outward_reach, outward_samples
+from sbafab.rules.facing import facing_films
 from sbafab.rules.freedoms import Freedom, Freedoms, Part
 from sbafab.rules.limits import Limits, holds
 from sbafab.rules.mask_overhang import pin_at
@@ -111,10 +112,16 @@ def pushes(margin: Margin, interface: Interface, moves: Freedoms) -> list[Push]:
 def interface_margins(
     laminate: Laminate, limits: Limits, moves: Freedoms
 ) -> list[InterfaceMargins]:
-    """Every interface's narrow places: all that could become the least under the tolerances."""
+    """Every interface's narrow places: all that could become the least under the tolerances.
+
+    Films that face each other past a smaller balloon count as an interface of their own; where no
+    mask lies between them, facing-films tells of it.
+    """
     groups: dict[object, list[Interface]] = {}
-    for interface in laminate.interfaces:
-        groups.setdefault((interface.pattern, _signature(interface, moves)), []).append(interface)
+    faced = [pair.gap for pair in facing_films(laminate) if pair.bare.is_empty]
+    for interface in (*laminate.interfaces, *faced):
+        key = interface.pattern, interface.unbonded, _signature(interface, moves)
+        groups.setdefault(key, []).append(interface)
     return [
         InterfaceMargins(
             tuple(group),

@@ -97,12 +97,24 @@ def test_one_plate_from_two_to_eight_lobes_far_from_the_lumen() -> None:
         assert all(len(layer.profile.pieces) == 1 for layer in lam.tpe_layers)
 
 
-def test_tapered_stack_separates_by_the_smaller_neighbour() -> None:
-    lam = laminate("1dof-5mm", "stack.balloons=3", "chamber.diameter=[10, 5, 6]")
+@pytest.mark.parametrize(
+    ("sizes", "reaches"),
+    [
+        # Half the smaller neighbour's pocket, its bond and one overhang.
+        ([10, 6, 5], [4.25, 3.75]),
+        ([5, 5, 4], [3.75, 3.25]),
+        # The third balloon faces the first past the second, and is masked all over.
+        ([10, 5, 6], [3.75, 4.25]),
+    ],
+)
+def test_masks_of_a_tapered_stack_reach_as_far_as_films_face_each_other(
+    sizes: list[int], reaches: list[float]
+) -> None:
+    lam = laminate("1dof-5mm", "stack.balloons=3", f"chamber.diameter={sizes}")
     separators = [layer.profile for layer in lam.layers if layer.role == "separator-mask"]
-    assert [round(profile.bounds[2], 6) for profile in separators] == [3.75, 3.75]
+    assert [round(profile.bounds[2], 6) for profile in separators] == reaches
     caps = [layer.profile for layer in lam.layers if layer.role == "cap"]
-    assert caps[0].bounds[2] == pytest.approx(3.75)
+    assert caps[0].bounds[0] == pytest.approx(-(sizes[-1] / 2 + 0.75))
 
 
 def test_manifold_joins_the_bottom_pockets_and_has_one_inlet() -> None:

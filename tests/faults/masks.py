@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import grow, shrink
 from sbafab.geometry.region import Region
@@ -11,6 +12,7 @@ from tests.faults.holes import aside, bore, cut_in_two
 from tests.faults.record import Kind, no_lumen, no_sheet, one_chamber, redrawn
 from tests.faults.specimen import (
     base,
+    cap,
     inlet_mask,
     mask,
     separator,
@@ -21,6 +23,11 @@ from tests.faults.specimen import (
 
 def smaller(region: Region, laminate: Laminate) -> Region:
     return shrink(region, 0.1)
+
+
+def inside_the_rim(region: Region, laminate: Laminate) -> Region:
+    """Its outer edge moved in from 0.5 outside the films' edge to 0.8 inside."""
+    return region & shrink(Region(region.outers), 1.3)
 
 
 def larger(region: Region, laminate: Laminate) -> Region:
@@ -115,6 +122,12 @@ def strip_aside(region: Region, laminate: Laminate) -> Region:
     return region | strip(_inside(inlet, inlet.length, off), _inside(inlet, -0.5, off), 0.1)
 
 
+def tabs_left(region: Region, laminate: Laminate) -> Region:
+    """As wide as the strips and with their run: over the tabs of the bottom balloon."""
+    tabs = (strip(_inside(i, i.length + 1.0), i.mouth, i.width) for i in laminate.inlets)
+    return union([region, *tabs])
+
+
 def tab_cut_off(region: Region, laminate: Laminate) -> Region:
     inlet = laminate.inlets[0]
     return region - strip(_inside(inlet, 4.0), _inside(inlet, -2.0), 6.0)
@@ -125,6 +138,13 @@ KIND = Kind(
     "Chambers are joined by a strip of mask 0.5 mm wide. The inlet is that of the first chamber.",
     (
         redrawn("separator too small by 0.1 all round", "mask-overhang", separator, smaller),
+        redrawn(
+            "separator that ends 0.8 inside the films' edge",
+            "facing-films",
+            separator,
+            inside_the_rim,
+        ),
+        redrawn("inlet tab left on the cap", "facing-films", cap, tabs_left),
         redrawn("separator too large: bond 0.74", "bond-width", separator, larger),
         redrawn("chamber mask too large: bond 0.74", "bond-width", mask, larger),
         redrawn("chamber mask with strip too large: bond 0.74", "bond-width", inlet_mask, larger),

@@ -25,6 +25,10 @@ ONE = ("1dof-5mm", "stack.balloons=3")
 LOBED = ("3dof-15mm", "stack.balloons=3")
 RADIAL = ("radial-15mm", "stack.balloons=2")
 EARS = 'registration.method="ears"'
+# The middle balloon ends at 3.25, the others at 4.75.
+WAIST = (*ONE, "chamber.diameter=[8, 5, 8]")
+# The largest balloon, out to 6.75, lies over the inlet tab, 3.1 wide from 3.25 to 8.25.
+TOP = (*ONE, "chamber.diameter=[5, 5, 12]")
 
 
 class Fault(NamedTuple):
@@ -68,6 +72,31 @@ FAULTS = {
     ),
     "strip flush with the tab's end": Fault(
         "mask-overhang", ONE, 2, lambda mask: mask - rectangle((8.25, -1), (10, 1)), 0.0
+    ),
+    "mask no larger than the smaller neighbour": Fault(
+        "facing-films",
+        WAIST,
+        8,
+        lambda mask: disc(AXIS, 3.75) - disc(AXIS, 1.25),
+        math.pi * (4.75**2 - 3.75**2),
+    ),
+    "mask that just covers the films": Fault(
+        "facing-films", WAIST, 8, lambda mask: disc(AXIS, 5.1) - disc(AXIS, 1.25), 0.35
+    ),
+    "tab under a larger balloon": Fault(
+        "facing-films",
+        TOP,
+        8,
+        lambda mask: mask - rectangle((4.5, -3.0), (5.5, 3.0)) - rectangle((6.0, -3.0), (8.0, 3.0)),
+        3.1,
+        2,
+    ),
+    "mask that ends within the rim": Fault(
+        "facing-films",
+        ONE,
+        4,
+        lambda mask: disc(AXIS, 2.4) - disc(AXIS, 1.25),
+        math.pi * (3.25**2 - 2.4**2),
     ),
     "hole in the base": Fault("sealing", ONE, 1, lambda base: base - disc((1.5, 0.0), 0.5), 1.0),
     "hole in a wall between two balloons": Fault(

@@ -90,6 +90,23 @@ class Things:
         return films[-1] if films else self.laminate.layer(thing[-1])
 
 
+def over_tab(laminate: Laminate, layers: Sequence[int]) -> Layer | None:
+    """The lowest separator mask among layers round one axis that reaches out to one side.
+
+    It does so over the inlet tab, under a balloon larger than those between.
+    """
+    if len(laminate.chambers) > 1 or len(laminate.chambers[0].centres) > 1:
+        return None
+    (x, y), (dx, dy) = laminate.chambers[0].centres[0], laminate.inlets[0].direction
+    turn = -math.degrees(math.atan2(dy, dx))
+    masks = [layer for layer in map(laminate.layer, layers) if layer.role == "separator-mask"]
+    for mask in masks:
+        low_x, _, high_x, _ = mask.profile.moved(-x, -y).turned(turn).bounds
+        if high_x + low_x > ALIKE:
+            return mask
+    return None
+
+
 def lip(region: Region, other: Region) -> Lip | None:
     """How the outline of a region follows another's; None where it mostly does not."""
     outline = Region(other.outers)

@@ -14,7 +14,7 @@ from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.exploded import exploded
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.layup import Bed, Round, beds, inlets_in, rounds
-from sbafab.reports.traveller.placing import Place, Things, pitch, places
+from sbafab.reports.traveller.placing import Place, Things, over_tab, pitch, places
 from sbafab.reports.traveller.plan import plan
 
 LEAK_KILOPASCALS = 5.0
@@ -177,7 +177,7 @@ def _lay(things: Things, bed: Bed, pins: Sequence[Pin]) -> Iterator[Action]:
         yield Action(
             f"Lay the {many} from step {bed.made_in} (layers {numbers}), layer {lowest.index}, the "
             f"{lowest.film.material} {lowest.role.replace('-', ' ')}, down."
-            + ("" if pins else _along(things, lowest))
+            + ("" if pins else _along(things, lowest) + _turned(laminate, bed.layers))
         )
         return
     turns = rounds([laminate.layer(index) for index in bed.layers])
@@ -234,6 +234,14 @@ def _along(things: Things, layer: Layer) -> str:
     """A sentence on the edge along which a layer, or the stack over it, is laid."""
     line = "" if things.is_lowest(layer.index) else things.line_up(layer.index)
     return f" Lay {line}." if line else ""
+
+
+def _turned(laminate: Laminate, layers: Sequence[int]) -> str:
+    """Which way a round stack is turned, where a mask of it reaches out over the inlet tab."""
+    mask = over_tab(laminate, layers)
+    if mask is None:
+        return ""
+    return f" Turn it so that layer {mask.index}, the PTFE mask that reaches out, covers the tab."
 
 
 def _named(layer: Layer) -> str:

@@ -1,0 +1,130 @@
+"""Films that face each other past films that end between them: every pair, found in one sweep.
+
+Seen from above, a stack of films is a patchwork: at each place the highest film so far. A film
+laid on top faces the film just below it over most of its area, which is their interface, and lower
+ones where those in between have ended or are open.
+"""
+
+from __future__ import annotations
+
+from functools import cache, lru_cache
+from typing import NamedTuple
+
+from sbafab.geometry.boolean import union
+from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import disc
+from sbafab.laminate.interfaces import Interface
+from sbafab.laminate.laminate import LOOSE, Laminate, Layer
+from sbafab.rules.limits import TOLERANCE
+
+
+class Facing(NamedTuple):
+    """Two films with no film between them over some area outside pins' openings.
+
+    ``gap`` holds both, the masks it takes to cover that area from above, and as its unbonded
+    region what they cover; its index is that of the interface just below the upper film. ``bare``
+    is what no mask covers.
+    """
+
+    gap: Interface
+    bare: Region
+
+
+class _Seen(NamedTuple):
+    """The part of a film that no film covers yet."""
+
+    film: Layer
+    region: Region
+
+
+@lru_cache(maxsize=1)
+def facing_films(laminate: Laminate) -> tuple[Facing, ...]:
+    """Every pair of films, not next to each other, that face each other but in pins' openings.
+
+    Lowest upper film first. Equal shapes are laid on each other once. Cached: three rules use it.
+    """
+    found: list[Facing] = []
+    seen: list[_Seen] = []
+    shapes = _Shapes(laminate)
+    films = laminate.tpe_layers
+    for index, film in enumerate(films):
+        left: list[_Seen] = []
+        for below, region in seen:
+            shared, rest = shapes.laid(region, film.profile)
+            if rest.contours:
+                left.append(_Seen(below, rest))
+            if shared.contours and below is not films[index - 1]:
+                gap, bare = shapes.kept_apart(shared, index, below, film)
+                if gap.masks or bare.contours:
+                    found.append(Facing(gap, bare))
+        seen = [*left, _Seen(film, film.profile)]
+    return tuple(found)
+
+
+class _Shapes:
+    """Regions laid on each other, each pair of shapes once."""
+
+    def __init__(self, laminate: Laminate) -> None:
+        self.laminate = laminate
+        self.openings = pin_openings(laminate)
+        self.laid = cache(self._laid)
+        self.minus = cache(self._minus)
+        self.both = cache(Region.__and__)
+        self.union = cache(_union)
+
+    def _laid(self, seen: Region, film: Region) -> tuple[Region, Region]:
+        """What a film covers of a region, and what it leaves."""
+        shared = without_slivers(seen & film)
+        return shared, self.minus(seen, film) if shared.contours else seen
+
+    def _minus(self, region: Region, other: Region) -> Region:
+        return without_slivers(region - other)
+
+    def kept_apart(
+        self, region: Region, index: int, below: Layer, above: Layer
+    ) -> tuple[Interface, Region]:
+        """Two films that face each other over a region, as an interface, and what is bare of it."""
+        facing = bare = self.minus(region, self.openings)
+        masks: dict[Region, Layer] = {}
+        for layer in reversed(self.laminate.layers[below.index : above.index - 1]):
+            if bare.is_empty:
+                break
+            if layer.is_mask and layer.profile not in masks:
+                left = self.minus(bare, layer.profile)
+                if left != bare:
+                    masks[layer.profile] = layer
+                bare = left
+        mask = self.union(tuple(masks))
+        unbonded = self.minus(facing, bare) if bare.contours else facing
+        contact = self.both(below.profile, above.profile)
+        used = tuple(reversed(masks.values()))
+        return Interface(
+            index, "separator", below, above, used, mask, contact, Region(), unbonded
+        ), bare
+
+
+def _union(regions: tuple[Region, ...]) -> Region:
+    return union(regions)
+
+
+def pin_openings(laminate: Laminate) -> Region:
+    """Where bores, lumen and tooling holes are open, as wide as holes that are still a pin's."""
+    places = [(bore.centre, bore.diameter) for bore in laminate.bores]
+    places += [(pin.centre, pin.diameter) for pin in laminate.pins]
+    if laminate.lumen is not None:
+        places.append(((0.0, 0.0), laminate.lumen))
+    return union(disc(centre, (width + LOOSE) / 2) for centre, width in dict.fromkeys(places))
+
+
+def without_slivers(region: Region) -> Region:
+    """The region without pieces that are on average no wider than TOLERANCE."""
+    if region.is_empty:
+        return region
+    pieces = [piece for piece in region.pieces if _is_wide(piece)]
+    if len(pieces) == len(region.outers):
+        return region
+    return Region(tuple(contour for piece in pieces for contour in piece.contours))
+
+
+def _is_wide(piece: Region) -> bool:
+    return 2 * piece.area > TOLERANCE * sum(contour.length for contour in piece.contours)

@@ -1,0 +1,143 @@
+"""facing-films: films of two balloons meet nowhere but where they are meant to bond.
+
+The press welds any two films that face each other with neither film nor mask between them: past a
+smaller balloon these need not be neighbours. Balloons bond in their neck rings, a sheet in its
+windows, and all films on ears. Elsewhere a mask must lie between, and reach past the films' edges
+as far as between neighbours.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+from sbafab.geometry.edges import Point
+from sbafab.geometry.region import Contour, Region
+from sbafab.laminate.interfaces import Interface
+from sbafab.laminate.laminate import LOOSE, Laminate, Pin
+from sbafab.rules.alike import distinct_interfaces
+from sbafab.rules.boundary import beside, edges_along, outward_reach
+from sbafab.rules.facing import Facing, facing_films, without_slivers
+from sbafab.rules.finding import Finding, Place
+from sbafab.rules.limits import TOLERANCE, Limits, at, holds
+from sbafab.rules.mask_overhang import pin_at
+
+NAME = "facing-films"
+
+
+class _Weld(NamedTuple):
+    """A place where two films weld that should not; ``number`` of them are alike."""
+
+    region: Region
+    gap: Interface
+    number: int
+
+
+class _Overhang(NamedTuple):
+    value: float
+    at: Point
+    gap: Interface
+
+
+def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+    """The largest place where films weld that should not; with none, the least overhang there."""
+    pairs = _distinct(facing_films(laminate))
+    welds = [*_past_films(pairs), *_at_rims(laminate)]
+    if welds:
+        return [_welded(welds, laminate)]
+    message = "films of two balloons meet where they are meant to bond, and nowhere else"
+    clear = Finding(NAME, "pass", 0.0, 0.0, "mm2", Place(), message)
+    overhangs = [o for pair, _ in pairs for o in _overhangs(pair.gap, laminate.pins)]
+    return [clear, _least(overhangs, limits)] if overhangs else [clear]
+
+
+def _distinct(pairs: Iterable[Facing]) -> list[tuple[Facing, int]]:
+    """The first of those that are alike, and how many they are."""
+    groups: dict[object, list[Facing]] = {}
+    for pair in pairs:
+        key = pair.gap.pattern, pair.gap.unbonded, pair.bare
+        groups.setdefault(key, []).append(pair)
+    return [(group[0], len(group)) for group in groups.values()]
+
+
+def _past_films(pairs: Iterable[tuple[Facing, int]]) -> Iterator[_Weld]:
+    for pair, number in pairs:
+        for piece in pair.bare.pieces:
+            yield _Weld(piece, pair.gap, number)
+
+
+def _at_rims(laminate: Laminate) -> Iterator[_Weld]:
+    """Bonds between neighbouring balloons that reach an edge of film that is no bore's."""
+    for alike in distinct_interfaces(laminate):
+        gap = alike.interface
+        if gap.kind == "chamber":
+            continue
+        rim = Region(tuple(c for c in gap.contact.contours if not _is_bore(c, laminate)))
+        for piece in without_slivers(gap.bond).pieces:
+            if not _is_ear(piece, laminate) and edges_along(piece, rim):
+                yield _Weld(piece, gap, alike.number)
+
+
+def _is_bore(contour: Contour, laminate: Laminate) -> bool:
+    return contour.is_hole and any(contour.winding(bore.centre) for bore in laminate.bores)
+
+
+def _is_ear(piece: Region, laminate: Laminate) -> bool:
+    """Whether it lies round a tooling hole, nowhere twice as far from it as at the nearest."""
+    for pin in laminate.pins:
+        if any(math.dist(pin.centre, bore.centre) < LOOSE for bore in laminate.bores):
+            continue
+        if any(hole.winding(pin.centre) for hole in piece.holes):
+            room = Region(piece.outers).distance_to_edge(pin.centre)
+            return all(math.dist(edge.start, pin.centre) <= 2 * room for edge in piece.edges)
+    return False
+
+
+def _overhangs(gap: Interface, pins: tuple[Pin, ...]) -> Iterator[_Overhang]:
+    """How far the masks reach past the edges of either film where these face each other."""
+    for edge in edges_along(gap.unbonded, gap.contact):
+        reach = None if pin_at(edge, pins) else outward_reach(edge, gap.mask.index)
+        if reach is not None:
+            yield _Overhang(reach.value, edge.nearest(reach.at), gap)
+
+
+def _welded(welds: Sequence[_Weld], laminate: Laminate) -> Finding:
+    worst = max(welds, key=lambda weld: round(weld.region.area, 9))
+    gap, area, p = worst.gap, worst.region.area, _inside(worst.region)
+    message = (
+        f"layers {gap.below.index} ({gap.below.name}) and {gap.above.index} ({gap.above.name}) "
+        f"face each other over {area:.3f} mm2 with neither film nor mask between, {at(p)}, and "
+        f"weld there; let the mask below layer {gap.above.index} reach over that place"
+    )
+    masks = laminate.interfaces[gap.index - 1].masks
+    others = sum(weld.number for weld in welds) - 1
+    if others:
+        message += f" (and {others} more such place{'s' if others > 1 else ''})"
+    layers = (gap.below.index, *(mask.index for mask in masks), gap.above.index)
+    place = Place(gap.index, layers, *p)
+    return Finding(NAME, "fail", 0.0, area, "mm2", place, message)
+
+
+def _least(overhangs: Sequence[_Overhang], limits: Limits) -> Finding:
+    worst = min(overhangs, key=lambda overhang: round(overhang.value, 9))
+    gap, limit = worst.gap, limits.mask_overhang
+    good = holds(worst.value, limit)
+    message = (
+        f"layers {gap.below.index} and {gap.above.index} face each other past films that end "
+        f"between them; the masks there reach {worst.value:.3f} mm past their edges, {at(worst.at)}"
+    )
+    if not good:
+        message += (
+            f"; it needs {limit:g}: let the mask below layer {gap.above.index} reach further there"
+        )
+    layers = (gap.below.index, *sorted(mask.index for mask in gap.masks), gap.above.index)
+    place = Place(gap.index, layers, *worst.at)
+    return Finding(NAME, "pass" if good else "fail", limit, worst.value, "mm", place, message)
+
+
+def _inside(region: Region) -> Point:
+    """A point inside the region: halfway from its longest edge to the edge across."""
+    edge = max(region.edges, key=lambda edge: round(edge.length, 9))
+    across = outward_reach(edge.reversed(), region.index)
+    return beside(edge, (across.value if across is not None else TOLERANCE) / 2)
