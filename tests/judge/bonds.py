@@ -1,0 +1,151 @@
+"""The least width of every bond, between edges that face each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from tests.judge.folder import Disagreement, Folder, Interface, pieces, place
+
+THINNEST = 0.004
+"""mm: narrower bonds are what flattened arcs make of edges that coincide."""
+TAPER = math.radians(30.0)
+"""Edges at a wider angle to each other are a corner, no bond that tapers (docs/rules.md)."""
+STEP = 0.05
+FAN = math.radians(10.0)
+Array = NDArray[np.float64]
+
+
+def bond_of(interface: Interface) -> BaseGeometry:
+    """Where two consecutive films touch."""
+    bond = interface.below.profile.intersection(interface.above.profile)
+    for mask in interface.masks:
+        bond = bond.difference(mask.profile)
+    return shapely.MultiPolygon(list(pieces(bond, THINNEST)))
+
+
+def judge_bonds(folder: Folder) -> Iterator[Disagreement]:
+    """Every bond is as wide as the design's limit, and between balloons lies round a pin's hole."""
+    seen = set()
+    for interface in folder.interfaces:
+        if interface.shape in seen:
+            continue
+        seen.add(interface.shape)
+        bond = bond_of(interface)
+        where = f"interface {interface.number}"
+        for width, x, y in narrow_places(bond, folder.bond_limit - folder.slack):
+            yield Disagreement(
+                "bonds",
+                f"the bond of {where} is {width:.4f} wide at x {x:.3f}, y {y:.3f}, where "
+                f"{folder.bond_limit:g} are asked for",
+            )
+        if not interface.is_chamber and interface.below.role != "sheet":
+            yield from _stray(folder, bond, where)
+        if bond.is_empty:
+            yield Disagreement("bonds", f"nothing bonds at {where}")
+
+
+def _stray(folder: Folder, bond: BaseGeometry, where: str) -> Iterator[Disagreement]:
+    """Bonds between two balloons that are no ring round a pin: neighbours that weld."""
+    pins = [shapely.Point(hole.x, hole.y) for hole in folder.holes]
+    for part in pieces(bond):
+        filled = Polygon(part.exterior)
+        if not any(filled.contains(pin) for pin in pins):
+            yield Disagreement(
+                "bonds",
+                f"{part.area:.4f} mm2 of {where} bond where there is no bore, at {place(part)}",
+            )
+
+
+def narrow_places(region: BaseGeometry, limit: float) -> Iterator[tuple[float, float, float]]:
+    """Width, x and y of the narrowest place of each part of a region that is below a limit.
+
+    What a disc of that diameter cannot reach is looked at edge by edge: corners are left out.
+    """
+    for part in pieces(region):
+        radius = limit / 2
+        reached = part.buffer(-radius).buffer(radius)
+        for rest in pieces(part.difference(reached), THINNEST):
+            # A part of its own boundary on either side of the gap is all that can face.
+            near = part.boundary.intersection(rest.buffer(THINNEST))
+            found = _least_facing(part, near, limit)
+            if found is not None:
+                yield found
+
+
+def _least_facing(
+    part: Polygon, edges: BaseGeometry, limit: float
+) -> tuple[float, float, float] | None:
+    points, normals = _samples(part, edges)
+    if len(points) < 2:
+        return None
+    best = (limit, 0.0, 0.0)
+    for number in range(len(points)):
+        ways = points[number + 1 :] - points[number]
+        lengths = np.hypot(ways[:, 0], ways[:, 1])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            along = ways / lengths[:, None]
+        ahead = along @ normals[number]
+        back = -np.einsum("ij,ij->i", along, normals[number + 1 :])
+        opposed = normals[number + 1 :] @ normals[number] <= -math.cos(TAPER)
+        square = math.cos(TAPER / 2 + 0.02)
+        facing = opposed & (ahead >= square) & (back >= square) & (lengths < best[0])
+        for other in np.flatnonzero(facing)[np.argsort(lengths[facing])]:
+            end = points[number + 1 + other]
+            if part.buffer(1e-4).covers(LineString([points[number], end])):
+                middle = (points[number] + end) / 2
+                best = (float(lengths[other]), float(middle[0]), float(middle[1]))
+                break
+    return best if best[0] < limit else None
+
+
+def _samples(part: Polygon, edges: BaseGeometry) -> tuple[Array, Array]:
+    """Points along the edges with the normals into the material; at concave corners a fan."""
+    points: list[tuple[float, float]] = []
+    normals: list[tuple[float, float]] = []
+    near = edges.buffer(1e-6)
+    shapely.prepare(near)
+    for ring in (part.exterior, *part.interiors):
+        corners = np.asarray(ring.coords)
+        if not ring.is_ccw:
+            corners = corners[::-1]
+        if ring is not part.exterior:
+            corners = corners[::-1]
+        _along(corners, near, points, normals)
+    return np.array(points).reshape(-1, 2), np.array(normals).reshape(-1, 2)
+
+
+def _along(
+    corners: Array,
+    near: BaseGeometry,
+    points: list[tuple[float, float]],
+    normals: list[tuple[float, float]],
+) -> None:
+    """The material lies to the left of a ring's corners."""
+    ways = np.diff(corners, axis=0)
+    lengths = np.hypot(ways[:, 0], ways[:, 1])
+    keep = lengths > 1e-7
+    starts, ways, lengths = corners[:-1][keep], ways[keep], lengths[keep]
+    headings = np.arctan2(ways[:, 1], ways[:, 0])
+    touched = shapely.intersects(near, shapely.linestrings(np.stack([starts, starts + ways], 1)))
+    before_all = np.roll(headings, 1)
+    for number in np.flatnonzero(touched):
+        start, way, length = starts[number], ways[number], lengths[number]
+        heading, before = headings[number], before_all[number]
+        count = max(1, math.ceil(length / STEP))
+        inward = (-math.sin(heading), math.cos(heading))
+        for i in range(count + 1):
+            points.append(tuple(start + way * i / count))
+            normals.append(inward)
+        turn = (heading - before + math.pi) % (2 * math.pi) - math.pi
+        if turn < -0.02:  # to the right: the material bulges round a corner of the void
+            for i in range(1, math.ceil(-turn / FAN)):
+                at = before + turn * i / math.ceil(-turn / FAN) + math.pi / 2
+                points.append(tuple(start))
+                normals.append((math.cos(at), math.sin(at)))
