@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -17,6 +18,9 @@ THINNEST = 0.004
 """mm: narrower bonds are what flattened arcs make of edges that coincide."""
 TAPER = math.radians(30.0)
 """Edges at a wider angle to each other are a corner, no bond that tapers (docs/rules.md)."""
+SQUARE = math.cos(TAPER / 2 + 0.02)
+NEAREST = 0.002
+"""mm: points of one edge, or of both sides of a sharp corner's tip."""
 STEP = 0.05
 FAN = math.radians(10.0)
 Array = NDArray[np.float64]
@@ -66,64 +70,44 @@ def _stray(folder: Folder, bond: BaseGeometry, where: str) -> Iterator[Disagreem
 def narrow_places(region: BaseGeometry, limit: float) -> Iterator[tuple[float, float, float]]:
     """Width, x and y of the narrowest place of each part of a region that is below a limit.
 
-    What a disc of that diameter cannot reach is looked at edge by edge: corners are left out.
+    Measured between points of its edges that face each other through the region.
     """
     for part in pieces(region):
-        radius = limit / 2
-        reached = part.buffer(-radius).buffer(radius)
-        for rest in pieces(part.difference(reached), THINNEST):
-            # A part of its own boundary on either side of the gap is all that can face.
-            near = part.boundary.intersection(rest.buffer(THINNEST))
-            found = _least_facing(part, near, limit)
-            if found is not None:
-                yield found
-
-
-def _least_facing(
-    part: Polygon, edges: BaseGeometry, limit: float
-) -> tuple[float, float, float] | None:
-    points, normals = _samples(part, edges)
-    if len(points) < 2:
-        return None
-    best = (limit, 0.0, 0.0)
-    for number in range(len(points)):
-        ways = points[number + 1 :] - points[number]
+        points, normals = _samples(part)
+        pairs = KDTree(points).query_pairs(limit, output_type="ndarray")
+        ways = points[pairs[:, 1]] - points[pairs[:, 0]]
         lengths = np.hypot(ways[:, 0], ways[:, 1])
-        with np.errstate(invalid="ignore", divide="ignore"):
-            along = ways / lengths[:, None]
-        ahead = along @ normals[number]
-        back = -np.einsum("ij,ij->i", along, normals[number + 1 :])
-        opposed = normals[number + 1 :] @ normals[number] <= -math.cos(TAPER)
-        square = math.cos(TAPER / 2 + 0.02)
-        facing = opposed & (ahead >= square) & (back >= square) & (lengths < best[0])
-        for other in np.flatnonzero(facing)[np.argsort(lengths[facing])]:
-            end = points[number + 1 + other]
-            if part.buffer(1e-4).covers(LineString([points[number], end])):
-                middle = (points[number] + end) / 2
-                best = (float(lengths[other]), float(middle[0]), float(middle[1]))
+        apart = lengths > NEAREST
+        pairs, ways, lengths = pairs[apart], ways[apart], lengths[apart]
+        along = ways / lengths[:, None]
+        one, other = normals[pairs[:, 0]], normals[pairs[:, 1]]
+        facing = (
+            ((one * other).sum(axis=1) <= -math.cos(TAPER))
+            & ((along * one).sum(axis=1) >= SQUARE)
+            & ((along * other).sum(axis=1) <= -SQUARE)
+        )
+        inside = part.buffer(1e-4)
+        shapely.prepare(inside)
+        for number in np.flatnonzero(facing)[np.argsort(lengths[facing])]:
+            ends = points[pairs[number]]
+            if inside.covers(LineString(ends)):
+                x, y = ends.mean(axis=0)
+                yield float(lengths[number]), float(x), float(y)
                 break
-    return best if best[0] < limit else None
 
 
-def _samples(part: Polygon, edges: BaseGeometry) -> tuple[Array, Array]:
+def _samples(part: Polygon) -> tuple[Array, Array]:
     """Points along the edges with the normals into the material; at concave corners a fan."""
     points: list[tuple[float, float]] = []
     normals: list[tuple[float, float]] = []
-    near = edges.buffer(1e-6)
-    shapely.prepare(near)
+    part = shapely.geometry.polygon.orient(part)
     for ring in (part.exterior, *part.interiors):
-        corners = np.asarray(ring.coords)
-        if not ring.is_ccw:
-            corners = corners[::-1]
-        if ring is not part.exterior:
-            corners = corners[::-1]
-        _along(corners, near, points, normals)
+        _along(np.asarray(ring.coords), points, normals)
     return np.array(points).reshape(-1, 2), np.array(normals).reshape(-1, 2)
 
 
 def _along(
     corners: Array,
-    near: BaseGeometry,
     points: list[tuple[float, float]],
     normals: list[tuple[float, float]],
 ) -> None:
@@ -133,9 +117,8 @@ def _along(
     keep = lengths > 1e-7
     starts, ways, lengths = corners[:-1][keep], ways[keep], lengths[keep]
     headings = np.arctan2(ways[:, 1], ways[:, 0])
-    touched = shapely.intersects(near, shapely.linestrings(np.stack([starts, starts + ways], 1)))
     before_all = np.roll(headings, 1)
-    for number in np.flatnonzero(touched):
+    for number in range(len(starts)):
         start, way, length = starts[number], ways[number], lengths[number]
         heading, before = headings[number], before_all[number]
         count = max(1, math.ceil(length / STEP))

@@ -8,13 +8,13 @@ from collections.abc import Iterator
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import Polygon
+from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from tests.judge.folder import Disagreement, Folder, Hole, Interface, Layer, pieces
 
 STEP = 0.1
-INSIDE = 0.004
+INSIDE = 0.001
 """mm inward from an edge: whether the films are kept apart there."""
 FITS = 0.004
 """mm by which a hole may differ from the pin in it."""
@@ -39,7 +39,7 @@ def judge_overhangs(folder: Folder) -> Iterator[Disagreement]:
                 reach, x, y = worst
                 yield Disagreement(
                     "overhangs",
-                    f"at {_named(interface)} the mask reaches less than {reach:.4f} past the edge of "
+                    f"at {_named(interface)} the mask reaches only {reach:.4f} past the edge of "
                     f"film {film.index} at x {x:.3f}, y {y:.3f}, where "
                     f"{folder.overhang_limit:g} are asked for",
                 )
@@ -64,18 +64,26 @@ def _least(
     kept &= shapely.contains_xy(other.profile, inside[:, 0], inside[:, 1])
     points, normals = points[kept], normals[kept]
     shapely.prepare(film.profile)
-    worst = None
-    open_yet = np.ones(len(points), dtype=bool)
+    bare = np.zeros(len(points), dtype=bool)
+    open_yet = ~bare
     for look in range(1, LOOKS + 1):
         out = points + normals * (limit * look / LOOKS)
         # Past a gap of the film the far edge speaks for itself.
         open_yet &= ~shapely.contains_xy(film.profile, out[:, 0], out[:, 1])
-        bare = open_yet & ~shapely.contains_xy(mask, out[:, 0], out[:, 1])
-        if bare.any():
-            number = int(np.flatnonzero(bare)[0])
-            worst = (limit * look / LOOKS, float(points[number, 0]), float(points[number, 1]))
-            break
-    return worst
+        bare |= open_yet & ~shapely.contains_xy(mask, out[:, 0], out[:, 1])
+    short = [
+        (_reach(mask, points[number], normals[number], limit), *points[number])
+        for number in np.flatnonzero(bare)
+    ]
+    return min(short, default=None)
+
+
+def _reach(mask: BaseGeometry, start: Array, normal: Array, limit: float) -> float:
+    """How far the mask reaches from a film's edge."""
+    ray = LineString([start - normal * INSIDE, start + normal * limit])
+    covered = shapely.get_parts(ray.intersection(mask))
+    lengths = [part.length for part in covered if part.distance(shapely.Point(ray.coords[0])) < 1e-6]
+    return float(max(lengths, default=INSIDE)) - INSIDE
 
 
 def _edges(film: Layer, exempt: tuple[Hole, ...], slack: float) -> tuple[Array, Array]:
