@@ -56,15 +56,23 @@ def judge_bonds(folder: Folder) -> Iterator[Disagreement]:
 
 
 def _stray(folder: Folder, bond: BaseGeometry, where: str) -> Iterator[Disagreement]:
-    """Bonds between two balloons that are no ring round a pin: neighbours that weld."""
-    pins = [shapely.Point(hole.x, hole.y) for hole in folder.holes]
-    for part in pieces(bond):
-        filled = Polygon(part.exterior)
-        if not any(filled.contains(pin) for pin in pins):
-            yield Disagreement(
-                "bonds",
-                f"{part.area:.4f} mm2 of {where} bond where there is no bore, at {place(part)}",
-            )
+    """Bonds between two balloons that are no ring round a bore, and no ear: neighbours that weld.
+
+    An ear is as wide as its pin and two bonds, and ends as far from the pin.
+    """
+    width = float(folder.wish("bond", "width", 0.75))
+    back = float(folder.wish("mask", "overhang", 0.5)) if folder.method == "ears" else 0.0
+    meant = shapely.union_all(
+        [
+            shapely.Point(hole.x, hole.y).buffer(math.sqrt(2) * (hole.radius + width) + back + 0.01)
+            for hole in folder.holes
+        ]
+    )
+    for part in pieces(bond.difference(meant), THINNEST):
+        yield Disagreement(
+            "bonds",
+            f"{part.area:.4f} mm2 of {where} bond where there is no bore, at {place(part)}",
+        )
 
 
 def narrow_places(region: BaseGeometry, limit: float) -> Iterator[tuple[float, float, float]]:

@@ -128,9 +128,7 @@ def run_cases(seed: int, count: int, ways: Ways, jobs: int, start: int = 0) -> I
             yield run_case(seed, number, ways)
         return
     with ProcessPoolExecutor(jobs) as pool:
-        yield from pool.map(
-            run_case, [seed] * count, numbers, [ways] * count, chunksize=4
-        )
+        yield from pool.map(run_case, [seed] * count, numbers, [ways] * count, chunksize=4)
 
 
 def table(cases: list[Case]) -> str:

@@ -9,11 +9,13 @@ from typing import Any
 
 import ezdxf
 import shapely
+from ezdxf import bbox
 from shapely import Polygon, affinity
 from shapely.geometry.base import BaseGeometry
 
 from tests.judge.folder import Folder, open_folder, pieces
 
+Box = tuple[float, float, float, float]
 Change = Callable[[BaseGeometry], BaseGeometry]
 
 
@@ -72,26 +74,23 @@ def add_part(space: Any, part: Polygon) -> None:
         space.add_lwpolyline(ring.coords[:-1], close=True, dxfattribs={"layer": "CUT_INNER"})
 
 
-def parts_of(space: Any) -> list[tuple[Any, list[Any]]]:
-    """The outlines of a sheet, each with the holes in it."""
-    outers, inner = [], []
-    for entity in space:
-        if entity.dxf.layer == "CUT_OUTER":
-            outers.append((entity, Polygon([p[:2] for p in entity.get_points()])))
-        elif entity.dxf.layer == "CUT_INNER":
-            inner.append(entity)
+def parts_of(space: Any) -> list[tuple[Box, list[Any]]]:
+    """The parts of a sheet: each one's extent, and its outline and holes."""
+    outlines = [e for e in space if e.dxf.layer == "CUT_OUTER"]
+    holes = [e for e in space if e.dxf.layer == "CUT_INNER"]
     found = []
-    for entity, outline in outers:
-        mine = [hole for hole in inner if outline.contains(shapely.Point(_middle(hole)))]
-        found.append((entity, mine))
+    for outline in outlines:
+        extent = extent_of(outline)
+        inside = shapely.box(*extent)
+        mine = [hole for hole in holes if inside.contains(shapely.box(*extent_of(hole)))]
+        found.append((extent, [outline, *mine]))
     return found
 
 
-def _middle(entity: Any) -> tuple[float, float]:
-    if entity.dxftype() == "CIRCLE":
-        return float(entity.dxf.center.x), float(entity.dxf.center.y)
-    points = [p[:2] for p in entity.get_points()]
-    return sum(p[0] for p in points) / len(points), sum(p[1] for p in points) / len(points)
+def extent_of(entity: Any) -> Box:
+    """Lowest and highest x and y."""
+    low, high = bbox.extents([entity])
+    return low.x, low.y, high.x, high.y
 
 
 def shift(entities: Iterable[Any], x: float, y: float) -> None:

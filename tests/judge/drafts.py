@@ -216,9 +216,7 @@ def _room_round_tube(rng: Random, tables: dict[str, Any], drawn: Drawing) -> Non
     }
 
 
-def _oblong(
-    rng: Random, tables: dict[str, Any], chamber: dict[str, Any], least: float
-) -> Polygon:
+def _oblong(rng: Random, tables: dict[str, Any], chamber: dict[str, Any], least: float) -> Polygon:
     bond = tables.get("bond", {}).get("width", 0.75)
     overhang = tables.get("mask", {}).get("overhang", 0.5)
     width = _mm(rng, 2 * (least + bond) + 0.05, 2 * (least + bond) + 8)

@@ -23,6 +23,8 @@ from tests.judge.reading import Drawing, UnreadableError, read
 
 ROUND = 24
 """Chords a quarter circle where kerf is taken back."""
+FINE = 2e-4
+"""mm by which points are left out again where a shrunk path has more than it needs."""
 Kerf = tuple[float, float]
 
 
@@ -167,10 +169,10 @@ def cut_with(path: BaseGeometry, kerf: Kerf | None) -> BaseGeometry:
         return path
     x, y = max(kerf[0], 1e-6), max(kerf[1], 1e-6)
     if x == y:
-        return path.buffer(-x / 2, quad_segs=ROUND)
+        return path.buffer(-x / 2, quad_segs=ROUND).simplify(FINE)
     scaled = affinity.scale(path, y / x, 1.0, origin=(0, 0))
     left = scaled.buffer(-y / 2, quad_segs=ROUND)
-    return affinity.scale(left, x / y, 1.0, origin=(0, 0))
+    return affinity.scale(left, x / y, 1.0, origin=(0, 0)).simplify(FINE)
 
 
 def open_folder(path: Path, design: Path, chord_error: float = 0.0) -> Folder:

@@ -82,7 +82,9 @@ def _reach(mask: BaseGeometry, start: Array, normal: Array, limit: float) -> flo
     """How far the mask reaches from a film's edge."""
     ray = LineString([start - normal * INSIDE, start + normal * limit])
     covered = shapely.get_parts(ray.intersection(mask))
-    lengths = [part.length for part in covered if part.distance(shapely.Point(ray.coords[0])) < 1e-6]
+    lengths = [
+        part.length for part in covered if part.distance(shapely.Point(ray.coords[0])) < 1e-6
+    ]
     return float(max(lengths, default=INSIDE)) - INSIDE
 
 

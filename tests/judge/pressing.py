@@ -51,7 +51,9 @@ def _step(
         yield Disagreement("press", f"{name} presses layers that it does not add and none added")
     wanted = float(folder.wish("press", "temperature_c", 135.0))
     if step["temperature_c"] != wanted:
-        yield Disagreement("press", f"{name} presses at {step['temperature_c']:g} C, not {wanted:g}")
+        yield Disagreement(
+            "press", f"{name} presses at {step['temperature_c']:g} C, not {wanted:g}"
+        )
     asked = {float(folder.wish("press", key, usual)) for key, usual in MINUTES.items()}
     if step["minutes"] not in asked:
         yield Disagreement("press", f"{name} takes {step['minutes']:g} min, which nobody asked for")

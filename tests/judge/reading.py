@@ -98,7 +98,9 @@ def _parsed(path: Path) -> Drawing:
         contours += [Contour(layer, *_joined(chain)) for chain in _chains(pieces)]
     open_cuts = [c for c in contours if c.layer in ("CUT_INNER", "CUT_OUTER") and not c.closed]
     if open_cuts:
-        raise UnreadableError(f"{path.name} has a cut that is not closed at {open_cuts[0].points[0]}")
+        raise UnreadableError(
+            f"{path.name} has a cut that is not closed at {open_cuts[0].points[0]}"
+        )
     region = _region(
         [c.points for c in contours if c.layer == "CUT_OUTER"],
         [c.points for c in contours if c.layer == "CUT_INNER"],

@@ -67,9 +67,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Patient]:
 
 
 @pytest.fixture
-def patient(
-    sound: dict[str, Patient], tmp_path: Path, request: pytest.FixtureRequest
-) -> Patient:
+def patient(sound: dict[str, Patient], tmp_path: Path, request: pytest.FixtureRequest) -> Patient:
     healthy = sound[request.param]
     copy = tmp_path / "copy"
     shutil.copytree(healthy.folder, copy)
@@ -104,7 +102,7 @@ def _shrunk_middle(patient: Patient) -> None:
 
 def _bridge(region: BaseGeometry) -> BaseGeometry:
     """Two pockets of a lobed balloon joined."""
-    one, other = (part.centroid for part in region.geoms[:2])
+    one, other = (part.centroid for part in list(region.geoms)[:2])
     return region | Polygon(
         [(one.x, one.y), (other.x, other.y), (other.x + 0.4, other.y), (one.x + 0.4, one.y)]
     )
@@ -116,27 +114,23 @@ def _swapped(manifest: dict[str, Any]) -> None:
 
 
 def _first_part_off(space: Any) -> None:
-    outline, holes = parts_of(space)[0]
-    for entity in (outline, *holes):
+    for entity in parts_of(space)[0][1]:
         space.delete_entity(entity)
 
 
-def _first_part_again(space: Any) -> None:
+def _one_part_more(space: Any) -> None:
     add_part(space, Polygon([(120, 120), (126, 120), (126, 126), (120, 126)]))
 
 
 def _parts_near(space: Any) -> None:
-    (one, _), (other, holes) = parts_of(space)[:2]
-    right = max(p[0] for p in one.get_points())
-    left = min(p[0] for p in other.get_points())
-    low = min(p[1] for p in one.get_points())
-    bottom = min(p[1] for p in other.get_points())
-    shift([other, *holes], right - left + 0.9, low - bottom)
+    """The second part beside the first, nearer than 1 mm."""
+    (one, _), (other, entities) = parts_of(space)[:2]
+    shift(entities, one[2] - other[0] + 0.9, one[1] - other[1])
 
 
 def _into_border(space: Any) -> None:
-    outline, holes = min(parts_of(space), key=lambda part: min(p[0] for p in part[0].get_points()))
-    shift([outline, *holes], -0.01, 0.0)
+    extent, entities = parts_of(space)[0]
+    shift(entities, 9.99 - extent[0], 0.0)
 
 
 def _line_through(layer: str) -> Callable[[Any], object]:
@@ -158,19 +152,34 @@ def _later_last(press: dict[str, Any]) -> None:
 
 FAULTS: dict[str, Fault] = {
     "films that meet past a smaller balloon": (
-        "stack", _shrunk_middle, judge_facing, "films 3 and 9",
+        "stack",
+        _shrunk_middle,
+        judge_facing,
+        "films 3 and 9",
     ),
     "a layer in another's place": (
-        "stack", lambda p: p.edit("manifest.json", _swapped), judge_facing, "face each other",
+        "stack",
+        lambda p: p.edit("manifest.json", _swapped),
+        judge_bonds,
+        "nothing bonds at interface 3",
     ),
     "a narrowed ring": (
-        "stack", lambda p: p.redraw([6], lambda m: m.buffer(0.01)), judge_bonds, "interface 3 is 0.74",
+        "stack",
+        lambda p: p.redraw([6], lambda m: m.buffer(0.01)),
+        judge_bonds,
+        "interface 3 is 0.7397",
     ),
     "a narrowed neck": (
-        "stack", lambda p: p.redraw([4], lambda m: m.buffer(0.01)), judge_bonds, "interface 2 is 0.74",
+        "stack",
+        lambda p: p.redraw([4], lambda m: m.buffer(0.01)),
+        judge_bonds,
+        "interface 2 is 0.7397",
     ),
     "a missing mask": (
-        "stack", lambda p: p.redraw([4], lambda m: m & box(2, 2, 9, 9)), judge_bonds, "interface 2",
+        "stack",
+        lambda p: p.redraw([4], lambda m: m & box(2, 2, 9, 9)),
+        judge_bonds,
+        "no bore",
     ),
     "a bond where none belongs": (
         "stack",
@@ -253,15 +262,21 @@ FAULTS: dict[str, Fault] = {
     ),
     "a part of no layer": (
         "stack",
-        lambda p: p.edit_dxf("sheets/TPE_1.dxf", _first_part_again),
+        lambda p: p.edit_dxf("sheets/TPE_1.dxf", _one_part_more),
         on_sheets,
         "no piece of a layer",
     ),
     "parts too near": (
-        "stack", lambda p: p.edit_dxf("sheets/TPE_1.dxf", _parts_near), on_sheets, "apart at",
+        "stack",
+        lambda p: p.edit_dxf("sheets/TPE_1.dxf", _parts_near),
+        on_sheets,
+        "apart at",
     ),
     "a part in the border": (
-        "stack", lambda p: p.edit_dxf("sheets/PTFE_1.dxf", _into_border), on_sheets, "in the border",
+        "stack",
+        lambda p: p.edit_dxf("sheets/PTFE_1.dxf", _into_border),
+        on_sheets,
+        "in the border",
     ),
     "a stray line": (
         "stack",
@@ -318,7 +333,10 @@ FAULTS: dict[str, Fault] = {
         "layer 1 is added 0 times",
     ),
     "an upper layer before a lower one": (
-        "stack", lambda p: p.edit("press.json", _later_last), judge_press, "lower before upper",
+        "stack",
+        lambda p: p.edit("press.json", _later_last),
+        judge_press,
+        "lower before upper",
     ),
     "a press too hot": (
         "stack",
