@@ -14,6 +14,7 @@ from tests.judge.overhangs import judge_overhangs
 from tests.judge.pins import judge_pins
 from tests.judge.pockets import judge_pockets
 from tests.judge.pressing import judge_press
+from tests.judge.reading import UnreadableError
 from tests.judge.sheets import judge_sheets
 from tests.judge.voids import judge_voids
 
@@ -31,9 +32,17 @@ JUDGES: tuple[Judge, ...] = (
 
 def judged(folder: Folder, drawn: Sequence[Polygon] | None = None) -> list[Disagreement]:
     """What all judges say of one design's folder, its sheets included if it has its own."""
-    said = [found for judge in JUDGES for found in judge(folder)]
+    found = [said for judge in JUDGES for said in _heard(lambda judge=judge: judge(folder))]
     if folder.manifest.get("sheets"):
-        said += judge_sheets([folder], folder.path, folder.manifest["sheets"])
+        found += _heard(lambda: judge_sheets([folder], folder.path, folder.manifest["sheets"]))
     if drawn is not None:
-        said += judge_pockets(folder, drawn)
-    return said
+        found += _heard(lambda: judge_pockets(folder, drawn))
+    return found
+
+
+def _heard(judge: Callable[[], Iterator[Disagreement]]) -> list[Disagreement]:
+    """What a judge says; a file that no cutter could follow does not silence the others."""
+    try:
+        return list(judge())
+    except UnreadableError as error:
+        return [Disagreement("reading", str(error))]

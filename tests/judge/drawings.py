@@ -235,10 +235,8 @@ def svg_drawing(path: str) -> Drawing:
     numbers: list[float] = []
     letters: list[str] = []
     for mark in marks:
-        if mark[0].isalpha():
-            letters.append(mark[0])
-            mark = mark[1:]
-        numbers.append(float(mark))
+        letters += mark[0] if mark[0].isalpha() else ""
+        numbers.append(float(mark.lstrip("MCS")))
     at = (numbers.pop(0), numbers.pop(0))
     corners: list[Point] = []
     before = at

@@ -108,7 +108,7 @@ class Folder:
 
     @cached_property
     def slack(self) -> float:
-        """mm by which a measure may fall short: rule, flattening, and the kerf's own arcs."""
+        """Mm by which a measure may fall short: rule, flattening, and the kerf's own arcs."""
         pair = any(isinstance(self.wish("laser", f"kerf_{m}", 0), list) for m in ("tpe", "ptfe"))
         return 0.004 if pair else 0.0025
 

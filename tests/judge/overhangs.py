@@ -91,8 +91,7 @@ def _reach(mask: BaseGeometry, start: Array, normal: Array, limit: float) -> flo
 def _edges(film: Layer, exempt: tuple[Hole, ...], slack: float) -> tuple[Array, Array]:
     """Points along a film's edges with outward normals, but not round pinned holes."""
     found = []
-    for part in pieces(film.profile):
-        part = shapely.geometry.polygon.orient(part)
+    for part in map(shapely.geometry.polygon.orient, pieces(film.profile)):
         rings = [part.exterior]
         rings += [ring for ring in part.interiors if not _is_pinned(ring, exempt, slack)]
         found += [_ring(np.asarray(ring.coords)) for ring in rings]

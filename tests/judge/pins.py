@@ -28,7 +28,7 @@ def judge_pins(folder: Folder) -> Iterator[Disagreement]:
         return
     pins, said = _pins(folder)
     yield from said
-    held: dict[str, int] = {name: 0 for name in pins}
+    held: dict[str, int] = dict.fromkeys(pins, 0)
     holding: dict[int, list[Pin]] = {layer.index: [] for layer in folder.layers}
     known: dict[tuple[str, int], str] = {}
     by_index = {layer.index: layer for layer in folder.layers}

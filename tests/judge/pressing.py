@@ -16,7 +16,7 @@ MINUTES = {
 
 
 def judge_press(folder: Folder) -> Iterator[Disagreement]:
-    """Each layer is added once, stacks are laid lower before upper, settings are those asked for."""
+    """Each layer is added once, lower before upper, and the press is set as asked for."""
     press = folder.press
     if press is None:
         yield Disagreement("press", "press.json is missing")

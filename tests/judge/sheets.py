@@ -21,7 +21,8 @@ SAME = 0.002
 NEAR = 0.003
 """mm by which a gap may fall short: rounding, and what chords leave of arcs."""
 USUAL = {"width": 152.4, "length": 152.4, "border": 10.0, "spacing": 1.0, "roll": False, "pins": []}
-KNOWN_LAYERS = {"CUT_INNER", "CUT_OUTER", "CUT_SHEET", "ENGRAVE", "REFERENCE"}
+PARTS = {"CUT_INNER", "CUT_OUTER"}
+KNOWN_LAYERS = {*PARTS, "CUT_SHEET", "ENGRAVE", "REFERENCE"}
 
 
 @dataclass
@@ -181,11 +182,8 @@ def _strays(
     for contour in drawing.contours:
         if contour.layer not in KNOWN_LAYERS:
             yield Disagreement("sheets", f"{name} draws on layer {contour.layer}")
-        elif not contour.layer.startswith("CUT_") or contour.layer == "CUT_SHEET":
-            if outlines.intersects(contour.line):
-                yield Disagreement(
-                    "sheets", f"a line on {contour.layer} of {name} runs through a part"
-                )
+        elif contour.layer not in PARTS and outlines.intersects(contour.line):
+            yield Disagreement("sheets", f"a line on {contour.layer} of {name} crosses a part")
     low_x, low_y, high_x, high_y = shapely.total_bounds([c.line for c in drawing.contours])
     if min(low_x, low_y) < -NEAR or high_x > width + NEAR or high_y > length + NEAR:
         yield Disagreement("sheets", f"{name} draws outside its sheet")

@@ -130,7 +130,7 @@ def _parts_near(space: Any) -> None:
 
 def _into_border(space: Any) -> None:
     extent, entities = parts_of(space)[0]
-    shift(entities, 9.99 - extent[0], 0.0)
+    shift(entities, 0.0, 9.99 - extent[1])
 
 
 def _line_through(layer: str) -> Callable[[Any], object]:
@@ -282,7 +282,7 @@ FAULTS: dict[str, Fault] = {
         "stack",
         lambda p: p.edit_dxf("sheets/TPE_1.dxf", _line_through("ENGRAVE")),
         on_sheets,
-        "runs through a part",
+        "crosses a part",
     ),
     "a layer that the sheets do not cut": (
         "pinned",

@@ -131,53 +131,66 @@ def _said(
     bottom: Interface,
 ) -> Iterator[Disagreement]:
     pockets = {gap.node: gap for found in gaps.values() for gap in found if gap.is_pocket}
-    chamber_interfaces = [i.number for i in folder.interfaces if i.is_chamber]
-    fed: dict[Node, list[str]] = defaultdict(list)
     chambers = _chambers(folder)
-    inlets = [
-        (gap, line, width)
-        for line, width in mouths
-        for gap in gaps[bottom.number]
-        if gap.is_pocket and gap.region.distance(line) < 2 * PLUG
-    ]
-    if len(inlets) != (1 if chambers.manifold else chambers.count):
-        yield Disagreement("voids", f"{len(inlets)} inlets lead into the bottom pockets")
-    for gap, line, width in inlets:
+    wanted = {
+        i.number: chambers.count if chambers.manifold and i is not bottom else 1
+        for i in folder.interfaces
+        if i.is_chamber
+    }
+    fed: dict[Node, list[str]] = defaultdict(list)
+    count = 0
+    for line, width in mouths:
         at = place(line)
-        yield from _tube(folder, width, at)
-        reached = graph.reached(gap.node)
-        if OUTSIDE in reached:
-            yield Disagreement("voids", f"the chamber of the inlet at {at} leaks to the outside")
-            continue
-        for number in chamber_interfaces:
-            own = [n for n in reached if n in pockets and n[1] == number]
-            wanted = chambers.count if chambers.manifold and number != bottom.number else 1
-            if len(own) != wanted:
-                yield Disagreement(
-                    "voids",
-                    f"from the inlet at {at} {len(own)} pockets are reached at interface "
-                    f"{number}, where {wanted} belong to its chamber",
-                )
-        for node in reached & set(pockets):
-            fed[node].append(at)
+        for gap in gaps[bottom.number]:
+            if gap.is_pocket and gap.region.distance(line) < 2 * PLUG:
+                count += 1
+                reached = graph.reached(gap.node)
+                yield from _tube(folder, width, at)
+                yield from _from_inlet(reached, at, pockets, wanted)
+                for node in reached & set(pockets):
+                    fed[node].append(at)
+    if count != (1 if chambers.manifold else chambers.count):
+        yield Disagreement("voids", f"{count} inlets lead into the bottom pockets")
+    yield from _pockets(graph, pockets, fed)
+    for number in wanted:
+        found = sum(node[1] == number for node in pockets)
+        meant = 1 if chambers.manifold and number == bottom.number else chambers.count
+        if found != meant:
+            yield Disagreement(
+                "voids", f"{found} pockets at interface {number}, where {meant} were asked for"
+            )
+
+
+def _from_inlet(
+    reached: set[Node], at: str, pockets: dict[Node, Gap], wanted: dict[int, int]
+) -> Iterator[Disagreement]:
+    """What an inlet reaches: as many pockets as wanted at every interface, and no way out."""
+    if OUTSIDE in reached:
+        yield Disagreement("voids", f"the chamber of the inlet at {at} leaks to the outside")
+        return
+    for number, meant in wanted.items():
+        own = sum(node[1] == number for node in reached & set(pockets))
+        if own != meant:
+            yield Disagreement(
+                "voids",
+                f"from the inlet at {at} {own} pockets are reached at interface {number}, where "
+                f"{meant} belong to its chamber",
+            )
+
+
+def _pockets(
+    graph: Graph, pockets: dict[Node, Gap], fed: dict[Node, list[str]]
+) -> Iterator[Disagreement]:
     for node, gap in pockets.items():
-        if len(fed[node]) > 1:
-            yield Disagreement("voids", f"inlets {fed[node]} reach one pocket, at {node[1]}")
-        if not fed[node] and OUTSIDE not in graph.reached(node):
-            yield Disagreement(
-                "voids", f"no inlet reaches the pocket at interface {node[1]}, {place(gap.region)}"
-            )
-        elif not fed[node]:
-            yield Disagreement(
-                "voids", f"the pocket at interface {node[1]} is open, {place(gap.region)}"
-            )
-    for number in chamber_interfaces:
-        count = sum(node[1] == number for node in pockets)
-        wanted = 1 if chambers.manifold and number == bottom.number else chambers.count
-        if count != wanted:
-            yield Disagreement(
-                "voids", f"{count} pockets at interface {number}, where {wanted} were asked for"
-            )
+        if len(fed[node]) == 1:
+            continue
+        at = f"the pocket at interface {node[1]}, {place(gap.region)}"
+        if fed[node]:
+            yield Disagreement("voids", f"inlets {' and '.join(fed[node])} both reach {at}")
+        elif OUTSIDE in graph.reached(node):
+            yield Disagreement("voids", f"{at}, is open")
+        else:
+            yield Disagreement("voids", f"no inlet reaches {at}")
 
 
 class Chambers(NamedTuple):
