@@ -15,10 +15,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tests.judge.deck import judged
-from tests.judge.drafts import Draft, draft
+from tests.judge.drafts import Draft, beside, draft
 from tests.judge.folder import Disagreement, open_folder
 from tests.judge.reading import UnreadableError
-from tests.judge.using import sbafab
+from tests.judge.sheets import judge_sheets
+from tests.judge.using import Ended, sbafab
+
+TOGETHER = 15
+ANOTHER = 1_000_000
+"""Added to a design's number for the one that is cut with it."""
 
 
 @dataclass
@@ -27,7 +32,7 @@ class Case:
 
     name: str
     family: str
-    typed: str
+    typed: str = ""
     refused: str = ""
     disagreements: list[Disagreement] = field(default_factory=list)
     seconds: float = 0.0
@@ -48,48 +53,85 @@ class Ways:
 
 
 def run_case(seed: int, number: int, ways: Ways = Ways()) -> Case:
-    """One design made and judged."""
-    made = draft(seed, number, ways.most_balloons)
+    """One design made and judged, or every ``TOGETHER``-th time two that are cut together."""
+    made = [draft(seed, number, ways.most_balloons)]
+    if number % TOGETHER == TOGETHER - 1:
+        made.append(beside(made[0], draft(seed, ANOTHER + number, ways.most_balloons)))
+    families = " and ".join(str(one.tables["family"]) for one in made)
+    case = Case(made[0].name, families)
     began = time.process_time()
     with tempfile.TemporaryDirectory() as scratch:
         home = Path(scratch)
         try:
-            case = _made_and_judged(made, home, ways)
+            if len(made) == 1:
+                _one(case, made[0], home, ways)
+            else:
+                _together(case, made, home, ways)
         except Exception as error:  # a crash of the program, or of a judge, is a finding too
             lines = traceback.format_exception_only(error)[-1].strip()
             at = traceback.extract_tb(error.__traceback__)[-1]
             said = f"{lines} ({Path(at.filename).name}:{at.lineno})"
-            case = Case(made.name, str(made.tables["family"]), "", "")
             case.disagreements.append(Disagreement("crash", said))
         if case.disagreements and ways.keep is not None:
-            kept = ways.keep / made.name
+            kept = ways.keep / case.name
             shutil.rmtree(kept, ignore_errors=True)
             shutil.copytree(home, kept)
     case.seconds = time.process_time() - began
     return case
 
 
-def _made_and_judged(made: Draft, home: Path, ways: Ways) -> Case:
+def _one(case: Case, made: Draft, home: Path, ways: Ways) -> None:
     design = made.write(home)
-    commands = [["cut"], ["press"]] if ways.lean else [["generate"]]
-    typed = " ".join(["sbafab", commands[0][0], design.name, *made.options])
-    case = Case(made.name, str(made.tables["family"]), typed)
-    for command in commands:
-        options = made.options if command[0] != "press" else []
-        ended = sbafab(*command, design, "-o", home / "out", *options)
-        if ended.code:
-            case.refused = _reason(ended.code, ended.said, home / "out" / made.name)
-            if ended.code not in (1, 2):
-                case.disagreements.append(Disagreement("exit", f"code {ended.code}: {ended.said}"))
-            return case
+    commands = ["cut", "press"] if ways.lean else ["generate"]
+    case.typed = " ".join(["sbafab", commands[0], design.name, *made.options])
     folder = home / "out" / made.name
+    for command in commands:
+        options = made.options if command != "press" else []
+        if _refused(case, sbafab(command, design, "-o", home / "out", *options), folder):
+            return
     case.disagreements += _judged(folder, design, made)
     if ways.check:
-        checked = sbafab("check", folder, "--json")
-        if checked.code:
-            why = _reason(checked.code, checked.said, None, checked.out)
-            case.disagreements.append(Disagreement("check", f"exit {checked.code}: {why}"))
-    return case
+        _check(case, folder)
+
+
+def _together(case: Case, made: list[Draft], home: Path, ways: Ways) -> None:
+    """Designs on common sheets: each one judged by itself, the sheets against all of them."""
+    designs = [one.write(home) for one in made]
+    names = [design.name for design in designs]
+    case.typed = " ".join(["sbafab", "nest", *names, *made[0].options])
+    ended = sbafab("nest", *designs, "-o", home / "out", *made[0].options)
+    if _refused(case, ended, home / "out"):
+        return
+    job = home / "out" / "job"
+    for one, design in zip(made, designs, strict=True):
+        case.disagreements += _judged(job / one.name, design, one)
+    try:
+        folders = [
+            open_folder(job / one.name, design, one.chord_error)
+            for one, design in zip(made, designs, strict=True)
+        ]
+        sheets = json.loads((job / "manifest.json").read_text(encoding="utf-8"))["sheets"]
+        case.disagreements += judge_sheets(folders, job, sheets)
+    except UnreadableError as error:
+        case.disagreements.append(Disagreement("reading", str(error)))
+    if ways.check:
+        _check(case, job)
+
+
+def _refused(case: Case, ended: Ended, folder: Path) -> bool:
+    if ended.code:
+        case.refused = _reason(ended, folder)
+    if ended.code not in (0, 1, 2):
+        case.disagreements.append(Disagreement("exit", f"code {ended.code}: {ended.said}"))
+    return bool(ended.code)
+
+
+def _check(case: Case, folder: Path) -> None:
+    """What the program itself says of the folder that it has just written without complaint."""
+    checked = sbafab("check", folder, "--json")
+    if checked.code:
+        why = _reason(checked)
+        case.disagreements.append(Disagreement("check", f"exit {checked.code}: {why}"))
 
 
 def _judged(folder: Path, design: Path, made: Draft) -> list[Disagreement]:
@@ -100,24 +142,22 @@ def _judged(folder: Path, design: Path, made: Draft) -> list[Disagreement]:
         return [Disagreement("reading", str(error))]
 
 
-def _reason(code: int, said: str, folder: Path | None, printed: str = "") -> str:
+def _reason(ended: Ended, folder: Path | None = None) -> str:
     """Rules that fail, or the sentence without its numbers."""
-    findings = []
-    if code == 1:
-        text = printed
-        if folder is not None and (folder / "checks.json").is_file():
-            text = (folder / "checks.json").read_text(encoding="utf-8")
-        try:
-            findings = json.loads(text)["findings"]
-        except (ValueError, KeyError, TypeError):
-            findings = []
+    text = ended.out
+    if folder is not None and (folder / "checks.json").is_file():
+        text = (folder / "checks.json").read_text(encoding="utf-8")
+    try:
+        findings = json.loads(text)["findings"] if ended.code == 1 else []
+    except (ValueError, KeyError, TypeError):
+        findings = []
     failed = sorted({f["rule"] for f in findings if f["verdict"] == "fail"})
     if failed:
         return "rule " + ", ".join(failed)
-    sentence = " ".join(said.split())
+    sentence = " ".join(ended.said.split())
     sentence = re.sub(r"s\d+n\d+", "NAME", sentence)
     sentence = re.sub(r"\S*pocket\.(svg|dxf)", r"pocket.\1", sentence)
-    return re.sub(r"-?\d+(\.\d+)?(e-?\d+)?", "#", sentence)[:110] or f"exit {code}"
+    return re.sub(r"-?\d+(\.\d+)?(e-?\d+)?", "#", sentence)[:110] or f"exit {ended.code}"
 
 
 def run_cases(seed: int, count: int, ways: Ways, jobs: int, start: int = 0) -> Iterator[Case]:

@@ -58,13 +58,33 @@ def draft(seed: int, number: int, most_balloons: int = 4) -> Draft:
     family = rng.choice(("1dof", "1dof", "lobed", "lobed", "radial"))
     tables = _common(rng, f"s{seed}n{number}", family, most_balloons)
     profile = rng.choice(PROFILES)
+    if profile == "chords" and _is_pair(tables) and rng.random() < 0.9:
+        profile = "arcs"  # as the program would say
     chord_error = rng.choice(CHORD_ERRORS) if profile == "chords" else 0.0
     drawn, pockets = _pockets(rng, tables)
     return Draft(tables, drawn, profile, chord_error, pockets)
 
 
+def beside(first: Draft, second: Draft) -> Draft:
+    """The second draft on the first one's sheets, cut as that is: what may be cut together."""
+    tables = dict(second.tables)
+    for section in ("laser", "sheets"):
+        tables.pop(section, None)
+        if section in first.tables:
+            tables[section] = first.tables[section]
+    drawn = second.drawing
+    if drawn is not None:
+        drawn = drawn._replace(name=drawn.name.replace("pocket", "other"))
+        tables["chamber"] = {**tables["chamber"], "outline": drawn.name}
+    return Draft(tables, drawn, first.dxf_profile, first.chord_error, second.pockets)
+
+
 def _mm(rng: Random, low: float, high: float, digits: int = 3) -> float:
     return round(rng.uniform(low, high), digits)
+
+
+def _is_pair(tables: dict[str, Any]) -> bool:
+    return any(isinstance(width, list) for width in tables.get("laser", {}).values())
 
 
 def _common(rng: Random, name: str, family: str, most_balloons: int) -> dict[str, Any]:
