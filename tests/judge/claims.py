@@ -135,6 +135,8 @@ def _without_tab(folder: Folder, film: Layer) -> BaseGeometry:
     """A film of the bottom balloon as its pocket and the bond round it, other films as they are."""
     if film.balloon != 1:
         return film.profile
+    if folder.wish("chamber", "outline", None) is not None:
+        return Point(0, 0)  # the second balloon is the same without a tab
     bond = float(folder.wish("bond", "width", 0.75))
     pocket = next(
         layer.profile
