@@ -1,0 +1,142 @@
+"""The least width of every bond, between edges that face each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+from shapely import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from tests.judge.folder import Disagreement, Folder, Interface, pieces, place
+
+THINNEST = 0.004
+"""mm: narrower bonds are what flattened arcs make of edges that coincide."""
+TAPER = math.radians(30.0)
+"""Edges at a wider angle to each other are a corner, no bond that tapers (docs/rules.md)."""
+SQUARE = math.cos(TAPER / 2 + 0.02)
+NEAREST = 0.002
+"""mm: points of one edge, or of both sides of a sharp corner's tip."""
+STEP = 0.05
+FAN = math.radians(10.0)
+Array = NDArray[np.float64]
+
+
+def bond_of(interface: Interface) -> BaseGeometry:
+    """Where two consecutive films touch."""
+    bond = interface.below.profile.intersection(interface.above.profile)
+    for mask in interface.masks:
+        bond = bond.difference(mask.profile)
+    return shapely.MultiPolygon(list(pieces(bond, THINNEST)))
+
+
+def judge_bonds(folder: Folder) -> Iterator[Disagreement]:
+    """Every bond is as wide as the design's limit, and between balloons lies round a pin's hole."""
+    seen = set()
+    for interface in folder.interfaces:
+        if interface.shape in seen:
+            continue
+        seen.add(interface.shape)
+        bond = bond_of(interface)
+        where = f"interface {interface.number}"
+        for width, x, y in narrow_places(bond, folder.bond_limit - folder.slack):
+            yield Disagreement(
+                "bonds",
+                f"the bond of {where} is {width:.4f} wide at x {x:.3f}, y {y:.3f}, where "
+                f"{folder.bond_limit:g} are asked for",
+            )
+        if not interface.is_chamber and interface.below.role != "sheet":
+            yield from _stray(folder, bond, where)
+        if bond.is_empty:
+            yield Disagreement("bonds", f"nothing bonds at {where}")
+
+
+def _stray(folder: Folder, bond: BaseGeometry, where: str) -> Iterator[Disagreement]:
+    """Bonds between two balloons that are no ring round a bore, and no ear: neighbours that weld.
+
+    An ear is as wide as its pin and two bonds, and ends as far from the pin.
+    """
+    width = float(folder.wish("bond", "width", 0.75))
+    back = float(folder.wish("mask", "overhang", 0.5)) if folder.method == "ears" else 0.0
+    meant = shapely.union_all(
+        [
+            shapely.Point(hole.x, hole.y).buffer(math.sqrt(2) * (hole.radius + width) + back + 0.01)
+            for hole in folder.holes
+        ]
+    )
+    for part in pieces(bond.difference(meant), THINNEST):
+        yield Disagreement(
+            "bonds",
+            f"{part.area:.4f} mm2 of {where} bond where there is no bore, at {place(part)}",
+        )
+
+
+def narrow_places(region: BaseGeometry, limit: float) -> Iterator[tuple[float, float, float]]:
+    """Width, x and y of the narrowest place of each part of a region that is below a limit.
+
+    Measured between points of its edges that face each other through the region.
+    """
+    for part in pieces(region):
+        points, normals = _samples(part)
+        pairs = KDTree(points).query_pairs(limit, output_type="ndarray")
+        ways = points[pairs[:, 1]] - points[pairs[:, 0]]
+        lengths = np.hypot(ways[:, 0], ways[:, 1])
+        apart = lengths > NEAREST
+        pairs, ways, lengths = pairs[apart], ways[apart], lengths[apart]
+        along = ways / lengths[:, None]
+        one, other = normals[pairs[:, 0]], normals[pairs[:, 1]]
+        facing = (
+            ((one * other).sum(axis=1) <= -math.cos(TAPER))
+            & ((along * one).sum(axis=1) >= SQUARE)
+            & ((along * other).sum(axis=1) <= -SQUARE)
+        )
+        inside = part.buffer(1e-4)
+        shapely.prepare(inside)
+        for number in np.flatnonzero(facing)[np.argsort(lengths[facing])]:
+            ends = points[pairs[number]]
+            if inside.covers(LineString(ends)):
+                x, y = ends.mean(axis=0)
+                yield float(lengths[number]), float(x), float(y)
+                break
+
+
+def _samples(part: Polygon) -> tuple[Array, Array]:
+    """Points along the edges with the normals into the material; at concave corners a fan."""
+    points: list[tuple[float, float]] = []
+    normals: list[tuple[float, float]] = []
+    part = shapely.geometry.polygon.orient(part)
+    for ring in (part.exterior, *part.interiors):
+        _along(np.asarray(ring.coords), points, normals)
+    return np.array(points).reshape(-1, 2), np.array(normals).reshape(-1, 2)
+
+
+def _along(
+    corners: Array,
+    points: list[tuple[float, float]],
+    normals: list[tuple[float, float]],
+) -> None:
+    """The material lies to the left of a ring's corners."""
+    ways = np.diff(corners, axis=0)
+    lengths = np.hypot(ways[:, 0], ways[:, 1])
+    keep = lengths > 1e-7
+    starts, ways, lengths = corners[:-1][keep], ways[keep], lengths[keep]
+    headings = np.arctan2(ways[:, 1], ways[:, 0])
+    before_all = np.roll(headings, 1)
+    for number in range(len(starts)):
+        start, way, length = starts[number], ways[number], lengths[number]
+        heading, before = headings[number], before_all[number]
+        count = max(1, math.ceil(length / STEP))
+        inward = (-math.sin(heading), math.cos(heading))
+        for i in range(count + 1):
+            points.append(tuple(start + way * i / count))
+            normals.append(inward)
+        turn = (heading - before + math.pi) % (2 * math.pi) - math.pi
+        if turn < -0.02:  # to the right: the material bulges round a corner of the void
+            for i in range(1, math.ceil(-turn / FAN)):
+                at = before + turn * i / math.ceil(-turn / FAN) + math.pi / 2
+                points.append(tuple(start))
+                normals.append((math.cos(at), math.sin(at)))

@@ -1,0 +1,208 @@
+"""Many random designs: made by the program, judged from their files, counted."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import tempfile
+import time
+import traceback
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tests.judge.deck import judged
+from tests.judge.drafts import Draft, beside, draft
+from tests.judge.folder import Disagreement, open_folder
+from tests.judge.reading import UnreadableError
+from tests.judge.sheets import judge_sheets
+from tests.judge.using import Ended, sbafab
+
+TOGETHER = 15
+ANOTHER = 1_000_000
+"""Added to a design's number for the one that is cut with it."""
+
+
+@dataclass
+class Case:
+    """What became of one design."""
+
+    name: str
+    family: str
+    typed: str = ""
+    refused: str = ""
+    disagreements: list[Disagreement] = field(default_factory=list)
+    seconds: float = 0.0
+
+    @property
+    def is_judged(self) -> bool:
+        return not self.refused
+
+
+@dataclass(frozen=True)
+class Ways:
+    """How designs are made: everything by ``generate``, or ``lean``: cut files and schedule."""
+
+    lean: bool = False
+    check: bool = True
+    most_balloons: int = 4
+    keep: Path | None = None
+
+
+def run_case(seed: int, number: int, ways: Ways = Ways()) -> Case:
+    """One design made and judged, or every ``TOGETHER``-th time two that are cut together."""
+    made = [draft(seed, number, ways.most_balloons)]
+    if number % TOGETHER == TOGETHER - 1:
+        made.append(beside(made[0], draft(seed, ANOTHER + number, ways.most_balloons)))
+    families = " and ".join(str(one.tables["family"]) for one in made)
+    case = Case(made[0].name, families)
+    began = time.process_time()
+    with tempfile.TemporaryDirectory() as scratch:
+        home = Path(scratch)
+        try:
+            if len(made) == 1:
+                _one(case, made[0], home, ways)
+            else:
+                _together(case, made, home, ways)
+        except Exception as error:  # a crash of the program, or of a judge, is a finding too
+            lines = traceback.format_exception_only(error)[-1].strip()
+            at = traceback.extract_tb(error.__traceback__)[-1]
+            said = f"{lines} ({Path(at.filename).name}:{at.lineno})"
+            case.disagreements.append(Disagreement("crash", said))
+        if case.disagreements and ways.keep is not None:
+            kept = ways.keep / case.name
+            shutil.rmtree(kept, ignore_errors=True)
+            shutil.copytree(home, kept)
+    case.seconds = time.process_time() - began
+    return case
+
+
+def _one(case: Case, made: Draft, home: Path, ways: Ways) -> None:
+    design = made.write(home)
+    commands = ["cut", "press"] if ways.lean else ["generate"]
+    case.typed = " ".join(["sbafab", commands[0], design.name, *made.options])
+    folder = home / "out" / made.name
+    for command in commands:
+        options = made.options if command != "press" else []
+        if _refused(case, sbafab(command, design, "-o", home / "out", *options), folder):
+            return
+    case.disagreements += _judged(folder, design, made)
+    if ways.check:
+        _check(case, folder)
+
+
+def _together(case: Case, made: list[Draft], home: Path, ways: Ways) -> None:
+    """Designs on common sheets: each one judged by itself, the sheets against all of them."""
+    designs = [one.write(home) for one in made]
+    names = [design.name for design in designs]
+    case.typed = " ".join(["sbafab", "nest", *names, *made[0].options])
+    ended = sbafab("nest", *designs, "-o", home / "out", *made[0].options)
+    if _refused(case, ended, home / "out"):
+        return
+    job = home / "out" / "job"
+    for one, design in zip(made, designs, strict=True):
+        case.disagreements += _judged(job / one.name, design, one)
+    try:
+        folders = [
+            open_folder(job / one.name, design, one.chord_error)
+            for one, design in zip(made, designs, strict=True)
+        ]
+        sheets = json.loads((job / "manifest.json").read_text(encoding="utf-8"))["sheets"]
+        case.disagreements += judge_sheets(folders, job, sheets)
+    except UnreadableError as error:
+        case.disagreements.append(Disagreement("reading", str(error)))
+    if ways.check:
+        _check(case, job)
+
+
+def _refused(case: Case, ended: Ended, folder: Path) -> bool:
+    if ended.code:
+        case.refused = _reason(ended, folder)
+    if ended.code not in (0, 1, 2):
+        case.disagreements.append(Disagreement("exit", f"code {ended.code}: {ended.said}"))
+    return bool(ended.code)
+
+
+def _check(case: Case, folder: Path) -> None:
+    """What the program itself says of the folder that it has just written without complaint."""
+    checked = sbafab("check", folder, "--json")
+    if checked.code:
+        why = _reason(checked)
+        case.disagreements.append(Disagreement("check", f"exit {checked.code}: {why}"))
+
+
+def _judged(folder: Path, design: Path, made: Draft) -> list[Disagreement]:
+    try:
+        opened = open_folder(folder, design, made.chord_error)
+        return judged(opened, made.pockets)
+    except UnreadableError as error:
+        return [Disagreement("reading", str(error))]
+
+
+def _reason(ended: Ended, folder: Path | None = None) -> str:
+    """Rules that fail, or the sentence without its numbers."""
+    text = ended.out
+    if folder is not None and (folder / "checks.json").is_file():
+        text = (folder / "checks.json").read_text(encoding="utf-8")
+    try:
+        findings = json.loads(text)["findings"] if ended.code == 1 else []
+    except (ValueError, KeyError, TypeError):
+        findings = []
+    failed = sorted({f["rule"] for f in findings if f["verdict"] == "fail"})
+    if failed:
+        return "rule " + ", ".join(failed)
+    sentence = " ".join(ended.said.split())
+    sentence = re.sub(r"s\d+n\d+", "NAME", sentence)
+    sentence = re.sub(r"\S*pocket\.(svg|dxf)", r"pocket.\1", sentence)
+    return re.sub(r"-?\d+(\.\d+)?(e-?\d+)?", "#", sentence)[:110] or f"exit {ended.code}"
+
+
+def run_cases(seed: int, count: int, ways: Ways, jobs: int, start: int = 0) -> Iterator[Case]:
+    """Cases in their order, on one process or several."""
+    numbers = range(start, start + count)
+    if jobs == 1:
+        for number in numbers:
+            yield run_case(seed, number, ways)
+        return
+    with ProcessPoolExecutor(jobs) as pool:
+        yield from pool.map(run_case, [seed] * count, numbers, [ways] * count, chunksize=4)
+
+
+def table(cases: list[Case]) -> str:
+    """Designs by what became of them, and every disagreement with its design."""
+    judged_cases = [case for case in cases if case.is_judged]
+    wrong = [case for case in cases if case.disagreements]
+    lines = [
+        f"designs        {len(cases)}",
+        f"refused        {len(cases) - len(judged_cases)}",
+        *(
+            f"  {count:4d}  {reason}"
+            for reason, count in Counter(c.refused for c in cases if c.refused).most_common()
+        ),
+        f"judged         {len(judged_cases)}",
+        *(
+            f"  {count:4d}  {family}"
+            for family, count in Counter(c.family for c in judged_cases).most_common()
+        ),
+        f"disagreements  {len(wrong)}",
+        *(
+            f"  {count:4d}  {judge}"
+            for judge, count in Counter(
+                judge for c in wrong for judge in {d.judge for d in c.disagreements}
+            ).most_common()
+        ),
+    ]
+    for case in wrong:
+        lines.append(f"{case.name} ({case.family}): {case.typed}")
+        by_judge: dict[str, list[str]] = {}
+        for found in case.disagreements:
+            by_judge.setdefault(found.judge, []).append(found.said)
+        for judge, said in by_judge.items():
+            more = f" (and {len(said) - 2} more)" if len(said) > 2 else ""
+            lines += [f"    {judge}: {sentence}" for sentence in said[:2]]
+            lines[-1] += more
+    lines.append(f"processor time {sum(case.seconds for case in cases):.0f} s")
+    return "\n".join(lines)

@@ -1,0 +1,152 @@
+"""What manifest and traveller say of sizes and areas, against the files."""
+
+from __future__ import annotations
+
+import hashlib
+import html
+import re
+from collections.abc import Iterator
+
+import numpy as np
+import shapely
+from shapely import Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from tests.judge.bonds import bond_of
+from tests.judge.folder import Disagreement, Folder, Layer, asked_kerf, pieces
+
+SHARE = 1e-4
+SIZE = 0.002
+"""mm by which a stated size may differ."""
+STRIP = 0.02
+"""mm, about, of an inlet strip that is not told apart from its pocket."""
+CIRCLE = re.compile(r"Fits a circle of\s+([\d.]+)\s*mm")
+EXTENT = re.compile(r"(Width|Length) of all that is cut[a-z, ]*\s+([\d.]+)\s*mm")
+
+
+def judge_claims(folder: Folder) -> Iterator[Disagreement]:
+    """Areas, pieces and sizes are those of the files, and the files those of the hashes."""
+    yield from _files(folder)
+    yield from _layers(folder)
+    yield from _interfaces(folder)
+    yield from _sizes(folder)
+
+
+def _files(folder: Folder) -> Iterator[Disagreement]:
+    for name, stated in folder.manifest["files"].items():
+        path = folder.path / name
+        if not path.is_file():
+            yield Disagreement("claims", f"{name} is listed and missing")
+        elif hashlib.sha256(path.read_bytes()).hexdigest() != stated:
+            yield Disagreement("claims", f"{name} is not the file that is listed")
+
+
+def _slack(folder: Folder, region: BaseGeometry) -> float:
+    """mm2 by which an area may differ: arcs drawn as chords, corners that a beam rounds."""
+    kerf = max(max(asked_kerf(folder.asked, film) or (0.0, 0.0)) for film in ("tpe", "ptfe"))
+    corners = 40 * (kerf / 2) ** 2
+    return SHARE * region.area + region.length * (folder.chord_error + 5e-4) + corners
+
+
+def _layers(folder: Folder) -> Iterator[Disagreement]:
+    for layer, entry in zip(folder.layers, folder.manifest["layers"], strict=True):
+        area = layer.profile.area
+        if abs(area - entry["area"]) > _slack(folder, layer.profile):
+            yield Disagreement(
+                "claims", f"layer {layer.index} has {area:.4f} mm2, stated {entry['area']:.4f}"
+            )
+        count = len(list(pieces(layer.profile)))
+        if count != entry["pieces"]:
+            yield Disagreement(
+                "claims", f"layer {layer.index} has {count} pieces, stated {entry['pieces']}"
+            )
+    for film in folder.manifest["films"]:
+        own = [layer for layer in folder.layers if layer.material == film["material"]]
+        area = sum(layer.profile.area for layer in own)
+        slack = sum(_slack(folder, layer.profile) for layer in own)
+        copies = int(folder.wish("order", "copies", 1))
+        if min(abs(area - film["area"]), abs(copies * area - film["area"])) > slack * copies:
+            yield Disagreement(
+                "claims", f"{film['material']} has {area:.4f} mm2, stated {film['area']:.4f}"
+            )
+
+
+def _interfaces(folder: Folder) -> Iterator[Disagreement]:
+    stated = folder.manifest["interfaces"]
+    if len(stated) != len(folder.interfaces):
+        yield Disagreement("claims", f"{len(stated)} interfaces stated of {len(folder.interfaces)}")
+        return
+    for interface, entry in zip(folder.interfaces, stated, strict=True):
+        contact = interface.below.profile.intersection(interface.above.profile)
+        bond = bond_of(interface)
+        for name, region in (("contact", contact), ("bond", bond)):
+            slack = _slack(folder, contact) + _slack(folder, bond)
+            if abs(region.area - entry[f"{name}_area"]) > slack:
+                yield Disagreement(
+                    "claims",
+                    f"the {name} of interface {interface.number} has {region.area:.4f} mm2, "
+                    f"stated {entry[f'{name}_area']:.4f}",
+                )
+
+
+def _sizes(folder: Folder) -> Iterator[Disagreement]:
+    whole = shapely.union_all([layer.profile for layer in folder.layers])
+    low_x, low_y, high_x, high_y = whole.bounds
+    slack = SIZE + folder.chord_error + folder.slack
+    measured = {
+        "thickness": sum(layer.thickness for layer in folder.layers),
+        "width": high_x - low_x,
+        "length": high_y - low_y,
+    }
+    stated = folder.manifest["sizes"]
+    for name, value in measured.items():
+        if abs(stated[name] - value) > slack:
+            yield Disagreement("claims", f"the {name} is {value:.3f}, stated {stated[name]:.3f}")
+    circles = [stated["outline_diameter"]] if "outline_diameter" in stated else []
+    page = folder.path / "traveller.html"
+    if page.is_file():
+        text = re.sub(r"<[^>]*>", " ", html.unescape(page.read_text(encoding="utf-8")))
+        circles += [float(found) for found in CIRCLE.findall(text)]
+        for name, value in EXTENT.findall(text):
+            if abs(float(value) - measured[name.lower()]) > slack + 0.001:
+                yield Disagreement(
+                    "claims", f"the traveller says {name.lower()} {value}, which is not the files'"
+                )
+    yield from _circles(folder, circles, slack + 0.0006)
+
+
+def _circles(folder: Folder, circles: list[float], slack: float) -> Iterator[Disagreement]:
+    """A circle that is stated holds all films but tabs, and is no larger than it must be."""
+    if not circles:
+        return
+    body = shapely.union_all([_without_tab(folder, film) for film in folder.films])
+    # Round the axis: what lies farther out on one side cannot be turned inside a tube.
+    least = 2 * shapely.minimum_bounding_radius(body)
+    far = shapely.get_coordinates(body)
+    most = 2 * float(np.hypot(far[:, 0], far[:, 1]).max())
+    for circle in circles:
+        if not least - STRIP - slack <= circle <= most + slack:
+            yield Disagreement(
+                "claims", f"it is said to fit a circle of {circle:g}, and takes {least:.3f}"
+            )
+
+
+def _without_tab(folder: Folder, film: Layer) -> BaseGeometry:
+    """A film of the bottom balloon as its pocket and the bond round it, other films as they are."""
+    if film.balloon != 1:
+        return film.profile
+    if folder.wish("chamber", "outline", None) is not None:
+        return Point(0, 0)  # the second balloon is the same without a tab
+    bond = float(folder.wish("bond", "width", 0.75))
+    pocket = next(
+        layer.profile
+        for layer in folder.layers
+        if layer.balloon == 1 and layer.role == "chamber-mask"
+    )
+    # Where the widest disc of a pocket cannot go is its strip, or a corner of a drawn one.
+    bodies = [Point(0, 0).buffer(0.01)]
+    for part in pieces(pocket):
+        filled = Polygon(part.exterior)
+        widest = 0.97 * shapely.maximum_inscribed_circle(filled, 0.01).length
+        bodies.append(filled.buffer(-widest).buffer(widest).buffer(bond))
+    return shapely.union_all(bodies)

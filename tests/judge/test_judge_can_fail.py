@@ -1,0 +1,382 @@
+"""Every judge sees the fault that is its own, and says nothing of sound folders."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomli_w
+from shapely import Point, Polygon, affinity, box
+from shapely.geometry.base import BaseGeometry
+
+from tests.judge import deck
+from tests.judge.bonds import judge_bonds
+from tests.judge.claims import judge_claims
+from tests.judge.doctoring import (
+    Patient,
+    add_part,
+    moved_hole,
+    parts_of,
+    shift,
+    without_hole,
+)
+from tests.judge.drawings import svg_drawing
+from tests.judge.facing import judge_facing
+from tests.judge.folder import Disagreement, Folder
+from tests.judge.overhangs import judge_overhangs
+from tests.judge.pins import judge_pins
+from tests.judge.pockets import judge_pockets
+from tests.judge.pressing import judge_press
+from tests.judge.sheets import judge_sheets
+from tests.judge.using import sbafab
+from tests.judge.voids import judge_voids
+
+RULES = {"yield_builds": 100, "worst_bond_width": 0, "worst_mask_overhang": 0}
+BLOB = svg_drawing("M3,0 C3,2 1,2.6 -0.5,2.4 S-3.4,1 -2.6,-1 S3,-2.4 3,0 Z")
+DESIGNS: dict[str, dict[str, Any]] = {
+    # Layers: 1 base, 2 pocket, 3 wall, 4 separator, 5 wall, 6 pocket, 7 wall ... 11 cap.
+    "stack": {"family": "1dof", "stack": {"balloons": 3}},
+    "pinned": {
+        "family": "lobed",
+        "stack": {"balloons": 2},
+        "registration": {"method": "ears"},
+        "laser": {"kerf_tpe": [0.12, 0.1], "kerf_ptfe": 0.08},
+    },
+    "drawn": {"family": "1dof", "stack": {"balloons": 2}, "chamber": {"outline": "pocket.svg"}},
+}
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Patient]:
+    """One folder a design, as the program writes it."""
+    home = tmp_path_factory.mktemp("sound")
+    made = {}
+    (home / "pocket.svg").write_text(BLOB.text)
+    for name, tables in DESIGNS.items():
+        design = home / f"{name}.toml"
+        design.write_text(tomli_w.dumps({"name": name, **tables, "rules": RULES}))
+        commands = ("generate",) if name == "stack" else ("cut", "press")
+        for command in commands:
+            ended = sbafab(command, design, "-o", home / "out")
+            assert ended.code == 0, ended.said
+        made[name] = Patient(home / "out" / name, design)
+    return made
+
+
+@pytest.fixture
+def patient(sound: dict[str, Patient], tmp_path: Path, request: pytest.FixtureRequest) -> Patient:
+    healthy = sound[request.param]
+    copy = tmp_path / "copy"
+    shutil.copytree(healthy.folder, copy)
+    return Patient(copy, healthy.design)
+
+
+def on_sheets(folder: Folder) -> Iterator[Disagreement]:
+    return judge_sheets([folder], folder.path, folder.manifest["sheets"])
+
+
+def of_blob(folder: Folder) -> Iterator[Disagreement]:
+    return judge_pockets(folder, [BLOB.pocket] * 2)
+
+
+@pytest.mark.parametrize("name", DESIGNS)
+def test_sound_folders_are_left_alone(sound: dict[str, Patient], name: str) -> None:
+    drawn = [BLOB.pocket] * 2 if name == "drawn" else None
+    folder = sound[name].opened()
+    said = deck.judged(folder, drawn)
+    # The traveller's circle of a stack of equal balloons is theirs.
+    assert said == []
+
+
+Fault = tuple[str, Callable[[Patient], object], Callable[[Folder], Iterator[Disagreement]], str]
+
+
+def _shrunk_middle(patient: Patient) -> None:
+    """The middle balloon becomes a smaller one, and so do the masks on either side of it."""
+    patient.redraw([5, 7], lambda film: film & Point(0, 0).buffer(2.6))
+    patient.redraw([4, 8], lambda mask: mask & Point(0, 0).buffer(2.9))
+
+
+def _bridge(region: BaseGeometry) -> BaseGeometry:
+    """Two pockets of a lobed balloon joined."""
+    one, other = (part.centroid for part in list(region.geoms)[:2])
+    return region | Polygon(
+        [(one.x, one.y), (other.x, other.y), (other.x + 0.4, other.y), (one.x + 0.4, one.y)]
+    )
+
+
+def _swapped(manifest: dict[str, Any]) -> None:
+    below, above = manifest["layers"][4], manifest["layers"][5]
+    below["file"], above["file"] = above["file"], below["file"]
+
+
+def _first_part_off(space: Any) -> None:
+    for entity in parts_of(space)[0][1]:
+        space.delete_entity(entity)
+
+
+def _one_part_more(space: Any) -> None:
+    add_part(space, Polygon([(120, 120), (126, 120), (126, 126), (120, 126)]))
+
+
+def _parts_near(space: Any) -> None:
+    """The second part beside the first, nearer than 1 mm."""
+    (one, _), (other, entities) = parts_of(space)[:2]
+    shift(entities, one[2] - other[0] + 0.9, one[1] - other[1])
+
+
+def _into_border(space: Any) -> None:
+    extent, entities = parts_of(space)[0]
+    shift(entities, 0.0, 9.99 - extent[1])
+
+
+def _line_through(layer: str) -> Callable[[Any], object]:
+    return lambda space: space.add_line((0, 0), (150, 150), dxfattribs={"layer": layer})
+
+
+def _plate_hole_off(space: Any) -> None:
+    hole = next(e for e in space if e.dxftype() == "CIRCLE" and e.dxf.layer == "CUT_INNER")
+    hole.translate(0.05, 0, 0)
+
+
+def _plate_hole_more(space: Any) -> None:
+    space.add_circle((1.0, 1.0), 0.75, dxfattribs={"layer": "CUT_INNER"})
+
+
+def _later_last(press: dict[str, Any]) -> None:
+    press["steps"][0]["adds"], press["steps"][0]["layers"] = [3, 2], [3, 2]
+
+
+FAULTS: dict[str, Fault] = {
+    "films that meet past a smaller balloon": (
+        "stack",
+        _shrunk_middle,
+        judge_facing,
+        "films 3 and 9",
+    ),
+    "a layer in another's place": (
+        "stack",
+        lambda p: p.edit("manifest.json", _swapped),
+        judge_bonds,
+        "nothing bonds at interface 3",
+    ),
+    "a narrowed ring": (
+        "stack",
+        lambda p: p.redraw([6], lambda m: m.buffer(0.01)),
+        judge_bonds,
+        "interface 3 is 0.7397",
+    ),
+    "a narrowed neck": (
+        "stack",
+        lambda p: p.redraw([4], lambda m: m.buffer(0.01)),
+        judge_bonds,
+        "interface 2 is 0.7397",
+    ),
+    "a missing mask": (
+        "stack",
+        lambda p: p.redraw([4], lambda m: m & box(2, 2, 9, 9)),
+        judge_bonds,
+        "no bore",
+    ),
+    "a bond where none belongs": (
+        "stack",
+        lambda p: p.redraw([4], lambda m: m - Point(0, 2.4).buffer(0.5)),
+        judge_bonds,
+        "bond where there is no bore",
+    ),
+    "a short overhang": (
+        "stack",
+        lambda p: p.redraw([8], lambda m: m & Point(0, 0).buffer(3.74, 256)),
+        judge_overhangs,
+        "interface 4 the mask reaches only 0.49",
+    ),
+    "a bore without overhang": (
+        "pinned",
+        lambda p: p.redraw([5], lambda film: film.buffer(0.02)),
+        judge_overhangs,
+        "past the edge of film 5",
+    ),
+    "merged pockets": ("pinned", lambda p: p.redraw([6], _bridge), judge_voids, "pockets"),
+    "a closed bore": (
+        "stack",
+        lambda p: p.redraw([5], lambda film: without_hole(film, 0)),
+        judge_voids,
+        "no inlet reaches the pocket at interface 3",
+    ),
+    "a leak": (
+        "stack",
+        lambda p: p.redraw([6], lambda mask: mask | box(-5, 1.0, 0, 1.5)),
+        judge_voids,
+        "leaks to the outside",
+    ),
+    "no inlet": (
+        "stack",
+        lambda p: p.redraw([2], lambda mask: mask & Point(0, 0).buffer(2.6)),
+        judge_voids,
+        "0 inlets",
+    ),
+    "a narrow inlet": (
+        "stack",
+        lambda p: p.redraw([2], lambda mask: mask - box(2.4, 0.5, 20, 2)),
+        judge_voids,
+        "the tube takes",
+    ),
+    "a shifted tooling hole": (
+        "pinned",
+        lambda p: p.redraw([1], lambda film: moved_hole(film, -1, 0.05, 0)),
+        judge_pins,
+        "layer 1",
+    ),
+    "a hole of the plate off its place": (
+        "stack",
+        lambda p: p.edit_dxf("sheets/fixture.dxf", _plate_hole_off),
+        judge_pins,
+        "no hole for pin",
+    ),
+    "a hole of the plate for nothing": (
+        "stack",
+        lambda p: p.edit_dxf("sheets/fixture.dxf", _plate_hole_more),
+        judge_pins,
+        "hole for no pin",
+    ),
+    "a film across a pin": (
+        "stack",
+        lambda p: p.redraw([7], lambda film: without_hole(film, 0)),
+        judge_pins,
+        "stands in layer 7",
+    ),
+    "pins that are out": (
+        "stack",
+        lambda p: p.edit("press.json", lambda press: press["steps"][0].update(pins=[])),
+        judge_pins,
+        "0 pins hold a piece of layer",
+    ),
+    "a missing part": (
+        "stack",
+        lambda p: p.edit_dxf("sheets/TPE_1.dxf", _first_part_off),
+        on_sheets,
+        "the sheets lack 1",
+    ),
+    "a part of no layer": (
+        "stack",
+        lambda p: p.edit_dxf("sheets/TPE_1.dxf", _one_part_more),
+        on_sheets,
+        "no piece of a layer",
+    ),
+    "parts too near": (
+        "stack",
+        lambda p: p.edit_dxf("sheets/TPE_1.dxf", _parts_near),
+        on_sheets,
+        "apart at",
+    ),
+    "a part in the border": (
+        "stack",
+        lambda p: p.edit_dxf("sheets/PTFE_1.dxf", _into_border),
+        on_sheets,
+        "in the border",
+    ),
+    "a stray line": (
+        "stack",
+        lambda p: p.edit_dxf("sheets/TPE_1.dxf", _line_through("ENGRAVE")),
+        on_sheets,
+        "crosses a part",
+    ),
+    "a layer that the sheets do not cut": (
+        "pinned",
+        lambda p: p.redraw([5], lambda film: film.buffer(0.01)),
+        on_sheets,
+        "no piece of a layer",
+    ),
+    "a wrong size": (
+        "stack",
+        lambda p: p.edit("manifest.json", lambda m: m["sizes"].update(width=13.0)),
+        judge_claims,
+        "the width",
+    ),
+    "a wrong circle on the traveller": (
+        "stack",
+        lambda p: p.replace("traveller.html", "6.5 mm", "6.3 mm"),
+        judge_claims,
+        "said to fit a circle of 6.3",
+    ),
+    "a wrong area": (
+        "stack",
+        lambda p: p.edit("manifest.json", lambda m: m["layers"][2].update(area=30.0)),
+        judge_claims,
+        "layer 3 has",
+    ),
+    "a wrong bond area": (
+        "stack",
+        lambda p: p.edit("manifest.json", lambda m: m["interfaces"][1].update(bond_area=1.0)),
+        judge_claims,
+        "the bond of interface 2",
+    ),
+    "a changed file": (
+        "stack",
+        lambda p: p.replace("press.csv", "135", "136"),
+        judge_claims,
+        "press.csv is not the file",
+    ),
+    "kerf that was not compensated": (
+        "pinned",
+        lambda p: p.redraw([3], lambda film: film.buffer(-0.05)),
+        judge_claims,
+        "layer 3 has",
+    ),
+    "a layer that is never added": (
+        "stack",
+        lambda p: p.edit("press.json", lambda press: press["steps"][1].update(adds=[])),
+        judge_press,
+        "layer 1 is added 0 times",
+    ),
+    "an upper layer before a lower one": (
+        "stack",
+        lambda p: p.edit("press.json", _later_last),
+        judge_press,
+        "lower before upper",
+    ),
+    "a press too hot": (
+        "stack",
+        lambda p: p.edit("press.json", lambda press: press["steps"][2].update(temperature_c=270.0)),
+        judge_press,
+        "270 C",
+    ),
+    "a missing step": (
+        "stack",
+        lambda p: p.edit("press.json", lambda press: press["steps"].pop()),
+        judge_press,
+        "not a full bond of the whole",
+    ),
+    "a pocket turned over": (
+        "drawn",
+        lambda p: p.redraw([6], lambda m: affinity.scale(m, 1, -1, origin=(0, 0))),
+        of_blob,
+        "of what was drawn",
+    ),
+    "a pocket of another size": (
+        "drawn",
+        lambda p: p.redraw([6], lambda m: affinity.scale(m, 1.01, 1.01, origin=(0, 0))),
+        of_blob,
+        "has more by",
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    ("patient", "harm", "judge", "said"),
+    FAULTS.values(),
+    ids=FAULTS,
+    indirect=["patient"],
+)
+def test_a_fault_is_seen_by_its_judge(
+    patient: Patient,
+    harm: Callable[[Patient], object],
+    judge: Callable[[Folder], Iterator[Disagreement]],
+    said: str,
+) -> None:
+    harm(patient)
+    found = [disagreement.said for disagreement in judge(patient.opened())]
+    assert any(said in sentence for sentence in found), found

@@ -1,0 +1,217 @@
+"""Where air goes: the gaps between films, joined by the films' openings, from every inlet on.
+
+A gap is all that is not bonded between two consecutive films, the plane around them included.
+Masks seal nothing. An inlet is where the gap of the bottom pocket leaves the films; it is plugged,
+and what can then be reached from it must be its own chamber and nothing else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import shapely
+from shapely import Polygon, box
+from shapely.geometry.base import BaseGeometry
+
+from tests.judge.bonds import bond_of
+from tests.judge.folder import Disagreement, Folder, Interface, pieces, place
+
+THINNEST = 0.004
+PLUG = 0.05
+"""mm of film that a plug takes the place of."""
+OUTSIDE = ("outside",)
+Node = tuple[object, ...]
+
+
+class Gap(NamedTuple):
+    """A connected piece of what is open between two films, and its node in the graph."""
+
+    node: Node
+    region: Polygon
+    is_pocket: bool
+
+
+class Inlet(NamedTuple):
+    """The mouth of a bottom pocket: its node and how wide it is."""
+
+    node: Node
+    width: float
+    at: str
+
+
+class Graph:
+    """Nodes that air can go between."""
+
+    def __init__(self) -> None:
+        self._next: dict[Node, set[Node]] = defaultdict(set)
+
+    def join(self, one: Node, other: Node) -> None:
+        self._next[one].add(other)
+        self._next[other].add(one)
+
+    def reached(self, start: Node) -> set[Node]:
+        found, left = {start}, [start]
+        while left:
+            for node in self._next[left.pop()] - found:
+                found.add(node)
+                left.append(node)
+        return found
+
+
+def judge_voids(folder: Folder) -> Iterator[Disagreement]:
+    """From every inlet its own chamber's pockets are reached, and nothing else."""
+    low_x, low_y, high_x, high_y = shapely.union_all([f.profile for f in folder.films]).bounds
+    plane = box(low_x - 5, low_y - 5, high_x + 5, high_y + 5)
+    bottom = next((i for i in folder.interfaces if i.is_chamber), None)
+    if bottom is None:
+        yield Disagreement("voids", "no interface has a chamber mask")
+        return
+    mouths, plugs = _mouths(bottom)
+    graph = Graph()
+    gaps = {i.number: _gaps(i, plane, plugs if i is bottom else None) for i in folder.interfaces}
+    _join_openings(folder, plane, gaps, graph)
+    yield from _said(folder, graph, gaps, mouths, bottom)
+
+
+def _mouths(bottom: Interface) -> tuple[list[tuple[BaseGeometry, float]], BaseGeometry]:
+    """Where the bottom pockets leave the films that both cover them, and how wide; the plugs."""
+    contact = bottom.below.profile.intersection(bottom.above.profile)
+    mask = shapely.union_all([m.profile for m in bottom.masks])
+    whole = shapely.MultiPolygon([Polygon(part.exterior) for part in pieces(contact)])
+    out = mask.difference(whole.buffer(THINNEST))
+    mouths = []
+    for part in pieces(out, 0.02):
+        line = whole.boundary.intersection(part.buffer(2 * THINNEST)).intersection(mask)
+        if line.length > 0.02:
+            mouths.append((line, line.length))
+    plugs = shapely.union_all([line.buffer(PLUG, cap_style="square") for line, _ in mouths])
+    return mouths, plugs
+
+
+def _gaps(interface: Interface, plane: Polygon, plugs: BaseGeometry | None) -> list[Gap]:
+    gap = plane.difference(bond_of(interface))
+    if plugs is not None and not plugs.is_empty:
+        gap = gap.difference(plugs)
+    masks = shapely.union_all([mask.profile for mask in interface.masks])
+    contact = interface.below.profile.intersection(interface.above.profile)
+    found = []
+    for number, part in enumerate(pieces(gap, THINNEST)):
+        open_part = part.intersection(masks).intersection(contact)
+        is_pocket = interface.is_chamber and any(pieces(open_part, 0.1))
+        found.append(Gap(("gap", interface.number, number), part, is_pocket))
+    return found
+
+
+def _join_openings(
+    folder: Folder, plane: Polygon, gaps: dict[int, list[Gap]], graph: Graph
+) -> None:
+    """Every opening of a film joins the gaps below and above it; the outside lies round all."""
+    films = folder.films
+    corner = shapely.Point(plane.exterior.coords[0]).buffer(1.0)
+    for number, film in enumerate(films, start=1):
+        below = gaps.get(number - 1, [])
+        above = gaps.get(number, [])
+        for part_number, opening in enumerate(pieces(plane.difference(film.profile), THINNEST)):
+            node = ("opening", film.index, part_number)
+            if number in (1, len(films)) or opening.intersects(corner):
+                graph.join(node, OUTSIDE)
+            for gap in (*below, *above):
+                if any(pieces(gap.region.intersection(opening), THINNEST)):
+                    graph.join(node, gap.node)
+
+
+def _said(
+    folder: Folder,
+    graph: Graph,
+    gaps: dict[int, list[Gap]],
+    mouths: list[tuple[BaseGeometry, float]],
+    bottom: Interface,
+) -> Iterator[Disagreement]:
+    pockets = {gap.node: gap for found in gaps.values() for gap in found if gap.is_pocket}
+    chambers = _chambers(folder)
+    wanted = {
+        i.number: chambers.count if chambers.manifold and i is not bottom else 1
+        for i in folder.interfaces
+        if i.is_chamber
+    }
+    fed: dict[Node, list[str]] = defaultdict(list)
+    count = 0
+    for line, width in mouths:
+        at = place(line)
+        for gap in gaps[bottom.number]:
+            if gap.is_pocket and gap.region.distance(line) < 2 * PLUG:
+                count += 1
+                reached = graph.reached(gap.node)
+                yield from _tube(folder, width, at)
+                yield from _from_inlet(reached, at, pockets, wanted)
+                for node in reached & set(pockets):
+                    fed[node].append(at)
+    if count != (1 if chambers.manifold else chambers.count):
+        yield Disagreement("voids", f"{count} inlets lead into the bottom pockets")
+    yield from _pockets(graph, pockets, fed)
+    for number in wanted:
+        found = sum(node[1] == number for node in pockets)
+        meant = 1 if chambers.manifold and number == bottom.number else chambers.count
+        if found != meant:
+            yield Disagreement(
+                "voids", f"{found} pockets at interface {number}, where {meant} were asked for"
+            )
+
+
+def _from_inlet(
+    reached: set[Node], at: str, pockets: dict[Node, Gap], wanted: dict[int, int]
+) -> Iterator[Disagreement]:
+    """What an inlet reaches: as many pockets as wanted at every interface, and no way out."""
+    if OUTSIDE in reached:
+        yield Disagreement("voids", f"the chamber of the inlet at {at} leaks to the outside")
+        return
+    for number, meant in wanted.items():
+        own = sum(node[1] == number for node in reached & set(pockets))
+        if own != meant:
+            yield Disagreement(
+                "voids",
+                f"from the inlet at {at} {own} pockets are reached at interface {number}, where "
+                f"{meant} belong to its chamber",
+            )
+
+
+def _pockets(
+    graph: Graph, pockets: dict[Node, Gap], fed: dict[Node, list[str]]
+) -> Iterator[Disagreement]:
+    for node, gap in pockets.items():
+        if len(fed[node]) == 1:
+            continue
+        at = f"the pocket at interface {node[1]}, {place(gap.region)}"
+        if fed[node]:
+            yield Disagreement("voids", f"inlets {' and '.join(fed[node])} both reach {at}")
+        elif OUTSIDE in graph.reached(node):
+            yield Disagreement("voids", f"{at}, is open")
+        else:
+            yield Disagreement("voids", f"no inlet reaches {at}")
+
+
+class Chambers(NamedTuple):
+    """How many pockets lie side by side, and whether one inlet feeds all."""
+
+    count: int
+    manifold: bool
+
+
+def _chambers(folder: Folder) -> Chambers:
+    family = folder.asked["family"]
+    if family == "1dof":
+        return Chambers(1, False)
+    count = int(folder.wish("chamber", "count", 3))
+    return Chambers(count, family == "radial" and bool(folder.wish("inlet", "manifold", False)))
+
+
+def _tube(folder: Folder, width: float, at: str) -> Iterator[Disagreement]:
+    """The inlet opens to half the tube's perimeter."""
+    needed = math.pi * float(folder.wish("inlet", "tube_outer_diameter", 1.016)) / 2
+    if width < needed - 2 * folder.slack:
+        yield Disagreement(
+            "voids", f"the inlet at {at} is {width:.4f} wide, and the tube takes {needed:.4f}"
+        )
