@@ -13,8 +13,9 @@ from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import spread
 
-END_ROOM = 1e-5
-"""mm left out at both ends of an edge: what starts at a corner does not lie beside the edge."""
+END_ROOM = 4e-3
+"""mm left out at both ends of an edge: what starts at a corner does not lie beside the edge, nor
+where corner and start are each off by the 1 um that cut files promise."""
 
 
 def edges_along(region: Region, other: Region) -> list[Edge]:
@@ -103,7 +104,7 @@ class _Band(NamedTuple):
     def height(self, p: Point) -> float | None:
         """Distance of ``p`` from the edge along the normal; None beside the band."""
         edge = self.edge
-        room = 0.5 * END_ROOM / edge.length
+        room = 0.5 * _end_room(edge) / edge.length
         if not room <= edge.parameter(p) <= 1 - room:
             return None
         if isinstance(edge, Arc):
@@ -121,16 +122,22 @@ class _Band(NamedTuple):
             yield from _on_ray(origin, unit, other)
 
 
+def _end_room(edge: Edge) -> float:
+    """What is left out at each end; of a short edge a quarter."""
+    return min(END_ROOM, edge.length / 4)
+
+
 def _line_band(line: Line) -> _Band:
     ux, uy = line.direction(line.start)
     (x0, y0), (x1, y1) = line.start, line.end
-    first = (x0 + ux * END_ROOM, y0 + uy * END_ROOM)
-    last = (x1 - ux * END_ROOM, y1 - uy * END_ROOM)
+    room = _end_room(line)
+    first = (x0 + ux * room, y0 + uy * room)
+    last = (x1 - ux * room, y1 - uy * room)
     return _Band(line, ((first, (uy, -ux)), (last, (uy, -ux))))
 
 
 def _arc_band(arc: Arc) -> _Band:
-    room = END_ROOM / arc.length
+    room = _end_room(arc) / arc.length
     cx, cy = arc.centre
     first, last = (
         ((p[0] - cx) / arc.radius, (p[1] - cy) / arc.radius)
@@ -181,7 +188,7 @@ def outward_samples(
 
     Edges farther off than ``within`` may be left out.
     """
-    room = END_ROOM / edge.length
+    room = _end_room(edge) / edge.length
     for p in spread(edge):
         start = edge.at(min(1 - room, max(room, edge.parameter(p))))
         nx, ny = left_normal(edge, start)

@@ -11,7 +11,7 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.output.as_built.claims import claim
-from sbafab.output.as_built.cut_files import CutPart, LayerFile, read_part
+from sbafab.output.as_built.cut_files import CutPart, LayerFile, read_part, told_of
 from sbafab.output.as_built.records import CLAIMS, INTEGRITY, Manifest, Problem
 from sbafab.rules.limits import TOLERANCE, at
 
@@ -60,9 +60,9 @@ def layer_problems(files: Iterable[LayerFile], claims: Manifest) -> list[Problem
 
 
 def _area_room(region: Region, part: CutPart) -> float:
-    """mm2 by which an area may be off: its share, the chords' error, corners the beam rounds."""
+    """mm2 by which an area may be off: its share, its edges' error, corners the beam rounds."""
     length = sum(contour.length for contour in region.contours)
-    return SHARE * region.area + 1e-6 + part.corner_room + part.chord_error * length
+    return SHARE * region.area + part.corner_room + (part.chord_error + TOLERANCE) * length
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -120,9 +120,9 @@ def interface_problems(
     return problems
 
 
-def place_problems(laminate: Laminate, claims: Manifest, chord_error: float) -> list[Problem]:
+def place_problems(laminate: Laminate, claims: Manifest) -> list[Problem]:
     """Bores, inlets, pins and lumen: where the manifest says, and as wide."""
-    room = TOLERANCE + chord_error
+    room = TOLERANCE
     pairs: list[tuple[str, Sequence[_Spot], Sequence[_Spot]]] = [
         (
             "bore",
@@ -211,7 +211,7 @@ def fixture_problems(folder: Path, laminate: Laminate, claims: Manifest) -> list
     if claims.fixture not in claims.files:
         return [claim(f"the fixture {claims.fixture!r} is not among the manifest's files")]
     try:
-        part = read_part(folder / claims.fixture)
+        part = read_part(folder / claims.fixture, told=told_of(claims, "plate"))
     except OutputError as error:
         name = Path(claims.fixture).name
         said = str(error).removeprefix(f"{name}: ")
@@ -219,7 +219,7 @@ def fixture_problems(folder: Path, laminate: Laminate, claims: Manifest) -> list
     circles = [hole.circle for hole in part.region.holes]
     holes = [("hole", c[0], 2 * c[1]) for c in circles if c is not None]
     pins = [("hole", pin.centre, pin.diameter) for pin in laminate.pins]
-    room = TOLERANCE + part.chord_error
+    room = TOLERANCE
     problems = _unmatched("pin's hole of the plate", pins, holes, room)
     if problems or len(circles) != len(pins):
         return [claim(f"{claims.fixture} has other holes than the laminate has pins")]
