@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from itertools import pairwise
 
 from sbafab.geometry.boolean import tidy
-from sbafab.geometry.edges import Arc, Edge, Line, Point
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Contour, Region, same_support
 from sbafab.laminate.laminate import Role
@@ -25,11 +25,12 @@ ROOM = 0.05
 """Share of a chord's angle within which no vertex stands beside the end of an arc."""
 
 
-def in_chords(path: Region, role: Role | None, error: float) -> Region:
+def in_chords(path: Region, role: Role | None, error: float, beam: float = 0.0) -> Region:
     """The path of a layer (None: the pin plate) with chords for arcs, within ``error`` mm of them.
 
     Holes open, round ones by less than FINE. Outlines of films grow by half of the error at most,
-    those of separator masks by at least half; those of chamber masks shrink.
+    those of separator masks by at least half; those of chamber masks shrink. Arcs of the radius
+    ``beam``, half the kerf in mm, are led round corners of the part, which stay where they are.
     """
     is_film = role is None or not role.endswith("-mask")
     outers = path.outers
@@ -40,20 +41,28 @@ def in_chords(path: Region, role: Role | None, error: float) -> Region:
     fine = min(error, FINE)
     return Region(
         (
-            *(_contour(outer, role != "chamber-mask", near) for outer in outers),
+            *(_contour(outer, role != "chamber-mask", near, beam) for outer in outers),
             *(
-                _contour(hole, False, fine if is_film or hole.circle else error)
+                _contour(hole, False, fine if is_film or hole.circle else error, beam)
                 for hole in path.holes
             ),
         )
     )
 
 
-def _contour(contour: Contour, grows: bool, error: float) -> Contour:
+def _contour(contour: Contour, grows: bool, error: float, beam: float) -> Contour:
     """The contour as lines that leave its material no less (``grows``), or no more, anywhere."""
-    points = [p for run in _runs(contour.edges) for p in _points(run, grows, error)]
+    points = [
+        p
+        for run in _runs(contour.edges)
+        for p in _points(run, grows or _rounds_corner(run[0], beam), error)
+    ]
     loop = [Line(p, q) for p, q in zip(points, (*points[1:], points[0]), strict=True) if p != q]
     return tidy(loop) or Contour(tuple(loop))
+
+
+def _rounds_corner(edge: Edge, beam: float) -> bool:
+    return isinstance(edge, Arc) and edge.ccw and beam > 0 and abs(edge.radius - beam) < EPSILON
 
 
 def _runs(edges: tuple[Edge, ...]) -> Iterable[tuple[Edge, Edge | None]]:

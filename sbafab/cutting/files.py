@@ -15,6 +15,7 @@ from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import FOLDER, CutSettings, file_properties, layer_path
 from sbafab.cutting.verify import verify_file
 from sbafab.errors import DesignError, OutputError
+from sbafab.geometry.beam import widths
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
 
@@ -51,9 +52,9 @@ def _compensated(layer: Layer, settings: CutSettings) -> Region:
                 "chords do not tell how a kerf along x and y was compensated; write bulges or arcs."
             )
         path = compensate(layer.profile, kerf or 0.0)
-        if settings.profile == "chords":
-            path = in_chords(path, layer.role, settings.chord_error)
-        return path
+        if settings.profile != "chords":
+            return path
+        return in_chords(path, layer.role, settings.chord_error, max(widths(kerf or 0.0)) / 2)
     except DesignError as error:
         raise DesignError(f"layer {layer.name}: {error}") from error
 

@@ -21,7 +21,9 @@ from sbafab.nesting.nest import nest
 from sbafab.nesting.parts import parts_of
 from sbafab.nesting.records import Nest, Part
 from sbafab.nesting.saved import as_dict, from_dict
+from sbafab.output.coarse import refuse_coarse
 from sbafab.output.settings import machine, stocks
+from sbafab.rules.limits import Limits
 
 PLACES = f"{FOLDER}/nest.json"
 MOST_BYTES = 50_000_000
@@ -50,9 +52,11 @@ class CutSet:
     curves: str | None = None
 
 
-def plan_cuts(laminate: Laminate, copies: int, settings: CutSettings) -> CutPlan:
-    """Raises DesignError where the kerf leaves no path."""
+def plan_cuts(laminate: Laminate, copies: int, settings: CutSettings, limits: Limits) -> CutPlan:
+    """Raises DesignError where the kerf leaves no path, or chords do not hold the limits."""
     paths = compensated_paths(laminate, settings)
+    if settings.profile == "chords":
+        refuse_coarse(laminate, paths, settings, limits)
     return CutPlan(paths, parts_of(laminate, paths, copies))
 
 

@@ -13,9 +13,13 @@ from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import spread
 
-END_ROOM = 4e-3
-"""mm left out at both ends of an edge: what starts at a corner does not lie beside the edge, nor
-where corner and start are each off by the 1 um that cut files promise."""
+END_ROOM = 1e-5
+"""mm left out at both ends of an edge: what starts at a corner does not lie beside the edge."""
+LEANING = 4e-3
+"""mm from its ends, beside which an edge that leaves the corner along the normal may lean in: both
+are read from files, whose coordinates are off by up to 1 um."""
+STEEP = 0.01
+"""Sine of the angle to the normal up to which an edge runs along it."""
 
 
 def edges_along(region: Region, other: Region) -> list[Edge]:
@@ -88,6 +92,7 @@ def _nearest(within: _Band, others: Iterable[Edge]) -> Reach | None:
             height = within.height(p)
             if (
                 height is not None
+                and not within.is_passed_by(other, p)
                 and height > -EPSILON
                 and (best is None or height < best.value - 1e-9)
             ):
@@ -104,7 +109,7 @@ class _Band(NamedTuple):
     def height(self, p: Point) -> float | None:
         """Distance of ``p`` from the edge along the normal; None beside the band."""
         edge = self.edge
-        room = 0.5 * _end_room(edge) / edge.length
+        room = 0.5 * END_ROOM / edge.length
         if not room <= edge.parameter(p) <= 1 - room:
             return None
         if isinstance(edge, Arc):
@@ -112,6 +117,12 @@ class _Band(NamedTuple):
             return outward if edge.ccw else -outward
         nx, ny = left_normal(edge, p)
         return -((p[0] - edge.start[0]) * nx + (p[1] - edge.start[1]) * ny)
+
+    def is_passed_by(self, other: Edge, p: Point) -> bool:
+        """Whether ``other`` runs along the band's side at ``p``, and not across the band."""
+        along = self.edge.parameter(p) * self.edge.length
+        at_side = min(along, self.edge.length - along) < LEANING
+        return at_side and _runs_along(other, p, left_normal(self.edge, p))
 
     def nearest_candidates(self, other: Edge) -> Iterator[Point]:
         """Points of ``other`` of which one is the nearest within the band."""
@@ -122,22 +133,21 @@ class _Band(NamedTuple):
             yield from _on_ray(origin, unit, other)
 
 
-def _end_room(edge: Edge) -> float:
-    """What is left out at each end; of a short edge a quarter."""
-    return min(END_ROOM, edge.length / 4)
+def _runs_along(edge: Edge, p: Point, normal: Point) -> bool:
+    ux, uy = edge.direction(p)
+    return abs(ux * normal[1] - uy * normal[0]) < STEEP
 
 
 def _line_band(line: Line) -> _Band:
     ux, uy = line.direction(line.start)
     (x0, y0), (x1, y1) = line.start, line.end
-    room = _end_room(line)
-    first = (x0 + ux * room, y0 + uy * room)
-    last = (x1 - ux * room, y1 - uy * room)
+    first = (x0 + ux * END_ROOM, y0 + uy * END_ROOM)
+    last = (x1 - ux * END_ROOM, y1 - uy * END_ROOM)
     return _Band(line, ((first, (uy, -ux)), (last, (uy, -ux))))
 
 
 def _arc_band(arc: Arc) -> _Band:
-    room = _end_room(arc) / arc.length
+    room = END_ROOM / arc.length
     cx, cy = arc.centre
     first, last = (
         ((p[0] - cx) / arc.radius, (p[1] - cy) / arc.radius)
@@ -188,7 +198,7 @@ def outward_samples(
 
     Edges farther off than ``within`` may be left out.
     """
-    room = _end_room(edge) / edge.length
+    room = END_ROOM / edge.length
     for p in spread(edge):
         start = edge.at(min(1 - room, max(room, edge.parameter(p))))
         nx, ny = left_normal(edge, start)
@@ -198,7 +208,8 @@ def outward_samples(
         for other in others.touching(widened(Line(start, end).bounds, END_ROOM)):
             for q in _on_ray(start, outward, other):
                 height = (q[0] - start[0]) * outward[0] + (q[1] - start[1]) * outward[1]
-                if height > -EPSILON and (best is None or height < best.value):
+                is_first = best is None or height < best.value
+                if height > -EPSILON and is_first and not _runs_along(other, q, outward):
                     best = Reach(max(0.0, height), q)
         if best is not None:
             yield start, outward, best

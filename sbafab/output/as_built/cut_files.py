@@ -40,7 +40,7 @@ class CutPart:
 
     ``path`` is the beam's path as it is drawn. ``chord_error`` is what the file says, in mm, 0 for
     true arcs; ``corner_room`` the mm2 by which the area may be off because the beam rounds corners.
-    A DXF before R2004 has no ``properties``.
+    ``properties`` and ``units`` are empty where the file does not say.
     """
 
     region: Region
@@ -48,6 +48,7 @@ class CutPart:
     properties: dict[str, str]
     chord_error: float
     corner_room: float
+    units: str = "mm"
 
 
 @dataclass(frozen=True)
@@ -170,7 +171,14 @@ def _part(found: ReadBack, chords_drawn: bool, properties: Mapping[str, str]) ->
     region, corner_room = uncut(with_circles(found.region), kerf)
     if region.is_empty:
         raise OutputError(f"nothing is left inside a kerf of {kerf_text(kerf)} mm; write it anew")
-    return CutPart(with_circles(region), found.region, found.properties, chord_error, corner_room)
+    return CutPart(
+        with_circles(region),
+        found.region,
+        found.properties,
+        chord_error,
+        corner_room,
+        found.units,
+    )
 
 
 def _check_drawn(found: ReadBack) -> None:

@@ -21,7 +21,7 @@ from sbafab.laminate.films import Material
 from sbafab.nesting.check import check_placed
 from sbafab.nesting.records import Stock
 from sbafab.output.as_built.agreement import AGREED
-from sbafab.output.as_built.claims import claim
+from sbafab.output.as_built.claims import bare_problem, claim
 from sbafab.output.as_built.cut_files import check_sequence, inside, sound_digest
 from sbafab.output.as_built.measures import SHARE
 from sbafab.output.as_built.pieces import CutSheet, Lot, piece_problems
@@ -66,6 +66,7 @@ def sheet_problems(folder: Path, order: Order) -> list[Problem]:
     parts = [file.part for file in files if file.part is not None]
     curves = parts[0].properties.get("CURVES") if parts else None
     sheets: list[CutSheet] = []
+    bare: list[ReadBack] = []
     for told in order.sheets:
         try:
             found = _read(folder, told)
@@ -73,9 +74,15 @@ def sheet_problems(folder: Path, order: Order) -> list[Problem]:
             problems.append(_unsound(told, error))
             continue
         sheets.append(CutSheet(told, found.region))
-        problems += _property_problems(told, found, order, curves)
+        if found.properties:
+            problems += _property_problems(told, found, order, curves)
+        else:
+            bare.append(found)
         problems += _layout_problems(told, found, stock_of[told.material])
         problems += _number_problems(sheets[-1])
+    if bare:
+        of = "the files of " + (f"{len(bare)} film sheets" if len(bare) > 1 else "a film sheet")
+        problems.append(bare_problem(of, all(found.units for found in bare)))
     if len(sheets) == len(order.sheets) and len(parts) == len(files):
         turns = {material: stock.turns for material, stock in stock_of.items()}
         problems += piece_problems(sheets, order.lots, turns)
