@@ -1,7 +1,7 @@
 """Arcs drawn as chords, on the side of them that keeps bonds, overhangs and pins.
 
-An edge that gives way takes nothing from what it bounds: films grow, chamber masks shrink,
-separator masks grow past the films, holes open.
+What bounds a bond or overhang on one side gives way, and what bounds it on the other side stays
+nearer to its arcs than anything measures: films and round holes stay, masks give way.
 """
 
 from __future__ import annotations
@@ -12,13 +12,12 @@ from itertools import pairwise
 
 from sbafab.geometry.boolean import tidy
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
-from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Contour, Region, same_support
 from sbafab.laminate.laminate import Role
 
 FINE = 0.0004
-"""mm: chords of round holes stay nearer, so that a pin fits as in arcs and a bond beside it keeps
-its width on both sides."""
+"""mm: chords of films and of round holes stay nearer, so that pins fit as in arcs, and a mask's
+edge that gives way has nothing to make up for."""
 LEAST = 8
 """Chords that a whole turn has at least."""
 ROOM = 0.05
@@ -28,20 +27,18 @@ ROOM = 0.05
 def in_chords(path: Region, role: Role | None, error: float, beam: float = 0.0) -> Region:
     """The path of a layer (None: the pin plate) with chords for arcs, within ``error`` mm of them.
 
-    Holes open, round ones by less than FINE. Outlines of films grow by half of the error at most,
-    those of separator masks by at least half; those of chamber masks shrink. Arcs of the radius
-    ``beam``, half the kerf in mm, are led round corners of the part, which stay where they are.
+    Outlines of chamber masks shrink, those of separator masks grow, holes open; films grow and
+    round holes open by less than FINE. Straight edges stay. Arcs of the radius ``beam``, half the
+    kerf in mm, are led round corners of the part, which stay where they are.
     """
     is_film = role is None or not role.endswith("-mask")
-    outers = path.outers
-    if role == "separator-mask" and any(isinstance(e, Arc) for c in outers for e in c.edges):
-        # Films have grown: their masks go before them.
-        outers = grow(Region(outers), error / 2).outers
-    near = error if role == "chamber-mask" else error / 2
     fine = min(error, FINE)
     return Region(
         (
-            *(_contour(outer, role != "chamber-mask", near, beam) for outer in outers),
+            *(
+                _contour(outer, role != "chamber-mask", fine if is_film else error, beam)
+                for outer in path.outers
+            ),
             *(
                 _contour(hole, False, fine if is_film or hole.circle else error, beam)
                 for hole in path.holes

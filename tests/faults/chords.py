@@ -38,8 +38,8 @@ def inside(region: Region) -> Region:
 
 
 def outside(region: Region) -> Region:
-    """Chords that grow the outlines, as those of a film may."""
-    return in_chords(region, None, 2 * ERROR)
+    """Chords that grow the outlines, as those of a separator may."""
+    return in_chords(region, "separator-mask", ERROR)
 
 
 def tight_holes(region: Region) -> Region:

@@ -92,7 +92,7 @@ def redone(change: Callable[[Region], Region]) -> Callable[[Path], None]:
 
 def as_chords(path: Path) -> None:
     found = read_profile(path)
-    drawn = in_chords(found.region, None, 0.005)
+    drawn = in_chords(found.region, "separator-mask", 0.005)
     path.write_text(dxf_text(cutting_order(drawn), found.properties, "chords"))
 
 

@@ -176,7 +176,7 @@ def read_folder(folder: Path, of_job: bool = False) -> AsBuilt:
         try:
             laminate = laminate_of(files, claims, design)
             problems += _laminate_problems(folder, laminate, claims, parts)
-            room = TOLERANCE + 2 * chord_error
+            room = 2 * (TOLERANCE + chord_error)
             problems += size_problems(claims, sizes(design, laminate), room)
         except UNMEASURED as error:
             laminate = None
