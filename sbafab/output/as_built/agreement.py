@@ -44,6 +44,24 @@ def _rounded(contour: Contour) -> Contour:
     return whole.reversed() if contour.is_hole else whole
 
 
+def without_specks(region: Region) -> Region:
+    """The region without edges shorter than AGREED, which rounded corners leave when uncut."""
+    return Region(tuple(map(_unspecked, region.contours)))
+
+
+def _unspecked(contour: Contour) -> Contour:
+    kept = [edge for edge in contour.edges if math.dist(edge.start, edge.end) >= AGREED]
+    if len(kept) == len(contour.edges) or len(kept) < 3:
+        return contour
+    ends = [edge.start for edge in (*kept[1:], kept[0])]
+    return Contour(
+        tuple(
+            edge if edge.end == end else edge_from_bulge(edge.start, end, edge.bulge)
+            for edge, end in zip(kept, ends, strict=True)
+        )
+    )
+
+
 @dataclass
 class _Alike:
     """Contours that agree with the ``first``; ``members`` are drawn like it, edge by edge."""

@@ -21,7 +21,7 @@ from sbafab.cutting.properties import (
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
-from sbafab.output.as_built.agreement import in_agreement, with_circles
+from sbafab.output.as_built.agreement import in_agreement, with_circles, without_specks
 from sbafab.output.as_built.chords import chorded_place
 from sbafab.output.as_built.records import INTEGRITY, LayerClaim, Manifest, Problem
 from sbafab.output.as_built.uncut import uncut
@@ -172,7 +172,7 @@ def _part(found: ReadBack, chords_drawn: bool, properties: Mapping[str, str]) ->
     if region.is_empty:
         raise OutputError(f"nothing is left inside a kerf of {kerf_text(kerf)} mm; write it anew")
     return CutPart(
-        with_circles(region),
+        with_circles(without_specks(region)),
         found.region,
         found.properties,
         chord_error,
