@@ -91,10 +91,10 @@ def jittered(most: float) -> Callable[[Drawing], object]:
 @pytest.mark.parametrize(
     "change",
     [
-        jittered(4e-4),
+        jittered(3e-4),
         partial(moved, move=lambda value: round(value, 4)),
     ],
-    ids=["0.4 um", "4 decimals"],
+    ids=["0.3 um", "4 decimals"],
 )
 def test_coordinates_off_by_less_than_a_micrometre_change_no_verdict(
     change: Callable[[Drawing], object], good: Path, doctor: Doctor
