@@ -47,7 +47,7 @@ def test_half_a_micrometre_passes_and_two_do_not(write: Write) -> None:
 
 
 def test_chords_are_not_the_arcs_they_stand_for(plate: Region, write: Write) -> None:
-    path = write(dxf_text(cutting_order(in_chords(plate, "wall", 0.005)), {}, "chords"))
+    path = write(dxf_text(cutting_order(in_chords(plate, "chamber-mask", 0.005)), {}, "chords"))
     with pytest.raises(OutputError, match="mm off at x"):
         verify_file(path, plate, {})
     with pytest.raises(ValueError, match="an arc is left"):
