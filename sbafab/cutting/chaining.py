@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
-from sbafab.geometry.boolean import LEAST_AREA, PointPool, tidy
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Point
+from sbafab.geometry.boolean import LEAST_AREA, tidy
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, edge_from_bulge
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
 from sbafab.geometry.region import Contour, Region, same_support
@@ -18,14 +18,17 @@ from sbafab.geometry.shapes import circle
 CLEAR = 10 * EPSILON
 """mm between two circles from which on they surely do not touch."""
 
+JOINED = 0.002
+"""mm: ends that lie within 1 um of one corner, which is what cut files promise, are as near."""
+
 
 def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
-    """Contours from loose edges in any order and sense.
+    """Contours from loose edges in any order and sense, whose ends meet to within JOINED.
 
     Raises OutputError at an end that has not exactly one other to go on with.
     """
-    pool = PointPool()
-    snapped = [edge.part(pool.snapped(edge.start), pool.snapped(edge.end)) for edge in edges]
+    joints = _joints([p for edge in edges for p in (edge.start, edge.end)])
+    snapped = [_between(edge, joints[edge.start], joints[edge.end]) for edge in edges]
     at: dict[Point, list[int]] = defaultdict(list)
     for index, edge in enumerate(snapped):
         at[edge.start].append(index)
@@ -53,6 +56,30 @@ def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
             loop.append(step if step.start == here else step.reversed())
         contours.append(Contour(tuple(loop)))
     return contours
+
+
+def _joints(ends: Sequence[Point]) -> dict[Point, Point]:
+    """The first known of the points within JOINED of each end."""
+    cells: dict[tuple[int, int], list[Point]] = defaultdict(list)
+    joints: dict[Point, Point] = {}
+    for p in ends:
+        if p in joints:
+            continue
+        x, y = math.floor(p[0] / JOINED), math.floor(p[1] / JOINED)
+        near = [q for i in (x - 1, x, x + 1) for j in (y - 1, y, y + 1) for q in cells[i, j]]
+        joint = min(near, key=lambda q: math.dist(p, q), default=p)
+        joints[p] = joint if math.dist(p, joint) <= JOINED else p
+        if joints[p] is p:
+            cells[x, y].append(p)
+    return joints
+
+
+def _between(edge: Edge, start: Point, end: Point) -> Edge:
+    """The edge with its ends moved onto joints; an arc keeps its turn, so that it still fits."""
+    moved = max(math.dist(edge.start, start), math.dist(edge.end, end))
+    if moved < 2 * EPSILON:
+        return edge.part(start, end)
+    return edge_from_bulge(start, end, edge.bulge)
 
 
 def check_clear(contours: Sequence[Contour]) -> None:

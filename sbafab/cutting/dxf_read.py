@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
@@ -19,8 +19,12 @@ from sbafab.geometry.shapes import circle
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
     from ezdxf.entities.dxfentity import DXFEntity
-    from ezdxf.entities.lwpolyline import LWPolyline
+    from ezdxf.entities.polyline import Polyline
 
+DRAWN = ("LWPOLYLINE", "POLYLINE", "CIRCLE", "LINE", "ARC")
+R12 = "AC1009"
+CLOSED = 1
+"""Flag of a closed POLYLINE; all others are of splines and meshes."""
 FLAT = 1e-9
 """Heights and widths up to this, in mm, are none."""
 
@@ -29,9 +33,10 @@ FLAT = 1e-9
 class ReadBack:
     """What a cut file holds.
 
-    ``region``: the contours on CUT_INNER and CUT_OUTER; ``properties``: the custom properties;
-    ``layers``: the layer of every entity in file order; ``other``: types of the entities that
-    are not part of the region (datum, engraving, sheet), and ``strokes`` their layers and edges.
+    ``region``: the contours on CUT_INNER and CUT_OUTER; ``properties``: the custom properties,
+    which a DXF before R2004 has none of; ``units`` is "mm", or empty in R12, which cannot say;
+    ``layers``: the layer of every entity in file order; ``other``: types of the entities that are
+    not part of the region (datum, engraving, sheet), and ``strokes`` their layers and edges.
     """
 
     region: Region
@@ -46,7 +51,8 @@ def read_profile(source: Path | str) -> ReadBack:
     """The cut file at a path, or given as text.
 
     Raises OutputError for what is no whole DXF in millimetres of closed, separate contours of
-    lines and arcs at z = 0, holes on CUT_INNER and outlines on CUT_OUTER.
+    lines and arcs at z = 0, holes on CUT_INNER and outlines on CUT_OUTER. Ends of loose edges
+    within 1 um of each other are one.
     """
     name = source.name if isinstance(source, Path) else "the DXF text"
     try:
@@ -80,7 +86,8 @@ def _text(path: Path) -> str:
 
 def _read(document: Drawing) -> ReadBack:
     units = document.header.get("$INSUNITS"), document.header.get("$MEASUREMENT")
-    if units != (4, 1):
+    says_units = document.dxfversion != R12 or units != (None, None)
+    if says_units and units != (4, 1):
         raise OutputError(
             f"not in millimetres: $INSUNITS is {units[0]} and $MEASUREMENT {units[1]}; "
             "set them to 4 and 1."
@@ -115,7 +122,7 @@ def _read(document: Drawing) -> ReadBack:
     return ReadBack(
         nested_region(contours[CUT_INNER], contours[CUT_OUTER]),
         dict(document.header.custom_vars.properties),
-        "mm",
+        "mm" if says_units else "",
         tuple(entity.dxf.layer for entity in model),
         tuple(other),
         tuple(strokes),
@@ -125,18 +132,22 @@ def _read(document: Drawing) -> ReadBack:
 def _geometry(entity: DXFEntity, may_be_open: bool) -> tuple[Contour | None, list[Edge]]:
     """The closed contour, or else the loose edges, that an entity draws."""
     from ezdxf.entities.lwpolyline import LWPolyline
+    from ezdxf.entities.polyline import Polyline
 
     kind, dxf = entity.dxftype(), entity.dxf
-    if kind not in ("LWPOLYLINE", "CIRCLE", "LINE", "ARC"):
-        raise OutputError(
-            f"{kind} (handle {dxf.handle}) cannot be cut; use LWPOLYLINE, CIRCLE, LINE and ARC."
-        )
+    if kind not in DRAWN or (isinstance(entity, Polyline) and not _is_plain(entity)):
+        raise OutputError(f"{kind} (handle {dxf.handle}) cannot be cut; use {', '.join(DRAWN)}.")
     if not all(math.isfinite(value) for value in _numbers(entity)):
         raise OutputError(f"{kind} (handle {dxf.handle}) has a coordinate that is no number.")
     if isinstance(entity, LWPolyline):
         _check_flat(entity, dxf.elevation)
-        edges = _polyline(entity, may_be_open)
+        rows = [tuple(map(float, row)) for row in entity.lwpoints]
+        edges = _polyline(rows, entity.closed, dxf.get("const_width", 0.0), may_be_open)
         return (Contour(tuple(edges)), []) if entity.closed else (None, edges)
+    if isinstance(entity, Polyline):
+        _check_flat(entity, *(vertex.dxf.location.z for vertex in entity.vertices))
+        edges = _polyline(list(_old_rows(entity)), entity.is_closed, 0.0, may_be_open)
+        return (Contour(tuple(edges)), []) if entity.is_closed else (None, edges)
     if kind == "LINE":
         _check_flat(entity, dxf.start.z, dxf.end.z)
         return None, [Line((dxf.start.x, dxf.start.y), (dxf.end.x, dxf.end.y))]
@@ -158,6 +169,23 @@ def _numbers(entity: DXFEntity) -> Iterator[float]:
             yield from value.xyz
     for row in getattr(entity, "lwpoints", ()):
         yield from row
+    if entity.dxftype() == "POLYLINE":
+        for vertex in getattr(entity, "vertices", ()):
+            yield from _numbers(vertex)
+
+
+def _is_plain(entity: Polyline) -> bool:
+    """Whether an old polyline is flat and drawn as it stands: no mesh, no curve fitted to it."""
+    return bool(entity.is_2d_polyline) and not entity.dxf.flags & ~CLOSED
+
+
+def _old_rows(entity: Polyline) -> Iterator[tuple[float, ...]]:
+    """Its vertices as an LWPOLYLINE has them: x, y, start and end width, bulge."""
+    widths = entity.dxf.default_start_width, entity.dxf.default_end_width
+    for vertex in entity.vertices:
+        dxf = vertex.dxf
+        start, end = dxf.get("start_width", widths[0]), dxf.get("end_width", widths[1])
+        yield dxf.location.x, dxf.location.y, start, end, dxf.get("bulge", 0.0)
 
 
 def _check_flat(entity: DXFEntity, *heights: float) -> None:
@@ -168,16 +196,18 @@ def _check_flat(entity: DXFEntity, *heights: float) -> None:
         )
 
 
-def _polyline(entity: LWPolyline, may_be_open: bool) -> list[Edge]:
-    rows = [tuple(map(float, row)) for row in entity.lwpoints]
+def _polyline(
+    rows: Sequence[tuple[float, ...]], closed: bool, width: float, may_be_open: bool
+) -> list[Edge]:
+    """The edges of a polyline's rows: x, y, start and end width, bulge."""
     x, y = rows[0][:2] if rows else (0.0, 0.0)
     place = f"polyline at x {x:.3f}, y {y:.3f}"
-    if len(rows) < 2 or not (entity.closed or may_be_open):
+    if len(rows) < 2 or not (closed or may_be_open):
         raise OutputError(f"{place} is open; close it.")
-    if entity.dxf.get("const_width", 0.0) or any(row[2] or row[3] for row in rows):
+    if width or any(row[2] or row[3] for row in rows):
         raise OutputError(f"{place} has a width; draw the cut's middle without width.")
     edges: list[Edge] = []
-    followers = [*rows[1:], rows[0]] if entity.closed else rows[1:]
+    followers = [*rows[1:], rows[0]] if closed else rows[1:]
     for row, following in zip(rows, followers, strict=False):
         start, end = (row[0], row[1]), (following[0], following[1])
         if start == end:

@@ -56,18 +56,17 @@ def dxf_text(
     contours: Sequence[Contour],
     properties: Mapping[str, str],
     profile: DxfProfile = "bulges",
-    chord_error: float = 0.005,
     sheet: Surroundings | None = None,
 ) -> str:
     """A DXF document of the contours, cut in the order given.
 
     Holes (clockwise) go on CUT_INNER, outlines on CUT_OUTER. ``properties`` become the
-    document's custom properties; ``chord_error`` is the largest sagitta in mm of the chords
-    profile. A layer's file has a cross at the origin on REFERENCE, after all that is cut; a
-    ``sheet`` has its engraving, parting cut and frame instead.
+    document's custom properties. The chords profile takes contours of lines only. A layer's file
+    has a cross at the origin on REFERENCE, after all that is cut; a ``sheet`` has its engraving,
+    parting cut and frame instead.
     """
     skeleton = _skeleton()
-    cuts = _cuts(contours, profile, chord_error)
+    cuts = _cuts(contours, profile)
     if sheet is None:
         entities = [*cuts, *_datum_cross()]
         low, high = (-DATUM_ARM, -DATUM_ARM), (DATUM_ARM, DATUM_ARM)
@@ -100,18 +99,16 @@ def dxf_text(
     )
 
 
-def _cuts(
-    contours: Iterable[Contour], profile: DxfProfile, chord_error: float
-) -> Iterator[_Entity]:
+def _cuts(contours: Iterable[Contour], profile: DxfProfile) -> Iterator[_Entity]:
     for contour in contours:
         layer = CUT_INNER if contour.is_hole else CUT_OUTER
-        if profile == "chords":
-            yield _polyline(layer, [(x, y, 0.0) for x, y in contour.polygon(chord_error)])
-        elif contour.circle is not None:
+        if contour.circle is not None:
             centre, radius = contour.circle
             yield _Entity("CIRCLE", layer, "AcDbCircle", _round(centre, radius))
         else:
             edges = [part for edge in contour.edges for part in _quarters(edge)]
+            if profile == "chords" and any(isinstance(edge, Arc) for edge in edges):
+                raise ValueError("an arc is left: draw the contours in chords first")
             if profile == "arcs":
                 yield from (_edge_entity(layer, edge) for edge in edges)
             else:

@@ -8,12 +8,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from sbafab.cutting.chords import in_chords
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import compensate
 from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import FOLDER, CutSettings, file_properties, layer_path
 from sbafab.cutting.verify import verify_file
 from sbafab.errors import DesignError, OutputError
+from sbafab.geometry.beam import widths
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
 
@@ -33,7 +35,7 @@ class CutFile:
 
 
 def compensated_paths(laminate: Laminate, settings: CutSettings) -> dict[str, Region]:
-    """The path of the beam for every pattern.
+    """The path of the beam for every pattern, in chords where those are to be drawn.
 
     Raises DesignError where the kerf leaves none.
     """
@@ -49,7 +51,10 @@ def _compensated(layer: Layer, settings: CutSettings) -> Region:
             raise DesignError(
                 "chords do not tell how a kerf along x and y was compensated; write bulges or arcs."
             )
-        return compensate(layer.profile, kerf or 0.0)
+        path = compensate(layer.profile, kerf or 0.0)
+        if settings.profile != "chords":
+            return path
+        return in_chords(path, layer.role, settings.chord_error, max(widths(kerf or 0.0)) / 2)
     except DesignError as error:
         raise DesignError(f"layer {layer.name}: {error}") from error
 
@@ -86,12 +91,11 @@ def _write_pattern(
     kerf = settings.kerf_width(material)
     properties = file_properties(settings, material, first.pattern)
     contours = cutting_order(path)
-    text = dxf_text(contours, properties, settings.profile, settings.chord_error)
+    text = dxf_text(contours, properties, settings.profile)
     data = text.encode()
     original = folder / layer_path(first.name, kerf)
     original.write_bytes(data)
-    chord_error = settings.chord_error if settings.profile == "chords" else 0.0
-    verify_file(original, path, properties, chord_error)
+    verify_file(original, path, properties)
     digest = hashlib.sha256(data).hexdigest()
     length = sum(contour.length for contour in contours)
     files = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from sbafab.cutting.chords import in_chords
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import CutSettings, fixture_properties
@@ -41,11 +42,11 @@ def write_fixture(laminate: Laminate, folder: Path, settings: CutSettings) -> st
     if plate is None:
         return None
     properties = fixture_properties(settings)
-    text = dxf_text(cutting_order(plate), properties, settings.profile, settings.chord_error)
+    if settings.profile == "chords":
+        plate = in_chords(plate, None, settings.chord_error)
+    text = dxf_text(cutting_order(plate), properties, settings.profile)
     path = folder / PATH
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(text.encode())
-    verify_file(
-        path, plate, properties, settings.chord_error if settings.profile == "chords" else 0.0
-    )
+    verify_file(path, plate, properties)
     return PATH

@@ -97,7 +97,7 @@ def _properties(
         "WAIVED": ", ".join(settings.waived) or "none",
         **limit_properties(settings.lowered),
         "GENERATOR": settings.generator,
-        **_curves(settings),
+        **curves_property(curves_of(settings)),
     }
 
 
@@ -150,11 +150,14 @@ def layer_path(name: str, kerf: Kerf | None) -> str:
     return f"{FOLDER}/{name}{kerf_suffix(kerf)}.dxf"
 
 
-def _curves(settings: CutSettings) -> dict[str, str]:
-    """Nothing for true arcs: only what departs from them has to be said."""
-    if settings.profile != "chords":
-        return {}
-    return {"CURVES": f"{CHORDS} {settings.chord_error:g} mm"}
+def curves_of(settings: CutSettings) -> str | None:
+    """What files and manifest say of chords; nothing of true arcs."""
+    return f"{CHORDS} {settings.chord_error:g} mm" if settings.profile == "chords" else None
+
+
+def curves_property(said: str | None) -> dict[str, str]:
+    """The custom property of that: only what departs from true arcs has to be said."""
+    return {} if said is None else {"CURVES": said}
 
 
 def chord_error_of(properties: Mapping[str, str]) -> float:

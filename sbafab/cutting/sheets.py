@@ -114,12 +114,11 @@ def _write_sheet(
     )
     stem = f"{nest.material}_{sheet + 1}{kerf_suffix(settings.kerf_width(nest.material))}"
     path = folder / FOLDER / f"{stem}.dxf"
-    text = dxf_text(contours, properties, settings.profile, settings.chord_error, around)
+    text = dxf_text(contours, properties, settings.profile, around)
     path.write_bytes(text.encode())
-    chord_error = settings.chord_error if settings.profile == "chords" else 0.0
-    found = verify_file(path, region, properties, chord_error)
+    found = verify_file(path, region, properties)
     used = replace(nest.stock, length=length)
-    _verify_sheet(path.name, found, around, used, TOLERANCE + 2 * chord_error)
+    _verify_sheet(path.name, found, around, used, TOLERANCE)
     picture = path.with_suffix(".svg")
     title = f"{settings.design}: {nest.material} sheet {sheet + 1} of {nest.sheets}"
     picture.write_text(

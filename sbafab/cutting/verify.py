@@ -27,19 +27,19 @@ def verify_file(
     path: Path,
     expected: Region,
     expected_properties: Mapping[str, str],
-    chord_error: float = 0.0,
 ) -> ReadBack:
     """Reads the file at ``path``, compares it with what was meant, and returns it.
 
-    ``chord_error`` is the sagitta in mm allowed on top where curves were written as chords.
     Raises OutputError with the file, the worst deviation and its place.
     """
     found = read_profile(path)
     try:
+        if found.units != "mm":
+            raise OutputError("it does not say that its units are millimetres.")
         _check_properties(found.properties, expected_properties)
         _check_sequence(found)
-        check_contours(found.region, expected, TOLERANCE + chord_error)
-        _check_area(found.region, expected, chord_error)
+        check_contours(found.region, expected, TOLERANCE)
+        _check_area(found.region, expected)
     except OutputError as error:
         raise OutputError(f"{path.name}: {error} Write it anew.") from error
     return found
@@ -164,10 +164,9 @@ def _same_edge(a: Edge, b: Edge) -> bool:
     )
 
 
-def _check_area(found: Region, expected: Region, chord_error: float) -> None:
-    length = sum(contour.length for contour in expected.contours)
+def _check_area(found: Region, expected: Region) -> None:
     off = abs(found.area - expected.area)
-    if off > AREA_TOLERANCE * expected.area + chord_error * length:
+    if off > AREA_TOLERANCE * expected.area:
         raise OutputError(f"its area is {found.area:.6f} mm2, not {expected.area:.6f}.")
 
 

@@ -18,7 +18,7 @@ from sbafab.nesting.nest import refuse_unfit
 from sbafab.nesting.records import Nest
 from sbafab.output.contents import Checked, Made, Part, close_folder, schedule_of, write_contents
 from sbafab.output.manifest import sheet_entry
-from sbafab.output.settings import GENERATOR, cut_settings, kerf_widths, stocks
+from sbafab.output.settings import GENERATOR, cut_settings, kerf_widths, limits, stocks
 from sbafab.output.shop import (
     CutPlan,
     CutSet,
@@ -98,7 +98,7 @@ def plan_batch(
     designs = []
     for one in checked:
         settings = cut_settings(one.design, one.waived, drawing.profile, drawing.chord_error)
-        plan = plan_cuts(one.laminate, one.design.order.copies, settings)
+        plan = plan_cuts(one.laminate, one.design.order.copies, settings, limits(one.design))
         designs.append(Planned(one, settings, plan, schedule_of(one)))
     parts = [part for one in designs for part in one.plan.parts]
     nests = find_nests(parts, checked[0].design, old_folder, tell)
@@ -110,7 +110,8 @@ def refuse_undoable(checked: Sequence[Checked]) -> None:
     for one in checked:
         design = one.design
         schedule_of(one)
-        plan = plan_cuts(one.laminate, design.order.copies, cut_settings(design, one.waived))
+        settings = cut_settings(design, one.waived)
+        plan = plan_cuts(one.laminate, design.order.copies, settings, limits(design))
         refuse_unfit(plan.parts, stocks(design))
 
 

@@ -61,6 +61,7 @@ def manifest(
             material: {"state": "uncalibrated" if width is None else "compensated", "width": width}
             for material, width in kerf_widths(design).items()
         },
+        **({"curves": cut.curves} if cut and cut.curves else {}),
         "waived": list(waived),
         "lowered_limits": list(lowered(limits(design))),
         "sizes": {name: round(value, 6) for name, value in sizes(design, laminate).items()},

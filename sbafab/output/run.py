@@ -37,6 +37,7 @@ from sbafab.output.earlier import (
 from sbafab.output.manifest import identity
 from sbafab.output.settings import cut_settings, limits
 from sbafab.output.shop import (
+    CutPlan,
     CutSet,
     Progress,
     find_nests,
@@ -145,7 +146,9 @@ def generate(
     # Schedule, nest and meshes are made before anything is written: they may refuse the design.
     pressing = schedule_of(checked) if "press" in wanted else None
     settings = cut_settings(design, checked.waived, dxf_profile, chord_error)
-    plan = plan_cuts(checked.laminate, design.order.copies, settings) if "cut" in wanted else None
+    plan: CutPlan | None = None
+    if "cut" in wanted:
+        plan = plan_cuts(checked.laminate, design.order.copies, settings, limits(design))
     nests = find_nests(plan.parts, design, target, tell) if plan is not None else ()
     meshes = _meshed(checked, extras.conforming, tell) if "mesh" in wanted else None
     listed = listed_files(target)

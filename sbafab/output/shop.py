@@ -10,7 +10,7 @@ from typing import Any
 
 from sbafab.cutting.files import CutFile, compensated_paths, write_layer_files
 from sbafab.cutting.fixture import write_fixture
-from sbafab.cutting.properties import CutSettings
+from sbafab.cutting.properties import CutSettings, curves_of
 from sbafab.cutting.sheets import FOLDER, SheetFile, write_sheets
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
@@ -21,7 +21,9 @@ from sbafab.nesting.nest import nest
 from sbafab.nesting.parts import parts_of
 from sbafab.nesting.records import Nest, Part
 from sbafab.nesting.saved import as_dict, from_dict
+from sbafab.output.coarse import refuse_coarse
 from sbafab.output.settings import machine, stocks
+from sbafab.rules.limits import Limits
 
 PLACES = f"{FOLDER}/nest.json"
 MOST_BYTES = 50_000_000
@@ -40,15 +42,21 @@ class CutPlan:
 
 @dataclass(frozen=True)
 class CutSet:
-    """The cut files of one laminate; ``fixture`` is the pin plate's path, if it has pins."""
+    """The cut files of one laminate; ``fixture`` is the pin plate's path, if it has pins.
+
+    ``curves`` says within what chords stay; None for true arcs.
+    """
 
     files: tuple[CutFile, ...]
     fixture: str | None
+    curves: str | None = None
 
 
-def plan_cuts(laminate: Laminate, copies: int, settings: CutSettings) -> CutPlan:
-    """Raises DesignError where the kerf leaves no path."""
+def plan_cuts(laminate: Laminate, copies: int, settings: CutSettings, limits: Limits) -> CutPlan:
+    """Raises DesignError where the kerf leaves no path, or chords do not hold the limits."""
     paths = compensated_paths(laminate, settings)
+    if settings.profile == "chords":
+        refuse_coarse(laminate, paths, settings, limits)
     return CutPlan(paths, parts_of(laminate, paths, copies))
 
 
@@ -72,7 +80,7 @@ def write_cut_set(
     files = write_layer_files(
         laminate, plan.paths, folder, settings, lambda done, total: tell("cut files", done, total)
     )
-    return CutSet(tuple(files), write_fixture(laminate, folder, settings))
+    return CutSet(tuple(files), write_fixture(laminate, folder, settings), curves_of(settings))
 
 
 def write_nested_sheets(

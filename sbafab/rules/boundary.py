@@ -15,6 +15,11 @@ from sbafab.geometry.width import spread
 
 END_ROOM = 1e-5
 """mm left out at both ends of an edge: what starts at a corner does not lie beside the edge."""
+LEANING = 4e-3
+"""mm from its ends, beside which an edge that leaves the corner along the normal may lean in: both
+are read from files, whose coordinates are off by up to 1 um."""
+STEEP = 0.01
+"""Sine of the angle to the normal up to which an edge runs along it."""
 
 
 def edges_along(region: Region, other: Region) -> list[Edge]:
@@ -87,6 +92,7 @@ def _nearest(within: _Band, others: Iterable[Edge]) -> Reach | None:
             height = within.height(p)
             if (
                 height is not None
+                and not within.is_passed_by(other, p)
                 and height > -EPSILON
                 and (best is None or height < best.value - 1e-9)
             ):
@@ -112,6 +118,12 @@ class _Band(NamedTuple):
         nx, ny = left_normal(edge, p)
         return -((p[0] - edge.start[0]) * nx + (p[1] - edge.start[1]) * ny)
 
+    def is_passed_by(self, other: Edge, p: Point) -> bool:
+        """Whether ``other`` runs along the band's side at ``p``, and not across the band."""
+        along = self.edge.parameter(p) * self.edge.length
+        at_side = min(along, self.edge.length - along) < LEANING
+        return at_side and _runs_along(other, p, left_normal(self.edge, p))
+
     def nearest_candidates(self, other: Edge) -> Iterator[Point]:
         """Points of ``other`` of which one is the nearest within the band."""
         yield other.start
@@ -119,6 +131,11 @@ class _Band(NamedTuple):
         yield from _extremes(self.edge, other)
         for origin, unit in self.rays:
             yield from _on_ray(origin, unit, other)
+
+
+def _runs_along(edge: Edge, p: Point, normal: Point) -> bool:
+    ux, uy = edge.direction(p)
+    return abs(ux * normal[1] - uy * normal[0]) < STEEP
 
 
 def _line_band(line: Line) -> _Band:
@@ -191,7 +208,8 @@ def outward_samples(
         for other in others.touching(widened(Line(start, end).bounds, END_ROOM)):
             for q in _on_ray(start, outward, other):
                 height = (q[0] - start[0]) * outward[0] + (q[1] - start[1]) * outward[1]
-                if height > -EPSILON and (best is None or height < best.value):
+                is_first = best is None or height < best.value
+                if height > -EPSILON and is_first and not _runs_along(other, q, outward):
                     best = Reach(max(0.0, height), q)
         if best is not None:
             yield start, outward, best

@@ -135,7 +135,8 @@ def test_missing_and_doubled_edges_of_a_chain_are_refused(plate: Region) -> None
         lambda model: model.add_text("P01", dxfattribs=OUTER),
         lambda model: model.add_hatch(dxfattribs=OUTER),
         lambda model: model.add_point((0, 0), dxfattribs=OUTER),
-        lambda model: model.add_polyline2d(SQUARE, close=True, dxfattribs=OUTER),
+        lambda model: model.add_polyline3d([(*p, 0) for p in SQUARE], close=True, dxfattribs=OUTER),
+        lambda model: model.add_polyline2d(SQUARE, close=True, dxfattribs={**OUTER, "flags": 5}),
         lambda model: model.add_blockref(model.doc.blocks.new("PART").name, (0, 0)),
     ],
 )

@@ -151,6 +151,7 @@ def test_a_folder_that_cannot_be_written_is_left_to_the_run_to_report(
 
 SCRIPT = """
 import hashlib, math
+from sbafab.cutting.chords import in_chords
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import compensate
 from sbafab.cutting.order import cutting_order
@@ -163,7 +164,9 @@ plate = union([disc(axis, 3.25) for axis in axes]) | disc((0, 0), 1.75)
 plate = plate - union([disc(axis, 0.5) for axis in axes])
 properties = file_properties(CutSettings("d", "", {"PTFE": 0.1}), "PTFE", "P01")
 for profile in ("bulges", "arcs", "chords"):
-    text = dxf_text(cutting_order(compensate(plate, 0.1)), properties, profile)
+    path = compensate(plate, 0.1)
+    drawn = in_chords(path, "separator-mask", 0.005) if profile == "chords" else path
+    text = dxf_text(cutting_order(drawn), properties, profile)
     print(hashlib.sha256(text.encode()).hexdigest())
 print(hashlib.sha256(skeleton_text().encode()).hexdigest())
 """

@@ -190,8 +190,8 @@ def test_engraving_that_runs_through_a_part_is_found(
 def test_a_frame_of_another_size_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from sbafab.cutting.dxf_write import dxf_text
 
-    def scaled(contours, properties, profile, error, around):  # type: ignore[no-untyped-def]
-        return dxf_text(contours, properties, profile, error, around._replace(frame=(61.0, 80.0)))
+    def scaled(contours, properties, profile, around):  # type: ignore[no-untyped-def]
+        return dxf_text(contours, properties, profile, around._replace(frame=(61.0, 80.0)))
 
     monkeypatch.setattr(module, "dxf_text", scaled)
     with pytest.raises(OutputError, match="REFERENCE"):

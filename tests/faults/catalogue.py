@@ -13,7 +13,7 @@ from sbafab.actuators import load_design
 from sbafab.design.writing import design_sha256
 from sbafab.output.as_built.check import read_folder
 from sbafab.output.run import generate
-from tests.faults import claims, files, holes, layers, masks, sheets
+from tests.faults import chords, claims, files, holes, layers, masks, sheets
 from tests.faults.record import Fault, Kind
 from tests.faults.specimen import Specimen, failing
 from tests.output.doctoring import Doctor
@@ -25,6 +25,7 @@ KINDS: tuple[Kind, ...] = (
     holes.KIND,
     holes.EARS_KIND,
     masks.KIND,
+    chords.KIND,
     files.KIND,
     claims.KIND,
     sheets.KIND,

@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+from sbafab.cutting.chords import in_chords
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.order import cutting_order
@@ -91,7 +92,8 @@ def redone(change: Callable[[Region], Region]) -> Callable[[Path], None]:
 
 def as_chords(path: Path) -> None:
     found = read_profile(path)
-    path.write_text(dxf_text(cutting_order(found.region), found.properties, "chords"))
+    drawn = in_chords(found.region, "separator-mask", 0.005)
+    path.write_text(dxf_text(cutting_order(drawn), found.properties, "chords"))
 
 
 def crossing_itself(region: Region) -> Region:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -89,10 +89,12 @@ def quick(parts: dict[str, CutPart]) -> Iterator[None]:
     folder is written; film sheets are not looked at.
     """
 
-    def known(path: Path, chords_drawn: bool = False) -> CutPart:
+    def known(
+        path: Path, chords_drawn: bool = False, told: Mapping[str, str] | None = None
+    ) -> CutPart:
         digest = sha256(path.read_bytes()).hexdigest()
         if digest not in parts:
-            parts[digest] = read_part(path, chords_drawn)
+            parts[digest] = read_part(path, chords_drawn, told)
         return parts[digest]
 
     def regions(below: Region, above: Region, masks: Sequence[Region]) -> tuple[Region, ...]:

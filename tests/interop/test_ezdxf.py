@@ -10,6 +10,7 @@ import ezdxf
 import pytest
 from ezdxf.document import Drawing
 
+from sbafab.cutting.chords import in_chords
 from sbafab.cutting.dxf_write import DxfProfile, dxf_text
 from sbafab.cutting.order import cutting_order
 from sbafab.geometry.boolean import union
@@ -27,7 +28,8 @@ def lobed() -> Region:
 
 
 def text(profile: DxfProfile) -> str:
-    return dxf_text(cutting_order(lobed()), {"DESIGN": "lobed", "UNITS": "mm"}, profile)
+    region = in_chords(lobed(), "wall", 0.005) if profile == "chords" else lobed()
+    return dxf_text(cutting_order(region), {"DESIGN": "lobed", "UNITS": "mm"}, profile)
 
 
 def document(profile: DxfProfile) -> Drawing:

@@ -11,6 +11,7 @@ import pytest
 import shapely
 from pyogrio import raw
 
+from sbafab.cutting.chords import in_chords
 from sbafab.cutting.dxf_write import DxfProfile, dxf_text
 from sbafab.cutting.order import cutting_order
 from sbafab.geometry.boolean import union
@@ -69,6 +70,8 @@ CASES = {
 
 def read(region: Region, profile: DxfProfile, folder: Path) -> tuple[list[str], list[object]]:
     """Layer name and geometry of every cut entity, as GDAL reads them."""
+    if profile == "chords":
+        region = in_chords(region, None, 0.005)
     path = folder / "part.dxf"
     path.write_text(dxf_text(cutting_order(region), {}, profile), encoding="utf-8")
     _, _, shapes, (layers,) = raw.read(path, columns=["Layer"])

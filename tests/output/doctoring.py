@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import DxfProfile, dxf_text
+from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.order import cutting_order
 from sbafab.geometry.edges import Arc, Line, Point
 from sbafab.geometry.region import Contour, Region
@@ -36,13 +36,11 @@ class Doctor:
     def path(self, layer: int) -> Path:
         return self.folder / self.manifest["layers"][layer - 1]["file"]
 
-    def redraw(
-        self, layer: int, change: Callable[[Region], Region], profile: DxfProfile = "bulges"
-    ) -> None:
+    def redraw(self, layer: int, change: Callable[[Region], Region]) -> None:
         """The layer's file with its profile changed and everything else as it was."""
         found = read_profile(self.path(layer))
         contours = cutting_order(change(found.region))
-        self.path(layer).write_text(dxf_text(contours, found.properties, profile), newline="\n")
+        self.path(layer).write_text(dxf_text(contours, found.properties), newline="\n")
 
     def edit(self, layer: int, old: str, new: str) -> None:
         """The layer's file with a piece of its text replaced where it first occurs."""

@@ -63,8 +63,10 @@ def test_a_piece_may_lie_turned_by_quarters(turns: int, doctor: Doctor) -> None:
     assert told(doctor) == []
 
 
-@pytest.mark.parametrize(("off", "is_told"), [(0.0008, False), (0.0015, True)])
-def test_a_piece_agrees_within_a_micrometre(off: float, is_told: bool, lobed: Doctor) -> None:
+@pytest.mark.parametrize(("off", "is_told"), [(0.0015, False), (0.003, True)])
+def test_a_piece_agrees_where_both_are_within_a_micrometre(
+    off: float, is_told: bool, lobed: Doctor
+) -> None:
     """The bore of one piece moved."""
 
     def moved(pieces: list[Region]) -> list[Region]:

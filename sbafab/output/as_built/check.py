@@ -51,7 +51,7 @@ from sbafab.output.as_built.records import (
 from sbafab.output.as_built.sheets import Order, sheet_problems
 from sbafab.output.as_built.stack import laminate_of, stacked_layers
 from sbafab.output.settings import limits as limits_of
-from sbafab.rules import film_limits, registration_yield
+from sbafab.rules import film_limits
 from sbafab.rules.deck import RULES, Rule, run_rule
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits
@@ -90,9 +90,7 @@ def _findings(built: AsBuilt) -> tuple[Finding, ...]:
         measured = _by_layer(built)
     else:
         measured = tuple(
-            finding
-            for rule in RULES
-            for finding in _measured(rule, built.laminate, _limits(rule, built))
+            finding for rule in RULES for finding in _measured(rule, built.laminate, built.limits)
         )
     problems = [*built.problems, *_unsaid_waivers(measured, built.claims)]
     count = len(built.files)
@@ -172,7 +170,7 @@ def read_folder(folder: Path, of_job: bool = False) -> AsBuilt:
         problems += file_problems(folder, claims)
     except OSError as error:
         raise OutputError(f"{folder} cannot be read: {error.strerror or error}") from None
-    files, unread = read_layers(folder, claims.layers, _drawn_in_chords(design))
+    files, unread = read_layers(folder, claims, _drawn_in_chords(design))
     problems += unread
     layers = stacked_layers(files, design)
     problems += height_problems(claims, layers, design)
@@ -187,8 +185,8 @@ def read_folder(folder: Path, of_job: bool = False) -> AsBuilt:
     if len(parts) == len(files):
         try:
             laminate = laminate_of(files, claims, design)
-            problems += _laminate_problems(folder, laminate, claims, parts, chord_error)
-            room = TOLERANCE + 2 * chord_error
+            problems += _laminate_problems(folder, laminate, claims, parts)
+            room = 2 * (TOLERANCE + chord_error)
             outlined = replace(laminate, outline=_outline(design))
             problems += size_problems(claims, sizes(design, outlined), room)
             laminate = with_plate_pins(folder, laminate, claims)
@@ -196,8 +194,7 @@ def read_folder(folder: Path, of_job: bool = False) -> AsBuilt:
             laminate = None
             message = f"the layers do not lie over each other as films of one stack ({error})"
             problems.append(Problem(INTEGRITY, message))
-    limits = _within(limits_of(design), chord_error)
-    return AsBuilt(claims, design, limits, tuple(files), laminate, tuple(problems))
+    return AsBuilt(claims, design, limits_of(design), tuple(files), laminate, tuple(problems))
 
 
 def _outline(design: Design) -> Region:
@@ -236,11 +233,10 @@ def _laminate_problems(
     laminate: Laminate,
     claims: Manifest,
     parts: Sequence[CutPart],
-    chord_error: float,
 ) -> list[Problem]:
     return [
         *interface_problems(laminate, claims, parts),
-        *place_problems(laminate, claims, chord_error),
+        *place_problems(laminate, claims),
         *fixture_problems(folder, laminate, claims),
     ]
 
@@ -270,25 +266,6 @@ def _drawn_in_chords(design: Design) -> bool:
         return chorded_place(read_outline(design.drawing)) is not None
     except (DesignError, OSError):
         return False
-
-
-def _limits(rule: Rule, built: AsBuilt) -> Limits:
-    """Room for chords would make good builds of bad ones: these are counted at the true limits."""
-    return limits_of(built.design) if rule.name == registration_yield.NAME else built.limits
-
-
-def _within(limits: Limits, chord_error: float) -> Limits:
-    """Limits for files in chords, both edges of a bond being off by as much as they say."""
-    if not chord_error:
-        return limits
-    return replace(
-        limits,
-        bond_width=limits.bond_width - 2 * chord_error,
-        mask_overhang=limits.mask_overhang - 2 * chord_error,
-        worst_bond_width=limits.worst_bond_width - 2 * chord_error,
-        worst_mask_overhang=limits.worst_mask_overhang - 2 * chord_error,
-        registration_tolerance=limits.registration_tolerance + chord_error,
-    )
 
 
 def _measured(rule: Rule, laminate: Laminate, limits: Limits) -> list[Finding]:

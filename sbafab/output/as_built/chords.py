@@ -1,9 +1,9 @@
-"""Curves written as chords: found where no arc should be missing, put back where they stand."""
+"""Runs of chords that are meant as an arc: found where none should be, and made one again."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -18,10 +18,6 @@ WIDEST_STEP = math.radians(20)
 """So many chords, each turning less than this on one circle, are meant as an arc."""
 
 
-Short = Callable[[float, float], bool]
-"""Whether a chord, by its length and its circle's radius, is short enough to stand for an arc."""
-
-
 class Run(NamedTuple):
     """Consecutive chords of one circle: their ends, and the circle."""
 
@@ -33,43 +29,18 @@ class Run(NamedTuple):
 def chorded_place(region: Region) -> Point | None:
     """Where a run of chords stands in for an arc; None if there is none."""
     for contour in region.contours:
-        for run in _runs(_ends(contour), _narrow):
+        for run in _runs(_ends(contour)):
             if len(run.points) > LEAST_CHORDS:
                 return run.points[0]
     return None
 
 
-def with_short_chords_rounded(contour: Contour) -> Contour:
+def with_arcs(contour: Contour) -> Contour:
     """The contour of lines with arcs through every run of chords that are meant as one."""
-    return _with_arcs(contour, _narrow)
-
-
-def _narrow(length: float, radius: float) -> bool:
-    return length < 2 * math.sin(WIDEST_STEP / 2) * radius
-
-
-def with_arcs(region: Region, chord_error: float, known: float = 0.0) -> Region:
-    """The region with arcs in place of chords that stay within ``chord_error`` of them.
-
-    ``known`` is a radius that arcs too short to tell by themselves may have: half the kerf's.
-    """
-    sagitta = 1.05 * chord_error
-
-    def short(length: float, radius: float) -> bool:
-        return length < 2 * radius and _sagitta(length, radius) <= sagitta
-
-    return Region(tuple(_with_arcs(contour, short, known) for contour in region.contours))
-
-
-def _sagitta(length: float, radius: float) -> float:
-    return radius - math.sqrt(radius * radius - length * length / 4)
-
-
-def _with_arcs(contour: Contour, short: Short, known: float = 0.0) -> Contour:
     points = _ends(contour)
     if len(points) != len(contour.edges):
         return contour
-    runs = list(_runs(points, short, known))
+    runs = list(_runs(points))
     if len(runs) == 1 and len(runs[0].points) == len(points) + 1:
         whole = circle(runs[0].centre, runs[0].radius)
         return whole.reversed() if contour.is_hole else whole
@@ -108,15 +79,12 @@ def _arcs(run: Run) -> tuple[Edge, ...]:
     return tuple(Arc(a, b, run.centre, run.radius, ccw) for a, b in pairwise(stops))
 
 
-def _runs(points: list[Point], short: Short, known: float = 0.0) -> Iterator[Run]:
-    """Longest runs of at least three short chords on one circle, turning one way.
-
-    On circles of the ``known`` radius two chords are enough to tell.
-    """
+def _runs(points: list[Point]) -> Iterator[Run]:
+    """Longest runs of at least three short chords on one circle, turning one way."""
     count = len(points)
     if count < 4:
         return
-    first = next((i for i in range(count) if not _is_run(points, i - 1, short)), None)
+    first = next((i for i in range(count) if not _is_run(points, i - 1)), None)
     if first is None:
         found = _circle(points[0], points[count // 3], points[2 * count // 3])
         if found is not None:
@@ -127,12 +95,11 @@ def _runs(points: list[Point], short: Short, known: float = 0.0) -> Iterator[Run
     start, last = 0, count + 1
     while start + 2 <= last:
         end = start + 2
-        while end + 1 <= last and _is_run(ring, end - 2, short):
+        while end + 1 <= last and _is_run(ring, end - 2):
             end += 1
         run = tuple(ring[start : end + 1])
         found = _circle(run[0], run[len(run) // 2], run[-1])
-        is_arc = len(run) > 3 or (found is not None and abs(found[1] - known) < ON_CIRCLE)
-        if found is None or not is_arc:
+        if found is None or len(run) < 4:
             start += 1
             continue
         if start == 0:
@@ -141,7 +108,7 @@ def _runs(points: list[Point], short: Short, known: float = 0.0) -> Iterator[Run
         start = end
 
 
-def _is_run(points: list[Point], first: int, short: Short) -> bool:
+def _is_run(points: list[Point], first: int) -> bool:
     """Whether four points from ``first`` on lie on one circle, near each other, turning one way."""
     a, b, c, d = (points[(first + i) % len(points)] for i in range(4))
     found = _circle(a, b, c)
@@ -149,7 +116,12 @@ def _is_run(points: list[Point], first: int, short: Short) -> bool:
         return False
     centre, radius = found
     longest = max(math.dist(a, b), math.dist(b, c), math.dist(c, d))
-    return abs(math.dist(d, centre) - radius) < ON_CIRCLE and short(longest, radius)
+    return abs(math.dist(d, centre) - radius) < ON_CIRCLE and _narrow(longest, radius)
+
+
+def _narrow(length: float, radius: float) -> bool:
+    """Whether a chord is short enough, beside its circle, to stand for an arc."""
+    return length < 2 * math.sin(WIDEST_STEP / 2) * radius
 
 
 def _turn(a: Point, b: Point, c: Point) -> float:

@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from sbafab.cutting.properties import LIMITS, kerf_properties, layer_path, limit_properties
+from sbafab.cutting.properties import (
+    LIMITS,
+    curves_property,
+    kerf_properties,
+    layer_path,
+    limit_properties,
+)
 from sbafab.design.records import Design
 from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Layer
@@ -194,8 +200,9 @@ def _kerf(said: KerfClaim | None) -> str:
 def property_problems(files: Iterable[LayerFile], claims: Manifest) -> list[Problem]:
     """Custom properties of the cut files that are not what the manifest says, alike ones as one."""
     where: dict[str, list[int]] = {}
+    bare = [file for file in files if file.part is not None and not file.part.properties]
     for file in files:
-        if file.part is None:
+        if file.part is None or file in bare:
             continue
         found = file.part.properties
         for name, said in _properties(file.claim, claims).items():
@@ -203,11 +210,26 @@ def property_problems(files: Iterable[LayerFile], claims: Manifest) -> list[Prob
                 message = f"custom property {name} is {found.get(name)!r}, not {said!r}"
                 where.setdefault(message, []).append(file.position)
     problems = []
+    if bare:
+        parts = [file.part for file in bare if file.part is not None]
+        of = f"the files of {len(bare)} layers" if len(bare) > 1 else f"the file of {bare[0].label}"
+        has_units = all(part.units for part in parts)
+        problems.append(bare_problem(of, has_units, *(file.position for file in bare)))
     for message, layers in where.items():
         shown = ", ".join(map(str, layers[:5])) + (" ..." if len(layers) > 5 else "")
         plural = "layers" if len(layers) > 1 else "layer"
         problems.append(claim(f"{plural} {shown}: {message}", *layers))
     return problems
+
+
+def bare_problem(files: str, has_units: bool, *layers: int) -> Problem:
+    """A warning that files carry no custom properties, as one saved before R2004 cannot."""
+    lost = "custom properties" if has_units else "custom properties and no units"
+    message = (
+        f"{files} carry no {lost}: save as DXF R2004 or later to keep them; kerf, waivers and "
+        "curves are taken to be as the manifest tells"
+    )
+    return Problem(CLAIMS, message, layers, verdict="warn")
 
 
 def _properties(layer: LayerClaim, claims: Manifest) -> dict[str, str | None]:
@@ -220,6 +242,7 @@ def _properties(layer: LayerClaim, claims: Manifest) -> dict[str, str | None]:
         "MATERIAL": layer.material,
         "UNITS": "mm",
         **kerf_properties(width),
+        **curves_property(claims.curves),
         **waiver_properties(claims),
     }
 

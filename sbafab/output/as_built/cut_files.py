@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path, PurePosixPath
 
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER, CUT_SEQUENCE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
-from sbafab.cutting.properties import chord_error_of, kerf_of, kerf_text
+from sbafab.cutting.properties import (
+    chord_error_of,
+    curves_property,
+    kerf_of,
+    kerf_properties,
+    kerf_text,
+)
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
-from sbafab.output.as_built.chords import chorded_place, with_arcs
-from sbafab.output.as_built.records import INTEGRITY, LayerClaim, Problem
+from sbafab.laminate.films import Material
+from sbafab.output.as_built.agreement import in_agreement, with_circles, without_specks
+from sbafab.output.as_built.chords import chorded_place
+from sbafab.output.as_built.records import INTEGRITY, LayerClaim, Manifest, Problem
 from sbafab.output.as_built.uncut import uncut
 
 MOST_BYTES = 20_000_000
@@ -28,10 +36,11 @@ DATUM = "LINE"
 
 @dataclass(frozen=True)
 class CutPart:
-    """What a cut file cuts: ``region`` with the kerf undone and arcs for chords.
+    """What a cut file cuts: ``region`` with the kerf undone, round contours as circles.
 
     ``path`` is the beam's path as it is drawn. ``chord_error`` is what the file says, in mm, 0 for
     true arcs; ``corner_room`` the mm2 by which the area may be off because the beam rounds corners.
+    ``properties`` and ``units`` are empty where the file does not say.
     """
 
     region: Region
@@ -39,6 +48,7 @@ class CutPart:
     properties: dict[str, str]
     chord_error: float
     corner_room: float
+    units: str = "mm"
 
 
 @dataclass(frozen=True)
@@ -55,29 +65,45 @@ class LayerFile:
 
 
 def read_layers(
-    folder: Path, claims: Sequence[LayerClaim], chords_drawn: bool
+    folder: Path, claims: Manifest, chords_drawn: bool
 ) -> tuple[list[LayerFile], list[Problem]]:
-    """Every layer's file, files of equal bytes read once.
+    """Every layer's file, files of equal bytes read once, contours drawn alike made one.
 
     ``chords_drawn``: the design's own outline is drawn in chords, so they are no fault.
     """
-    known: dict[str, CutPart] = {}
+    known: dict[tuple[str, Material], CutPart] = {}
     files, problems = [], []
-    for position, claim in enumerate(claims, start=1):
+    for position, claim in enumerate(claims.layers, start=1):
         part: CutPart | None = None
         try:
             path = inside(folder, claim.file)
-            digest = sound_digest(path)
-            if digest not in known:
-                known[digest] = read_part(path, chords_drawn)
-            part = known[digest]
+            key = sound_digest(path), claim.material
+            if key not in known:
+                known[key] = read_part(path, chords_drawn, told_of(claims, claim.material))
+            part = known[key]
         except OutputError as error:
             name = claim.file or claim.name
             said = str(error).removeprefix(f"{PurePosixPath(name).name}: ")
             message = f"layer {position} ({name}): {said}"
             problems.append(Problem(INTEGRITY, message, (position,)))
         files.append(LayerFile(position, claim, part))
-    return files, problems
+    return _in_agreement(files), problems
+
+
+def told_of(claims: Manifest, material: str) -> dict[str, str]:
+    """The properties that the manifest tells of the cut files of a material."""
+    kerf = next((kerf.width for name, kerf in claims.kerf.items() if name == material), None)
+    return {**kerf_properties(kerf), **curves_property(claims.curves)}
+
+
+def _in_agreement(files: Sequence[LayerFile]) -> list[LayerFile]:
+    parts = {id(file.part): file.part for file in files if file.part is not None}
+    regions = in_agreement([part.region for part in parts.values()])
+    agreed = {
+        key: replace(part, region=region)
+        for (key, part), region in zip(parts.items(), regions, strict=True)
+    }
+    return [replace(file, part=agreed.get(id(file.part))) for file in files]
 
 
 def inside(folder: Path, file: str | None) -> Path:
@@ -113,38 +139,46 @@ def sound_digest(path: Path) -> str:
         raise OutputError(f"cannot be read ({error.strerror or error}); write it anew") from None
 
 
-def read_part(path: Path, chords_drawn: bool = False) -> CutPart:
-    """The part that a cut file cuts. Raises OutputError where it is not what the format says."""
+def read_part(
+    path: Path, chords_drawn: bool = False, told: Mapping[str, str] | None = None
+) -> CutPart:
+    """The part that a cut file cuts. Raises OutputError where it is not what the format says.
+
+    ``told`` stands in for the properties of a file that has none.
+    """
     try:
         found = read_profile(path)
-        return _part(found, chords_drawn)
+        return _part(found, chords_drawn, found.properties or told or {})
     except OutputError:
         raise
     except (ArithmeticError, ValueError, LookupError, TypeError, AttributeError) as error:
         raise OutputError(f"holds no sound contours ({error}); write it anew") from error
 
 
-def _part(found: ReadBack, chords_drawn: bool) -> CutPart:
+def _part(found: ReadBack, chords_drawn: bool, properties: Mapping[str, str]) -> CutPart:
     _check_drawn(found)
-    properties = found.properties
     kerf = kerf_of(properties) or 0.0
     chord_error = chord_error_of(properties)
-    region = found.region
-    if chord_error:
-        if isinstance(kerf, tuple):
-            raise OutputError("its chords do not tell how its kerf was compensated; write it anew")
-        region = with_arcs(region, chord_error, kerf / 2)
-    elif not chords_drawn:
-        place = chorded_place(region)
+    if chord_error and isinstance(kerf, tuple):
+        raise OutputError("its chords do not tell how its kerf was compensated; write it anew")
+    if not chord_error and not chords_drawn:
+        place = chorded_place(found.region)
         if place is not None:
             raise OutputError(
                 f"an arc is drawn as chords at x {place[0]:.3f}, y {place[1]:.3f}, and the file "
                 "does not say so; write it anew with arcs"
             )
-    region, corner_room = uncut(region, kerf)
+    region, corner_room = uncut(with_circles(found.region), kerf)
     if region.is_empty:
         raise OutputError(f"nothing is left inside a kerf of {kerf_text(kerf)} mm; write it anew")
-    return CutPart(region, found.region, properties, chord_error, corner_room)
+    return CutPart(
+        with_circles(without_specks(region)),
+        found.region,
+        found.properties,
+        chord_error,
+        corner_room,
+        found.units,
+    )
 
 
 def _check_drawn(found: ReadBack) -> None:

@@ -12,7 +12,7 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
 from sbafab.output.as_built.claims import claim, waiver_properties
-from sbafab.output.as_built.cut_files import CutPart, LayerFile, read_part
+from sbafab.output.as_built.cut_files import CutPart, LayerFile, read_part, told_of
 from sbafab.output.as_built.records import CLAIMS, INTEGRITY, Manifest, Problem
 from sbafab.rules.limits import TOLERANCE, at
 
@@ -61,9 +61,9 @@ def layer_problems(files: Iterable[LayerFile], claims: Manifest) -> list[Problem
 
 
 def _area_room(region: Region, part: CutPart) -> float:
-    """mm2 by which an area may be off: its share, the chords' error, corners the beam rounds."""
+    """mm2 by which an area may be off: its share, its edges' error, corners the beam rounds."""
     length = sum(contour.length for contour in region.contours)
-    return SHARE * region.area + 1e-6 + part.corner_room + part.chord_error * length
+    return SHARE * region.area + part.corner_room + (part.chord_error + TOLERANCE) * length
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -121,9 +121,9 @@ def interface_problems(
     return problems
 
 
-def place_problems(laminate: Laminate, claims: Manifest, chord_error: float) -> list[Problem]:
+def place_problems(laminate: Laminate, claims: Manifest) -> list[Problem]:
     """Bores, inlets, pins and lumen: where the manifest says, and as wide."""
-    room = TOLERANCE + chord_error
+    room = TOLERANCE
     pairs: list[tuple[str, Sequence[_Spot], Sequence[_Spot]]] = [
         (
             "bore",
@@ -212,7 +212,7 @@ def fixture_problems(folder: Path, laminate: Laminate, claims: Manifest) -> list
     if claims.fixture not in claims.files:
         return [claim(f"the fixture {claims.fixture!r} is not among the manifest's files")]
     try:
-        part = read_part(folder / claims.fixture)
+        part = read_part(folder / claims.fixture, told=told_of(claims, "plate"))
     except OutputError as error:
         name = Path(claims.fixture).name
         said = str(error).removeprefix(f"{name}: ")
@@ -220,8 +220,8 @@ def fixture_problems(folder: Path, laminate: Laminate, claims: Manifest) -> list
     circles = [hole.circle for hole in part.region.holes]
     holes = [("hole", c[0], 2 * c[1]) for c in circles if c is not None]
     pins = [("hole", pin.centre, pin.diameter) for pin in laminate.pins]
-    room = TOLERANCE + part.chord_error
-    for name, stated in waiver_properties(claims).items():
+    room = TOLERANCE
+    for name, stated in waiver_properties(claims).items() if part.properties else ():
         found = part.properties.get(name)
         if found != stated:
             return [claim(f"{claims.fixture}: custom property {name} is {found!r}, not {stated!r}")]

@@ -7,11 +7,13 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from sbafab.cutting.verify import TOLERANCE, check_contours
+from sbafab.cutting.verify import check_contours
 from sbafab.errors import OutputError
+from sbafab.geometry.centroid import centroid
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
 from sbafab.nesting.records import MATERIALS, Turn
+from sbafab.output.as_built.agreement import AGREED
 from sbafab.output.as_built.claims import claim
 from sbafab.output.as_built.cut_files import LayerFile
 from sbafab.output.as_built.records import CLAIMS, Problem, SheetClaim
@@ -23,7 +25,6 @@ class CutSheet:
 
     told: SheetClaim
     path: Region
-    chord_error: float
 
 
 @dataclass(frozen=True)
@@ -98,8 +99,7 @@ def piece_problems(
     problems = []
     for material in MATERIALS:
         own = [sheet for sheet in sheets if sheet.told.material == material]
-        room = TOLERANCE + 2 * max((sheet.chord_error for sheet in own), default=0.0)
-        kinds = _kinds_of(lots, material, turns[material], room)
+        kinds = _kinds_of(lots, material, turns[material], AGREED)
         cut: Counter[int] = Counter()
         for sheet in own:
             found, strangers = _sorted_out(sheet, kinds)
@@ -185,15 +185,16 @@ def _groups(kinds: Sequence[_Kind]) -> dict[_Pattern, _Pattern]:
 
 
 def _at_origin(piece: Region) -> Region:
-    low_x, low_y, _, _ = piece.bounds
-    return piece.moved(-low_x, -low_y)
+    """The piece with its centre of area at the origin."""
+    x, y = centroid(piece)
+    return piece.moved(-x, -y)
 
 
 def _alike(piece: Region, form: Region, room: float) -> bool:
     """Whether two regions at the origin agree within ``room`` mm."""
     if len(piece.contours) != len(form.contours):
         return False
-    if math.dist(piece.bounds, form.bounds) > 2 * room:
+    if math.dist(piece.bounds, form.bounds) > 4 * room:
         return False
     try:
         check_contours(piece, form, room)

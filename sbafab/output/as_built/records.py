@@ -149,6 +149,7 @@ class Manifest(_Claim):
     design_sha256: str
     registration: RegistrationClaim
     kerf: dict[Material, KerfClaim]
+    curves: str | None = None
     waived: tuple[str, ...]
     lowered_limits: tuple[str, ...] = ()
     copies: Annotated[int, Field(ge=1, le=1000)] = 1

@@ -9,13 +9,7 @@ from pathlib import Path, PurePosixPath
 from sbafab.cutting.cut_layers import ENGRAVE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.properties import (
-    LIMITS,
-    chord_error_of,
-    kerf_properties,
-    kerf_suffix,
-    limit_properties,
-)
+from sbafab.cutting.properties import LIMITS, kerf_properties, kerf_suffix, limit_properties
 from sbafab.cutting.sheets import FOLDER
 from sbafab.cutting.verify import TOLERANCE, check_surroundings
 from sbafab.design.records import Design
@@ -26,7 +20,8 @@ from sbafab.geometry.intersect import meeting_points
 from sbafab.laminate.films import Material
 from sbafab.nesting.check import check_placed
 from sbafab.nesting.records import Stock
-from sbafab.output.as_built.claims import claim
+from sbafab.output.as_built.agreement import AGREED
+from sbafab.output.as_built.claims import bare_problem, claim
 from sbafab.output.as_built.cut_files import check_sequence, inside, sound_digest
 from sbafab.output.as_built.measures import SHARE
 from sbafab.output.as_built.pieces import CutSheet, Lot, piece_problems
@@ -72,24 +67,31 @@ def sheet_problems(folder: Path, order: Order) -> list[Problem]:
     parts = [file.part for file in files if file.part is not None]
     curves = parts[0].properties.get("CURVES") if parts else None
     sheets: list[CutSheet] = []
+    bare: list[ReadBack] = []
     for told in order.sheets:
         try:
-            found, chord_error = _read(folder, told)
+            found = _read(folder, told)
         except OutputError as error:
             problems.append(_unsound(told, error))
             continue
-        sheets.append(CutSheet(told, found.region, chord_error))
-        problems += _property_problems(told, found, order, curves)
-        problems += _layout_problems(told, found, stock_of[told.material], chord_error)
+        sheets.append(CutSheet(told, found.region))
+        if found.properties:
+            problems += _property_problems(told, found, order, curves)
+        else:
+            bare.append(found)
+        problems += _layout_problems(told, found, stock_of[told.material])
         problems += _number_problems(sheets[-1])
+    if bare:
+        of = "the files of " + (f"{len(bare)} film sheets" if len(bare) > 1 else "a film sheet")
+        problems.append(bare_problem(of, all(found.units for found in bare)))
     if len(sheets) == len(order.sheets) and len(parts) == len(files):
         turns = {material: stock.turns for material, stock in stock_of.items()}
         problems += piece_problems(sheets, order.lots, turns)
     return problems
 
 
-def _read(folder: Path, told: SheetClaim) -> tuple[ReadBack, float]:
-    """What a sheet's file holds, and the sagitta of its chords."""
+def _read(folder: Path, told: SheetClaim) -> ReadBack:
+    """What a sheet's file holds. Raises OutputError where it is not sound."""
     path = inside(folder, told.file)
     sound_digest(path)
     try:
@@ -97,7 +99,7 @@ def _read(folder: Path, told: SheetClaim) -> tuple[ReadBack, float]:
         check_sequence(found)
         if found.region.is_empty:
             raise OutputError("it cuts nothing; write it anew")
-        return found, chord_error_of(found.properties)
+        return found
     except OutputError:
         raise
     except (ArithmeticError, ValueError, LookupError, TypeError, AttributeError) as error:
@@ -213,9 +215,7 @@ def _property_problems(
     ]
 
 
-def _layout_problems(
-    told: SheetClaim, found: ReadBack, stock: Stock, chord_error: float
-) -> list[Problem]:
+def _layout_problems(told: SheetClaim, found: ReadBack, stock: Stock) -> list[Problem]:
     """Frame, parting cut and engraving; borders, gaps and pins."""
     problems = []
     pins = tuple((pin.x, pin.y, pin.diameter) for pin in told.pins)
@@ -224,14 +224,13 @@ def _layout_problems(
     around = Surroundings((), parting, (told.width, told.length))
     beside = tuple(stroke for stroke in found.strokes if stroke[0] != ENGRAVE)
     pieces = [(_placed_piece(piece.bounds), piece) for piece in found.region.pieces]
-    slack = TOLERANCE + 2 * chord_error
     try:
         check_surroundings(replace(found, strokes=beside), around)
-        check_placed(pieces, laid, slack)
+        check_placed(pieces, laid, AGREED)
     except OutputError as error:
         problems.append(_unsound(told, error))
     top = found.region.bounds[3] + told.border
-    if stock.roll and abs(told.length - top) > slack:
+    if stock.roll and abs(told.length - top) > TOLERANCE:
         message = f"{told.file}: is {told.length:g} mm long, and its parts and border {top:g}"
         problems.append(claim(message))
     bad = _badly_engraved(found, told)
@@ -268,9 +267,8 @@ def _number_problems(sheet: CutSheet) -> list[Problem]:
     """Areas, contours and lengths that the manifest claims of a sheet."""
     told, region = sheet.told, sheet.path
     length = sum(contour.length for contour in region.contours)
-    area_room = SHARE * region.area + ROUNDED + sheet.chord_error * length
-    # Chords are shorter than their arcs: by a third of the sagitta over the radius.
-    length_room = (2e-2 if sheet.chord_error else SHARE) * length + ROUNDED
+    area_room = SHARE * region.area + ROUNDED + TOLERANCE * length
+    length_room = SHARE * length + ROUNDED
     agree: list[tuple[str, float, float, float]] = [
         ("parts_area", told.parts_area, region.area, area_room),
         ("density", told.density, told.parts_area / (told.width * told.length), ROUNDED),

@@ -14,7 +14,7 @@ from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
 from sbafab.geometry.offset import shrink
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.tracks import rim
-from sbafab.output.as_built.chords import with_short_chords_rounded
+from sbafab.output.as_built.chords import with_arcs
 
 KINK = 0.05
 """Radians: arcs along one curve turn less where they join, corners of a path more."""
@@ -69,7 +69,7 @@ def _inside(contour: Contour, a: float, b: float) -> Contour:
             kept.append(spot)
     if len(kept) > 1 and _at_one_corner(kept[-1], kept[0]):
         kept.pop() if kept[0].is_straight else kept.pop(0)
-    inside = tidy(with_short_chords_rounded(_chords(kept)).edges) if _is_sound(kept) else None
+    inside = tidy(with_arcs(_chords(kept)).edges) if _is_sound(kept) else None
     if inside is None or inside.is_hole != contour.is_hole:
         x, y = contour.edges[0].start
         raise OutputError(f"the contour at x {x:.3f}, y {y:.3f} is lost in its kerf")
