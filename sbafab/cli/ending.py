@@ -13,8 +13,9 @@ from types import FrameType
 
 import click
 
-from sbafab.errors import SbafabError
+from sbafab.errors import DefectError, SbafabError
 
+RULE_FAILED = 1
 BAD_INPUT = 2
 BY_SIGNAL = 128
 """Added to a signal's number, as shells do."""
@@ -47,6 +48,9 @@ def ended_plainly() -> Iterator[None]:
         help_of = f"; see {error.ctx.command_path} --help" if error.ctx is not None else ""
         say(f"{error.format_message().rstrip('.')}{help_of}")
         sys.exit(BAD_INPUT)
+    except DefectError as error:
+        say(str(error))
+        sys.exit(RULE_FAILED)
     except SbafabError as error:
         say(str(error))
         sys.exit(BAD_INPUT)

@@ -23,6 +23,7 @@ from sbafab.output.as_built import check as as_built
 from sbafab.output.as_built import cut_files, stack
 from sbafab.output.as_built.check import check_folder, read_folder
 from sbafab.output.as_built.cut_files import CutPart, read_part
+from sbafab.output.as_built.meant import Expected
 from sbafab.output.as_built.sheets import sheet_problems
 from sbafab.output.manifest import manifest
 from sbafab.rules import registration_worst_case, registration_yield
@@ -89,10 +90,11 @@ def quick(parts: dict[str, CutPart]) -> Iterator[None]:
     folder is written; film sheets are not looked at.
     """
 
-    def known(path: Path, chords_drawn: bool = False) -> CutPart:
-        digest = sha256(path.read_bytes()).hexdigest()
+    def known(path: Path, chords_drawn: bool = False, expected: Expected | None = None) -> CutPart:
+        shape = expected.profile.key if expected is not None else ""
+        digest = sha256(path.read_bytes()).hexdigest() + shape
         if digest not in parts:
-            parts[digest] = read_part(path, chords_drawn)
+            parts[digest] = read_part(path, chords_drawn, expected)
         return parts[digest]
 
     def regions(below: Region, above: Region, masks: Sequence[Region]) -> tuple[Region, ...]:
@@ -105,6 +107,7 @@ def quick(parts: dict[str, CutPart]) -> Iterator[None]:
         patch.object(stack, "interface_regions", regions),
         patch.object(as_built, "RULES", rules),
         patch.object(as_built, "sheet_problems", lambda *_: []),
+        patch.object(as_built, "design_problems_of", lambda *_: []),
         patch.object(run, "run_deck", lambda *_: ()),
     ):
         yield

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from sbafab.cutting.properties import kerf_properties, layer_path
+from sbafab.cutting.properties import PTFE_WARNING, kerf_properties, layer_path
 from sbafab.design.records import Design
 from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Layer
@@ -209,4 +209,6 @@ def _properties(layer: LayerClaim, claims: Manifest) -> dict[str, str]:
         "UNITS": "mm",
         **kerf_properties(width),
         "WAIVED": ", ".join(claims.waived) or "none",
+        "GENERATOR": claims.generator,
+        **({"WARNING": PTFE_WARNING} if layer.material == "PTFE" else {}),
     }
