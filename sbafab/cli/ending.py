@@ -13,9 +13,9 @@ from types import FrameType
 
 import click
 
+from sbafab.cli.working import RULE_FAILED
 from sbafab.errors import DefectError, SbafabError
 
-RULE_FAILED = 1
 BAD_INPUT = 2
 BY_SIGNAL = 128
 """Added to a signal's number, as shells do."""

@@ -85,10 +85,9 @@ def _value_difference(found: Any, meant: Any, where: str) -> str:
     if isinstance(meant, list) and isinstance(found, list):
         if len(meant) != len(found):
             return f"{where.rstrip('.')} has {len(found)} entries, not {len(meant)}"
-        said = (
-            _value_difference(*pair, f"{where}{n}.") for n, pair in enumerate(zip(found, meant))
-        )
-        return next(filter(None, said), "")
+        pairs = zip(found, meant, strict=True)
+        told = (_value_difference(*pair, f"{where}{n}.") for n, pair in enumerate(pairs, start=1))
+        return next(filter(None, told), "")
     if _is_number(meant) and _is_number(found):
         same = _alike(float(found), float(meant))
     elif isinstance(meant, str) and isinstance(found, str):

@@ -21,6 +21,8 @@ NEAR = 2e-5
 SHARE = 1e-5
 """Share of a volume by which two triangulations of one solid may differ."""
 MOST_BYTES = 500_000_000
+MOST_SIZE = 1e5
+"""mm from the origin."""
 MODEL = "3D/3dmodel.model"
 VERTEX = re.compile(r'<vertex x="([^"]*)" y="([^"]*)" z="([^"]*)" */>')
 TRIANGLE = re.compile(r'<triangle v1="([^"]*)" v2="([^"]*)" v3="([^"]*)" */>')
@@ -58,30 +60,35 @@ def bodies(path: Path) -> list[Body]:
 
 
 def _difference(own: Body, wanted: Body) -> str:
-    import numpy as np
-
     if own.said != wanted.said:
         return "names, materials or scales of its bodies are others"
     surface, meant = own.surface, wanted.surface
-    if not np.isfinite(surface.points).all():
-        return "it has a point that is no number"
-    if surface.faces.size and int(surface.faces.max()) >= len(surface.points):
-        return "it has a face of a point that is not there"
-    low, high = surface.points.min(axis=0), surface.points.max(axis=0)
-    if np.abs([low - meant.points.min(axis=0), high - meant.points.max(axis=0)]).max() > NEAR:
-        return "it is of another size"
+    said = _unsound(surface)
+    if said:
+        return said
     for one, other, what in ((surface, meant, "too many"), (meant, surface, "missing")):
         stray = _stray(one.points, other.points)
         if stray is not None:
             x, y, z = stray
             return f"the point at x {x:.3f}, y {y:.3f}, z {z:.3f} is {what}"
-    if len(open_edges(surface)):
-        return "it is not watertight"
     if abs(surface.volume - meant.volume) > SHARE * abs(meant.volume):
         return f"it encloses {surface.volume:.4f} mm3, not {meant.volume:.4f}"
     if abs(_area(surface) - _area(meant)) > SHARE * _area(meant):
         return f"its surface is {_area(surface):.3f} mm2, not {_area(meant):.3f}"
     return ""
+
+
+def _unsound(surface: Surface) -> str:
+    import numpy as np
+
+    points, faces = surface.points, surface.faces
+    if not len(points) or not len(faces):
+        return "it is empty"
+    if not np.isfinite(points).all() or float(np.abs(points).max()) > MOST_SIZE:
+        return "it has a point that is nowhere"
+    if int(faces.min()) < 0 or int(faces.max()) >= len(points):
+        return "it has a face of a point that is not there"
+    return "it is not watertight" if len(open_edges(surface)) else ""
 
 
 def _area(surface: Surface) -> float:
@@ -95,7 +102,7 @@ def _stray(points: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[
     """A point with none of the others nearer than NEAR."""
     import numpy as np
 
-    def cells(of: NDArray[np.float64], shift: float) -> NDArray[np.int64]:
+    def cells(of: NDArray[np.float64], shift: NDArray[np.float64]) -> NDArray[np.int64]:
         return np.floor(of / (4 * NEAR) + shift).astype(np.int64)
 
     # A point and its like share a cell of one grid or of another one shifted by half a cell.
