@@ -268,9 +268,9 @@ def design_problems_of(folder: Path, built: AsBuilt, measured: Sequence[Finding]
     """Layers, and all that lies beside them, that are not what the folder's design makes."""
     problems = _layer_problems(built)
     checked = _as_designed(built, measured)
-    if checked is not None:
+    if checked is not None and built.meant is not None:
         of_job = is_job(folder.absolute().parent)
-        problems += derived_problems(folder, built.claims, checked, of_job)
+        problems += derived_problems(folder, built.claims, checked, built.meant.paths, of_job)
     return problems
 
 

@@ -7,26 +7,29 @@ against; the places of the parts on their film sheets are those of the folder's 
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from sbafab.cutting.files import CutFile, compensated_paths
+from sbafab.cutting.files import CutFile
 from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.properties import layer_path
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.boolean import GeometryError
+from sbafab.geometry.region import Region
 from sbafab.nesting.parts import parts_of
+from sbafab.nesting.records import Part as NestPart
 from sbafab.output.as_built.likeness import file_difference, index_difference
+from sbafab.output.as_built.meshes import bodies
 from sbafab.output.as_built.records import DESIGNED, Job, Manifest, Problem, is_joined
 from sbafab.output.batch import Drawing, plan_batch, write_batch
 from sbafab.output.contents import TRAVELLER, Checked, Made, Part, schedule_of, write_contents
 from sbafab.output.earlier import PRESS
-from sbafab.output.manifest import as_json, manifest
+from sbafab.output.manifest import as_json
 from sbafab.output.settings import GENERATOR, cut_settings
 from sbafab.output.shop import CutSet, find_nests, write_nested_sheets
 
@@ -38,11 +41,15 @@ NOT_COMPARED = ("files", "mesh_statistics", "meshes")
 
 
 def derived_problems(
-    folder: Path, claims: Manifest, checked: Checked, of_job: bool
+    folder: Path, claims: Manifest, checked: Checked, paths: Mapping[str, Region], of_job: bool
 ) -> list[Problem]:
-    """Files of one design that are not what it makes; of a job's design, all but its sheets."""
+    """Files of one design that are not what it makes; of a job's design, all but its sheets.
+
+    ``paths`` holds the beam's path for every pattern of the design's laminate.
+    """
     with _made_anew(folder) as (fresh, problems):
-        index = _write_anew(folder, fresh, claims, checked, of_job)
+        parts = parts_of(checked.laminate, paths, checked.design.order.copies)
+        index = _write_anew(folder, fresh, claims, checked, None if of_job else parts)
         problems.extend(_differences(folder, fresh, claims.files, claims.generator))
         problems.extend(_index_problems(folder, index, of_job))
         problems.extend(_prediction_problems(folder, fresh, claims, checked))
@@ -87,26 +94,31 @@ def _made_anew(folder: Path) -> Iterator[tuple[Path, list[Problem]]]:
 
 
 def _write_anew(
-    folder: Path, fresh: Path, claims: Manifest, checked: Checked, of_job: bool
+    folder: Path,
+    fresh: Path,
+    claims: Manifest,
+    checked: Checked,
+    parts: Sequence[NestPart] | None,
 ) -> dict[str, Any]:
-    """Writes what a run would have put beside the layers' files; its manifest, without hashes."""
+    """Writes what a run would have put beside the layers' files; its manifest, without hashes.
+
+    The ``parts`` go on film sheets of their own; a design of a job has none.
+    """
     design, laminate = checked.design, checked.laminate
     settings = cut_settings(design, checked.waived)
     wanted = _parts(claims.files)
     # Pictures come with a run that makes everything: then there is a page as well.
-    has_page = not of_job and (TRAVELLER in claims.files or {"press", "preview"} <= wanted)
+    has_page = parts is not None and (TRAVELLER in claims.files or {"press", "preview"} <= wanted)
     wanted |= {"press", "preview"} if has_page else set()
     sheets: list[SheetFile] = []
-    if not of_job:
-        parts = parts_of(laminate, compensated_paths(laminate, settings), design.order.copies)
+    if parts is not None:
         nests = find_nests(parts, design, folder, _quiet)
         sheets = write_nested_sheets(nests, design, fresh, settings, _quiet)
     write_fixture(laminate, fresh, settings)
     cut = CutSet(_cut_files(checked), FIXTURE if laminate.pins else None)
     pressing = schedule_of(checked) if "press" in wanted else None
     made = Made(cut, sheets, pressing, traveller=has_page)
-    write_contents(checked, wanted, made, fresh, _quiet)
-    return manifest(design, laminate, checked.waived, cut, sheets, ())
+    return write_contents(checked, wanted, made, fresh, _quiet)
 
 
 def _cut_files(checked: Checked) -> tuple[CutFile, ...]:
@@ -172,8 +184,24 @@ def _index(path: Path) -> dict[str, Any]:
 def _index_problems(folder: Path, index: dict[str, Any], of_job: bool) -> list[Problem]:
     """Where the manifest is not the design's; sheets of a job are claimed by the job."""
     left_out = (*NOT_COMPARED, "sheets", "films") if of_job else NOT_COMPARED
-    said = index_difference(_index(folder / INDEX), json.loads(as_json(index)), left_out)
+    found, wanted = _index(folder / INDEX), json.loads(as_json(index))
+    said = index_difference(found, wanted, left_out) or _mesh_difference(folder, found, wanted)
     return [Problem(DESIGNED, f"manifest.json: {said}; write the folder anew")] if said else []
+
+
+def _mesh_difference(folder: Path, found: dict[str, Any], wanted: dict[str, Any]) -> str:
+    """Surfaces that the manifest lists otherwise; a library may make other triangles of them."""
+    listed = found.get("meshes", [])
+    for mesh in wanted["meshes"]:
+        own: dict[str, Any] = next((m for m in listed if m.get("file") == mesh["file"]), {})
+        count = mesh["elements"]
+        if own.get("elements") != count:
+            (body,) = bodies(folder / mesh["file"])
+            count = len(body.surface.faces)
+        said = index_difference(own, {**mesh, "elements": count}, ())
+        if said:
+            return f"{mesh['file']}: {said}"
+    return ""
 
 
 def _prediction_problems(

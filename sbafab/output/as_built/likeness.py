@@ -7,6 +7,7 @@ made a mesh or a picture, and nothing differs that is cut, pressed or read.
 from __future__ import annotations
 
 import base64
+import csv
 import json
 import math
 import re
@@ -27,6 +28,7 @@ GREY = 1.0
 """Mean difference of two pictures, of 255 levels, that antialiasing may make."""
 SEEN, FEW = 48, 2e-4
 """A pixel that differs by as much is seen; that share of them may be."""
+UNREADABLE = (ValueError, LookupError, ArithmeticError, RecursionError, csv.Error)
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 PICTURE = re.compile(r"data:image/png;base64,([A-Za-z0-9+/=\s]+)")
 LONGEST_SHOWN = 40
@@ -42,7 +44,14 @@ def file_difference(found: Path, meant: Path, name: str) -> str:
         return ""
     try:
         said = _readers()[meant.suffix](found, meant)
-    except (OutputError, ValueError, LookupError, ArithmeticError, RecursionError) as error:
+    except (
+        OutputError,
+        ValueError,
+        LookupError,
+        ArithmeticError,
+        RecursionError,
+        csv.Error,
+    ) as error:
         said = f"it cannot be read ({error})"
     return f"{name} is not what design.toml makes: {said}" if said else ""
 
@@ -63,14 +72,25 @@ def _readers() -> dict[str, Callable[[Path, Path], str]]:
         ".json": _json_difference,
         ".dxf": _drawing_difference,
         ".png": lambda found, meant: _picture_difference(found.read_bytes(), meant.read_bytes()),
-        **dict.fromkeys((".csv", ".svg", ".toml", ".html"), _text_difference),
+        ".csv": _table_difference,
+        **dict.fromkeys((".svg", ".toml", ".html"), _text_difference),
         **dict.fromkeys((".stl", ".3mf", ".glb"), mesh_difference),
     }
 
 
+def _text(path: Path) -> str:
+    with path.open(encoding="utf-8", newline="") as file:
+        return file.read()
+
+
 def _json_difference(found: Path, meant: Path) -> str:
-    own, wanted = (json.loads(path.read_text(encoding="utf-8")) for path in (found, meant))
+    own, wanted = (json.loads(_text(path)) for path in (found, meant))
     return _value_difference(own, wanted, "")
+
+
+def _table_difference(found: Path, meant: Path) -> str:
+    own, wanted = ([*csv.reader(_text(path).splitlines(True))] for path in (found, meant))
+    return _value_difference(own, wanted, "row ")
 
 
 def _value_difference(found: Any, meant: Any, where: str) -> str:
@@ -111,7 +131,7 @@ def _shown(value: object) -> str:
 
 
 def _text_difference(found: Path, meant: Path) -> str:
-    own, wanted = (path.read_text(encoding="utf-8") for path in (found, meant))
+    own, wanted = _text(found), _text(meant)
     pictures, others = PICTURE.findall(own), PICTURE.findall(wanted)
     if len(pictures) != len(others):
         return f"it has {len(pictures)} pictures, not {len(others)}"
