@@ -10,6 +10,7 @@ from sbafab.errors import DefectError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.output.as_built.check import check_written
 from sbafab.output.as_built.meant import Meant, Work
+from sbafab.output.as_built.records import CLAIMS, DESIGNED, INTEGRITY
 from sbafab.output.batch import Batch
 from sbafab.output.contents import Checked
 from sbafab.output.shop import Progress
@@ -52,7 +53,14 @@ def refuse_batch(batch: Batch, folder: Path, tell: Progress) -> None:
 
 
 def _said(failed: Iterable[Finding]) -> str:
-    """The first findings, each with its rule."""
-    told = [f"{finding.rule}: {finding.message.rstrip('.')}" for finding in failed]
-    more = f"; and {len(told) - MOST_NAMED} more" if len(told) > MOST_NAMED else ""
+    """The first finding of each rule; what is cut first, what is claimed of it last."""
+    first: dict[str, Finding] = {}
+    for finding in failed:
+        first.setdefault(finding.rule, finding)
+    order = {DESIGNED: 0, INTEGRITY: 1, CLAIMS: 3}
+    told = [
+        f"{finding.rule}: {finding.message.rstrip('.')}"
+        for finding in sorted(first.values(), key=lambda finding: order.get(finding.rule, 2))
+    ]
+    more = f"; {len(told) - MOST_NAMED} more rules fail" if len(told) > MOST_NAMED else ""
     return "; ".join(told[:MOST_NAMED]) + more

@@ -152,7 +152,7 @@ KIND = Kind(
         replaced("sheet's picture of another size", "sheets/TPE_1.svg", r'height="\d', 'height="9'),
         replaced("part lost in a sheet's picture", "sheets/PTFE_1.svg", r"<path [^>]*/>\n", ""),
         Fault("stray engraving in the waste", RULE, engraved, beside=True),
-        told("parts placed otherwise", "sheets/nest.json", lambda d: d["nests"][0].popitem()),
+        told("parts placed otherwise", "sheets/nest.json", lambda d: d["nests"]["TPE"].reverse()),
         plate("pin plate turned over", flipped),
         plate("pin plate of another size", lambda region: region.moved(1.0, 0.0)),
         told("press at 270 C", "press.json", lambda d: d["steps"][0].update(temperature_c=270)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
@@ -59,16 +60,20 @@ def lumen_of(radius: float) -> Change:
     return lambda region, laminate: (region | disc(ORIGIN, 1.2)) - disc(ORIGIN, radius)
 
 
+def _near(place: Point, others: Iterable[Point]) -> bool:
+    return any(math.dist(place, other) < 1e-6 for other in others)
+
+
 def tooling_hole(name: str, pick: Pick, by: float | None) -> Fault:
     """A layer's first tooling hole closed, or moved."""
 
     def change(region: Region, laminate: Laminate) -> Region:
-        bores = {b.centre for b in laminate.bores}
+        bores = [bore.centre for bore in laminate.bores]
+        drilled = [hole.circle[0] for hole in region.holes if hole.circle]
         pin = next(
             pin
             for pin in laminate.pins
-            if pin.centre not in bores
-            and any(hole.circle and hole.circle[0] == pin.centre for hole in region.holes)
+            if not _near(pin.centre, bores) and _near(pin.centre, drilled)
         )
         closed = region | disc(pin.centre, pin.diameter / 2 + 0.1)
         return closed if by is None else closed - disc(aside(pin.centre, by), pin.diameter / 2)

@@ -23,9 +23,7 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
     That is what a design makes, what the rules find in it, and what it writes beside cut files.
     """
     deck, write = as_built._deck, derived._write_anew
-    measured = _remembered(
-        deck, lambda b: design_sha256(b.design) + repr((b.limits, _deck_names()))
-    )
+    measured = _remembered(deck, _asked_of_deck)
     meant_by = _remembered(as_built.meant_by, design_sha256)
     run_deck = _remembered(as_built.run_deck, lambda made, limits: made.name + repr(limits))
     made: dict[str, Any] = {}
@@ -58,7 +56,8 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
 
 def _asked_of_deck(built: as_built.AsBuilt) -> str:
     """Design, limits, and the rules that are run: some checks leave out all or some."""
-    return design_sha256(built.design) + repr((built.limits, [r.name for r in as_built.RULES]))
+    names = [rule.name for rule in as_built.RULES]
+    return design_sha256(built.design) + repr((built.limits, built.known, names))
 
 
 def _remembered(work: Callable[..., Any], key: Callable[..., str]) -> Callable[..., Any]:

@@ -191,16 +191,18 @@ def _index_problems(folder: Path, index: dict[str, Any], of_job: bool) -> list[P
 
 def _mesh_difference(folder: Path, found: dict[str, Any], wanted: dict[str, Any]) -> str:
     """Surfaces that the manifest lists otherwise; a library may make other triangles of them."""
-    listed = found.get("meshes", [])
+    said = [one for one in found.get("meshes", []) if isinstance(one, dict)]
+    listed = [one for one in said if one.get("kind") in ("solid", "cavity")]
+    if len(listed) != len(wanted["meshes"]):
+        return f"it lists {len(listed)} surfaces, not {len(wanted['meshes'])}"
     for mesh in wanted["meshes"]:
         own: dict[str, Any] = next((m for m in listed if m.get("file") == mesh["file"]), {})
         count = mesh["elements"]
         if own.get("elements") != count:
-            (body,) = bodies(folder / mesh["file"])
-            count = len(body.surface.faces)
-        said = index_difference(own, {**mesh, "elements": count}, ())
-        if said:
-            return f"{mesh['file']}: {said}"
+            count = sum(len(body.surface.faces) for body in bodies(folder / mesh["file"]))
+        off = index_difference(own, {**mesh, "elements": count}, ())
+        if off:
+            return f"{mesh['file']}: {off}"
     return ""
 
 
