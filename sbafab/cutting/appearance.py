@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from sbafab.cutting.cut_layers import COLOURS, REFERENCE
@@ -12,7 +13,9 @@ if TYPE_CHECKING:
     from ezdxf.entities.dxfgfx import DXFGraphic
     from ezdxf.entities.layer import Layer
 
-BY_BLOCK, BY_LAYER = 0, 256
+BY_LAYER = 256
+PAPER = re.compile(r"(?m)^ *67\r?\n *1\r?$")
+"""Where an entity may be marked as one of paper space."""
 SOLID = ("continuous", "bylayer")
 """Linetypes that are drawn without gaps, in small letters; no model space entity has a block's."""
 
@@ -35,6 +38,24 @@ def check_appearance(document: Drawing) -> None:
     for entity in entities:
         if entity.dxf.layer in COLOURS:
             _check_entity(entity)
+
+
+def check_space(text: str) -> None:
+    """Raises OutputError for an entity that says it is in paper space, in a DXF text.
+
+    ezdxf goes by an entity's owner alone, other programs by this.
+    """
+    if PAPER.search(text) is None:
+        return
+    lines = [line.strip() for line in text.splitlines()]
+    kind, is_drawn = "", False
+    for code, value in zip(lines[::2], lines[1::2], strict=False):
+        if code == "0":
+            kind = value
+        elif code == "2" and kind == "SECTION":
+            is_drawn = value == "ENTITIES"
+        elif is_drawn and code == "67" and value != "0" and kind != "VIEWPORT":
+            raise OutputError(f"a {kind} is in paper space; draw in model space only.")
 
 
 def _check_layer(layer: Layer, name: str) -> None:
@@ -60,8 +81,6 @@ def _check_entity(entity: DXFGraphic) -> None:
     place = f"{entity.dxftype()} (handle {dxf.handle}) on layer {layer}"
     if dxf.get("invisible", 0):
         raise OutputError(f"{place} is invisible; show it or remove it.")
-    if dxf.get("paperspace", 0):
-        raise OutputError(f"{place} is in paper space; draw in model space only.")
     if dxf.get("transparency") and entity.transparency > 0:
         raise OutputError(f"{place} is transparent; make it solid.")
     if dxf.get("color", BY_LAYER) not in (BY_LAYER, COLOURS[layer]) or not _is_true(

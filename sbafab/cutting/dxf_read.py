@@ -10,7 +10,7 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sbafab.cutting.appearance import check_appearance
+from sbafab.cutting.appearance import check_appearance, check_space
 from sbafab.cutting.chaining import check_clear, closed_loops, nested_region
 from sbafab.cutting.cut_layers import COLOURS, CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
@@ -62,6 +62,7 @@ def _read_text(text: str) -> ReadBack:
     """Equal texts hold the same, and are parsed once: a run reads its files when it writes them,
     and again, from the disk, when it checks the folder.
     """
+    check_space(text)
     return _read(_parsed(text))
 
 
