@@ -36,9 +36,9 @@ def text(cells: Cells) -> str:
         "`sbafab generate` writes, and every rule is run on them.",
         "",
         "`SBAFAB_FAULTS=500 python -m pytest tests/faults/test_mutants.py` puts 500 faults drawn "
-        "at random into any of the files of such folders, with the hashes put right: each is caught, "
-        "or other readers (ezdxf, trimesh, parsers of the formats) find nothing changed that is "
-        "cut, pressed or read.",
+        "at random into any of the files of such folders, with the hashes put right: each is "
+        "caught, or other readers (ezdxf, trimesh, parsers of the formats) find nothing changed "
+        "that is cut, pressed or read.",
         "",
         "**caught**: the rule named for the fault fails; what fails besides it stands after the "
         "semicolon. **n/a**: the fault does not apply, and why.",
