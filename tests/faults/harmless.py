@@ -75,6 +75,8 @@ def _drawing(text: str) -> Any:
         # A colour of an entity's own that is its layer's draws it as without.
         if own.get("color") == document.layers.get(own["layer"]).dxf.color:
             del own["color"]
+    # Which of one layer's entities is cut first changes no part.
+    entities.sort(key=lambda entity: (entity[1]["layer"], repr(entity)))
     used = {entity.dxf.layer for entity in document.modelspace()}
     layers = {
         layer.dxf.name: _attributes(layer) for layer in document.layers if layer.dxf.name in used
