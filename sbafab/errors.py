@@ -17,3 +17,7 @@ class DesignError(SbafabError, ValueError):
 
 class OutputError(SbafabError, OSError):
     """Files that could not be written or read back as they should be."""
+
+
+class DefectError(SbafabError):
+    """Files that the program wrote and that are not what it was asked for: a defect of its own."""

@@ -14,7 +14,8 @@ from types import FrameType
 
 import click
 
-from sbafab.errors import BY_SIGNAL, STOPPED, SbafabError
+from sbafab.cli.working import RULE_FAILED
+from sbafab.errors import BY_SIGNAL, STOPPED, DefectError, SbafabError
 
 BAD_INPUT = 2
 LATER = 0.01
@@ -53,6 +54,9 @@ def ended_plainly() -> Iterator[None]:
         help_of = f"; see {error.ctx.command_path} --help" if error.ctx is not None else ""
         say(f"{error.format_message().rstrip('.')}{help_of}")
         sys.exit(BAD_INPUT)
+    except DefectError as error:
+        say(str(error))
+        sys.exit(RULE_FAILED)
     except SbafabError as error:
         say(str(error))
         sys.exit(BAD_INPUT)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sbafab.cutting.appearance import check_appearance, check_space
 from sbafab.cutting.chaining import check_clear, closed_loops, nested_region
 from sbafab.cutting.cut_layers import COLOURS, CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
@@ -56,16 +58,24 @@ def read_profile(source: Path | str) -> ReadBack:
     """
     name = source.name if isinstance(source, Path) else "the DXF text"
     try:
-        return _read(_parsed(source))
+        return _read_text(_text(source) if isinstance(source, Path) else source)
     except OutputError as error:
         raise OutputError(f"{name}: {error}") from error
 
 
-def _parsed(source: Path | str) -> Drawing:
+@lru_cache(maxsize=64)
+def _read_text(text: str) -> ReadBack:
+    """Equal texts hold the same, and are parsed once: a run reads its files when it writes them,
+    and again, from the disk, when it checks the folder.
+    """
+    check_space(text)
+    return _read(_parsed(text))
+
+
+def _parsed(text: str) -> Drawing:
     from ezdxf.filemanagement import read
     from ezdxf.lldxf.const import DXFError
 
-    text = _text(source) if isinstance(source, Path) else source
     words = text.split()
     if words[:2] != ["0", "SECTION"]:
         raise OutputError("not an ASCII DXF document; write it anew.")
@@ -117,6 +127,7 @@ def _read(document: Drawing) -> ReadBack:
             closed[layer].append(contour)
         else:
             loose[layer] += edges
+    check_appearance(document)
     contours = {layer: [*closed[layer], *closed_loops(loose[layer])] for layer in closed}
     check_clear([*contours[CUT_INNER], *contours[CUT_OUTER]])
     return ReadBack(

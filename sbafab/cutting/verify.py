@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sbafab.cutting.cut_layers import CUT_SEQUENCE, CUT_SHEET, ENGRAVE, REFERENCE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
-from sbafab.cutting.dxf_write import Surroundings
+from sbafab.cutting.dxf_write import DATUM_ARM, Surroundings
 from sbafab.cutting.remaining import Remaining
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Bounds, Edge, Line, Point, distance_to
@@ -85,6 +85,37 @@ def _near(region: Region, edges: Sequence[Edge]) -> Region:
             if low_x <= right and high_x >= left and low_y <= top and high_y >= bottom
         )
     )
+
+
+def check_datum(found: ReadBack) -> None:
+    """Raises OutputError where a layer's file has more beside its contours than the datum cross.
+
+    Nor may it have less: the cross is what layers are laid over each other by.
+    """
+    arm = DATUM_ARM
+    wanted = [((-arm, 0.0), (arm, 0.0)), ((0.0, -arm), (0.0, arm))]
+    for layer, edges in found.strokes:
+        ends = edges[0].start, edges[-1].end
+        own = next(
+            (
+                line
+                for line in wanted
+                if min(_apart(line, ends), _apart(line, ends[::-1])) <= TOLERANCE
+            ),
+            None,
+        )
+        if layer != REFERENCE or len(edges) != 1 or own is None:
+            x, y = ends[0]
+            raise OutputError(
+                f"a stroke on {layer} at x {x:.3f}, y {y:.3f} is not the datum cross; remove it."
+            )
+        wanted.remove(own)
+    if wanted:
+        raise OutputError("the datum cross at x 0, y 0 is not whole; write it anew.")
+
+
+def _apart(line: Sequence[Point], other: Sequence[Point]) -> float:
+    return max(math.dist(p, q) for p, q in zip(line, other, strict=True))
 
 
 def _check_properties(found: Mapping[str, str], expected: Mapping[str, str]) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 from sbafab.assemblies.build import Assembled, PlacedPart, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
 from sbafab.assemblies.colours import colours, linear
+from sbafab.assemblies.reading import load_assembly
 from sbafab.assemblies.records import Assembly
 from sbafab.assemblies.shapes import placed_surface
 from sbafab.assemblies.writing import DESIGN_FILE, assembly_sha256, assembly_toml, part_entry
@@ -38,6 +39,7 @@ from sbafab.output.contents import (
 )
 from sbafab.output.earlier import no_longer, puts_away
 from sbafab.output.manifest import as_json, checks
+from sbafab.output.self_check import refuse_batch
 from sbafab.output.settings import GENERATOR, kerf_widths, limits
 from sbafab.output.shop import Progress
 from sbafab.output.swap import ASSEMBLY_SCHEMA, listed_files, replaced_folder
@@ -121,6 +123,12 @@ def check_assembly(assembly: Assembly, progress: Progress | None = None) -> Chec
     return CheckedAssembly(assembled, checked, run_checks(assembled))
 
 
+def checked_again(folder: Path, designs: Sequence[Checked]) -> CheckedAssembly:
+    """The assembly of a folder, with what was found in its designs as they lie in there."""
+    assembled = assemble(load_assembly(folder / DESIGN_FILE))
+    return CheckedAssembly(assembled, tuple(designs), run_checks(assembled))
+
+
 def generate_assembly(
     assembly: Assembly,
     out: Path = Path("out"),
@@ -158,8 +166,10 @@ def generate_assembly(
             written = write_batch(batch, folder, PARTS, False, tell)
         else:
             _write_uncut(checked, folder, tell)
-        index = _write_whole(checked, batch, written, folder, tell)
+        index = write_whole(checked, batch, written, folder, tell)
         close_folder(folder, index)
+        if batch is not None:
+            refuse_batch(batch, folder, tell)
     return AssemblyRun(checked, target, index, no_longer(listed, index))
 
 
@@ -171,14 +181,14 @@ def _write_uncut(checked: CheckedAssembly, folder: Path, tell: Progress) -> None
         close_folder(own, write_contents(one, UNCUT, Made(), own, tell))
 
 
-def _write_whole(
+def write_whole(
     checked: CheckedAssembly,
     batch: Batch | None,
     written: Written | None,
     folder: Path,
     tell: Progress,
 ) -> dict[str, Any]:
-    """What is the assembly's own; its manifest, without the files' hashes."""
+    """Writes what is the assembly's own; its manifest, without the files' hashes."""
     from sbafab.reports.assembly_png import assembly_pngs
 
     assembled = checked.assembled

@@ -25,7 +25,7 @@ def refuse_coarse(
     """Raises DesignError where the laminate holds and what its ``paths`` in chords cut does not."""
     error = settings.chord_error
     try:
-        found = _first_failure(_as_cut(laminate, paths, settings), limits)
+        found = _first_failure(as_cut(laminate, paths, settings), limits)
     except (OutputError, GeometryError) as failure:
         raise DesignError(_refused(error, f"leave no sound contours: {failure}")) from failure
     if found is not None:
@@ -39,7 +39,7 @@ def _refused(error: float, why: str) -> str:
     )
 
 
-def _as_cut(laminate: Laminate, paths: Mapping[str, Region], settings: CutSettings) -> Laminate:
+def as_cut(laminate: Laminate, paths: Mapping[str, Region], settings: CutSettings) -> Laminate:
     """The laminate of the parts that a beam leaves which is led along the paths."""
     cut = []
     for pattern, path in paths.items():

@@ -15,6 +15,7 @@ from sbafab.output.batch import Drawing, batch_manifest, plan_batch, refuse_unli
 from sbafab.output.contents import Checked, Part, close_folder
 from sbafab.output.earlier import no_longer
 from sbafab.output.run import check
+from sbafab.output.self_check import refuse_batch
 from sbafab.output.shop import Progress
 from sbafab.output.swap import JOB_SCHEMA, listed_files, replaced_folder
 
@@ -68,6 +69,7 @@ def generate_job(
         written = write_batch(batch, folder, PARTS, True, tell)
         index = batch_manifest(JOB_SCHEMA, name, checked, batch, written.sheets)
         close_folder(folder, index)
+        refuse_batch(batch, folder, tell)
     return Job(checked, target, index, no_longer(listed, index))
 
 

@@ -35,6 +35,7 @@ from sbafab.output.earlier import (
     refuse_to_put_away,
 )
 from sbafab.output.manifest import identity
+from sbafab.output.self_check import refuse_unlike, work_of
 from sbafab.output.settings import cut_settings, limits
 from sbafab.output.shop import (
     CutPlan,
@@ -128,8 +129,8 @@ def generate(
     A design that breaks a rule gets its findings and pictures, but no cut files, schedule or
     meshes; where another design's lie, it gets nothing and they stay (``Run.kept``). With some of
     the ``parts`` only, the others stay if they are of the same design.
-    Raises DesignError or OutputError, also where other parts are another design's; the old folder
-    is then whole.
+    Raises DesignError or OutputError, also where other parts are another design's, and DefectError
+    where the cut files read back are not what was checked; the old folder is then whole.
     """
     tell = progress or (lambda what, done, total: None)
     checked = Checked(design, *check(design, tell))
@@ -166,6 +167,9 @@ def generate(
                 extras.also(checked.laminate, folder)
             carry_over(target, folder, index)
         close_folder(folder, index)
+        if plan is not None:
+            tell("reading back", 0, 1)
+            refuse_unlike(folder, {design.name: work_of(checked, plan.paths)}, settings)
     dropped = no_longer(listed, index)
     return Run(design, checked.laminate, checked.findings, target, index, pressing, meshes, dropped)
 

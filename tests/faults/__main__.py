@@ -6,6 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from tests.faults.catalogue import FAULTS, TEMPLATES, caught_by, cell, good_folders
+from tests.faults.once import remembering
 from tests.faults.specimen import quick
 from tests.faults.table import PAGE, text
 
@@ -13,7 +14,7 @@ from tests.faults.table import PAGE, text
 def main() -> int:
     """Puts every fault into every template; 1 if a rule missed one."""
     cells: dict[tuple[str, str], str] = {}
-    with TemporaryDirectory() as folder, quick({}):
+    with TemporaryDirectory() as folder, quick({}), remembering(Path(folder) / "anew")():
         root = Path(folder)
         (root / "good").mkdir()
         goods = good_folders(root / "good")

@@ -13,9 +13,9 @@ from sbafab.actuators import load_design
 from sbafab.design.writing import design_sha256
 from sbafab.output.as_built.check import read_folder
 from sbafab.output.run import generate
-from tests.faults import chords, claims, files, holes, layers, masks, sheets
+from tests.faults import beside, chords, claims, files, holes, layers, masks, sheets
 from tests.faults.record import Fault, Kind
-from tests.faults.specimen import Specimen, failing
+from tests.faults.specimen import Specimen, failing, unabridged
 from tests.output.doctoring import Doctor
 
 TEMPLATES = ("1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm")
@@ -29,11 +29,12 @@ KINDS: tuple[Kind, ...] = (
     files.KIND,
     claims.KIND,
     sheets.KIND,
+    beside.KIND,
 )
 FAULTS = tuple(fault for kind in KINDS for fault in kind.faults)
 
-Goods = Callable[[str, tuple[str, ...]], Specimen]
-"""The good folder of a template with settings."""
+Goods = Callable[[str, tuple[str, ...], bool], Specimen]
+"""The good folder of a template with settings; all that a run writes, or the cut files alone."""
 
 
 def good_folders(root: Path) -> Goods:
@@ -43,14 +44,18 @@ def good_folders(root: Path) -> Goods:
     """
 
     @cache
-    def good(template: str, settings: tuple[str, ...]) -> Specimen:
+    def good(template: str, settings: tuple[str, ...], whole: bool) -> Specimen:
         few = (f"stack.balloons={BALLOONS}", "rules.yield_builds=100")
         design = load_design(template, [*few, *settings])
-        out = root / design_sha256(design)
+        out = root / f"{design_sha256(design)}{'-whole' if whole else ''}"
         folder = out / design.name
         with FileLock(out.with_suffix(".lock")):
             if not folder.exists():
-                generate(design, out, ("cut",))
+                if whole:
+                    with unabridged():
+                        generate(design, out)
+                else:
+                    generate(design, out, ("cut",))
         clean = read_folder(folder).laminate
         assert clean is not None
         return Specimen(Doctor(folder), clean)
@@ -60,13 +65,17 @@ def good_folders(root: Path) -> Goods:
 
 def caught_by(fault: Fault, template: str, goods: Goods, folder: Path) -> tuple[str, ...] | str:
     """The rules that fail once the fault is in a copy at ``folder``, or why it does not apply."""
-    good = goods(template, fault.settings)
+    good = goods(template, fault.settings, fault.beside)
     reason = fault.why_not(good.clean)
     if reason:
         return reason
     shutil.copytree(good.doctor.folder, folder)
     fault.put(Specimen(Doctor(folder), good.clean))
-    rules = failing(folder, layers=not fault.sheets, sheets=fault.sheets)
+    if fault.beside:
+        with unabridged():
+            rules = failing(folder)
+    else:
+        rules = failing(folder, layers=not fault.sheets, sheets=fault.sheets)
     shutil.rmtree(folder)
     return rules
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 
 import pytest
 
 from sbafab.output.as_built.cut_files import CutPart
 from tests.faults.catalogue import Goods, good_folders
-from tests.faults.specimen import quick
+from tests.faults.once import remembering
 
 
 @pytest.fixture(scope="session")
@@ -28,8 +29,8 @@ def parts() -> dict[str, CutPart]:
     return {}
 
 
-@pytest.fixture(autouse=True)
-def _quick(parts: dict[str, CutPart]) -> Iterator[None]:
-    # For one test at a time: other tests of the session must meet the program as it is.
-    with quick(parts):
-        yield
+@pytest.fixture(scope="session")
+def remember(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Callable[[], AbstractContextManager[None]]:
+    return remembering(tmp_path_factory.mktemp("anew"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -80,6 +81,50 @@ def raised(text: str) -> str:
     """The outline lifted off the plane by 1 mm."""
     head, marker, tail = text.rpartition(POLYLINE)
     return head + marker + tail.replace(" 70\n1\n", " 70\n1\n 38\n1.0\n", 1)
+
+
+def with_stroke(layer: str) -> Callable[[str], str]:
+    """A line more, from the middle of the part out, on a layer that has no business there."""
+    line = (
+        f"  0\nLINE\n  5\nFFF1\n330\n17\n100\nAcDbEntity\n  8\n{layer}\n100\nAcDbLine\n"
+        " 10\n2.0\n 20\n0.0\n 30\n0.0\n 11\n40.0\n 21\n1.0\n 31\n0.0\n"
+    )
+    return lambda text: text.replace("  2\nENTITIES\n", f"  2\nENTITIES\n{line}", 1)
+
+
+def without_datum(text: str) -> str:
+    """One of the two lines of the datum cross removed."""
+    start = text.rindex("  0\nLINE\n")
+    return text[:start] + text[text.index("  0\n", start + 4) :]
+
+
+def in_table(layer: str, **wrong: str) -> Callable[[str], str]:
+    """A layer's record with other flags, colour or linetype, or with a word more."""
+
+    def change(text: str) -> str:
+        start = text.index(f"AcDbLayerTableRecord\n  2\n{layer}\n")
+        head, record = text[:start], text[start:]
+        for group, value in (("flags", " 70"), ("colour", " 62"), ("linetype", "  6")):
+            if group in wrong:
+                new = f"\n{value}\n{wrong[group]}\n"
+                record = re.sub(rf"\n{value}\n.*\n", new, record, count=1)
+        if "plot" in wrong:
+            record = re.sub(r"(\n  6\n.*\n)", rf"\g<1>290\n{wrong['plot']}\n", record, count=1)
+        return head + record
+
+    return change
+
+
+def on_entity(group: str) -> Callable[[str], str]:
+    """The outline with an attribute of its own."""
+
+    def change(text: str) -> str:
+        start = text.rindex("  0\nLWPOLYLINE\n")
+        return text[:start] + text[start:].replace(
+            "  8\nCUT_OUTER\n", f"  8\nCUT_OUTER\n{group}\n", 1
+        )
+
+    return change
 
 
 def redone(change: Callable[[Region], Region]) -> Callable[[Path], None]:
@@ -184,6 +229,21 @@ KIND = Kind(
         edited("contour on layer 0", on_layer("0")),
         edited("contour off the plane", raised),
         broken("contours as chords", as_chords),
+        *(
+            edited(f"stray line on {layer} through the part", with_stroke(layer))
+            for layer in ("CUT_SHEET", "ENGRAVE", "REFERENCE")
+        ),
+        edited("datum cross not whole", without_datum),
+        edited("layer off", in_table("CUT_OUTER", colour="-1")),
+        edited("layer frozen", in_table("CUT_OUTER", flags="1")),
+        edited("layer not plotted", in_table("CUT_OUTER", plot="0")),
+        edited("layer of another colour", in_table("CUT_OUTER", colour="5")),
+        edited("layer dashed", in_table("CUT_OUTER", linetype="DASHED")),
+        edited("contour invisible", on_entity(" 60\n1")),
+        edited("contour dashed", on_entity("  6\nDASHED")),
+        edited("contour of another colour", on_entity(" 62\n5")),
+        edited("contour of another true colour", on_entity("420\n255")),
+        edited("contour in paper space", on_entity(" 67\n1")),
         Fault("file changed after it was written", CLAIMS, unhashed),
         Fault("a cut file too many", CLAIMS, spare),
         Fault("pin plate without a hole", CLAIMS, undrilled_plate),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
@@ -59,14 +60,16 @@ def lumen_of(radius: float) -> Change:
     return lambda region, laminate: (region | disc(ORIGIN, 1.2)) - disc(ORIGIN, radius)
 
 
+def _near(place: Point, others: Iterable[Point]) -> bool:
+    return any(math.dist(place, other) < 1e-6 for other in others)
+
+
 def first_pin(region: Region, laminate: Laminate) -> Pin:
     """The first pin of the ears that a layer has a hole for."""
-    bores = {b.centre for b in laminate.bores}
+    bores = [bore.centre for bore in laminate.bores]
+    drilled = [hole.circle[0] for hole in region.holes if hole.circle]
     return next(
-        pin
-        for pin in laminate.pins
-        if pin.centre not in bores
-        and any(hole.circle and hole.circle[0] == pin.centre for hole in region.holes)
+        pin for pin in laminate.pins if not _near(pin.centre, bores) and _near(pin.centre, drilled)
     )
 
 

@@ -19,6 +19,8 @@ class Fault:
 
     ``sheets``: it is one of the film sheets. These are looked at for such faults alone, for they
     cut what the layers were and would tell every fault of a layer; the deck is then left out.
+    ``beside``: it is in a file beside the cut ones. All that a run writes is then in the folder,
+    and everything is looked at.
     """
 
     name: str
@@ -27,6 +29,7 @@ class Fault:
     why_not: WhyNot = lambda laminate: ""
     settings: tuple[str, ...] = ()
     sheets: bool = False
+    beside: bool = False
 
 
 @dataclass(frozen=True)

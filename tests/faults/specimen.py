@@ -21,12 +21,13 @@ from sbafab.laminate.laminate import Laminate, Layer, Role
 from sbafab.output import run
 from sbafab.output.as_built import check as as_built
 from sbafab.output.as_built import cut_files, stack
-from sbafab.output.as_built.check import check_folder, read_folder
+from sbafab.output.as_built.check import check_folder, design_problems_of, read_folder
 from sbafab.output.as_built.cut_files import CutPart, read_part
+from sbafab.output.as_built.meant import Expected
 from sbafab.output.as_built.sheets import sheet_problems
 from sbafab.output.manifest import manifest
 from sbafab.rules import registration_worst_case, registration_yield
-from sbafab.rules.deck import RULES
+from sbafab.rules.deck import RULES, run_deck
 from tests.output.doctoring import Doctor
 
 Change = Callable[[Region, Laminate], Region]
@@ -90,11 +91,15 @@ def quick(parts: dict[str, CutPart]) -> Iterator[None]:
     """
 
     def known(
-        path: Path, chords_drawn: bool = False, told: Mapping[str, str] | None = None
+        path: Path,
+        chords_drawn: bool = False,
+        told: Mapping[str, str] | None = None,
+        expected: Expected | None = None,
     ) -> CutPart:
-        digest = sha256(path.read_bytes()).hexdigest()
+        shape = expected.profile.key if expected is not None else ""
+        digest = sha256(path.read_bytes()).hexdigest() + shape
         if digest not in parts:
-            parts[digest] = read_part(path, chords_drawn, told)
+            parts[digest] = read_part(path, chords_drawn, told, expected)
         return parts[digest]
 
     def regions(below: Region, above: Region, masks: Sequence[Region]) -> tuple[Region, ...]:
@@ -107,7 +112,19 @@ def quick(parts: dict[str, CutPart]) -> Iterator[None]:
         patch.object(stack, "interface_regions", regions),
         patch.object(as_built, "RULES", rules),
         patch.object(as_built, "sheet_problems", lambda *_: []),
+        patch.object(as_built, "design_problems_of", lambda *_: []),
         patch.object(run, "run_deck", lambda *_: ()),
+    ):
+        yield
+
+
+@contextmanager
+def unabridged() -> Iterator[None]:
+    """Every rule is run, and all that lies in a folder is held against its design."""
+    with (
+        patch.object(as_built, "RULES", RULES),
+        patch.object(as_built, "design_problems_of", design_problems_of),
+        patch.object(run, "run_deck", run_deck),
     ):
         yield
 

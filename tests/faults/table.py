@@ -30,7 +30,15 @@ def text(cells: Cells) -> str:
         f"`{LEFT_OUT[0]}` and `{LEFT_OUT[1]}`, which foresee errors on the bench, are not run. "
         "The film sheets are looked at in the table of their own only: they are cut as the layers "
         "were before the fault, and would tell every fault in a layer's profile besides. The rules "
-        "on the layers, which are sound there, are not run for that table.",
+        "on the layers, which are sound there, are not run for that table. "
+        "Whether all is as the design makes it (`as-designed`) is asked in the last table only: "
+        "it would tell every other fault as well; the folders of that table hold all that "
+        "`sbafab generate` writes, and every rule is run on them.",
+        "",
+        "`SBAFAB_FAULTS=500 python -m pytest tests/faults/test_mutants.py` puts 500 faults drawn "
+        "at random into any of the files of such folders, with the hashes put right: each is "
+        "caught, or other readers (ezdxf, trimesh, parsers of the formats) find nothing changed "
+        "that is cut, pressed or read.",
         "",
         "**caught**: the rule named for the fault fails; what fails besides it stands after the "
         "semicolon. **n/a**: the fault does not apply, and why.",

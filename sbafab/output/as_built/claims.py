@@ -7,6 +7,7 @@ from pathlib import Path
 
 from sbafab.cutting.properties import (
     LIMITS,
+    PTFE_WARNING,
     curves_property,
     kerf_properties,
     layer_path,
@@ -244,6 +245,8 @@ def _properties(layer: LayerClaim, claims: Manifest) -> dict[str, str | None]:
         **kerf_properties(width),
         **curves_property(claims.curves),
         **waiver_properties(claims),
+        "GENERATOR": claims.generator,
+        **({"WARNING": PTFE_WARNING} if layer.material == "PTFE" else {}),
     }
 
 

@@ -18,11 +18,13 @@ from sbafab.cutting.properties import (
     kerf_properties,
     kerf_text,
 )
+from sbafab.cutting.verify import check_datum
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
 from sbafab.output.as_built.agreement import in_agreement, with_circles, without_specks
 from sbafab.output.as_built.chords import chorded_place
+from sbafab.output.as_built.meant import Expected, departure
 from sbafab.output.as_built.records import INTEGRITY, LayerClaim, Manifest, Problem
 from sbafab.output.as_built.uncut import uncut
 
@@ -41,6 +43,7 @@ class CutPart:
     ``path`` is the beam's path as it is drawn. ``chord_error`` is what the file says, in mm, 0 for
     true arcs; ``corner_room`` the mm2 by which the area may be off because the beam rounds corners.
     ``properties`` and ``units`` are empty where the file does not say.
+    ``is_meant``: the path is that of the design's own layer, and ``region`` what that one cuts.
     """
 
     region: Region
@@ -49,6 +52,7 @@ class CutPart:
     chord_error: float
     corner_room: float
     units: str = "mm"
+    is_meant: bool = False
 
 
 @dataclass(frozen=True)
@@ -65,21 +69,28 @@ class LayerFile:
 
 
 def read_layers(
-    folder: Path, claims: Manifest, chords_drawn: bool
+    folder: Path,
+    claims: Manifest,
+    chords_drawn: bool,
+    expected: Sequence[Expected | None],
 ) -> tuple[list[LayerFile], list[Problem]]:
-    """Every layer's file, files of equal bytes read once, contours drawn alike made one.
+    """Every layer's file, files of equal bytes that should be equal read once.
+
+    Contours that differ by less than what files promise are made one.
 
     ``chords_drawn``: the design's own outline is drawn in chords, so they are no fault.
+    ``expected`` holds what each layer should be, where that is known.
     """
-    known: dict[tuple[str, Material], CutPart] = {}
+    known: dict[tuple[str, Material, str], CutPart] = {}
     files, problems = [], []
-    for position, claim in enumerate(claims.layers, start=1):
+    for position, (claim, own) in enumerate(zip(claims.layers, expected, strict=True), start=1):
         part: CutPart | None = None
         try:
             path = inside(folder, claim.file)
-            key = sound_digest(path), claim.material
+            key = sound_digest(path), claim.material, own.profile.key if own is not None else ""
             if key not in known:
-                known[key] = read_part(path, chords_drawn, told_of(claims, claim.material))
+                told = told_of(claims, claim.material)
+                known[key] = read_part(path, chords_drawn, told, own)
             part = known[key]
         except OutputError as error:
             name = claim.file or claim.name
@@ -98,6 +109,8 @@ def told_of(claims: Manifest, material: str) -> dict[str, str]:
 
 def _in_agreement(files: Sequence[LayerFile]) -> list[LayerFile]:
     parts = {id(file.part): file.part for file in files if file.part is not None}
+    if all(part.is_meant for part in parts.values()):
+        return list(files)
     regions = in_agreement([part.region for part in parts.values()])
     agreed = {
         key: replace(part, region=region)
@@ -140,27 +153,47 @@ def sound_digest(path: Path) -> str:
 
 
 def read_part(
-    path: Path, chords_drawn: bool = False, told: Mapping[str, str] | None = None
+    path: Path,
+    chords_drawn: bool = False,
+    told: Mapping[str, str] | None = None,
+    expected: Expected | None = None,
 ) -> CutPart:
     """The part that a cut file cuts. Raises OutputError where it is not what the format says.
 
-    ``told`` stands in for the properties of a file that has none.
+    ``told`` stands in for the properties of a file that has none; ``expected`` is what it should
+    be, where that is known.
     """
     try:
         found = read_profile(path)
-        return _part(found, chords_drawn, found.properties or told or {})
+        return _part(found, chords_drawn, found.properties or told or {}, expected)
     except OutputError:
         raise
-    except (ArithmeticError, ValueError, LookupError, TypeError, AttributeError) as error:
+    except (ArithmeticError, ValueError, LookupError) as error:
         raise OutputError(f"holds no sound contours ({error}); write it anew") from error
 
 
-def _part(found: ReadBack, chords_drawn: bool, properties: Mapping[str, str]) -> CutPart:
+def _part(
+    found: ReadBack,
+    chords_drawn: bool,
+    properties: Mapping[str, str],
+    expected: Expected | None,
+) -> CutPart:
     _check_drawn(found)
     kerf = kerf_of(properties) or 0.0
     chord_error = chord_error_of(properties)
     if chord_error and isinstance(kerf, tuple):
         raise OutputError("its chords do not tell how its kerf was compensated; write it anew")
+    if expected is not None and not departure(found.region, expected.path):
+        # What is cut within its tolerance needs no guess at what the beam may have left.
+        return CutPart(
+            expected.profile,
+            found.region,
+            found.properties,
+            chord_error,
+            0.0,
+            found.units,
+            is_meant=True,
+        )
     if not chord_error and not chords_drawn:
         place = chorded_place(found.region)
         if place is not None:
@@ -190,6 +223,7 @@ def _check_drawn(found: ReadBack) -> None:
                 f"a {kind} lies on a layer other than {CUT_INNER} and {CUT_OUTER}, so it would "
                 "not be cut in its turn; move it"
             )
+    check_datum(found)
     check_sequence(found)
 
 

@@ -17,6 +17,7 @@ from sbafab.rules.finding import Finding, Place, Verdict
 
 INTEGRITY = "file-integrity"
 CLAIMS = "manifest-claims"
+DESIGNED = "as-designed"
 MOST_BYTES = 50_000_000
 MOST_SHOWN = 12
 """Problems of one rule that are reported one by one."""
@@ -147,6 +148,7 @@ class Manifest(_Claim):
     family: str
     units: Literal["mm"]
     design_sha256: str
+    generator: str
     registration: RegistrationClaim
     kerf: dict[Material, KerfClaim]
     curves: str | None = None
@@ -179,6 +181,7 @@ class Job(_Claim):
     name: str
     units: Literal["mm"]
     designs_sha256: str
+    generator: str
     waived: tuple[str, ...]
     lowered_limits: tuple[str, ...] = ()
     designs: Annotated[tuple[DesignClaim, ...], Field(min_length=1, max_length=100)]

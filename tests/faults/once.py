@@ -1,0 +1,72 @@
+"""Checks of many folders of one design, in which each thing is worked out once."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+from sbafab.design.writing import design_sha256
+from sbafab.output.as_built import check as as_built
+from sbafab.output.as_built import derived
+from sbafab.output.as_built.records import Manifest
+from sbafab.output.contents import Checked
+
+
+def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
+    """A context in which checks remember, under ``root``, what does not hang on a changed file.
+
+    That is what a design makes, what the rules find in it, and what it writes beside cut files.
+    """
+    deck, write = as_built._deck, derived._write_anew
+    measured = _remembered(deck, _asked_of_deck)
+    meant_by = _remembered(as_built.meant_by, design_sha256)
+    run_deck = _remembered(as_built.run_deck, lambda made, limits: made.name + repr(limits))
+    made: dict[str, Any] = {}
+
+    def write_once(
+        folder: Path, fresh: Path, claims: Manifest, checked: Checked, parts: object
+    ) -> Any:
+        asked = [folder / name for name in ("design.toml", "sheets/nest.json")]
+        files = [path.read_bytes() if path.exists() else b"" for path in asked]
+        said = repr((sorted(claims.files), checked.findings)).encode()
+        key = sha256(b"".join(files) + said).hexdigest()
+        if key not in made:
+            (root / key).mkdir(parents=True)
+            made[key] = write(folder, root / key, claims, checked, parts)
+        shutil.copytree(root / key, fresh, dirs_exist_ok=True)
+        return made[key]
+
+    @contextmanager
+    def context() -> Iterator[None]:
+        with (
+            patch.object(as_built, "_deck", lambda b: (measured if b.is_meant else deck)(b)),
+            patch.object(as_built, "meant_by", meant_by),
+            patch.object(as_built, "run_deck", run_deck),
+            patch.object(derived, "_write_anew", write_once),
+        ):
+            yield
+
+    return context
+
+
+def _asked_of_deck(built: as_built.AsBuilt) -> str:
+    """Design, limits, and the rules that are run: some checks leave out all or some."""
+    names = [rule.name for rule in as_built.RULES]
+    return design_sha256(built.design) + repr((built.limits, built.known, names))
+
+
+def _remembered(work: Callable[..., Any], key: Callable[..., str]) -> Callable[..., Any]:
+    known: dict[str, Any] = {}
+
+    def asked(*args: Any) -> Any:
+        own = key(*args)
+        if own not in known:
+            known[own] = work(*args)
+        return known[own]
+
+    return asked
