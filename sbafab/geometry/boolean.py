@@ -180,8 +180,9 @@ def leftmost(before: Edge, options: Sequence[Edge]) -> Edge:
     """The edge that turns most to the left after ``before``; all options start where it ends."""
     if len(options) == 1:
         return options[0]
-    # Edges that leave a point in one direction are told apart where the shortest of them ends.
-    reach = min(math.dist(edge.start, edge.end) for edge in (before, *options))
+    # Edges that leave a point in one direction are told apart half way along the shortest: where
+    # it ends they may meet again.
+    reach = min(math.dist(edge.start, edge.end) for edge in (before, *options)) / 2
     return max(options, key=lambda option: left_turn(before, option, reach))
 
 

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 
 from sbafab.geometry.boolean import PointPool, chain, left_turn, split_edges
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, distance_to
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Contour, Region
+
+CUSP = 3.0
+"""Radians: a path that turns by more is taken to turn back on itself."""
 
 
 def grow(region: Region, distance: float) -> Region:
@@ -45,9 +49,7 @@ def _offset_pieces(
     raw: list[Edge] = []
     for contour in contours:
         for before, edge in zip((contour.edges[-1], *contour.edges), contour.edges, strict=False):
-            corner = _corner_arc(before, edge, distance)
-            if corner is not None:
-                raw.append(corner)
+            raw += _corner_arcs(before, edge, distance)
             moved = edge.offset(distance)
             if moved is not None:
                 raw.append(moved)
@@ -62,26 +64,24 @@ def _offset_pieces(
     return _balanced([entry for entries in kept.values() for entry in entries])
 
 
-def _corner_arc(before: Edge, after: Edge, distance: float) -> Arc | None:
-    """The arc round a convex corner; none where the path is smooth or turns the other way."""
-    corner = after.start
-    ux, uy = before.direction(corner)
-    vx, vy = after.direction(corner)
+def _corner_arcs(before: Edge, after: Edge, distance: float) -> Iterator[Arc]:
+    """The arcs round a convex corner; none where the path is smooth or turns the other way.
+
+    At the tip of a cusp rounding decides whether the path turns left or right, so there it gets
+    its arcs either way: round the end of a notch they lie in the material, and fall away.
+    """
     turn = left_turn(before, after)
-    if abs(turn) > 3:
-        # At the tip of a cusp the curvature tells a spike from a notch.
-        reach = min(math.dist(edge.start, edge.end) for edge in (before, after))
-        turn = left_turn(before, after, reach)
-    if turn * distance < EPSILON:
-        return None
-    x, y = corner
-    return Arc(
-        (x + uy * distance, y - ux * distance),
-        (x + vy * distance, y - vx * distance),
-        corner,
-        distance,
-        True,
-    )
+    if -CUSP < turn < EPSILON / distance:
+        return
+    (x, y), (ux, uy) = after.start, before.direction(after.start)
+    heading, sweep = math.atan2(-ux, uy), turn % math.tau
+    count = 2 if sweep > CUSP else 1
+    vx, vy = after.direction(after.start)
+    between = [heading + sweep * k / count for k in range(1, count)]
+    stops = [(uy, -ux), *((math.cos(t), math.sin(t)) for t in between), (vy, -vx)]
+    points = [(x + nx * distance, y + ny * distance) for nx, ny in stops]
+    for start, end in pairwise(points):
+        yield Arc(start, end, (x, y), distance, True)
 
 
 def _depth(near: EdgeIndex, p: Point, distance: float) -> float:
