@@ -8,10 +8,11 @@ from collections.abc import Sequence
 
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
-from sbafab.geometry.boolean import LEAST_AREA, PointPool, tidy
+from sbafab.geometry.boolean import LEAST_AREA, tidy
 from sbafab.geometry.edges import EPSILON, Edge, Point
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import close_pairs
+from sbafab.geometry.pool import PointPool
 from sbafab.geometry.region import Contour, Region, same_support
 
 
@@ -20,7 +21,7 @@ def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
 
     Raises OutputError at an end that has not exactly one other to go on with.
     """
-    pool = PointPool()
+    pool = PointPool(p for edge in edges for p in (edge.start, edge.end))
     snapped = [edge.part(pool.snapped(edge.start), pool.snapped(edge.end)) for edge in edges]
     at: dict[Point, list[int]] = defaultdict(list)
     for index, edge in enumerate(snapped):

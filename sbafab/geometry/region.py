@@ -37,6 +37,30 @@ def _join(bounds: Iterable[Bounds]) -> Bounds:
     return low_x, low_y, high_x, high_y
 
 
+def turns_round(edge: Edge, p: Point) -> int:
+    """What an edge adds to the times its contour runs counter-clockwise round ``p``."""
+    (px, py), (x0, y0), (x1, y1) = p, edge.start, edge.end
+    side = (x1 - x0) * (py - y0) - (px - x0) * (y1 - y0)
+    turns = 0
+    if y0 <= py < y1 and side > 0:
+        turns = 1
+    elif y1 <= py < y0 and side < 0:
+        turns = -1
+    if isinstance(edge, Arc):
+        cx, cy = edge.centre
+        dx, dy = x1 - x0, y1 - y0
+        # Beside its chord alone: that of a short arc with snapped ends may lean either way.
+        beside = 0 <= (px - x0) * dx + (py - y0) * dy <= dx * dx + dy * dy
+        if beside and (px - cx) ** 2 + (py - cy) ** 2 < edge.radius**2:
+            # A point exactly on the chord belongs to the side the count above gave it.
+            left = side > 0 or (side == 0 and (y0 > y1 or (y0 == y1 and x1 > x0)))
+            if edge.ccw and not left:
+                turns += 1
+            elif not edge.ccw and left:
+                turns -= 1
+    return turns
+
+
 @dataclass(frozen=True)
 class Contour:
     """One closed chain of edges; each edge starts where the one before it ends."""
@@ -92,25 +116,7 @@ class Contour:
         low_x, low_y, high_x, high_y = self.bounds
         if not (low_x <= px <= high_x and low_y <= py <= high_y):
             return 0
-        turns = 0
-        for edge in self._level_with(py):
-            (x0, y0), (x1, y1) = edge.start, edge.end
-            side = (x1 - x0) * (py - y0) - (px - x0) * (y1 - y0)
-            upward = y0 <= py < y1
-            if upward and side > 0:
-                turns += 1
-            elif y1 <= py < y0 and side < 0:
-                turns -= 1
-            if isinstance(edge, Arc):
-                cx, cy = edge.centre
-                if (px - cx) ** 2 + (py - cy) ** 2 < edge.radius**2:
-                    # A point exactly on the chord belongs to the side the count above gave it.
-                    left = side > 0 or (side == 0 and (y0 > y1 or (y0 == y1 and x1 > x0)))
-                    if edge.ccw and not left:
-                        turns += 1
-                    elif not edge.ccw and left:
-                        turns -= 1
-        return turns
+        return sum(turns_round(edge, p) for edge in self._level_with(py))
 
     def _level_with(self, y: float) -> Sequence[Edge]:
         """The edges that a level line at ``y`` can meet, and perhaps some more."""
