@@ -25,9 +25,9 @@ def groups(points: list[Point]) -> set[frozenset[Point]]:
     return {frozenset(group) for group in found.values()}
 
 
-@pytest.mark.parametrize("order", itertools.permutations(range(5)))
-def test_a_chain_of_points_is_one_point_in_any_order(order: tuple[int, ...]) -> None:
-    assert groups([STEPS[i] for i in order]) == {frozenset(STEPS)}
+def test_a_chain_of_points_is_one_point_in_any_order() -> None:
+    for order in itertools.permutations(STEPS):
+        assert groups(list(order)) == {frozenset(STEPS)}
 
 
 def test_groups_are_what_hangs_together_by_short_steps() -> None:
