@@ -12,8 +12,9 @@ def meeting_points(a: Edge, b: Edge, tolerance: float = EPSILON) -> list[Point]:
 
     Edges that run along each other give the ends of the shared stretch.
     """
-    found = [p for p in (a.start, a.end) if distance_to(b, p) < tolerance]
-    found += [p for p in (b.start, b.end) if distance_to(a, p) < tolerance]
+    of_a, of_b = (a.start, a.end), (b.start, b.end)
+    found = [p for p in of_a if p in of_b or distance_to(b, p) < tolerance]
+    found += [p for p in of_b if p not in of_a and distance_to(a, p) < tolerance]
     for p in _support_crossings(a, b, tolerance):
         # A known end wins over a computed point: at a touch the computed one is less exact.
         if any(math.dist(p, known) <= 2 * tolerance for known in found):

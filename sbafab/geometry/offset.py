@@ -44,7 +44,7 @@ def _moved(contour: Contour, distance: float) -> Iterator[Edge]:
     """A closed chain that winds round what the contour does, and the bands beside its edges.
 
     The band of an edge reaches ``distance`` to its right. Bands that overlap at a corner are walked
-    round one by one, by way of the corner.
+    round one by one, by way of the corner, or straight on where both cover the difference.
     """
     edges = contour.edges
     moved = [edge.offset(distance) for edge in edges]
@@ -59,10 +59,20 @@ def _moved(contour: Contour, distance: float) -> Iterator[Edge]:
             stops = [start, arcs[0].start], [arcs[-1].end, end]
             way = [*_lines(stops[0]), *arcs, *_lines(stops[1])]
         elif math.dist(start, end) >= EPSILON:
-            way = _lines([start, corner, end])
+            way = _lines(
+                [start, end] if _both_cover(edges[i - 1], edge, distance) else [start, corner, end]
+            )
         yield from way
         if after is not None:
             yield after
+
+
+def _both_cover(before: Edge, after: Edge, distance: float) -> bool:
+    """Whether the bands of two lines both hold the triangle of a corner and the ends beside it."""
+    if not (isinstance(before, Line) and isinstance(after, Line)):
+        return False
+    turn = left_turn(before, after)
+    return turn > -1 and min(before.length, after.length) > -distance * math.sin(turn)
 
 
 def _centre(edge: Edge) -> Point:

@@ -98,14 +98,17 @@ def pushes(margin: Margin, interface: Interface, moves: Freedoms) -> list[Push]:
     """What can narrow a margin: the freedoms that one of its two edges has and the other not."""
     layers = seated(interface)
     start, end = (moves[Part(layers[o.seat], o.piece)] for o in margin.owners)
-    found = []
     sides = ((start, end, margin.start, False), (end, start, margin.end, True))
-    for own, other, p, at_end in sides:
-        for freedom in own:
-            if freedom not in other:
-                cost = freedom.most * abs(freedom.lever(p, margin.normal))
-                found.append(Push(freedom, cost, at_end))
-    return found
+    return [
+        Push(freedom, freedom.most * abs(freedom.lever(p, margin.normal)), at_end)
+        for own, other, p, at_end in sides
+        for freedom in _without(own, other)
+    ]
+
+
+@lru_cache(maxsize=1024)
+def _without(own: tuple[Freedom, ...], other: tuple[Freedom, ...]) -> tuple[Freedom, ...]:
+    return tuple(freedom for freedom in own if freedom not in other)
 
 
 def interface_margins(
