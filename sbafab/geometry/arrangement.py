@@ -138,12 +138,27 @@ def _plainest(entry: tuple[float, Edge, int]) -> tuple[float, Point]:
 
 
 class _Leaving(NamedTuple):
-    """A piece as it leaves a point: its direction there, its chord and how it bends."""
+    """A piece as it leaves a point: its direction there, its chord, how it bends, where it ends."""
 
     half: int
+    edge: Edge
     heading: float
     chord: float
     bend: float
+
+    @property
+    def end(self) -> Point:
+        return self.edge.start if self.half & 1 else self.edge.end
+
+    def to_left(self, p: Point) -> float:
+        """How far ``p`` lies to the left of the line or circle the piece is a part of."""
+        if isinstance(self.edge, Arc):
+            inside = self.edge.radius - math.dist(p, self.edge.centre)
+            left = inside if self.edge.ccw else -inside
+        else:
+            (x, y), (ux, uy) = self.edge.start, self.edge.direction(self.edge.start)
+            left = ux * (p[1] - y) - uy * (p[0] - x)
+        return -left if self.half & 1 else left
 
     def towards(self, reach: float) -> float:
         """Angle from the point to where the piece is ``reach`` away."""
@@ -155,10 +170,10 @@ def _leaving(half: int, edge: Edge) -> _Leaving:
     chord = math.hypot(x1 - x0, y1 - y0)
     straight = math.atan2(y1 - y0, x1 - x0)
     if not isinstance(edge, Arc):
-        return _Leaving(half, straight, chord, 0.0)
+        return _Leaving(half, edge, straight, chord, 0.0)
     lean = (-edge.sweep if half & 1 else edge.sweep) / 2
     heading = math.remainder(straight - lean, math.tau)
-    return _Leaving(half, heading, chord, 2 * math.sin(lean) / chord)
+    return _Leaving(half, edge, heading, chord, 2 * math.sin(lean) / chord)
 
 
 class Arrangement:
@@ -308,9 +323,14 @@ class Arrangement:
 def _by_side(a: _Leaving, b: _Leaving) -> int:
     """Negative where ``b`` runs to the left of ``a``.
 
-    They are compared half way along the shorter: what they part by at the point and what they are
-    apart by at its end then count alike, and neither has the other sign but by rounding.
+    Where the shorter ends it is clear of the other, or it would have been cut there. Where both
+    end in one point they are compared half way: there neither what they part by at the start nor
+    what they are apart by at the end has the other sign but by rounding.
     """
-    reach = min(a.chord, b.chord) / 2
+    short, other = (a, b) if a.chord <= b.chord else (b, a)
+    left = other.to_left(short.end)
+    if short.end != other.end and abs(left) > EPSILON / 2:
+        return 1 if (left > 0) == (short is a) else -1
+    reach = short.chord / 2
     apart = math.remainder(a.towards(reach) - b.towards(reach), math.tau)
     return (apart > 0) - (apart < 0)
