@@ -29,7 +29,7 @@ Quantity = Literal["bond", "overhang"]
 QUANTITIES: tuple[Quantity, ...] = ("bond", "overhang")
 
 ON_EDGE = 1e-5
-"""mm within which a point lies on an edge: booleans keep points to 2 nm, files to 1 nm."""
+"""mm within which a point lies on an edge: booleans keep points to 4 nm, files to 1 nm."""
 SQUARE = 0.9
 """Cosine above which an edge counts as square to a direction (within 25 degrees)."""
 

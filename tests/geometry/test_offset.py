@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from sbafab.geometry.beam import beam_path
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Arc, Point
 from sbafab.geometry.offset import fillet, grow, shrink
@@ -253,6 +254,15 @@ def test_flat_segments_shrink_to_segments(width: float, height: float) -> None:
         assert shrink(segment(radius, height), distance).area == pytest.approx(expected, abs=1e-5)
         grown = grow(segment(radius, height), distance)
         assert shrink(grown, distance).area == pytest.approx(cap_area(radius, height), abs=1e-5)
+
+
+def test_a_kerf_wider_than_an_outline_is_high_keeps_it() -> None:
+    for height in (0.05, 0.02):
+        path = beam_path(segment(7.5, height), 0.1)
+        assert path.lost is None
+        half = math.acos(1 - height / 7.5)
+        grown = cap_area(7.5, height) + 15 * (half + math.sin(half)) * 0.05 + math.pi * 0.05**2
+        assert path.region.area == pytest.approx(grown, abs=1e-5)
 
 
 def test_a_lens_of_two_flat_arcs_grows_round_both_tips() -> None:

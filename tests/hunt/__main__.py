@@ -1,6 +1,6 @@
 """A hunt for counterexamples: ``python -m tests.hunt --booleans 100000 --offsets 20000 --seed 1``.
 
-Every case follows from the seed and its number, which a finding names; ``--case`` runs it alone.
+Every case follows from the seed and its number, which a finding names; ``--first`` starts there.
 """
 
 from __future__ import annotations
