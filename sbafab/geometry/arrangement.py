@@ -11,11 +11,11 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from functools import cmp_to_key
+from functools import cached_property, cmp_to_key
 from itertools import pairwise
 from typing import NamedTuple
 
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, distance_to
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, distance_to, left_normal
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
 from sbafab.geometry.pool import PointPool
@@ -185,10 +185,14 @@ class Arrangement:
         rings: dict[Point, list[int]] = defaultdict(list)
         for half, p in enumerate(self.origin):
             rings[p].append(half)
+        self.tangled: set[Point] = set()
+        """Where pieces leave in nearly one direction, so that rounding could order them wrongly."""
         self.rings = {p: self._in_order(halves) for p, halves in rings.items()}
         """The halves that leave each point, counter-clockwise; the widest gap comes last."""
         self.left = self._wound()
         """How often the chains wind round what is to the left of each half."""
+        if self.tangled:
+            self._verify()
 
     def turns(self, half: int) -> int:
         turns = self.pieces[half >> 1].turns
@@ -212,31 +216,78 @@ class Arrangement:
                 bundle = found[start:stop]
                 if len(bundle) > 1:
                     bundle.sort(key=cmp_to_key(_by_side))
+                    if count > 2:
+                        self.tangled.add(self.origin[halves[0]])
                 ring += [leaving.half for leaving in bundle]
                 start = stop
         return ring
 
+    @cached_property
+    def _index(self) -> EdgeIndex:
+        return EdgeIndex([edge for edge, _ in self.pieces])
+
+    def _around(self, p: Point, left: Sequence[int | None]) -> int:
+        """How often the pieces that are told in ``left`` wind round a point."""
+        x, y = p
+        return sum(
+            self.pieces[number].turns * turns_round(self.pieces[number].edge, p)
+            for number in self._index.numbers((x, y, self._index.right, y))
+            if left[2 * number] is not None
+        )
+
     def _wound(self) -> list[int | None]:
         left: list[int | None] = [None] * len(self.origin)
-        boxes = [edge.bounds for edge, _ in self.pieces]
-        index: EdgeIndex | None = None
-        seen = 0
-        for number in sorted(range(len(boxes)), key=lambda i: boxes[i][0]):
+        edges = [edge.bounds[0] for edge, _ in self.pieces]
+        told = False
+        for number in sorted(range(len(edges)), key=edges.__getitem__):
             if left[2 * number] is not None:
                 continue
             # Nothing of this group lies farther left, and no other group that is still to come
             # reaches round it.
-            half, (x, y) = self._leftmost(number, boxes[number][0])
-            turns = 0
-            if seen:
-                index = index or EdgeIndex([edge for edge, _ in self.pieces])
-                for other in index.numbers((x, y, max(box[2] for box in boxes), y)):
-                    if left[2 * other] is not None:
-                        edge, times = self.pieces[other]
-                        turns += times * turns_round(edge, (x, y))
-            self._carry(half, turns, left)
-            seen += 1
+            half, p = self._leftmost(number, edges[number])
+            self._carry(half, self._around(p, left) if told else 0, left)
+            told = True
         return left
+
+    def _verify(self) -> None:
+        """Asks beside one piece of every part that hangs together by points that leave no doubt.
+
+        Raises InconsistentError where what was carried there is not what winds round that place.
+        """
+        seen: set[int] = set()
+        for first in range(len(self.pieces)):
+            if first in seen:
+                continue
+            part, waiting = [first], [first]
+            seen.add(first)
+            while waiting:
+                number = waiting.pop()
+                for p in self.origin[2 * number : 2 * number + 2]:
+                    if p in self.tangled:
+                        continue
+                    more = {half >> 1 for half in self.rings[p]} - seen
+                    seen |= more
+                    part += more
+                    waiting += more
+            half = 2 * max(part, key=lambda number: self.pieces[number].edge.length)
+            beside = self._beside(half)
+            if beside is not None and self._around(beside, self.left) != self.left[half]:
+                raise InconsistentError(self.pieces[half >> 1].edge.at(0.5))
+
+    def _beside(self, half: int) -> Point | None:
+        """A point to the left of a half, nearer to it than to any other; None if there is hardly
+        room.
+        """
+        edge = self.pieces[half >> 1].edge
+        x, y = edge.at(0.5)
+        room = reach = edge.length / 16
+        for number in self._index.numbers(widened((x, y, x, y), reach)):
+            if number != half >> 1:
+                room = min(room, distance_to(self._index.edges[number], (x, y)))
+        if room < 16 * EPSILON:
+            return None
+        nx, ny = left_normal(edge, (x, y))
+        return x + nx * room / 2, y + ny * room / 2
 
     def _leftmost(self, number: int, x: float) -> tuple[int, Point]:
         """A half with the plane outside its group on its left, and its leftmost point."""

@@ -51,7 +51,7 @@ def wound(edges: Sequence[Edge], above: int) -> Region:
 
     Raises GeometryError where no way to cut the edges where they meet gives one answer.
     """
-    place = (0.0, 0.0)
+    place: Point | None = None
     for coarser, rounds in WAYS:
         pieces: Sequence[Edge] = edges
         try:
@@ -61,10 +61,10 @@ def wound(edges: Sequence[Edge], above: int) -> Region:
             loops = arrangement.loops(arrangement.borders(above))
             contours = [contour for contour in map(tidy, loops) if contour is not None]
         except InconsistentError as fault:
-            place = place if any(place) else fault.args[0]
+            place = place or fault.args[0]
         else:
             return Region(tuple(sorted(contours, key=_reading_order)))
-    x, y = place
+    x, y = place or (0.0, 0.0)
     raise GeometryError(
         f"edges that nearly meet at x {x:.6f}, y {y:.6f} cannot be told apart; change a size "
         "there by 0.001 mm"

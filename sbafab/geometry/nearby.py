@@ -77,6 +77,11 @@ class EdgeIndex:
             and own[3] >= bottom
         ]
 
+    @property
+    def right(self) -> float:
+        """Largest x of any edge."""
+        return self._high[0]
+
     def all_within(self, box: Bounds) -> bool:
         """Whether no edge reaches out of the box."""
         (low_x, low_y), (high_x, high_y) = self._low, self._high
