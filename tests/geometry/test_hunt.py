@@ -12,11 +12,11 @@ SCALE = int(os.environ.get("SBAFAB_HUNT", "1"))
 """Times as many cases as in the suite."""
 
 
-@pytest.mark.parametrize("chunk", range(5 * SCALE))
+@pytest.mark.parametrize("chunk", range(8 * SCALE))
 def test_booleans(chunk: int) -> None:
     assert hunted("booleans", seed=0, first=CHUNK * chunk, count=CHUNK) == []
 
 
-@pytest.mark.parametrize("chunk", range(2 * SCALE))
+@pytest.mark.parametrize("chunk", range(3 * SCALE))
 def test_offsets(chunk: int) -> None:
     assert hunted("offsets", seed=0, first=CHUNK * chunk, count=CHUNK) == []
