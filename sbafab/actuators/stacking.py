@@ -156,12 +156,12 @@ def films(design: Design) -> dict[str, Film]:
 def layers(cuts: Iterable[Cut], design: Design) -> tuple[Layer, ...]:
     """The films in their order, with heights and pattern names."""
     stock = films(design)
-    patterns: dict[tuple[str, str], str] = {}
+    patterns: dict[tuple[str, Region], str] = {}
     placed: list[Layer] = []
     z = 0.0
     for index, cut in enumerate(cuts, start=1):
         film = stock["PTFE" if cut.role.endswith("-mask") else "TPE"]
-        shape = (film.material, cut.profile.key)
+        shape = (film.material, cut.profile)
         pattern = patterns.setdefault(shape, f"P{len(patterns) + 1:02d}")
         placed.append(
             Layer(index, cut.role, film, cut.profile, cut.balloon, round(z, 9), cut.pieces, pattern)

@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 from sbafab.design.strands import JOIN, Strand, Traced, counted, joined, sealed, widest_gap
 from sbafab.errors import DesignError
+from sbafab.geometry.arrangement import split_edges
 from sbafab.geometry.biarc import FitError
-from sbafab.geometry.boolean import PointPool, split_edges, tidy
-from sbafab.geometry.edges import EPSILON
+from sbafab.geometry.boolean import tidy
+from sbafab.geometry.edges import EPSILON, Point
 from sbafab.geometry.region import Contour, Region
 
 MOST_BYTES = 2_000_000
@@ -134,10 +135,9 @@ def _checked(loop: Strand) -> Region:
 
 
 def _refuse_crossings(loop: Strand) -> None:
-    pool = PointPool()
-    corners: set[int] = set()
-    for edge, pieces in zip(loop, split_edges(loop, pool), strict=True):
-        start = pool.index(edge.start)
+    corners: set[Point] = set()
+    for edge, pieces in zip(loop, split_edges(loop), strict=True):
+        start = pieces[0].start if pieces else edge.start
         if len(pieces) != 1 or start in corners:
             x, y = pieces[0].end if len(pieces) > 1 else edge.start
             raise DesignError(

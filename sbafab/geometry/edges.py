@@ -13,7 +13,11 @@ Point = tuple[float, float]
 Bounds = tuple[float, float, float, float]
 
 EPSILON = 2e-6
-"""Two points nearer than this are one point: 2 nm, far below the 1 um the cut files promise."""
+"""mm: a point nearer to an edge than this, 2 nm, lies on it."""
+SAME = 2 * EPSILON
+"""mm: points nearer to each other than this, 4 nm, are one point, and so are all that hang together
+by such steps. Far below the 1 um that the cut files promise.
+"""
 
 
 def unit(degrees: float) -> Point:

@@ -7,30 +7,31 @@ import math
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, distance_to
 
 
-def meeting_points(a: Edge, b: Edge) -> list[Point]:
-    """Points that both edges hold, to within EPSILON.
+def meeting_points(a: Edge, b: Edge, tolerance: float = EPSILON) -> list[Point]:
+    """Points that both edges hold, to within the tolerance.
 
     Edges that run along each other give the ends of the shared stretch.
     """
-    found = [p for p in (a.start, a.end) if distance_to(b, p) < EPSILON]
-    found += [p for p in (b.start, b.end) if distance_to(a, p) < EPSILON]
-    for p in _support_crossings(a, b):
+    of_a, of_b = (a.start, a.end), (b.start, b.end)
+    found = [p for p in of_a if p in of_b or distance_to(b, p) < tolerance]
+    found += [p for p in of_b if p not in of_a and distance_to(a, p) < tolerance]
+    for p in _support_crossings(a, b, tolerance):
         # A known end wins over a computed point: at a touch the computed one is less exact.
-        if any(math.dist(p, known) <= 2 * EPSILON for known in found):
+        if any(math.dist(p, known) <= 2 * tolerance for known in found):
             continue
-        if distance_to(a, p) < EPSILON and distance_to(b, p) < EPSILON:
+        if distance_to(a, p) < tolerance and distance_to(b, p) < tolerance:
             found.append(p)
     return found
 
 
-def _support_crossings(a: Edge, b: Edge) -> list[Point]:
+def _support_crossings(a: Edge, b: Edge, tolerance: float) -> list[Point]:
     if isinstance(a, Line):
         if isinstance(b, Line):
             return _line_line(a, b)
-        return line_circle(a.start, a.direction(a.start), b.centre, b.radius)
+        return line_circle(a.start, a.direction(a.start), b.centre, b.radius, tolerance)
     if isinstance(b, Line):
-        return line_circle(b.start, b.direction(b.start), a.centre, a.radius)
-    return _circle_circle(a, b)
+        return line_circle(b.start, b.direction(b.start), a.centre, a.radius, tolerance)
+    return _circle_circle(a, b, tolerance)
 
 
 def _line_line(a: Line, b: Line) -> list[Point]:
@@ -44,43 +45,45 @@ def _line_line(a: Line, b: Line) -> list[Point]:
     return [(ax + t * ux, ay + t * uy)]
 
 
-def line_circle(origin: Point, unit: Point, centre: Point, radius: float) -> list[Point]:
+def line_circle(
+    origin: Point, unit: Point, centre: Point, radius: float, tolerance: float = EPSILON
+) -> list[Point]:
     """Crossings of the infinite line through ``origin`` with a circle; a touch counts once."""
     (ox, oy), (ux, uy), (cx, cy) = origin, unit, centre
     along = (cx - ox) * ux + (cy - oy) * uy
     across = (cx - ox) * uy - (cy - oy) * ux
     foot = (ox + along * ux, oy + along * uy)
     room = radius - abs(across)
-    if room < -EPSILON:
+    if room < -tolerance:
         return []
     half = math.sqrt(max(0.0, room * (radius + abs(across))))
-    if half < EPSILON:
+    if half < tolerance:
         return [foot]
     points = [
         (foot[0] - half * ux, foot[1] - half * uy),
         (foot[0] + half * ux, foot[1] + half * uy),
     ]
-    return [foot, *points] if room < EPSILON else points
+    return [foot, *points] if room < tolerance else points
 
 
-def _circle_circle(a: Arc, b: Arc) -> list[Point]:
+def _circle_circle(a: Arc, b: Arc, tolerance: float) -> list[Point]:
     (ax, ay), (bx, by) = a.centre, b.centre
     gap = math.hypot(bx - ax, by - ay)
     if gap < 1e-12:
         return []
     outside = a.radius + b.radius - gap
     inside = gap - abs(a.radius - b.radius)
-    if outside < -EPSILON or inside < -EPSILON:
+    if outside < -tolerance or inside < -tolerance:
         return []
     ux, uy = (bx - ax) / gap, (by - ay) / gap
     along = (gap * gap + (a.radius - b.radius) * (a.radius + b.radius)) / (2 * gap)
     # The product form keeps its digits where the circles all but touch (Heron).
     rest = outside * inside * (gap + a.radius + b.radius) * (gap + abs(a.radius - b.radius))
     half = math.sqrt(max(0.0, rest)) / (2 * gap)
-    if outside < EPSILON or inside < EPSILON:
+    if outside < tolerance or inside < tolerance:
         side = 1.0 if along > 0 else -1.0
         touch = (ax + side * a.radius * ux, ay + side * a.radius * uy)
-        if half < EPSILON:
+        if half < tolerance:
             return [touch]
     foot = (ax + along * ux, ay + along * uy)
     return [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from itertools import chain
 
 from sbafab.geometry.edges import Bounds, Edge, Point, distance_to
 
@@ -78,22 +79,29 @@ class EdgeIndex:
         """Edges whose bounding boxes meet a box."""
         return (self.edges[number] for number in self.numbers(box))
 
-    def numbers(self, box: Bounds) -> Iterator[int]:
+    def numbers(self, box: Bounds) -> list[int]:
         """The same, by their place among the edges that were filed."""
         x0, y0, x1, y1 = self._places(box)
         low_x, low_y, high_x, high_y = self._reach
-        x0, y0, x1, y1 = max(x0, low_x), max(y0, low_y), min(x1, high_x), min(y1, high_y)
+        columns = range(max(x0, low_x), min(x1, high_x) + 1)
+        rows = range(max(y0, low_y), min(y1, high_y) + 1)
         left, bottom, right, top = box
-        seen: set[int] = set()
-        for x in range(x0, x1 + 1):
-            for y in range(y0, y1 + 1):
-                for number in self._filed.get((x, y), ()):
-                    if number in seen:
-                        continue
-                    seen.add(number)
-                    box = self._boxes[number]
-                    if box[0] <= right and box[2] >= left and box[1] <= top and box[3] >= bottom:
-                        yield number
+        filed, boxes = self._filed, self._boxes
+        cells = [filed[x, y] for x in columns for y in rows if (x, y) in filed]
+        near = dict.fromkeys(chain.from_iterable(cells)) if len(cells) > 1 else chain(*cells)
+        return [
+            number
+            for number in near
+            if (own := boxes[number])[0] <= right
+            and own[2] >= left
+            and own[1] <= top
+            and own[3] >= bottom
+        ]
+
+    @property
+    def right(self) -> float:
+        """Largest x of any edge."""
+        return self._high[0]
 
     def all_within(self, box: Bounds) -> bool:
         """Whether no edge reaches out of the box."""

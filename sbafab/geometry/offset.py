@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
-from sbafab.geometry.boolean import PointPool, chain, left_turn, split_edges
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, distance_to
-from sbafab.geometry.nearby import EdgeIndex, widened
+from sbafab.geometry.boolean import left_turn, wound
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
 from sbafab.geometry.region import Contour, Region
+
+CUSP = 3.0
+"""Radians: a path that turns by more is taken to turn back on itself."""
 
 
 def grow(region: Region, distance: float) -> Region:
@@ -18,7 +20,7 @@ def grow(region: Region, distance: float) -> Region:
         return shrink(region, -distance)
     if distance < EPSILON or region.is_empty:
         return region
-    return chain(_offset_pieces(region.contours, distance, region.contains))
+    return wound([edge for contour in region.contours for edge in _moved(contour, distance)], 0)
 
 
 def shrink(region: Region, distance: float) -> Region:
@@ -27,9 +29,10 @@ def shrink(region: Region, distance: float) -> Region:
         return grow(region, -distance)
     if distance < EPSILON or region.is_empty:
         return region
+    # What is outside grows: the chains wind round it 0 times, or more; round what is left, -1.
     outside = [contour.reversed() for contour in region.contours]
-    pieces = _offset_pieces(outside, distance, lambda p: not region.contains(p))
-    return chain([piece.reversed() for piece in pieces])
+    moved = [edge.reversed() for contour in outside for edge in _moved(contour, distance)]
+    return wound(moved, 0)
 
 
 def fillet(region: Region, radius: float) -> Region:
@@ -37,96 +40,65 @@ def fillet(region: Region, radius: float) -> Region:
     return shrink(grow(region, radius), radius)
 
 
-def _offset_pieces(
-    contours: Sequence[Contour], distance: float, covers: Callable[[Point], bool]
-) -> list[Edge]:
-    """Pieces of the curve at exactly ``distance`` outside the side that ``covers`` knows."""
-    near = EdgeIndex([edge for contour in contours for edge in contour.edges])
-    raw: list[Edge] = []
-    for contour in contours:
-        for before, edge in zip((contour.edges[-1], *contour.edges), contour.edges, strict=False):
-            corner = _corner_arc(before, edge, distance)
-            if corner is not None:
-                raw.append(corner)
-            moved = edge.offset(distance)
-            if moved is not None:
-                raw.append(moved)
-    kept: dict[frozenset[Point], list[tuple[float, Edge]]] = defaultdict(list)
-    for pieces in split_edges(raw, PointPool()):
-        for piece in pieces:
-            middle = piece.at(0.5)
-            depth = _depth(near, middle, distance)
-            # In a touch of two pieces the inside, too, can be as far as this from every edge.
-            if depth < 2 * EPSILON and not covers(middle):
-                _add(kept[frozenset((piece.start, piece.end))], depth, piece)
-    return _balanced([entry for entries in kept.values() for entry in entries])
+def _moved(contour: Contour, distance: float) -> Iterator[Edge]:
+    """A closed chain that winds round what the contour does, and the bands beside its edges.
+
+    The band of an edge reaches ``distance`` to its right. Bands that overlap at a corner are walked
+    round one by one, by way of the corner, or straight on where both cover the difference.
+    """
+    edges = contour.edges
+    moved = [edge.offset(distance) for edge in edges]
+    for i, edge in enumerate(edges):
+        before, after = moved[i - 1], moved[i]
+        start = before.end if before is not None else _centre(edges[i - 1])
+        end = after.start if after is not None else _centre(edge)
+        corner = edge.start
+        arcs = list(_corner_arcs(edges[i - 1], edge, distance))
+        way: list[Edge] = list(arcs)
+        if arcs:
+            stops = [start, arcs[0].start], [arcs[-1].end, end]
+            way = [*_lines(stops[0]), *arcs, *_lines(stops[1])]
+        elif math.dist(start, end) >= EPSILON:
+            way = _lines(
+                [start, end] if _both_cover(edges[i - 1], edge, distance) else [start, corner, end]
+            )
+        yield from way
+        if after is not None:
+            yield after
 
 
-def _corner_arc(before: Edge, after: Edge, distance: float) -> Arc | None:
-    """The arc round a convex corner; none where the path is smooth or turns the other way."""
-    corner = after.start
-    ux, uy = before.direction(corner)
-    vx, vy = after.direction(corner)
+def _both_cover(before: Edge, after: Edge, distance: float) -> bool:
+    """Whether the bands of two lines both hold the triangle of a corner and the ends beside it."""
+    if not (isinstance(before, Line) and isinstance(after, Line)):
+        return False
     turn = left_turn(before, after)
-    if abs(turn) > 3:
-        # At the tip of a cusp the curvature tells a spike from a notch.
-        reach = min(math.dist(edge.start, edge.end) for edge in (before, after))
-        turn = left_turn(before, after, reach)
-    if turn * distance < EPSILON:
-        return None
-    x, y = corner
-    return Arc(
-        (x + uy * distance, y - ux * distance),
-        (x + vy * distance, y - vx * distance),
-        corner,
-        distance,
-        True,
-    )
+    return turn > -1 and min(before.length, after.length) > -distance * math.sin(turn)
 
 
-def _depth(near: EdgeIndex, p: Point, distance: float) -> float:
-    """How far ``p`` lies within ``distance`` of the edges; negative where it does not.
+def _centre(edge: Edge) -> Point:
+    assert isinstance(edge, Arc)
+    return edge.centre
 
-    The search ends at the first edge that is clearly too near.
+
+def _lines(stops: Sequence[Point]) -> list[Edge]:
+    return [Line(a, b) for a, b in pairwise(stops) if math.dist(a, b) > EPSILON]
+
+
+def _corner_arcs(before: Edge, after: Edge, distance: float) -> Iterator[Arc]:
+    """The arcs round a convex corner; none where the path is smooth or turns the other way.
+
+    At the tip of a cusp rounding decides whether the path turns left or right, so there it gets
+    its arcs either way: round the end of a notch they lie in the material, and fall away.
     """
-    depth = -math.inf
-    for edge in near.touching(widened((*p, *p), distance)):
-        depth = max(depth, distance - distance_to(edge, p))
-        if depth > 2 * EPSILON:
-            break
-    return depth
-
-
-def _add(kept: list[tuple[float, Edge]], depth: float, piece: Edge) -> None:
-    """Keeps one of equal pieces, and neither of two that run opposite ways (a closed gap).
-
-    All that are ``kept`` have the piece's ends.
-    """
-    middle = piece.at(0.5)
-    for index, (_, other) in enumerate(kept):
-        if math.dist(middle, other.at(0.5)) < 4 * EPSILON:
-            if other.start != piece.start:
-                del kept[index]
-            return
-    kept.append((depth, piece))
-
-
-def _balanced(kept: Sequence[tuple[float, Edge]]) -> list[Edge]:
-    """The pieces without those, deepest first, that leave a point that too few arrive at.
-
-    Where two curves graze each other within EPSILON, both are kept at first.
-    """
-    pieces = sorted(kept, key=lambda entry: entry[0])
-    while True:
-        surplus: dict[Point, int] = defaultdict(int)
-        for _, piece in pieces:
-            surplus[piece.start] += 1
-            surplus[piece.end] -= 1
-        doubtful = [
-            index
-            for index, (depth, piece) in enumerate(pieces)
-            if depth > 0 and (surplus[piece.start] > 0 or surplus[piece.end] < 0)
-        ]
-        if not doubtful:
-            return [piece for _, piece in pieces]
-        del pieces[doubtful[-1]]
+    turn = left_turn(before, after)
+    if -CUSP < turn < EPSILON / distance:
+        return
+    (x, y), (ux, uy) = after.start, before.direction(after.start)
+    heading, sweep = math.atan2(-ux, uy), turn % math.tau
+    count = 2 if sweep > CUSP else 1
+    vx, vy = after.direction(after.start)
+    between = [heading + sweep * k / count for k in range(1, count)]
+    stops = [(uy, -ux), *((math.cos(t), math.sin(t)) for t in between), (vy, -vx)]
+    points = [(x + nx * distance, y + ny * distance) for nx, ny in stops]
+    for start, end in pairwise(points):
+        yield Arc(start, end, (x, y), distance, True)

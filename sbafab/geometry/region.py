@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from sbafab.geometry.edges import (
     EPSILON,
+    SAME,
     Arc,
     Bounds,
     Edge,
@@ -28,6 +29,7 @@ from sbafab.geometry.nearby import EdgeIndex, close_pairs
 if TYPE_CHECKING:
     import shapely
 
+Mark = tuple[float, float, float]
 MANY = 32
 """Edges from which on filing them by place is worth its cost."""
 NOWHERE: Bounds = (math.inf, math.inf, -math.inf, -math.inf)
@@ -39,6 +41,30 @@ def _join(bounds: Iterable[Bounds]) -> Bounds:
         return NOWHERE
     left, bottom, right, top = zip(*boxes, strict=True)
     return min(left), min(bottom), max(right), max(top)
+
+
+def turns_round(edge: Edge, p: Point) -> int:
+    """What an edge adds to the times its contour runs counter-clockwise round ``p``."""
+    (px, py), (x0, y0), (x1, y1) = p, edge.start, edge.end
+    side = (x1 - x0) * (py - y0) - (px - x0) * (y1 - y0)
+    turns = 0
+    if y0 <= py < y1 and side > 0:
+        turns = 1
+    elif y1 <= py < y0 and side < 0:
+        turns = -1
+    if isinstance(edge, Arc):
+        cx, cy = edge.centre
+        dx, dy = x1 - x0, y1 - y0
+        # Beside its chord alone: that of a short arc with snapped ends may lean either way.
+        beside = 0 <= (px - x0) * dx + (py - y0) * dy <= dx * dx + dy * dy
+        if beside and (px - cx) ** 2 + (py - cy) ** 2 < edge.radius**2:
+            # A point exactly on the chord belongs to the side the count above gave it.
+            left = side > 0 or (side == 0 and (y0 > y1 or (y0 == y1 and x1 > x0)))
+            if edge.ccw and not left:
+                turns += 1
+            elif not edge.ccw and left:
+                turns -= 1
+    return turns
 
 
 @dataclass(frozen=True)
@@ -87,6 +113,31 @@ class Contour:
         """x, y and bulge of each vertex, as a DXF polyline carries them."""
         return tuple((*edge.start, edge.bulge) for edge in self.edges)
 
+    @cached_property
+    def marks(self) -> tuple[Mark, ...]:
+        """What the contour is known by: its vertices with their bulges, or one circle (which may be
+        split anywhere) with its radius, negative round a hole.
+        """
+        if self.circle is None:
+            return self.vertices
+        centre, radius = self.circle
+        return ((*centre, -radius if self.is_hole else radius),)
+
+    def coincides(self, other: Contour) -> bool:
+        """Whether corners and middles of the edges of both lie within SAME of each other."""
+        if len(self.marks) != len(other.marks) or self.is_hole != other.is_hole:
+            return False
+        if any(abs(a - b) > SAME for a, b in zip(self.bounds, other.bounds, strict=True)):
+            return False
+        if self.circle is not None or other.circle is not None:
+            return (self.circle is None) == (other.circle is None)
+        return any(
+            all(_same(a, b) for a, b in zip(self.edges, after, strict=True))
+            for turn, edge in enumerate(other.edges)
+            if _same(self.edges[0], edge)
+            for after in [other.edges[turn:] + other.edges[:turn]]
+        )
+
     def reversed(self) -> Contour:
         return Contour(tuple(edge.reversed() for edge in reversed(self.edges)))
 
@@ -96,25 +147,7 @@ class Contour:
         low_x, low_y, high_x, high_y = self.bounds
         if not (low_x <= px <= high_x and low_y <= py <= high_y):
             return 0
-        turns = 0
-        for edge in self._level_with(py):
-            (x0, y0), (x1, y1) = edge.start, edge.end
-            side = (x1 - x0) * (py - y0) - (px - x0) * (y1 - y0)
-            upward = y0 <= py < y1
-            if upward and side > 0:
-                turns += 1
-            elif y1 <= py < y0 and side < 0:
-                turns -= 1
-            if isinstance(edge, Arc):
-                cx, cy = edge.centre
-                if (px - cx) ** 2 + (py - cy) ** 2 < edge.radius**2:
-                    # A point exactly on the chord belongs to the side the count above gave it.
-                    left = side > 0 or (side == 0 and (y0 > y1 or (y0 == y1 and x1 > x0)))
-                    if edge.ccw and not left:
-                        turns += 1
-                    elif not edge.ccw and left:
-                        turns -= 1
-        return turns
+        return sum(turns_round(edge, p) for edge in self._level_with(py))
 
     def _level_with(self, y: float) -> Sequence[Edge]:
         """The edges that a level line at ``y`` can meet, and perhaps some more."""
@@ -192,6 +225,10 @@ def same_support(a: Edge, b: Edge) -> bool:
     return False
 
 
+def _same(a: Edge, b: Edge) -> bool:
+    return math.dist(a.start, b.start) < SAME and math.dist(a.at(0.5), b.at(0.5)) < SAME
+
+
 @dataclass(frozen=True)
 class Region:
     """A planar region, possibly of several pieces, possibly empty."""
@@ -253,26 +290,35 @@ class Region:
 
     @cached_property
     def key(self) -> str:
-        """A name for the shape: equal for identical profiles (to 1 nm), on every machine."""
+        """A name for the shape, from its corners rounded to 1 nm; the same on every machine.
+
+        Equal keys are of equal shapes. Shapes that differ by a hair may round to two keys: ``==``
+        tells whether they are one.
+        """
         rings = []
         for contour in self.contours:
-            if contour.circle is not None:
-                # A circle may be split anywhere.
-                centre, radius = contour.circle
-                marks = [(*centre, -radius if contour.is_hole else radius)]
-            else:
-                marks = list(contour.vertices)
             # Adding 0.0 makes -0.0 and 0.0 one.
-            ring = [tuple(round(value, 6) + 0.0 for value in mark) for mark in marks]
+            ring = [tuple(round(value, 6) + 0.0 for value in mark) for mark in contour.marks]
             first = ring.index(min(ring))
             rings.append(ring[first:] + ring[:first])
         return hashlib.sha256(repr(sorted(rings)).encode()).hexdigest()[:16]
 
     def __hash__(self) -> int:
-        return hash(self.key)
+        return hash(tuple(sorted(len(contour.marks) for contour in self.contours)))
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Region) and self.key == other.key
+        """Whether the same corners and arcs lie within SAME of each other, wherever they start."""
+        if not isinstance(other, Region) or len(self.contours) != len(other.contours):
+            return False
+        if self is other or self.key == other.key:
+            return True
+        left = list(other.contours)
+        for contour in self.contours:
+            twin = next((c for c in left if contour.coincides(c)), None)
+            if twin is None:
+                return False
+            left.remove(twin)
+        return True
 
     def contains(self, p: Point) -> bool:
         """Whether ``p``, not on an edge, lies in the region."""

@@ -191,11 +191,16 @@ class _Narrowest:
 
         Their normals are opposed somewhere, to within ``aside`` radians.
         """
-        normal, turn = a.normal, a.half_turn + aside
+        (nx, ny), turn = a.normal, a.half_turn + aside
+        sides = self.boundary.sides
+        straight = -math.cos(turn)
         for number in self.boundary.index.numbers(widened(a.box, self.value)):
-            side = self.boundary.sides[number]
+            side = sides[number]
+            mx, my = side.normal
             room = turn + side.half_turn
-            if room > math.pi or _dot(normal, side.normal) < -math.cos(room):
+            if room > math.pi or nx * mx + ny * my < (
+                -math.cos(room) if side.half_turn else straight
+            ):
                 yield number, side
 
     def _clear(self, p: Point, q: Point) -> bool:

@@ -17,11 +17,11 @@ def parts_of(laminate: Laminate, paths: Mapping[str, Region], copies: int) -> tu
     """
     parts: list[Part] = []
     for pattern, layers in laminate.patterns.items():
-        alike: dict[str, list[int]] = {}
+        alike: dict[Region, list[int]] = {}
         pieces = paths[pattern].pieces
         for number, piece in enumerate(pieces):
             low_x, low_y, _, _ = piece.bounds
-            alike.setdefault(piece.moved(-low_x, -low_y).key, []).append(number)
+            alike.setdefault(piece.moved(-low_x, -low_y), []).append(number)
         for numbers in alike.values():
             parts.append(
                 Part(

@@ -24,7 +24,7 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
         if width is None and not bond.is_empty:
             continue
         value = width.value if width else 0.0
-        if worst is None or value < worst[0]:
+        if worst is None or value < worst[0] - 1e-9:
             worst = value, width, alike
     if worst is None:
         return [_finding(None, limits, Place(), "the laminate has no bond to measure")]

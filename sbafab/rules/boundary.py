@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from sbafab.geometry.boolean import PointPool, split_edges
+from sbafab.geometry.arrangement import split_edges
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal
 from sbafab.geometry.intersect import line_circle
 from sbafab.geometry.nearby import EdgeIndex, widened
@@ -26,10 +26,9 @@ def edges_along(region: Region, other: Region) -> list[Edge]:
     """The stretches of ``region``'s edges that run along edges of ``other``, the same way."""
     edges = [*region.edges, *other.edges]
     own = len(region.edges)
-    pool = PointPool()
     middles: dict[tuple[Point, Point], list[Point]] = {}
     stretches: list[Edge] = []
-    for index, pieces in enumerate(split_edges(edges, pool)):
+    for index, pieces in enumerate(split_edges(edges)):
         if index < own:
             stretches += pieces
         else:

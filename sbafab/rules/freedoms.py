@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -28,8 +27,7 @@ class Part(NamedTuple):
     piece: int
 
 
-@dataclass(frozen=True)
-class Freedom:
+class Freedom(NamedTuple):
     """One way a body may lie off its place: by up to ``most`` mm in any direction, or, where a
     ``centre`` is given, turned about it by up to ``most`` radians.
 

@@ -30,7 +30,7 @@ Quantity = Literal["bond", "overhang"]
 QUANTITIES: tuple[Quantity, ...] = ("bond", "overhang")
 
 ON_EDGE = 1e-5
-"""mm within which a point lies on an edge: booleans keep points to 2 nm, files to 1 nm."""
+"""mm within which a point lies on an edge: booleans keep points to 4 nm, files to 1 nm."""
 SQUARE = 0.9
 """Cosine above which an edge counts as square to a direction (within 25 degrees)."""
 
@@ -99,14 +99,17 @@ def pushes(margin: Margin, interface: Interface, moves: Freedoms) -> list[Push]:
     """What can narrow a margin: the freedoms that one of its two edges has and the other not."""
     layers = seated(interface)
     start, end = (moves[Part(layers[o.seat], o.piece)] for o in margin.owners)
-    found = []
     sides = ((start, end, margin.start, False), (end, start, margin.end, True))
-    for own, other, p, at_end in sides:
-        for freedom in own:
-            if freedom not in other:
-                cost = freedom.most * abs(freedom.lever(p, margin.normal))
-                found.append(Push(freedom, cost, at_end))
-    return found
+    return [
+        Push(freedom, freedom.most * abs(freedom.lever(p, margin.normal)), at_end)
+        for own, other, p, at_end in sides
+        for freedom in _without(own, other)
+    ]
+
+
+@lru_cache(maxsize=1024)
+def _without(own: tuple[Freedom, ...], other: tuple[Freedom, ...]) -> tuple[Freedom, ...]:
+    return tuple(freedom for freedom in own if freedom not in other)
 
 
 def interface_margins(

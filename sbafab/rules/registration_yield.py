@@ -19,6 +19,7 @@ from sbafab.rules.limits import TOLERANCE, Limits
 from sbafab.rules.margins import (
     QUANTITIES,
     Margin,
+    Push,
     Quantity,
     interface_margins,
     own_freedoms,
@@ -241,12 +242,14 @@ def _rows(
 ) -> list[_Row]:
     """The margins that can come short at all; of those that feel all errors alike, the least."""
     limit_of = {"bond": limits.worst_bond_width, "overhang": limits.worst_mask_overhang}
+    layers = seated(interface)
     found: dict[object, _Row] = {}
     for margin in margins:
         room = margin.nominal - limit_of[margin.quantity]
-        loss = sum(push.cost for push in pushes(margin, interface, moves))
+        felt_by = pushes(margin, interface, moves)
+        loss = sum(push.cost for push in felt_by)
         if room - 2 * limits.tolerances.cutting - loss < -TOLERANCE:
-            row = _Row(margin.quantity, room, tuple(_terms(margin, interface, moves)))
+            row = _Row(margin.quantity, room, tuple(_terms(margin, layers, felt_by)))
             felt = tuple((error, *(round(f, 3) for f in factors)) for error, factors in row.terms)
             known = found.get((margin.quantity, felt))
             if known is None or room < known.room:
@@ -255,16 +258,15 @@ def _rows(
 
 
 def _terms(
-    margin: Margin, interface: Interface, moves: Freedoms
+    margin: Margin, layers: Sequence[int], found: Iterable[Push]
 ) -> Iterator[tuple[_Error, tuple[float, ...]]]:
     """What widens the margin, and by how much for each unit of it."""
-    layers = seated(interface)
     nx, ny = margin.normal
     for owner in margin.owners:
         # More film widens a bond, more mask an overhang.
         widens = owner.is_film == (margin.quantity == "bond")
         yield _Contour(layers[owner.seat], owner.contour), (1.0 if widens else -1.0,)
-    for push in pushes(margin, interface, moves):
+    for push in found:
         sign = 1.0 if push.at_end else -1.0
         freedom = push.freedom
         if freedom.centre is None:

@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from sbafab.geometry.beam import beam_path
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Arc, Point
 from sbafab.geometry.offset import fillet, grow, shrink
@@ -217,3 +218,57 @@ def test_spikes_and_closed_notches_are_offset_on_the_right_side(angle: float) ->
     filled = fillet(slot.turned(angle), 0.5)
     assert filled.contains(place(-0.5, 2))
     assert not filled.contains(place(-0.5, 0.01))
+
+
+def segment(radius: float, height: float) -> Region:
+    """What a straight cut ``height`` below its top takes off a disc."""
+    far = 2 * radius
+    return disc((0, 0), radius) - rectangle((-far, -far), (far, radius - height))
+
+
+def cap_area(radius: float, height: float) -> float:
+    half = math.acos(1 - height / radius)
+    return radius**2 * (half - math.sin(half) * math.cos(half))
+
+
+@pytest.mark.parametrize("radius", [1.5, 7.5, 40])
+@pytest.mark.parametrize("distance", [0.02, 0.05, 0.75])
+def test_segments_grow_round_their_sharp_tips(radius: float, distance: float) -> None:
+    """Steiner again: from 1 um to 0.3 mm high, where line and arc meet at under a degree or two."""
+    for i in range(40):
+        height = 1e-3 * 300 ** (i / 39)
+        half = math.acos(1 - height / radius)
+        around = 2 * radius * (half + math.sin(half))
+        shape = segment(radius, height).turned(17.3 * i)
+        expected = cap_area(radius, height) + around * distance + math.pi * distance**2
+        # The line and the arc each end within 4 nm of the tip.
+        assert grow(shape, distance).area == pytest.approx(expected, abs=1e-5 * around)
+
+
+@pytest.mark.parametrize(("width", "height"), [(44, 1.5), (32, 1.05)])
+def test_flat_segments_shrink_to_segments(width: float, height: float) -> None:
+    """A line and an arc, both moved in by the distance, bound a segment again."""
+    radius = (width**2 / 4 + height**2) / (2 * height)
+    for distance in (0.05, 0.25, 0.5):
+        expected = cap_area(radius - distance, height - 2 * distance)
+        assert shrink(segment(radius, height), distance).area == pytest.approx(expected, abs=1e-5)
+        grown = grow(segment(radius, height), distance)
+        assert shrink(grown, distance).area == pytest.approx(cap_area(radius, height), abs=1e-5)
+
+
+def test_a_kerf_wider_than_an_outline_is_high_keeps_it() -> None:
+    for height in (0.05, 0.02):
+        path = beam_path(segment(7.5, height), 0.1)
+        assert path.lost is None
+        half = math.acos(1 - height / 7.5)
+        grown = cap_area(7.5, height) + 15 * (half + math.sin(half)) * 0.05 + math.pi * 0.05**2
+        assert path.region.area == pytest.approx(grown, abs=1e-5)
+
+
+def test_a_lens_of_two_flat_arcs_grows_round_both_tips() -> None:
+    for height in (0.002, 0.05, 0.4):
+        lens = segment(20, height).moved(0, height - 20)
+        lens |= segment(20, height).moved(0, height - 20).turned(180)
+        half = math.acos(1 - height / 20)
+        expected = 2 * cap_area(20, height) + 80 * half * 0.05 + math.pi * 0.05**2
+        assert grow(lens, 0.05).area == pytest.approx(expected, abs=1e-4)

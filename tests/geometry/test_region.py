@@ -181,3 +181,17 @@ def test_a_circle_is_known_whatever_its_edges_are_split_into() -> None:
     assert halves.circle == ((0, 0), 2)
     assert halves.area == pytest.approx(4 * math.pi)
     assert stadium((0, 0), 2, 3).contours[0].circle is None
+
+
+def test_shapes_a_hair_apart_are_equal_wherever_their_numbers_round_to() -> None:
+    """Coordinates half way between two nanometres: a hair decides what they round to."""
+    for x in (0.0000005, 1.2345675, -3.0000015):
+        for shape in (disc((x, 0), 2), rectangle((x, 0), (3, 2)), stadium((x, x), 2, 5)):
+            assert len({shape, shape.moved(1e-11, -1e-11), shape.moved(-1e-11, 1e-11)}) == 1
+    shape = stadium((0, 0), 2, 5) - disc((0, 1), 0.5)
+    assert shape == shape.moved(1e-6, 1e-6)
+    assert shape != shape.moved(1e-5, 0)
+    assert shape != stadium((0, 0), 2, 5) - disc((0, 1), 0.50001)
+    assert rectangle((0, 0), (2, 2)) != disc((1, 1), 1)
+    turned = Region(tuple(Contour((*c.edges[1:], c.edges[0])) for c in shape.contours))
+    assert turned.moved(1e-6, 0) == shape

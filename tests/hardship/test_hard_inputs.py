@@ -11,7 +11,7 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.errors import SbafabError
-from sbafab.geometry.boolean import GeometryError, chain
+from sbafab.geometry.boolean import GeometryError, wound
 from sbafab.geometry.edges import Line
 from sbafab.output import run as run_module
 
@@ -116,10 +116,10 @@ def test_other_line_ends_and_marks_are_read(content: bytes, tmp_path: Path) -> N
 
 def test_what_the_geometry_cannot_resolve_names_the_design(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(GeometryError, match=r"x 1\.000000, y 2\.000000 .*change a size"):
-        chain([Line((0.0, 0.0), (1.0, 2.0))])
+        wound([Line((1.0, 2.0), (3.0, 4.0))], 0)
 
     def unresolved(*_: object) -> object:
-        return chain([Line((0.0, 0.0), (1.0, 2.0))])
+        return wound([Line((1.0, 2.0), (3.0, 4.0))], 0)
 
     monkeypatch.setattr(run_module, "build", unresolved)
     with pytest.raises(SbafabError, match=r"design 1dof-5mm cannot be resolved: .*change a size"):

@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from sbafab.geometry.boolean import PointPool, split_edges
+from sbafab.geometry.arrangement import split_edges
 from sbafab.geometry.edges import Edge, Point, edge_from_bulge
 from sbafab.geometry.region import Region
 
@@ -42,14 +42,13 @@ def arrangement(regions: Sequence[Region], h: float) -> list[Border]:
     Where two edges leave a point in one direction (a fillet and the outline it runs into) they
     are one until they are a small part of ``h`` mm apart, so that no cell ends in a cusp.
     """
-    pool = PointPool()
     edges = [edge for region in regions for edge in region.edges]
     owner = [index for index, region in enumerate(regions) for _ in region.edges]
-    found: defaultdict[tuple[int, int], list[tuple[Edge, dict[int, int]]]] = defaultdict(list)
-    for index, pieces in enumerate(split_edges(edges, pool)):
+    found: defaultdict[tuple[Point, Point], list[tuple[Edge, dict[int, int]]]] = defaultdict(list)
+    for index, pieces in enumerate(split_edges(edges)):
         for piece in pieces:
-            a, b = pool.index(piece.start), pool.index(piece.end)
-            _file(found[min(a, b), max(a, b)], piece, owner[index])
+            ends = min(piece.start, piece.end), max(piece.start, piece.end)
+            _file(found[ends], piece, owner[index])
     borders = [
         _labelled(piece, cover, regions) for entries in found.values() for piece, cover in entries
     ]

@@ -1,0 +1,52 @@
+"""Points that lie too near each other to be told apart, made one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from sbafab.geometry.edges import SAME, Point
+
+CELLS = 16
+"""Cells of the grid are so many times as wide as points are pooled: most points touch one only."""
+
+
+class PointPool:
+    """One point for all that hang together by steps shorter than ``same``, in any order.
+
+    A group is called after its first point (least x, then least y) among ``ends``; after its first
+    among ``others`` where it holds no end.
+    """
+
+    def __init__(
+        self, ends: Iterable[Point], others: Iterable[Point] = (), same: float = SAME
+    ) -> None:
+        self._same = same
+        self._rank: dict[Point, int] = {}
+        self._leader: dict[Point, Point] = {}
+        self._cells: dict[tuple[int, int], list[Point]] = {}
+        first = set(ends)
+        for p in (*sorted(first), *sorted(set(others) - first)):
+            self._add(p)
+
+    def snapped(self, p: Point) -> Point:
+        """The point that stands for ``p``, one of those that were pooled."""
+        while (leader := self._leader[p]) is not p:
+            p = leader
+        return p
+
+    def _add(self, p: Point) -> None:
+        self._rank[p] = len(self._rank)
+        self._leader[p] = p
+        width, margin = CELLS * self._same, 1.01 / CELLS
+        u, v = p[0] / width, p[1] / width
+        for column in range(math.floor(u - margin), math.floor(u + margin) + 1):
+            for row in range(math.floor(v - margin), math.floor(v + margin) + 1):
+                for q in self._cells.get((column, row), ()):
+                    if math.dist(p, q) < self._same:
+                        self._unite(self.snapped(p), self.snapped(q))
+        self._cells.setdefault((math.floor(u), math.floor(v)), []).append(p)
+
+    def _unite(self, p: Point, q: Point) -> None:
+        first, second = (p, q) if self._rank[p] <= self._rank[q] else (q, p)
+        self._leader[second] = first
