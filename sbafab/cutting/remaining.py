@@ -19,13 +19,13 @@ class Remaining:
         self._file(range(len(points)))
 
     def _file(self, numbers: Sequence[int]) -> None:
-        """About one point a cell."""
+        """About one point a cell, and of points on a line no more cells than points."""
         points = [self._points[number] for number in numbers] or [(0.0, 0.0)]
         self._low = min(x for x, _ in points), min(y for _, y in points)
         high = max(x for x, _ in points), max(y for _, y in points)
         across, along = high[0] - self._low[0], high[1] - self._low[1]
-        self._cell = math.sqrt(across * along / len(points)) or max(across, along) / len(points)
-        self._cell = self._cell or 1.0
+        longest = max(across, along) / len(points)
+        self._cell = max(math.sqrt(across * along / len(points)), longest) or 1.0
         self._last = self._place(high)
         self._cells: dict[tuple[int, int], list[int]] = {}
         for number in numbers:
