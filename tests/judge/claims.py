@@ -21,6 +21,7 @@ SIZE = 0.002
 STRIP = 0.02
 """mm, about, of an inlet strip that is not told apart from its pocket."""
 CIRCLE = re.compile(r"Fits a circle of\s+([\d.]+)\s*mm")
+LIMITS = re.compile(r"\bLIMITS\s+9\s+\$CUSTOMPROPERTY\s+1\s+([^\n]*)")
 EXTENT = re.compile(r"(Width|Length) of all that is cut[a-z, ]*\s+([\d.]+)\s*mm")
 
 
@@ -30,6 +31,22 @@ def judge_claims(folder: Folder) -> Iterator[Disagreement]:
     yield from _layers(folder)
     yield from _interfaces(folder)
     yield from _sizes(folder)
+    yield from _lowered(folder)
+
+
+def _lowered(folder: Folder) -> Iterator[Disagreement]:
+    """Limits below the paper's are named in every cut file."""
+    names = {
+        name.replace("_", " ")
+        for name, usual in (("bond_width", 0.75), ("mask_overhang", 0.5))
+        if float(folder.wish("rules", name, usual)) < usual
+    }
+    for file in {layer.file for layer in folder.layers} if names else ():
+        text = (folder.path / file).read_text(encoding="utf-8")
+        stated = LIMITS.search(text)
+        said = stated.group(1).replace("_", " ").replace("-", " ") if stated else "nothing"
+        if any(name not in said for name in names):
+            yield Disagreement("claims", f"{file} says {said} of limits that are lowered")
 
 
 def _files(folder: Folder) -> Iterator[Disagreement]:
