@@ -149,17 +149,19 @@ def _circles(folder: Folder, circles: list[float], slack: float) -> Iterator[Dis
 
 
 def _without_tab(folder: Folder, film: Layer) -> BaseGeometry:
-    """A film of the bottom balloon as its pocket and the bond round it, other films as they are."""
-    if film.balloon != 1:
+    """A film that has tabs or ears as its pocket and the bond round it, others as they are."""
+    if film.balloon is None or (film.balloon != 1 and folder.method != "ears"):
         return film.profile
-    if folder.wish("chamber", "outline", None) is not None:
+    if film.balloon == 1 and folder.wish("chamber", "outline", None) is not None:
         return Point(0, 0)  # the second balloon is the same without a tab
     bond = float(folder.wish("bond", "width", 0.75))
     pocket = next(
         layer.profile
         for layer in folder.layers
-        if layer.balloon == 1 and layer.role == "chamber-mask"
+        if layer.balloon == film.balloon and layer.role == "chamber-mask"
     )
+    if film.balloon != 1:
+        return shapely.union_all([Polygon(p.exterior).buffer(bond) for p in pieces(pocket)])
     # Where the widest disc of a pocket cannot go is its strip, or a corner of a drawn one.
     bodies = [Point(0, 0).buffer(0.01)]
     for part in pieces(pocket):
