@@ -20,7 +20,8 @@ SIZE = 0.002
 """mm by which a stated size may differ."""
 STRIP = 0.02
 """mm, about, of an inlet strip that is not told apart from its pocket."""
-CIRCLE = re.compile(r"Fits a circle of\s+([\d.]+)\s*mm")
+CIRCLE = re.compile(r"[Ff]its? a circle[a-z ]* of\s+([\d.]+)\s*mm")
+OVERALL = re.compile(r"All that is cut[a-z, ]* fits one of\s+([\d.]+)\s*mm")
 LIMITS = re.compile(r"\bLIMITS\s+9\s+\$CUSTOMPROPERTY\s+1\s+([^\n]*)")
 EXTENT = re.compile(r"(Width|Length) of all that is cut[a-z, ]*\s+([\d.]+)\s*mm")
 
@@ -120,15 +121,25 @@ def _sizes(folder: Folder) -> Iterator[Disagreement]:
         if abs(stated[name] - value) > slack:
             yield Disagreement("claims", f"the {name} is {value:.3f}, stated {stated[name]:.3f}")
     circles = [stated["outline_diameter"]] if "outline_diameter" in stated else []
+    overall = [stated["overall_diameter"]] if "overall_diameter" in stated else []
     page = folder.path / "traveller.html"
     if page.is_file():
         text = re.sub(r"<[^>]*>", " ", html.unescape(page.read_text(encoding="utf-8")))
-        circles += [float(found) for found in CIRCLE.findall(text)]
+        told = CIRCLE.findall(text)
+        if len(told) != len(circles):
+            yield Disagreement("claims", f"the traveller tells {len(told)} circles that it fits")
+        circles += [float(found) for found in told]
+        overall += [float(found) for found in OVERALL.findall(text)]
         for name, value in EXTENT.findall(text):
             if abs(float(value) - measured[name.lower()]) > slack + 0.001:
                 yield Disagreement(
                     "claims", f"the traveller says {name.lower()} {value}, which is not the files'"
                 )
+    far = shapely.get_coordinates(whole)
+    around = 2 * float(np.hypot(far[:, 0], far[:, 1]).max())
+    for circle in overall:
+        if abs(circle - around) > 2 * slack:
+            yield Disagreement("claims", f"all is said to fit {circle:g}, and takes {around:.3f}")
     yield from _circles(folder, circles, slack + 0.0006)
 
 
