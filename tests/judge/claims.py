@@ -150,7 +150,7 @@ def _circles(folder: Folder, circles: list[float], slack: float) -> Iterator[Dis
     body = shapely.union_all([_without_tab(folder, film) for film in folder.films])
     # Round the axis: what lies farther out on one side cannot be turned inside a tube.
     least = 2 * shapely.minimum_bounding_radius(body)
-    far = shapely.get_coordinates(body)
+    far = shapely.get_coordinates([film.profile for film in folder.films])
     most = 2 * float(np.hypot(far[:, 0], far[:, 1]).max())
     for circle in circles:
         if not least - STRIP - slack <= circle <= most + slack:
@@ -173,10 +173,13 @@ def _without_tab(folder: Folder, film: Layer) -> BaseGeometry:
     )
     if film.balloon != 1:
         return shapely.union_all([Polygon(p.exterior).buffer(bond) for p in pieces(pocket)])
-    # Where the widest disc of a pocket cannot go is its strip, or a corner of a drawn one.
-    bodies = [Point(0, 0).buffer(0.01)]
+    # Where a disc nearly as wide as the pocket cannot go is its strip; what lies beyond is a tail.
+    diameter = folder.wish("chamber", "diameter", 5.0)
+    radius = float(diameter[0] if isinstance(diameter, list) else diameter) / 2
+    widest = 0.97 * (radius - folder.chord_error)
+    bodies = [Point(0, 0)]
     for part in pieces(pocket):
-        filled = Polygon(part.exterior)
-        widest = 0.97 * shapely.maximum_inscribed_circle(filled, 0.01).length
-        bodies.append(filled.buffer(-widest).buffer(widest).buffer(bond))
+        wide = pieces(Polygon(part.exterior).buffer(-widest).buffer(widest))
+        nearest = min(wide, key=lambda body: body.distance(Point(0, 0)), default=None)
+        bodies += [] if nearest is None else [nearest.buffer(bond)]
     return shapely.union_all(bodies)
