@@ -26,6 +26,8 @@ def main() -> int:
     cases = []
     for case in run_cases(given.seed, given.designs, ways, given.jobs, given.start):
         cases.append(case)
+        for found in case.disagreements:
+            print(f"{case.name} {found.judge}: {found.said}", file=sys.stderr, flush=True)
         if sys.stderr.isatty():
             print(f"\r{len(cases)} of {given.designs}", end="", file=sys.stderr, flush=True)
     print(table(cases))

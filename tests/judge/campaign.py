@@ -5,14 +5,17 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import signal
 import tempfile
 import time
 import traceback
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import FrameType
 
 from tests.judge.deck import judged
 from tests.judge.drafts import Draft, beside, draft
@@ -21,6 +24,10 @@ from tests.judge.reading import UnreadableError
 from tests.judge.sheets import judge_sheets
 from tests.judge.using import Ended, sbafab
 
+MOST_SECONDS = 90
+"""Processor time of one case; ten times what the slowest takes."""
+STOPPED = (130, 143)
+"""Exit codes of a command that someone stopped, and with it the judging."""
 TOGETHER = 15
 ANOTHER = 1_000_000
 """Added to a design's number for the one that is cut with it."""
@@ -63,10 +70,13 @@ def run_case(seed: int, number: int, ways: Ways = Ways()) -> Case:
     with tempfile.TemporaryDirectory() as scratch:
         home = Path(scratch)
         try:
-            if len(made) == 1:
-                _one(case, made[0], home, ways)
-            else:
-                _together(case, made, home, ways)
+            with _no_longer_than(MOST_SECONDS):
+                if len(made) == 1:
+                    _one(case, made[0], home, ways)
+                else:
+                    _together(case, made, home, ways)
+        except TooSlowError as error:
+            case.disagreements.append(Disagreement("time", f"over {MOST_SECONDS} s in {error}"))
         except Exception as error:  # a crash of the program, or of a judge, is a finding too
             lines = traceback.format_exception_only(error)[-1].strip()
             at = traceback.extract_tb(error.__traceback__)[-1]
@@ -78,6 +88,27 @@ def run_case(seed: int, number: int, ways: Ways = Ways()) -> Case:
             shutil.copytree(home, kept)
     case.seconds = time.process_time() - began
     return case
+
+
+class TooSlowError(BaseException):
+    """A case that takes no end; no ``except Exception`` on the way is meant to catch it."""
+
+
+@contextmanager
+def _no_longer_than(seconds: int) -> Iterator[None]:
+    """Raises TooSlowError, with the innermost place, after so much processor time."""
+
+    def stop(_: int, frame: FrameType | None) -> None:
+        code = frame.f_code if frame is not None else None
+        raise TooSlowError(f"{Path(code.co_filename).name}, {code.co_name}" if code else "it")
+
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def _one(case: Case, made: Draft, home: Path, ways: Ways) -> None:
@@ -119,6 +150,8 @@ def _together(case: Case, made: list[Draft], home: Path, ways: Ways) -> None:
 
 
 def _refused(case: Case, ended: Ended, folder: Path) -> bool:
+    if ended.code in STOPPED:
+        raise KeyboardInterrupt
     if ended.code:
         case.refused = _reason(ended, folder)
     if ended.code not in (0, 1, 2):

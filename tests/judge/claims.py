@@ -20,7 +20,9 @@ SIZE = 0.002
 """mm by which a stated size may differ."""
 STRIP = 0.02
 """mm, about, of an inlet strip that is not told apart from its pocket."""
-CIRCLE = re.compile(r"Fits a circle of\s+([\d.]+)\s*mm")
+CIRCLE = re.compile(r"[Ff]its? a circle[a-z ]* of\s+([\d.]+)\s*mm")
+OVERALL = re.compile(r"All that is cut[a-z, ]* fits one of\s+([\d.]+)\s*mm")
+LIMITS = re.compile(r"\bLIMITS\s+9\s+\$CUSTOMPROPERTY\s+1\s+([^\n]*)")
 EXTENT = re.compile(r"(Width|Length) of all that is cut[a-z, ]*\s+([\d.]+)\s*mm")
 
 
@@ -30,6 +32,22 @@ def judge_claims(folder: Folder) -> Iterator[Disagreement]:
     yield from _layers(folder)
     yield from _interfaces(folder)
     yield from _sizes(folder)
+    yield from _lowered(folder)
+
+
+def _lowered(folder: Folder) -> Iterator[Disagreement]:
+    """Limits below the paper's are named in every cut file."""
+    names = {
+        name.replace("_", " ")
+        for name, usual in (("bond_width", 0.75), ("mask_overhang", 0.5))
+        if float(folder.wish("rules", name, usual)) < usual
+    }
+    for file in {layer.file for layer in folder.layers} if names else ():
+        text = (folder.path / file).read_text(encoding="utf-8")
+        stated = LIMITS.search(text)
+        said = stated.group(1).replace("_", " ").replace("-", " ") if stated else "nothing"
+        if any(name not in said for name in names):
+            yield Disagreement("claims", f"{file} says {said} of limits that are lowered")
 
 
 def _files(folder: Folder) -> Iterator[Disagreement]:
@@ -103,15 +121,25 @@ def _sizes(folder: Folder) -> Iterator[Disagreement]:
         if abs(stated[name] - value) > slack:
             yield Disagreement("claims", f"the {name} is {value:.3f}, stated {stated[name]:.3f}")
     circles = [stated["outline_diameter"]] if "outline_diameter" in stated else []
+    overall = [stated["overall_diameter"]] if "overall_diameter" in stated else []
     page = folder.path / "traveller.html"
     if page.is_file():
         text = re.sub(r"<[^>]*>", " ", html.unescape(page.read_text(encoding="utf-8")))
-        circles += [float(found) for found in CIRCLE.findall(text)]
+        told = CIRCLE.findall(text)
+        if len(told) != len(circles):
+            yield Disagreement("claims", f"the traveller tells {len(told)} circles that it fits")
+        circles += [float(found) for found in told]
+        overall += [float(found) for found in OVERALL.findall(text)]
         for name, value in EXTENT.findall(text):
             if abs(float(value) - measured[name.lower()]) > slack + 0.001:
                 yield Disagreement(
                     "claims", f"the traveller says {name.lower()} {value}, which is not the files'"
                 )
+    far = shapely.get_coordinates(whole)
+    around = 2 * float(np.hypot(far[:, 0], far[:, 1]).max())
+    for circle in overall:
+        if abs(circle - around) > 2 * slack:
+            yield Disagreement("claims", f"all is said to fit {circle:g}, and takes {around:.3f}")
     yield from _circles(folder, circles, slack + 0.0006)
 
 
@@ -122,7 +150,7 @@ def _circles(folder: Folder, circles: list[float], slack: float) -> Iterator[Dis
     body = shapely.union_all([_without_tab(folder, film) for film in folder.films])
     # Round the axis: what lies farther out on one side cannot be turned inside a tube.
     least = 2 * shapely.minimum_bounding_radius(body)
-    far = shapely.get_coordinates(body)
+    far = shapely.get_coordinates([film.profile for film in folder.films])
     most = 2 * float(np.hypot(far[:, 0], far[:, 1]).max())
     for circle in circles:
         if not least - STRIP - slack <= circle <= most + slack:
@@ -132,21 +160,26 @@ def _circles(folder: Folder, circles: list[float], slack: float) -> Iterator[Dis
 
 
 def _without_tab(folder: Folder, film: Layer) -> BaseGeometry:
-    """A film of the bottom balloon as its pocket and the bond round it, other films as they are."""
-    if film.balloon != 1:
+    """A film that has tabs or ears as its pocket and the bond round it, others as they are."""
+    if film.balloon is None or (film.balloon != 1 and folder.method != "ears"):
         return film.profile
-    if folder.wish("chamber", "outline", None) is not None:
+    if film.balloon == 1 and folder.wish("chamber", "outline", None) is not None:
         return Point(0, 0)  # the second balloon is the same without a tab
     bond = float(folder.wish("bond", "width", 0.75))
     pocket = next(
         layer.profile
         for layer in folder.layers
-        if layer.balloon == 1 and layer.role == "chamber-mask"
+        if layer.balloon == film.balloon and layer.role == "chamber-mask"
     )
-    # Where the widest disc of a pocket cannot go is its strip, or a corner of a drawn one.
-    bodies = [Point(0, 0).buffer(0.01)]
+    if film.balloon != 1:
+        return shapely.union_all([Polygon(p.exterior).buffer(bond) for p in pieces(pocket)])
+    # Where a disc nearly as wide as the pocket cannot go is its strip; what lies beyond is a tail.
+    diameter = folder.wish("chamber", "diameter", 5.0)
+    radius = float(diameter[0] if isinstance(diameter, list) else diameter) / 2
+    widest = 0.97 * (radius - folder.chord_error)
+    bodies = [Point(0, 0)]
     for part in pieces(pocket):
-        filled = Polygon(part.exterior)
-        widest = 0.97 * shapely.maximum_inscribed_circle(filled, 0.01).length
-        bodies.append(filled.buffer(-widest).buffer(widest).buffer(bond))
+        wide = pieces(Polygon(part.exterior).buffer(-widest).buffer(widest))
+        nearest = min(wide, key=lambda body: body.distance(Point(0, 0)), default=None)
+        bodies += [] if nearest is None else [nearest.buffer(bond)]
     return shapely.union_all(bodies)

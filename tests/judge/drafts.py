@@ -230,7 +230,12 @@ def _room_round_tube(rng: Random, tables: dict[str, Any], drawn: Drawing) -> Non
     low_x, _, high_x, _ = drawn.pocket.bounds
     bond = tables.get("bond", {}).get("width", 0.75)
     overhang = tables.get("mask", {}).get("overhang", 0.5)
-    pitch = high_x - low_x + 2 * bond + 2 * overhang + rng.choice([0.25, 2.0, 5.0, 9.0])
+    room = rng.choice([0.25, 2.0, 5.0, 9.0])
+    if tables["registration"]["method"] == "ears":
+        room += rng.choice([4.0, 10.0])
+        tables["fillet"] = {"radius": rng.choice([0.2, 1.0])}
+        tables["chamber"]["count"] = min(tables["chamber"]["count"], 3)
+    pitch = high_x - low_x + 2 * bond + 2 * overhang + room
     tables["tube"] = {
         "outer_diameter": round(pitch * tables["chamber"]["count"] / math.pi + 0.01, 3)
     }
