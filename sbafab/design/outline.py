@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,6 +12,8 @@ from sbafab.geometry.arrangement import split_edges
 from sbafab.geometry.biarc import FitError
 from sbafab.geometry.boolean import tidy
 from sbafab.geometry.edges import EPSILON, Point
+from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.nearby import close_pairs
 from sbafab.geometry.region import Contour, Region
 
 MOST_BYTES = 2_000_000
@@ -135,12 +138,21 @@ def _checked(loop: Strand) -> Region:
 
 
 def _refuse_crossings(loop: Strand) -> None:
+    # A tangle is told at its first knot: there may be one for every two edges.
+    for i, j in close_pairs([edge.bounds for edge in loop], EPSILON):
+        ends = loop[i].start, loop[i].end, loop[j].start, loop[j].end
+        for p in meeting_points(loop[i], loop[j]):
+            if min(math.dist(p, end) for end in ends) > JOIN:
+                raise _crossing(p)
     corners: set[Point] = set()
     for edge, pieces in zip(loop, split_edges(loop), strict=True):
         start = pieces[0].start if pieces else edge.start
         if len(pieces) != 1 or start in corners:
-            x, y = pieces[0].end if len(pieces) > 1 else edge.start
-            raise DesignError(
-                f"crosses or touches itself at x {x:.4f}, y {y:.4f}; draw it without the loop"
-            )
+            raise _crossing(pieces[0].end if len(pieces) > 1 else edge.start)
         corners.add(start)
+
+
+def _crossing(p: Point) -> DesignError:
+    return DesignError(
+        f"crosses or touches itself at x {p[0]:.4f}, y {p[1]:.4f}; draw it without the loop"
+    )

@@ -24,7 +24,7 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
     """
     deck, write = as_built._deck, derived._write_anew
     measured = _remembered(deck, _asked_of_deck)
-    meant_by = _remembered(as_built.meant_by, design_sha256)
+    meant_by = _remembered(as_built.meant_by, lambda d, curves: f"{design_sha256(d)} {curves}")
     run_deck = _remembered(as_built.run_deck, lambda made, limits: made.name + repr(limits))
     made: dict[str, Any] = {}
 
@@ -33,7 +33,7 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
     ) -> Any:
         asked = [folder / name for name in ("design.toml", "sheets/nest.json")]
         files = [path.read_bytes() if path.exists() else b"" for path in asked]
-        said = repr((sorted(claims.files), checked.findings)).encode()
+        said = repr((sorted(claims.files), claims.curves, checked.findings)).encode()
         key = sha256(b"".join(files) + said).hexdigest()
         if key not in made:
             (root / key).mkdir(parents=True)

@@ -20,6 +20,7 @@ from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.properties import chord_error_of
 from sbafab.cutting.verify import TOLERANCE, check_contours
 from sbafab.errors import OutputError
+from sbafab.output.as_built.cut_files import sound_digest
 from sbafab.output.as_built.meshes import mesh_difference
 
 SHARE, LEAST = 1e-6, 1e-6
@@ -188,6 +189,7 @@ def _picture_difference(found: bytes, meant: bytes) -> str:
 
 def _drawing_difference(found: Path, meant: Path) -> str:
     """Contours, strokes and properties of two drawings."""
+    sound_digest(found)
     own, wanted = read_profile(found), read_profile(meant)
     room = TOLERANCE + 2 * chord_error_of(own.properties)
     try:
