@@ -222,7 +222,6 @@ def test_a_design_of_a_job_says_that_its_sheets_lie_elsewhere(clean_job: Path) -
 
 JOB_FAULTS: list[tuple[str, Callable[[Claims], object]]] = [
     ("copies", lambda m: m["designs"][0].update(copies=1)),
-    ("a design left out", lambda m: m["designs"].pop()),
     ("hash of a design", lambda m: m["designs"][1].update(design_sha256="0" * 64)),
     ("hash of all designs", lambda m: m.update(designs_sha256="0" * 64)),
     ("parts", lambda m: m["sheets"][0]["parts"][0].update(design="radial-15mm")),
@@ -237,6 +236,13 @@ def test_wrong_claims_of_a_job_are_told(
     doctor = Doctor(Path(shutil.copytree(clean_job, tmp_path / "batch")))
     doctor.set_manifest(change)
     assert rules_failing(doctor.folder) == {"manifest-claims"}
+
+
+def test_a_design_left_out_of_a_job_is_told(clean_job: Path, tmp_path: Path) -> None:
+    doctor = Doctor(Path(shutil.copytree(clean_job, tmp_path / "batch")))
+    doctor.set_manifest(lambda m: m["designs"].pop())
+    # The sheets hold more than what is left of the job makes.
+    assert rules_failing(doctor.folder) == {"manifest-claims", "as-designed"}
 
 
 def test_a_piece_of_another_design_is_told(clean_job: Path, tmp_path: Path) -> None:

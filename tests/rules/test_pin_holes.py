@@ -65,7 +65,7 @@ def test_a_pin_that_no_layer_has_a_hole_for(good: Good) -> None:
 
 
 def test_ears_that_vanished_from_all_films(good: Good) -> None:
-    """The plate is drilled for them; equal outlines and equal holes pass every other rule."""
+    """The plate is drilled for them; where no hole tells an ear, its bond past the mask counts."""
     laminate = good("1dof-5mm", "stack.balloons=3", EARS)
     tools = [pin for pin in laminate.pins if pin.name.startswith("film")]
 
@@ -81,7 +81,7 @@ def test_ears_that_vanished_from_all_films(good: Good) -> None:
         for layer in laminate.layers
     )
     laminate = replace(laminate, layers=layers)
-    assert failing(laminate) == {"pin-holes"}
+    assert failing(laminate) == {"pin-holes", "facing-films"}
     assert "hangs on no pin in step 1" in found(laminate).message
     # Three patterns of film (tabbed base, tabbed wall, wall, cap) hang on nothing, two pins idle.
     assert found(laminate).measured >= 5

@@ -183,6 +183,13 @@ def _part(
     chord_error = chord_error_of(properties)
     if chord_error and isinstance(kerf, tuple):
         raise OutputError("its chords do not tell how its kerf was compensated; write it anew")
+    if not chord_error and not chords_drawn:
+        place = chorded_place(found.region)
+        if place is not None:
+            raise OutputError(
+                f"an arc is drawn as chords at x {place[0]:.3f}, y {place[1]:.3f}, and the file "
+                "does not say so; write it anew with arcs"
+            )
     if expected is not None and not departure(found.region, expected.path):
         # What is cut within its tolerance needs no guess at what the beam may have left.
         return CutPart(
@@ -194,13 +201,6 @@ def _part(
             found.units,
             is_meant=True,
         )
-    if not chord_error and not chords_drawn:
-        place = chorded_place(found.region)
-        if place is not None:
-            raise OutputError(
-                f"an arc is drawn as chords at x {place[0]:.3f}, y {place[1]:.3f}, and the file "
-                "does not say so; write it anew with arcs"
-            )
     region, corner_room = uncut(with_circles(found.region), kerf)
     if region.is_empty:
         raise OutputError(f"nothing is left inside a kerf of {kerf_text(kerf)} mm; write it anew")

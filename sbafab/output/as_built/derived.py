@@ -67,15 +67,16 @@ def derived_job_problems(
     with _made_anew(folder) as (fresh, problems):
         whole = None
         waived: tuple[str, ...] = ()
+        lowered: tuple[str, ...] = ()
         if is_joined(job):
             # An assembly's run checks what it has written, and so imports this module.
             from sbafab.output.assembly import checked_again
 
             whole = checked_again(folder, checked)
-            waived = whole.waived
+            waived, lowered = whole.waived, whole.lowered
         error = chord_error_of(curves_property(curves))
         drawing = Drawing("chords", error) if error else Drawing()
-        batch = plan_batch(checked, job.name, folder, drawing, _quiet, waived=waived)
+        batch = plan_batch(checked, job.name, folder, drawing, _quiet, waived, lowered)
         written = write_batch(batch, fresh, ("press", "mesh", "preview"), whole is None, _quiet)
         if whole is not None:
             from sbafab.output.assembly import write_whole
