@@ -16,6 +16,9 @@ from tests.judge.folder import Disagreement, Folder, Hole, Interface, Layer, pie
 STEP = 0.1
 INSIDE = 0.001
 """mm inward from an edge: whether the films are kept apart there."""
+BESIDE = 0.003
+"""mm from a mask's side, along the film's edge, from where on a ray stays within the mask: sides
+whose kerf was taken back may lean by a thousandth."""
 FITS = 0.004
 """mm by which a hole may differ from the pin in it."""
 LOOKS = 8
@@ -59,7 +62,10 @@ def _least(
     if not len(points):
         return None
     inside = points - normals * INSIDE
-    kept = shapely.contains_xy(mask, inside[:, 0], inside[:, 1])
+    along = np.stack([-normals[:, 1], normals[:, 0]], axis=1) * BESIDE
+    kept = np.ones(len(points), dtype=bool)
+    for place in (inside - along, inside + along):
+        kept &= shapely.contains_xy(mask, place[:, 0], place[:, 1])
     shapely.prepare(other.profile)
     kept &= shapely.contains_xy(other.profile, inside[:, 0], inside[:, 1])
     points, normals = points[kept], normals[kept]
