@@ -176,7 +176,7 @@ def _without_tab(folder: Folder, film: Layer) -> BaseGeometry:
     # Where a disc nearly as wide as the pocket cannot go is its strip; what lies beyond is a tail.
     diameter = folder.wish("chamber", "diameter", 5.0)
     radius = float(diameter[0] if isinstance(diameter, list) else diameter) / 2
-    widest = 0.97 * (radius - folder.chord_error)
+    widest = 0.99 * (radius - folder.chord_error)
     bodies = [Point(0, 0)]
     for part in pieces(pocket):
         wide = pieces(Polygon(part.exterior).buffer(-widest).buffer(widest))
