@@ -42,11 +42,11 @@ def run_design(
 ) -> None:
     """The same with a design that is loaded."""
     from sbafab.cli.printing import print_json, print_run, run_json, shown_progress
-    from sbafab.output.run import NONE, generate
+    from sbafab.output.run import NO_EXTRAS, generate
 
     with shown_progress(request.as_json) as progress:
         run = generate(
-            design, request.out, parts, progress, dxf_profile, chord_error, extras or NONE
+            design, request.out, parts, progress, dxf_profile, chord_error, extras or NO_EXTRAS
         )
     if request.as_json:
         print_json(run_json(run))

@@ -37,7 +37,7 @@ from sbafab.output.contents import (
     write_contents,
     write_text,
 )
-from sbafab.output.earlier import no_longer, puts_away
+from sbafab.output.earlier import removed_files, would_replace
 from sbafab.output.manifest import as_json, checks
 from sbafab.output.self_check import refuse_batch
 from sbafab.output.settings import GENERATOR, kerf_widths, limits
@@ -93,7 +93,7 @@ class AssemblyRun:
     folder: Path
     manifest: dict[str, Any]
     dropped: tuple[str, ...] = ()
-    """Files of an earlier run in the folder that this one put away."""
+    """Files of an earlier run in the folder that this one removed."""
     kept: bool = False
     """Whether something failed and ``folder`` was left to an earlier run that is worth more."""
 
@@ -146,7 +146,7 @@ def generate_assembly(
     checked = check_assembly(assembly, tell)
     target = out / assembly.name
     batch = None
-    if checked.failed and puts_away(target, None):
+    if checked.failed and would_replace(target, None):
         return AssemblyRun(checked, target, {}, kept=True)
     if not checked.failed:
         drawing = Drawing(dxf_profile, chord_error)
@@ -170,7 +170,7 @@ def generate_assembly(
         close_folder(folder, index)
         if batch is not None:
             refuse_batch(batch, folder, tell)
-    return AssemblyRun(checked, target, index, no_longer(listed, index))
+    return AssemblyRun(checked, target, index, removed_files(listed, index))
 
 
 def _write_uncut(checked: CheckedAssembly, folder: Path, tell: Progress) -> None:

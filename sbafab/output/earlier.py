@@ -22,7 +22,9 @@ WORTH_KEEPING = {*CUT, *PRESS, *MESH, *PREDICTION, *SIMULATORS}
 """Files and folders that a design which breaks a rule does not get."""
 
 
-def puts_away(target: Path, mine: Mapping[str, Any] | None, own: Collection[str] = ()) -> list[str]:
+def would_replace(
+    target: Path, mine: Mapping[str, Any] | None, own: Collection[str] = ()
+) -> list[str]:
     """Files worth keeping of another design's run in ``target`` that a new run would lose.
 
     ``mine`` says in a manifest's words which design and version the new run is of; ``own`` are the
@@ -35,14 +37,14 @@ def puts_away(target: Path, mine: Mapping[str, Any] | None, own: Collection[str]
     return [path for path in listed_files(target) if worth & set(path.split("/"))]
 
 
-def no_longer(listed: Sequence[str], index: Mapping[str, Any]) -> tuple[str, ...]:
+def removed_files(listed: Sequence[str], index: Mapping[str, Any]) -> tuple[str, ...]:
     """What an earlier run listed in ``swap.listed_files`` and the new run's manifest does not."""
     return tuple(path for path in listed if path not in index["files"])
 
 
-def refuse_to_put_away(target: Path, mine: Mapping[str, Any], own: Collection[str]) -> None:
+def refuse_to_replace(target: Path, mine: Mapping[str, Any], own: Collection[str]) -> None:
     """Raises OutputError where a run that writes ``own`` would lose another design's files."""
-    lost = puts_away(target, mine, own)
+    lost = would_replace(target, mine, own)
     if lost:
         names = dict.fromkeys(path.partition("/")[0] for path in lost)
         raise OutputError(

@@ -13,7 +13,7 @@ from sbafab.design.records import NAME_PATTERN, Design
 from sbafab.errors import DesignError
 from sbafab.output.batch import Drawing, batch_manifest, plan_batch, refuse_unlike, write_batch
 from sbafab.output.contents import Checked, Part, close_folder
-from sbafab.output.earlier import no_longer
+from sbafab.output.earlier import removed_files
 from sbafab.output.run import check
 from sbafab.output.self_check import refuse_batch
 from sbafab.output.shop import Progress
@@ -35,7 +35,7 @@ class Job:
     folder: Path
     manifest: dict[str, Any]
     dropped: tuple[str, ...] = ()
-    """Files of an earlier run in the folder that this one put away."""
+    """Files of an earlier run in the folder that this one removed."""
 
     @property
     def failed(self) -> bool:
@@ -70,7 +70,7 @@ def generate_job(
         index = batch_manifest(JOB_SCHEMA, name, checked, batch, written.sheets)
         close_folder(folder, index)
         refuse_batch(batch, folder, tell)
-    return Job(checked, target, index, no_longer(listed, index))
+    return Job(checked, target, index, removed_files(listed, index))
 
 
 def _refuse_names(names: Sequence[str], name: str) -> None:

@@ -11,7 +11,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.models.figures import Prediction
 from sbafab.output.contents import write_text
 from sbafab.output.manifest import as_json
-from sbafab.output.run import Also
+from sbafab.output.run import ExtraFiles
 from sbafab.output.settings import GENERATOR
 
 SCHEMA = "sbafab/predict@1"
@@ -33,7 +33,7 @@ def prediction_json(design: Design, prediction: Prediction) -> dict[str, Any]:
     }
 
 
-def with_prediction(design: Design, prediction: Prediction) -> Also:
+def with_prediction(design: Design, prediction: Prediction) -> ExtraFiles:
     """Writes ``predict.json`` and ``predict/<relation>.svg`` into the folder of a run."""
 
     def put(_: Laminate, folder: Path) -> None:

@@ -30,9 +30,9 @@ from sbafab.output.earlier import (
     MESH,
     PRESS,
     carry_over,
-    no_longer,
-    puts_away,
-    refuse_to_put_away,
+    refuse_to_replace,
+    removed_files,
+    would_replace,
 )
 from sbafab.output.manifest import identity
 from sbafab.output.self_check import refuse_unlike, work_of
@@ -54,7 +54,7 @@ from sbafab.rules.finding import Finding, Findings
 if TYPE_CHECKING:
     from sbafab.meshing.conforming.meshes import ConformingMeshes
 
-Also = Callable[[Laminate, Path], None]
+ExtraFiles = Callable[[Laminate, Path], None]
 """Writes something of its own for a laminate into the folder of a run."""
 EVERYTHING: tuple[Part, ...] = ("cut", "press", "mesh", "preview")
 OWN: dict[Part, tuple[str, ...]] = {"cut": CUT, "press": PRESS, "mesh": MESH, "preview": ()}
@@ -69,11 +69,11 @@ class Extras(NamedTuple):
     """
 
     conforming: Conforming | None = None
-    also: Also | None = None
+    also: ExtraFiles | None = None
     own: tuple[str, ...] = ()
 
 
-NONE = Extras()
+NO_EXTRAS = Extras()
 
 
 @dataclass(frozen=True, repr=False)
@@ -88,7 +88,7 @@ class Run:
     schedule: Schedule | None
     conforming: ConformingMeshes | None = None
     dropped: tuple[str, ...] = ()
-    """Files of an older run of another design or version that this one put away."""
+    """Files of an older run of another design or version that this one removed."""
     kept: bool = False
     """Whether the design fails and ``folder`` was left to an older run of another one."""
 
@@ -122,7 +122,7 @@ def generate(
     progress: Progress | None = None,
     dxf_profile: DxfProfile = "bulges",
     chord_error: float = 0.005,
-    extras: Extras = NONE,
+    extras: Extras = NO_EXTRAS,
 ) -> Run:
     """Writes ``out/<design name>/`` and returns what was made.
 
@@ -137,13 +137,13 @@ def generate(
     wanted = set(parts)
     target = out / design.name
     if checked.failed:
-        kept = puts_away(target, identity(design, checked.waived))
+        kept = would_replace(target, identity(design, checked.waived))
         if kept:
             return Run(design, checked.laminate, checked.findings, target, {}, None, kept=True)
         wanted &= {"preview"}
     elif wanted < set(EVERYTHING):
         own = [name for part in wanted for name in OWN[part]]
-        refuse_to_put_away(target, identity(design, checked.waived), (*own, *extras.own))
+        refuse_to_replace(target, identity(design, checked.waived), (*own, *extras.own))
     # Schedule, nest and meshes are made before anything is written: they may refuse the design.
     pressing = schedule_of(checked) if "press" in wanted else None
     settings = cut_settings(design, checked.waived, dxf_profile, chord_error)
@@ -170,7 +170,7 @@ def generate(
         if plan is not None:
             tell("reading back", 0, 1)
             refuse_unlike(folder, {design.name: work_of(checked, plan.paths)}, settings)
-    dropped = no_longer(listed, index)
+    dropped = removed_files(listed, index)
     return Run(design, checked.laminate, checked.findings, target, index, pressing, meshes, dropped)
 
 
@@ -183,7 +183,7 @@ def _meshed(checked: Checked, asked: Conforming | None, tell: Progress) -> Confo
     return conforming_meshes(checked.laminate, asked.settings)
 
 
-def with_folder(made: Path) -> Also:
+def with_folder(made: Path) -> ExtraFiles:
     """Puts a folder that was made elsewhere into that of a run, under its own name."""
 
     def put(_: Laminate, folder: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sbafab.design.records import Design
 from sbafab.output.contents import Checked
-from sbafab.output.earlier import refuse_to_put_away
+from sbafab.output.earlier import refuse_to_replace
 from sbafab.output.manifest import as_json, identity
 from sbafab.output.run import Extras, check, generate, with_folder
 from sbafab.output.shop import Progress
@@ -63,7 +63,7 @@ def simulate(
         if checked.failed:
             return Simulated(checked.findings, None, found)
         # Said before a run of hours, not after it.
-        refuse_to_put_away(out / design.name, identity(design, checked.waived), (name,))
+        refuse_to_replace(out / design.name, identity(design, checked.waived), (name,))
         # A folder in the temporary one has the usual rights, the temporary one itself has not.
         folder = Path(place) / name
         if export:

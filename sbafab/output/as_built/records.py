@@ -276,11 +276,11 @@ class Problem:
     verdict: Verdict = "fail"
 
 
-def findings_of(rule: str, problems: list[Problem], praise: str) -> list[Finding]:
-    """Findings of one rule: each problem, the many in one at the end, or one that praises."""
+def findings_of(rule: str, problems: list[Problem], passed: str) -> list[Finding]:
+    """Findings of one rule: each problem, the many in one at the end, or one that passes."""
     own = [problem for problem in problems if problem.rule == rule]
     if not any(problem.verdict == "fail" for problem in own):
-        own.append(Problem(rule, praise, verdict="pass"))
+        own.append(Problem(rule, passed, verdict="pass"))
     shown, rest = own[:MOST_SHOWN], own[MOST_SHOWN:]
     if rest:
         layers = tuple(dict.fromkeys(index for problem in rest for index in problem.layers))
