@@ -24,15 +24,21 @@ def main() -> int:
     ways = Ways(lean=given.lean, check=not given.no_check, most_balloons=5, keep=given.keep)
     began = time.perf_counter()
     cases = []
-    for case in run_cases(given.seed, given.designs, ways, given.jobs, given.start):
-        cases.append(case)
-        for found in case.disagreements:
-            print(f"{case.name} {found.judge}: {found.said}", file=sys.stderr, flush=True)
-        if sys.stderr.isatty():
-            print(f"\r{len(cases)} of {given.designs}", end="", file=sys.stderr, flush=True)
+    stopped = False
+    try:
+        for case in run_cases(given.seed, given.designs, ways, given.jobs, given.start):
+            cases.append(case)
+            for found in case.disagreements:
+                print(f"{case.name} {found.judge}: {found.said}", file=sys.stderr, flush=True)
+            if sys.stderr.isatty():
+                print(f"\r{len(cases)} of {given.designs}", end="", file=sys.stderr, flush=True)
+    except KeyboardInterrupt:
+        stopped = True
     print(table(cases))
+    if stopped:
+        print(f"stopped after {len(cases)} of {given.designs}")
     print(f"wall time      {time.perf_counter() - began:.0f} s")
-    return 1 if any(case.disagreements for case in cases) else 0
+    return 1 if stopped or any(case.disagreements for case in cases) else 0
 
 
 if __name__ == "__main__":

@@ -16,9 +16,9 @@ from tests.judge.folder import Disagreement, Folder, Hole, Interface, Layer, pie
 STEP = 0.1
 INSIDE = 0.001
 """mm inward from an edge: whether the films are kept apart there."""
-BESIDE = 0.003
+BESIDE = 0.01
 """mm from a mask's side, along the film's edge, from where on a ray stays within the mask: sides
-whose kerf was taken back may lean by a thousandth."""
+whose kerf was taken back may lean by a thousandth, and arcs that end at them by their last chord."""
 FITS = 0.004
 """mm by which a hole may differ from the pin in it."""
 LOOKS = 8

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 
 from sbafab.cutting.verify import check_contours
 from sbafab.errors import OutputError
-from sbafab.geometry.centroid import centroid
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
 from sbafab.nesting.records import MATERIALS, Turn
@@ -185,8 +184,8 @@ def _groups(kinds: Sequence[_Kind]) -> dict[_Pattern, _Pattern]:
 
 
 def _at_origin(piece: Region) -> Region:
-    """The piece with its centre of area at the origin."""
-    x, y = centroid(piece)
+    """The piece with the lower left corner of its box at the origin."""
+    x, y, _, _ = piece.bounds
     return piece.moved(-x, -y)
 
 
