@@ -17,8 +17,8 @@ STEP = 0.1
 INSIDE = 0.001
 """mm inward from an edge: whether the films are kept apart there."""
 BESIDE = 0.01
-"""mm from a mask's side, along the film's edge, from where on a ray stays within the mask: sides
-whose kerf was taken back may lean by a thousandth, and arcs that end at them by their last chord."""
+"""mm from a mask's side, along the film's edge, from where on a ray stays within the mask: a side
+whose kerf was taken back may lean by a thousandth, an arc that ends at it by its last chord."""
 FITS = 0.004
 """mm by which a hole may differ from the pin in it."""
 LOOKS = 8
