@@ -21,7 +21,7 @@ from tests.faults.mutants import mutated
 from tests.faults.once import remembering
 from tests.output.doctoring import Doctor
 
-COUNT = int(os.environ.get("SBAFAB_FAULTS", "24"))
+COUNT = int(os.environ.get("SBAFAB_FAULTS", "16"))
 SEED = int(os.environ.get("SBAFAB_FAULTS_SEED", "12"))
 PARTS = 8
 """Tests that the draws are shared out over."""

@@ -36,7 +36,7 @@ CLEAN: list[tuple[str, tuple[str, ...], DxfProfile]] = [
     ("1dof-10mm", ("chamber.outline=drop.svg", "stack.balloons=1"), "chords"),
     ("3dof-15mm", ("stack.balloons=6",), "bulges"),
     ("3dof-15mm", ("stack.balloons=2",), "arcs"),
-    ("3dof-15mm", ("stack.balloons=2", *KERF), "chords"),
+    ("1dof-5mm", ("stack.balloons=2", *KERF), "chords"),
     ("3dof-15mm", ("fillet.radius=0", "stack.balloons=2", *KERF), "bulges"),
     *(("3dof-15mm", (f"chamber.count={n}", "stack.balloons=1"), "bulges") for n in (5, 8)),
     *(("3dof-15mm", (f"chamber.count={n}", "stack.balloons=2"), "bulges") for n in (2, 4)),
