@@ -186,7 +186,6 @@ def _check_job(folder: Path, works: Mapping[str, Work] | None = None) -> tuple[F
             job.sheets,
             job.files,
             lots,
-            works is not None,
         ),
     )
     if is_joined(job):
@@ -236,7 +235,7 @@ def read_folder(folder: Path, of_job: bool = False, work: Work | None = None) ->
     problems += layer_problems(files, claims)
     problems += pattern_problems(layers, claims)
     if not of_job:
-        problems += _own_sheet_problems(folder, claims, design, files, work is not None)
+        problems += _own_sheet_problems(folder, claims, design, files)
     laminate: Laminate | None = None
     parts = [file.part for file in files if file.part is not None]
     chord_error = max((part.chord_error for part in parts), default=0.0)
@@ -317,11 +316,7 @@ def _as_designed(built: AsBuilt, measured: Sequence[Finding]) -> Checked | None:
 
 
 def _own_sheet_problems(
-    folder: Path,
-    claims: Manifest,
-    design: Design,
-    files: Sequence[LayerFile],
-    just_written: bool,
+    folder: Path, claims: Manifest, design: Design, files: Sequence[LayerFile]
 ) -> list[Problem]:
     if not claims.sheets and is_job(folder.absolute().parent):
         message = "the film sheets are those of the job, and were not looked at; check the folder "
@@ -339,7 +334,6 @@ def _own_sheet_problems(
             claims.sheets,
             claims.files,
             [Lot(claims.name, claims.copies, files)],
-            just_written,
         ),
     )
 

@@ -43,7 +43,6 @@ class Order:
     """What the sheets of a folder are claimed to be, and the layers that they must hold.
 
     ``design`` states the stock; ``sha256`` is that of the design, or of all designs of a job.
-    ``just_written``: frames, borders and gaps were read off the same files as they were written.
     """
 
     name: str
@@ -56,7 +55,6 @@ class Order:
     sheets: Sequence[SheetClaim]
     files: Mapping[str, str]
     lots: Sequence[Lot]
-    just_written: bool = False
 
 
 def sheet_problems(folder: Path, order: Order) -> list[Problem]:
@@ -81,8 +79,7 @@ def sheet_problems(folder: Path, order: Order) -> list[Problem]:
             problems += _property_problems(told, found, order, curves)
         else:
             bare.append(found)
-        if not order.just_written:
-            problems += _layout_problems(told, found, stock_of[told.material])
+        problems += _layout_problems(told, found, stock_of[told.material])
         problems += _number_problems(sheets[-1])
     if bare:
         of = "the files of " + (f"{len(bare)} film sheets" if len(bare) > 1 else "a film sheet")
