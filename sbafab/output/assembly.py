@@ -35,6 +35,7 @@ from sbafab.output.contents import (
     Part,
     close_folder,
     write_contents,
+    write_findings,
     write_text,
 )
 from sbafab.output.earlier import removed_files, would_replace
@@ -178,7 +179,7 @@ def _write_uncut(checked: CheckedAssembly, folder: Path, tell: Progress) -> None
     for one in checked.designs:
         own = folder / one.design.name
         own.mkdir()
-        close_folder(own, write_contents(one, UNCUT, Made(), own, tell))
+        close_folder(own, write_contents(one, UNCUT, Made(traveller=False), own, tell))
 
 
 def write_whole(
@@ -201,6 +202,8 @@ def write_whole(
         (folder / "mesh").mkdir()
         index["meshes"] = [_write_solid(assembled, folder)]
         write_text(folder / TRAVELLER, _traveller(checked, batch, written, bare))
+    sha256 = assembly_sha256(assembled)
+    write_findings(assembled.assembly.name, sha256, checked.designs, checked.between, folder)
     write_text(folder / "checks.json", as_json(checks(checked.findings, "design")))
     write_text(folder / DESIGN_FILE, assembly_toml(assembled))
     return index

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 Part = Literal["cut", "press", "mesh", "preview"]
 TRAVELLER = "traveller.html"
+FINDINGS = "findings.html"
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Conforming:
 class Made:
     """What was made before the rest is written; None or empty for what was not asked for.
 
-    Without ``traveller`` the folder gets none of its own: an assembly has one for all designs.
+    Without ``traveller`` the folder gets no pages of its own: an assembly has them for all designs.
     """
 
     cut: CutSet | None = None
@@ -120,6 +121,8 @@ def write_contents(
     if paged and made.cut is not None and made.pressing is not None:
         page = _traveller(checked, made.cut, made.sheets, made.pressing, folder)
         write_text(folder / TRAVELLER, page)
+    if made.traveller and "preview" in wanted:
+        write_findings(checked.design.name, design_sha256(checked.design), [checked], (), folder)
     write_text(folder / "checks.json", as_json(checks(checked.findings, "design")))
     _write_design(checked.design, folder)
     index = manifest(
@@ -128,6 +131,25 @@ def write_contents(
     if made.conforming is not None:
         index["mesh_statistics"] = made.conforming.statistics
     return index
+
+
+def write_findings(
+    name: str,
+    sha256: str,
+    designs: Sequence[Checked],
+    between: Sequence[Finding],
+    folder: Path,
+) -> None:
+    """The designer's page: of every design, and of the checks ``between`` an assembly's parts."""
+    from sbafab.reports.traveller.findings import Inspected, findings_html
+
+    inspected = [
+        Inspected(one.design.name, one.findings, one.laminate, limits(one.design))
+        for one in designs
+    ]
+    if between:
+        inspected.append(Inspected("Between the parts", between))
+    write_text(folder / FINDINGS, findings_html(name, sha256, GENERATOR, inspected))
 
 
 def close_folder(folder: Path, index: dict[str, Any]) -> None:

@@ -38,7 +38,7 @@ def test_a_folder_for_each_design_and_one_page_for_all(brace: AssemblyRun) -> No
     assert not brace.failed
     assert {path.name for path in brace.folder.iterdir()} == {
         *("radial-15mm", "3dof-15mm", "sheets", "mesh", "preview"),
-        *("traveller.html", "checks.json", "design.toml", "manifest.json"),
+        *("traveller.html", "findings.html", "checks.json", "design.toml", "manifest.json"),
     }
     assert not list(brace.folder.glob("*/traveller.html"))
     assert (brace.folder / "preview" / "assembled.png").read_bytes().startswith(b"\x89PNG")

@@ -185,13 +185,13 @@ def test_labels_do_not_lie_over_each_other_or_windows(sheet_files: Any) -> None:
                     assert all(box.intersection(other).area < 0.05 for other in covered[:i])
     masks = [sheet for sheet in sheet_files(laminate) if sheet.material == "PTFE"]
     for sheet in masks:
-        scale = 84.0 / sheet.width
         svg = lxml_html.fromstring(sheet_map(sheet, {"radial-15mm": ""}, "sheet-1"))
+        frame = max(svg.iter("rect"), key=lambda rect: float(rect.get("width")))
+        scale = float(frame.get("width")) / sheet.width
+        foot = float(frame.get("y")) + float(frame.get("height"))
         for placement in sheet.nest.on_sheet(sheet.number - 1):
             for hole in sheet.nest.region(placement).holes:
-                points = [
-                    (0.5 + scale * x, 0.5 + scale * (sheet.length - y)) for x, y in hole.polygon()
-                ]
+                points = [(0.5 + scale * x, foot - scale * y) for x, y in hole.polygon()]
                 window = shapely.Polygon(points)
                 hidden = sum(box.intersection(window).area for box in boxes(svg))
                 assert hidden < 0.2 * window.area

@@ -126,7 +126,7 @@ def _write_anew(
     write_fixture(laminate, fresh, settings)
     cut = CutSet(_cut_files(checked), FIXTURE if laminate.pins else None, claims.curves)
     pressing = schedule_of(checked) if "press" in wanted else None
-    made = Made(cut, sheets, pressing, traveller=has_page)
+    made = Made(cut, sheets, pressing, traveller=parts is not None)
     return write_contents(checked, wanted, made, fresh, _quiet)
 
 

@@ -10,8 +10,9 @@ from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Sba, Tube
 from sbafab.models.sizes import inflated_diameter
 from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller.action import Action
 from sbafab.reports.traveller.bill import Item
-from sbafab.reports.traveller.process import LEAK_KILOPASCALS, Action
+from sbafab.reports.traveller.process import LEAK_KILOPASCALS
 
 
 @dataclass(frozen=True)

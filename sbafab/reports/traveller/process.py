@@ -11,6 +11,8 @@ from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.pressing.schedule import Step
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller.action import Action
+from sbafab.reports.traveller.bench import reseat, warm_plate
 from sbafab.reports.traveller.exploded import exploded
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.layup import Bed, Round, beds, inlets_in, rounds
@@ -26,15 +28,6 @@ BONDS = {
     "flash": "Flash bond: the layers just barely stick together.",
     "full": "Full bond: all TPE that touches melts into one.",
 }
-
-
-@dataclass(frozen=True)
-class Action:
-    """One thing to do. ``layers`` are laid in it; ``ticks`` label one box each, or there is one."""
-
-    text: str
-    layers: tuple[int, ...] = ()
-    ticks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -140,6 +133,7 @@ def _actions(
         yield Action("Lay a release film on a flat plate. No pins: lay by eye, as each line says.")
     for bed in lying:
         yield from _lay(things, bed, part.pins)
+    yield from reseat(laminate, part.adds, bool(part.pins))
     many = stack_count(laminate, part.layers)
     lies = "stack lies" if many == 1 else f"{many} stacks lie"
     yield Action(
@@ -153,6 +147,7 @@ def _actions(
             "with the same holes lies on top."
         )
     yield Action("Cover with a release film.")
+    yield warm_plate(step)
     yield Action(f"Close the press and start the timer: {say.minutes(step.minutes)}.")
     yield Action("Take it out: it is as hot as the platens. Let it cool flat before you touch it.")
     if part.pins:
