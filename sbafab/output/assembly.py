@@ -201,7 +201,7 @@ def write_whole(
     if batch is not None and written is not None:
         (folder / "mesh").mkdir()
         index["meshes"] = [_write_solid(assembled, folder)]
-        write_text(folder / TRAVELLER, _traveller(checked, batch, written, bare))
+        write_text(folder / TRAVELLER, _traveller(checked, batch, written, bare, folder))
     sha256 = assembly_sha256(assembled)
     write_findings(assembled.assembly.name, sha256, checked.designs, checked.between, folder)
     write_text(folder / "checks.json", as_json(checks(checked.findings, "design")))
@@ -287,9 +287,12 @@ def _uncut_manifest(name: str, designs: Sequence[Checked]) -> dict[str, Any]:
     }
 
 
-def _traveller(checked: CheckedAssembly, batch: Batch, written: Written, picture: bytes) -> str:
+def _traveller(
+    checked: CheckedAssembly, batch: Batch, written: Written, picture: bytes, folder: Path
+) -> str:
     from sbafab.reports.traveller.assembly_page import AssemblyJob, DesignWork, assembly_html
     from sbafab.reports.traveller.job import Job, Work
+    from sbafab.reports.underlay import NAME as UNDERLAY
 
     works = []
     for one, planned, cut in zip(checked.designs, batch.designs, written.cut, strict=True):
@@ -301,6 +304,7 @@ def _traveller(checked: CheckedAssembly, batch: Batch, written: Written, picture
             lowered=one.lowered,
             findings=one.findings,
             fixture=cut.fixture and f"{name}/{cut.fixture}",
+            underlay=f"{name}/{UNDERLAY}" if (folder / name / UNDERLAY).is_file() else None,
             kerf=kerf_widths(one.design),
             copies=one.design.order.copies,
         )

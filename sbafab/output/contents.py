@@ -102,10 +102,16 @@ def write_contents(
 
     The traveller needs cut files, schedule and pictures.
     """
+    from sbafab.reports.underlay import NAME as UNDERLAY
+    from sbafab.reports.underlay import underlay_pdf
+
     meshes: list[MeshFile] = []
     if made.pressing is not None:
         write_text(folder / "press.json", as_json(press_json(made.pressing)))
         write_text(folder / "press.csv", press_csv(made.pressing))
+        underlay = underlay_pdf(checked.laminate, design_sha256(checked.design))
+        if underlay is not None:
+            (folder / UNDERLAY).write_bytes(underlay)
     if "mesh" in wanted:
         meshes = write_meshes(
             checked.laminate, folder, progress=lambda done, total: tell("meshes", done, total)
@@ -171,6 +177,7 @@ def _traveller(
 ) -> str:
     from sbafab.reports.traveller.job import Job
     from sbafab.reports.traveller.page import traveller_html
+    from sbafab.reports.underlay import NAME as UNDERLAY
 
     design = checked.design
     job = Job(
@@ -180,6 +187,7 @@ def _traveller(
         lowered=checked.lowered,
         findings=checked.findings,
         fixture=cut.fixture,
+        underlay=UNDERLAY if (folder / UNDERLAY).is_file() else None,
         kerf=kerf_widths(design),
         copies=design.order.copies,
         made_for=design.order.made_for,

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from sbafab.laminate.assembly import distinct_layers
+from sbafab.laminate.assembly import AssemblyStep, distinct_layers
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.schedule import Step
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
 from sbafab.reports.traveller.job import Work
+from sbafab.reports.underlay import guides
 
 WARM = 5.0
 """C by which a plate may be colder than the platens when the timer starts."""
@@ -59,6 +60,25 @@ def _loose(laminate: Laminate) -> int:
     """Pieces of masks that fall into several."""
     pieces = (len(layer.profile.pieces) for layer in laminate.layers if layer.is_mask)
     return sum(count for count in pieces if count > 1)
+
+
+def underlay(work: Work, part: AssemblyStep) -> list[Action]:
+    """The printed page below the release film, in steps in which it has a line to lay by."""
+    patterns = [
+        pattern
+        for guide in guides(work.laminate)
+        if part.number in guide.steps
+        for pattern in guide.patterns
+    ]
+    if work.job.underlay is None or not patterns:
+        return []
+    prick = ", the pins pricked through" if part.pins else ""
+    return [
+        Action(
+            f"{work.job.underlay}, printed at 100 % and its bars measured: tape it to the plate"
+            f"{prick}, release film over it. It has the edges of {say.listed(patterns)}."
+        )
+    ]
 
 
 def reseat(laminate: Laminate, adds: Sequence[int], pinned: bool) -> list[Action]:

@@ -49,6 +49,9 @@ def bill(work: Work) -> list[Item]:
     if job.fixture is not None:
         what = f"cut from {job.fixture}, holes reamed to the pins; a second one lies on top"
         items.append(Item("Pin plate", f"{what} of longer pins", "1 or 2"))
+    if job.underlay is not None:
+        what = f"{job.underlay} printed at 100 % on plain paper; its bars must measure 100 mm"
+        items.append(Item("Underlay", what, "1 page"))
     items.append(
         Item(
             "Release film",

@@ -19,7 +19,8 @@ Kerf = float | tuple[float, float] | None
 class Job:
     """The order behind a traveller.
 
-    ``kerf`` by material, ``fixture`` the path of the pin plate's cut file, ``solid_png`` the bytes
+    ``kerf`` by material, ``fixture`` the path of the pin plate's cut file, ``underlay`` that of the
+    page to lay up on, ``solid_png`` the bytes
     of the picture of the solid. ``lowered`` are limits below the usual ones. ``extras`` are further
     rows of the bill of materials: item and quantity. Empty ``made_for`` leaves a blank to fill in
     by hand.
@@ -31,6 +32,7 @@ class Job:
     lowered: Sequence[str] = ()
     findings: Sequence[Finding] = ()
     fixture: str | None = None
+    underlay: str | None = None
     kerf: Mapping[str, Kerf] = field(default_factory=dict)
     copies: int = 1
     made_for: str = ""

@@ -12,7 +12,7 @@ from sbafab.pressing.schedule import Step
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
-from sbafab.reports.traveller.bench import reseat, warm_plate
+from sbafab.reports.traveller.bench import reseat, underlay, warm_plate
 from sbafab.reports.traveller.exploded import exploded
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.layup import Bed, Round, beds, inlets_in, rounds
@@ -66,7 +66,7 @@ def step_pages(work: Work) -> list[StepPage]:
                 pitch(placed),
                 plan(work.laminate, part, lying, f"plan-{step.step}"),
                 exploded(work.laminate, part, lying, f"exploded-{step.step}"),
-                tuple(_actions(work.laminate, part, step, lying)),
+                _bench_actions(work, part, step, lying),
             )
         )
     return found
@@ -114,6 +114,14 @@ def _pin_notes(work: Work, part: AssemblyStep) -> tuple[str, ...]:
 
 def _height(laminate: Laminate, part: AssemblyStep) -> str:
     return say.millimetres(sum(laminate.layer(index).film.thickness for index in part.layers))
+
+
+def _bench_actions(
+    work: Work, part: AssemblyStep, step: Step, lying: Sequence[Bed]
+) -> tuple[Action, ...]:
+    """A step's actions; the printed underlay comes right after the press is set."""
+    first, *others = _actions(work.laminate, part, step, lying)
+    return (first, *underlay(work, part), *others)
 
 
 def _actions(
