@@ -362,3 +362,8 @@ def test_ears_are_trimmed_and_tubes_wrapped(sheet_files: Any) -> None:
     assert "Snip off every ear" not in plain
     assert "Wrap the sheet round its tube, outer diameter 15 mm" in radial
     assert "Wrap the sheet" not in plain
+    assert "Glue: 3M 1587" in radial
+    other = page_of(work_of(sheet_files, "radial-15mm", 'tube.glue="Sil-Poxy"'))
+    assert other.count("Sil-Poxy") == 2
+    for page in (ears, plain, radial):
+        assert "Snip off what of the strip stands out of the tab" in page

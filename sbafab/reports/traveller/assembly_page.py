@@ -179,7 +179,7 @@ def _bill(job: AssemblyJob) -> list[bill.Item]:
 
 def _is_elsewhere(item: bill.Item) -> bool:
     """Films are summed over the designs, and the tube to wrap is a part of the assembly."""
-    return item.name in ("TPE film", "PTFE film", "Tube to wrap")
+    return item.name in ("TPE film", "PTFE film", "Tube to wrap", "Adhesive of the wrap")
 
 
 def _named(item: bill.Item, one: DesignWork) -> bill.Item:

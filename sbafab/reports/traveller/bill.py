@@ -41,6 +41,8 @@ def bill(work: Work) -> list[Item]:
         diameter = say.millimetres(wrap.tube_diameter)
         what = f"to wrap the sheet round, outer diameter {diameter}"
         items.append(Item("Tube to wrap", what, str(job.copies)))
+        what = f"{wrap.glue}, between sheet and tube (ours: the paper does not say what holds it)"
+        items.append(Item("Adhesive of the wrap", what, "as needed"))
     pins = Counter(pin.diameter for pin in laminate.pins)
     items += [
         Item("Dowel pins", f"⌀{say.millimetres(diameter)}; {pin_lengths(work)}", str(number))

@@ -33,6 +33,7 @@ from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.layup import Round, rounds
 from sbafab.reports.traveller.shapes import definitions, pattern_regions
 from sbafab.reports.traveller.sheet_map import marked, part_regions, rows_said, sheet_map
+from sbafab.reports.traveller.wrapping import wrapping
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -105,7 +106,7 @@ def context(work: Work) -> dict[str, Any]:
         "finishing": process.finishing(work),
         "tubing": process.tubing(work),
         "leak_test": process.leak_test(work),
-        "wrapping": process.wrapping(work),
+        "wrapping": wrapping(work),
         "leak_kilopascals": process.LEAK_KILOPASCALS,
         "burst": f"{BURST.value:g} ± {BURST.error:g}",
         "times": times.times(work),

@@ -318,6 +318,7 @@ def tubing(work: Work) -> list[Action]:
             (),
             names,
         ),
+        Action("Snip off what of the strip stands out of the tab, flush with its end.", (), names),
         Action(
             "Seal the mouth all round with a small drop of Loctite Vinyl, Fabric & Plastic; keep "
             "it out of the tube.",
@@ -331,20 +332,6 @@ def tubing(work: Work) -> list[Action]:
 def _apart(names: Sequence[str]) -> tuple[str, ...]:
     """A box for each of several; a single one needs no name."""
     return tuple(names) if len(names) > 1 else ()
-
-
-def wrapping(work: Work) -> list[Action]:
-    """Some laminates go round a tube in the end; empty for others."""
-    wrap = work.design.form.wrap
-    if wrap is None:
-        return []
-    return [
-        Action(
-            f"Wrap the sheet round its tube, outer diameter "
-            f"{say.millimetres(wrap.tube_diameter)}, balloons outward, its straight edges "
-            "along the tube. The paper does not say what holds it there."
-        )
-    ]
 
 
 def leak_test(work: Work) -> list[Action]:
