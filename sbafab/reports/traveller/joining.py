@@ -290,10 +290,10 @@ def _supply(placed: PlacedPart, other: PlacedPart | None, assembled: Assembled) 
         away = "start" if placed.part.at == "end" else "end"
         over = say.listed(list(dict.fromkeys(name for run in own for name in run.over)))
         past = f"; where one crosses {over}, leave it slack" if over else ""
-        places = say.listed([f"{run.chamber} {_round(round(run.angle, 1))}" for run in own])
+        places = say.listed([f"{run.chamber} at {round(run.angle, 1) % 360:g}" for run in own])
         yield Action(
             f"Fold each tab back over the rim, round its tube and not flat, and lead the tubes "
-            f"along the outside of {other.name} toward its {away}: {places}{past}; {tie}."
+            f"along the outside of {other.name} toward its {away}: {places} degrees{past}; {tie}."
         )
     elif other is not None and placed.radius is not None:
         yield Action(
