@@ -10,6 +10,8 @@ from unittest.mock import patch
 import pytest
 
 from sbafab.actuators import load_design
+from sbafab.as_built import check as as_built
+from sbafab.as_built.check import check_folder
 from sbafab.cli.ending import ended_plainly
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
@@ -19,15 +21,13 @@ from sbafab.geometry.region import Region
 from sbafab.models.figures import Asked
 from sbafab.models.prediction import predict
 from sbafab.output import run as run_module
-from sbafab.output.as_built import check as as_built
-from sbafab.output.as_built.check import check_folder
 from sbafab.output.job import generate_job
 from sbafab.output.manifest import file_hashes
 from sbafab.output.predicting import with_prediction
 from sbafab.output.run import Extras, generate
 from sbafab.output.shop import write_cut_set
 from sbafab.rules.deck import Rule
-from tests.output.doctoring import Doctor
+from tests.as_built.doctoring import Doctor
 
 FEW = ("stack.balloons=1", "rules.yield_builds=100")
 Edit = Callable[[Path], object]

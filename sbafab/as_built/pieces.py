@@ -7,15 +7,15 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from sbafab.as_built.agreement import AGREED
+from sbafab.as_built.claims import claim
+from sbafab.as_built.cut_files import LayerFile
+from sbafab.as_built.records import CLAIMS, Problem, SheetClaim
 from sbafab.cutting.verify import check_contours
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
 from sbafab.nesting.records import MATERIALS, Turn
-from sbafab.output.as_built.agreement import AGREED
-from sbafab.output.as_built.claims import claim
-from sbafab.output.as_built.cut_files import LayerFile
-from sbafab.output.as_built.records import CLAIMS, Problem, SheetClaim
 
 
 @dataclass(frozen=True)
