@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 from lxml import html as lxml_html
 
 from sbafab.actuators import build, load_design
+from sbafab.laminate.assembly import assembly, laying_pins
 from sbafab.output.settings import limits
 from sbafab.reports.traveller.findings import Inspected, findings_html
+from sbafab.reports.traveller.hand import on_laying_pins
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding, Place
+from sbafab.rules.registration_yield import simulate
 
 
 def page(*given: str) -> Any:
@@ -55,3 +59,16 @@ def test_words_from_outside_stay_words() -> None:
     found = Finding("bond-width", "warn", 1.0, None, "mm", Place(), hostile)
     text = findings_html(hostile, "0" * 64, "sbafab 1", [Inspected(hostile, [found])])
     assert text.count("alert(1)") == text.count("&gt;alert(1)")
+
+
+def test_the_lumens_pin_is_offered_where_it_passes_every_film() -> None:
+    for template, steps in (("3dof-15mm", [2, 4]), ("1dof-5mm", []), ("radial-15mm", [])):
+        laminate = build(load_design(template, ("stack.balloons=2",)[: template != "radial-15mm"]))
+        found = [step.number for step in assembly(laminate) if laying_pins(laminate, step)]
+        assert found == steps
+    lobed = load_design("3dof-15mm", ("stack.balloons=2",))
+    laminate, asked = build(lobed), limits(lobed)
+    on_pin = on_laying_pins(laminate, asked)
+    assert on_pin is not None
+    by_eye = simulate(laminate, replace(asked, yield_builds=1000)).whole.value
+    assert on_pin.share > by_eye + 0.03

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from sbafab.laminate.assembly import AssemblyStep, distinct_layers
+from sbafab.laminate.assembly import AssemblyStep, distinct_layers, laying_pins
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.schedule import Step
@@ -77,6 +77,20 @@ def underlay(work: Work, part: AssemblyStep) -> list[Action]:
         Action(
             f"{work.job.underlay}, printed at 100 % and its bars measured: tape it to the plate"
             f"{prick}, release film over it. It has the edges of {say.listed(patterns)}."
+        )
+    ]
+
+
+def on_the_lumen(laminate: Laminate, part: AssemblyStep) -> list[Action]:
+    """A pin that a step without pins may be laid up on; empty where none passes all its films."""
+    pins = laying_pins(laminate, part)
+    if not pins:
+        return []
+    names = say.listed([f"{pin.name} (⌀{say.millimetres(pin.diameter)})" for pin in pins])
+    return [
+        Action(
+            f"Better than by eye: lay up on the pin plate with the pin of the {names} alone, which "
+            "passes every film here; then only the turn is yours. Draw it before the press closes."
         )
     ]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import NamedTuple
 
+from sbafab.laminate.assembly import assembly, laying_pins
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.limits import Limits
 from sbafab.rules.registration_yield import simulate
@@ -38,3 +39,16 @@ def _hand(laminate: Laminate, limits: Limits, factor: float) -> Hand:
     hand = replace(own, placement=factor * own.placement, turn=factor * own.turn)
     asked = replace(limits, tolerances=hand, yield_builds=BUILDS)
     return Hand(hand.placement, hand.turn, simulate(laminate, asked).whole.value)
+
+
+def on_laying_pins(laminate: Laminate, limits: Limits) -> Hand | None:
+    """The design's hand where every step without pins is laid up on one, and only turns are left.
+
+    None where a step has no pin that passes all its films.
+    """
+    steps = [step for step in assembly(laminate) if not step.pins]
+    if not steps or not all(laying_pins(laminate, step) for step in steps):
+        return None
+    own = limits.tolerances
+    asked = replace(limits, tolerances=replace(own, placement=own.pin), yield_builds=BUILDS)
+    return Hand(own.pin, own.turn, simulate(laminate, asked).whole.value)

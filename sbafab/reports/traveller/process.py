@@ -12,7 +12,7 @@ from sbafab.pressing.schedule import Step
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
-from sbafab.reports.traveller.bench import reseat, underlay, warm_plate
+from sbafab.reports.traveller.bench import on_the_lumen, reseat, underlay, warm_plate
 from sbafab.reports.traveller.exploded import exploded
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.layup import Bed, Round, beds, inlets_in, rounds
@@ -119,9 +119,10 @@ def _height(laminate: Laminate, part: AssemblyStep) -> str:
 def _bench_actions(
     work: Work, part: AssemblyStep, step: Step, lying: Sequence[Bed]
 ) -> tuple[Action, ...]:
-    """A step's actions; the printed underlay comes right after the press is set."""
+    """A step's actions; what it is laid up on comes right after the press is set."""
     first, *others = _actions(work.laminate, part, step, lying)
-    return (first, *underlay(work, part), *others)
+    own = (*underlay(work, part), *on_the_lumen(work.laminate, part))
+    return (first, *own, *others)
 
 
 def _actions(
