@@ -166,7 +166,7 @@ def _check_job(folder: Path, works: Mapping[str, Work] | None = None) -> tuple[F
         named += findings_of(DESIGNED, layers, AS_DESIGNED) if layers else []
         found += [replace(f, message=f"{told.name}: {f.message}") for f in named]
         checked.append(_as_designed(built, measured) if works is None else None)
-        lots.append(Lot(told.name, told.copies, built.files))
+        lots.append(Lot(told.name, told.copies, built.files, built.design.order.spares))
         own = (built.claims.name, built.claims.copies, built.claims.design_sha256)
         if own != (told.name, told.copies, told.design_sha256):
             message = f"{told.folder}: name, copies or design_sha256 are not those of its manifest"
@@ -333,7 +333,7 @@ def _own_sheet_problems(
             claims.films,
             claims.sheets,
             claims.files,
-            [Lot(claims.name, claims.copies, files)],
+            [Lot(claims.name, claims.copies, files, design.order.spares)],
         ),
     )
 

@@ -49,7 +49,8 @@ def derived_problems(
     ``paths`` holds the beam's path for every pattern of the design's laminate.
     """
     with _made_anew(folder) as (fresh, problems):
-        parts = parts_of(checked.laminate, paths, checked.design.order.copies)
+        order = checked.design.order
+        parts = parts_of(checked.laminate, paths, order.copies, order.spares)
         index = _write_anew(folder, fresh, claims, checked, None if of_job else parts)
         problems.extend(_differences(folder, fresh, claims.files, claims.generator))
         problems.extend(_index_problems(folder, index, of_job))

@@ -269,6 +269,9 @@ class Order(Section):
 
     copies: int = Field(default=1, ge=1, le=1000)
     """How many of the actuator are cut."""
+    spares: int = Field(default=2, ge=0, le=100)
+    """Spare sets of every mask's pieces that are cut beyond what the copies take: they are small
+    and loose, and a lost one else costs a trip to the laser."""
     made_for: str = Field(default="", max_length=120)
     """Printed on the traveller."""
     note: str = Field(default="", max_length=400)

@@ -98,7 +98,7 @@ def plan_batch(
     designs = []
     for one in checked:
         settings = cut_settings(one.design, one.waived, drawing.profile, drawing.chord_error)
-        plan = plan_cuts(one.laminate, one.design.order.copies, settings, limits(one.design))
+        plan = plan_cuts(one.laminate, one.design.order, settings, limits(one.design))
         designs.append(Planned(one, settings, plan, schedule_of(one)))
     parts = [part for one in designs for part in one.plan.parts]
     nests = find_nests(parts, checked[0].design, old_folder, tell)
@@ -111,7 +111,7 @@ def refuse_undoable(checked: Sequence[Checked]) -> None:
         design = one.design
         schedule_of(one)
         settings = cut_settings(design, one.waived)
-        plan = plan_cuts(one.laminate, design.order.copies, settings, limits(design))
+        plan = plan_cuts(one.laminate, design.order, settings, limits(design))
         refuse_unfit(plan.parts, stocks(design))
 
 

@@ -149,7 +149,7 @@ def generate(
     settings = cut_settings(design, checked.waived, dxf_profile, chord_error)
     plan: CutPlan | None = None
     if "cut" in wanted:
-        plan = plan_cuts(checked.laminate, design.order.copies, settings, limits(design))
+        plan = plan_cuts(checked.laminate, design.order, settings, limits(design))
     nests = find_nests(plan.parts, design, target, tell) if plan is not None else ()
     meshes = _meshed(checked, extras.conforming, tell) if "mesh" in wanted else None
     listed = listed_files(target)

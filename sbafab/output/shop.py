@@ -12,7 +12,7 @@ from sbafab.cutting.files import CutFile, compensated_paths, write_layer_files
 from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.properties import CutSettings, curves_of
 from sbafab.cutting.sheets import FOLDER, SheetFile, write_sheets
-from sbafab.design.records import Design
+from sbafab.design.records import Design, Order
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
@@ -52,12 +52,12 @@ class CutSet:
     curves: str | None = None
 
 
-def plan_cuts(laminate: Laminate, copies: int, settings: CutSettings, limits: Limits) -> CutPlan:
+def plan_cuts(laminate: Laminate, order: Order, settings: CutSettings, limits: Limits) -> CutPlan:
     """Raises DesignError where the kerf leaves no path, or chords do not hold the limits."""
     paths = compensated_paths(laminate, settings)
     if settings.profile == "chords":
         refuse_coarse(laminate, paths, settings, limits)
-    return CutPlan(paths, parts_of(laminate, paths, copies))
+    return CutPlan(paths, parts_of(laminate, paths, order.copies, order.spares))
 
 
 def find_nests(

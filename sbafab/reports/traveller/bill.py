@@ -95,6 +95,7 @@ class Cut:
     roles: str
     layers: str
     count: int
+    spares: int
     pieces: int
     cut_length: float
     sheets: str
@@ -121,10 +122,24 @@ def _cut(work: Work, layers: tuple[Layer, ...]) -> Cut:
         ", ".join(dict.fromkeys(layer.role.replace("-", " ") for layer in layers)),
         layer_numbers([layer.index for layer in layers]),
         len(layers) * work.job.copies,
+        _spares(work, layers),
         len(profile.pieces),
         sum(contour.length for contour in profile.contours),
         ", ".join(holding),
     )
+
+
+def _spares(work: Work, layers: Sequence[Layer]) -> int:
+    """How many more of a pattern lie on the sheets than its layers take."""
+    own = work.design.name, layers[0].pattern
+    cut = sum(
+        count
+        for sheet in work.sheets
+        for design, pattern, count in sheet.counts
+        if (design, pattern) == own
+    )
+    needed = len(layers) * work.job.copies
+    return max(0, cut // len(layers[0].profile.pieces) - needed)
 
 
 def kerf_states(job: Job, materials: Sequence[str]) -> list[tuple[str, str, bool]]:
