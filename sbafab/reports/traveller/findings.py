@@ -83,7 +83,7 @@ def _helps(one: Inspected, hands: Sequence[Hand]) -> Iterator[str]:
             f"closes: {pinned.share:.0%} of builds are then good, if the hand turns as before."
         )
     yield (
-        f"sbafab check design.toml --target-yield 0.99 says how much wider bonds and overhangs "
+        "sbafab check design.toml --target-yield 0.99 says how much wider bonds and overhangs "
         "reach 99 % with the hand as it is."
     )
     if laminate.registration == "channel-pin":
