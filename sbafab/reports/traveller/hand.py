@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 from sbafab.laminate.assembly import assembly, laying_pins
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules.limits import Limits
+from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.registration_yield import simulate
 
 ROUGHER = (0.5, 1.5, 2.0, 2.5)
@@ -37,8 +38,7 @@ def rougher_hands(laminate: Laminate, limits: Limits) -> tuple[Hand, ...]:
 def _hand(laminate: Laminate, limits: Limits, factor: float) -> Hand:
     own = limits.tolerances
     hand = replace(own, placement=factor * own.placement, turn=factor * own.turn)
-    asked = replace(limits, tolerances=hand, yield_builds=BUILDS)
-    return Hand(hand.placement, hand.turn, simulate(laminate, asked).whole.value)
+    return Hand(hand.placement, hand.turn, _share(laminate, replace(limits, tolerances=hand)))
 
 
 def on_laying_pins(laminate: Laminate, limits: Limits) -> Hand | None:
@@ -50,5 +50,26 @@ def on_laying_pins(laminate: Laminate, limits: Limits) -> Hand | None:
     if not steps or not all(laying_pins(laminate, step) for step in steps):
         return None
     own = limits.tolerances
-    asked = replace(limits, tolerances=replace(own, placement=own.pin), yield_builds=BUILDS)
-    return Hand(own.pin, own.turn, simulate(laminate, asked).whole.value)
+    on_pin = replace(limits, tolerances=replace(own, placement=own.pin))
+    return Hand(own.pin, own.turn, _share(laminate, on_pin))
+
+
+def _share(laminate: Laminate, limits: Limits) -> float:
+    """Share of good builds. Of the limits only those of registration count, and can be hashed."""
+    own = limits.tolerances, limits.worst_bond_width, limits.worst_mask_overhang
+    return _counted(laminate, *own, limits.mask_overhang)
+
+
+@lru_cache(maxsize=16)
+def _counted(
+    laminate: Laminate, tolerances: Tolerances, bond: float, overhang: float, drawn: float
+) -> float:
+    """Kept, for a run makes the page and then checks it."""
+    asked = Limits(
+        mask_overhang=drawn,
+        tolerances=tolerances,
+        worst_bond_width=bond,
+        worst_mask_overhang=overhang,
+        yield_builds=BUILDS,
+    )
+    return simulate(laminate, asked).whole.value
