@@ -183,10 +183,10 @@ def _is_elsewhere(item: bill.Item) -> bool:
 
 
 def _named(item: bill.Item, one: DesignWork) -> bill.Item:
-    """A design's item with the design's name; pins and plate for all copies pressed at once."""
+    """A design's item with its name; pins, plate and underlay for all copies pressed at once."""
     if item.name == "Release film":
         return item
-    often = one.runs.together if item.name in ("Dowel pins", "Pin plate") else 1
+    often = one.runs.together if item.name in ("Dowel pins", "Pin plate", "Underlay") else 1
     quantity = f"{often} {TIMES} {item.quantity}" if often > 1 else item.quantity
     return bill.Item(f"{item.name} ({one.name})", item.what, quantity)
 
