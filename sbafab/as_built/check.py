@@ -52,7 +52,7 @@ from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.models.sizes import sizes
-from sbafab.output.contents import Checked
+from sbafab.output.planned import Checked
 from sbafab.output.settings import limits as limits_of
 from sbafab.rules import film_limits
 from sbafab.rules.deck import RULES, Rule, run_deck, run_rule

@@ -17,22 +17,21 @@ from sbafab.as_built.likeness import file_difference, index_difference
 from sbafab.as_built.meant import drawn_settings
 from sbafab.as_built.meshes import bodies
 from sbafab.as_built.records import DESIGNED, Job, Manifest, Problem, is_joined
-from sbafab.cutting.files import CutFile
-from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.fixture import write_fixture
-from sbafab.cutting.properties import chord_error_of, curves_property, layer_path
+from sbafab.cutting.properties import curves_of
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.boolean import GeometryError
 from sbafab.geometry.region import Region
 from sbafab.nesting.parts import parts_of
 from sbafab.nesting.records import Part as NestPart
-from sbafab.output.batch import Drawing, plan_batch, write_batch
-from sbafab.output.contents import TRAVELLER, Checked, Made, Part, schedule_of, write_contents
+from sbafab.output.batch import plan_batch, write_batch
+from sbafab.output.contents import TRAVELLER, write_contents
 from sbafab.output.earlier import PRESS
 from sbafab.output.manifest import as_json
-from sbafab.output.settings import GENERATOR, cut_settings
-from sbafab.output.shop import CutSet, find_nests, write_nested_sheets
+from sbafab.output.planned import EVERYTHING, Checked, Part, Planned, plan, schedule_of
+from sbafab.output.settings import GENERATOR
+from sbafab.output.shop import find_nests, write_nested_sheets
 
 INDEX = "manifest.json"
 UNMADE = (DesignError, OutputError, GeometryError, ArithmeticError, LookupError)
@@ -65,23 +64,17 @@ def derived_job_problems(
     ``curves`` is what the manifests of the designs say of their chords.
     """
     with _made_anew(folder) as (fresh, problems):
-        whole = None
-        waived: tuple[str, ...] = ()
-        lowered: tuple[str, ...] = ()
         if is_joined(job):
             # An assembly's run checks what it has written, and so imports this module.
-            from sbafab.output.assembly import checked_again
+            from sbafab.output.assembly import checked_again, plan_assembly, write_assembly
 
             whole = checked_again(folder, checked)
-            waived, lowered = whole.waived, whole.lowered
-        error = chord_error_of(curves_property(curves))
-        drawing = Drawing("chords", error) if error else Drawing()
-        batch = plan_batch(checked, job.name, folder, drawing, _quiet, waived, lowered)
-        written = write_batch(batch, fresh, ("press", "mesh", "preview"), whole is None, _quiet)
-        if whole is not None:
-            from sbafab.output.assembly import write_whole
-
-            write_whole(whole, batch, written, fresh, _quiet)
+            batch = plan_assembly(whole, folder, _quiet, curves_of(curves))
+            write_assembly(whole, batch, fresh, _quiet)
+        else:
+            planned = [plan(one, EVERYTHING, curves_of(curves)) for one in checked]
+            batch = plan_batch(job.schema_name, job.name, planned, folder, _quiet)
+            write_batch(batch, fresh, _quiet)
         problems.extend(_differences(folder, fresh, job.files, job.generator))
     return problems
 
@@ -124,20 +117,9 @@ def _write_anew(
         nests = find_nests(parts, design, folder, _quiet)
         sheets = write_nested_sheets(nests, design, fresh, settings, _quiet)
     write_fixture(laminate, fresh, settings)
-    cut = CutSet(_cut_files(checked), FIXTURE if laminate.pins else None, claims.curves)
     pressing = schedule_of(checked) if "press" in wanted else None
-    made = Made(cut, sheets, pressing, traveller=has_page)
-    return write_contents(checked, wanted, made, fresh, _quiet)
-
-
-def _cut_files(checked: Checked) -> tuple[CutFile, ...]:
-    settings = cut_settings(checked.design, checked.waived)
-    return tuple(
-        CutFile(
-            layer.index, layer_path(layer.name, settings.kerf_width(layer.film.material)), "", 0, 0
-        )
-        for layer in checked.laminate.layers
-    )
+    planned = Planned(checked, frozenset(wanted), settings, pressing)
+    return write_contents(planned, sheets, fresh, _quiet, has_page)
 
 
 def _parts(files: Collection[str]) -> set[Part]:

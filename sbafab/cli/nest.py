@@ -10,7 +10,7 @@ from sbafab.cli.options import Request, dxf_options, several_run_options, sheet_
 from sbafab.cli.working import RULE_FAILED
 
 if TYPE_CHECKING:
-    from sbafab.cutting.dxf_write import DxfProfile
+    from sbafab.cutting.dxf_write import Curves
 
 
 @click.command()
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 @click.option("--name", default="job", show_default=True, help="Names the folder OUT/<name>/.")
 @dxf_options
 @sheet_options
-def nest(request: Request, name: str, dxf_profile: DxfProfile, chord_error: float) -> None:
+def nest(request: Request, name: str, curves: Curves) -> None:
     """Cut several designs from the same film sheets.
 
     OUT/<name>/ gets a folder for each DESIGN and sheets/ with the parts of all. Overrides count
@@ -32,7 +32,7 @@ def nest(request: Request, name: str, dxf_profile: DxfProfile, chord_error: floa
         load_design(design, request.assignments, request.waivers) for design in request.designs
     ]
     with shown_progress(request.as_json) as progress:
-        job = generate_job(designs, name, request.out, progress, dxf_profile, chord_error)
+        job = generate_job(designs, name, request.out, progress, curves)
     if request.as_json:
         print_json(job_json(job))
     else:

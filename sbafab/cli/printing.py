@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from sbafab.output.contents import Checked
-    from sbafab.output.job import Job
+    from sbafab.output.planned import Checked
     from sbafab.output.run import Run
     from sbafab.output.shop import Progress
     from sbafab.rules.finding import Finding
@@ -104,6 +103,22 @@ def facts_table() -> Table:
     return made
 
 
+def add_designs(table: Table, checked: Iterable[Checked]) -> None:
+    """A row for each of several designs: how many, and whether it holds; then their notes."""
+    from rich.text import Text
+
+    designs = list(checked)
+    for one in designs:
+        warned = sorted({f.rule for f in one.findings if f.verdict == "warn"})
+        said = f"; warns: {', '.join(warned)}" if warned else ""
+        waived = f"; waived: {', '.join(one.waived)}" if one.waived else ""
+        verdict = "a rule failed" if one.failed else "every rule holds"
+        words = f"{one.design.order.copies} x, {verdict}{waived}{said}"
+        table.add_row(one.design.name, Text(words))
+    for note in notes_of(designs):
+        table.add_row("note", Text(note))
+
+
 def print_failed(findings: Iterable[Finding], written: str, change: str) -> None:
     """What failed, what was ``written`` all the same, and the two ways on."""
     from rich.text import Text
@@ -143,20 +158,13 @@ def print_run(run: Run) -> None:
             out.print(Text(f"{run.folder} {LEFT_AS_IT_WAS}"), soft_wrap=True)
 
 
-def print_job(job: Job) -> None:
+def print_job(job: Run) -> None:
     """What a job made; for a design that a rule stopped, what the rules found."""
     from rich.text import Text
 
     out = console()
     made = facts_table()
-    for one in job.checked:
-        warned = sorted({f.rule for f in one.findings if f.verdict == "warn"})
-        said = f"; warns: {', '.join(warned)}" if warned else ""
-        waived = f"; waived: {', '.join(one.waived)}" if one.waived else ""
-        verdict = "a rule failed" if one.failed else "every rule holds"
-        made.add_row(one.design.name, Text(f"{one.design.order.copies} x, {verdict}{waived}{said}"))
-    for note in notes_of(job.checked):
-        made.add_row("note", Text(note))
+    add_designs(made, job.checked)
     for film in job.manifest.get("films", ()):
         sheets = film_said(film, job.manifest["sheets"], 1)
         made.add_row(f"{film['material']} film", Text(sheets))
@@ -175,7 +183,7 @@ def print_job(job: Job) -> None:
         print_failed(every, f"Nothing was written, {job.folder} is as it was", "designs")
 
 
-def job_json(job: Job) -> dict[str, object]:
+def job_json(job: Run) -> dict[str, object]:
     """The result of a job for programs."""
     return {
         "folder": str(job.folder),
@@ -295,6 +303,6 @@ def run_json(run: Run) -> dict[str, object]:
         "folder": str(run.folder),
         "failed": run.failed,
         "findings": [finding.as_dict() for finding in run.findings],
-        "notes": list(run.laminate.notes),
+        "notes": notes_of(run.checked),
         "files": [] if run.kept else sorted(run.manifest["files"]),
     }

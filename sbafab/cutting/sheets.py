@@ -114,7 +114,7 @@ def _write_sheet(
     )
     stem = f"{nest.material}_{sheet + 1}{kerf_suffix(settings.kerf_width(nest.material))}"
     path = folder / FOLDER / f"{stem}.dxf"
-    text = dxf_text(contours, properties, settings.profile, around)
+    text = dxf_text(contours, properties, settings.curves.profile, around)
     path.write_bytes(text.encode())
     found = verify_file(path, region, properties)
     used = replace(nest.stock, length=length)

@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sbafab.cutting.properties import PTFE_WARNING
+from sbafab.cutting.fixture import PATH as FIXTURE
+from sbafab.cutting.properties import PTFE_WARNING, layer_path, said_of
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
@@ -16,11 +17,11 @@ from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.meshing.files import MeshFile
 from sbafab.models.sizes import sizes
-from sbafab.output.settings import GENERATOR, kerf_widths, limits
-from sbafab.output.shop import CutSet, film_use
+from sbafab.output.planned import Planned
+from sbafab.output.settings import GENERATOR, kerf_widths
+from sbafab.output.shop import film_use
 from sbafab.output.swap import SCHEMA
 from sbafab.rules.finding import Finding
-from sbafab.rules.lowered import lowered
 
 
 def as_json(value: object) -> str:
@@ -34,15 +35,12 @@ def checks(findings: Sequence[Finding], source: str) -> dict[str, Any]:
 
 
 def manifest(
-    design: Design,
-    laminate: Laminate,
-    waived: Sequence[str],
-    cut: CutSet | None,
-    sheets: Sequence[SheetFile],
-    meshes: Sequence[MeshFile],
+    planned: Planned, sheets: Sequence[SheetFile], meshes: Sequence[MeshFile]
 ) -> dict[str, Any]:
     """The index of an output folder, but for the hashes of its files."""
-    paths = {file.layer: file.path for file in cut.files} if cut else {}
+    checked, is_cut = planned.checked, "cut" in planned.wanted
+    design, laminate = checked.design, checked.laminate
+    curves = said_of(planned.settings.curves) if is_cut else None
     return {
         "schema": SCHEMA,
         "name": laminate.name,
@@ -61,15 +59,15 @@ def manifest(
             material: {"state": "uncalibrated" if width is None else "compensated", "width": width}
             for material, width in kerf_widths(design).items()
         },
-        **({"curves": cut.curves} if cut and cut.curves else {}),
-        "waived": list(waived),
-        "lowered_limits": list(lowered(limits(design))),
+        **({"curves": curves} if curves else {}),
+        "waived": list(checked.waived),
+        "lowered_limits": list(checked.lowered),
         "sizes": {name: round(value, 6) for name, value in sizes(design, laminate).items()},
         "notes": list(laminate.notes),
         "copies": design.order.copies,
         "films": _films(laminate, sheets),
         "warnings": [PTFE_WARNING],
-        "layers": [_layer(laminate, layer, paths.get(layer.index)) for layer in laminate.layers],
+        "layers": [_layer(planned, layer) for layer in laminate.layers],
         "interfaces": [_interface(interface) for interface in laminate.interfaces],
         "bores": [
             {"chamber": bore.chamber, **_place(bore.centre), "diameter": bore.diameter}
@@ -85,7 +83,7 @@ def manifest(
             for inlet in laminate.inlets
         ],
         "lumen": laminate.lumen,
-        "fixture": cut.fixture if cut else None,
+        "fixture": FIXTURE if is_cut and laminate.pins else None,
         "sheets": [sheet_entry(sheet) for sheet in sheets],
         "meshes": [
             {
@@ -158,7 +156,9 @@ def _films(laminate: Laminate, sheets: Sequence[SheetFile]) -> list[dict[str, An
     ]
 
 
-def _layer(laminate: Laminate, layer: Layer, path: str | None) -> dict[str, Any]:
+def _layer(planned: Planned, layer: Layer) -> dict[str, Any]:
+    kerf = planned.settings.kerf_width(layer.film.material)
+    bores = planned.checked.laminate.bores
     return {
         "index": layer.index,
         "name": layer.name,
@@ -167,11 +167,11 @@ def _layer(laminate: Laminate, layer: Layer, path: str | None) -> dict[str, Any]
         "balloon": layer.balloon,
         "thickness": layer.film.thickness,
         "z": layer.z,
-        "file": path,
+        "file": layer_path(layer.name, kerf) if "cut" in planned.wanted else None,
         "pattern": layer.pattern,
         "area": round(layer.profile.area, 6),
         "pieces": len(layer.profile.pieces),
-        "bores": [bore.chamber for bore in laminate.bores if _is_open(layer, bore.centre)],
+        "bores": [bore.chamber for bore in bores if _is_open(layer, bore.centre)],
     }
 
 

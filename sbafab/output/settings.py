@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sbafab import __version__
-from sbafab.cutting.dxf_write import DxfProfile
+from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import Machine
 from sbafab.design.records import Design, Sheet
@@ -48,10 +48,7 @@ def limits(design: Design) -> Limits:
 
 
 def cut_settings(
-    design: Design,
-    waived: tuple[str, ...],
-    profile: DxfProfile = "bulges",
-    chord_error: float = 0.005,
+    design: Design, waived: tuple[str, ...], curves: Curves = TRUE_ARCS
 ) -> CutSettings:
     return CutSettings(
         design=design.name,
@@ -59,8 +56,7 @@ def cut_settings(
         kerf_widths=kerf_widths(design),
         waived=waived,
         lowered=lowered(limits(design)),
-        profile=profile,
-        chord_error=chord_error,
+        curves=curves,
         generator=GENERATOR,
     )
 

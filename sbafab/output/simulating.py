@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sbafab.design.records import Design
-from sbafab.output.contents import Checked
 from sbafab.output.earlier import refuse_to_replace
 from sbafab.output.manifest import as_json, identity
+from sbafab.output.planned import Checked
 from sbafab.output.run import Extras, check, generate, with_folder
 from sbafab.output.shop import Progress
 from sbafab.rules.finding import Finding

@@ -13,9 +13,9 @@ from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.settings import MeshSettings
 from sbafab.output.assembly import generate_assembly
-from sbafab.output.contents import Conforming, Part
 from sbafab.output.manifest import file_hashes
-from sbafab.output.run import Extras, generate
+from sbafab.output.planned import Part
+from sbafab.output.run import Conforming, Extras, generate
 
 SMALL = ("stack.balloons=1",)
 OTHER = (*SMALL, "press.temperature_c=140")
