@@ -35,7 +35,6 @@ from sbafab.as_built.records import (
     CLAIMS,
     DESIGNED,
     INTEGRITY,
-    Manifest,
     Problem,
     findings_of,
     is_job,
@@ -52,6 +51,7 @@ from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.models.sizes import sizes
+from sbafab.output.manifest_records import Manifest
 from sbafab.output.planned import Checked
 from sbafab.output.settings import limits as limits_of
 from sbafab.rules import film_limits

@@ -13,10 +13,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from pydantic import BaseModel
+
 from sbafab.as_built.likeness import file_difference, index_difference
 from sbafab.as_built.meant import drawn_settings
 from sbafab.as_built.meshes import bodies
-from sbafab.as_built.records import DESIGNED, Job, Manifest, Problem, is_joined
+from sbafab.as_built.records import DESIGNED, Problem, is_joined
 from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.properties import curves_of
 from sbafab.cutting.sheets import SheetFile
@@ -29,6 +31,7 @@ from sbafab.output.batch import plan_batch, write_batch
 from sbafab.output.contents import TRAVELLER, write_contents
 from sbafab.output.earlier import PRESS
 from sbafab.output.manifest import as_json
+from sbafab.output.manifest_records import JobManifest, Manifest
 from sbafab.output.planned import EVERYTHING, Checked, Part, Planned, plan, schedule_of
 from sbafab.output.settings import GENERATOR
 from sbafab.output.shop import find_nests, write_nested_sheets
@@ -57,7 +60,7 @@ def derived_problems(
 
 
 def derived_job_problems(
-    folder: Path, job: Job, checked: Sequence[Checked], curves: str | None
+    folder: Path, job: JobManifest, checked: Sequence[Checked], curves: str | None
 ) -> list[Problem]:
     """Files of a job, and of its designs' folders, that are not what the designs make.
 
@@ -197,6 +200,20 @@ def _mesh_difference(folder: Path, found: dict[str, Any], wanted: dict[str, Any]
     return ""
 
 
+class _Wish(BaseModel):
+    pressures_kpa: tuple[float, ...]
+    flow_ml_min: float
+    volumes_ul: tuple[float, ...]
+    press_factor: float
+    contact_factor: float
+
+
+class _Predicted(BaseModel):
+    """What of ``predict.json`` says what was asked for."""
+
+    asked: _Wish
+
+
 def _prediction_problems(
     folder: Path, fresh: Path, claims: Manifest, checked: Checked
 ) -> list[Problem]:
@@ -208,14 +225,13 @@ def _prediction_problems(
     from sbafab.output.predicting import FOLDER, with_prediction
 
     try:
-        asked = _index(folder / "predict.json")["asked"]
-        factors = Calibration(float(asked["press_factor"]), float(asked["contact_factor"]))
-        pressures, volumes = (tuple(map(float, asked[k])) for k in ("pressures_kpa", "volumes_ul"))
-        wish = Asked(pressures, float(asked["flow_ml_min"]), volumes, factors)
+        told = _Predicted.model_validate_json((folder / "predict.json").read_bytes()).asked
+        factors = Calibration(told.press_factor, told.contact_factor)
+        wish = Asked(told.pressures_kpa, told.flow_ml_min, told.volumes_ul, factors)
         apart = fresh / FOLDER
         apart.mkdir()
         with_prediction(checked.design, predict(checked.design, wish))(checked.laminate, apart)
-    except (TypeError, ValueError, LookupError, OSError) as error:
+    except (ValueError, OSError) as error:
         said = f"predict.json does not say what was asked for ({error})"
         return [_other(said, claims.generator, is_done=False)]
     return _differences(folder, apart, claims.files, claims.generator)

@@ -11,13 +11,7 @@ from sbafab.as_built.claims import bare_problem, claim
 from sbafab.as_built.cut_files import check_sequence, inside, sound_digest
 from sbafab.as_built.measures import SHARE
 from sbafab.as_built.pieces import CutSheet, Lot, piece_problems
-from sbafab.as_built.records import (
-    INTEGRITY,
-    FilmUseClaim,
-    KerfClaim,
-    Problem,
-    SheetClaim,
-)
+from sbafab.as_built.records import INTEGRITY, Problem
 from sbafab.cutting.cut_layers import ENGRAVE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import Surroundings
@@ -32,6 +26,7 @@ from sbafab.geometry.intersect import meeting_points
 from sbafab.laminate.films import Material
 from sbafab.nesting.check import check_placed
 from sbafab.nesting.records import Stock
+from sbafab.output.manifest_records import FilmUseClaim, KerfClaim, SheetClaim
 from sbafab.output.settings import stocks
 
 ROUNDED = 2e-3
@@ -102,7 +97,7 @@ def _read(folder: Path, told: SheetClaim) -> ReadBack:
         return found
     except OutputError:
         raise
-    except (ArithmeticError, ValueError, LookupError, TypeError, AttributeError) as error:
+    except (ArithmeticError, ValueError, LookupError) as error:
         raise OutputError(f"holds no sound contours ({error}); write it anew") from error
 
 

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
+from sbafab.design.records import is_kerf
 from sbafab.errors import OutputError
-from sbafab.geometry.beam import Kerf, is_kerf, widths
+from sbafab.geometry.beam import Kerf, widths
 from sbafab.laminate.films import Material
 
 UNCALIBRATED = "uncalibrated: nominal edges"
@@ -35,7 +36,7 @@ class CutSettings:
 
     design: str
     design_sha256: str
-    kerf_widths: Mapping[str, Kerf | None] = field(default_factory=dict)
+    kerf_widths: Mapping[Material, Kerf | None] = field(default_factory=dict)
     waived: tuple[str, ...] = ()
     lowered: tuple[str, ...] = ()
     curves: Curves = TRUE_ARCS

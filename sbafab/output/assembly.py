@@ -23,6 +23,7 @@ from sbafab.output.batch import Batch, plan_batch, refuse_other_film, write_batc
 from sbafab.output.contents import TRAVELLER, order_of, write_text
 from sbafab.output.earlier import would_replace
 from sbafab.output.manifest import as_json, checks
+from sbafab.output.manifest_records import AssemblyManifest
 from sbafab.output.planned import EVERYTHING, PICTURES, Checked, plan
 from sbafab.output.run import Run, found_in, swapped_in, unheard
 from sbafab.output.settings import GENERATOR, limits
@@ -136,14 +137,15 @@ def write_assembly(
     (folder / "preview").mkdir()
     picture, bare = assembly_pngs(assembled, _note(checked))
     (folder / PICTURE).write_bytes(picture)
-    index |= _claims(assembled)
+    meshes = []
     if batch.is_cut:
         (folder / "mesh").mkdir()
-        index["meshes"] = [_write_solid(assembled, folder)]
+        meshes.append(_write_solid(assembled, folder))
         write_text(folder / TRAVELLER, _traveller(checked, batch, sheets, bare))
     write_text(folder / "checks.json", as_json(checks(checked.findings, "design")))
     write_text(folder / DESIGN_FILE, assembly_toml(assembled))
-    return index
+    index |= {**_claims(assembled), "meshes": meshes, "files": {}}
+    return AssemblyManifest.model_validate_json(as_json(index)).as_dict()
 
 
 def _note(checked: CheckedAssembly) -> str:
@@ -188,7 +190,6 @@ def _claims(assembled: Assembled) -> dict[str, Any]:
         "design_sha256": assembly_sha256(assembled),
         "copies": assembled.assembly.order.copies,
         "parts": [part_entry(placed) for placed in assembled.parts],
-        "meshes": [],
     }
 
 

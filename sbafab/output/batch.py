@@ -11,17 +11,16 @@ from typing import Any
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
-from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError
 from sbafab.nesting.nest import refuse_unfit
 from sbafab.nesting.records import Nest
 from sbafab.output.contents import close_folder, write_contents
-from sbafab.output.manifest import sheet_entry
+from sbafab.output.manifest import job_manifest
+from sbafab.output.manifest_records import Schema
 from sbafab.output.planned import Checked, Planned, plan
-from sbafab.output.settings import GENERATOR, stocks
+from sbafab.output.settings import stocks
 from sbafab.output.shop import (
     Progress,
-    film_use,
     find_nests,
     write_cut_files,
     write_nested_sheets,
@@ -39,7 +38,7 @@ class Batch:
     ``schema`` is that of the folder's manifest: of one design, of a job or of an assembly.
     """
 
-    schema: str
+    schema: Schema
     name: str
     designs: tuple[Planned, ...]
     settings: CutSettings
@@ -63,7 +62,7 @@ def refuse_other_film(designs: Sequence[Design]) -> None:
 
 
 def plan_batch(
-    schema: str,
+    schema: Schema,
     name: str,
     designs: Sequence[Planned],
     old_folder: Path,
@@ -127,7 +126,9 @@ def write_batch(
         index = _write_design(one, seen, own, tell, batch.schema != ASSEMBLY_SCHEMA)
         # The folder above has the sheets; a design's own is one without.
         close_folder(own, {**index, "sheets": []})
-    return _manifest(batch, sheets), sheets
+    own_designs = [one.checked.design for one in batch.designs]
+    index = job_manifest(batch.schema, batch.name, batch.settings, own_designs, sheets)
+    return index, sheets
 
 
 def _write_design(
@@ -147,28 +148,3 @@ def _seen_from_below(sheets: Sequence[SheetFile]) -> list[SheetFile]:
     return [
         replace(sheet, path=f"../{sheet.path}", picture=f"../{sheet.picture}") for sheet in sheets
     ]
-
-
-def _manifest(batch: Batch, sheets: Sequence[SheetFile]) -> dict[str, Any]:
-    """The index of the folder of several designs, without the files' hashes."""
-    designs = [one.checked.design for one in batch.designs]
-    return {
-        "schema": batch.schema,
-        "name": batch.name,
-        "units": "mm",
-        "designs_sha256": batch.settings.design_sha256,
-        "generator": GENERATOR,
-        "waived": list(batch.settings.waived),
-        "lowered_limits": list(batch.settings.lowered),
-        "designs": [
-            {
-                "name": design.name,
-                "folder": design.name,
-                "copies": design.order.copies,
-                "design_sha256": design_sha256(design),
-            }
-            for design in designs
-        ],
-        "films": [{"material": material, **use} for material, use in film_use(sheets).items()],
-        "sheets": [sheet_entry(sheet) for sheet in sheets],
-    }

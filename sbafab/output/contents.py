@@ -58,14 +58,12 @@ def write_contents(
         write_text(folder / TRAVELLER, _traveller(planned, sheets, solid))
     write_text(folder / "checks.json", as_json(checks(checked.findings, "design")))
     _write_design(checked.design, folder)
-    index = manifest(planned, sheets, meshes)
-    if planned.conforming is not None:
-        index["mesh_statistics"] = planned.conforming.statistics
-    return index
+    return manifest(planned, sheets, meshes)
 
 
 def close_folder(folder: Path, index: dict[str, Any]) -> None:
     """Writes the manifest, with the hashes of all that lies in the folder."""
+    index.pop("files", None)
     index["files"] = file_hashes(folder)
     write_text(folder / "manifest.json", as_json(index))
 
@@ -95,7 +93,7 @@ def order_of(checked: Checked, folder: str = "") -> Job:
         lowered=checked.lowered,
         findings=checked.findings,
         fixture=f"{folder}{FIXTURE}" if checked.laminate.pins else None,
-        kerf=kerf_widths(design),
+        kerf={str(name): kerf for name, kerf in kerf_widths(design).items()},
         copies=design.order.copies,
     )
 

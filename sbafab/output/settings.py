@@ -18,10 +18,13 @@ from sbafab.rules.lowered import lowered
 GENERATOR = f"sbafab {__version__}"
 
 
-def kerf_widths(design: Design) -> dict[str, Kerf | None]:
+def kerf_widths(design: Design) -> dict[Material, Kerf | None]:
     """Full kerf width (or that along x and y) by material, None where it was not measured."""
-    widths = {"TPE": design.laser.kerf_tpe, "PTFE": design.laser.kerf_ptfe}
-    return {name: None if isinstance(kerf, str) else kerf for name, kerf in widths.items()}
+    tpe, ptfe = design.laser.kerf_tpe, design.laser.kerf_ptfe
+    return {
+        "TPE": None if isinstance(tpe, str) else tpe,
+        "PTFE": None if isinstance(ptfe, str) else ptfe,
+    }
 
 
 def limits(design: Design) -> Limits:

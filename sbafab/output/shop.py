@@ -14,6 +14,7 @@ from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import FOLDER, SheetFile, write_sheets
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
+from sbafab.laminate.films import Material
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import nest
 from sbafab.nesting.records import Nest, Part
@@ -88,9 +89,9 @@ def _is_possible(nest: Nest) -> bool:
     return nest.sheets <= nest.stock.most and all(p.turn in turns for p in nest.placements)
 
 
-def film_use(sheets: Sequence[SheetFile]) -> dict[str, dict[str, float]]:
+def film_use(sheets: Sequence[SheetFile]) -> dict[Material, dict[str, Any]]:
     """Sheets, their area, the parts' share and the waste in mm2, by material."""
-    used: dict[str, dict[str, float]] = {}
+    used: dict[Material, dict[str, float]] = {}
     for sheet in sheets:
         entry = used.setdefault(sheet.material, {"sheets": 0, "sheet_area": 0.0, "parts_area": 0.0})
         entry["sheets"] += 1

@@ -10,8 +10,8 @@ from sbafab.cutting.properties import PTFE_WARNING
 from sbafab.geometry.edges import Point
 from sbafab.geometry.svg import number
 from sbafab.laminate.assembly import pins_when_added
+from sbafab.laminate.inks import INK
 from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.picture import INK
 from sbafab.reports import drawing as draw
 from sbafab.reports.features import balloons
 from sbafab.reports.pattern_card import Card, cells, drawn, pattern_card, pin_mark

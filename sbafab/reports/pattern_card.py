@@ -9,8 +9,8 @@ from functools import cached_property
 
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.svg import number, path_data
+from sbafab.laminate.inks import INK
 from sbafab.laminate.laminate import Laminate, Layer, Pin
-from sbafab.laminate.picture import INK
 from sbafab.reports import drawing as draw
 from sbafab.reports.features import (
     Circle,

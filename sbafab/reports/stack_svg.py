@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from sbafab.geometry.edges import Point
 from sbafab.geometry.section import Interval
 from sbafab.geometry.svg import number
+from sbafab.laminate.inks import INK
 from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.picture import INK
 from sbafab.reports import drawing as draw
 from sbafab.reports.features import length
 from sbafab.reports.stack_labels import Label, feature_labels, layer_labels, pin_labels

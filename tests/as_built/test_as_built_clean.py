@@ -107,7 +107,7 @@ def test_as_built_laminate_is_the_designed_one(clean: Path) -> None:
 
 def test_chords_make_no_better_builds(tmp_path: Path) -> None:
     design = load_design("3dof-15mm", ("stack.balloons=1",))
-    run = generate(design, tmp_path, ("cut",), None, "chords", 0.05)
+    run = generate(design, tmp_path, ("cut",), curves=Curves("chords", 0.05))
     shares = [
         next(f.measured for f in findings if f.rule == "registration-yield")
         for findings in (run.findings, check_folder(run.folder))

@@ -12,8 +12,8 @@ from unittest.mock import patch
 
 from sbafab.as_built import check as as_built
 from sbafab.as_built import derived
-from sbafab.as_built.records import Manifest
 from sbafab.design.writing import design_sha256
+from sbafab.output.manifest_records import Manifest
 from sbafab.output.planned import Checked
 
 
