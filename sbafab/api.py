@@ -202,10 +202,10 @@ def predict(
 
     Raises DesignError for what is out of every model's range.
     """
-    from sbafab.models.figures import Asked, Calibration
+    from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict as model_predict
 
-    factors = Calibration(press_factor, contact_factor)
+    factors = Factors(press_factor, contact_factor)
     asked = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), factors)
     return model_predict(load(source, *changes, **tables), asked)
 

@@ -26,15 +26,16 @@ from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.boolean import GeometryError
 from sbafab.geometry.region import Region
 from sbafab.nesting.parts import parts_of
-from sbafab.nesting.records import Part as NestPart
+from sbafab.nesting.records import NestPart
 from sbafab.output.batch import plan_batch, write_batch
 from sbafab.output.contents import TRAVELLER, write_contents
 from sbafab.output.earlier import PRESS
 from sbafab.output.manifest import as_json
 from sbafab.output.manifest_records import JobManifest, Manifest
-from sbafab.output.planned import EVERYTHING, Checked, Part, Planned, plan, schedule_of
+from sbafab.output.planned import EVERYTHING, Checked, Planned, RunPart, plan, schedule_of
 from sbafab.output.settings import GENERATOR
 from sbafab.output.shop import find_nests, write_nested_sheets
+from sbafab.progress import unheard
 
 INDEX = "manifest.json"
 UNMADE = (DesignError, OutputError, GeometryError, ArithmeticError, LookupError)
@@ -72,18 +73,14 @@ def derived_job_problems(
             from sbafab.output.assembly import checked_again, plan_assembly, write_assembly
 
             whole = checked_again(folder, checked)
-            batch = plan_assembly(whole, folder, _quiet, curves_of(curves))
-            write_assembly(whole, batch, fresh, _quiet)
+            batch = plan_assembly(whole, folder, unheard, curves_of(curves))
+            write_assembly(whole, batch, fresh, unheard)
         else:
             planned = [plan(one, EVERYTHING, curves_of(curves)) for one in checked]
-            batch = plan_batch(job.schema_name, job.name, planned, folder, _quiet)
-            write_batch(batch, fresh, _quiet)
+            batch = plan_batch(job.schema_name, job.name, planned, folder, unheard)
+            write_batch(batch, fresh, unheard)
         problems.extend(_differences(folder, fresh, job.files, job.generator))
     return problems
-
-
-def _quiet(what: str, done: int, total: int) -> None:
-    pass
 
 
 @contextmanager
@@ -117,17 +114,17 @@ def _write_anew(
     wanted |= {"press", "preview"} if has_page else set()
     sheets: list[SheetFile] = []
     if parts is not None:
-        nests = find_nests(parts, design, folder, _quiet)
-        sheets = write_nested_sheets(nests, design, fresh, settings, _quiet)
+        nests = find_nests(parts, design, folder, unheard)
+        sheets = write_nested_sheets(nests, design, fresh, settings, unheard)
     write_fixture(laminate, fresh, settings)
     pressing = schedule_of(checked) if "press" in wanted else None
     planned = Planned(checked, frozenset(wanted), settings, pressing)
-    return write_contents(planned, sheets, fresh, _quiet, has_page)
+    return write_contents(planned, sheets, fresh, unheard, has_page)
 
 
-def _parts(files: Collection[str]) -> set[Part]:
+def _parts(files: Collection[str]) -> set[RunPart]:
     """The parts of a run that a folder's files are of."""
-    parts: set[Part] = {"cut"}
+    parts: set[RunPart] = {"cut"}
     if any(path in files for path in PRESS):
         parts.add("press")
     if any(path.startswith("preview/") for path in files):
@@ -220,13 +217,13 @@ def _prediction_problems(
     """The prediction, asked for again what the file says that was asked for."""
     if "predict.json" not in claims.files:
         return []
-    from sbafab.models.figures import Asked, Calibration
+    from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict
     from sbafab.output.predicting import FOLDER, with_prediction
 
     try:
         told = _Predicted.model_validate_json((folder / "predict.json").read_bytes()).asked
-        factors = Calibration(told.press_factor, told.contact_factor)
+        factors = Factors(told.press_factor, told.contact_factor)
         wish = Asked(told.pressures_kpa, told.flow_ml_min, told.volumes_ul, factors)
         apart = fresh / FOLDER
         apart.mkdir()

@@ -43,7 +43,7 @@ class Meant(NamedTuple):
         return [Expected(layer.profile, self.paths[layer.pattern]) for layer in layers]
 
 
-class Work(NamedTuple):
+class RunWork(NamedTuple):
     """What a run that has just written a folder knows of it: its design's part and findings."""
 
     meant: Meant

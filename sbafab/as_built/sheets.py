@@ -34,7 +34,7 @@ ROUNDED = 2e-3
 
 
 @dataclass(frozen=True)
-class Order:
+class SheetOrder:
     """What the sheets of a folder are claimed to be, and the layers that they must hold.
 
     ``design`` states the stock; ``sha256`` is that of the design, or of all designs of a job.
@@ -52,7 +52,7 @@ class Order:
     lots: Sequence[Lot]
 
 
-def sheet_problems(folder: Path, order: Order) -> list[Problem]:
+def sheet_problems(folder: Path, order: SheetOrder) -> list[Problem]:
     """Every sheet: sound, laid out as its stock asks, and cutting the layers' pieces, no others."""
     if not order.sheets:
         return [claim("the manifest lists no film sheets; write them with sbafab cut")]
@@ -107,7 +107,7 @@ def _unsound(told: SheetClaim, error: OutputError, place: Point | None = None) -
     return Problem(INTEGRITY, f"{told.file}: {said}", x=x, y=y)
 
 
-def _order_problems(order: Order) -> list[Problem]:
+def _order_problems(order: SheetOrder) -> list[Problem]:
     """Sheets by number, name and stock against the design; films against sheets."""
     problems = []
     for material, stock in stocks(order.design).items():
@@ -127,7 +127,7 @@ def _order_problems(order: Order) -> list[Problem]:
     return problems
 
 
-def _name_problems(sheet: SheetClaim, order: Order) -> list[Problem]:
+def _name_problems(sheet: SheetClaim, order: SheetOrder) -> list[Problem]:
     stem = f"{FOLDER}/{sheet.material}_{sheet.number}{kerf_suffix(_kerf(order, sheet.material))}"
     return [
         *(
@@ -143,7 +143,7 @@ def _name_problems(sheet: SheetClaim, order: Order) -> list[Problem]:
     ]
 
 
-def _kerf(order: Order, material: Material) -> Kerf | None:
+def _kerf(order: SheetOrder, material: Material) -> Kerf | None:
     said = order.kerf.get(material)
     return said.width if said is not None else None
 
@@ -185,7 +185,7 @@ def _film_problems(film: FilmUseClaim, sheets: Sequence[SheetClaim]) -> list[Pro
 
 
 def _property_problems(
-    told: SheetClaim, found: ReadBack, order: Order, curves: str | None
+    told: SheetClaim, found: ReadBack, order: SheetOrder, curves: str | None
 ) -> list[Problem]:
     """Custom properties that are not what the manifest says, or curves unlike the layers'."""
     of = sum(sheet.material == told.material for sheet in order.sheets)

@@ -12,7 +12,6 @@ from sbafab.assemblies.poses import (
     LYING,
     OUTWARD,
     Pose,
-    Vector,
     about_axis,
     along,
     shifted,
@@ -26,6 +25,7 @@ from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import GeometryError
 from sbafab.laminate.laminate import Inlet, Laminate
+from sbafab.meshing.surface import Vector
 
 if TYPE_CHECKING:
     import numpy as np

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
     from sbafab.design.records import Design
     from sbafab.output.advice import Advice
-    from sbafab.output.shop import Progress
+    from sbafab.progress import Progress
     from sbafab.rules.finding import Finding
 
     Told = tuple[str, tuple[Finding, ...], list[str]]

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sbafab.progress import Progress, unheard
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
     from sbafab.output.planned import Checked
     from sbafab.output.run import Run
-    from sbafab.output.shop import Progress
     from sbafab.rules.finding import Finding
 
 DECKS = ("calculix/actuator.inp", "sofa/actuator.scn", "mujoco/actuator.xml")
@@ -49,7 +50,7 @@ def console() -> Console:
 def shown_progress(quiet: bool) -> Iterator[Progress]:
     """A progress line on standard error, where that is a terminal."""
     if quiet or not sys.stderr.isatty():
-        yield lambda what, done, total: None
+        yield unheard
         return
     from rich.console import Console
     from rich.status import Status

@@ -12,7 +12,7 @@ from sbafab.cli.options import Request
 if TYPE_CHECKING:
     from sbafab.cutting.dxf_write import Curves
     from sbafab.design.records import Design
-    from sbafab.output.planned import Part
+    from sbafab.output.planned import RunPart
     from sbafab.output.run import Extras
 
 RULE_FAILED = 1
@@ -20,7 +20,7 @@ RULE_FAILED = 1
 
 def run_parts(
     request: Request,
-    parts: Sequence[Part],
+    parts: Sequence[RunPart],
     curves: Curves | None = None,
     extras: Extras | None = None,
 ) -> None:
@@ -34,7 +34,7 @@ def run_parts(
 def run_design(
     design: Design,
     request: Request,
-    parts: Sequence[Part],
+    parts: Sequence[RunPart],
     curves: Curves | None,
     extras: Extras | None,
 ) -> None:

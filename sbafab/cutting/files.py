@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,9 +18,7 @@ from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.beam import widths
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
-
-Progress = Callable[[int, int], None]
-"""Told how many of how many layers are written."""
+from sbafab.progress import Counted
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,7 @@ def write_layer_files(
     paths: Mapping[str, Region],
     folder: Path,
     settings: CutSettings,
-    progress: Progress | None = None,
+    progress: Counted | None = None,
 ) -> list[CutFile]:
     """Writes ``layers/<layer name>.dxf`` under ``folder`` for every layer, bottom to top.
 

@@ -25,10 +25,10 @@ from sbafab.output.earlier import would_replace
 from sbafab.output.manifest import as_json, checks
 from sbafab.output.manifest_records import AssemblyManifest
 from sbafab.output.planned import EVERYTHING, PICTURES, Checked, plan
-from sbafab.output.run import Run, found_in, swapped_in, unheard
+from sbafab.output.run import Run, found_in, swapped_in
 from sbafab.output.settings import GENERATOR, limits
-from sbafab.output.shop import Progress
 from sbafab.output.swap import ASSEMBLY_SCHEMA
+from sbafab.progress import Progress, unheard
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding
 

@@ -20,12 +20,12 @@ from sbafab.output.manifest_records import Schema
 from sbafab.output.planned import Checked, Planned, plan
 from sbafab.output.settings import stocks
 from sbafab.output.shop import (
-    Progress,
     find_nests,
     write_cut_files,
     write_nested_sheets,
 )
 from sbafab.output.swap import ASSEMBLY_SCHEMA, SCHEMA
+from sbafab.progress import Progress
 
 SHARED = ("sheets", "laser")
 """Sections that must be alike in all designs that are cut from the same film."""

@@ -18,8 +18,8 @@ from sbafab.meshing.files import MeshFile, write_meshes
 from sbafab.output.manifest import as_json, checks, file_hashes, manifest
 from sbafab.output.planned import Checked, Planned
 from sbafab.output.settings import GENERATOR, kerf_widths
-from sbafab.output.shop import Progress
 from sbafab.pressing.schedule import press_csv, press_json
+from sbafab.progress import Progress
 
 if TYPE_CHECKING:
     from sbafab.reports.traveller.job import Job

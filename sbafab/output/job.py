@@ -11,9 +11,9 @@ from sbafab.design.records import NAME_PATTERN, Design
 from sbafab.errors import DesignError
 from sbafab.output.batch import plan_batch, refuse_other_film, write_batch
 from sbafab.output.planned import EVERYTHING, Checked, plan
-from sbafab.output.run import Run, check, swapped_in, unheard
-from sbafab.output.shop import Progress
+from sbafab.output.run import Run, check, swapped_in
 from sbafab.output.swap import JOB_SCHEMA
+from sbafab.progress import Progress, unheard
 
 RESERVED = {
     "sheets": "the job's folder of film sheets",

@@ -12,8 +12,8 @@ from sbafab.cutting.properties import CutSettings
 from sbafab.design.records import Design
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from sbafab.nesting import records as nesting
 from sbafab.nesting.parts import parts_of
+from sbafab.nesting.records import NestPart
 from sbafab.output.coarse import refuse_coarse
 from sbafab.output.settings import cut_settings, limits, press_settings
 from sbafab.pressing.schedule import Schedule, schedule
@@ -24,9 +24,9 @@ from sbafab.rules.lowered import CHECKED_AGAINST, lowered
 if TYPE_CHECKING:
     from sbafab.meshing.conforming.meshes import ConformingMeshes
 
-Part = Literal["cut", "press", "mesh", "preview"]
-EVERYTHING: tuple[Part, ...] = ("cut", "press", "mesh", "preview")
-PICTURES: tuple[Part, ...] = ("preview",)
+RunPart = Literal["cut", "press", "mesh", "preview"]
+EVERYTHING: tuple[RunPart, ...] = ("cut", "press", "mesh", "preview")
+PICTURES: tuple[RunPart, ...] = ("preview",)
 """What is left, beside the findings, of a design that is not to be cut."""
 
 
@@ -63,16 +63,16 @@ class Planned:
     """
 
     checked: Checked
-    wanted: frozenset[Part]
+    wanted: frozenset[RunPart]
     settings: CutSettings
     pressing: Schedule | None = None
     paths: Mapping[str, Region] = field(default_factory=dict)
-    parts: tuple[nesting.Part, ...] = ()
+    parts: tuple[NestPart, ...] = ()
     conforming: ConformingMeshes | None = None
     formats: tuple[str, ...] = ()
 
 
-def plan(checked: Checked, wanted: Collection[Part], curves: Curves = TRUE_ARCS) -> Planned:
+def plan(checked: Checked, wanted: Collection[RunPart], curves: Curves = TRUE_ARCS) -> Planned:
     """The plan of a design. Raises DesignError where press, kerf or chords cannot do it."""
     design, laminate = checked.design, checked.laminate
     settings = cut_settings(design, checked.waived, curves)

@@ -27,12 +27,12 @@ from sbafab.output.earlier import (
     would_replace,
 )
 from sbafab.output.manifest import identity
-from sbafab.output.planned import EVERYTHING, PICTURES, Checked, Part, plan
+from sbafab.output.planned import EVERYTHING, PICTURES, Checked, RunPart, plan
 from sbafab.output.self_check import refuse_unlike
 from sbafab.output.settings import limits
-from sbafab.output.shop import Progress
 from sbafab.output.swap import SCHEMA, listed_files, replaced_folder
 from sbafab.pressing.schedule import Schedule
+from sbafab.progress import Progress, unheard
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding, Findings
 
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 ExtraFiles = Callable[[Laminate, Path], None]
 """Writes something of its own for a laminate into the folder of a run."""
-OWN: dict[Part, tuple[str, ...]] = {"cut": CUT, "press": PRESS, "mesh": MESH, "preview": ()}
+OWN: dict[RunPart, tuple[str, ...]] = {"cut": CUT, "press": PRESS, "mesh": MESH, "preview": ()}
 """What of an earlier run is made anew with a part."""
 
 
@@ -136,10 +136,6 @@ def found_in(checked: Sequence[Checked], between: Sequence[Finding]) -> tuple[Fi
     return (*named, *between)
 
 
-def unheard(what: str, done: int, total: int) -> None:
-    """A progress that nobody watches."""
-
-
 def check(design: Design, progress: Progress | None = None) -> tuple[Laminate, tuple[Finding, ...]]:
     """The laminate of a design and what the rule deck finds in it."""
     try:
@@ -152,7 +148,7 @@ def check(design: Design, progress: Progress | None = None) -> tuple[Laminate, t
 def generate(
     design: Design,
     out: Path = Path("out"),
-    parts: Sequence[Part] = EVERYTHING,
+    parts: Sequence[RunPart] = EVERYTHING,
     progress: Progress | None = None,
     curves: Curves = TRUE_ARCS,
     extras: Extras = NO_EXTRAS,

@@ -6,12 +6,12 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from sbafab.as_built.check import check_written
-from sbafab.as_built.meant import Meant, Work
+from sbafab.as_built.meant import Meant, RunWork
 from sbafab.as_built.records import CLAIMS, DESIGNED, INTEGRITY
 from sbafab.errors import DefectError, OutputError
 from sbafab.output.batch import Batch
 from sbafab.output.planned import Planned
-from sbafab.output.shop import Progress
+from sbafab.progress import Progress
 from sbafab.rules.finding import Finding
 
 MOST_NAMED = 3
@@ -41,10 +41,10 @@ def refuse_unlike(batch: Batch, folder: Path, tell: Progress) -> None:
     )
 
 
-def _work(planned: Planned) -> Work:
+def _work(planned: Planned) -> RunWork:
     """What a run knows of a design: its laminate, the beam's paths by pattern, the findings."""
     checked = planned.checked
-    return Work(Meant(checked.laminate, planned.paths), checked.findings)
+    return RunWork(Meant(checked.laminate, planned.paths), checked.findings)
 
 
 def _said(failed: Iterable[Finding]) -> str:

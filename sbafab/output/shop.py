@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,20 +17,19 @@ from sbafab.errors import OutputError
 from sbafab.laminate.films import Material
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import nest
-from sbafab.nesting.records import Nest, Part
+from sbafab.nesting.records import Nest, NestPart
 from sbafab.nesting.saved import as_dict, from_dict
 from sbafab.output.planned import Planned
 from sbafab.output.settings import machine, stocks
+from sbafab.progress import Progress
 
 PLACES = f"{FOLDER}/nest.json"
 MOST_BYTES = 50_000_000
 """Of saved places; more are not read but searched anew."""
-Progress = Callable[[str, int, int], None]
-"""Told what is being done, and how much of how much is done."""
 
 
 def find_nests(
-    parts: Sequence[Part], design: Design, old_folder: Path, tell: Progress
+    parts: Sequence[NestPart], design: Design, old_folder: Path, tell: Progress
 ) -> tuple[Nest, ...]:
     """Places for the parts on the design's film sheets.
 
@@ -67,7 +66,7 @@ def write_nested_sheets(
     return sheets
 
 
-def _saved(parts: Sequence[Part], design: Design, path: Path) -> tuple[Nest, ...] | None:
+def _saved(parts: Sequence[NestPart], design: Design, path: Path) -> tuple[Nest, ...] | None:
     """The places of an earlier run; None where there are none for these parts, or bad ones."""
     try:
         if not path.is_file() or path.stat().st_size > MOST_BYTES:

@@ -22,14 +22,15 @@ from sbafab.geometry.region import Region
 from sbafab.models.figures import Asked
 from sbafab.models.prediction import predict
 from sbafab.nesting.bottom_left import bottom_left
-from sbafab.nesting.records import Part, Placement, Stock
+from sbafab.nesting.records import NestPart, Placement, Stock
 from sbafab.output import batch
 from sbafab.output.job import generate_job
 from sbafab.output.manifest import file_hashes
 from sbafab.output.planned import Planned
 from sbafab.output.predicting import with_prediction
 from sbafab.output.run import Extras, generate
-from sbafab.output.shop import Progress, write_cut_files
+from sbafab.output.shop import write_cut_files
+from sbafab.progress import Progress
 from sbafab.rules.deck import Rule
 from tests.as_built.doctoring import Doctor
 
@@ -153,7 +154,7 @@ def test_chords_that_are_too_coarse_are_the_users_choice(tmp_path: Path) -> None
 def test_parts_of_a_nest_that_lie_badly_are_not_let_through(
     shift: tuple[float, float], said: str, tmp_path: Path
 ) -> None:
-    def moved(parts: Sequence[Part], stock: Stock) -> tuple[Placement, ...]:
+    def moved(parts: Sequence[NestPart], stock: Stock) -> tuple[Placement, ...]:
         first, *others = bottom_left(parts, stock)
         x, y = first.shift
         return (replace(first, shift=(x + shift[0], y + shift[1])), *others)

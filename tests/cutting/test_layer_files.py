@@ -15,10 +15,11 @@ import sbafab
 from sbafab.cutting import files
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Curves, DxfProfile
-from sbafab.cutting.files import CutFile, Progress, compensated_paths, write_layer_files
+from sbafab.cutting.files import CutFile, compensated_paths, write_layer_files
 from sbafab.cutting.properties import CutSettings
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
+from sbafab.progress import Counted
 
 SETTINGS = CutSettings("two-plates", "ab" * 32)
 CALIBRATED = CutSettings(
@@ -31,7 +32,7 @@ CALIBRATED = CutSettings(
 
 
 def written(
-    laminate: Laminate, folder: Path, settings: CutSettings, progress: Progress | None = None
+    laminate: Laminate, folder: Path, settings: CutSettings, progress: Counted | None = None
 ) -> list[CutFile]:
     paths = compensated_paths(laminate, settings)
     return write_layer_files(laminate, paths, folder, settings, progress)
