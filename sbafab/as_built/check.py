@@ -173,21 +173,8 @@ def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tupl
             problems.append(claim(message))
     first = folders[0]
     problems += file_problems(folder, job)
-    problems += sheet_problems(
-        folder,
-        SheetOrder(
-            job.name,
-            job.designs_sha256,
-            first.design,
-            first.claims.kerf,
-            job.waived,
-            job.lowered_limits,
-            job.films,
-            job.sheets,
-            job.files,
-            lots,
-        ),
-    )
+    order = SheetOrder(job, first.design, first.claims.kerf, lots)
+    problems += sheet_problems(folder, order)
     if is_joined(job):
         weak += lowered_between(folder)
         between, wrong = joined_findings(folder)
@@ -321,21 +308,8 @@ def _own_sheet_problems(
     if not claims.sheets and is_job(folder.absolute().parent):
         message = "the film sheets are those of the job, and were not looked at; check the folder "
         return [Problem(CLAIMS, f"{message}above this one", verdict="warn")]
-    return sheet_problems(
-        folder,
-        SheetOrder(
-            claims.name,
-            claims.design_sha256,
-            design,
-            claims.kerf,
-            claims.waived,
-            claims.lowered_limits,
-            claims.films,
-            claims.sheets,
-            claims.files,
-            [Lot(claims.name, claims.copies, files)],
-        ),
-    )
+    lots = [Lot(claims.name, claims.copies, files)]
+    return sheet_problems(folder, SheetOrder(claims, design, claims.kerf, lots))
 
 
 def _laminate_problems(

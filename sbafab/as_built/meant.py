@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from sbafab.actuators import build
+from sbafab.as_built.coarse import as_cut
 from sbafab.cutting.files import compensated_paths
 from sbafab.cutting.properties import CutSettings, curves_of
 from sbafab.cutting.verify import TOLERANCE, check_contours
@@ -14,7 +15,6 @@ from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.boolean import GeometryError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.coarse import as_cut
 from sbafab.output.settings import cut_settings
 from sbafab.rules.finding import Finding
 

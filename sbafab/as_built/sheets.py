@@ -26,7 +26,13 @@ from sbafab.geometry.intersect import meeting_points
 from sbafab.laminate.films import Material
 from sbafab.nesting.check import check_placed
 from sbafab.nesting.records import Stock
-from sbafab.output.manifest_records import FilmUseClaim, KerfClaim, SheetClaim
+from sbafab.output.manifest_records import (
+    FilmUseClaim,
+    JobManifest,
+    KerfClaim,
+    Manifest,
+    SheetClaim,
+)
 from sbafab.output.settings import stocks
 
 ROUNDED = 2e-3
@@ -35,26 +41,26 @@ ROUNDED = 2e-3
 
 @dataclass(frozen=True)
 class SheetOrder:
-    """What the sheets of a folder are claimed to be, and the layers that they must hold.
+    """What a manifest claims of film sheets, and the layers that they must hold.
 
-    ``design`` states the stock; ``sha256`` is that of the design, or of all designs of a job.
+    ``design`` states the stock; all designs of a job have the same, and the same ``kerf``.
     """
 
-    name: str
-    sha256: str
+    claims: Manifest | JobManifest
     design: Design
     kerf: Mapping[Material, KerfClaim]
-    waived: Sequence[str]
-    lowered: Sequence[str]
-    films: Sequence[FilmUseClaim]
-    sheets: Sequence[SheetClaim]
-    files: Mapping[str, str]
     lots: Sequence[Lot]
+
+    @property
+    def sha256(self) -> str:
+        """That of the design, or of all designs of a job."""
+        claims = self.claims
+        return claims.design_sha256 if isinstance(claims, Manifest) else claims.designs_sha256
 
 
 def sheet_problems(folder: Path, order: SheetOrder) -> list[Problem]:
     """Every sheet: sound, laid out as its stock asks, and cutting the layers' pieces, no others."""
-    if not order.sheets:
+    if not order.claims.sheets:
         return [claim("the manifest lists no film sheets; write them with sbafab cut")]
     problems = _order_problems(order)
     stock_of = stocks(order.design)
@@ -63,7 +69,7 @@ def sheet_problems(folder: Path, order: SheetOrder) -> list[Problem]:
     curves = parts[0].properties.get("CURVES") if parts else None
     sheets: list[CutSheet] = []
     bare: list[ReadBack] = []
-    for told in order.sheets:
+    for told in order.claims.sheets:
         try:
             found = _read(folder, told)
         except OutputError as error:
@@ -79,7 +85,7 @@ def sheet_problems(folder: Path, order: SheetOrder) -> list[Problem]:
     if bare:
         of = "the files of " + (f"{len(bare)} film sheets" if len(bare) > 1 else "a film sheet")
         problems.append(bare_problem(of, all(found.units for found in bare)))
-    if len(sheets) == len(order.sheets) and len(parts) == len(files):
+    if len(sheets) == len(order.claims.sheets) and len(parts) == len(files):
         turns = {material: stock.turns for material, stock in stock_of.items()}
         problems += piece_problems(sheets, order.lots, turns)
     return problems
@@ -111,7 +117,7 @@ def _order_problems(order: SheetOrder) -> list[Problem]:
     """Sheets by number, name and stock against the design; films against sheets."""
     problems = []
     for material, stock in stocks(order.design).items():
-        own = [sheet for sheet in order.sheets if sheet.material == material]
+        own = [sheet for sheet in order.claims.sheets if sheet.material == material]
         if [sheet.number for sheet in own] != [*range(1, len(own) + 1)] or len(own) > stock.most:
             message = f"the {material} sheets are not numbered from 1 to at most {stock.most}"
             problems.append(claim(message))
@@ -120,7 +126,7 @@ def _order_problems(order: SheetOrder) -> list[Problem]:
             problems += _stock_problems(sheet, stock, order.design.sheets.engine)
         problems += [
             problem
-            for film in order.films
+            for film in order.claims.films
             if film.material == material
             for problem in _film_problems(film, own)
         ]
@@ -138,7 +144,7 @@ def _name_problems(sheet: SheetClaim, order: SheetOrder) -> list[Problem]:
         *(
             claim(f"{path} has no hash in the manifest")
             for path in (sheet.file, sheet.picture)
-            if path not in order.files
+            if path not in order.claims.files
         ),
     ]
 
@@ -188,16 +194,16 @@ def _property_problems(
     told: SheetClaim, found: ReadBack, order: SheetOrder, curves: str | None
 ) -> list[Problem]:
     """Custom properties that are not what the manifest says, or curves unlike the layers'."""
-    of = sum(sheet.material == told.material for sheet in order.sheets)
+    of = sum(sheet.material == told.material for sheet in order.claims.sheets)
     expected: dict[str, str | None] = {
-        "DESIGN": order.name,
+        "DESIGN": order.claims.name,
         "DESIGN_SHA256": order.sha256,
         "PATTERN": f"sheet {told.number} of {of}",
         "MATERIAL": told.material,
         "UNITS": "mm",
         **kerf_properties(_kerf(order, told.material)),
-        "WAIVED": ", ".join(order.waived) or "none",
-        LIMITS: limit_properties(order.lowered).get(LIMITS),
+        "WAIVED": ", ".join(order.claims.waived) or "none",
+        LIMITS: limit_properties(order.claims.lowered_limits).get(LIMITS),
         "PARTS": ", ".join(f"{part.count} x {part.design} {part.pattern}" for part in told.parts),
         "CURVES": curves,
     }

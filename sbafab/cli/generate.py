@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from sbafab.cli.options import Request, dxf_options, run_options, sheet_options
-from sbafab.cli.working import RULE_FAILED, run_design
+from sbafab.cli.working import run_design, tell
 
 if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
@@ -43,18 +43,13 @@ def generate(request: Request, curves: Curves, decks: bool) -> None:
 
 
 def _generate_assembly(assembly: Assembly, request: Request, curves: Curves) -> None:
-    from sbafab.cli.printing import print_json, run_json, shown_progress
+    from sbafab.cli.printing import run_json, shown_progress
     from sbafab.cli.printing_assembly import print_assembly
     from sbafab.output.assembly import generate_assembly
 
     with shown_progress(request.as_json) as progress:
         run = generate_assembly(assembly, request.out, progress, curves)
-    if request.as_json:
-        print_json(run_json(run))
-    else:
-        print_assembly(run)
-    if run.failed:
-        click.get_current_context().exit(RULE_FAILED)
+    tell(run, request, run_json, print_assembly)
 
 
 def _write_decks(laminate: Laminate, folder: Path) -> None:

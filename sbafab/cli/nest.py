@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from sbafab.cli.options import Request, dxf_options, several_run_options, sheet_options
-from sbafab.cli.working import RULE_FAILED
+from sbafab.cli.working import tell
 
 if TYPE_CHECKING:
     from sbafab.cutting.dxf_write import Curves
@@ -25,7 +25,7 @@ def nest(request: Request, name: str, curves: Curves) -> None:
     for every design; how many of each is its own order.copies, or --copies of every one.
     """
     from sbafab.actuators import load_design
-    from sbafab.cli.printing import job_json, print_job, print_json, shown_progress
+    from sbafab.cli.printing import job_json, print_job, shown_progress
     from sbafab.output.job import generate_job
 
     designs = [
@@ -33,9 +33,4 @@ def nest(request: Request, name: str, curves: Curves) -> None:
     ]
     with shown_progress(request.as_json) as progress:
         job = generate_job(designs, name, request.out, progress, curves)
-    if request.as_json:
-        print_json(job_json(job))
-    else:
-        print_job(job)
-    if job.failed:
-        click.get_current_context().exit(RULE_FAILED)
+    tell(job, request, job_json, print_job)

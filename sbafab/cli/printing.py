@@ -104,20 +104,28 @@ def facts_table() -> Table:
     return made
 
 
-def add_designs(table: Table, checked: Iterable[Checked]) -> None:
-    """A row for each of several designs: how many, and whether it holds; then their notes."""
+def add_batch(table: Table, run: Run) -> None:
+    """Rows on several designs: how many of each, whether it holds, what was written of them."""
     from rich.text import Text
 
-    designs = list(checked)
-    for one in designs:
+    for one in run.checked:
         warned = sorted({f.rule for f in one.findings if f.verdict == "warn"})
         said = f"; warns: {', '.join(warned)}" if warned else ""
         waived = f"; waived: {', '.join(one.waived)}" if one.waived else ""
         verdict = "a rule failed" if one.failed else "every rule holds"
         words = f"{one.design.order.copies} x, {verdict}{waived}{said}"
         table.add_row(one.design.name, Text(words))
-    for note in notes_of(designs):
+    for note in notes_of(run.checked):
         table.add_row("note", Text(note))
+    index = run.manifest
+    for film in index.get("films", ()):
+        table.add_row(f"{film['material']} film", Text(film_said(film, index["sheets"], 1)))
+    for mesh in index.get("meshes", ()):
+        table.add_row("solid", Text(f"{mesh['file']}, a node a part"))
+    for label, text in replaced(run.dropped):
+        table.add_row(label, Text(text))
+    if index:
+        table.add_row("folder", Text(str(run.folder)))
 
 
 def print_failed(findings: Iterable[Finding], written: str, change: str) -> None:
@@ -165,14 +173,7 @@ def print_job(job: Run) -> None:
 
     out = console()
     made = facts_table()
-    add_designs(made, job.checked)
-    for film in job.manifest.get("films", ()):
-        sheets = film_said(film, job.manifest["sheets"], 1)
-        made.add_row(f"{film['material']} film", Text(sheets))
-    for label, text in replaced(job.dropped):
-        made.add_row(label, Text(text))
-    if not job.failed:
-        made.add_row("folder", Text(str(job.folder)))
+    add_batch(made, job)
     out.print(made)
     for one in job.checked:
         if one.failed:

@@ -6,13 +6,11 @@ from typing import TYPE_CHECKING
 
 from sbafab.cli.printing import (
     LEFT_AS_IT_WAS,
-    add_designs,
+    add_batch,
     console,
     facts_table,
-    film_said,
     findings_table,
     print_failed,
-    replaced,
 )
 
 if TYPE_CHECKING:
@@ -48,12 +46,5 @@ def _made(run: Run) -> Table:
     parts = (f"{p['name']} ({p['design'] or p['kind']})" for p in index["parts"])
     made.add_row("assembly", Text(f"{index['name']}, {index['design_sha256'][:12]}"))
     made.add_row("parts", Text(", ".join(parts)))
-    add_designs(made, run.checked)
-    for film in index["films"]:
-        made.add_row(f"{film['material']} film", Text(film_said(film, index["sheets"], 1)))
-    for mesh in index["meshes"]:
-        made.add_row("solid", Text(f"{mesh['file']}, a node a part"))
-    for label, text in replaced(run.dropped):
-        made.add_row(label, Text(text))
-    made.add_row("folder", Text(str(run.folder)))
+    add_batch(made, run)
     return made

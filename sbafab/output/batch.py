@@ -21,7 +21,6 @@ from sbafab.output.planned import Checked, Planned, plan
 from sbafab.output.settings import stocks
 from sbafab.output.shop import (
     find_nests,
-    write_cut_files,
     write_nested_sheets,
 )
 from sbafab.output.swap import ASSEMBLY_SCHEMA, SCHEMA
@@ -117,30 +116,18 @@ def write_batch(
         design = first.checked.design
         sheets = write_nested_sheets(batch.nests, design, folder, batch.settings, tell)
     if batch.schema == SCHEMA:
-        return _write_design(first, sheets, folder, tell), sheets
+        return write_contents(first, sheets, folder, tell), sheets
     seen = _seen_from_below(sheets)
     for one in batch.designs:
         own = folder / one.checked.design.name
         own.mkdir()
         # An assembly has one page for all designs.
-        index = _write_design(one, seen, own, tell, batch.schema != ASSEMBLY_SCHEMA)
+        index = write_contents(one, seen, own, tell, batch.schema != ASSEMBLY_SCHEMA)
         # The folder above has the sheets; a design's own is one without.
         close_folder(own, {**index, "sheets": []})
     own_designs = [one.checked.design for one in batch.designs]
     index = job_manifest(batch.schema, batch.name, batch.settings, own_designs, sheets)
     return index, sheets
-
-
-def _write_design(
-    planned: Planned,
-    sheets: Sequence[SheetFile],
-    folder: Path,
-    tell: Progress,
-    has_page: bool = True,
-) -> dict[str, Any]:
-    if planned.paths:
-        write_cut_files(planned, folder, tell)
-    return write_contents(planned, sheets, folder, tell, has_page)
 
 
 def _seen_from_below(sheets: Sequence[SheetFile]) -> list[SheetFile]:

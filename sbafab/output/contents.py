@@ -1,4 +1,4 @@
-"""What lies in the output folder of one design beside its cut files."""
+"""What lies in the output folder of one design."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from sbafab.meshing.files import MeshFile, write_meshes
 from sbafab.output.manifest import as_json, checks, file_hashes, manifest
 from sbafab.output.planned import Checked, Planned
 from sbafab.output.settings import GENERATOR, kerf_widths
+from sbafab.output.shop import write_cut_files
 from sbafab.pressing.schedule import press_csv, press_json
 from sbafab.progress import Progress
 
@@ -34,7 +35,7 @@ def write_contents(
     tell: Progress,
     has_page: bool = True,
 ) -> dict[str, Any]:
-    """Writes what is wanted beside the cut files; the manifest, without the files' hashes.
+    """Writes what is wanted of a design; the manifest, without the files' hashes.
 
     The traveller, which a folder without a page of its own does not get, needs cut files, schedule
     and pictures.
@@ -42,6 +43,8 @@ def write_contents(
     checked, wanted = planned.checked, planned.wanted
     meshes: list[MeshFile] = []
     solid: bytes | None = None
+    if planned.paths:
+        write_cut_files(planned, folder, tell)
     if planned.pressing is not None:
         write_text(folder / "press.json", as_json(press_json(planned.pressing)))
         write_text(folder / "press.csv", press_csv(planned.pressing))

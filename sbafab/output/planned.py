@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
+from sbafab.as_built.coarse import refuse_coarse
 from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.cutting.files import compensated_paths
 from sbafab.cutting.properties import CutSettings
@@ -14,7 +15,6 @@ from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.parts import parts_of
 from sbafab.nesting.records import NestPart
-from sbafab.output.coarse import refuse_coarse
 from sbafab.output.settings import cut_settings, limits, press_settings
 from sbafab.pressing.schedule import Schedule, schedule
 from sbafab.rules.deck import has_failed

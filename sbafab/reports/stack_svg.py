@@ -142,7 +142,7 @@ def _rod(rod: Rod, view: StackView) -> list[str]:
 
 def _heading(laminate: Laminate, view: StackView) -> list[str]:
     what = (
-        f"StackSection through {view.section.chamber} along its inlet. "
+        f"Section through {view.section.chamber} along its inlet. "
         f"Height exaggerated {view.factor}{draw.TIMES}, {number(laminate.thickness)} in all "
         "(nominal). All dimensions in mm."
     )

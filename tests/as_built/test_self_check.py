@@ -23,7 +23,7 @@ from sbafab.models.figures import Asked
 from sbafab.models.prediction import predict
 from sbafab.nesting.bottom_left import bottom_left
 from sbafab.nesting.records import NestPart, Placement, Stock
-from sbafab.output import batch
+from sbafab.output import contents
 from sbafab.output.job import generate_job
 from sbafab.output.manifest import file_hashes
 from sbafab.output.planned import Planned
@@ -74,7 +74,7 @@ def test_a_run_whose_files_are_not_its_design_changes_nothing(
     design = load_design("1dof-5mm", FEW)
     before = file_hashes(generate(design, tmp_path, ("cut",)).folder)
     with (
-        patch.object(batch, "write_cut_files", spoilt(edit)),
+        patch.object(contents, "write_cut_files", spoilt(edit)),
         pytest.raises(DefectError, match=f"(?s){said}.*a defect of sbafab.*report"),
     ):
         generate(design, tmp_path, ("cut",))
@@ -142,7 +142,7 @@ def test_a_job_is_made_again_whole(tmp_path: Path) -> None:
 def test_chords_that_are_too_coarse_are_the_users_choice(tmp_path: Path) -> None:
     design = load_design("1dof-5mm", FEW)
     with (
-        patch.object(batch, "write_cut_files", spoilt(in_inches)),
+        patch.object(contents, "write_cut_files", spoilt(in_inches)),
         pytest.raises(OutputError, match=r"smaller --chord-error than 0\.005"),
     ):
         generate(design, tmp_path, ("cut",), curves=Curves("chords"))
