@@ -30,7 +30,7 @@ def read_measurements(path: Path) -> list[Measurement]:
     """
     lines = [
         (f"{path}, line {number}", line)
-        for number, line in enumerate(_text(path).splitlines(), start=1)
+        for number, line in enumerate(table_text(path).splitlines(), start=1)
         if line.strip(' ,;\t"') and not line.lstrip(' "').startswith("#")
     ]
     separator, names = _header(path, lines[0] if lines else ("", ""))
@@ -44,11 +44,12 @@ def read_measurements(path: Path) -> list[Measurement]:
     return found
 
 
-def _text(path: Path) -> str:
+def table_text(path: Path) -> str:
+    """The text of a table that someone filled in. Raises DesignError where it is none."""
     try:
         if path.stat().st_size > MOST_BYTES:
             raise DesignError(
-                f"{path} is larger than {MOST_BYTES:,} bytes; give the coupon's table"
+                f"{path} is larger than {MOST_BYTES:,} bytes; give the table that was filled in"
             )
         return path.read_text(encoding="utf-8-sig")
     except OSError as error:
