@@ -20,6 +20,7 @@ from sbafab.as_built.records import DESIGNED, Job, Manifest, Problem, is_joined
 from sbafab.cutting.files import CutFile
 from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.fixture import write_fixture
+from sbafab.cutting.lightburn import ENDING
 from sbafab.cutting.properties import chord_error_of, curves_property, layer_path
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DesignError, OutputError
@@ -173,7 +174,7 @@ def _differences(
         else:
             said = file_difference(folder / name, path, name)
         if said:
-            is_done = name.endswith((*PRESS, ".dxf"))
+            is_done = name.endswith((*PRESS, ".dxf", ENDING))
             problems.append(_other(said, generator, is_done))
     return problems
 

@@ -112,6 +112,7 @@ def sheet_entry(sheet: SheetFile) -> dict[str, Any]:
     return {
         "file": sheet.path,
         "picture": sheet.picture,
+        "project": sheet.project,
         "material": sheet.material,
         "number": sheet.number,
         "width": sheet.width,
