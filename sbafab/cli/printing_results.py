@@ -61,7 +61,7 @@ def print_report(report: Report, as_json: bool) -> None:
     if as_json:
         print_json(report.as_dict())
         return
-    click.echo(f"{report.items} actuators in {report.records} records")
+    click.echo(f"actuators: {report.items}, records: {report.records}")
     _print_table(
         "Success: leak test passed, with Wilson's interval of 95 %",
         ("by", "", "passed", "share", "interval"),

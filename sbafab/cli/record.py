@@ -91,7 +91,7 @@ def _measured(command: Command) -> Command:
 def record(
     design: str | None, lab: Path, assignments: tuple[str, ...], as_json: bool, **said: Any
 ) -> None:
-    r"""Record what came out of the press and the test bench; see what all records say.
+    """Record what came out of the press and the test bench; see what all records say.
 
     DESIGN is a template's name, a TOML file or the folder that was built from. Records are only
     added: --correct adds one that names the record it corrects. Nothing leaves this machine.
@@ -100,7 +100,7 @@ def record(
     sbafab record 3dof-15mm --serial A1 --leak pass --stroke 16.8
     sbafab record 3dof-15mm --table batch.csv
     sbafab record --report
-    """
+    """  # noqa: D301 (click reads the backspace as a mark)
     from sbafab.cli.printing_results import print_records, print_report
     from sbafab.results.finding import found_by
     from sbafab.results.report import report
@@ -175,7 +175,7 @@ def _recorded(
     from sbafab.design.writing import design_sha256
     from sbafab.output.settings import GENERATOR
     from sbafab.results.batch import read_batch
-    from sbafab.results.builds import promised
+    from sbafab.results.builds import kit_name, promised
     from sbafab.results.records import checked
 
     if said["table"] is not None:
@@ -187,7 +187,7 @@ def _recorded(
         if results[0].is_empty:
             raise click.UsageError("say what came out, such as --leak pass or --note TEXT")
     design = _built(source, assignments)
-    kit = str(getattr(design, "kit", None) or "")
+    kit = kit_name(design)
     results = [replace(result, kit=result.kit or kit) for result in results]
     sha256 = design_sha256(design)
     is_known = store.knows(sha256, GENERATOR)
@@ -205,6 +205,7 @@ def _built(source: str, assignments: tuple[str, ...]) -> Design:
     found = load(resolved if folder.is_dir() and resolved.is_file() else source, assignments)
     if not isinstance(found, Design):
         raise DesignError(
-            f"{found.name} is an assembly; record its actuators one by one, each by its own design"
+            f"{found.name} is an assembly; record its actuators one by one, each by its own design "
+            "file or by its folder in the assembly's"
         )
     return found

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import PurePath
+
 from sbafab.actuators import build as laminate_of
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256, design_toml
@@ -44,6 +46,11 @@ def promised(design: Design) -> Build:
         tolerances={name: getattr(registration, key) for name, key in TOLERANCES.items()},
         good_builds=(share.good, share.builds),
     )
+
+
+def kit_name(design: Design) -> str:
+    """The kit that the design names, without folder and ending; "" where it names none."""
+    return PurePath(str(getattr(design, "kit", None) or "")).stem
 
 
 def _predicted(prediction: Prediction) -> dict[str, tuple[float, str]]:
