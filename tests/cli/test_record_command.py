@@ -34,7 +34,8 @@ def offline(monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(*arguments: object, **named: object) -> None:
         raise AssertionError("a record left the machine")
 
-    monkeypatch.setattr(socket, "socket", refused)
+    for name in ("connect", "connect_ex", "sendto"):
+        monkeypatch.setattr(socket.socket, name, refused)
     monkeypatch.setattr(socket, "getaddrinfo", refused)
 
 

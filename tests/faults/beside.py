@@ -156,16 +156,10 @@ KIND = Kind(
         replaced("vertex off in a LightBurn project", PROJECT, r"(V\d+\.\d)\d*", r"\g<1>"),
         replaced("part lost in a LightBurn project", PROJECT, r'<Shape [^\n]*CutIndex="2".*\n', ""),
         replaced("frame cut by a LightBurn project", PROJECT, r'put Value="0"', 'put Value="1"'),
-        replaced(
-            "layer not cut by a LightBurn project", PROJECT, r'put Value="1"', 'put Value="0"'
-        ),
-        replaced("kerf taken twice by LightBurn", PROJECT, r'kerf Value="0"', 'kerf Value="0.1"'),
         replaced("LightBurn project mirrored", PROJECT, r'MirrorX="False"', 'MirrorX="True"'),
         replaced(
             "power set in a LightBurn project", PROJECT, r'maxPower Value="0', 'maxPower Value="9'
         ),
-        replaced("travel sorted by LightBurn", PROJECT, r'eTravel Value="0"', 'eTravel Value="1"'),
-        replaced("outlines first in LightBurn", PROJECT, r'ity Value="2"', 'ity Value="-1"'),
         Fault("stray engraving in the waste", RULE, engraved, beside=True),
         told("parts placed otherwise", "sheets/nest.json", lambda d: d["nests"]["TPE"].reverse()),
         plate("pin plate turned over", flipped),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -58,7 +57,7 @@ def points_of(node: Node) -> list[Point]:
         geometry.transform(told["matrix"])
     else:
         geometry = node.told["geometry"]
-    points = geometry.as_interpolated_points(interpolate=200)
+    points = geometry.as_interpolated_points(interpolate=100)
     return [(p.real / UNITS_PER_MM, p.imag / UNITS_PER_MM) for p in points if p is not None]
 
 
@@ -66,46 +65,35 @@ def area(points: list[Point]) -> float:
     return sum(x * v - u * y for (x, y), (u, v) in pairwise([*points, points[0]])) / 2
 
 
-@pytest.fixture
-def read(sheet: Sheet) -> Elements:
+@pytest.mark.usefixtures("fine_arcs")
+def test_meerk40t_cuts_what_the_sheet_says_in_its_order_with_no_power(sheet: Sheet) -> None:
     from meerk40t.extra.lbrn import LbrnLoader
 
-    path = sheet.files["bulges"].with_suffix(".lbrn2")
-    found = Elements()
-    assert LbrnLoader.load(None, found, str(path))
-    return found
-
-
-def test_it_cuts_every_contour_on_its_layer_in_order(read: Elements, sheet: Sheet) -> None:
+    cut_file = sheet.files["bulges"]
+    read = Elements()
+    assert LbrnLoader.load(None, read, str(cut_file.with_suffix(".lbrn2")))
     layers = {op.told["label"].partition(":")[0]: op for op in read.op_branch.children}
     assert list(layers) == ["ENGRAVE", "CUT_INNER", "CUT_OUTER", "REFERENCE"]
-    assert {op.told["type"] for op in layers.values()} == {"op cut"}
-    found = {name: [area(points_of(node)) for node in op.children] for name, op in layers.items()}
-    assert sorted(map(abs, found["CUT_OUTER"])) == pytest.approx(sheet.outers, rel=EXACT / 10)
-    assert sorted(map(abs, found["CUT_INNER"])) == pytest.approx(sheet.holes, rel=EXACT / 10)
-    assert found["REFERENCE"] == pytest.approx([WIDTH * LENGTH])
+    for name, op in layers.items():
+        says = "not cut" if name == "REFERENCE" else "set power and speed"
+        assert op.told == {**op.told, "type": "op cut", "power": 0, "label": f"{name}: {says}"}
+
+    runs = {name: [points_of(node) for node in op.children] for name, op in layers.items()}
+    areas = {name: sorted(abs(area(run)) for run in own) for name, own in runs.items()}
+    assert areas["CUT_OUTER"] == pytest.approx(sheet.outers, rel=EXACT)
+    assert areas["CUT_INNER"] == pytest.approx(sheet.holes, rel=EXACT)
+    assert areas["REFERENCE"] == pytest.approx([WIDTH * LENGTH])
+    # Numbers, not looks: MeerK40t counts y downwards, as a project does that says MirrorY.
+    xs, ys = zip(*(p for run in runs["CUT_OUTER"] for p in run), strict=True)
+    bounds = (min(xs), min(ys), max(xs), max(ys))
+    assert bounds == pytest.approx(outline_bounds(cut_file), abs=0.001)
+
     # The tree holds the shapes as the file does: all holes before any outline, the frame last.
     [file] = read.elem_branch.children
     layer_of = {id(node): name for name, op in layers.items() for node in op.children}
     seen = [layer_of[id(node)] for node in file.children]
     assert seen == sorted(seen, key=list(layers).index)
 
-
-@pytest.mark.usefixtures("fine_arcs")
-def test_it_lies_as_the_cut_file_does(read: Elements, sheet: Sheet) -> None:
-    """Numbers, not looks: MeerK40t counts y downwards, as a project does that says MirrorY."""
-    outlines = next(op for op in read.op_branch.children if op.told["label"].startswith("CUT_OUT"))
-    points = [p for node in outlines.children for p in points_of(node)]
-    xs, ys = zip(*points, strict=True)
-    bounds = (min(xs), min(ys), max(xs), max(ys))
-    assert bounds == pytest.approx(outline_bounds(sheet.files["bulges"]), abs=0.001)
-
-
-def test_no_power_is_guessed_and_the_notes_say_what_to_set(read: Elements, sheet: Sheet) -> None:
-    for op in read.op_branch.children:
-        assert op.told["power"] == 0
-        wanted = "not cut" if op.told["label"].startswith("REF") else "set power and speed"
-        assert op.told["label"].endswith(f": {wanted}")
     assert read.note.startswith("Powers are 0: set power and speed of each layer")
     assert "KERF_STATE: uncalibrated" in read.note
-    assert (PTFE_WARNING in read.note) == ("PTFE" in Path(sheet.picture).name)
+    assert (PTFE_WARNING in read.note) == (cut_file.name == "PTFE_1.dxf")
