@@ -49,10 +49,23 @@ CREATE TABLE result (
 );
 CREATE INDEX item ON result (design_sha256, serial);
 """
-_KEPT = (
-    "CREATE TRIGGER {table}_{verb} BEFORE {verb} ON {table} BEGIN SELECT RAISE(ABORT, {why}); END"
-)
-_WHY = "'records are never changed; add one that corrects'"
+_KEPT = """
+CREATE TRIGGER {name} BEFORE {what} BEGIN
+    SELECT RAISE(ABORT, 'records are never changed; add one that corrects');
+END
+"""
+# REPLACE deletes rows without asking the triggers of deletion.
+_TRIGGERS = {
+    **{
+        f"{table}_{verb}": f"{verb} ON {table}"
+        for table in ("design", "result")
+        for verb in ("UPDATE", "DELETE")
+    },
+    "design_twice": "INSERT ON design WHEN EXISTS "
+    "(SELECT 1 FROM design WHERE sha256 = NEW.sha256 AND generator = NEW.generator)",
+    "result_twice": "INSERT ON result WHEN EXISTS "
+    "(SELECT 1 FROM result WHERE id = NEW.id OR corrects = NEW.corrects)",
+}
 
 Clock = Callable[[], datetime]
 
@@ -76,15 +89,12 @@ class Lab:
         if not self.path.exists():
             return False
         with self._reading() as rows:
-            found = rows.execute(
-                "SELECT 1 FROM design WHERE sha256 = ? AND generator = ?", (sha256, generator)
-            )
-            return found.fetchone() is not None
+            return _is_known(rows, sha256, generator)
 
     def add(self, sha256: str, build: Build | None, results: Sequence[Result]) -> list[Record]:
         """Stores results of a design, all or none; ``build`` where it is not known yet."""
         with self._writing() as rows:
-            if build is not None:
+            if build is not None and not _is_known(rows, build.sha256, build.generator):
                 _put_build(rows, build)
             return [self._put(rows, sha256, result, None) for result in results]
 
@@ -240,11 +250,15 @@ def _reason(error: sqlite3.Error) -> str:
 def _make(rows: sqlite3.Connection) -> None:
     for statement in _SCHEMA.split(";"):
         rows.execute(statement)
-    for table in ("design", "result"):
-        for verb in ("UPDATE", "DELETE"):
-            rows.execute(_KEPT.format(table=table, verb=verb, why=_WHY))
+    for name, what in _TRIGGERS.items():
+        rows.execute(_KEPT.format(name=name, what=what))
     rows.execute(f"PRAGMA application_id = {APPLICATION}")
     rows.execute(f"PRAGMA user_version = {VERSION}")
+
+
+def _is_known(rows: sqlite3.Connection, sha256: str, generator: str) -> bool:
+    asked = "SELECT 1 FROM design WHERE sha256 = ? AND generator = ?"
+    return rows.execute(asked, (sha256, generator)).fetchone() is not None
 
 
 def _put_build(rows: sqlite3.Connection, build: Build) -> None:
@@ -254,9 +268,7 @@ def _put_build(rows: sqlite3.Connection, build: Build) -> None:
         for value in (dict(build.predicted), dict(build.tolerances), list(build.good_builds))
     ]
     marks = ", ".join("?" * len(_BUILD))
-    rows.execute(
-        f"INSERT OR IGNORE INTO design ({', '.join(_BUILD)}) VALUES ({marks})", [*plain, *told]
-    )
+    rows.execute(f"INSERT INTO design ({', '.join(_BUILD)}) VALUES ({marks})", [*plain, *told])
 
 
 def _build(row: Sequence[str]) -> Build:

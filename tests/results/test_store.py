@@ -66,13 +66,18 @@ def test_a_correction_is_a_row_of_its_own_that_names_the_other(lab: Lab, make_bu
         "DELETE FROM result",
         "UPDATE design SET name = 'leg'",
         "DELETE FROM design",
+        "REPLACE INTO design SELECT * FROM design",
+        "REPLACE INTO result SELECT * FROM result WHERE id = 1",
+        "REPLACE INTO result SELECT 9, recorded, design_sha256, 1, withdrawn, serial, leak, "
+        "operator, kit, note, burst_kpa, stroke_mm, force_n, height_mm, mass_g, offset_mm, "
+        "turn_deg, cut_mm FROM result WHERE id = 2",
         "INSERT INTO result SELECT 9, recorded, design_sha256, 1, withdrawn, serial, leak, "
         "operator, kit, note, burst_kpa, stroke_mm, force_n, height_mm, mass_g, offset_mm, "
         "turn_deg, cut_mm FROM result WHERE id = 1",
     ],
 )
 def test_the_file_itself_refuses_changes(statement: str, lab: Lab, make_build: Make) -> None:
-    """Also to another program; the last would correct a record twice."""
+    """Also to another program; the last two would correct a record twice."""
     lab.add(SHA, make_build(), [Result("A1", "pass")])
     lab.correct(1, Result(note="same"))
     before = lab.contents()
