@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.fits import WHOLE, found
-from sbafab.assemblies.poses import Vector
 from sbafab.assemblies.records import Tube
+from sbafab.meshing.surface import Vector
 from sbafab.rules.finding import Finding
 
 

@@ -6,19 +6,19 @@ from collections.abc import Mapping
 
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from sbafab.nesting.records import Part
+from sbafab.nesting.records import NestPart
 
 
 def parts_of(
     laminate: Laminate, paths: Mapping[str, Region], copies: int, spares: int = 0
-) -> tuple[Part, ...]:
+) -> tuple[NestPart, ...]:
     """Every piece of every pattern, by pattern in stacking order.
 
     ``paths`` holds each pattern's path of the beam, kerf compensated; ``spares`` more of every
     mask are cut than the ``copies`` take. Pieces of one pattern that
     differ only in their place are one part, named after the first of them.
     """
-    parts: list[Part] = []
+    parts: list[NestPart] = []
     for pattern, layers in laminate.patterns.items():
         layers_cut = len(layers) * copies + (spares if layers[0].is_mask else 0)
         alike: dict[Region, list[int]] = {}
@@ -28,7 +28,7 @@ def parts_of(
             alike.setdefault(piece.moved(-low_x, -low_y), []).append(number)
         for numbers in alike.values():
             parts.append(
-                Part(
+                NestPart(
                     design=laminate.name,
                     pattern=pattern,
                     piece=numbers[0] + 1,
