@@ -7,7 +7,7 @@ ones where those in between have ended or are open.
 
 from __future__ import annotations
 
-from functools import cache, lru_cache
+from functools import cache
 from typing import NamedTuple
 
 from sbafab.geometry.boolean import union
@@ -37,11 +37,10 @@ class _Seen(NamedTuple):
     region: Region
 
 
-@lru_cache(maxsize=1)
 def facing_films(laminate: Laminate) -> tuple[Facing, ...]:
     """Every pair of films, not next to each other, that face each other but in pins' openings.
 
-    Lowest upper film first. Equal shapes are laid on each other once. Cached: three rules use it.
+    Lowest upper film first. Equal shapes are laid on each other once.
     """
     found: list[Facing] = []
     seen: list[_Seen] = []

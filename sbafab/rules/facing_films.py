@@ -18,10 +18,11 @@ from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import LOOSE, Laminate, Pin
 from sbafab.rules.alike import distinct_interfaces
 from sbafab.rules.boundary import beside, edges_along, outward_reach
-from sbafab.rules.facing import Facing, facing_films, without_slivers
+from sbafab.rules.facing import Facing, without_slivers
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, at, holds
 from sbafab.rules.mask_overhang import pin_at
+from sbafab.rules.measures import Measures
 
 NAME = "facing-films"
 
@@ -40,9 +41,10 @@ class _Overhang(NamedTuple):
     gap: Interface
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
     """The largest place where films weld that should not; with none, the least overhang there."""
-    pairs = _distinct(facing_films(laminate))
+    measures = measures or Measures(laminate, limits)
+    pairs = _distinct(measures.facing)
     welds = [*_past_films(pairs), *_at_rims(laminate)]
     if welds:
         return [_welded(welds, laminate)]

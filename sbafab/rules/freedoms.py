@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 from sbafab.geometry.centroid import centroid
@@ -63,12 +62,10 @@ class Freedom(NamedTuple):
 Freedoms = Mapping[Part, tuple[Freedom, ...]]
 
 
-@lru_cache(maxsize=1)
 def freedoms(laminate: Laminate, tolerances: Tolerances) -> Freedoms:
     """All that each piece of each layer can do, from every step that it goes through.
 
-    Two pieces lie off each other by what one of them does and the other does not. Kept, for two
-    rules ask for the same.
+    Two pieces lie off each other by what one of them does and the other does not.
     """
     shapes = _Shapes(laminate)
     bodies = [[part] for layer in laminate.layers for part in shapes.parts(layer.index)]

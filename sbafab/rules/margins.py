@@ -7,9 +7,8 @@ change along the normal there, which is linear in every cutting error, shift and
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import product
 from typing import Literal, NamedTuple
 
@@ -21,7 +20,7 @@ from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate, Pin
 from sbafab.rules.bond_width import SHARP
 from sbafab.rules.boundary import edges_along, outward_reach, outward_samples
-from sbafab.rules.facing import facing_films
+from sbafab.rules.facing import Facing
 from sbafab.rules.freedoms import Freedom, Freedoms, Part
 from sbafab.rules.limits import Limits, holds
 from sbafab.rules.mask_overhang import pin_at
@@ -95,25 +94,33 @@ def seated(interface: Interface) -> tuple[int, ...]:
     )
 
 
-def pushes(margin: Margin, interface: Interface, moves: Freedoms) -> list[Push]:
-    """What can narrow a margin: the freedoms that one of its two edges has and the other not."""
+def felt(
+    owners: tuple[Owner, Owner], interface: Interface, moves: Freedoms
+) -> list[tuple[Freedom, bool]]:
+    """The freedoms that one of two edges has and the other not, and whether it is the end's."""
     layers = seated(interface)
-    start, end = (moves[Part(layers[o.seat], o.piece)] for o in margin.owners)
-    sides = ((start, end, margin.start, False), (end, start, margin.end, True))
+    start, end = (moves[Part(layers[o.seat], o.piece)] for o in owners)
     return [
-        Push(freedom, freedom.most * abs(freedom.lever(p, margin.normal)), at_end)
-        for own, other, p, at_end in sides
-        for freedom in _without(own, other)
+        *((freedom, False) for freedom in start if freedom not in end),
+        *((freedom, True) for freedom in end if freedom not in start),
     ]
 
 
-@lru_cache(maxsize=1024)
-def _without(own: tuple[Freedom, ...], other: tuple[Freedom, ...]) -> tuple[Freedom, ...]:
-    return tuple(freedom for freedom in own if freedom not in other)
+def pushes(margin: Margin, interface: Interface, moves: Freedoms) -> list[Push]:
+    """What can narrow a margin, and by how much."""
+    return [
+        Push(
+            freedom,
+            freedom.most
+            * abs(freedom.lever(margin.end if at_end else margin.start, margin.normal)),
+            at_end,
+        )
+        for freedom, at_end in felt(margin.owners, interface, moves)
+    ]
 
 
 def interface_margins(
-    laminate: Laminate, limits: Limits, moves: Freedoms
+    laminate: Laminate, facing: Iterable[Facing], limits: Limits, moves: Freedoms
 ) -> list[InterfaceMargins]:
     """Every interface's narrow places: all that could become the least under the tolerances.
 
@@ -121,7 +128,7 @@ def interface_margins(
     mask lies between them, facing-films tells of it.
     """
     groups: dict[object, list[Interface]] = {}
-    faced = [pair.gap for pair in facing_films(laminate) if pair.bare.is_empty]
+    faced = [pair.gap for pair in facing if pair.bare.is_empty]
     for interface in (*laminate.interfaces, *faced):
         key = interface.pattern, interface.unbonded, _signature(interface, moves)
         groups.setdefault(key, []).append(interface)
@@ -172,11 +179,9 @@ def _slack(interface: Interface, limits: Limits, moves: Freedoms) -> float:
     )
 
 
-@lru_cache(maxsize=64)
 def _margins(
     interface: Interface, pins: tuple[Pin, ...], flush_below: float, slack: float
 ) -> tuple[Margin, ...]:
-    """Kept, for two rules ask for the same."""
     if interface.contact.is_empty:
         return ()
     owners = _Owners(interface)
