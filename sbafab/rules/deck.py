@@ -53,8 +53,8 @@ def _sharing(
 
 
 RULES = (
-    Rule(bond_width.NAME, _alone(bond_width.check)),
-    Rule(mask_overhang.NAME, _alone(mask_overhang.check)),
+    Rule(bond_width.NAME, _sharing(bond_width.check)),
+    Rule(mask_overhang.NAME, _sharing(mask_overhang.check)),
     Rule(facing_films.NAME, _sharing(facing_films.check)),
     Rule(sealing.NAME, _alone(sealing.check)),
     Rule(channel_clear.NAME, _alone(channel_clear.check)),
