@@ -7,13 +7,17 @@ side of it only; the pieces that stay are chained into contours. Nothing is flat
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeVar
 
 from sbafab.errors import SbafabError
-from sbafab.geometry.arrangement import Arrangement, InconsistentError, merged, split_edges
+from sbafab.geometry.arrangement import Arrangement, InconsistentError
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
+from sbafab.geometry.pieces import overlaid
 from sbafab.geometry.region import Contour, Region, same_support
 from sbafab.geometry.shapes import circle
+
+Found = TypeVar("Found")
 
 LEAST_AREA = 1e-7
 """Contours that enclose less, in mm2, are rounding dust; so are those thinner than 4 EPSILON."""
@@ -51,19 +55,25 @@ def wound(edges: Sequence[Edge], above: int) -> Region:
 
     Raises GeometryError where no way to cut the edges where they meet gives one answer.
     """
+
+    def contours(found: Arrangement) -> list[Contour]:
+        loops = found.loops(found.borders(above))
+        return [contour for contour in map(tidy, loops) if contour is not None]
+
+    return Region(tuple(sorted(arranged([edges], contours), key=_reading_order)))
+
+
+def arranged(owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Found]) -> Found:
+    """What is read from the closed chains of edges of all owners, laid over each other.
+
+    Raises GeometryError where no way to cut the edges where they meet gives one answer.
+    """
     place: Point | None = None
     for coarser, rounds in WAYS:
-        pieces: Sequence[Edge] = edges
         try:
-            for _ in range(rounds):
-                pieces = [p for parts in split_edges(pieces, coarser * EPSILON) for p in parts]
-            arrangement = Arrangement(merged(pieces, coarser * EPSILON))
-            loops = arrangement.loops(arrangement.borders(above))
-            contours = [contour for contour in map(tidy, loops) if contour is not None]
+            return read(Arrangement(overlaid(owners, coarser * EPSILON, rounds)))
         except InconsistentError as fault:
             place = place or fault.args[0]
-        else:
-            return Region(tuple(sorted(contours, key=_reading_order)))
     x, y = place or (0.0, 0.0)
     raise GeometryError(
         f"edges that nearly meet at x {x:.6f}, y {y:.6f} cannot be told apart; change a size "

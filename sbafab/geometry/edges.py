@@ -19,6 +19,11 @@ SAME = 2 * EPSILON
 by such steps. Far below the 1 um that the cut files promise.
 """
 
+BENT = EPSILON / 4
+"""mm: an edge whose points were moved off its line or circle by more may run where none was looked
+for. Two edges bent by less still are within EPSILON of each other where they meet.
+"""
+
 
 def unit(degrees: float) -> Point:
     """The unit vector at an angle from the x axis; exact at quarter turns."""
@@ -86,6 +91,11 @@ class Line(NamedTuple):
     def farthest_along(self, origin: Point, unit: Point) -> float:
         """How far the edge reaches from ``origin`` along a unit direction."""
         return max(_along(self.start, origin, unit), _along(self.end, origin, unit))
+
+    def to_left(self, p: Point) -> float:
+        """How far ``p`` lies to the left of the infinite line."""
+        (x, y), (ux, uy) = self.start, self.direction(self.start)
+        return ux * (p[1] - y) - uy * (p[0] - x)
 
     def part(self, start: Point, end: Point) -> Line:
         """The piece between two points of the edge, taken in the direction of travel."""
@@ -205,6 +215,11 @@ class Arc(NamedTuple):
         ends = max(_along(self.start, origin, unit), _along(self.end, origin, unit))
         return _along(top, origin, unit) if 0.0 <= self.parameter(top) <= 1.0 else ends
 
+    def to_left(self, p: Point) -> float:
+        """How far ``p`` lies to the left of the whole circle."""
+        inside = self.radius - math.dist(p, self.centre)
+        return inside if self.ccw else -inside
+
     def part(self, start: Point, end: Point) -> Arc:
         """The piece between two points of the edge, taken in the direction of travel."""
         return Arc(start, end, self.centre, self.radius, self.ccw)
@@ -235,6 +250,13 @@ def edge_from_bulge(start: Point, end: Point, bulge: float) -> Edge:
     cx = (x0 + x1) / 2 - lean * (y1 - y0)
     cy = (y0 + y1) / 2 + lean * (x1 - x0)
     return Arc(start, end, (cx, cy), math.hypot(x0 - cx, y0 - cy), bulge > 0)
+
+
+def is_bent(edge: Edge) -> bool:
+    """Whether snapping has taken an end of an arc off its circle by more than BENT."""
+    if not isinstance(edge, Arc):
+        return False
+    return max(abs(edge.to_left(edge.start)), abs(edge.to_left(edge.end))) > BENT
 
 
 def left_normal(edge: Edge, p: Point) -> Point:

@@ -20,3 +20,8 @@ def test_booleans(chunk: int) -> None:
 @pytest.mark.parametrize("chunk", range(3 * SCALE))
 def test_offsets(chunk: int) -> None:
     assert hunted("offsets", seed=0, first=CHUNK * chunk, count=CHUNK) == []
+
+
+def test_an_offset_across_an_edge_of_7_nm() -> None:
+    """The arc beside it ends 3.7 nm off its circle: a wedge was left outside the result."""
+    assert hunted("offsets", seed=11, first=16945, count=1) == []
