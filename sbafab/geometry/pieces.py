@@ -25,6 +25,9 @@ from sbafab.geometry.pool import PointPool
 DIGIT = 16
 """Bits: how often the edges of several owners wind stands in one whole number, a digit an owner."""
 
+ROUNDS = 4
+"""Most times that edges are cut over again."""
+
 
 class Piece(NamedTuple):
     """An edge that meets others at its ends only; the chains wind ``turns`` times more on its left
@@ -42,19 +45,22 @@ class Overlay(NamedTuple):
     bent: bool
 
 
-def overlaid(
-    owners: Sequence[Iterable[Edge]], tolerance: float = EPSILON, rounds: int = 1
-) -> Overlay:
-    """The edges of all owners, each place once, cut where they meet (``rounds`` times over)."""
+def overlaid(owners: Sequence[Iterable[Edge]], tolerance: float = EPSILON) -> Overlay:
+    """The edges of all owners, each place once, cut where they meet.
+
+    What was bent to meet another edge is cut over again, for it may have come to meet a third.
+    """
     entries = [(edge, 1 << DIGIT * i) for i, edges in enumerate(owners) for edge in edges]
-    bent = False
-    for _ in range(rounds):
+    bent = True
+    for _ in range(ROUNDS):
         split, bent = split_edges([edge for edge, _ in entries], tolerance)
         entries = [
             (part, turns)
             for parts, (_, turns) in zip(split, entries, strict=True)
             for part in parts
         ]
+        if not bent:
+            break
     return Overlay(_merged(entries, tolerance), bent)
 
 
@@ -75,13 +81,16 @@ class Split(NamedTuple):
 def split_edges(edges: Sequence[Edge], tolerance: float = EPSILON) -> Split:
     """Each edge cut where it meets another; points nearer than 2 ``tolerance`` become one.
 
-    The order of the edges has no part in where they are cut. An arc that was bent before is taken
-    as the arc of its sweep between its ends, for what meets it is looked for along its circle.
+    The order of the edges has no part in where they are cut. An arc that was bent before is cut
+    where the arc of its sweep between its ends is: what meets that is looked for along its circle.
     """
-    edges = [
-        edge_from_bulge(edge.start, edge.end, edge.bulge) if is_bent(edge) else edge
-        for edge in edges
-    ]
+    whole, edges = (
+        edges,
+        [
+            edge_from_bulge(edge.start, edge.end, edge.bulge) if is_bent(edge) else edge
+            for edge in edges
+        ],
+    )
     cuts: list[list[Point]] = [[] for _ in edges]
     meeting: list[tuple[int, int]] = []
     for i, j in close_pairs([edge.bounds for edge in edges], tolerance):
@@ -97,7 +106,7 @@ def split_edges(edges: Sequence[Edge], tolerance: float = EPSILON) -> Split:
     return Split(
         [
             [edge.part(a, b) for a, b in pairwise(own) if a != b]
-            for edge, own in zip(edges, stops, strict=True)
+            for edge, own in zip(whole, stops, strict=True)
         ],
         any(
             abs(edge.to_left(p)) > BENT
