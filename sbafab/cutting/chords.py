@@ -7,12 +7,13 @@ nearer to its arcs than anything measures: films and round holes stay, masks giv
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from itertools import pairwise
 
 from sbafab.geometry.boolean import tidy
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
-from sbafab.geometry.region import Contour, Region, same_support
+from sbafab.geometry.facets import chord_step, run_sweep, ticks
+from sbafab.geometry.region import Contour, Region
 from sbafab.laminate.laminate import Role
 
 FINE = 0.0004
@@ -51,7 +52,7 @@ def _contour(contour: Contour, grows: bool, error: float, beam: float) -> Contou
     """The contour as lines that leave its material no less (``grows``), or no more, anywhere."""
     points = [
         p
-        for run in _runs(contour.edges)
+        for run in contour.runs
         for p in _points(run, grows or _rounds_corner(run[0], beam), error)
     ]
     loop = [Line(p, q) for p, q in zip(points, (*points[1:], points[0]), strict=True) if p != q]
@@ -62,59 +63,26 @@ def _rounds_corner(edge: Edge, beam: float) -> bool:
     return isinstance(edge, Arc) and edge.ccw and beam > 0 and abs(edge.radius - beam) < EPSILON
 
 
-def _runs(edges: tuple[Edge, ...]) -> Iterable[tuple[Edge, Edge | None]]:
-    """First and last edge of every stretch on one line or circle; a whole circle has no last."""
-    breaks = [i for i in range(len(edges)) if not same_support(edges[i - 1], edges[i])]
-    if not breaks:
-        return [(edges[0], None)]
-    return [
-        (edges[i], edges[after - 1])
-        for i, after in zip(breaks, [*breaks[1:], breaks[0]], strict=True)
-    ]
-
-
-def _points(run: tuple[Edge, Edge | None], grows: bool, error: float) -> list[Point]:
+def _points(run: Sequence[Edge], grows: bool, error: float) -> list[Point]:
     """Vertices of a stretch, but for the last, where the next begins."""
-    first, last = run
+    first = run[0]
     if isinstance(first, Line):
         return [first.start]
-    angles = _angles(first, last, error)
-    on_circle = [first.on_circle(angle) for angle in angles]
+    step = chord_step(math.acos(first.radius / (first.radius + error)) / (1 + ROOM), LEAST)
+    angles = ticks(run, step, ROOM)
+    is_whole = run[-1].end == first.start
+    if is_whole:
+        angles.append(angles[0] + (math.tau if first.ccw else -math.tau))
+    else:
+        angles = [first.start_angle, *angles, first.start_angle + run_sweep(run)]
     if first.ccw == grows:
-        apexes = [_apex(first, a, b) for a, b in pairwise(angles)]
-        return apexes if last is None else [first.start, *apexes]
-    return on_circle[:-1] if last is None else [first.start, *on_circle[1:-1]]
+        corners = [_apex(first, a, b) for a, b in pairwise(angles)]
+    else:
+        corners = [first.on_circle(angle) for angle in angles[not is_whole : -1]]
+    return corners if is_whole else [first.start, *corners]
 
 
 def _apex(arc: Arc, a: float, b: float) -> Point:
     """Where the tangents at two angles meet."""
     middle, radius = (a + b) / 2, arc.radius / math.cos((b - a) / 2)
     return arc.centre[0] + radius * math.cos(middle), arc.centre[1] + radius * math.sin(middle)
-
-
-def _angles(first: Arc, last: Edge | None, error: float) -> list[float]:
-    """Where chords end or tangents touch: both ends, and whole multiples of one step between.
-
-    Multiples of a step: whichever contours share a circle share its vertices.
-    """
-    share = first.radius / (first.radius + error)
-    count = max(LEAST, math.ceil((1 + ROOM) * math.pi / math.acos(share)))
-    step = math.tau / (4 * math.ceil(count / 4))
-    sign = 1 if first.ccw else -1
-    if last is None:
-        return [sign * k * step for k in range(round(math.tau / step) + 1)]
-    start = first.start_angle
-    turn = _sweep(first, last)
-    low, high = sorted((start, start + turn))
-    ticks = range(math.ceil(low / step + ROOM), math.floor(high / step - ROOM) + 1)
-    inner = [tick * step for tick in ticks]
-    return [start, *inner[::sign], start + turn]
-
-
-def _sweep(first: Arc, last: Edge) -> float:
-    """The signed angle from the start of one arc to the end of a later one on its circle."""
-    end = math.atan2(last.end[1] - first.centre[1], last.end[0] - first.centre[0])
-    turn = (end - first.start_angle) % math.tau
-    if not first.ccw:
-        turn -= math.tau
-    return turn

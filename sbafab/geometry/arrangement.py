@@ -13,7 +13,15 @@ from collections.abc import Iterator, Sequence
 from functools import cached_property, cmp_to_key
 from typing import NamedTuple
 
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, distance_to, left_normal
+from sbafab.geometry.edges import (
+    EPSILON,
+    Arc,
+    Edge,
+    Point,
+    distance_to,
+    from_end_to_end,
+    left_normal,
+)
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.pieces import Overlay
 from sbafab.geometry.region import turns_round
@@ -65,6 +73,7 @@ class Arrangement:
 
     def __init__(self, overlay: Overlay) -> None:
         self.pieces = overlay.pieces
+        self._drawn = [from_end_to_end(edge) for edge, _ in self.pieces]
         self.origin = [p for edge, _ in self.pieces for p in (edge.start, edge.end)]
         rings: dict[Point, list[int]] = defaultdict(list)
         for half, p in enumerate(self.origin):
@@ -88,7 +97,7 @@ class Arrangement:
 
     def _in_order(self, halves: list[int]) -> list[int]:
         found = sorted(
-            (_leaving(half, self.pieces[half >> 1].edge) for half in halves),
+            (_leaving(half, self._drawn[half >> 1]) for half in halves),
             key=lambda leaving: leaving.heading,
         )
         count = len(found)
@@ -112,20 +121,20 @@ class Arrangement:
 
     @cached_property
     def _index(self) -> EdgeIndex:
-        return EdgeIndex([edge for edge, _ in self.pieces])
+        return EdgeIndex(self._drawn)
 
     def _around(self, p: Point, left: Sequence[int | None]) -> int:
         """How often the pieces that are told in ``left`` wind round a point."""
         x, y = p
         return sum(
-            self.pieces[number].turns * turns_round(self.pieces[number].edge, p)
+            self.pieces[number].turns * turns_round(self._drawn[number], p)
             for number in self._index.numbers((x, y, self._index.right, y))
             if left[2 * number] is not None
         )
 
     def _wound(self) -> list[int]:
         left: list[int | None] = [None] * len(self.origin)
-        edges = [edge.bounds[0] for edge, _ in self.pieces]
+        edges = [edge.bounds[0] for edge in self._drawn]
         told = False
         for number in sorted(range(len(edges)), key=edges.__getitem__):
             if left[2 * number] is not None:
@@ -157,16 +166,16 @@ class Arrangement:
                     seen |= more
                     part += more
                     waiting += more
-            half = 2 * max(part, key=lambda number: self.pieces[number].edge.length)
+            half = 2 * max(part, key=lambda number: self._drawn[number].length)
             beside = self._beside(half)
             if beside is not None and self._around(beside, self.left) != self.left[half]:
-                raise InconsistentError(self.pieces[half >> 1].edge.at(0.5))
+                raise InconsistentError(self._drawn[half >> 1].at(0.5))
 
     def _beside(self, half: int) -> Point | None:
         """A point to the left of a half, nearer to it than to any other; None if there is hardly
         room.
         """
-        edge = self.pieces[half >> 1].edge
+        edge = self._drawn[half >> 1]
         x, y = edge.at(0.5)
         room = reach = edge.length / 16
         for number in self._index.numbers(widened((x, y, x, y), reach)):
@@ -179,12 +188,12 @@ class Arrangement:
 
     def _leftmost(self, number: int, x: float) -> tuple[int, Point]:
         """A half with the plane outside its group on its left, and its leftmost point."""
-        edge = self.pieces[number].edge
+        edge = self._drawn[number]
         p = min(edge.start, edge.end)
         if isinstance(edge, Arc) and x < p[0]:
             return 2 * number + int(edge.ccw), (x, edge.centre[1])
         # All leave to the right of it, so the last of those that leave upwards most.
-        ring = [_leaving(half, self.pieces[half >> 1].edge) for half in self.rings[p]]
+        ring = [_leaving(half, self._drawn[half >> 1]) for half in self.rings[p]]
         upward = max(leaving.heading for leaving in ring) - NEAR
         return [leaving.half for leaving in ring if leaving.heading > upward][-1], p
 

@@ -12,9 +12,10 @@ from typing import TypeVar
 
 from sbafab.errors import SbafabError
 from sbafab.geometry.arrangement import Arrangement, InconsistentError
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, quarter_arcs
+from sbafab.geometry.facets import run_sweep
 from sbafab.geometry.pieces import overlaid
-from sbafab.geometry.region import Contour, Region, same_support
+from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import circle
 
 Found = TypeVar("Found")
@@ -113,12 +114,7 @@ def tidy(loop: Sequence[Edge]) -> Contour | None:
     if contour.circle is not None:
         whole = circle(*contour.circle)
         return whole if contour.area > 0 else whole.reversed()
-    breaks = [i for i in range(len(loop)) if not same_support(loop[i - 1], loop[i])]
-    runs = [
-        list(loop[first:last]) if first < last else [*loop[first:], *loop[:last]]
-        for first, last in zip(breaks, [*breaks[1:], breaks[0]], strict=True)
-    ]
-    edges = [edge for run in runs for edge in _joined(run)]
+    edges = [edge for run in contour.runs for edge in _joined(run)]
     first = min(range(len(edges)), key=lambda i: _rounded(edges[i].start))
     return Contour((*edges[first:], *edges[:first]))
 
@@ -127,18 +123,8 @@ def _rounded(p: Point) -> Point:
     return round(p[0], 6), round(p[1], 6)
 
 
-def _joined(run: Sequence[Edge]) -> list[Edge]:
-    head = run[0]
+def _joined(run: Sequence[Edge]) -> Sequence[Edge]:
+    head, end = run[0], run[-1].end
     if isinstance(head, Line):
-        return [Line(head.start, run[-1].end)]
-    sweep = sum(edge.sweep for edge in run if isinstance(edge, Arc))
-    count = max(1, math.ceil(abs(sweep) / (math.pi / 2) - 1e-9))
-    if count == 1:
-        return [head.part(head.start, run[-1].end)]
-    first = head.start_angle
-    corners = [
-        head.start,
-        *(head.on_circle(first + sweep * i / count) for i in range(1, count)),
-        run[-1].end,
-    ]
-    return [head.part(corners[i], corners[i + 1]) for i in range(count)]
+        return [Line(head.start, end)]
+    return quarter_arcs(head.start, end, head.centre, head.radius, run_sweep(run))

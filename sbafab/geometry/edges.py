@@ -7,6 +7,7 @@ Lengths are millimetres, angles radians. Every arc spans at most half a turn, so
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 Point = tuple[float, float]
@@ -252,11 +253,26 @@ def edge_from_bulge(start: Point, end: Point, bulge: float) -> Edge:
     return Arc(start, end, (cx, cy), math.hypot(x0 - cx, y0 - cy), bulge > 0)
 
 
-def is_bent(edge: Edge) -> bool:
-    """Whether snapping has taken an end of an arc off its circle by more than BENT."""
+def quarter_arcs(
+    start: Point, end: Point, centre: Point, radius: float, sweep: float
+) -> list[Edge]:
+    """The arcs of at most a quarter turn round ``centre`` that together turn ``sweep``."""
+    count = max(1, math.ceil(abs(sweep) / (math.pi / 2) - 1e-6))
+    circle = Arc(start, end, centre, radius, sweep > 0)
+    first = circle.start_angle
+    stops = [start, *(circle.on_circle(first + sweep * i / count) for i in range(1, count)), end]
+    return [circle.part(a, b) for a, b in pairwise(stops)]
+
+
+def from_end_to_end(edge: Edge) -> Edge:
+    """The edge; where an end was taken off an arc's circle by more than BENT, the arc of its sweep
+    through both ends.
+    """
     if not isinstance(edge, Arc):
-        return False
-    return max(abs(edge.to_left(edge.start)), abs(edge.to_left(edge.end))) > BENT
+        return edge
+    if max(abs(edge.to_left(edge.start)), abs(edge.to_left(edge.end))) < BENT:
+        return edge
+    return edge_from_bulge(edge.start, edge.end, edge.bulge)
 
 
 def left_normal(edge: Edge, p: Point) -> Point:

@@ -15,8 +15,7 @@ from sbafab.geometry.edges import (
     Edge,
     Point,
     distance_to,
-    edge_from_bulge,
-    is_bent,
+    from_end_to_end,
 )
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
@@ -81,16 +80,10 @@ class Split(NamedTuple):
 def split_edges(edges: Sequence[Edge], tolerance: float = EPSILON) -> Split:
     """Each edge cut where it meets another; points nearer than 2 ``tolerance`` become one.
 
-    The order of the edges has no part in where they are cut. An arc that was bent before is cut
-    where the arc of its sweep between its ends is: what meets that is looked for along its circle.
+    The order of the edges has no part in where they are cut. What meets an arc is looked for along
+    its circle, so one that was bent before is taken from end to end.
     """
-    whole, edges = (
-        edges,
-        [
-            edge_from_bulge(edge.start, edge.end, edge.bulge) if is_bent(edge) else edge
-            for edge in edges
-        ],
-    )
+    whole, edges = edges, [from_end_to_end(edge) for edge in edges]
     cuts: list[list[Point]] = [[] for _ in edges]
     meeting: list[tuple[int, int]] = []
     for i, j in close_pairs([edge.bounds for edge in edges], tolerance):
