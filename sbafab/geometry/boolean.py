@@ -6,13 +6,12 @@ side of it only; the pieces that stay are chained into contours. Nothing is flat
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
 from sbafab.errors import SbafabError
 from sbafab.geometry.arrangement import Arrangement, InconsistentError
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, quarter_arcs
+from sbafab.geometry.edges import EPSILON, Edge, Line, Point, quarter_arcs
 from sbafab.geometry.facets import run_sweep
 from sbafab.geometry.pieces import overlaid
 from sbafab.geometry.region import Contour, Region
@@ -85,25 +84,6 @@ def arranged(owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Fou
 def _reading_order(contour: Contour) -> tuple[bool, float, float, float]:
     low_x, low_y, high_x, _ = contour.bounds
     return contour.is_hole, round(low_x, 6), round(low_y, 6), round(high_x, 6)
-
-
-def left_turn(before: Edge, after: Edge, reach: float = 0.0) -> float:
-    """Angle between -pi and pi turned to the left, from edge to edge or from chord to chord.
-
-    The chords run from the common corner to the points at distance ``reach``.
-    """
-    back = _heading(before.reversed(), reach)
-    return math.pi - (back - _heading(after, reach)) % math.tau
-
-
-def _heading(edge: Edge, reach: float) -> float:
-    """Angle from the edge's start to its point at distance ``reach``."""
-    ux, uy = edge.direction(edge.start)
-    angle = math.atan2(uy, ux)
-    if isinstance(edge, Arc):
-        bend = math.asin(min(1.0, reach / (2 * edge.radius)))
-        angle += bend if edge.ccw else -bend
-    return angle
 
 
 def tidy(loop: Sequence[Edge]) -> Contour | None:

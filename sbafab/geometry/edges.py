@@ -270,9 +270,17 @@ def from_end_to_end(edge: Edge) -> Edge:
     """
     if not isinstance(edge, Arc):
         return edge
-    if max(abs(edge.to_left(edge.start)), abs(edge.to_left(edge.end))) < BENT:
+    centre, radius = edge.centre, edge.radius
+    off = math.dist(edge.start, centre) - radius, math.dist(edge.end, centre) - radius
+    if -BENT < min(off) and max(off) < BENT:
         return edge
     return edge_from_bulge(edge.start, edge.end, edge.bulge)
+
+
+def left_turn(before: Edge, after: Edge) -> float:
+    """Angle between -pi and pi that a path turns to the left from one edge to the next."""
+    (ux, uy), (vx, vy) = before.direction(before.end), after.direction(after.start)
+    return math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
 
 
 def left_normal(edge: Edge, p: Point) -> Point:

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-from sbafab.geometry.edges import Arc, Edge, Point
+from sbafab.geometry.edges import Arc, Edge, Point, left_turn
 from sbafab.geometry.facets import run_sweep
 from sbafab.geometry.region import Contour
 
@@ -36,9 +36,7 @@ class _Run(NamedTuple):
 
     def corner(self, after: _Run) -> float:
         """How far the path turns from this run to the next."""
-        ux, uy = self.last.direction(self.last.end)
-        vx, vy = after.first.direction(after.first.start)
-        return math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
+        return left_turn(self.last, after.first)
 
     def is_fillet(self, bottom: _Run) -> bool:
         """Whether it rounds a corner of the run beside it, which turns less tightly."""

@@ -8,22 +8,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-from sbafab.geometry.edges import (
-    BENT,
-    EPSILON,
-    Arc,
-    Edge,
-    Point,
-    distance_to,
-    from_end_to_end,
-)
+from sbafab.geometry.edges import BENT, EPSILON, Arc, Edge, Point, distance_to, from_end_to_end
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
 from sbafab.geometry.pool import PointPool
 
 DIGIT = 16
 """Bits: how often the edges of several owners wind stands in one whole number, a digit an owner."""
-
 ROUNDS = 4
 """Most times that edges are cut over again."""
 
@@ -166,22 +157,16 @@ def _offset(edge: Edge, a: Point, b: Point) -> float:
 
 def _united(entries: list[tuple[float, Edge, int]], same: float) -> Iterator[Piece]:
     """One piece for each group of edges with common ends whose middles are near each other."""
-    if len(entries) > 1:
-        entries.sort(key=lambda entry: entry[0])
-    group: list[tuple[float, Edge, int]] = []
-    for entry in entries:
-        if group and entry[0] - group[-1][0] >= same:
-            yield from _one_of(group)
-            group = []
-        group.append(entry)
-    yield from _one_of(group)
-
-
-def _one_of(group: Sequence[tuple[float, Edge, int]]) -> Iterator[Piece]:
-    turns = sum(turns for _, _, turns in group)
-    if turns:
-        edge = (min(group, key=_plainest) if len(group) > 1 else group[0])[1]
-        yield Piece(edge, turns if edge.start < edge.end else -turns)
+    entries.sort(key=lambda entry: entry[0])
+    start = 0
+    for stop in range(1, len(entries) + 1):
+        if stop < len(entries) and entries[stop][0] - entries[stop - 1][0] < same:
+            continue
+        group, start = entries[start:stop], stop
+        turns = sum(turns for _, _, turns in group)
+        if turns:
+            edge = min(group, key=_plainest)[1]
+            yield Piece(edge, turns if edge.start < edge.end else -turns)
 
 
 def _plainest(entry: tuple[float, Edge, int]) -> tuple[float, Point]:
