@@ -7,8 +7,8 @@ import pytest
 from sbafab.geometry import arrangement
 from sbafab.geometry.arrangement import Arrangement, InconsistentError
 from sbafab.geometry.boolean import GeometryError, union, wound
-from sbafab.geometry.edges import EPSILON, Arc, Line, Point, distance_to
-from sbafab.geometry.pieces import Overlay, Piece, overlaid, split_edges
+from sbafab.geometry.edges import EPSILON, Arc, Line, Point, distance_to, left_normal
+from sbafab.geometry.pieces import Overlay, Piece, by_owner, overlaid, split_edges
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, rectangle
 
@@ -28,6 +28,18 @@ def test_windings_of_nested_and_crossing_shapes() -> None:
         p = (x - 1e-4 * uy, y + 1e-4 * ux)
         inside = [r.contains(p) for r in (disc((0, 0), 3), disc((0, 0), 2), disc((2.5, 0), 1))]
         assert found.left[half] == sum(inside) + rectangle((9, 0), (10, 1)).contains(p)
+
+
+def test_each_owner_has_its_own_windings() -> None:
+    first, second = disc((0, 0), 3), rectangle((0, -9), (9, 9))
+    rows = [first, second, *([disc((0, 0), 1)] * 30), second]
+    found = Arrangement(overlaid([region.edges for region in rows]))
+    for half, turns in enumerate(found.left):
+        edge = found.edge(half)
+        nx, ny = left_normal(edge, edge.at(0.5))
+        x, y = edge.at(0.5)
+        p = (x + 1e-4 * nx, y + 1e-4 * ny)
+        assert by_owner(turns, len(rows)) == [int(region.contains(p)) for region in rows]
 
 
 def test_a_wrong_order_round_a_point_of_touch_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
