@@ -272,7 +272,7 @@ def from_end_to_end(edge: Edge) -> Edge:
         return edge
     centre, radius = edge.centre, edge.radius
     off = math.dist(edge.start, centre) - radius, math.dist(edge.end, centre) - radius
-    if -BENT < min(off) and max(off) < BENT:
+    if min(off) > -BENT and max(off) < BENT:
         return edge
     return edge_from_bulge(edge.start, edge.end, edge.bulge)
 

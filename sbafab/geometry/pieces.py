@@ -137,14 +137,24 @@ def _stops(edge: Edge, points: Sequence[Point], pool: PointPool) -> list[Point]:
     return [start, *sorted(inner, key=along.__getitem__), end]
 
 
-def _merged(entries: Iterable[tuple[Edge, int]], tolerance: float) -> list[Piece]:
+class _Entry(NamedTuple):
+    """An edge: how far its middle is off the chord, its number, how often it winds that chord."""
+
+    offset: float
+    number: int
+    edge: Edge
+    turns: int
+
+
+def _merged(edges: Iterable[tuple[Edge, int]], tolerance: float) -> list[Piece]:
     """Cut edges, those that coincide as one; none where the chains wind alike on both sides."""
-    between: dict[tuple[Point, Point], list[tuple[float, Edge, int]]] = defaultdict(list)
-    for edge, turns in entries:
+    between: dict[tuple[Point, Point], list[_Entry]] = defaultdict(list)
+    for number, (edge, turns) in enumerate(edges):
         forward = edge.start < edge.end
         a, b = (edge.start, edge.end) if forward else (edge.end, edge.start)
-        between[a, b].append((_offset(edge, a, b), edge, turns if forward else -turns))
-    return [piece for group in between.values() for piece in _united(group, 4 * tolerance)]
+        entry = _Entry(_offset(edge, a, b), number, edge, turns if forward else -turns)
+        between[a, b].append(entry)
+    return [piece for entries in between.values() for piece in _united(entries, 4 * tolerance)]
 
 
 def _offset(edge: Edge, a: Point, b: Point) -> float:
@@ -155,21 +165,26 @@ def _offset(edge: Edge, a: Point, b: Point) -> float:
     return (dx * (y - a[1]) - dy * (x - a[0])) / math.hypot(dx, dy)
 
 
-def _united(entries: list[tuple[float, Edge, int]], same: float) -> Iterator[Piece]:
+def _united(entries: list[_Entry], same: float) -> Iterator[Piece]:
     """One piece for each group of edges with common ends whose middles are near each other."""
-    entries.sort(key=lambda entry: entry[0])
+    entries.sort()
     start = 0
     for stop in range(1, len(entries) + 1):
-        if stop < len(entries) and entries[stop][0] - entries[stop - 1][0] < same:
+        if stop < len(entries) and entries[stop].offset - entries[stop - 1].offset < same:
             continue
         group, start = entries[start:stop], stop
-        turns = sum(turns for _, _, turns in group)
+        turns = sum(entry.turns for entry in group)
         if turns:
-            edge = min(group, key=_plainest)[1]
+            edge = min(group, key=_plainest).edge if len(group) > 1 else group[0].edge
             yield Piece(edge, turns if edge.start < edge.end else -turns)
 
 
-def _plainest(entry: tuple[float, Edge, int]) -> tuple[float, Point]:
-    """Lines first, then arcs by radius: the same choice in any order, and along a whole circle."""
-    edge = entry[1]
-    return (edge.radius, edge.centre) if isinstance(edge, Arc) else (0.0, (0.0, 0.0))
+def _plainest(entry: _Entry) -> tuple[float, Point, int]:
+    """Lines first, then arcs by radius: the same choice in any order, and along a whole circle.
+
+    Of edges that are equal but for their direction, the first.
+    """
+    edge = entry.edge
+    if isinstance(edge, Arc):
+        return edge.radius, edge.centre, entry.number
+    return 0.0, (0.0, 0.0), entry.number
