@@ -6,23 +6,15 @@ nearer to its arcs than anything measures: films and round holes stay, masks giv
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from itertools import pairwise
-
 from sbafab.geometry.boolean import tidy
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
-from sbafab.geometry.facets import chord_step, run_sweep, ticks
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line
+from sbafab.geometry.facets import run_chords
 from sbafab.geometry.region import Contour, Region
 from sbafab.laminate.laminate import Role
 
 FINE = 0.0004
 """mm: chords of films and of round holes stay nearer, so that pins fit as in arcs, and a mask's
 edge that gives way has nothing to make up for."""
-LEAST = 8
-"""Chords that a whole turn has at least."""
-ROOM = 0.05
-"""Share of a chord's angle within which no vertex stands beside the end of an arc."""
 
 
 def in_chords(path: Region, role: Role | None, error: float, beam: float = 0.0) -> Region:
@@ -53,7 +45,7 @@ def _contour(contour: Contour, grows: bool, error: float, beam: float) -> Contou
     points = [
         p
         for run in contour.runs
-        for p in _points(run, grows or _rounds_corner(run[0], beam), error)
+        for p in run_chords(run, grows or _rounds_corner(run[0], beam), error)
     ]
     loop = [Line(p, q) for p, q in zip(points, (*points[1:], points[0]), strict=True) if p != q]
     return tidy(loop) or Contour(tuple(loop))
@@ -61,28 +53,3 @@ def _contour(contour: Contour, grows: bool, error: float, beam: float) -> Contou
 
 def _rounds_corner(edge: Edge, beam: float) -> bool:
     return isinstance(edge, Arc) and edge.ccw and beam > 0 and abs(edge.radius - beam) < EPSILON
-
-
-def _points(run: Sequence[Edge], grows: bool, error: float) -> list[Point]:
-    """Vertices of a stretch, but for the last, where the next begins."""
-    first = run[0]
-    if isinstance(first, Line):
-        return [first.start]
-    step = chord_step(math.acos(first.radius / (first.radius + error)) / (1 + ROOM), LEAST)
-    angles = ticks(run, step, ROOM)
-    is_whole = run[-1].end == first.start
-    if is_whole:
-        angles.append(angles[0] + (math.tau if first.ccw else -math.tau))
-    else:
-        angles = [first.start_angle, *angles, first.start_angle + run_sweep(run)]
-    if first.ccw == grows:
-        corners = [_apex(first, a, b) for a, b in pairwise(angles)]
-    else:
-        corners = [first.on_circle(angle) for angle in angles[not is_whole : -1]]
-    return corners if is_whole else [first.start, *corners]
-
-
-def _apex(arc: Arc, a: float, b: float) -> Point:
-    """Where the tangents at two angles meet."""
-    middle, radius = (a + b) / 2, arc.radius / math.cos((b - a) / 2)
-    return arc.centre[0] + radius * math.cos(middle), arc.centre[1] + radius * math.sin(middle)

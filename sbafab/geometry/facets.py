@@ -6,9 +6,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
-from sbafab.geometry.edges import Arc, Edge, Point
+from sbafab.geometry.edges import Arc, Edge, Line, Point
 from sbafab.geometry.region import Contour
+
+ROOM = 0.05
+"""Share of a chord's angle within which no vertex stands beside the end of a run of chords that
+keep to one side of it.
+"""
 
 
 def chord_step(half: float, least: int) -> float:
@@ -67,3 +73,32 @@ def facets(contour: Contour, sagitta: float, keeps_area: bool = True) -> list[Po
     if len(points) < 3:
         return [edge.at(t) for edge in contour.edges for t in (0.0, 0.5)]
     return points
+
+
+def run_chords(run: Sequence[Edge], grows: bool, error: float) -> list[Point]:
+    """Vertices of chords within ``error`` mm of a run, but for the last, where the next run begins.
+
+    What lies to the left of the run lies left of the chords too if it ``grows``, and there is
+    nowhere more of it if not.
+    """
+    first = run[0]
+    if isinstance(first, Line):
+        return [first.start]
+    step = chord_step(math.acos(first.radius / (first.radius + error)) / (1 + ROOM), 8)
+    angles = ticks(run, step, ROOM)
+    is_whole = run[-1].end == first.start
+    if is_whole:
+        angles.append(angles[0] + (math.tau if first.ccw else -math.tau))
+    else:
+        angles = [first.start_angle, *angles, first.start_angle + run_sweep(run)]
+    if first.ccw == grows:
+        corners = [_apex(first, a, b) for a, b in pairwise(angles)]
+    else:
+        corners = [first.on_circle(angle) for angle in angles[not is_whole : -1]]
+    return corners if is_whole else [first.start, *corners]
+
+
+def _apex(arc: Arc, a: float, b: float) -> Point:
+    """Where the tangents at two angles meet."""
+    middle, radius = (a + b) / 2, arc.radius / math.cos((b - a) / 2)
+    return arc.centre[0] + radius * math.cos(middle), arc.centre[1] + radius * math.sin(middle)

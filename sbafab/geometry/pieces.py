@@ -13,6 +13,8 @@ from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
 from sbafab.geometry.pool import PointPool
 
+_Entry = tuple[float, int, Edge, int]
+"""How far the middle of an edge is off its chord, the edge's number, the edge, its turns."""
 DIGIT = 16
 """Bits: how often the edges of several owners wind stands in one whole number, a digit an owner."""
 ROUNDS = 4
@@ -137,23 +139,13 @@ def _stops(edge: Edge, points: Sequence[Point], pool: PointPool) -> list[Point]:
     return [start, *sorted(inner, key=along.__getitem__), end]
 
 
-class _Entry(NamedTuple):
-    """An edge: how far its middle is off the chord, its number, how often it winds that chord."""
-
-    offset: float
-    number: int
-    edge: Edge
-    turns: int
-
-
 def _merged(edges: Iterable[tuple[Edge, int]], tolerance: float) -> list[Piece]:
     """Cut edges, those that coincide as one; none where the chains wind alike on both sides."""
     between: dict[tuple[Point, Point], list[_Entry]] = defaultdict(list)
     for number, (edge, turns) in enumerate(edges):
         forward = edge.start < edge.end
         a, b = (edge.start, edge.end) if forward else (edge.end, edge.start)
-        entry = _Entry(_offset(edge, a, b), number, edge, turns if forward else -turns)
-        between[a, b].append(entry)
+        between[a, b].append((_offset(edge, a, b), number, edge, turns if forward else -turns))
     return [piece for entries in between.values() for piece in _united(entries, 4 * tolerance)]
 
 
@@ -170,12 +162,12 @@ def _united(entries: list[_Entry], same: float) -> Iterator[Piece]:
     entries.sort()
     start = 0
     for stop in range(1, len(entries) + 1):
-        if stop < len(entries) and entries[stop].offset - entries[stop - 1].offset < same:
+        if stop < len(entries) and entries[stop][0] - entries[stop - 1][0] < same:
             continue
         group, start = entries[start:stop], stop
-        turns = sum(entry.turns for entry in group)
+        turns = sum(turns for *_, turns in group)
         if turns:
-            edge = min(group, key=_plainest).edge if len(group) > 1 else group[0].edge
+            edge = min(group, key=_plainest)[2]
             yield Piece(edge, turns if edge.start < edge.end else -turns)
 
 
@@ -184,7 +176,7 @@ def _plainest(entry: _Entry) -> tuple[float, Point, int]:
 
     Of edges that are equal but for their direction, the first.
     """
-    edge = entry.edge
+    _, number, edge, _ = entry
     if isinstance(edge, Arc):
-        return edge.radius, edge.centre, entry.number
-    return 0.0, (0.0, 0.0), entry.number
+        return edge.radius, edge.centre, number
+    return 0.0, (0.0, 0.0), number
