@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from sbafab.geometry.arrangement import split_edges
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal
 from sbafab.geometry.intersect import line_circle
 from sbafab.geometry.nearby import EdgeIndex, widened
+from sbafab.geometry.pieces import by_owner, overlaid
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import spread
 
@@ -24,24 +24,12 @@ STEEP = 0.01
 
 def edges_along(region: Region, other: Region) -> list[Edge]:
     """The stretches of ``region``'s edges that run along edges of ``other``, the same way."""
-    edges = [*region.edges, *other.edges]
-    own = len(region.edges)
-    middles: dict[tuple[Point, Point], list[Point]] = {}
-    stretches: list[Edge] = []
-    for index, pieces in enumerate(split_edges(edges)):
-        if index < own:
-            stretches += pieces
-        else:
-            for piece in pieces:
-                middles.setdefault((piece.start, piece.end), []).append(piece.at(0.5))
-    return [
-        piece
-        for piece in stretches
-        if any(
-            math.dist(piece.at(0.5), middle) < 4 * EPSILON
-            for middle in middles.get((piece.start, piece.end), ())
-        )
-    ]
+    along = []
+    for edge, turns in overlaid([region.edges, other.edges]).pieces:
+        own, others = by_owner(turns, 2)
+        if own * others > 0:
+            along.append(edge if own > 0 else edge.reversed())
+    return along
 
 
 def beside(edge: Edge, distance: float) -> Point:
