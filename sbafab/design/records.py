@@ -155,6 +155,10 @@ class Registration(Section):
     paper's). "ears": tooling holes outside the outline, pinned in every press step."""
     pin_diameter: Length = 1.5
     """Dowel pins of the ears."""
+    pin_standard: Literal["ISO 8734", "ISO 2338"] = "ISO 8734"
+    """Whose diameters and lengths the dowel pins have; both are ground to m6."""
+    pin_lengths: tuple[Length, ...] = Field(default=(), max_length=30, strict=False)
+    """Lengths of pins that you have, in place of the standard's."""
     cutting_error: Annotated[float, Millimetres(0, 1)] = 0.1
     """The most by which a cut edge lies off its place (paper Sec. 2)."""
     pin_error: Annotated[float, Millimetres(0, 1)] = 0.004
@@ -176,6 +180,21 @@ class Press(Section):
     """Heated area; the paper's press has 6 x 6 in."""
     platen_length: Length = 152.4
     """Heated area, the other way."""
+    plate_material: str = Field(default="steel", max_length=80)
+    """Base plate, as large as the platen: under every lay-up, with the holes for the pins."""
+    plate_thickness: Length | None = None
+    """Of the base plate; by default the thinnest plate sold, from 6 mm, that takes the pins."""
+    release_film: str = Field(default="PTFE film", max_length=80)
+    """What TPE does not stick to, one sheet below and one above (the paper names none)."""
+    release_thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.05
+    """Thickness of one release film; PTFE film is sold in this thickness."""
+    pad_material: Literal["silicone sponge", "silicone rubber"] = "silicone sponge"
+    """Press pad: the compliant sheet, as large as the platen, that spreads the force (ours)."""
+    pad_thickness: Length | None = None
+    """Of the press pad; by default the thinnest sold that gives films 1.5 times the pressure."""
+    pad_hardness: float = Field(default=10.0, ge=5, le=90)
+    """Shore A; 10 is a soft closed-cell silicone sponge, grade 4 of ASTM D1056 by Gent's formula;
+    sheets of solid silicone rubber have 40 to 70."""
     flash_bottom_minutes: float = Field(default=3.0, gt=0, le=600)
     """Step 1: the bottom balloon's upper two layers."""
     bond_bottom_minutes: float = Field(default=12.0, gt=0, le=600)

@@ -100,11 +100,20 @@ class Inlet:
 
 @dataclass(frozen=True)
 class Pin:
-    """A dowel pin of the press fixture; it holds every layer with an opening at its place."""
+    """A dowel pin of the press fixture; it holds every layer with an opening at its place.
+
+    ``clearance``: by how much the layers' hole for it is wider than the pin.
+    """
 
     name: str
     centre: Point
     diameter: float
+    clearance: float = 0.0
+
+    @property
+    def hole(self) -> float:
+        """Diameter of the layers' hole for the pin."""
+        return self.diameter + self.clearance
 
 
 @dataclass(frozen=True, repr=False)
@@ -195,7 +204,7 @@ class Laminate:
             pin
             for pin in self.pins
             if any(
-                math.dist(centre, pin.centre) < LOOSE and abs(2 * radius - pin.diameter) < LOOSE
+                math.dist(centre, pin.centre) < LOOSE and abs(2 * radius - pin.hole) < LOOSE
                 for centre, radius in circles
             )
         )

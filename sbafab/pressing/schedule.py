@@ -9,8 +9,8 @@ import csv
 import io
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import asdict, dataclass, field
+from typing import Any, NamedTuple
 
 from sbafab.errors import DesignError
 from sbafab.laminate.assembly import (
@@ -22,6 +22,9 @@ from sbafab.laminate.assembly import (
     stack_count,
 )
 from sbafab.laminate.laminate import Laminate
+from sbafab.pressing import build_up
+from sbafab.pressing.build_up import Footprint, Item, Pad
+from sbafab.pressing.dowels import PinSetting, Standard, is_sold, plate_thickness, settings_by_step
 
 TITLES: dict[StepName, str] = {
     "flash_bottom": "Bottom balloon, upper two layers",
@@ -41,6 +44,9 @@ SNIP = (
     "masks stay in their pockets."
 )
 
+BASE_PLATE, RELEASE, LAMINATE, PAD = "base plate", "release film", "laminate", "press pad"
+"""The parts of the build-up, between the platens."""
+
 HOTTEST_TRIED = 150.0
 PRESSURES_TRIED = (70.0, 200.0)
 HANDLING_MINUTES = 60.0
@@ -59,6 +65,13 @@ COLUMNS = (
     "platen_width_mm",
     "platen_length_mm",
     "minutes",
+    "film_kpa",
+    "edge_kpa",
+    "bond_kpa",
+    "plate_kpa",
+    "pressure_basis",
+    "build_up",
+    "pin_settings",
     "instructions",
 )
 
@@ -75,6 +88,13 @@ class PressSettings:
     flash_middle: float = 10.0
     bond_all: float = 20.0
     validated_balloons: int = 20
+    pad: Pad = field(default_factory=Pad)
+    plate_material: str = "steel"
+    plate_thickness: float | None = None
+    release_film: str = "PTFE film"
+    release_thickness: float = 0.05
+    pin_standard: Standard = "ISO 8734"
+    pin_lengths: tuple[float, ...] = ()
 
     @property
     def force_n(self) -> float:
@@ -96,7 +116,9 @@ class Step:
     """One closing of the press.
 
     ``layers`` are pressed together, ``adds`` those of them that join in this step, both by layer
-    index; ``pins`` names the dowel pins that are in.
+    index; ``pins`` names the dowel pins that are in, ``pin_settings`` how long they are and how
+    deep they sit. ``pressure_kpa`` is the force on the whole platen, ``film_kpa`` and the others
+    what the pad makes of it (``build_up.Pressures``). ``build_up`` goes from the lower platen up.
     """
 
     step: int
@@ -110,7 +132,19 @@ class Step:
     force_n: float
     platen_mm: tuple[float, float]
     minutes: float
+    film_kpa: float
+    edge_kpa: float
+    bond_kpa: float
+    plate_kpa: float
+    pressure_basis: str
+    build_up: tuple[Item, ...]
+    pin_settings: tuple[PinSetting, ...]
     instructions: str
+
+    @property
+    def stack_mm(self) -> float:
+        """Height of the stack that is pressed."""
+        return next(item.thickness_mm for item in self.build_up if item.part == LAMINATE)
 
 
 @dataclass(frozen=True)
@@ -129,14 +163,28 @@ def schedule(laminate: Laminate, press: PressSettings) -> Schedule:
 
     Flash bonds hold layers in place on their pins. Full bonds are pressed without any: base and
     cap have no bore for a channel pin, and a lumen pin, though it would pass, stays out as in the
-    paper. Raises DesignError at a temperature that would not bond TPE or that PTFE does not stand.
+    paper. Raises DesignError at a temperature that would not bond TPE or that PTFE or the pad does
+    not stand, and where pad, pins or plate do not do for the laminate.
     """
     _refuse_temperature(laminate, press)
-    *parts, last = assembly(laminate)
-    after = f" {SNIP}" if laminate.registration == "ears" else ""
-    steps = (
-        *(_step(laminate, part, press) for part in parts),
-        _step(laminate, last, press, after),
+    parts = assembly(laminate)
+    under = [build_up.footprint(laminate, part.layers) for part in parts]
+    pad = build_up.pad_thickness(press.pressure_kpa, press.platen, press.pad, under)
+    pins = settings_by_step(
+        [(stack.height, part.pins) for stack, part in zip(under, parts, strict=True)],
+        press.pin_standard,
+        press.pin_lengths,
+    )
+    plate = plate_thickness(press.plate_thickness, pins)
+    steps = tuple(
+        _step(
+            laminate,
+            part,
+            press,
+            _Setting(pad, plate, stack, own),
+            f" {SNIP}" if laminate.registration == "ears" and part is parts[-1] else "",
+        )
+        for part, stack, own in zip(parts, under, pins, strict=True)
     )
     total = sum(step.minutes for step in steps)
     return Schedule(
@@ -149,8 +197,20 @@ def schedule(laminate: Laminate, press: PressSettings) -> Schedule:
     )
 
 
-def _step(laminate: Laminate, part: AssemblyStep, press: PressSettings, after: str = "") -> Step:
+class _Setting(NamedTuple):
+    """Thickness of pad and plate, mm, and what one step's stack and pins are like."""
+
+    pad: float
+    plate: float
+    under: Footprint
+    pins: tuple[PinSetting, ...]
+
+
+def _step(
+    laminate: Laminate, part: AssemblyStep, press: PressSettings, own: _Setting, after: str
+) -> Step:
     count = stack_count(laminate, part.layers)
+    found = build_up.pressures(press.pressure_kpa, press.platen, press.pad, own.pad, own.under)
     return Step(
         step=part.number,
         title=TITLES[part.name] if count == 1 else TITLES_OF_SEVERAL[part.name],
@@ -163,8 +223,35 @@ def _step(laminate: Laminate, part: AssemblyStep, press: PressSettings, after: s
         force_n=round(press.force_n, 1),
         platen_mm=press.platen,
         minutes=press.minutes(part.name),
+        film_kpa=found.film,
+        edge_kpa=found.edge,
+        bond_kpa=found.bond,
+        plate_kpa=found.plate,
+        pressure_basis=build_up.said(press.pressure_kpa, press.pad, own.pad, own.under, found)
+        + _round_pins(press, own),
+        build_up=tuple(_items(press, own)),
+        pin_settings=own.pins,
         instructions=_instructions(part, count) + after,
     )
+
+
+def _round_pins(press: PressSettings, own: _Setting) -> str:
+    out = max((pin.stands_mm - own.under.height for pin in own.pins), default=0.0)
+    if not out:
+        return ""
+    free = build_up.unpressed(press.pressure_kpa, press.pad, out)
+    return f"; up to {free:.1f} mm round a pin none"
+
+
+def _items(press: PressSettings, own: _Setting) -> Iterator[Item]:
+    """From the lower platen up; the films take the size that they have."""
+    release = Item(RELEASE, press.release_film, press.release_thickness, press.platen)
+    pad = f"{press.pad.material}, {press.pad.hardness:g} Shore A"
+    yield Item(BASE_PLATE, press.plate_material, own.plate, press.platen)
+    yield release
+    yield Item(LAMINATE, "films of this step", round(own.under.height, 6), (0.0, 0.0))
+    yield release
+    yield Item(PAD, pad, own.pad, press.platen)
 
 
 def _instructions(part: AssemblyStep, count: int) -> str:
@@ -219,6 +306,11 @@ def _refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
                 f"{film.limit:g} C for {film.product}; lower it, for hotter PTFE gives off toxic "
                 "fumes"
             )
+    if press.temperature_c > build_up.PAD_LIMIT_C:
+        raise DesignError(
+            f"press.temperature_c = {press.temperature_c:g} is more than the press pad of "
+            f"{press.pad.material} stands, {build_up.PAD_LIMIT_C:g} C; lower it"
+        )
 
 
 def _warnings(laminate: Laminate, press: PressSettings, steps: Sequence[Step]) -> Iterator[str]:
@@ -238,6 +330,29 @@ def _warnings(laminate: Laminate, press: PressSettings, steps: Sequence[Step]) -
             f"{laminate.balloons} balloons are more than the {press.validated_balloons} validated; "
             "heat must pass the whole laminate, so try the bond on a sample first"
         )
+    uneven = [step for step in steps if not low <= step.film_kpa <= high]
+    if uneven and low <= press.pressure_kpa <= high:
+        worst = max(uneven, key=lambda step: abs(step.film_kpa - press.pressure_kpa))
+        yield (
+            f"step {worst.step}: the films get about {worst.film_kpa:.0f} kPa (estimate), outside "
+            f"{low:g} to {high:g} kPa; take a thicker or softer pad (press.pad_thickness, "
+            "press.pad_hardness)"
+        )
+    pad = next(item.thickness_mm for item in steps[0].build_up if item.part == PAD)
+    if (sheets := build_up.pieces(pad)) > 1:
+        yield (
+            f"the press pad is a pile of {sheets} sheets, {pad:g} mm high together, which may "
+            "slide aside: hold it in a frame, and see whether the press opens so far"
+        )
+    unsold = {
+        pin.diameter for pin in laminate.pins if not is_sold(pin.diameter, press.pin_standard)
+    }
+    if unsold and not press.pin_lengths:
+        yield (
+            f"{press.pin_standard} has no dowel pin of diameter "
+            f"{_listed([f'{diameter:g}' for diameter in sorted(unsold)])}: change the diameter, or "
+            "make the pins and give their lengths in registration.pin_lengths"
+        )
     for step in steps:
         if step.bond == "flash":
             held = {pin for pin in laminate.pins if pin.name in step.pins}
@@ -252,6 +367,14 @@ def _warnings(laminate: Laminate, press: PressSettings, steps: Sequence[Step]) -
                 yield f"step {step.step}: no pin holds {which}; align by hand"
 
 
+def pin_words(pin: PinSetting) -> str:
+    """One pin as the table and the page name it."""
+    return (
+        f"{pin.pin}: {pin.diameter_mm:g} x {pin.length_mm:g} mm, {pin.seat_mm:g} in the plate, "
+        f"stands {pin.stands_mm:g}"
+    )
+
+
 def _by_role(laminate: Laminate, layers: Sequence[int]) -> str:
     counts = Counter(laminate.layer(index).role for index in layers)
     return _listed([f"the {count} {role}s" for role, count in counts.items()])
@@ -260,18 +383,19 @@ def _by_role(laminate: Laminate, layers: Sequence[int]) -> str:
 def press_json(plan: Schedule) -> dict[str, Any]:
     """The schedule as ``press.json`` holds it."""
     return {
-        "steps": [
-            {
-                key: list(value) if isinstance(value, tuple) else value
-                for key, value in asdict(step).items()
-            }
-            for step in plan.steps
-        ],
+        "steps": [_plain(asdict(step)) for step in plan.steps],
         "total_press_minutes": plan.total_press_minutes,
         "estimated_build_minutes": plan.estimated_build_minutes,
         "estimate_basis": plan.estimate_basis,
         "warnings": list(plan.warnings),
     }
+
+
+def _plain(value: Any) -> Any:
+    """Tuples as lists, as JSON has them, at every depth."""
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    return [_plain(one) for one in value] if isinstance(value, tuple | list) else value
 
 
 def press_csv(plan: Schedule) -> str:
@@ -293,6 +417,13 @@ def press_csv(plan: Schedule) -> str:
                 f"{step.force_n:.1f}",
                 *(f"{size:g}" for size in step.platen_mm),
                 f"{step.minutes:g}",
+                f"{step.film_kpa:g}",
+                f"{step.edge_kpa:g}",
+                f"{step.bond_kpa:g}",
+                f"{step.plate_kpa:g}",
+                step.pressure_basis,
+                "; ".join(f"{i.part} {i.thickness_mm:g} mm ({i.material})" for i in step.build_up),
+                "; ".join(map(pin_words, step.pin_settings)),
                 step.instructions,
             ]
         )
