@@ -40,6 +40,8 @@ def limits(design: Design) -> Limits:
             placement=design.registration.hand_placement,
             turn=design.registration.hand_turn,
         ),
+        unknown_kerf=design.laser.unknown_kerf,
+        pin_stretch=design.registration.pin_stretch,
         worst_bond_width=design.rules.worst_bond_width,
         worst_mask_overhang=design.rules.worst_mask_overhang,
         target_yield=design.rules.target_yield,
