@@ -163,6 +163,7 @@ def build(design: LobedDesign) -> Laminate:
         lumen=design.lumen.diameter,
         balloons=design.stack.balloons,
         registration=design.registration.method,
+        pins_in_full_bonds=design.registration.full_bond_pins == "in",
         notes=(*((note,) if note else ()), *((NOTE,) if ears else ())),
         outline=plates,
     )

@@ -74,6 +74,7 @@ def build(design: OneDofDesign) -> Laminate:
         lumen=None,
         balloons=balloons,
         registration=design.registration.method,
+        pins_in_full_bonds=design.registration.full_bond_pins == "in",
         notes=(NOTE,) if ears else (),
         outline=plates,
     )

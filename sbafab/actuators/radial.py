@@ -175,6 +175,7 @@ def build(design: RadialDesign) -> Laminate:
         lumen=None,
         balloons=design.stack.balloons,
         registration=design.registration.method,
+        pins_in_full_bonds=design.registration.full_bond_pins == "in",
         notes=(NOTE,) if ears else (),
     )
 

@@ -163,6 +163,10 @@ class Registration(Section):
     paper's). "ears": tooling holes outside the outline, pinned in every press step."""
     pin_diameter: Length = 1.5
     """Dowel pins of the ears."""
+    full_bond_pins: Literal["out", "in"] = "out"
+    """Ears: "out" tacks base and cap on the pins by a flash bond and draws the pins before the full
+    bond, as the paper keeps pins out of molten TPE; "in" leaves them in, under a release sleeve or
+    coat. Neither was tried."""
     pin_clearance: Annotated[float, Millimetres(0, 1)] = 0.0
     """By how much the holes of the ears are wider than their pins; up to three steps add it up."""
     pin_stretch: float = Field(default=0.3, ge=0, le=2)
@@ -391,8 +395,14 @@ class Design(Section):
         if self.inlet.width is not None:
             return self.inlet.width
         opened = math.pi / 2 * (self.inlet.tube_outer_diameter + self.films.ptfe.thickness)
-        lost = 2 * self.registration.cutting_error + self.laser.unknown_kerf
-        return round(math.ceil((opened + lost) / 0.05 - 1e-9) * 0.05, 4)
+        return round(math.ceil((opened + self.strip_loss) / 0.05 - 1e-9) * 0.05, 4)
+
+    @property
+    def strip_loss(self) -> float:
+        """By how much a strip may come out narrower than drawn, mm, whether a kerf is known or not:
+        one that is measured later changes no strip.
+        """
+        return 2 * self.registration.cutting_error + self.laser.unknown_kerf
 
     @property
     @abstractmethod

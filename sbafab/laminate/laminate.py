@@ -121,7 +121,8 @@ class Laminate:
     """A stack of layers, bottom to top, with what the layers alone do not tell.
 
     ``outline`` is that of the films of all balloons laid over each other, without inlet tabs and
-    ears; empty where only the layers are known.
+    ears; empty where only the layers are known. ``pins_in_full_bonds``: whether the pins of ears
+    stay in while TPE melts.
     """
 
     name: str
@@ -136,6 +137,7 @@ class Laminate:
     registration: str
     notes: tuple[str, ...] = ()
     outline: Region = NOTHING
+    pins_in_full_bonds: bool = False
 
     def __repr__(self) -> str:
         return f"Laminate({self.name!r}, {self.family!r}, {len(self.layers)} layers)"

@@ -28,13 +28,16 @@ from sbafab.pressing.dowels import PinSetting, Standard, is_sold, plate_thicknes
 
 TITLES: dict[StepName, str] = {
     "flash_bottom": "Bottom balloon, upper two layers",
+    "tack_bottom": "Bottom balloon, its base tacked on",
     "bond_bottom": "Bottom balloon, with its base",
     "flash_middle": "Middle layers",
+    "tack_all": "Whole laminate, tacked",
     "bond_all": "Whole laminate",
 }
 TITLES_OF_SEVERAL = {
     **TITLES,
     "flash_bottom": "Bottom balloons, upper two layers of each",
+    "tack_bottom": "Bottom balloons, their bases tacked on",
     "bond_bottom": "Bottom balloons, each with its base",
 }
 """Where stacks are pressed beside each other."""
@@ -42,6 +45,15 @@ TITLES_OF_SEVERAL = {
 SNIP = (
     "Snip off the ears along the outline, and the tails of the inlet strips at the tab's end; the "
     "masks stay in their pockets."
+)
+
+PINS_OUT = (
+    "untested: with ears each full bond comes after a flash bond on the pins, and is pressed "
+    "without them; that the flash bond keeps the layers in register was not tried on a bench"
+)
+PINS_IN = (
+    "untested: the ears' pins stay in through the full bonds, where molten TPE can grip them; put "
+    "a release sleeve on each or coat it with a release agent, and try it on a sample first"
 )
 
 BASE_PLATE, RELEASE, LAMINATE, PAD = "base plate", "release film", "laminate", "press pad"
@@ -102,11 +114,13 @@ class PressSettings:
         return self.pressure_kpa * self.platen[0] * self.platen[1] / 1000
 
     def minutes(self, step: StepName) -> float:
-        """How long the press stays closed in a step."""
+        """How long the press stays closed in a step; tacking is a flash bond."""
         return {
             "flash_bottom": self.flash_bottom,
+            "tack_bottom": self.flash_bottom,
             "bond_bottom": self.bond_bottom,
             "flash_middle": self.flash_middle,
+            "tack_all": self.flash_middle,
             "bond_all": self.bond_all,
         }[step]
 
@@ -161,9 +175,8 @@ class Schedule:
 def schedule(laminate: Laminate, press: PressSettings) -> Schedule:
     """The press steps of a laminate, bottom balloon first.
 
-    Flash bonds hold layers in place on their pins. Full bonds are pressed without any: base and
-    cap have no bore for a channel pin, and a lumen pin, though it would pass, stays out as in the
-    paper. Raises DesignError at a temperature that would not bond TPE or that PTFE or the pad does
+    Flash bonds hold layers in place on their pins. Full bonds are pressed without any, as in the
+    paper; with ears a flash bond on the pins comes before each. Raises DesignError at a temperature that would not bond TPE or that PTFE or the pad does
     not stand, and where pad, pins or plate do not do for the laminate.
     """
     _refuse_temperature(laminate, press)
@@ -259,6 +272,8 @@ def _instructions(part: AssemblyStep, count: int) -> str:
     pins = [pin.name for pin in part.pins]
     stacks = ", then ".join(_named(stack) for stack in part.stacks if stack)
     on_pins = f"on the pin{'s' if len(pins) > 1 else ''} {_listed(pins)}"
+    if not part.adds:
+        return f"Lay {stacks} down again, with no pin. Press to the full bond and let it cool flat."
     if part.bond == "full":
         how = on_pins if pins else "by eye, with no pin"
         return (
@@ -283,6 +298,8 @@ def _named(layers: Sequence[int]) -> str:
             runs[-1][1] = index
         else:
             runs.append([index, index])
+    if not runs:
+        return "none"
     words = [
         word
         for first, last in runs
@@ -338,6 +355,8 @@ def _warnings(laminate: Laminate, press: PressSettings, steps: Sequence[Step]) -
             f"{low:g} to {high:g} kPa; take a thicker or softer pad (press.pad_thickness, "
             "press.pad_hardness)"
         )
+    if laminate.registration == "ears" and laminate.pins:
+        yield PINS_IN if laminate.pins_in_full_bonds else PINS_OUT
     pad = next(item.thickness_mm for item in steps[0].build_up if item.part == PAD)
     if (sheets := build_up.pieces(pad)) > 1:
         yield (

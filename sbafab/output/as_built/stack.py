@@ -35,6 +35,7 @@ def laminate_of(files: Sequence[LayerFile], claims: Manifest, design: Design) ->
         lumen=design.form.lumen,
         balloons=sum(layer.role == "chamber-mask" for layer in layers),
         registration=design.registration.method,
+        pins_in_full_bonds=design.registration.full_bond_pins == "in",
     )
     drilled = sorted(
         (hole.centre for hole in bores(layers, design.bore.diameter, bare.lumen)),
