@@ -17,7 +17,8 @@ from sbafab.meshing.files import MeshFile, write_meshes
 from sbafab.output.manifest import as_json, checks, file_hashes, manifest
 from sbafab.output.settings import GENERATOR, kerf_widths, limits, press_settings
 from sbafab.output.shop import CutSet, Progress
-from sbafab.pressing.schedule import Schedule, press_csv, press_json, schedule
+from sbafab.pressing.schedule import Schedule, schedule
+from sbafab.pressing.tables import press_csv, press_json
 from sbafab.rules.deck import has_failed
 from sbafab.rules.finding import Finding
 from sbafab.rules.lowered import CHECKED_AGAINST, lowered

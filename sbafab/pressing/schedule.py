@@ -5,12 +5,10 @@ Temperatures are C, pressures kPa, forces N, times minutes, lengths mm.
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from sbafab.errors import DesignError
 from sbafab.laminate.assembly import (
@@ -63,29 +61,6 @@ HOTTEST_TRIED = 150.0
 PRESSURES_TRIED = (70.0, 200.0)
 HANDLING_MINUTES = 60.0
 """The paper's total build time of 1.75 h less its 45 minutes in the press."""
-
-COLUMNS = (
-    "step",
-    "title",
-    "bond",
-    "layers",
-    "adds",
-    "pins",
-    "temperature_c",
-    "pressure_kpa",
-    "force_n",
-    "platen_width_mm",
-    "platen_length_mm",
-    "minutes",
-    "film_kpa",
-    "edge_kpa",
-    "bond_kpa",
-    "plate_kpa",
-    "pressure_basis",
-    "build_up",
-    "pin_settings",
-    "instructions",
-)
 
 
 @dataclass(frozen=True)
@@ -176,8 +151,9 @@ def schedule(laminate: Laminate, press: PressSettings) -> Schedule:
     """The press steps of a laminate, bottom balloon first.
 
     Flash bonds hold layers in place on their pins. Full bonds are pressed without any, as in the
-    paper; with ears a flash bond on the pins comes before each. Raises DesignError at a temperature that would not bond TPE or that PTFE or the pad does
-    not stand, and where pad, pins or plate do not do for the laminate.
+    paper; with ears a flash bond on the pins comes before each. Raises DesignError at a temperature
+    that would not bond TPE or that PTFE or the pad does not stand, and where pad, pins or plate do
+    not do for the laminate.
     """
     _refuse_temperature(laminate, press)
     parts = assembly(laminate)
@@ -270,7 +246,7 @@ def _items(press: PressSettings, own: _Setting) -> Iterator[Item]:
 def _instructions(part: AssemblyStep, count: int) -> str:
     """What to do in a step that makes ``count`` stacks beside each other."""
     pins = [pin.name for pin in part.pins]
-    stacks = ", then ".join(_named(stack) for stack in part.stacks if stack)
+    stacks = ", then ".join(named(stack) for stack in part.stacks if stack)
     on_pins = f"on the pin{'s' if len(pins) > 1 else ''} {_listed(pins)}"
     if not part.adds:
         return f"Lay {stacks} down again, with no pin. Press to the full bond and let it cool flat."
@@ -290,7 +266,7 @@ def _listed(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
-def _named(layers: Sequence[int]) -> str:
+def named(layers: Sequence[int]) -> str:
     """Layer indices in words; never 2-3, which a spreadsheet takes for a date."""
     runs: list[list[int]] = []
     for index in layers:
@@ -382,68 +358,10 @@ def _warnings(laminate: Laminate, press: PressSettings, steps: Sequence[Step]) -
             ]
             layers = [i for i in step.layers if laminate.layer(i).pattern in loose]
             if layers:
-                which = _named(layers) if len(layers) < 4 else _by_role(laminate, layers)
+                which = named(layers) if len(layers) < 4 else _by_role(laminate, layers)
                 yield f"step {step.step}: no pin holds {which}; align by hand"
-
-
-def pin_words(pin: PinSetting) -> str:
-    """One pin as the table and the page name it."""
-    return (
-        f"{pin.pin}: {pin.diameter_mm:g} x {pin.length_mm:g} mm, {pin.seat_mm:g} in the plate, "
-        f"stands {pin.stands_mm:g}"
-    )
 
 
 def _by_role(laminate: Laminate, layers: Sequence[int]) -> str:
     counts = Counter(laminate.layer(index).role for index in layers)
     return _listed([f"the {count} {role}s" for role, count in counts.items()])
-
-
-def press_json(plan: Schedule) -> dict[str, Any]:
-    """The schedule as ``press.json`` holds it."""
-    return {
-        "steps": [_plain(asdict(step)) for step in plan.steps],
-        "total_press_minutes": plan.total_press_minutes,
-        "estimated_build_minutes": plan.estimated_build_minutes,
-        "estimate_basis": plan.estimate_basis,
-        "warnings": list(plan.warnings),
-    }
-
-
-def _plain(value: Any) -> Any:
-    """Tuples as lists, as JSON has them, at every depth."""
-    if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items()}
-    return [_plain(one) for one in value] if isinstance(value, tuple | list) else value
-
-
-def press_csv(plan: Schedule) -> str:
-    """The steps as a table, one row each, with units in the column names."""
-    table = io.StringIO()
-    writer = csv.writer(table, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for step in plan.steps:
-        writer.writerow(
-            [
-                step.step,
-                step.title,
-                step.bond,
-                _named(step.layers),
-                _named(step.adds),
-                ", ".join(step.pins),
-                f"{step.temperature_c:g}",
-                f"{step.pressure_kpa:g}",
-                f"{step.force_n:.1f}",
-                *(f"{size:g}" for size in step.platen_mm),
-                f"{step.minutes:g}",
-                f"{step.film_kpa:g}",
-                f"{step.edge_kpa:g}",
-                f"{step.bond_kpa:g}",
-                f"{step.plate_kpa:g}",
-                step.pressure_basis,
-                "; ".join(f"{i.part} {i.thickness_mm:g} mm ({i.material})" for i in step.build_up),
-                "; ".join(map(pin_words, step.pin_settings)),
-                step.instructions,
-            ]
-        )
-    return table.getvalue()

@@ -34,8 +34,8 @@ class Limits:
     the laser's, ``kerf`` the full kerf width by material, or that along x and along y (none given:
     not calibrated, and up to ``unknown_kerf``), ``waive`` the rules whose failure the user accepts
     by name. The ``worst_`` limits are for what is left of bond and overhang under the
-    ``tolerances``; ``target_yield`` is the share of ``yield_builds`` random builds that must keep them (None: none
-    asked for; for the builds: as many as are quick).
+    ``tolerances``; ``target_yield`` is the share of ``yield_builds`` random builds that must keep
+    them (None: none asked for; for the builds: as many as are quick).
     """
 
     bond_width: float = 0.75

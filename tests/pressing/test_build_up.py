@@ -20,7 +20,8 @@ from sbafab.pressing.build_up import (
     pad_thickness,
     pressures,
 )
-from sbafab.pressing.schedule import PressSettings, press_json, schedule
+from sbafab.pressing.schedule import PressSettings, schedule
+from sbafab.pressing.tables import press_json
 
 Stack = Callable[..., Laminate]
 PAPER = PressSettings()

@@ -12,7 +12,8 @@ import pytest
 
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.schedule import PressSettings, press_csv, press_json, schedule
+from sbafab.pressing.schedule import PressSettings, schedule
+from sbafab.pressing.tables import press_csv, press_json
 
 Stack = Callable[..., Laminate]
 PAPER = PressSettings()
