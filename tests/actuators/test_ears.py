@@ -196,7 +196,9 @@ def test_a_drawn_mask_does_not_go_on_the_pins_flipped(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("name", "assignments"), DESIGNS)
-def test_two_pins_hold_base_and_cap_whenever_they_are_laid(name: str, assignments: list[str]) -> None:
+def test_two_pins_hold_base_and_cap_whenever_they_are_laid(
+    name: str, assignments: list[str]
+) -> None:
     design = load_design(name, [*assignments, 'registration.method="ears"'])
     laminate = build(design)
     for step in schedule(laminate, press_settings(design)).steps:
