@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.edges import Bounds, Point, unit
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
 
@@ -21,7 +21,7 @@ MATERIALS: tuple[Material, ...] = ("TPE", "PTFE")
 
 
 @dataclass(frozen=True)
-class Part:
+class NestPart:
     """One piece that is to be cut ``count`` times.
 
     ``region`` is the path of the beam, kerf compensated, in the frame of its layer; ``design`` and
@@ -85,7 +85,7 @@ class Nest:
     engine: EngineName
     material: Material
     stock: Stock
-    parts: tuple[Part, ...]
+    parts: tuple[NestPart, ...]
     placements: tuple[Placement, ...]
 
     @property
@@ -109,4 +109,5 @@ class Nest:
 
 def placed(region: Region, turn: Turn, shift: Point) -> Region:
     """A region turned by exact quarter turns about the origin and then moved."""
-    return region.turned(90.0 * turn).moved(*shift)
+    (c, s), (dx, dy) = unit(90.0 * turn), shift
+    return region.mapped(lambda p: (p[0] * c - p[1] * s + dx, p[0] * s + p[1] * c + dy), 1.0, False)

@@ -52,7 +52,7 @@ class Pad:
 
 
 @dataclass(frozen=True)
-class Item:
+class BuildUpPart:
     """A part of the build-up: what it is of, its thickness and size in mm (0: as the laminate)."""
 
     part: str

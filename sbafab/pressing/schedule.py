@@ -13,7 +13,7 @@ from typing import NamedTuple
 from sbafab.errors import DesignError
 from sbafab.laminate.assembly import (
     AssemblyStep,
-    Bond,
+    BondState,
     StepName,
     assembly,
     distinct_layers,
@@ -21,7 +21,7 @@ from sbafab.laminate.assembly import (
 )
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing import build_up
-from sbafab.pressing.build_up import Footprint, Item, Pad
+from sbafab.pressing.build_up import BuildUpPart, Footprint, Pad
 from sbafab.pressing.dowels import PinSetting, Standard, is_sold, plate_thickness, settings_by_step
 
 TITLES: dict[StepName, str] = {
@@ -112,7 +112,7 @@ class Step:
 
     step: int
     title: str
-    bond: Bond
+    bond: BondState
     layers: tuple[int, ...]
     adds: tuple[int, ...]
     pins: tuple[str, ...]
@@ -126,7 +126,7 @@ class Step:
     bond_kpa: float
     plate_kpa: float
     pressure_basis: str
-    build_up: tuple[Item, ...]
+    build_up: tuple[BuildUpPart, ...]
     pin_settings: tuple[PinSetting, ...]
     instructions: str
 
@@ -232,15 +232,15 @@ def _round_pins(press: PressSettings, own: _Setting) -> str:
     return f"; up to {free:.1f} mm round a pin none"
 
 
-def _items(press: PressSettings, own: _Setting) -> Iterator[Item]:
+def _items(press: PressSettings, own: _Setting) -> Iterator[BuildUpPart]:
     """From the lower platen up; the films take the size that they have."""
-    release = Item(RELEASE, press.release_film, press.release_thickness, press.platen)
+    release = BuildUpPart(RELEASE, press.release_film, press.release_thickness, press.platen)
     pad = f"{press.pad.material}, {press.pad.hardness:g} Shore A"
-    yield Item(BASE_PLATE, press.plate_material, own.plate, press.platen)
+    yield BuildUpPart(BASE_PLATE, press.plate_material, own.plate, press.platen)
     yield release
-    yield Item(LAMINATE, "films of this step", round(own.under.height, 6), (0.0, 0.0))
+    yield BuildUpPart(LAMINATE, "films of this step", round(own.under.height, 6), (0.0, 0.0))
     yield release
-    yield Item(PAD, pad, own.pad, press.platen)
+    yield BuildUpPart(PAD, pad, own.pad, press.platen)
 
 
 def _instructions(part: AssemblyStep, count: int) -> str:

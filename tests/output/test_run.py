@@ -12,12 +12,11 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
+from sbafab.as_built.check import check_folder
 from sbafab.design.writing import design_sha256
 from sbafab.meshing.conforming.settings import MeshSettings
 from sbafab.output import contents
-from sbafab.output.as_built.check import check_folder
-from sbafab.output.contents import Conforming
-from sbafab.output.run import Extras, generate
+from sbafab.output.run import Conforming, Extras, generate
 
 TEMPLATES = ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"]
 

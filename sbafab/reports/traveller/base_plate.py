@@ -13,7 +13,7 @@ from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.job import Work
 
 
-class Hole(NamedTuple):
+class PlateHole(NamedTuple):
     """A row of the hole table, mm: from the plate's front left corner, and from the datum."""
 
     pin: str
@@ -25,13 +25,13 @@ class Hole(NamedTuple):
     length: str
 
 
-def holes(work: Work) -> list[Hole]:
+def holes(work: Work) -> list[PlateHole]:
     """Every hole of the plate; films have the diameter ``films`` there."""
     laminate, press = work.laminate, work.design.press
     corner_x, corner_y = plate_corner(laminate, (press.platen_width, press.platen_length))
     lengths = _lengths(work.schedule)
     return [
-        Hole(
+        PlateHole(
             pin.name,
             pin.diameter,
             pin.centre[0] - corner_x,

@@ -1,0 +1,255 @@
+"""What the manifest claims in words: files and hashes, order and roles, heights, properties."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from sbafab.as_built.cut_files import LayerFile
+from sbafab.as_built.records import CLAIMS, Problem
+from sbafab.cutting.lightburn import ENDING
+from sbafab.cutting.properties import (
+    LIMITS,
+    PTFE_WARNING,
+    curves_property,
+    kerf_properties,
+    layer_path,
+    limit_properties,
+)
+from sbafab.design.records import Design
+from sbafab.laminate.laminate import Layer
+from sbafab.output.manifest import file_hashes, kerf_claim
+from sbafab.output.manifest_records import JobManifest, KerfClaim, LayerClaim, Manifest
+from sbafab.output.settings import kerf_widths, limits
+from sbafab.rules.lowered import lowered
+
+HEIGHT = 1e-6
+"""mm to which heights and thicknesses agree."""
+
+
+def claim(message: str, *layers: int) -> Problem:
+    return Problem(CLAIMS, message, layers)
+
+
+def file_problems(folder: Path, claims: Manifest | JobManifest) -> list[Problem]:
+    """Files that are missing, changed, or not in the manifest (a cut file is worse than a note)."""
+    found = file_hashes(folder)
+    found.pop("manifest.json", None)
+    layers = claims.layers if isinstance(claims, Manifest) else ()
+    layer_of = {layer.file: number for number, layer in enumerate(layers, start=1)}
+    problems = []
+    for path, digest in claims.files.items():
+        own = (layer_of[path],) if path in layer_of else ()
+        if path not in found:
+            problems.append(claim(f"{path} is in the manifest and not in the folder", *own))
+        elif found[path] != digest:
+            problems.append(
+                claim(
+                    f"{path} was changed: its sha256 is {found[path][:12]}..., the manifest's "
+                    f"{digest[:12]}...",
+                    *own,
+                )
+            )
+    for path in found:
+        if path not in claims.files:
+            message = f"{path} lies in the folder and is not in the manifest; remove it"
+            is_cut = path.lower().endswith((".dxf", ENDING))
+            problems.append(Problem(CLAIMS, message, verdict="fail" if is_cut else "warn"))
+    return problems
+
+
+def order_problems(claims: Manifest) -> list[Problem]:
+    """Indices, names and roles that do not fit their place in the stack."""
+    problems = []
+    expected = _roles([layer.role for layer in claims.layers])
+    for position, (layer, role) in enumerate(zip(claims.layers, expected, strict=True), start=1):
+        if layer.index != position:
+            problems.append(
+                claim(f"layer {position} of the manifest has index {layer.index}", position)
+            )
+        name = f"{layer.index:03d}_{layer.material}_{layer.role}"
+        if layer.name != name:
+            problems.append(
+                claim(f"layer {position} is named {layer.name!r}, not {name}", position)
+            )
+        kerf = claims.kerf.get(layer.material)
+        file = layer_path(name, kerf.width if kerf is not None else None)
+        if layer.file not in (None, file):
+            message = f"layer {position} ({name}) is cut from {layer.file!r}, not {file}"
+            problems.append(claim(message, position))
+        if layer.role != role:
+            message = f"layer {position} has the role {layer.role}, where the order asks for {role}"
+            problems.append(claim(message, position))
+        if (layer.material == "PTFE") != layer.role.endswith("-mask"):
+            message = f"layer {position} is {layer.material}, which no {layer.role} is made of"
+            problems.append(claim(message, position))
+    return problems
+
+
+def _roles(roles: Sequence[str]) -> list[str]:
+    """The roles that a stack of as many layers has, with a sheet below if there is one."""
+    carrier = ["sheet", "separator-mask"] if "sheet" in roles[:2] else []
+    count = len(roles) - len(carrier)
+    turn = ("separator-mask", "wall", "chamber-mask", "wall")
+    stack = ["base" if n == 0 else turn[(n + 1) % 4] for n in range(count)]
+    if stack:
+        stack[-1] = "cap"
+    return [*carrier, *stack][: len(roles)]
+
+
+def height_problems(claims: Manifest, layers: Sequence[Layer], design: Design) -> list[Problem]:
+    """Thicknesses against the design's films, heights against their sums, balloon numbers."""
+    problems = []
+    stock = {"TPE": design.films.tpe.thickness, "PTFE": design.films.ptfe.thickness}
+    placed = {layer.index: layer for layer in layers}
+    z = 0.0
+    for position, layer in enumerate(claims.layers, start=1):
+        nominal = stock[layer.material]
+        if abs(layer.thickness - nominal) > HEIGHT:
+            problems.append(
+                claim(
+                    f"layer {position} is {layer.thickness:g} mm thick in the manifest and "
+                    f"{nominal:g} in the design",
+                    position,
+                )
+            )
+        if abs(layer.z - z) > HEIGHT:
+            message = f"layer {position} lies at z {layer.z:g}, and the films below it sum to {z:g}"
+            problems.append(claim(message, position))
+        own = placed.get(position)
+        if own is not None and own.balloon != layer.balloon:
+            message = (
+                f"layer {position} is of balloon {layer.balloon} in the manifest and lies in "
+                f"balloon {own.balloon}"
+            )
+            problems.append(claim(message, position))
+        z += layer.thickness
+    return problems + _film_problems(claims, stock)
+
+
+def _film_problems(claims: Manifest, stock: Mapping[str, float]) -> list[Problem]:
+    problems = []
+    for material in dict.fromkeys(layer.material for layer in claims.layers):
+        own = [layer for layer in claims.layers if layer.material == material]
+        area = sum(layer.area for layer in own)
+        film = next((film for film in claims.films if film.material == material), None)
+        if film is None:
+            problems.append(claim(f"the manifest's films have no {material}"))
+            continue
+        if film.layers != len(own):
+            message = f"films: {film.layers} layers of {material}, and {len(own)} are listed"
+            problems.append(claim(message))
+        if abs(film.area - area) > 1e-4 * area:
+            message = f"films: {film.area:g} mm2 of {material}, and its layers sum to {area:g}"
+            problems.append(claim(message))
+        if abs(film.thickness - stock[material]) > HEIGHT:
+            message = f"films: {material} of {film.thickness:g} mm, and {stock[material]:g} in the "
+            problems.append(claim(f"{message}design"))
+    return problems
+
+
+def design_problems(claims: Manifest, design: Design, digest: str) -> list[Problem]:
+    """Where the manifest is not of the design that lies beside it."""
+    balloons = sum(layer.role == "chamber-mask" for layer in claims.layers)
+    agree = (
+        ("design_sha256", claims.design_sha256[:12], digest[:12]),
+        ("name", claims.name, design.name),
+        ("family", claims.family, design.family),
+        ("registration.method", claims.registration.method, design.registration.method),
+        ("balloons", balloons, design.stack.balloons),
+        ("copies", claims.copies, design.order.copies),
+    )
+    problems = [
+        claim(f"{what} is {said} in the manifest and {stated} by design.toml")
+        for what, said, stated in agree
+        if said != stated
+    ]
+    for material, width in kerf_widths(design).items():
+        said = claims.kerf.get(material)
+        wanted = kerf_claim(width)
+        if said != wanted:
+            problems.append(
+                claim(
+                    f"the kerf of {material} is {_kerf(said)} in the manifest and "
+                    f"{_kerf(wanted)} by design.toml"
+                )
+            )
+    problems += lowered_problems(claims.lowered_limits, lowered(limits(design)))
+    for rule in claims.waived:
+        if rule not in design.rules.waive:
+            problems.append(claim(f"{rule} is waived in the manifest and not in design.toml"))
+    return problems
+
+
+def lowered_problems(told: Sequence[str], own: Sequence[str]) -> list[Problem]:
+    """Where the manifest names other lowered limits than design.toml sets."""
+    missing = [said for said in own if said not in told]
+    added = [said for said in told if said not in own]
+    return [
+        *(claim(f"design.toml lowers {said}, which the manifest does not say") for said in missing),
+        *(claim(f"{said} is lowered in the manifest and not in design.toml") for said in added),
+    ]
+
+
+def _kerf(said: KerfClaim | None) -> str:
+    return "missing" if said is None else f"{said.state} ({said.width})"
+
+
+def property_problems(files: Iterable[LayerFile], claims: Manifest) -> list[Problem]:
+    """Custom properties of the cut files that are not what the manifest says, alike ones as one."""
+    where: dict[str, list[int]] = {}
+    bare = [file for file in files if file.part is not None and not file.part.properties]
+    for file in files:
+        if file.part is None or file in bare:
+            continue
+        found = file.part.properties
+        for name, said in _properties(file.claim, claims).items():
+            if found.get(name) != said:
+                message = f"custom property {name} is {found.get(name)!r}, not {said!r}"
+                where.setdefault(message, []).append(file.position)
+    problems = []
+    if bare:
+        parts = [file.part for file in bare if file.part is not None]
+        of = f"the files of {len(bare)} layers" if len(bare) > 1 else f"the file of {bare[0].label}"
+        has_units = all(part.units for part in parts)
+        problems.append(bare_problem(of, has_units, *(file.position for file in bare)))
+    for message, layers in where.items():
+        shown = ", ".join(map(str, layers[:5])) + (" ..." if len(layers) > 5 else "")
+        plural = "layers" if len(layers) > 1 else "layer"
+        problems.append(claim(f"{plural} {shown}: {message}", *layers))
+    return problems
+
+
+def bare_problem(files: str, has_units: bool, *layers: int) -> Problem:
+    """A warning that files carry no custom properties, as one saved before R2004 cannot."""
+    lost = "custom properties" if has_units else "custom properties and no units"
+    message = (
+        f"{files} carry no {lost}: save as DXF R2004 or later to keep them; kerf, waivers and "
+        "curves are taken to be as the manifest tells"
+    )
+    return Problem(CLAIMS, message, layers, verdict="warn")
+
+
+def _properties(layer: LayerClaim, claims: Manifest) -> dict[str, str | None]:
+    kerf = claims.kerf.get(layer.material)
+    width = kerf.width if kerf is not None else None
+    return {
+        "DESIGN": claims.name,
+        "DESIGN_SHA256": claims.design_sha256,
+        "PATTERN": layer.pattern,
+        "MATERIAL": layer.material,
+        "UNITS": "mm",
+        **kerf_properties(width),
+        **curves_property(claims.curves),
+        **waiver_properties(claims),
+        "GENERATOR": claims.generator,
+        **({"WARNING": PTFE_WARNING} if layer.material == "PTFE" else {}),
+    }
+
+
+def waiver_properties(claims: Manifest) -> dict[str, str | None]:
+    """What every cut file must say of waived rules and lowered limits; None for nothing."""
+    return {
+        "WAIVED": ", ".join(claims.waived) or "none",
+        LIMITS: limit_properties(claims.lowered_limits).get(LIMITS),
+    }

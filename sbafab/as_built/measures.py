@@ -1,0 +1,252 @@
+"""What the manifest claims in numbers: areas, pieces, patterns, interfaces, bores, pins."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from sbafab.as_built.claims import claim, waiver_properties
+from sbafab.as_built.cut_files import CutPart, LayerFile, read_part, told_of
+from sbafab.as_built.records import CLAIMS, INTEGRITY, Problem
+from sbafab.errors import OutputError
+from sbafab.geometry.edges import Point
+from sbafab.geometry.region import Region
+from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
+from sbafab.output.manifest_records import Manifest
+from sbafab.rules.limits import TOLERANCE, at
+
+SHARE = 1e-4
+"""Share of an area by which a claim may be off (0.01 %)."""
+
+
+def layer_problems(files: Iterable[LayerFile], claims: Manifest) -> list[Problem]:
+    """Area, pieces and open bores of every layer against what its file cuts."""
+    problems = []
+    for file in files:
+        if file.part is None:
+            continue
+        layer, region = file.claim, file.part.region
+        if abs(region.area - layer.area) > _area_room(region, file.part):
+            problems.append(
+                claim(
+                    f"{file.label} has an area of {region.area:.4f} mm2, the manifest says "
+                    f"{layer.area:.4f}",
+                    file.position,
+                )
+            )
+        if len(region.pieces) != layer.pieces:
+            problems.append(
+                claim(
+                    f"{file.label} falls into {len(region.pieces)} pieces, the manifest says "
+                    f"{layer.pieces}",
+                    file.position,
+                )
+            )
+        holes = region.holes
+        drilled = tuple(
+            bore.chamber
+            for bore in claims.bores
+            if any(hole.winding((bore.x, bore.y)) != 0 for hole in holes)
+        )
+        if drilled != layer.bores:
+            problems.append(
+                claim(
+                    f"{file.label} is open at the bores of {_listed(drilled)}, the manifest "
+                    f"says {_listed(layer.bores)}",
+                    file.position,
+                )
+            )
+    return problems
+
+
+def _area_room(region: Region, part: CutPart) -> float:
+    """mm2 by which an area may be off: its share, its edges' error, corners the beam rounds."""
+    length = sum(contour.length for contour in region.contours)
+    return SHARE * region.area + part.corner_room + (part.chord_error + TOLERANCE) * length
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names) or "none"
+
+
+def pattern_problems(layers: Sequence[Layer], claims: Manifest) -> list[Problem]:
+    """Layers that share a pattern in the manifest and not on disk, or the other way round."""
+    problems = []
+    said_of: dict[str, tuple[str, int]] = {}
+    found_of: dict[str, tuple[str, int]] = {}
+    for layer in layers:
+        said = claims.layers[layer.index - 1].pattern
+        pattern, first = found_of.setdefault(said, (layer.pattern, layer.index))
+        if pattern != layer.pattern:
+            message = f"layers {first} and {layer.index} are both of pattern {said} and differ"
+            problems.append(claim(message, first, layer.index))
+        name, twin = said_of.setdefault(layer.pattern, (said, layer.index))
+        if name != said and pattern == layer.pattern:
+            message = f"layers {twin} and {layer.index} are equal, and of patterns {name}, {said}"
+            problems.append(claim(message, twin, layer.index))
+    return problems
+
+
+def interface_problems(
+    laminate: Laminate, claims: Manifest, parts: Sequence[CutPart]
+) -> list[Problem]:
+    """Kind, layers, contact and bond of every interface."""
+    found, said = laminate.interfaces, claims.interfaces
+    if len(found) != len(said):
+        return [claim(f"the layers make {len(found)} interfaces, the manifest lists {len(said)}")]
+    problems = []
+    for gap, told in zip(found, said, strict=True):
+        masks = tuple(mask.index for mask in gap.masks)
+        own = (gap.below.index, gap.above.index, masks, gap.kind)
+        if own != (told.below, told.above, told.masks, told.kind):
+            message = (
+                f"interface {gap.index} is a {gap.kind} interface of layers "
+                f"{', '.join(map(str, gap.layer_indices))}, which the manifest tells otherwise"
+            )
+            problems.append(claim(message, *gap.layer_indices))
+            continue
+        lot = [parts[index - 1] for index in gap.layer_indices]
+        for what, region, area in (
+            ("contact", gap.contact, told.contact_area),
+            ("bond", gap.bond, told.bond_area),
+        ):
+            room = sum(_area_room(part.region, part) - SHARE * part.region.area for part in lot)
+            if abs(region.area - area) > room + SHARE * area:
+                message = (
+                    f"the {what} at {gap.kind} interface {gap.index} has {region.area:.4f} mm2, "
+                    f"the manifest says {area:.4f}"
+                )
+                problems.append(Problem(CLAIMS, message, gap.layer_indices, gap.index))
+    return problems
+
+
+def place_problems(laminate: Laminate, claims: Manifest) -> list[Problem]:
+    """Bores, inlets, pins and lumen: where the manifest says, and as wide."""
+    room = TOLERANCE
+    pairs: list[tuple[str, Sequence[_Spot], Sequence[_Spot]]] = [
+        (
+            "bore",
+            [(b.chamber, (b.x, b.y), b.diameter) for b in claims.bores],
+            [(b.chamber, b.centre, b.diameter) for b in laminate.bores],
+        ),
+        (
+            "inlet",
+            [(i.chamber, (i.x, i.y), i.width) for i in claims.inlets],
+            [(i.chamber, i.mouth, i.width) for i in laminate.inlets],
+        ),
+        (
+            "pin",
+            [(p.name, (p.x, p.y), p.diameter) for p in claims.registration.pins],
+            [(p.name, p.centre, p.diameter) for p in laminate.pins],
+        ),
+    ]
+    problems = [
+        problem for what, said, found in pairs for problem in _unmatched(what, said, found, room)
+    ]
+    if (claims.lumen is None) != (laminate.lumen is None) or (
+        claims.lumen is not None
+        and laminate.lumen is not None
+        and abs(claims.lumen - laminate.lumen) > room
+    ):
+        message = f"the lumen is {claims.lumen} in the manifest and {laminate.lumen} by design.toml"
+        problems.append(claim(message))
+    for inlet in claims.inlets:
+        tubes = {own.tube_diameter for own in laminate.inlets}
+        if any(abs(tube - inlet.tube_outer_diameter) > room for tube in tubes):
+            message = (
+                f"the tube of {inlet.chamber} is {inlet.tube_outer_diameter:g} in the manifest"
+            )
+            problems.append(claim(f"{message} and {min(tubes):g} by design.toml"))
+    return problems
+
+
+def size_problems(claims: Manifest, sizes: Mapping[str, float], room: float) -> list[Problem]:
+    """Overall sizes, mm, against those of the cut parts."""
+    return [
+        claim(
+            f"the {name.replace('_', ' ')} is {claims.sizes.get(name, math.nan):g} mm in the "
+            f"manifest and {size:g} as cut"
+        )
+        for name, size in (dict.fromkeys(claims.sizes, math.nan) | dict(sizes)).items()
+        if not abs(claims.sizes.get(name, math.nan) - size) <= room
+    ]
+
+
+_Spot = tuple[str, Point, float]
+
+
+def _unmatched(
+    what: str, said: Sequence[_Spot], found: Sequence[_Spot], room: float
+) -> list[Problem]:
+    """Claims that no place on disk answers to, and places that no claim is of."""
+
+    def alike(one: _Spot, other: _Spot) -> bool:
+        return (
+            one[0] == other[0]
+            and math.dist(one[1], other[1]) <= room + 1e-6
+            and abs(one[2] - other[2]) <= 2 * room
+        )
+
+    def told(spot: _Spot) -> str:
+        return f"{what} of {spot[0]}, {spot[2]:.3f} wide at {at(spot[1])}"
+
+    return [
+        *(
+            claim(f"the manifest has a {told(spot)}, which the cut files have not")
+            for spot in said
+            if not any(alike(spot, other) for other in found)
+        ),
+        *(
+            claim(f"the cut files have a {told(spot)}, which the manifest has not")
+            for spot in found
+            if not any(alike(spot, other) for other in said)
+        ),
+    ]
+
+
+def fixture_problems(folder: Path, laminate: Laminate, claims: Manifest) -> list[Problem]:
+    """The pin plate: sound, and a hole for every pin and for nothing else."""
+    if claims.fixture is None:
+        return [claim("the manifest names no fixture for the pins")] if laminate.pins else []
+    if claims.fixture not in claims.files:
+        return [claim(f"the fixture {claims.fixture!r} is not among the manifest's files")]
+    try:
+        part = read_part(folder / claims.fixture, told=told_of(claims, "plate"))
+    except OutputError as error:
+        name = Path(claims.fixture).name
+        said = str(error).removeprefix(f"{name}: ")
+        return [Problem(INTEGRITY, f"{claims.fixture}: {said}")]
+    circles = [hole.circle for hole in part.region.holes]
+    holes = [("hole", c[0], 2 * c[1]) for c in circles if c is not None]
+    pins = [("hole", pin.centre, pin.diameter) for pin in laminate.pins]
+    room = TOLERANCE
+    for name, stated in waiver_properties(claims).items() if part.properties else ():
+        found = part.properties.get(name)
+        if found != stated:
+            return [claim(f"{claims.fixture}: custom property {name} is {found!r}, not {stated!r}")]
+    problems = _unmatched("pin's hole of the plate", pins, holes, room)
+    if problems or len(circles) != len(pins):
+        return [claim(f"{claims.fixture} has other holes than the laminate has pins")]
+    return []
+
+
+def with_plate_pins(folder: Path, laminate: Laminate, claims: Manifest) -> Laminate:
+    """The laminate with a pin in every hole of the plate, whatever holes its layers have."""
+    if claims.fixture is None or claims.fixture not in claims.files:
+        return laminate
+    try:
+        holes = read_part(folder / claims.fixture).region.holes
+    except OutputError:
+        return laminate
+    names = {(pin.x, pin.y): pin.name for pin in claims.registration.pins}
+    pins = list(laminate.pins)
+    for number, (centre, radius) in enumerate((h.circle for h in holes if h.circle), start=1):
+        if not any(
+            math.dist(pin.centre, centre) < LOOSE and abs(pin.diameter - 2 * radius) < LOOSE
+            for pin in pins
+        ):
+            near = [name for place, name in names.items() if math.dist(place, centre) < LOOSE]
+            pins.append(Pin(near[0] if near else f"plate{number}", centre, 2 * radius))
+    return replace(laminate, pins=tuple(pins))

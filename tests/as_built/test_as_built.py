@@ -1,0 +1,296 @@
+"""Checks of doctored folders: every fault is told, by the rule that is named for it.
+
+Faults come with hashes put right, so that each has to be seen in the geometry itself.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from sbafab.actuators import load_design
+from sbafab.as_built.check import check_folder, read_folder
+from sbafab.cli import main
+from sbafab.cutting.chords import in_chords
+from sbafab.errors import OutputError
+from sbafab.geometry.offset import grow, shrink
+from sbafab.output.run import generate
+from sbafab.rules.deck import rule_names
+from sbafab.rules.finding import Finding
+from tests.as_built.doctoring import Doctor
+
+
+def failed(folder: Path) -> dict[str, Finding]:
+    """The first failing finding of every rule that fails."""
+    found: dict[str, Finding] = {}
+    for finding in check_folder(folder):
+        if finding.verdict == "fail":
+            found.setdefault(finding.rule, finding)
+    return found
+
+
+def test_a_finding_names_the_faulty_layer(lobed: Doctor) -> None:
+    lobed.redraw(9, lambda r: r.moved(0.15, 0.0))
+    lobed.rehash()
+    found = failed(lobed.folder)
+    assert "manifest-claims" in found
+    assert "file-integrity" not in found
+    finding = found["registration-nominal"]
+    assert 9 in finding.where.layers
+    assert finding.measured == pytest.approx(0.15, abs=1e-6)
+
+
+def delete_file(doctor: Doctor) -> None:
+    doctor.path(3).unlink()
+
+
+def empty_file(doctor: Doctor) -> None:
+    doctor.path(3).write_text("")
+
+
+def truncate(doctor: Doctor) -> None:
+    text = doctor.path(3).read_text()
+    doctor.path(3).write_text(text[: int(0.9 * len(text))])
+
+
+def not_dxf(doctor: Doctor) -> None:
+    doctor.path(3).write_bytes(b"\x89PNG\r\n\x1a\n\x00\x00")
+
+
+def inch_header(doctor: Doctor) -> None:
+    doctor.edit(3, "$INSUNITS\n 70\n4\n", "$INSUNITS\n 70\n1\n")
+
+
+def open_contour(doctor: Doctor) -> None:
+    text = doctor.path(3).read_text()
+    head, marker, tail = text.rpartition("AcDbPolyline\n")
+    doctor.path(3).write_text(head + marker + tail.replace(" 70\n1\n", " 70\n0\n", 1))
+
+
+def doubled_contour(doctor: Doctor) -> None:
+    text = doctor.path(3).read_text()
+    start = text.index("  0\nCIRCLE\n")
+    end = text.index("  0\n", start + 4)
+    entity = text[start:end]
+    head, handle, rest = entity.partition("  5\n")
+    _, line, rest = rest.partition("\n")
+    doctor.path(3).write_text(text[:end] + head + handle + "FFFF" + line + rest + text[end:])
+
+
+def crossing_contours(doctor: Doctor) -> None:
+    doctor.edit(3, "AcDbCircle\n 10\n0.0\n", "AcDbCircle\n 10\n-3.2\n")
+
+
+def wrong_dxf_layer(doctor: Doctor) -> None:
+    doctor.edit(3, "  8\nCUT_INNER\n100\nAcDbCircle", "  8\nCUT_OUTER\n100\nAcDbCircle")
+
+
+def contour_on_reference(doctor: Doctor) -> None:
+    doctor.edit(3, "  8\nCUT_INNER\n100\nAcDbCircle", "  8\nREFERENCE\n100\nAcDbCircle")
+
+
+def chords(doctor: Doctor) -> None:
+    doctor.redraw(3, lambda region: in_chords(region, "wall", 0.005))
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        delete_file,
+        empty_file,
+        truncate,
+        not_dxf,
+        inch_header,
+        open_contour,
+        doubled_contour,
+        crossing_contours,
+        wrong_dxf_layer,
+        contour_on_reference,
+        chords,
+    ],
+)
+def test_unsound_files_are_told_with_their_layer(
+    fault: Callable[[Doctor], None], doctor: Doctor
+) -> None:
+    fault(doctor)
+    found = check_folder(doctor.folder)
+    broken = [f for f in found if f.rule == "file-integrity" and f.verdict == "fail"]
+    assert [finding.where.layers for finding in broken] == [(3,)]
+    assert "003_TPE_wall.dxf" in broken[0].message
+    # What needs the whole stack says that it did not run; what looks at single layers ran.
+    told = {finding.rule: finding for finding in found}
+    assert told["sealing"].verdict == "warn"
+    assert "not run" in told["sealing"].message
+    assert told["film-limits"].verdict == "pass"
+
+
+def test_files_swapped_are_told(doctor: Doctor) -> None:
+    one, other = doctor.path(4), doctor.path(6)
+    text = one.read_text()
+    one.write_text(other.read_text())
+    other.write_text(text)
+    doctor.rehash()
+    claims = [f for f in check_folder(doctor.folder) if f.rule == "manifest-claims"]
+    assert {4, 6} <= {layer for finding in claims for layer in finding.where.layers}
+    assert "sealing" in failed(doctor.folder)
+
+
+@pytest.mark.parametrize("times", [2, -1])
+def test_a_kerf_undone_wrongly_shows_in_areas_and_bores(times: int, tmp_path: Path) -> None:
+    design = load_design(
+        "1dof-5mm", ["stack.balloons=2", "laser.kerf_tpe=0.2", "rules.yield_builds=100"]
+    )
+    doctor = Doctor(generate(design, tmp_path, ("cut",)).folder)
+    # The file holds the path for one kerf; half a kerf is 0.1.
+    for layer in (1, 3, 5, 7):
+        doctor.redraw(layer, lambda r: grow(r, 0.1) if times == 2 else shrink(r, 0.2))
+    doctor.rehash()
+    found = failed(doctor.folder)
+    assert "area" in found["manifest-claims"].message
+    assert {"channel-clear", "mask-overhang"} & set(found)
+
+
+def swap_layers(manifest: dict[str, list[object]]) -> None:
+    layers = manifest["layers"]
+    layers[3], layers[5] = layers[5], layers[3]
+
+
+CLAIMS: list[tuple[str, Callable[..., object], str]] = [
+    ("order", swap_layers, "layer 4 of the manifest has index 6"),
+    ("thickness", lambda m: m["layers"][4].update(thickness=0.05), "layer 5 is 0.05 mm thick"),
+    ("role", lambda m: m["layers"][4].update(role="cap"), "layer 5 has the role cap"),
+    ("height", lambda m: m["layers"][4].update(z=0.5), "layer 5 lies at z 0.5"),
+    ("balloon", lambda m: m["layers"][4].update(balloon=3), "layer 5 is of balloon 3"),
+    ("area", lambda m: m["layers"][4].update(area=m["layers"][4]["area"] * 1.002), "has an area"),
+    ("pieces", lambda m: m["layers"][5].update(pieces=3), "falls into 1 pieces"),
+    ("bores", lambda m: m["layers"][0].update(bores=["chamber1"]), "open at the bores of none"),
+    ("pattern", lambda m: m["layers"][4].update(pattern="P01"), "PATTERN"),
+    ("hash", lambda m: m["files"].update({"press.json": "0" * 64}), "press.json"),
+    ("file hash", lambda m: m["files"].update({m["layers"][2]["file"]: "0" * 64}), "was changed"),
+    (
+        "bond",
+        lambda m: m["interfaces"][0].update(bond_area=99.0),
+        "the bond at chamber interface 1",
+    ),
+    ("contact", lambda m: m["interfaces"][1].update(contact_area=9.0), "the contact at separator"),
+    ("kind", lambda m: m["interfaces"][1].update(kind="bond"), "tells otherwise"),
+    ("bore", lambda m: m["bores"][0].update(x=0.002), "the cut files have not"),
+    ("inlet", lambda m: m["inlets"][0].update(width=1.7), "the cut files have not"),
+    ("lumen", lambda m: m.update(lumen=3.0), "the lumen is 3.0"),
+    ("design", lambda m: m.update(design_sha256="0" * 64), "design_sha256"),
+    ("kerf", lambda m: m["kerf"]["TPE"].update(state="compensated", width=0.1), "the kerf of TPE"),
+    ("waived", lambda m: m.update(waived=["sealing"]), "sealing is waived in the manifest"),
+    ("size", lambda m: m["sizes"].update(width=9.0), "the width is 9 mm"),
+    ("film", lambda m: m["films"][0].update(layers=3), "films: 3 layers of TPE"),
+]
+
+
+@pytest.mark.parametrize(("change", "said"), [c[1:] for c in CLAIMS], ids=[c[0] for c in CLAIMS])
+def test_wrong_claims_are_told(change: Callable[..., object], said: str, doctor: Doctor) -> None:
+    doctor.set_manifest(change)
+    told = [
+        problem.message
+        for problem in read_folder(doctor.folder).problems
+        if problem.rule == "manifest-claims" and problem.verdict == "fail"
+    ]
+    assert any(said in message for message in told), told
+
+
+def test_files_too_many_are_told_cut_files_as_faults(doctor: Doctor) -> None:
+    (doctor.folder / "note.txt").write_text("bench 3")
+    assert "manifest-claims" not in failed(doctor.folder)
+    shutil.copy(doctor.path(4), doctor.folder / "layers" / "spare.dxf")
+    assert "spare.dxf" in failed(doctor.folder)["manifest-claims"].message
+
+
+def test_without_its_design_a_folder_fails_and_is_still_measured(doctor: Doctor) -> None:
+    (doctor.folder / "design.toml").unlink()
+    found = {finding.rule: finding.verdict for finding in check_folder(doctor.folder)}
+    assert found["manifest-claims"] == "fail"
+    assert found["bond-width"] == "pass"
+
+
+def test_limits_come_from_the_folders_design(doctor: Doctor) -> None:
+    path = doctor.folder / "design.toml"
+    path.write_text(path.read_text().replace("bond_width = 0.75", "bond_width = 0.8"))
+    found = failed(doctor.folder)
+    assert found["bond-width"].limit == 0.8
+    assert "design_sha256" in found["manifest-claims"].message
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        None,
+        "",
+        "{",
+        "[]",
+        "[" * 100_000,
+        '{"schema": "sbafab/manifest@2"}',
+        '{"schema": "sbafab/manifest@1"}',
+    ],
+)
+def test_a_folder_without_a_sound_manifest_is_one_sentence(
+    text: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if text is not None:
+        (tmp_path / "manifest.json").write_text(text)
+    with pytest.raises(SystemExit) as ended:
+        main(["check", str(tmp_path)])
+    out, err = capsys.readouterr()
+    assert ended.value.code == 2
+    assert out == ""
+    assert err.startswith("sbafab: ")
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda m: m.pop("layers"),
+        lambda m: m.update(layers=[]),
+        lambda m: m["layers"][2].update(thickness="thick"),
+        lambda m: m["layers"][2].update(role="lid"),
+        lambda m: m["interfaces"][2].pop("masks"),
+        lambda m: [layer.update(file=None) for layer in m["layers"]],
+    ],
+)
+def test_a_manifest_of_wrong_types_is_one_sentence(
+    change: Callable[..., object], doctor: Doctor
+) -> None:
+    doctor.set_manifest(change)
+    with pytest.raises(OutputError) as refused:
+        check_folder(doctor.folder)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_path_out_of_the_folder_is_not_followed(doctor: Doctor) -> None:
+    outside = doctor.folder.parent / "outside.dxf"
+    shutil.copy(doctor.path(4), outside)
+    doctor.set_manifest(lambda m: m["layers"][3].update(file="../outside.dxf"))
+    assert "out of the folder" in failed(doctor.folder)["file-integrity"].message
+
+
+def test_the_command_prints_findings_and_writes_nothing(
+    doctor: Doctor, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = sorted(doctor.folder.rglob("*"))
+    main_code(["check", str(doctor.folder), "--json"], 0)
+    shown = json.loads(capsys.readouterr().out)
+    assert shown["source"] == "as-built"
+    assert {finding["rule"] for finding in shown["findings"]} >= {"file-integrity", *rule_names()}
+    doctor.redraw(5, lambda r: r.moved(0.15, 0.0))
+    main_code(["check", str(doctor.folder)], 1)
+    assert "registration-nominal" in capsys.readouterr().out
+    main_code(["check", str(doctor.folder), "--waive", "sealing"], 2)
+    assert sorted(doctor.folder.rglob("*")) == before
+
+
+def main_code(arguments: list[str], code: int) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert (ended.value.code or 0) == code
