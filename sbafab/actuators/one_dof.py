@@ -13,7 +13,7 @@ from sbafab.actuators.pockets import (
     round_pockets,
     tab_and_strip,
 )
-from sbafab.actuators.stacking import BalloonShape, BalloonStack, balloon_cuts, layers
+from sbafab.actuators.stacking import BalloonShape, BalloonStack, balloon_cuts, channel_pin, layers
 from sbafab.actuators.tails import tails
 from sbafab.design.form import Form, degrees_of_freedom
 from sbafab.design.records import Design
@@ -21,7 +21,7 @@ from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import unit
 from sbafab.geometry.offset import fillet
 from sbafab.geometry.region import Region
-from sbafab.laminate.laminate import Bore, Chamber, Laminate, Pin
+from sbafab.laminate.laminate import Bore, Chamber, Laminate
 
 AXIS = (0.0, 0.0)
 
@@ -67,13 +67,14 @@ def build(design: OneDofDesign) -> Laminate:
         bores=(Bore("chamber1", AXIS, design.bore.diameter),) if has_bore else (),
         inlets=(inlet,),
         pins=(
-            *((Pin("chamber1", AXIS, design.bore.diameter),) if has_bore else ()),
+            *((channel_pin("chamber1", AXIS, design.bore),) if has_bore else ()),
             *(ear.pin for ear in ears),
             *(pin for tail in held for pin in tail.pins),
         ),
         lumen=None,
         balloons=balloons,
         registration=design.registration.method,
+        pins_in_full_bonds=design.registration.full_bond_pins == "in",
         notes=(NOTE,) if ears else (),
         outline=plates,
     )

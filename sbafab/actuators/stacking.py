@@ -14,6 +14,7 @@ from sbafab.actuators.ears import (
     with_mask_ears,
 )
 from sbafab.actuators.tails import Tail, with_tails
+from sbafab.design.records import Bore as BoreSection
 from sbafab.design.records import Design
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point
@@ -21,7 +22,7 @@ from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc
 from sbafab.laminate.films import Film
-from sbafab.laminate.laminate import Layer, Role
+from sbafab.laminate.laminate import Layer, Pin, Role
 
 
 @dataclass(frozen=True)
@@ -130,6 +131,11 @@ def balloon_cuts(stack: BalloonStack, design: Design) -> list[CutFilm]:
             mask = separator_mask(below, stack.shape_of[number] + 1)
             cuts.append(CutFilm("separator-mask", mask, number, stack.shapes[0].outline_pieces))
     return cuts
+
+
+def channel_pin(name: str, centre: Point, bore: BoreSection) -> Pin:
+    """The dowel pin of a channel bore."""
+    return Pin(name, centre, bore.pin, round(bore.diameter - bore.pin, 9))
 
 
 def films(design: Design) -> dict[str, Film]:

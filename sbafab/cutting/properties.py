@@ -31,7 +31,8 @@ class CutSettings:
     it was not measured.
     ``waived``: names of the waived rules; ``lowered``: limits below the usual ones, as
     ``rules.lowered`` says them.
-    ``generator``: program and version, for example ``sbafab 1.0.0``.
+    ``generator``: program and version, for example ``sbafab 1.0.0``. ``platen``: size of the base
+    plate in mm.
     """
 
     design: str
@@ -41,6 +42,7 @@ class CutSettings:
     lowered: tuple[str, ...] = ()
     curves: Curves = TRUE_ARCS
     generator: str = "sbafab"
+    platen: tuple[float, float] = (152.4, 152.4)
 
     def kerf_width(self, material: Material) -> Kerf | None:
         return self.kerf_widths.get(material)

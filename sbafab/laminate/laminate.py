@@ -100,11 +100,20 @@ class Inlet:
 
 @dataclass(frozen=True)
 class Pin:
-    """A dowel pin of the press fixture; it holds every layer with an opening at its place."""
+    """A dowel pin of the press fixture; it holds every layer with an opening at its place.
+
+    ``clearance``: by how much the layers' hole for it is wider than the pin.
+    """
 
     name: str
     centre: Point
     diameter: float
+    clearance: float = 0.0
+
+    @property
+    def hole(self) -> float:
+        """Diameter of the layers' hole for the pin."""
+        return self.diameter + self.clearance
 
 
 @dataclass(frozen=True, repr=False)
@@ -112,7 +121,8 @@ class Laminate:
     """A stack of layers, bottom to top, with what the layers alone do not tell.
 
     ``outline`` is that of the films of all balloons laid over each other, without inlet tabs and
-    ears; empty where only the layers are known.
+    ears; empty where only the layers are known. ``pins_in_full_bonds``: whether the pins of ears
+    stay in while TPE melts.
     """
 
     name: str
@@ -127,6 +137,7 @@ class Laminate:
     registration: str
     notes: tuple[str, ...] = ()
     outline: Region = NOTHING
+    pins_in_full_bonds: bool = False
 
     def __repr__(self) -> str:
         return f"Laminate({self.name!r}, {self.family!r}, {len(self.layers)} layers)"
@@ -195,7 +206,7 @@ class Laminate:
             pin
             for pin in self.pins
             if any(
-                math.dist(centre, pin.centre) < LOOSE and abs(2 * radius - pin.diameter) < LOOSE
+                math.dist(centre, pin.centre) < LOOSE and abs(2 * radius - pin.hole) < LOOSE
                 for centre, radius in circles
             )
         )

@@ -11,12 +11,12 @@ from typing import Any
 
 from sbafab.assemblies.build import Assembled
 from sbafab.assemblies.colours import colours
-from sbafab.cutting.fixture import fixture
+from sbafab.cutting.fixture import shown
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
 from sbafab.pressing.together import Runs, press_runs
 from sbafab.reports.drawing import TIMES
-from sbafab.reports.traveller import bench, bill, joining, notes, process, times
+from sbafab.reports.traveller import bench, bill, joining, notes, times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.cautions import cautions, for_the_designer
 from sbafab.reports.traveller.code import code_svg, code_text
@@ -70,8 +70,8 @@ class AssemblyJob:
 
 
 def runs_of(work: Work) -> Runs:
-    """Press runs for all copies of a design, each on a pin plate of its own if it has pins."""
-    plate = fixture(work.laminate)
+    """Press runs for all copies of a design, each with its own holes in the base plate."""
+    plate = shown(work.laminate)
     press = work.design.press
     bounds = work.laminate.bounds if plate is None else plate.bounds
     return press_runs(work.job.copies, bounds, (press.platen_width, press.platen_length))
@@ -126,7 +126,6 @@ def _chapter(one: DesignWork, number: int, mark: str) -> str:
     said["shapes"] = definitions(pattern_regions(one.work.laminate))
     # The sheet goes round its tube when the assembly is put together.
     said["wrapping"] = []
-    said["force_notes"] = process.force_notes(one.work, one.runs.together)
     html = (
         environment()
         .get_template(CHAPTER)

@@ -25,7 +25,7 @@ from sbafab.pressing.schedule import Schedule
 from sbafab.reports.canvas import COLOURS, KEY
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.features import balloons, layer_numbers
-from sbafab.reports.traveller import bench, bill, notes, process, times
+from sbafab.reports.traveller import base_plate, bench, bill, notes, process, times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.cautions import cautions, for_the_designer
 from sbafab.reports.traveller.code import code_svg, record_text
@@ -101,7 +101,8 @@ def context(work: Work) -> dict[str, Any]:
         "laser_minutes": times.laser_minutes(work),
         "laser_basis": times.laser_basis(work),
         "lay_up": _lay_up(work),
-        "force_notes": process.force_notes(work),
+        "force_notes": base_plate.build_up_notes(work),
+        "plate_holes": base_plate.holes(work),
         "step_pages": process.step_pages(work),
         "finishing": process.finishing(work),
         "tubing": process.tubing(work),
