@@ -27,7 +27,8 @@ def fixture(laminate: Laminate) -> Region | None:
     """
     if not laminate.pins:
         return None
-    low_x, low_y, high_x, high_y = laminate.bounds
+    whole = laminate.bounds if laminate.panel is None else laminate.panel.outline.bounds
+    low_x, low_y, high_x, high_y = whole
     x0, y0, x1, y1 = low_x - MARGIN, low_y - MARGIN, high_x + MARGIN, high_y + MARGIN
     plate = polygon([(x0, y0), (x1, y0), (x1, y1 - CHAMFER), (x1 - CHAMFER, y1), (x0, y1)])
     return plate - union(disc(pin.centre, pin.diameter / 2) for pin in laminate.pins)

@@ -40,7 +40,7 @@ def assembly(laminate: Laminate) -> tuple[AssemblyStep, ...]:
 
     Flash bonds hold layers in place on their pins. With channel pins full bonds are pressed
     without any: base and cap have no bore for one, and a lumen pin, though it would pass, stays
-    out as in the paper. With ears the pins are in every time.
+    out as in the paper. With ears and in registered sheets the pins are in every time.
     """
     return tuple(
         _step(number, plan, laminate)
@@ -59,6 +59,13 @@ class _Plan(NamedTuple):
 
 def _plans(laminate: Laminate) -> tuple[_Plan, ...]:
     indices = tuple(layer.index for layer in laminate.layers)
+    if laminate.panel is not None:
+        # Corner pins hold the base as well: nothing has to be pressed by itself first.
+        below, cap = indices[:-1], indices[-1:]
+        return (
+            _Plan("flash_middle", "flash", (below,), below),
+            _Plan("bond_all", "full", (below, cap), cap),
+        )
     films = [layer for layer in laminate.layers if not layer.is_mask]
     base = next((layer for layer in films if layer.role == "base"), films[0]).index
     upper = tuple(index for index in indices if base < index <= base + 2)
@@ -76,7 +83,7 @@ def _plans(laminate: Laminate) -> tuple[_Plan, ...]:
 
 def _step(number: int, plan: _Plan, laminate: Laminate) -> AssemblyStep:
     layers = [index for stack in plan.stacks for index in stack]
-    pinned = plan.bond == "flash" or laminate.registration == "ears"
+    pinned = plan.bond == "flash" or laminate.registration != "channel-pin"
     pins = _pins_in(laminate, layers) if pinned else ()
     stacks = tuple(stack for stack in plan.stacks if stack)
     return AssemblyStep(number, plan.name, plan.bond, stacks, plan.adds, pins)

@@ -13,8 +13,11 @@ def parts_of(laminate: Laminate, paths: Mapping[str, Region], copies: int) -> tu
     """Every piece of every pattern, by pattern in stacking order.
 
     ``paths`` holds each pattern's path of the beam, kerf compensated. Pieces of one pattern that
-    differ only in their place are one part, named after the first of them.
+    differ only in their place are one part, named after the first of them. None where the layers
+    are registered sheets: these are not nested.
     """
+    if laminate.panel is not None:
+        return ()
     parts: list[Part] = []
     for pattern, layers in laminate.patterns.items():
         alike: dict[Region, list[int]] = {}

@@ -69,6 +69,12 @@ class Written(NamedTuple):
 
 def refuse_unlike(designs: Sequence[Design]) -> None:
     """Raises DesignError where two designs are not cut from the same film by one machine."""
+    for one in designs:
+        if one.registration.method == "sheet":
+            raise DesignError(
+                f"{one.name} is made in registered sheets of its own, which no other parts are cut "
+                'from; make it by itself with sbafab generate, or give it registration.method = "ears"'
+            )
     first, *others = designs
     for other in others:
         for section in SHARED:

@@ -14,6 +14,7 @@ from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.panel import Panel
 from sbafab.meshing.files import MeshFile
 from sbafab.models.sizes import sizes
 from sbafab.output.settings import GENERATOR, kerf_widths, limits
@@ -86,6 +87,7 @@ def manifest(
         ],
         "lumen": laminate.lumen,
         "fixture": cut.fixture if cut else None,
+        **({"panel": panel_entry(laminate.panel, cut)} if laminate.panel and cut else {}),
         "sheets": [sheet_entry(sheet) for sheet in sheets],
         "meshes": [
             {
@@ -98,6 +100,20 @@ def manifest(
             }
             for mesh in meshes
         ],
+    }
+
+
+def panel_entry(panel: Panel, cut: CutSet) -> dict[str, Any]:
+    """Registered sheets as the manifest lists them, in the frame of the first copy."""
+    return {
+        "size": [round(side, 6) for side in panel.size],
+        "places": [_place(place) for place in panel.places],
+        "batches": panel.batches,
+        "second_cut": cut.second,
+        "fiducials": [
+            {**_place(place), "diameter": panel.fiducial_diameter} for place in panel.fiducials
+        ],
+        "turned_over": "PTFE",
     }
 
 

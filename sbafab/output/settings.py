@@ -38,6 +38,8 @@ def limits(design: Design) -> Limits:
             pin=design.registration.pin_error,
             placement=design.registration.hand_placement,
             turn=design.registration.hand_turn,
+            sheet=design.panel.sheet_error,
+            second_cut=design.panel.second_cut_error,
         ),
         worst_bond_width=design.rules.worst_bond_width,
         worst_mask_overhang=design.rules.worst_mask_overhang,

@@ -11,9 +11,10 @@ from typing import Any
 from sbafab.cutting.files import CutFile, compensated_paths, write_layer_files
 from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.properties import CutSettings, curves_of
+from sbafab.cutting.second_cut import write_second_cut
 from sbafab.cutting.sheets import FOLDER, SheetFile, write_sheets
 from sbafab.design.records import Design
-from sbafab.errors import OutputError
+from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.check import check_nest
@@ -44,16 +45,23 @@ class CutPlan:
 class CutSet:
     """The cut files of one laminate; ``fixture`` is the pin plate's path, if it has pins.
 
-    ``curves`` says within what chords stay; None for true arcs.
+    ``second`` that of the second cut of registered sheets. ``curves`` says within what chords stay;
+    None for true arcs.
     """
 
     files: tuple[CutFile, ...]
     fixture: str | None
     curves: str | None = None
+    second: str | None = None
 
 
 def plan_cuts(laminate: Laminate, copies: int, settings: CutSettings, limits: Limits) -> CutPlan:
     """Raises DesignError where the kerf leaves no path, or chords do not hold the limits."""
+    if laminate.panel is not None and settings.profile == "chords":
+        raise DesignError(
+            'registered sheets (registration.method = "sheet") are not drawn in chords; write '
+            "bulges or arcs"
+        )
     paths = compensated_paths(laminate, settings)
     if settings.profile == "chords":
         refuse_coarse(laminate, paths, settings, limits)
@@ -68,6 +76,8 @@ def find_nests(
     Places that an earlier run found for the same parts and sheets are taken over, not searched
     for again. Raises DesignError where parts do not fit.
     """
+    if not parts:
+        return ()
     tell("nesting", 0, 1)
     saved = _saved(parts, design, old_folder / PLACES)
     return saved or nest(parts, stocks(design), design.sheets.engine, design.sheets.seconds)
@@ -80,13 +90,23 @@ def write_cut_set(
     files = write_layer_files(
         laminate, plan.paths, folder, settings, lambda done, total: tell("cut files", done, total)
     )
-    return CutSet(tuple(files), write_fixture(laminate, folder, settings), curves_of(settings))
+    plate = write_fixture(laminate, folder, settings)
+    return CutSet(
+        tuple(files), plate, curves_of(settings), write_second(laminate, folder, settings)
+    )
+
+
+def write_second(laminate: Laminate, folder: Path, settings: CutSettings) -> str | None:
+    """Writes the second cut; its path in ``folder``, None for parts that are cut at once."""
+    return None if laminate.panel is None else write_second_cut(laminate.panel, folder, settings)
 
 
 def write_nested_sheets(
     nests: Sequence[Nest], design: Design, folder: Path, settings: CutSettings, tell: Progress
 ) -> list[SheetFile]:
-    """Writes the film sheets, and beside them the places for a later run."""
+    """Writes the film sheets, and beside them the places for a later run; nothing for no nest."""
+    if not nests:
+        return []
     sheets = write_sheets(
         nests,
         folder,

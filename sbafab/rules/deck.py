@@ -9,6 +9,7 @@ from typing import NamedTuple
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import (
     bond_width,
+    bridges,
     channel_clear,
     facing_films,
     film_limits,
@@ -19,6 +20,7 @@ from sbafab.rules import (
     registration_nominal,
     registration_worst_case,
     registration_yield,
+    scrap,
     sealing,
     tube_fit,
 )
@@ -46,6 +48,8 @@ RULES = (
     Rule(tube_fit.NAME, tube_fit.check),
     Rule(piece_count.NAME, piece_count.check),
     Rule(pin_holes.NAME, pin_holes.check),
+    Rule(bridges.NAME, bridges.check),
+    Rule(scrap.NAME, scrap.check),
     Rule(film_limits.NAME, film_limits.check),
     Rule(press_fit.NAME, press_fit.check),
     Rule(registration_nominal.NAME, registration_nominal.check),

@@ -18,12 +18,15 @@ class Tolerances:
 
     ``cutting``: mm, any cut edge along its normal; ``pin``: mm, a layer on its pins; ``placement``
     mm and ``turn`` degrees: a layer laid by hand. The first two are the paper's (Sec. 2).
+    ``sheet``: mm, a part in its registered sheet; ``second_cut``: mm, the second cut of these.
     """
 
     cutting: float = 0.1
     pin: float = 0.004
     placement: float = 0.2
     turn: float = 1.0
+    sheet: float = 0.05
+    second_cut: float = 0.2
 
 
 @dataclass(frozen=True)

@@ -111,8 +111,7 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     message = (
         f"{found.whole.value:.2%} of {found.whole.builds} random builds keep every limit "
         f"(95 % interval {low:.2%} to {high:.2%}){_by_interface(found)}; errors are assumed spread "
-        f"evenly, up to {limits.tolerances.placement:g} mm and "
-        f"{limits.tolerances.turn:g} degree where a hand places"
+        f"evenly, up to {_by_hand(laminate, limits)}"
     )
     if verdict == "fail":
         message += (
@@ -123,6 +122,14 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     if worst is not None and found.interfaces[worst].good < found.whole.builds:
         place = Place(worst, laminate.interfaces[worst - 1].layer_indices)
     return [Finding(NAME, verdict, target, found.whole.value, "", place, message)]
+
+
+def _by_hand(laminate: Laminate, limits: Limits) -> str:
+    """What the design assumes of the bench, in words."""
+    errors = limits.tolerances
+    if laminate.panel is not None:
+        return f"{errors.sheet:g} mm in a registered sheet"
+    return f"{errors.placement:g} mm and {errors.turn:g} degree where a hand places"
 
 
 def simulate(laminate: Laminate, limits: Limits, seed: int = SEED) -> Yield:

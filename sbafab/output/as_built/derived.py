@@ -32,7 +32,7 @@ from sbafab.output.contents import TRAVELLER, Checked, Made, Part, schedule_of, 
 from sbafab.output.earlier import PRESS
 from sbafab.output.manifest import as_json
 from sbafab.output.settings import GENERATOR, cut_settings
-from sbafab.output.shop import CutSet, find_nests, write_nested_sheets
+from sbafab.output.shop import CutSet, find_nests, write_nested_sheets, write_second
 
 INDEX = "manifest.json"
 UNMADE = (DesignError, OutputError, GeometryError, ArithmeticError, LookupError)
@@ -124,7 +124,8 @@ def _write_anew(
         nests = find_nests(parts, design, folder, _quiet)
         sheets = write_nested_sheets(nests, design, fresh, settings, _quiet)
     write_fixture(laminate, fresh, settings)
-    cut = CutSet(_cut_files(checked), FIXTURE if laminate.pins else None, claims.curves)
+    second = write_second(laminate, fresh, settings)
+    cut = CutSet(_cut_files(checked), FIXTURE if laminate.pins else None, claims.curves, second)
     pressing = schedule_of(checked) if "press" in wanted else None
     made = Made(cut, sheets, pressing, traveller=has_page)
     return write_contents(checked, wanted, made, fresh, _quiet)
