@@ -42,7 +42,7 @@ TURN = 7.5
 INSET = 6.0
 """mm from the sheet's edges to pins and fiducials."""
 ASIDE = 8.0
-"""mm by which one corner's pin stands off the others' rectangle: no sheet fits turned or flipped."""
+"""mm by which one corner's pin stands aside, so that no sheet fits turned or flipped."""
 CHAMFER = 5.0
 PLAY = 1.0
 """mm by which the holes at two corners are wider than their pins: these keep the sheet flat."""
@@ -231,7 +231,7 @@ def _outline(window: Region, places: Sequence[Point], design: Design) -> Region:
 
 
 def _pins(outline: Region, diameter: float) -> tuple[tuple[Pin, ...], list[Contour]]:
-    """Pins at the corners and their holes: one fits, one is a slot, two only keep the sheet flat."""
+    """Corner pins and their holes: one fits, one is a slot, two only keep the sheet flat."""
     x0, y0, x1, y1 = outline.bounds
     left, low, right, high = x0 + INSET, y0 + INSET, x1 - INSET, y1 - INSET
     corners = [(left, low), (right, low), (right, high), (left + ASIDE, high)]

@@ -40,19 +40,19 @@ def compensated_paths(laminate: Laminate, settings: CutSettings) -> dict[str, Re
     Raises DesignError where the kerf leaves none.
     """
     return {
-        pattern: _compensated(laminate, layers[0], settings)
+        pattern: _compensated(layers[0], laminate.first_cut(layers[0]), settings)
         for pattern, layers in laminate.patterns.items()
     }
 
 
-def _compensated(laminate: Laminate, layer: Layer, settings: CutSettings) -> Region:
+def _compensated(layer: Layer, shape: Region, settings: CutSettings) -> Region:
     kerf = settings.kerf_width(layer.film.material)
     try:
         if isinstance(kerf, tuple) and settings.profile == "chords":
             raise DesignError(
                 "chords do not tell how a kerf along x and y was compensated; write bulges or arcs."
             )
-        path = compensate(laminate.first_cut(layer), kerf or 0.0)
+        path = compensate(shape, kerf or 0.0)
         if settings.profile != "chords":
             return path
         return in_chords(path, layer.role, settings.chord_error, max(widths(kerf or 0.0)) / 2)

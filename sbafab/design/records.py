@@ -169,7 +169,7 @@ class Registration(Section):
 
 
 class PanelSection(Section):
-    """Registered sheets, for ``registration.method = "sheet"``; all ours, no bench has tried any."""
+    """Registered sheets (``registration.method = "sheet"``); all ours, no bench has tried any."""
 
     bridge_width: Length = 1.0
     """Width of the bridges that hold a film's part in its sheet until the second cut."""

@@ -202,7 +202,7 @@ class Laminate:
         return self.pins_in(layer.profile)
 
     def pins_in(self, part: Region) -> tuple[Pin, ...]:
-        """The pins on which this part of a layer has a hole that fits; its sheet's, if it has one."""
+        """The pins on which this part of a layer, or its registered sheet, has a hole that fits."""
         if self.panel is not None:
             return self.pins
         circles = [hole.circle for hole in part.holes if hole.circle is not None]

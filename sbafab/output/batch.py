@@ -72,8 +72,8 @@ def refuse_unlike(designs: Sequence[Design]) -> None:
     for one in designs:
         if one.registration.method == "sheet":
             raise DesignError(
-                f"{one.name} is made in registered sheets of its own, which no other parts are cut "
-                'from; make it by itself with sbafab generate, or give it registration.method = "ears"'
+                f"{one.name} is made in registered sheets, which hold no parts of other designs; "
+                'make it by itself with sbafab generate, or use registration.method = "ears"'
             )
     first, *others = designs
     for other in others:

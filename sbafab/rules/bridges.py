@@ -27,6 +27,12 @@ class _Bridge(NamedTuple):
     layer: Layer
 
 
+class _Wrong(NamedTuple):
+    layer: Layer
+    at: Point
+    message: str
+
+
 def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     """The narrowest bridge; fails as well where a part is loose, or not freed as it should be."""
     limit = max(LEAST, limits.least_feature)
@@ -66,37 +72,52 @@ def sheeted(laminate: Laminate, masks: bool = False) -> list[Layer]:
     return list(found.values())
 
 
-def _wrong(laminate: Laminate, panel: Panel, limits: Limits) -> Iterator[tuple[Layer, Point, str]]:
-    """What no width measures, in words, with its layer and place."""
-    for layer in sheeted(laminate):
-        named = f"layer {layer.index} ({layer.name})"
-        loose = _beyond(panel.sheets[layer.index - 1])
-        if loose is not None:
-            yield layer, loose, f"no bridge holds what {named} has at {at(loose)}; add one"
-        bridges = _bridges(panel, layer)
-        for place in panel.places:
-            count = sum(panel.holds(bridge.at, place) for bridge in bridges)
-            if count < FEWEST:
-                said = f"{named} hangs on {count} bridges in the copy at {at(place)}"
-                yield layer, place, f"{said}, and needs {FEWEST}; add bridges"
-    for layer in (*sheeted(laminate), *sheeted(laminate, masks=True)):
-        for place, part in zip(panel.places, freed(panel, layer).parts, strict=True):
-            if part == layer.profile:
-                continue
-            said = f"layer {layer.index} ({layer.name}), copy at {at(place)}"
-            what = "comes out of its sheet otherwise than it is meant to"
-            if part.is_empty:
-                what = "is still held after the second cut"
-            yield layer, place, f"{said}: it {what}; write the sheets anew"
+def _wrong(laminate: Laminate, panel: Panel, limits: Limits) -> Iterator[_Wrong]:
+    """What no width measures."""
+    films, masks = sheeted(laminate), sheeted(laminate, masks=True)
+    for layer in films:
+        yield from _loose(panel, layer)
+    for layer in (*films, *masks):
+        yield from _misfreed(panel, layer)
     needed = limits.bond_width + limits.tolerances.second_cut
-    for layer in sheeted(laminate, masks=True):
+    for layer in masks:
         if layer.role == "chamber-mask":
-            for place in panel.places:
-                near = grow(layer.profile.moved(*place), needed - TOLERANCE) & panel.second
-                if not near.is_empty:
-                    spot = near.edges[0].start
-                    said = f"the second cut comes nearer than {needed:g} mm to the pocket of layer "
-                    yield layer, spot, f"{said}{layer.index}, {at(spot)}; make panel.stub larger"
+            near = grow(layer.profile, needed - TOLERANCE)
+            yield from _cut_into(panel, layer, near, needed)
+
+
+def _loose(panel: Panel, layer: Layer) -> Iterator[_Wrong]:
+    """Film that too few bridges hold."""
+    named = f"layer {layer.index} ({layer.name})"
+    spot = _beyond(panel.sheets[layer.index - 1])
+    if spot is not None:
+        yield _Wrong(layer, spot, f"no bridge holds what {named} has at {at(spot)}; add one")
+    bridges = _bridges(panel, layer)
+    for place in panel.places:
+        count = sum(panel.holds(bridge.at, place) for bridge in bridges)
+        if count < FEWEST:
+            said = f"{named} hangs on {count} bridges in the copy at {at(place)}"
+            yield _Wrong(layer, place, f"{said}, and needs {FEWEST}; add bridges")
+
+
+def _misfreed(panel: Panel, layer: Layer) -> Iterator[_Wrong]:
+    """Parts that the cuts leave otherwise than they are meant to be."""
+    for place, part in zip(panel.places, freed(panel, layer).parts, strict=True):
+        if part != layer.profile:
+            what = "is still held after the second cut" if part.is_empty else "is cut otherwise"
+            said = f"layer {layer.index} ({layer.name}) {what} in the copy at {at(place)}"
+            yield _Wrong(layer, place, f"{said}; write the sheets anew")
+
+
+def _cut_into(panel: Panel, layer: Layer, near: Region, needed: float) -> Iterator[_Wrong]:
+    """Slots that an error of the second cut may bring too near to a pocket."""
+    for place in panel.places:
+        met = near.moved(*place) & panel.second
+        if not met.is_empty:
+            spot = met.edges[0].start
+            said = f"the second cut comes nearer than {needed:g} mm to the pocket of layer"
+            text = f"{said} {layer.index}, {at(spot)}; make panel.stub larger"
+            yield _Wrong(layer, spot, text)
 
 
 def _beyond(sheet: Region) -> Point | None:

@@ -105,13 +105,9 @@ def _in_sheets(laminate: Laminate, tolerances: Tolerances) -> Freedoms:
     under: tuple[Freedom, ...] = ()
     added = {index: step.number for step in assembly(laminate) for index in step.adds}
     for layer in laminate.layers:
-        body = Freedom(
-            added[layer.index], layer.index, layer.index, layer.index, len(laminate.pins), 0
-        )
-        both = (
-            body._replace(most=tolerances.pin),
-            body._replace(body=-layer.index, most=tolerances.sheet, in_sheet=True),
-        )
+        number, step, pins = layer.index, added[layer.index], len(laminate.pins)
+        on_pins = Freedom(step, number, number, number, pins, tolerances.pin)
+        both = on_pins, on_pins._replace(body=-number, most=tolerances.sheet, in_sheet=True)
         own = tuple(one for one in both if one.most > 0)
         if layer.is_mask:
             own = (*under, *own)

@@ -132,7 +132,7 @@ def _why_held(
 
 
 def _between(laminate: Laminate, panel: Panel, one: int, other: int) -> Region | None:
-    """The mask sheets between two films that face each other; None where another film lies there."""
+    """The mask sheets between two films; None where another film lies there."""
     low, high = sorted((one, other))
     within: Sequence[Layer] = laminate.layers[low : high - 1]
     if not all(layer.is_mask for layer in within):

@@ -89,9 +89,9 @@ class AsBuilt:
 
     @property
     def is_meant(self) -> bool:
-        if self.laminate is not None and self.meant is not None:
-            if self.laminate.panel is not self.meant.laminate.panel:
-                return False
+        own, meant = self.laminate, self.meant
+        if own is not None and meant is not None and own.panel is not meant.laminate.panel:
+            return False
         return all(file.part is not None and file.part.is_meant for file in self.files)
 
 
