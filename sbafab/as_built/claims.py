@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from sbafab.as_built.cut_files import LayerFile
+from sbafab.as_built.records import CLAIMS, Job, KerfClaim, LayerClaim, Manifest, Problem
 from sbafab.cutting.properties import (
     LIMITS,
     PTFE_WARNING,
@@ -16,8 +18,6 @@ from sbafab.cutting.properties import (
 from sbafab.design.records import Design
 from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Layer
-from sbafab.output.as_built.cut_files import LayerFile
-from sbafab.output.as_built.records import CLAIMS, Job, KerfClaim, LayerClaim, Manifest, Problem
 from sbafab.output.manifest import file_hashes
 from sbafab.output.settings import kerf_widths, limits
 from sbafab.rules.lowered import lowered

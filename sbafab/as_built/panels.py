@@ -6,6 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from sbafab.as_built.cut_files import LayerFile, check_sequence, sound_digest
+from sbafab.as_built.meant import Meant, departure
+from sbafab.as_built.records import INTEGRITY, Manifest, Problem
+from sbafab.as_built.uncut import uncut
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.second_cut import PATH, ROOM, marks, second_path
 from sbafab.cutting.verify import check_surroundings
@@ -16,10 +20,6 @@ from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import rectangle
 from sbafab.laminate.laminate import Layer
 from sbafab.laminate.panel import Panel, freed
-from sbafab.output.as_built.cut_files import LayerFile, check_sequence, sound_digest
-from sbafab.output.as_built.meant import Meant, departure
-from sbafab.output.as_built.records import INTEGRITY, Manifest, Problem
-from sbafab.output.as_built.uncut import uncut
 
 
 def read_panel(
