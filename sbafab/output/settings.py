@@ -78,6 +78,7 @@ def press_settings(design: Design) -> PressSettings:
         flash_middle=press.flash_middle_minutes,
         bond_all=press.bond_all_minutes,
         validated_balloons=design.rules.validated_balloons,
+        tack=design.panel.tack_minutes,
     )
 
 

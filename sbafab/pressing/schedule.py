@@ -22,6 +22,7 @@ from sbafab.laminate.assembly import (
     stack_count,
 )
 from sbafab.laminate.laminate import Laminate
+from sbafab.pressing import sheets
 
 TITLES: dict[StepName, str] = {
     "flash_bottom": "Bottom balloon, upper two layers",
@@ -75,6 +76,7 @@ class PressSettings:
     flash_middle: float = 10.0
     bond_all: float = 20.0
     validated_balloons: int = 20
+    tack: float = 1.0
 
     @property
     def force_n(self) -> float:
@@ -139,21 +141,31 @@ def schedule(laminate: Laminate, press: PressSettings) -> Schedule:
         _step(laminate, last, press, after),
     )
     total = sum(step.minutes for step in steps)
+    tacking = press.tack * sheets.tackings(laminate)
     return Schedule(
         steps,
         total,
-        total + HANDLING_MINUTES,
-        f"{total:g} min in the press and {HANDLING_MINUTES:g} min to cut, lay up, pin and fit the "
-        "tubing; the latter is assumed the same for every design (paper: 1.75 h in all)",
+        total + tacking + HANDLING_MINUTES,
+        f"{total:g} min in the press{_tacked(tacking)} and {HANDLING_MINUTES:g} min to cut, lay "
+        "up, pin and fit the tubing; the latter is assumed the same for every design (paper: "
+        "1.75 h in all)",
         tuple(_warnings(laminate, press, steps)),
     )
 
 
+def _tacked(minutes: float) -> str:
+    return f", {minutes:g} min to tack masks to their films" if minutes else ""
+
+
 def _step(laminate: Laminate, part: AssemblyStep, press: PressSettings, after: str = "") -> Step:
     count = stack_count(laminate, part.layers)
+    title = TITLES[part.name] if count == 1 else TITLES_OF_SEVERAL[part.name]
+    words = _instructions(part, count) + after
+    if laminate.panel is not None:
+        title, words = sheets.title(part), sheets.instructions(part)
     return Step(
         step=part.number,
-        title=TITLES[part.name] if count == 1 else TITLES_OF_SEVERAL[part.name],
+        title=title,
         bond=part.bond,
         layers=part.layers,
         adds=part.adds,
@@ -163,7 +175,7 @@ def _step(laminate: Laminate, part: AssemblyStep, press: PressSettings, after: s
         force_n=round(press.force_n, 1),
         platen_mm=press.platen,
         minutes=press.minutes(part.name),
-        instructions=_instructions(part, count) + after,
+        instructions=words,
     )
 
 
@@ -222,6 +234,8 @@ def _refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
 
 
 def _warnings(laminate: Laminate, press: PressSettings, steps: Sequence[Step]) -> Iterator[str]:
+    if laminate.panel is not None:
+        yield sheets.UNTRIED
     if press.temperature_c > HOTTEST_TRIED:
         yield (
             f"{press.temperature_c:g} C is hotter than the {HOTTEST_TRIED:g} C of earlier work, "

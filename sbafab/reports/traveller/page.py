@@ -24,7 +24,7 @@ from sbafab.models.sizes import sizes
 from sbafab.pressing.schedule import Schedule
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.features import balloons, layer_numbers
-from sbafab.reports.traveller import bill, notes, process, times
+from sbafab.reports.traveller import bill, notes, panel, process, times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.cautions import cautions
 from sbafab.reports.traveller.code import code_svg, code_text
@@ -107,6 +107,7 @@ def context(work: Work) -> dict[str, Any]:
         "times": times.times(work),
         "kerf_notes": notes.kerf_notes(work),
         "expected_sizes": notes.expected_sizes(work),
+        **panel.chapter(work),
     }
 
 
