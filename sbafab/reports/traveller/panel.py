@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from sbafab.cutting.cut_layers import CUT_INNER
+from sbafab.cutting.cut_layers import CUT_OUTER
 from sbafab.cutting.second_cut import PATH as SECOND_CUT
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
@@ -13,15 +13,18 @@ from sbafab.geometry.svg import number, path_data
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.laminate.panel import Panel
 from sbafab.laminate.picture import INK
+from sbafab.pressing.sheets import tackings
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller import process
 from sbafab.reports.traveller import quantities as say
-from sbafab.reports.traveller.bill import Cut, Item
+from sbafab.reports.traveller.bill import Cut, Item, bill, cut_list
 from sbafab.reports.traveller.job import Work
+from sbafab.reports.traveller.notes import expected_sizes
 from sbafab.reports.traveller.process import Action, StepPage
 from sbafab.reports.traveller.shapes import Picture, label
+from sbafab.reports.traveller.times import PAPER_MINUTES, Time
 
-WIDEST, TALLEST = 82.0, 92.0
+WIDEST, TALLEST = 62.0, 74.0
 EDGE, FOOT = 3.0, 5.0
 SECOND = "#c8008c"
 UNTRIED = (
@@ -43,9 +46,31 @@ def chapter(work: Work) -> dict[str, Any]:
         "panel_actions": _preparing(work, panel),
         "step_pages": _step_pages(work, panel),
         "finishing": _cut_free(panel),
+        "force_notes": _force_notes(work, panel),
         "bill": _bill(work, panel),
         "cuts": _cuts(work, panel),
+        "times": _times(work, panel),
+        "expected_sizes": [
+            ("every file in layers/", say.size(*panel.size)),
+            (f"{SECOND_CUT}, with its frame", say.size(*panel.size)),
+            *expected_sizes(work),
+        ],
     }
+
+
+def _force_notes(work: Work, panel: Panel) -> tuple[str, ...]:
+    """What the force means on sheets that are smaller than the platen."""
+    step = work.schedule.steps[0]
+    area = panel.outline.area
+    return (
+        f"{step.force_n:.0f} N is {step.pressure_kpa:g} kPa on the whole platen of "
+        f"{say.size(*step.platen_mm)}, as the paper gives it. The sheets take "
+        f"{say.size(*panel.size)}: without something compliant round them that fills the platen "
+        f"the same force is {1000 * step.force_n / area:.0f} kPa on them, and "
+        f"{step.pressure_kpa * area / 1000:.0f} N would be {step.pressure_kpa:g} kPa.",
+        "Sheets of every film lie round the parts at every height, so that these share the "
+        "pressure; what each part gets of it nobody has measured.",
+    )
 
 
 def _pairs(laminate: Laminate) -> list[tuple[Layer, tuple[Layer, ...]]]:
@@ -179,9 +204,9 @@ def _cut_free(panel: Panel) -> list[Action]:
             "hole. Check all of them before you cut."
         ),
         Action(
-            f"Second cut: the slots on {CUT_INNER} or CUT_OUTER go through all films and the edges "
-            "of the masks. PTFE is among what is cut: see the warnings. A sharp blade along the "
-            "outer end of every stub does the same."
+            f"Second cut: the slots on {CUT_OUTER} go through all films and the edges of the "
+            "masks. PTFE is among what is cut: see the warnings. A sharp blade along the inner "
+            "edge of every slot does the same."
         ),
         Action(f"Lift out {many}; the sheets round them come off one by one."),
         Action(
@@ -195,8 +220,6 @@ def _cut_free(panel: Panel) -> list[Action]:
 
 def _bill(work: Work, panel: Panel) -> list[Item]:
     """The bill with sheets in place of parts, and what carries the masks."""
-    from sbafab.reports.traveller.bill import bill
-
     items = []
     for item in bill(work):
         material = item.name.removesuffix(" film")
@@ -214,8 +237,6 @@ def _bill(work: Work, panel: Panel) -> list[Item]:
 
 def _cuts(work: Work, panel: Panel) -> list[Cut]:
     """The cut list: a sheet for every layer of a pattern and every batch."""
-    from sbafab.reports.traveller.bill import cut_list
-
     found = []
     for row in cut_list(work):
         layers = work.laminate.patterns[row.pattern]
@@ -223,6 +244,28 @@ def _cuts(work: Work, panel: Panel) -> list[Cut]:
         length = sum(contour.length for contour in sheet.contours)
         found.append(replace(row, count=len(layers) * panel.batches, pieces=1, cut_length=length))
     return found
+
+
+def _times(work: Work, panel: Panel) -> list[Time]:
+    """How long a batch takes; the paper's handling is of one actuator, and is not known of many."""
+    plan, copies = work.schedule, len(panel.places)
+    steps = " + ".join(f"{step.minutes:g}" for step in plan.steps)
+    tacking = work.design.panel.tack_minutes * tackings(work.laminate)
+    pressing = plan.total_press_minutes + tacking
+    return [
+        Time(
+            "In the press",
+            say.minutes(pressing),
+            f"{steps} min, and {tacking:g} min to tack masks; one batch of "
+            f"{say.count(copies, 'actuator')}, {say.minutes(pressing / copies)} each",
+        ),
+        Time(
+            "Handling",
+            "not known",
+            "cutting, weeding, tacking and stacking sheets, tubes; no bench has tried it",
+        ),
+        Time("The paper", f"{PAPER_MINUTES:g} min", "one actuator of single parts, in all"),
+    ]
 
 
 def _pictures(laminate: Laminate, panel: Panel) -> list[tuple[str, str]]:
