@@ -220,6 +220,7 @@ def test_kerf_that_closes_a_bore_fails_film_limits_alone(good: Callable[..., Lam
 
 def test_every_rule_has_a_fault_of_its_own() -> None:
     tested_apart = {"press-fit", "registration-worst-case", "registration-yield"}
+    tested_apart |= {"bridges", "scrap"}
     assert {fault.rule for fault in FAULTS.values()} | tested_apart == set(rule_names())
 
 
