@@ -66,7 +66,7 @@ def test_kerf_leaves_parts_of_nominal_size(whole: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "rules"),
     [
-        ("copy", {"as-designed", "bridges", "manifest-claims"}),
+        ("copy", {"as-designed", "bridges", "registration-nominal"}),
         ("missing", {"as-designed", "file-integrity", "manifest-claims"}),
     ],
 )
