@@ -46,6 +46,8 @@ def chapter(work: Work) -> dict[str, Any]:
         "panel_actions": _preparing(work, panel),
         "step_pages": _step_pages(work, panel),
         "finishing": _cut_free(panel),
+        "tubing": [*_each(panel, "Fit the tubes"), *process.tubing(work)],
+        "leak_test": [*_each(panel, "Test"), *process.leak_test(work)],
         "force_notes": _force_notes(work, panel),
         "bill": _bill(work, panel),
         "cuts": _cuts(work, panel),
@@ -216,6 +218,16 @@ def _cut_free(panel: Panel) -> list[Action]:
         Action("Look through every lumen and into every tab: no scrap may be left in either."),
         Action("Leave the masks in their pockets."),
     ]
+
+
+def _each(panel: Panel, what: str) -> list[Action]:
+    """What is done once for every actuator of a batch says so, with a box for each."""
+    count = len(panel.places)
+    if count == 1:
+        return []
+    numbers = tuple(str(number) for number in range(1, count + 1))
+    text = f"{what} one actuator after the other, numbered by its place in the sheet, row by row:"
+    return [Action(text, (), numbers)]
 
 
 def _bill(work: Work, panel: Panel) -> list[Item]:
