@@ -84,6 +84,8 @@ def _wrong(laminate: Laminate, panel: Panel, limits: Limits) -> Iterator[_Wrong]
         if layer.role == "chamber-mask":
             near = grow(layer.profile, needed - TOLERANCE)
             yield from _cut_into(panel, layer, near, needed)
+        else:
+            yield from _welded(laminate, panel, layer, limits.tolerances.second_cut)
 
 
 def _loose(panel: Panel, layer: Layer) -> Iterator[_Wrong]:
@@ -118,6 +120,22 @@ def _cut_into(panel: Panel, layer: Layer, near: Region, needed: float) -> Iterat
             said = f"the second cut comes nearer than {needed:g} mm to the pocket of layer"
             text = f"{said} {layer.index}, {at(spot)}; make panel.stub larger"
             yield _Wrong(layer, spot, text)
+
+
+def _welded(laminate: Laminate, panel: Panel, mask: Layer, error: float) -> Iterator[_Wrong]:
+    """What an error of the second cut may leave of bridges past the mask between two balloons.
+
+    There the bridges of all balloons weld to each other.
+    """
+    film = laminate.layer(mask.index - 1)
+    rest = (grow(film.profile, error - TOLERANCE) & panel.second) - mask.profile
+    if not rest.is_empty and rest.area > TOLERANCE * error:
+        spot = rest.edges[0].start
+        text = (
+            f"a second cut {error:g} mm off leaves a bridge past the edge of layer {mask.index} "
+            f"({mask.name}), where balloons weld together, {at(spot)}; make mask.overhang larger"
+        )
+        yield _Wrong(mask, spot, text)
 
 
 def _beyond(sheet: Region) -> Point | None:

@@ -65,6 +65,14 @@ def test_a_second_cut_nearer_to_a_pocket_than_its_error_allows_fails_bridges_alo
     assert failing(good("panel.stub=0.25")) == {}
 
 
+def test_a_second_cut_that_leaves_welded_bridges_fails_bridges_alone() -> None:
+    laminate = good("panel.stub=0.7")
+    for error, found in ((0.45, {}), (0.6, {"bridges": None})):
+        limits = replace(FEW, tolerances=Tolerances(second_cut=error))
+        findings = run_deck(laminate, limits)
+        assert {f.rule: f.measured for f in findings if f.verdict == "fail"} == found
+
+
 def test_a_bridge_that_is_not_severed_holds_its_part() -> None:
     laminate = good()
     assert laminate.panel is not None
