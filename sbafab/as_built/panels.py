@@ -20,6 +20,7 @@ from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import rectangle
 from sbafab.laminate.laminate import Layer
 from sbafab.laminate.panel import Panel, freed
+from sbafab.rules.bridges import apart
 
 
 def read_panel(
@@ -28,7 +29,7 @@ def read_panel(
     """The panel of a folder's files, each layer's file with the part that it frees.
 
     The panel is the design's own where all files are what it makes. Of copies that differ, the
-    first that is not what the design makes stands for its layer.
+    one that departs most from what the design makes stands for its layer.
     """
     panel = meant.laminate.panel if meant is not None else None
     if meant is None or panel is None or len(files) != len(panel.sheets):
@@ -58,10 +59,9 @@ def _upward(sheet: Region, layer: Layer) -> Region:
 def _with_part(file: LayerFile, panel: Panel, layer: Layer) -> LayerFile:
     if file.part is None or file.part.is_meant:
         return file
-    parts = freed(panel, layer).parts
-    odd = [part for part in parts if part != layer.profile and not part.is_empty]
+    parts = [part for part in freed(panel, layer).parts if not part.is_empty]
     # What is not freed at all is told by the rule bridges.
-    region = odd[0] if odd else layer.profile
+    region = max(parts, key=lambda part: apart(part, layer.profile), default=layer.profile)
     return replace(file, part=replace(file.part, region=region))
 
 

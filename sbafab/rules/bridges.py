@@ -105,10 +105,16 @@ def _loose(panel: Panel, layer: Layer) -> Iterator[_Wrong]:
 def _misfreed(panel: Panel, layer: Layer) -> Iterator[_Wrong]:
     """Parts that the cuts leave otherwise than they are meant to be."""
     for place, part in zip(panel.places, freed(panel, layer).parts, strict=True):
-        if part != layer.profile:
+        room = TOLERANCE * sum(contour.length for contour in layer.profile.contours)
+        if part != layer.profile and apart(part, layer.profile) > room:
             what = "is still held after the second cut" if part.is_empty else "is cut otherwise"
             said = f"layer {layer.index} ({layer.name}) {what} in the copy at {at(place)}"
             yield _Wrong(layer, place, f"{said}; write the sheets anew")
+
+
+def apart(one: Region, other: Region) -> float:
+    """The area in mm2 that one of two regions has and the other not."""
+    return sum(rest.area for rest in (one - other, other - one) if not rest.is_empty)
 
 
 def _cut_into(panel: Panel, layer: Layer, near: Region, needed: float) -> Iterator[_Wrong]:

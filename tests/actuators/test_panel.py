@@ -58,7 +58,7 @@ def test_the_second_cut_frees_every_copy_as_shapely_sees_it(design: tuple[str, .
         assert parts.symmetric_difference(wanted).area < 0.02 * len(panel.places)
 
 
-@pytest.mark.parametrize("design", [ONE, LOBED, EIGHT])
+@pytest.mark.parametrize("design", [ONE, EIGHT])
 def test_three_bridges_hold_a_film_of_every_copy(design: tuple[str, ...]) -> None:
     panel = panel_of(made(*design))
     assert len(panel.second.pieces) == 3 * len(panel.places)
@@ -85,14 +85,13 @@ def test_mask_sheets_are_cut_turned_over_and_films_are_not() -> None:
     assert laminate.first_cut(mask) == sheets[1].mirrored() != sheets[1]
 
 
-@pytest.mark.parametrize(
-    ("copies", "each", "batches"), [(1, 1, 1), (9, 9, 1), (10, 5, 2), (28, 7, 4)]
-)
+@pytest.mark.parametrize(("copies", "each", "batches"), [(1, 1, 1), (70, 35, 2), (71, 24, 3)])
 def test_copies_are_spread_over_as_few_batches_as_film_and_platen_allow(
     copies: int, each: int, batches: int
 ) -> None:
-    # Films of 152.4 with borders of 10 leave 132.4: nine copies of 24.3 by 27.2, 12 round them.
-    panel = panel_of(made("3dof-15mm", "stack.balloons=2", f"order.copies={copies}"))
+    # Films of 152.4 with borders of 10 leave 132.4. A window reaches 2 mm past disc (3.25 and a
+    # stub), tab's end (8.25) and strip (0.5); 12 mm lie round all, 4 between: 5 by 7 fit.
+    panel = panel_of(made("1dof-5mm", "stack.balloons=2", f"order.copies={copies}"))
     assert (len(panel.places), panel.batches) == (each, batches)
     assert max(panel.size) <= 132.4
 

@@ -105,7 +105,6 @@ KIND = Kind(
     "come out of them are as they should be.",
     (
         redrawn("bridge left 0.4 wide", HELD, base, narrowed),
-        redrawn("part on one bridge", HELD, wall, torn),
         redrawn("film sheet over the inlet tab", LOCKED, wall, over_the_tab),
         redrawn("mask sheet beside its pins", PINNED, separator, aside),
         second("second cut without a slot", lambda slots: Region(slots.contours[1:])),

@@ -10,9 +10,11 @@ import pytest
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc
 from sbafab.laminate.laminate import Laminate
+from sbafab.rules import bridges, scrap
 from sbafab.rules.deck import run_deck
 from sbafab.rules.freedoms import Part, freedoms
 from sbafab.rules.limits import Limits, Tolerances
+from sbafab.rules.registration_yield import simulate
 from tests.faults.panels import narrowed, over_the_tab, torn
 from tests.rules.conftest import built
 
@@ -62,29 +64,31 @@ def test_a_faulty_sheet_fails_its_own_rule_alone(
 def test_a_second_cut_nearer_to_a_pocket_than_its_error_allows_fails_bridges_alone() -> None:
     laminate = good("panel.stub=0.1")
     assert failing(laminate) == {"bridges": None}
-    assert failing(good("panel.stub=0.25")) == {}
+    assert failing(good()) == {}
 
 
-def test_a_second_cut_that_leaves_welded_bridges_fails_bridges_alone() -> None:
-    laminate = good("panel.stub=0.7")
-    for error, found in ((0.45, {}), (0.6, {"bridges": None})):
+def test_a_second_cut_that_leaves_welded_bridges_is_refused() -> None:
+    for error, verdict in ((0.45, "pass"), (0.6, "fail")):
         limits = replace(FEW, tolerances=Tolerances(second_cut=error))
-        findings = run_deck(laminate, limits)
-        assert {f.rule: f.measured for f in findings if f.verdict == "fail"} == found
+        (found,) = bridges.check(good("panel.stub=0.7"), limits)
+        assert found.verdict == verdict
+    assert "weld together" in found.message
 
 
 def test_a_bridge_that_is_not_severed_holds_its_part() -> None:
     laminate = good()
     assert laminate.panel is not None
-    found = failing(with_second(laminate, Region(laminate.panel.second.contours[1:])))
-    assert "bridges" in found
+    (found,) = bridges.check(with_second(laminate, Region(laminate.panel.second.contours[1:])), FEW)
+    assert found.verdict == "fail"
+    assert "still held" in found.message
 
 
 def test_scrap_between_two_parts_is_locked_in() -> None:
     laminate = good()
     # Without window the wall of the first balloon is all sheet in the copy at the origin.
     shut = with_sheet(laminate, 3, lambda sheet, own: sheet | disc((0.0, 0.0), 9.0))
-    assert {"bridges", "scrap"} <= set(failing(shut))
+    (found,) = scrap.check(shut, FEW)
+    assert found.verdict == "fail"
 
 
 def test_parts_of_a_sheet_move_together_and_a_mask_with_the_film_below() -> None:
@@ -98,11 +102,10 @@ def test_parts_of_a_sheet_move_together_and_a_mask_with_the_film_below() -> None
 
 
 def test_stretch_of_the_sheets_lowers_the_yield() -> None:
-    shares = []
-    for error in (0.0, 0.05, 0.15):
-        limits = Limits(yield_builds=400, tolerances=Tolerances(sheet=error))
-        found = {f.rule: f.measured for f in run_deck(good(), limits)}
-        shares.append(found["registration-yield"])
+    shares = [
+        simulate(good(), Limits(yield_builds=400, tolerances=Tolerances(sheet=error))).whole.value
+        for error in (0.0, 0.05, 0.15)
+    ]
     assert shares[0] == 1.0
-    assert shares == sorted(shares, key=lambda share: -float(share or 0))
+    assert shares == sorted(shares, reverse=True)
     assert shares[2] < 0.7
