@@ -8,7 +8,7 @@ from pathlib import Path
 
 from sbafab.as_built.cut_files import LayerFile, check_sequence, sound_digest
 from sbafab.as_built.meant import Meant, departure
-from sbafab.as_built.records import INTEGRITY, Manifest, Problem
+from sbafab.as_built.records import INTEGRITY, Problem
 from sbafab.as_built.uncut import uncut
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.second_cut import PATH, ROOM, marks, second_path
@@ -20,6 +20,7 @@ from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import rectangle
 from sbafab.laminate.laminate import Layer
 from sbafab.laminate.panel import Panel, freed
+from sbafab.output.manifest_records import Manifest
 from sbafab.rules.bridges import apart
 
 

@@ -41,7 +41,7 @@ def write_second_cut(panel: Panel, folder: Path, settings: CutSettings) -> str:
     properties = second_cut_properties(settings)
     path = second_path(panel, settings.kerf_width("TPE") or 0.0)
     around = marks(panel)
-    text = dxf_text(cutting_order(path), properties, settings.profile, around)
+    text = dxf_text(cutting_order(path), properties, settings.curves.profile, around)
     target = folder / PATH
     target.parent.mkdir(parents=True, exist_ok=True)
     target.write_bytes(text.encode())

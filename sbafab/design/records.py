@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator
 
 from sbafab.design.form import Form
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
-from sbafab.geometry.beam import Kerf, is_kerf
+from sbafab.geometry.beam import Kerf
 from sbafab.notebook import table_html
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
@@ -211,6 +211,11 @@ class Press(Section):
 
 
 KerfWidth = LengthOrZero | tuple[LengthOrZero, LengthOrZero] | Literal["uncalibrated"]
+
+
+def is_kerf(x: float, y: float) -> bool:
+    """Whether a beam may be so wide: up to a millimetre, and nowhere ten times as wide."""
+    return min(x, y) >= 0 and max(x, y) <= min(1.0, 10 * min(x, y)) and math.isfinite(x + y)
 
 
 class Laser(Section):

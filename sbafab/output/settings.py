@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sbafab import __version__
-from sbafab.cutting.dxf_write import DxfProfile
+from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import Machine
 from sbafab.design.records import Design, Sheet
@@ -18,10 +18,13 @@ from sbafab.rules.lowered import lowered
 GENERATOR = f"sbafab {__version__}"
 
 
-def kerf_widths(design: Design) -> dict[str, Kerf | None]:
+def kerf_widths(design: Design) -> dict[Material, Kerf | None]:
     """Full kerf width (or that along x and y) by material, None where it was not measured."""
-    widths = {"TPE": design.laser.kerf_tpe, "PTFE": design.laser.kerf_ptfe}
-    return {name: None if isinstance(kerf, str) else kerf for name, kerf in widths.items()}
+    tpe, ptfe = design.laser.kerf_tpe, design.laser.kerf_ptfe
+    return {
+        "TPE": None if isinstance(tpe, str) else tpe,
+        "PTFE": None if isinstance(ptfe, str) else ptfe,
+    }
 
 
 def limits(design: Design) -> Limits:
@@ -50,10 +53,7 @@ def limits(design: Design) -> Limits:
 
 
 def cut_settings(
-    design: Design,
-    waived: tuple[str, ...],
-    profile: DxfProfile = "bulges",
-    chord_error: float = 0.005,
+    design: Design, waived: tuple[str, ...], curves: Curves = TRUE_ARCS
 ) -> CutSettings:
     return CutSettings(
         design=design.name,
@@ -61,8 +61,7 @@ def cut_settings(
         kerf_widths=kerf_widths(design),
         waived=waived,
         lowered=lowered(limits(design)),
-        profile=profile,
-        chord_error=chord_error,
+        curves=curves,
         generator=GENERATOR,
     )
 

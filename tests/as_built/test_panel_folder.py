@@ -79,7 +79,9 @@ def test_a_copy_that_is_cut_otherwise_stands_for_its_layer(whole: Path, tmp_path
     assert not built.is_meant
     assert built.laminate is not None
     cap = built.laminate.layer(7).profile
-    assert clean.layer(7).profile.area - cap.area == pytest.approx(1.12 * (3.25 - 2.84) - 0.04, abs=0.03)
+    assert clean.layer(7).profile.area - cap.area == pytest.approx(
+        1.12 * (3.25 - 2.84) - 0.04, abs=0.03
+    )
     (found,) = bridges.check(built.laminate, built.limits)
     assert found.verdict == "fail"
 

@@ -10,9 +10,9 @@ from sbafab.cutting.second_cut import PATH as SECOND_CUT
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.svg import number, path_data
+from sbafab.laminate.inks import INK
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.laminate.panel import Panel
-from sbafab.laminate.picture import INK
 from sbafab.pressing.sheets import tackings
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller import process
