@@ -12,6 +12,7 @@ import pytest
 from sbafab.actuators import load_design
 from sbafab.as_built.check import check_folder, read_folder
 from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.dxf_write import Curves
 from sbafab.cutting.second_cut import PATH
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
@@ -95,7 +96,7 @@ def test_a_folder_without_second_cut_fails(whole: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("refused", "said"),
     [
-        (lambda out: generate(design(), out, dxf_profile="chords"), "are not drawn in chords"),
+        (lambda out: generate(design(), out, curves=Curves("chords")), "are not drawn in chords"),
         (
             lambda out: generate_job([design(), design("name=other")], "job", out),
             "made in registered sheets",
