@@ -21,7 +21,7 @@ from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import circle, disc, polygon, stadium, strip
 from sbafab.laminate.laminate import Inlet, Laminate, Pin
-from sbafab.laminate.panel import Panel
+from sbafab.laminate.panel import SheetPanel
 
 METHOD = "sheet"
 NOTE = (
@@ -168,7 +168,7 @@ def on_panel(laminate: Laminate, made: Sequence[Root], design: Design) -> Lamina
     holes += [circle(mark, FIDUCIAL / 2) for mark in marks]
     whole = {name: _sheet(outline, holes, one, places) for name, one in openings.items()}
     slots = [contour for root in made for contour in root.slot.contours]
-    panel = Panel(
+    panel = SheetPanel(
         outline=outline,
         places=places,
         sheets=tuple(whole[layer.pattern] for layer in laminate.layers),

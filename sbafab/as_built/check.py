@@ -51,7 +51,7 @@ from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.laminate.panel import Panel
+from sbafab.laminate.panel import SheetPanel
 from sbafab.models.sizes import sizes
 from sbafab.output.manifest_records import Manifest
 from sbafab.output.planned import Checked
@@ -256,7 +256,7 @@ def _laminate(
     claims: Manifest,
     design: Design,
     meant: Meant | None,
-    panel: Panel | None,
+    panel: SheetPanel | None,
 ) -> Laminate:
     """The layers as they are cut, with bores, inlets and pins where the design wants them.
 

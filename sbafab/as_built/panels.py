@@ -19,14 +19,14 @@ from sbafab.geometry.nearby import widened
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import rectangle
 from sbafab.laminate.laminate import Layer
-from sbafab.laminate.panel import Panel, freed
+from sbafab.laminate.panel import SheetPanel, freed
 from sbafab.output.manifest_records import Manifest
 from sbafab.rules.bridges import apart
 
 
 def read_panel(
     folder: Path, claims: Manifest, files: Sequence[LayerFile], meant: Meant | None
-) -> tuple[Panel | None, list[LayerFile], list[Problem]]:
+) -> tuple[SheetPanel | None, list[LayerFile], list[Problem]]:
     """The panel of a folder's files, each layer's file with the part that it frees.
 
     The panel is the design's own where all files are what it makes. Of copies that differ, the
@@ -57,7 +57,7 @@ def _upward(sheet: Region, layer: Layer) -> Region:
     return sheet.mirrored() if layer.is_mask else sheet
 
 
-def _with_part(file: LayerFile, panel: Panel, layer: Layer) -> LayerFile:
+def _with_part(file: LayerFile, panel: SheetPanel, layer: Layer) -> LayerFile:
     if file.part is None or file.part.is_meant:
         return file
     parts = [part for part in freed(panel, layer).parts if not part.is_empty]
@@ -66,7 +66,7 @@ def _with_part(file: LayerFile, panel: Panel, layer: Layer) -> LayerFile:
     return replace(file, part=replace(file.part, region=region))
 
 
-def _second(folder: Path, claims: Manifest, panel: Panel) -> tuple[Region, list[Problem]]:
+def _second(folder: Path, claims: Manifest, panel: SheetPanel) -> tuple[Region, list[Problem]]:
     """The slots of the second cut's file, the panel's own where they agree."""
     kerf = claims.kerf.get("TPE")
     width = kerf.width if kerf is not None and kerf.width is not None else 0.0

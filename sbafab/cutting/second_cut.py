@@ -14,13 +14,13 @@ from sbafab.geometry.beam import Kerf
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import rectangle
-from sbafab.laminate.panel import Panel
+from sbafab.laminate.panel import SheetPanel
 
 PATH = "sheets/second_cut.dxf"
 ROOM = 10.0
 
 
-def second_path(panel: Panel, kerf: Kerf) -> Region:
+def second_path(panel: SheetPanel, kerf: Kerf) -> Region:
     """The beam's path inside the slots, so that what stays keeps its size."""
     x0, y0, x1, y1 = panel.second.bounds
     around = rectangle((x0 - ROOM, y0 - ROOM), (x1 + ROOM, y1 + ROOM))
@@ -29,14 +29,14 @@ def second_path(panel: Panel, kerf: Kerf) -> Region:
     return Region(tuple(hole.reversed() for hole in path.holes))
 
 
-def marks(panel: Panel) -> Surroundings:
+def marks(panel: SheetPanel) -> Surroundings:
     """What is drawn for reference: the sheet's edge, its datum and a cross in every fiducial."""
     outline = [edge.start for edge in panel.outline.edges]
     crosses = [run for p in ((0.0, 0.0), *panel.fiducials) for run in _cross(p)]
     return Surroundings(marks=((*outline, outline[0]), *crosses))
 
 
-def write_second_cut(panel: Panel, folder: Path, settings: CutSettings) -> str:
+def write_second_cut(panel: SheetPanel, folder: Path, settings: CutSettings) -> str:
     """Writes and reads back the file; its path in ``folder``. Raises OutputError, OSError."""
     properties = second_cut_properties(settings)
     path = second_path(panel, settings.kerf_width("TPE") or 0.0)

@@ -15,7 +15,7 @@ from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Film
 from sbafab.laminate.interfaces import Interface, InterfaceKind, interface_regions
-from sbafab.laminate.panel import Panel
+from sbafab.laminate.panel import SheetPanel
 
 Role = Literal["base", "wall", "cap", "sheet", "chamber-mask", "separator-mask"]
 
@@ -129,7 +129,7 @@ class Laminate:
     registration: str
     notes: tuple[str, ...] = ()
     outline: Region = NOTHING
-    panel: Panel | None = None
+    panel: SheetPanel | None = None
 
     def __repr__(self) -> str:
         return f"Laminate({self.name!r}, {self.family!r}, {len(self.layers)} layers)"

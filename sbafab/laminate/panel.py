@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Panel:
+class SheetPanel:
     """The registered sheets of a laminate, pressed together as a batch.
 
     ``places`` are the axes of the copies, the first at the origin; ``sheets`` what the first cut
@@ -60,7 +60,7 @@ class Freed:
     crumbs: tuple[Region, ...] = field(default=())
 
 
-def freed(panel: Panel, layer: Layer) -> Freed:
+def freed(panel: SheetPanel, layer: Layer) -> Freed:
     """What the sheet of a layer falls into.
 
     Mask sheets fall apart in the first cut; what the second one takes of a mask is past the part.
@@ -70,7 +70,7 @@ def freed(panel: Panel, layer: Layer) -> Freed:
 
 
 @lru_cache(maxsize=64)
-def _freed(sheet: Region, cut: Region, panel: Panel) -> Freed:
+def _freed(sheet: Region, cut: Region, panel: SheetPanel) -> Freed:
     places = panel.places
     pieces = (sheet - cut).pieces if not cut.is_empty else sheet.pieces
     if not pieces:

@@ -19,7 +19,7 @@ from sbafab.geometry.beam import Kerf
 from sbafab.laminate.films import Film
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.laminate.panel import Panel
+from sbafab.laminate.panel import SheetPanel
 from sbafab.meshing.files import MeshFile
 from sbafab.models.sizes import sizes
 from sbafab.output.manifest_records import (
@@ -164,7 +164,7 @@ def kerf_claim(width: Kerf | None) -> KerfClaim:
     return KerfClaim(state="uncalibrated" if width is None else "compensated", width=width)
 
 
-def _panel(panel: Panel) -> PanelClaim:
+def _panel(panel: SheetPanel) -> PanelClaim:
     width, length = (round(side, 6) for side in panel.size)
     return PanelClaim(
         size=(width, length),
@@ -190,6 +190,7 @@ def _sheet(sheet: SheetFile) -> SheetClaim:
     return SheetClaim(
         file=sheet.path,
         picture=sheet.picture,
+        project=sheet.project,
         material=sheet.material,
         number=sheet.number,
         width=sheet.width,

@@ -10,7 +10,7 @@ from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import least_width
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.laminate.panel import Panel, freed
+from sbafab.laminate.panel import SheetPanel, freed
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, at, holds
 
@@ -72,7 +72,7 @@ def sheeted(laminate: Laminate, masks: bool = False) -> list[Layer]:
     return list(found.values())
 
 
-def _wrong(laminate: Laminate, panel: Panel, limits: Limits) -> Iterator[_Wrong]:
+def _wrong(laminate: Laminate, panel: SheetPanel, limits: Limits) -> Iterator[_Wrong]:
     """What no width measures."""
     films, masks = sheeted(laminate), sheeted(laminate, masks=True)
     for layer in films:
@@ -88,7 +88,7 @@ def _wrong(laminate: Laminate, panel: Panel, limits: Limits) -> Iterator[_Wrong]
             yield from _welded(laminate, panel, layer, limits.tolerances.second_cut)
 
 
-def _loose(panel: Panel, layer: Layer) -> Iterator[_Wrong]:
+def _loose(panel: SheetPanel, layer: Layer) -> Iterator[_Wrong]:
     """Film that too few bridges hold."""
     named = f"layer {layer.index} ({layer.name})"
     spot = _beyond(panel.sheets[layer.index - 1])
@@ -102,7 +102,7 @@ def _loose(panel: Panel, layer: Layer) -> Iterator[_Wrong]:
             yield _Wrong(layer, place, f"{said}, and needs {FEWEST}; add bridges")
 
 
-def _misfreed(panel: Panel, layer: Layer) -> Iterator[_Wrong]:
+def _misfreed(panel: SheetPanel, layer: Layer) -> Iterator[_Wrong]:
     """Parts that the cuts leave otherwise than they are meant to be."""
     for place, part in zip(panel.places, freed(panel, layer).parts, strict=True):
         room = TOLERANCE * sum(contour.length for contour in layer.profile.contours)
@@ -117,7 +117,7 @@ def apart(one: Region, other: Region) -> float:
     return sum(rest.area for rest in (one - other, other - one) if not rest.is_empty)
 
 
-def _cut_into(panel: Panel, layer: Layer, near: Region, needed: float) -> Iterator[_Wrong]:
+def _cut_into(panel: SheetPanel, layer: Layer, near: Region, needed: float) -> Iterator[_Wrong]:
     """Slots that an error of the second cut may bring too near to a pocket."""
     for place in panel.places:
         met = near.moved(*place) & panel.second
@@ -128,7 +128,7 @@ def _cut_into(panel: Panel, layer: Layer, near: Region, needed: float) -> Iterat
             yield _Wrong(layer, spot, text)
 
 
-def _welded(laminate: Laminate, panel: Panel, mask: Layer, error: float) -> Iterator[_Wrong]:
+def _welded(laminate: Laminate, panel: SheetPanel, mask: Layer, error: float) -> Iterator[_Wrong]:
     """What an error of the second cut may leave of bridges past the mask between two balloons.
 
     There the bridges of all balloons weld to each other.
@@ -150,7 +150,7 @@ def _beyond(sheet: Region) -> Point | None:
     return pieces[1].outers[0].edges[0].start if len(pieces) > 1 else None
 
 
-def _bridges(panel: Panel, layer: Layer) -> list[_Bridge]:
+def _bridges(panel: SheetPanel, layer: Layer) -> list[_Bridge]:
     """What the second cut takes out of a sheet; as wide as its area by the slot's least width."""
     slot = least_width(panel.second)
     if slot is None:

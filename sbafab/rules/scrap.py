@@ -15,7 +15,7 @@ from sbafab.geometry.nearby import widened
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import rectangle, strip
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.laminate.panel import Panel, freed
+from sbafab.laminate.panel import SheetPanel, freed
 from sbafab.rules.bridges import sheeted
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at
@@ -50,7 +50,7 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     return [Finding(NAME, "fail", 0.0, float(len(found)), "pieces", place, message)]
 
 
-def _held(laminate: Laminate, panel: Panel) -> Iterator[_Held]:
+def _held(laminate: Laminate, panel: SheetPanel) -> Iterator[_Held]:
     """Scrap that is bonded to a part, or has parts over and under it."""
     placed = {layer.pattern: _copied(layer.profile, panel) for layer in laminate.tpe_layers}
     own = union({layer.pattern: layer.profile for layer in laminate.tpe_layers}.values())
@@ -69,12 +69,12 @@ def _held(laminate: Laminate, panel: Panel) -> Iterator[_Held]:
                     yield _Held(layer, *what)
 
 
-def _copied(part: Region, panel: Panel) -> Region:
+def _copied(part: Region, panel: SheetPanel) -> Region:
     """A part at the places of all copies, which lie apart."""
     return Region(tuple(c for place in panel.places for c in part.moved(*place).contours))
 
 
-def _is_free(piece: Region, place: Point, own: Region, panel: Panel, free: set[str]) -> bool:
+def _is_free(piece: Region, place: Point, own: Region, panel: SheetPanel, free: set[str]) -> bool:
     """Whether what a piece has round one copy lies beside its part; ``free`` names those known."""
     here = _round(piece, place, panel)
     if here.key not in free and _area(here & own) < DUST:
@@ -82,7 +82,7 @@ def _is_free(piece: Region, place: Point, own: Region, panel: Panel, free: set[s
     return here.key in free
 
 
-def _round(piece: Region, place: Point, panel: Panel) -> Region:
+def _round(piece: Region, place: Point, panel: SheetPanel) -> Region:
     """What a piece has in the room of one copy, in that one's frame.
 
     All of the piece where holes of it run on past that room.
@@ -104,7 +104,7 @@ def _within(a: Bounds, b: Bounds) -> bool:
 
 
 def _why_held(
-    laminate: Laminate, panel: Panel, layer: Layer, piece: Region, placed: dict[str, Region]
+    laminate: Laminate, panel: SheetPanel, layer: Layer, piece: Region, placed: dict[str, Region]
 ) -> tuple[Point, str] | None:
     """Where and by what a piece is held; every layer that is cut so is looked at."""
     key = panel.sheets[layer.index - 1].key
@@ -131,7 +131,7 @@ def _why_held(
     return None
 
 
-def _between(laminate: Laminate, panel: Panel, one: int, other: int) -> Region | None:
+def _between(laminate: Laminate, panel: SheetPanel, one: int, other: int) -> Region | None:
     """The mask sheets between two films; None where another film lies there."""
     low, high = sorted((one, other))
     within: Sequence[Layer] = laminate.layers[low : high - 1]
@@ -140,7 +140,7 @@ def _between(laminate: Laminate, panel: Panel, one: int, other: int) -> Region |
     return union(panel.sheets[layer.index - 1] for layer in within)
 
 
-def _closed(laminate: Laminate, panel: Panel) -> Iterator[_Held]:
+def _closed(laminate: Laminate, panel: SheetPanel) -> Iterator[_Held]:
     """Film sheets that reach in front of an inlet, where its tube goes in."""
     free: set[str] = set()
     for layer in sheeted(laminate):

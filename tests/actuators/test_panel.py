@@ -12,7 +12,7 @@ from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.panel import Panel
+from sbafab.laminate.panel import SheetPanel
 
 SHEET = 'registration.method="sheet"'
 ONE = ("1dof-5mm", "stack.balloons=2", "order.copies=2")
@@ -25,7 +25,7 @@ def made(template: str, *changes: str) -> Laminate:
     return build(load_design(template, [SHEET, *changes]))
 
 
-def panel_of(laminate: Laminate) -> Panel:
+def panel_of(laminate: Laminate) -> SheetPanel:
     assert laminate.panel is not None
     return laminate.panel
 

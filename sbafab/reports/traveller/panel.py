@@ -12,7 +12,7 @@ from sbafab.geometry.region import Region
 from sbafab.geometry.svg import number, path_data
 from sbafab.laminate.inks import INK
 from sbafab.laminate.laminate import Laminate, Layer, Pin
-from sbafab.laminate.panel import Panel
+from sbafab.laminate.panel import SheetPanel
 from sbafab.pressing.sheets import tackings
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller import process
@@ -60,7 +60,7 @@ def chapter(work: Work) -> dict[str, Any]:
     }
 
 
-def _force_notes(work: Work, panel: Panel) -> tuple[str, ...]:
+def _force_notes(work: Work, panel: SheetPanel) -> tuple[str, ...]:
     """What the force means on sheets that are smaller than the platen."""
     step = work.schedule.steps[0]
     area = panel.outline.area
@@ -87,7 +87,7 @@ def _pairs(laminate: Laminate) -> list[tuple[Layer, tuple[Layer, ...]]]:
     return found
 
 
-def _preparing(work: Work, panel: Panel) -> list[Action]:
+def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
     """All that is done to the sheets before the first press step."""
     design, laminate = work.design, work.laminate
     pairs = [(film, masks) for film, masks in _pairs(laminate) if masks]
@@ -131,7 +131,7 @@ def _preparing(work: Work, panel: Panel) -> list[Action]:
     ]
 
 
-def _step_pages(work: Work, panel: Panel) -> list[StepPage]:
+def _step_pages(work: Work, panel: SheetPanel) -> list[StepPage]:
     """The press steps with what is done to sheets, and the panel in place of one copy."""
     pages = process.step_pages(work)
     found = []
@@ -197,7 +197,7 @@ def _pressing(laminate: Laminate, page: StepPage, last: bool) -> list[Action]:
     ]
 
 
-def _cut_free(panel: Panel) -> list[Action]:
+def _cut_free(panel: SheetPanel) -> list[Action]:
     many = say.count(len(panel.places), "actuator")
     return [
         Action(
@@ -220,7 +220,7 @@ def _cut_free(panel: Panel) -> list[Action]:
     ]
 
 
-def _each(panel: Panel, what: str) -> list[Action]:
+def _each(panel: SheetPanel, what: str) -> list[Action]:
     """What is done once for every actuator of a batch says so, with a box for each."""
     count = len(panel.places)
     if count == 1:
@@ -230,7 +230,7 @@ def _each(panel: Panel, what: str) -> list[Action]:
     return [Action(text, (), numbers)]
 
 
-def _bill(work: Work, panel: Panel) -> list[Item]:
+def _bill(work: Work, panel: SheetPanel) -> list[Item]:
     """The bill with sheets in place of parts, and what carries the masks."""
     items = []
     for item in bill(work):
@@ -247,7 +247,7 @@ def _bill(work: Work, panel: Panel) -> list[Item]:
     return [*items, Item("Carrier", what, say.count(masks, "piece"))]
 
 
-def _cuts(work: Work, panel: Panel) -> list[Cut]:
+def _cuts(work: Work, panel: SheetPanel) -> list[Cut]:
     """The cut list: a sheet for every layer of a pattern and every batch."""
     found = []
     for row in cut_list(work):
@@ -258,7 +258,7 @@ def _cuts(work: Work, panel: Panel) -> list[Cut]:
     return found
 
 
-def _times(work: Work, panel: Panel) -> list[Time]:
+def _times(work: Work, panel: SheetPanel) -> list[Time]:
     """How long a batch takes; the paper's handling is of one actuator, and is not known of many."""
     plan, copies = work.schedule, len(panel.places)
     steps = " + ".join(f"{step.minutes:g}" for step in plan.steps)
@@ -280,7 +280,7 @@ def _times(work: Work, panel: Panel) -> list[Time]:
     ]
 
 
-def _pictures(laminate: Laminate, panel: Panel) -> list[tuple[str, str]]:
+def _pictures(laminate: Laminate, panel: SheetPanel) -> list[tuple[str, str]]:
     """One film sheet and one mask sheet as they come from the laser, with what they are."""
     film = laminate.layers[0]
     mask = next(layer for layer in laminate.layers if layer.is_mask)
@@ -298,7 +298,7 @@ def _pictures(laminate: Laminate, panel: Panel) -> list[tuple[str, str]]:
     ]
 
 
-def _picture(laminate: Laminate, panel: Panel, layer: Layer, name: str, words: str) -> str:
+def _picture(laminate: Laminate, panel: SheetPanel, layer: Layer, name: str, words: str) -> str:
     """A sheet from above, its pins filled, crosses in its fiducials, its slots pink."""
     width, length = panel.size
     scale = min(WIDEST / width, TALLEST / length)
