@@ -13,17 +13,17 @@ from sbafab.cli.quantities import LENGTH, PRESSURE
 
 if TYPE_CHECKING:
     from sbafab.design.records import Design
-    from sbafab.results.records import Result
+    from sbafab.results.records import LabResult
     from sbafab.results.store import Lab
 
-Command = Callable[..., Any]
+Wrapped = Callable[..., Any]
 
 
-def _measured(command: Command) -> Command:
+def _measured(command: Wrapped) -> Wrapped:
     """Options for what was measured, in the order of the help."""
     options = (
         click.option(
-            "--leak", type=click.Choice(["pass", "fail"]), help="Outcome of the leak test."
+            "--leak", type=click.Choice(["pass", "fail"]), help="LabResult of the leak test."
         ),
         click.option(
             "--burst", type=PRESSURE.read, metavar="P", help="Pressure at which it burst, kPa."
@@ -138,11 +138,11 @@ def _one_task(design: str | None, said: Mapping[str, Any]) -> None:
         raise click.UsageError("--table holds serials and what was measured; leave those out")
 
 
-def _result(said: Mapping[str, Any]) -> Result:
-    from sbafab.results.records import ERRORS, NUMBERS, Result
+def _result(said: Mapping[str, Any]) -> LabResult:
+    from sbafab.results.records import ERRORS, NUMBERS, LabResult
 
     given = {name.replace("-", "_"): value for name, value in said.items()}
-    return Result(
+    return LabResult(
         serial=said["serial"],
         leak=said["leak"] or "",
         operator=said["operator"],
@@ -157,7 +157,7 @@ def _result(said: Mapping[str, Any]) -> Result:
     )
 
 
-def _change(said: Mapping[str, Any]) -> Result:
+def _change(said: Mapping[str, Any]) -> LabResult:
     from dataclasses import replace
 
     change = _result(said)

@@ -42,11 +42,11 @@ ADVICE = (
     "frame (REFERENCE) without output. The engraved label must read from left to right"
 )
 
-Drawn = tuple[str, tuple[Edge, ...], bool]
+LaserRun = tuple[str, tuple[Edge, ...], bool]
 """A layer, edges one after the other, and whether they close."""
 
 
-def drawn(contours: Sequence[Contour], sheet: Surroundings) -> Iterator[Drawn]:
+def drawn(contours: Sequence[Contour], sheet: Surroundings) -> Iterator[LaserRun]:
     """What a sheet holds, in cutting order; the frame, which is not cut, comes last."""
     for run in sheet.engraved:
         yield _run(ENGRAVE, run)
@@ -59,7 +59,7 @@ def drawn(contours: Sequence[Contour], sheet: Surroundings) -> Iterator[Drawn]:
         yield _run(REFERENCE, ((0.0, 0.0), (x, 0.0), (x, y), (0.0, y), (0.0, 0.0)))
 
 
-def _run(layer: str, run: Sequence[Point]) -> Drawn:
+def _run(layer: str, run: Sequence[Point]) -> LaserRun:
     edges = tuple(map(Line, run[:-1], run[1:]))
     return layer, edges, run[0] == run[-1]
 

@@ -29,7 +29,7 @@ _PRIMITIVE = re.compile(r"([LB])(\d+) (\d+)")
 _PLACE = re.compile(rf"1 0 0 1 ({_NUM}) ({_NUM})")
 
 
-class Curve(NamedTuple):
+class Bezier(NamedTuple):
     """A line, or a cubic curve with its two inner control points."""
 
     start: Point
@@ -44,22 +44,22 @@ class Curve(NamedTuple):
         a, b, c, d = rest**3, 3 * rest * rest * t, 3 * rest * t * t, t**3
         return a * x + b * px + c * qx + d * u, a * y + b * py + c * qy + d * v
 
-    def moved(self, x: float, y: float, times: float) -> Curve:
+    def moved(self, x: float, y: float, times: float) -> Bezier:
         """The curve ``times`` as large, then moved."""
 
         def placed(p: Point) -> Point:
             return x + times * p[0], y + times * p[1]
 
         handles = self.handles and (placed(self.handles[0]), placed(self.handles[1]))
-        return Curve(placed(self.start), handles, placed(self.end))
+        return Bezier(placed(self.start), handles, placed(self.end))
 
 
 @dataclass(frozen=True)
-class Shape:
+class LaserShape:
     """Curves one after the other on the layer of an index."""
 
     index: int
-    curves: tuple[Curve, ...]
+    curves: tuple[Bezier, ...]
 
     @property
     def is_closed(self) -> bool:
@@ -70,7 +70,7 @@ class Project(NamedTuple):
     """What a project cuts: settings of each index as they stand, shapes in the file's order."""
 
     settings: dict[int, dict[str, str]]
-    shapes: tuple[Shape, ...]
+    shapes: tuple[LaserShape, ...]
 
 
 def read_project(path: Path) -> Project:
@@ -93,7 +93,7 @@ def read_project(path: Path) -> Project:
         raise OutputError(f"{path.name}: it is no sound project ({error})") from error
 
 
-def _shape(item: ElementTree.Element) -> Shape:
+def _shape(item: ElementTree.Element) -> LaserShape:
     kind, index = item.get("Type"), int(item.get("CutIndex", ""))
     place = _PLACE.fullmatch(item.findtext("XForm") or "")
     if place is None:
@@ -101,15 +101,15 @@ def _shape(item: ElementTree.Element) -> Shape:
     x, y = float(place[1]), float(place[2])
     if kind == "Ellipse" and item.get("Rx") == item.get("Ry"):
         radius = float(item.get("Rx", ""))
-        return Shape(index, tuple(curve.moved(x, y, radius) for curve in _unit_circle()))
+        return LaserShape(index, tuple(curve.moved(x, y, radius) for curve in _unit_circle()))
     if kind != "Path" or (x, y) != (0.0, 0.0):
         raise OutputError(f"it holds a shape of the type {kind} that no sheet has")
     curves = _path(item.findtext("VertList") or "", item.findtext("PrimList") or "")
-    return Shape(index, tuple(curves))
+    return LaserShape(index, tuple(curves))
 
 
 @cache
-def _unit_circle() -> tuple[Curve, ...]:
+def _unit_circle() -> tuple[Bezier, ...]:
     """A circle of radius 1 round the origin, as curves of an eighth each."""
     step = 2 * math.pi / EIGHTHS
     reach = 4 / 3 * math.tan(step / 4)
@@ -117,24 +117,24 @@ def _unit_circle() -> tuple[Curve, ...]:
     for k in range(EIGHTHS):
         (c, s), (u, v) = ((math.cos(t), math.sin(t)) for t in (k * step, (k + 1) * step))
         handles = (c - reach * s, s + reach * c), (u + reach * v, v - reach * u)
-        curves.append(Curve((c, s), handles, (u, v)))
+        curves.append(Bezier((c, s), handles, (u, v)))
     return tuple(curves)
 
 
-def _path(vertices: str, primitives: str) -> list[Curve]:
+def _path(vertices: str, primitives: str) -> list[Bezier]:
     places: list[Point] = []
     handles: list[dict[str, float]] = []
     for x, y, behind in _matches(_VERTEX, vertices):
         places.append((float(x), float(y)))
         handles.append({name: float(value) for name, value in _HANDLE.findall(behind)})
-    curves: list[Curve] = []
+    curves: list[Bezier] = []
     for kind, first, last in _matches(_PRIMITIVE, primitives):
         i, j = int(first), int(last)
         inner = None
         if kind == "B":
             leaving, coming = handles[i], handles[j]
             inner = (leaving["c0x"], leaving["c0y"]), (coming["c1x"], coming["c1y"])
-        curves.append(Curve(places[i], inner, places[j]))
+        curves.append(Bezier(places[i], inner, places[j]))
         if len(curves) > 1 and curves[-2].end != places[i]:
             raise OutputError("a path falls apart")
     if not curves:
@@ -190,7 +190,7 @@ def _check_settings(found: Project, layers: set[str]) -> None:
                 raise OutputError(f"{name} of layer {layer} is {told.get(name)}, not {value}")
 
 
-def _check_shape(shape: Shape, edges: Sequence[Edge]) -> None:
+def _check_shape(shape: LaserShape, edges: Sequence[Edge]) -> None:
     """A full circle's curves may start anywhere; those of a path are its edges one by one."""
     circle = Contour(tuple(edges)).circle
     if circle is not None:
@@ -212,7 +212,7 @@ def _check_shape(shape: Shape, edges: Sequence[Edge]) -> None:
         raise OutputError(f"an edge is {off:.6f} mm off at x {x:.3f}, y {y:.3f}")
 
 
-def _offs(curve: Curve, part: Edge) -> Iterator[tuple[float, Point]]:
+def _offs(curve: Bezier, part: Edge) -> Iterator[tuple[float, Point]]:
     """How far ends lie off, and what lies between them off the edge or the arc's circle."""
     yield math.dist(curve.start, part.start), curve.start
     yield math.dist(curve.end, part.end), curve.end

@@ -9,12 +9,12 @@ from pathlib import Path
 
 from sbafab.cutting.measured_table import table_text
 from sbafab.errors import DesignError
-from sbafab.results.records import COLUMNS, ERRORS, NUMBERS, TEXTS, Result, checked
+from sbafab.results.records import COLUMNS, ERRORS, NUMBERS, TEXTS, LabResult, checked
 
 _NUMBER = re.compile(r"\d+(?:[.,]\d*)?|[.,]\d+", re.ASCII)
 
 
-def read_batch(path: Path) -> list[Result]:
+def read_batch(path: Path) -> list[LabResult]:
     """A result a row, of a table with some of COLUMNS, "serial" among them.
 
     Columns are parted by commas, semicolons or tabs, the latter two also with decimal commas;
@@ -65,11 +65,11 @@ def _row(line: tuple[str, str], names: Sequence[str], separator: str) -> dict[st
     return {name: cell for name, cell in zip(names, cells, strict=True) if name and cell}
 
 
-def _result(row: dict[str, str], where: str) -> Result:
+def _result(row: dict[str, str], where: str) -> LabResult:
     if "serial" not in row:
         raise DesignError(f"{where} has no serial")
     serial, operator, kit, note = (row.get(name, "") for name in TEXTS)
-    result = Result(
+    result = LabResult(
         serial=serial,
         operator=operator,
         kit=kit,

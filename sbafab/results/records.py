@@ -16,7 +16,7 @@ LONGEST = {"serial": 64, "operator": 80, "kit": 120, "note": 400}
 _UNWRITABLE = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 
 
-class Quantity(NamedTuple):
+class Measurand(NamedTuple):
     """A number that is measured: its unit, the most that can be meant, and the option's name."""
 
     name: str
@@ -27,17 +27,17 @@ class Quantity(NamedTuple):
 
 
 NUMBERS = (
-    Quantity("burst_kpa", "kPa", 10_000, "burst", "Pressure at which it burst."),
-    Quantity("stroke_mm", "mm", 10_000, "stroke", "Full stroke, as `predict` says it."),
-    Quantity("force_n", "N", 10_000, "force", "Blocked force at 100 kPa, flat."),
-    Quantity("height_mm", "mm", 10_000, "height", "Height after pressing, deflated."),
-    Quantity("mass_g", "g", 100_000, "mass", "Mass without tubes."),
+    Measurand("burst_kpa", "kPa", 10_000, "burst", "Pressure at which it burst."),
+    Measurand("stroke_mm", "mm", 10_000, "stroke", "Full stroke, as `predict` says it."),
+    Measurand("force_n", "N", 10_000, "force", "Blocked force at 100 kPa, flat."),
+    Measurand("height_mm", "mm", 10_000, "height", "Height after pressing, deflated."),
+    Measurand("mass_g", "g", 100_000, "mass", "Mass without tubes."),
 )
 """Once an actuator."""
 ERRORS = (
-    Quantity("offset_mm", "mm", 10, "offset", "How far a layer that a hand laid lies off."),
-    Quantity("turn_deg", "deg", 45, "turn", "How far a layer that a hand laid is turned."),
-    Quantity("cut_mm", "mm", 10, "cut-error", "How far a cut edge lies off its place."),
+    Measurand("offset_mm", "mm", 10, "offset", "How far a layer that a hand laid lies off."),
+    Measurand("turn_deg", "deg", 45, "turn", "How far a layer that a hand laid is turned."),
+    Measurand("cut_mm", "mm", 10, "cut-error", "How far a cut edge lies off its place."),
 )
 """As often as one likes."""
 TEXTS = ("serial", "operator", "kit", "note")
@@ -46,7 +46,7 @@ COLUMNS = (*TEXTS[:3], "leak", *(q.name for q in (*NUMBERS, *ERRORS)), "note")
 
 
 @dataclass(frozen=True)
-class Result:
+class LabResult:
     """What one record says of the actuator ``serial``; what it does not say is empty.
 
     ``leak`` is "pass", "fail" or "". ``operator`` built it. Units stand in the names of NUMBERS
@@ -73,7 +73,7 @@ class Result:
         texts = {"leak": self.leak, "operator": self.operator, "kit": self.kit}
         return {**{name: text for name, text in texts.items() if text}, **self.numbers}
 
-    def changed(self, other: Result) -> Result:
+    def changed(self, other: LabResult) -> LabResult:
         """The same with all that ``other`` says in its place."""
         texts = {
             name: getattr(other, name) for name in (*TEXTS, "leak") if getattr(other, name) != ""
@@ -88,7 +88,7 @@ class Result:
 
 
 @dataclass(frozen=True)
-class Record(Result):
+class Record(LabResult):
     """A result as it is stored: its number, when (UTC), of which design, what it corrects."""
 
     id: int = 0
@@ -120,7 +120,7 @@ class Build:
     good_builds: tuple[int, int]
 
 
-def checked(result: Result, where: str = "") -> Result:
+def checked(result: LabResult, where: str = "") -> LabResult:
     """The result, with texts stripped. Raises DesignError for what cannot be meant."""
     place = f"{where}: " if where else ""
     texts = {name: getattr(result, name).strip() for name in TEXTS}
@@ -142,7 +142,7 @@ def checked(result: Result, where: str = "") -> Result:
     return replace(result, **texts)
 
 
-def _check(quantity: Quantity, value: float, place: str, least: str) -> None:
+def _check(quantity: Measurand, value: float, place: str, least: str) -> None:
     is_low = value < 0 or (value == 0 and least == "above 0")
     if not math.isfinite(value) or is_low or value > quantity.most:
         raise DesignError(

@@ -20,7 +20,7 @@ DIMENSIONS = {"offset_mm": 2, "turn_deg": 1, CUT: 1}
 
 
 @dataclass(frozen=True)
-class Item:
+class Built:
     """An actuator that was built: all that its records say together."""
 
     sha256: str
@@ -165,7 +165,7 @@ def standing(records: Iterable[Record]) -> list[Record]:
     return [r for r in records if r.id not in corrected and not r.withdrawn]
 
 
-def items(records: Iterable[Record], builds: Mapping[str, Build]) -> list[Item]:
+def items(records: Iterable[Record], builds: Mapping[str, Build]) -> list[Built]:
     """The actuators, by design and serial, in the order of their first record."""
     gathered: dict[tuple[str, str], list[Record]] = defaultdict(list)
     for record in standing(records):
@@ -182,7 +182,7 @@ def items(records: Iterable[Record], builds: Mapping[str, Build]) -> list[Item]:
             for name, values in record.errors.items():
                 errors[name] = (*errors.get(name, ()), *values)
         found.append(
-            Item(
+            Built(
                 sha256=sha256,
                 serial=serial,
                 design=names[sha256],
@@ -219,22 +219,22 @@ def report(records: Sequence[Record], builds: Mapping[str, Build]) -> Report:
     )
 
 
-def _groups(found: Iterable[Item], key: Callable[[Item], Any]) -> list[tuple[Any, list[Item]]]:
-    groups: dict[Any, list[Item]] = defaultdict(list)
+def _groups(found: Iterable[Built], key: Callable[[Built], Any]) -> list[tuple[Any, list[Built]]]:
+    groups: dict[Any, list[Built]] = defaultdict(list)
     for item in found:
         groups[key(item)].append(item)
     return sorted(groups.items())
 
 
-def _passed(own: Sequence[Item]) -> Share:
+def _passed(own: Sequence[Built]) -> Share:
     return Share(sum(item.leak == PASS for item in own), len(own))
 
 
-def _success(found: Sequence[Item]) -> Iterable[Success]:
+def _success(found: Sequence[Built]) -> Iterable[Success]:
     tested = [item for item in found if item.leak]
     if tested:
         yield Success("all", "all", _passed(tested))
-    told: dict[By, Callable[[Item], str]] = {
+    told: dict[By, Callable[[Built], str]] = {
         "design": lambda item: item.design,
         "kit": lambda item: item.kit or UNSAID,
         "method": lambda item: item.method,
@@ -245,7 +245,7 @@ def _success(found: Sequence[Item]) -> Iterable[Success]:
             yield Success(by, name, _passed(own))
 
 
-def _comparisons(found: Sequence[Item], builds: Mapping[str, Build]) -> Iterable[Comparison]:
+def _comparisons(found: Sequence[Built], builds: Mapping[str, Build]) -> Iterable[Comparison]:
     for (design, sha256), own in _groups(found, lambda item: (item.design, item.sha256)):
         for quantity in NUMBERS:
             name = quantity.name
@@ -268,12 +268,12 @@ def _comparisons(found: Sequence[Item], builds: Mapping[str, Build]) -> Iterable
             )
 
 
-def _tolerances(found: Sequence[Item], builds: Mapping[str, Build]) -> Iterable[Tolerance]:
+def _tolerances(found: Sequence[Built], builds: Mapping[str, Build]) -> Iterable[Tolerance]:
     for quantity in ERRORS:
         name = quantity.name
         measured = [item for item in found if item.errors.get(name)]
 
-        def stated(item: Item, name: str = name) -> tuple[str, str, float]:
+        def stated(item: Built, name: str = name) -> tuple[str, str, float]:
             hand = (item.operator or UNSAID) if name != CUT else ""
             return item.kit or UNSAID, hand, builds[item.sha256].tolerances[name]
 
@@ -284,7 +284,7 @@ def _tolerances(found: Sequence[Item], builds: Mapping[str, Build]) -> Iterable[
             yield Tolerance(kit, operator, name, quantity.unit, key, value, most)
 
 
-def _promises(found: Sequence[Item], builds: Mapping[str, Build]) -> Iterable[Promise]:
+def _promises(found: Sequence[Built], builds: Mapping[str, Build]) -> Iterable[Promise]:
     tested = [item for item in found if item.leak]
     for (design, sha256), own in _groups(tested, lambda item: (item.design, item.sha256)):
         good, drawn = builds[sha256].good_builds

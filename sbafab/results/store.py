@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from sbafab.errors import DesignError, OutputError
-from sbafab.results.records import ERRORS, NUMBERS, Build, Record, Result, checked
+from sbafab.results.records import ERRORS, NUMBERS, Build, LabResult, Record, checked
 
 APPLICATION = 0x5BAFAB
 VERSION = 1
@@ -91,14 +91,14 @@ class Lab:
         with self._reading() as rows:
             return _is_known(rows, sha256, generator)
 
-    def add(self, sha256: str, build: Build | None, results: Sequence[Result]) -> list[Record]:
+    def add(self, sha256: str, build: Build | None, results: Sequence[LabResult]) -> list[Record]:
         """Stores results of a design, all or none; ``build`` where it is not known yet."""
         with self._writing() as rows:
             if build is not None and not _is_known(rows, build.sha256, build.generator):
                 _put_build(rows, build)
             return [self._put(rows, sha256, result, None) for result in results]
 
-    def correct(self, number: int, change: Result) -> Record:
+    def correct(self, number: int, change: LabResult) -> Record:
         """Stores a record that says what ``number`` says but for what ``change`` says."""
         if not self.path.exists():
             raise OutputError(f"{self.path} does not exist, so there is no record to correct")
@@ -131,7 +131,7 @@ class Lab:
         return records, builds
 
     def _put(
-        self, rows: sqlite3.Connection, sha256: str, result: Result, corrects: int | None
+        self, rows: sqlite3.Connection, sha256: str, result: LabResult, corrects: int | None
     ) -> Record:
         result = checked(result)
         live = [
@@ -307,7 +307,7 @@ def _record(row: Sequence[object]) -> Record:
     )
 
 
-def _refuse_contradiction(result: Result, other: Record) -> None:
+def _refuse_contradiction(result: LabResult, other: Record) -> None:
     for name, value in result.once.items():
         if name in other.once and other.once[name] != value:
             raise DesignError(

@@ -120,7 +120,10 @@ SPOILT: dict[str, tuple[Callable[[str], str], str]] = {
         "priority of layer CUT_INNER is 9",
     ),
     "a hole on the outlines' layer": (changed('CutIndex="1"', 'CutIndex="2"'), "one of CUT_INNER"),
-    "a shape too few": (changed(r'<Shape Type="Ellipse".*?</Shape>\n', ""), "shapes, not"),
+    "a shape too few": (
+        changed(r'<Shape Type="Ellipse".*?</Shape>\n', ""),
+        "shapes, not",
+    ),
     "an open outline": (
         changed(r'(CutIndex="2".*?)([LB]\d+ 0)(</PrimList>)', r"\1\3"),
         "not one of CUT_OUTER",

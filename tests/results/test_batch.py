@@ -8,7 +8,7 @@ import pytest
 
 from sbafab.errors import DesignError
 from sbafab.results.batch import read_batch
-from sbafab.results.records import Result
+from sbafab.results.records import LabResult
 
 POINTS = """\
 # Lot of Tuesday, pressed cold
@@ -37,8 +37,8 @@ def table(folder: Path, text: str) -> Path:
 @pytest.mark.parametrize("name", READABLE)
 def test_a_row_is_an_actuator(name: str, tmp_path: Path) -> None:
     assert read_batch(table(tmp_path, READABLE[name])) == [
-        Result("A1", "pass", numbers={"burst_kpa": 350.5}, errors={"offset_mm": (0.1, 0.25)}),
-        Result("A2", "fail", note="burnt, step 2"),
+        LabResult("A1", "pass", numbers={"burst_kpa": 350.5}, errors={"offset_mm": (0.1, 0.25)}),
+        LabResult("A2", "fail", note="burnt, step 2"),
     ]
 
 

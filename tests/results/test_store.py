@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 import pytest
 
 from sbafab.errors import DesignError, OutputError
-from sbafab.results.records import Build, Result, checked
+from sbafab.results.records import Build, LabResult, checked
 from sbafab.results.report import standing
 from sbafab.results.store import Lab
 
@@ -23,7 +23,7 @@ SHA = "c0ffee" + 58 * "0"
 
 
 def test_what_is_stored_comes_back(lab: Lab, make_build: Make) -> None:
-    told = Result(
+    told = LabResult(
         serial="A1",
         leak="pass",
         operator="Ada",
@@ -42,8 +42,8 @@ def test_what_is_stored_comes_back(lab: Lab, make_build: Make) -> None:
 
 
 def test_a_correction_is_a_row_of_its_own_that_names_the_other(lab: Lab, make_build: Make) -> None:
-    lab.add(SHA, make_build(), [Result("A1", "pass", numbers={"burst_kpa": 35.0})])
-    new = lab.correct(1, Result(numbers={"burst_kpa": 350.0}))
+    lab.add(SHA, make_build(), [LabResult("A1", "pass", numbers={"burst_kpa": 35.0})])
+    new = lab.correct(1, LabResult(numbers={"burst_kpa": 350.0}))
     records, _ = lab.contents()
     assert [(r.id, r.corrects, r.leak, r.numbers["burst_kpa"]) for r in records] == [
         (1, None, "pass", 35.0),
@@ -51,12 +51,12 @@ def test_a_correction_is_a_row_of_its_own_that_names_the_other(lab: Lab, make_bu
     ]
     assert standing(records) == [new]
     with pytest.raises(DesignError, match="record 1 is corrected by record 2 already"):
-        lab.correct(1, Result(leak="fail"))
+        lab.correct(1, LabResult(leak="fail"))
     with pytest.raises(DesignError, match="no record 7"):
-        lab.correct(7, Result(leak="fail"))
-    lab.correct(2, Result(withdrawn=True))
+        lab.correct(7, LabResult(leak="fail"))
+    lab.correct(2, LabResult(withdrawn=True))
     assert standing(lab.contents()[0]) == []
-    lab.add(SHA, None, [Result("A1", "fail")])
+    lab.add(SHA, None, [LabResult("A1", "fail")])
 
 
 @pytest.mark.parametrize(
@@ -78,8 +78,8 @@ def test_a_correction_is_a_row_of_its_own_that_names_the_other(lab: Lab, make_bu
 )
 def test_the_file_itself_refuses_changes(statement: str, lab: Lab, make_build: Make) -> None:
     """Also to another program; the last two would correct a record twice."""
-    lab.add(SHA, make_build(), [Result("A1", "pass")])
-    lab.correct(1, Result(note="same"))
+    lab.add(SHA, make_build(), [LabResult("A1", "pass")])
+    lab.correct(1, LabResult(note="same"))
     before = lab.contents()
     with closing(sqlite3.connect(lab.path)) as rows:
         with pytest.raises(sqlite3.IntegrityError):
@@ -89,12 +89,12 @@ def test_the_file_itself_refuses_changes(statement: str, lab: Lab, make_build: M
 
 
 def test_a_serial_is_told_in_parts_but_not_in_two_ways(lab: Lab, make_build: Make) -> None:
-    lab.add(SHA, make_build(), [Result("A1", "pass", "Ada")])
-    lab.add(SHA, None, [Result("A1", operator="Ada", numbers={"burst_kpa": 350.0})])
+    lab.add(SHA, make_build(), [LabResult("A1", "pass", "Ada")])
+    lab.add(SHA, None, [LabResult("A1", operator="Ada", numbers={"burst_kpa": 350.0})])
     with pytest.raises(DesignError, match=r"A1 has leak = pass in record 1; .* --correct 1"):
-        lab.add(SHA, None, [Result("A2", "pass"), Result("A1", "fail")])
+        lab.add(SHA, None, [LabResult("A2", "pass"), LabResult("A1", "fail")])
     with pytest.raises(DesignError, match=r"A1 has burst_kpa = 350\.0 in record 2 already"):
-        lab.add(SHA, None, [Result("A1", numbers={"burst_kpa": 350.0})])
+        lab.add(SHA, None, [LabResult("A1", numbers={"burst_kpa": 350.0})])
     assert len(lab.contents()[0]) == 2, "a batch is stored whole or not at all"
 
 
@@ -102,15 +102,15 @@ WRITER = """
 import sys
 from pathlib import Path
 from sbafab.errors import DesignError
-from sbafab.results.records import Build, Result
+from sbafab.results.records import Build, LabResult
 from sbafab.results.store import Lab
 file, who, sha = sys.argv[1:]
 lab = Lab(Path(file), 60)
 build = Build(sha, "sbafab 1.0.0", "arm", "lobed", "ears", "", {}, {}, (1, 1))
 for n in range(15):
-    lab.add(sha, build, [Result(f"{who}-{n}", "pass")])
+    lab.add(sha, build, [LabResult(f"{who}-{n}", "pass")])
 try:
-    lab.add(sha, build, [Result("shared", "pass")])
+    lab.add(sha, build, [LabResult("shared", "pass")])
     print("first")
 except DesignError:
     print("late")
@@ -166,11 +166,11 @@ def test_a_file_that_is_not_ours_is_left_alone(
     spoil: Callable[[Path], object], says: str, lab: Lab, make_build: Make
 ) -> None:
     if spoil in (newer, damaged):
-        lab.add(SHA, make_build(), [Result("A1", "pass")])
+        lab.add(SHA, make_build(), [LabResult("A1", "pass")])
     spoil(lab.path)
     before = lab.path.read_bytes() if lab.path.is_file() else None
     with pytest.raises(OutputError, match=says):
-        lab.add(SHA, make_build(), [Result("A2", "pass")])
+        lab.add(SHA, make_build(), [LabResult("A2", "pass")])
     with pytest.raises(OutputError):
         lab.contents()
     assert before == (lab.path.read_bytes() if lab.path.is_file() else None)
@@ -179,11 +179,11 @@ def test_a_file_that_is_not_ours_is_left_alone(
 def test_a_locked_file_is_one_sentence_and_readers_need_not_wait(
     lab: Lab, make_build: Make
 ) -> None:
-    lab.add(SHA, make_build(), [Result("A1", "pass")])
+    lab.add(SHA, make_build(), [LabResult("A1", "pass")])
     with closing(sqlite3.connect(lab.path, isolation_level=None)) as other:
         other.execute("BEGIN IMMEDIATE")
         with pytest.raises(OutputError, match="is in use by another program"):
-            lab.add(SHA, None, [Result("A2", "pass")])
+            lab.add(SHA, None, [LabResult("A2", "pass")])
         assert len(lab.contents()[0]) == 1
 
 
@@ -191,7 +191,7 @@ READ_ONLY = """
 import os, sys
 from pathlib import Path
 from sbafab.errors import OutputError
-from sbafab.results.records import Result
+from sbafab.results.records import LabResult
 from sbafab.results.store import Lab
 if os.getuid() == 0:
     os.setgid(65534); os.setuid(65534)
@@ -199,7 +199,7 @@ lab = Lab(Path(sys.argv[1]))
 print(len(lab.contents()[0]))
 for path in (lab.path, lab.path.parent / "new.sqlite"):
     try:
-        Lab(path).add(sys.argv[2], None, [Result("A2", "pass")])
+        Lab(path).add(sys.argv[2], None, [LabResult("A2", "pass")])
     except OutputError as error:
         print(error)
 """
@@ -211,7 +211,7 @@ def test_a_file_that_may_only_be_read_still_reports(make_build: Make) -> None:
     with TemporaryDirectory() as name:
         folder = Path(name)
         lab = Lab(folder / "lab.sqlite")
-        lab.add(SHA, make_build(), [Result("A1", "pass")])
+        lab.add(SHA, make_build(), [LabResult("A1", "pass")])
         lab.path.chmod(0o444)
         folder.chmod(0o555)
         arguments = [sys.executable, "-c", READ_ONLY, str(lab.path), SHA]
@@ -226,15 +226,15 @@ def test_a_file_that_may_only_be_read_still_reports(make_build: Make) -> None:
 @pytest.mark.parametrize(
     ("result", "says"),
     [
-        (Result("A1", "leaks"), "leak is 'leaks'; write pass or fail"),
-        (Result("x" * 65), "serial has 65 characters; at most 64"),
-        (Result("A\n1"), "serial must be plain text in one line"),
-        (Result("A1", numbers={"burst_kpa": 0.0}), r"burst_kpa is 0; it must be above 0"),
-        (Result("A1", numbers={"mass_g": float("nan")}), "mass_g is nan"),
-        (Result("A1", numbers={"stroke_mm": 1e9}), "at most 10,000 mm"),
-        (Result("A1", errors={"offset_mm": (0.1, -0.2)}), "offset_mm is -0.2; it must be 0 or"),
+        (LabResult("A1", "leaks"), "leak is 'leaks'; write pass or fail"),
+        (LabResult("x" * 65), "serial has 65 characters; at most 64"),
+        (LabResult("A\n1"), "serial must be plain text in one line"),
+        (LabResult("A1", numbers={"burst_kpa": 0.0}), r"burst_kpa is 0; it must be above 0"),
+        (LabResult("A1", numbers={"mass_g": float("nan")}), "mass_g is nan"),
+        (LabResult("A1", numbers={"stroke_mm": 1e9}), "at most 10,000 mm"),
+        (LabResult("A1", errors={"offset_mm": (0.1, -0.2)}), "offset_mm is -0.2; it must be 0 or"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(result: Result, says: str) -> None:
+def test_what_cannot_be_meant_is_refused(result: LabResult, says: str) -> None:
     with pytest.raises(DesignError, match=says):
         checked(result)
