@@ -17,14 +17,15 @@ class Tolerances:
     """The most by which cut edges and layers may lie off their places.
 
     ``cutting``: mm, any cut edge along its normal; ``pin``: mm, a layer on its pins; ``placement``
-    mm and ``turn`` degrees: a layer laid by hand. The first two are the paper's (Sec. 2).
+    mm and ``turn`` degrees: a layer laid by hand. The first two are the paper's (Sec. 2); the hand
+    is calibrated on its success rate (``docs/hand.py``).
     ``sheet``: mm, a part in its registered sheet; ``second_cut``: mm, the second cut of these.
     """
 
     cutting: float = 0.1
     pin: float = 0.004
-    placement: float = 0.2
-    turn: float = 1.0
+    placement: float = 0.08
+    turn: float = 0.4
     sheet: float = 0.05
     second_cut: float = 0.2
 

@@ -16,7 +16,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.forms import Form
 from sbafab.rules.freedoms import Freedom, Freedoms
-from sbafab.rules.limits import Limits
+from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.margins import QUANTITIES, Quantity, own_freedoms, seated
 from sbafab.rules.measures import Measures
 from sbafab.rules.random_builds import Contour, Draws, Error, Rows, kept, rows_of
@@ -98,7 +98,18 @@ def _by_hand(laminate: Laminate, limits: Limits) -> str:
     errors = limits.tolerances
     if laminate.panel is not None:
         return f"{errors.sheet:g} mm in a registered sheet"
-    return f"{errors.placement:g} mm and {errors.turn:g} degree where a hand places"
+    return (
+        f"{errors.placement:g} mm and {errors.turn:g} degree where a hand places"
+        f"{_calibrated(errors)}"
+    )
+
+
+def _calibrated(tolerances: Tolerances) -> str:
+    """Where the hand's figures come from, if they are the usual ones."""
+    usual = Tolerances()
+    if (tolerances.placement, tolerances.turn) != (usual.placement, usual.turn):
+        return ""
+    return f" (calibrated on the paper's success rate of {PAPER_SUCCESS:.0%}, not measured)"
 
 
 def simulate(

@@ -17,10 +17,11 @@ from sbafab.pressing.sheets import tackings
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller import process
 from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller.action import Action
 from sbafab.reports.traveller.bill import Cut, Item, bill, cut_list
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.notes import expected_sizes
-from sbafab.reports.traveller.process import Action, StepPage
+from sbafab.reports.traveller.process import StepPage
 from sbafab.reports.traveller.shapes import Picture, label
 from sbafab.reports.traveller.times import PAPER_MINUTES, Time
 

@@ -11,6 +11,8 @@ from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.pressing.schedule import Step
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller.action import Action
+from sbafab.reports.traveller.bench import on_the_lumen, reseat, underlay, warm_plate
 from sbafab.reports.traveller.exploded import exploded
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.layup import Bed, Round, beds, inlets_in, rounds
@@ -26,15 +28,6 @@ BONDS = {
     "flash": "Flash bond: the layers just barely stick together.",
     "full": "Full bond: all TPE that touches melts into one.",
 }
-
-
-@dataclass(frozen=True)
-class Action:
-    """One thing to do. ``layers`` are laid in it; ``ticks`` label one box each, or there is one."""
-
-    text: str
-    layers: tuple[int, ...] = ()
-    ticks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -73,7 +66,7 @@ def step_pages(work: Work) -> list[StepPage]:
                 pitch(placed),
                 plan(work.laminate, part, lying, f"plan-{step.step}"),
                 exploded(work.laminate, part, lying, f"exploded-{step.step}"),
-                tuple(_actions(work.laminate, part, step, lying)),
+                _bench_actions(work, part, step, lying),
             )
         )
     return found
@@ -123,6 +116,15 @@ def _height(laminate: Laminate, part: AssemblyStep) -> str:
     return say.millimetres(sum(laminate.layer(index).film.thickness for index in part.layers))
 
 
+def _bench_actions(
+    work: Work, part: AssemblyStep, step: Step, lying: Sequence[Bed]
+) -> tuple[Action, ...]:
+    """A step's actions; what it is laid up on comes right after the press is set."""
+    first, *others = _actions(work.laminate, part, step, lying)
+    own = (*underlay(work, part), *on_the_lumen(work.laminate, part))
+    return (first, *own, *others)
+
+
 def _actions(
     laminate: Laminate, part: AssemblyStep, step: Step, lying: Sequence[Bed]
 ) -> Iterator[Action]:
@@ -140,6 +142,7 @@ def _actions(
         yield Action("Lay a release film on a flat plate. No pins: lay by eye, as each line says.")
     for bed in lying:
         yield from _lay(things, bed, part.pins)
+    yield from reseat(laminate, part.adds, bool(part.pins))
     many = stack_count(laminate, part.layers)
     lies = "stack lies" if many == 1 else f"{many} stacks lie"
     yield Action(
@@ -153,6 +156,7 @@ def _actions(
             "with the same holes lies on top."
         )
     yield Action("Cover with a release film.")
+    yield warm_plate(step)
     yield Action(f"Close the press and start the timer: {say.minutes(step.minutes)}.")
     yield Action("Take it out: it is as hot as the platens. Let it cool flat before you touch it.")
     if part.pins:
@@ -315,6 +319,7 @@ def tubing(work: Work) -> list[Action]:
             (),
             names,
         ),
+        Action("Snip off what of the strip stands out of the tab, flush with its end.", (), names),
         Action(
             "Seal the mouth all round with a small drop of Loctite Vinyl, Fabric & Plastic; keep "
             "it out of the tube.",
@@ -328,20 +333,6 @@ def tubing(work: Work) -> list[Action]:
 def _apart(names: Sequence[str]) -> tuple[str, ...]:
     """A box for each of several; a single one needs no name."""
     return tuple(names) if len(names) > 1 else ()
-
-
-def wrapping(work: Work) -> list[Action]:
-    """Some laminates go round a tube in the end; empty for others."""
-    wrap = work.design.form.wrap
-    if wrap is None:
-        return []
-    return [
-        Action(
-            f"Wrap the sheet round its tube, outer diameter "
-            f"{say.millimetres(wrap.tube_diameter)}, balloons outward, its straight edges "
-            "along the tube. The paper does not say what holds it there."
-        )
-    ]
 
 
 def leak_test(work: Work) -> list[Action]:
