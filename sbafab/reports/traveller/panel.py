@@ -255,7 +255,9 @@ def _cuts(work: Work, panel: SheetPanel) -> list[Cut]:
         layers = work.laminate.patterns[row.pattern]
         sheet = work.laminate.first_cut(layers[0])
         length = sum(contour.length for contour in sheet.contours)
-        found.append(replace(row, count=len(layers) * panel.batches, pieces=1, cut_length=length))
+        found.append(
+            replace(row, count=len(layers) * panel.batches, pieces=1, spares=0, cut_length=length)
+        )
     return found
 
 
