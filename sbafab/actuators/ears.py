@@ -86,9 +86,9 @@ class Ear:
 def film_setback(design: Design) -> float:
     """How far bores and lumen of the TPE stand back from those of the masks.
 
-    With channel pins all share the pin's edge; with ears every mask overhangs.
+    With channel pins all share the pin's edge; without, every mask overhangs.
     """
-    return design.mask.overhang if design.registration.method == "ears" else 0.0
+    return 0.0 if design.registration.method == "channel-pin" else design.mask.overhang
 
 
 def placed(rays: Sequence[Ray], body: Region, plates: Region, design: Design) -> tuple[Ear, ...]:

@@ -8,6 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from sbafab.actuators.ears import NOTE, Ear, Holder, Ray, film_setback, placed
+from sbafab.actuators.panel import on_panel, roots, with_stubs
 from sbafab.actuators.pockets import (
     RoundChamber,
     bonded,
@@ -138,6 +139,8 @@ def build(design: LobedDesign) -> Laminate:
         count,
     )
     plates = union(shape.outline for shape in shapes)
+    held_by = roots(design, shapes, bottom.outline, [inlet for _, _, inlet in inlets])
+    bottom, shapes = with_stubs(bottom, held_by), tuple(with_stubs(s, held_by) for s in shapes)
     body = bottom.outline | plates
     ears = _ears(design, body, plates, axes)
     held = tails([inlet for _, _, inlet in inlets], body, ears, design)
@@ -148,7 +151,7 @@ def build(design: LobedDesign) -> Laminate:
         channel_pin(n, axis, design.bore) for n, axis in zip(names, axes, strict=True) if has_bores
     ]
     lumen_pin = Pin("lumen", (0.0, 0.0), design.lumen.pin, design.lumen.diameter - design.lumen.pin)
-    return Laminate(
+    laminate = Laminate(
         name=design.name,
         family=design.family,
         layers=layers(balloon_cuts(stack, design), design),
@@ -167,6 +170,7 @@ def build(design: LobedDesign) -> Laminate:
         notes=(*((note,) if note else ()), *((NOTE,) if ears else ())),
         outline=plates,
     )
+    return on_panel(laminate, held_by, design)
 
 
 def _hub_radius(design: LobedDesign, pockets: list[Region], axis: float) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from sbafab.actuators.ears import NOTE, Ear, Ray, placed
+from sbafab.actuators.panel import on_panel, roots, with_stubs
 from sbafab.actuators.pockets import (
     RoundChamber,
     bonded,
@@ -53,13 +54,15 @@ def build(design: OneDofDesign) -> Laminate:
         fillet(first.outline | tab, design.fillet.radius), first.pockets | strip, 1, 1
     )
     plates = union(shape.outline for shape in shapes)
+    held_by = roots(design, shapes, bottom.outline, [inlet])
+    bottom, shapes = with_stubs(bottom, held_by), tuple(with_stubs(s, held_by) for s in shapes)
     body = bottom.outline | plates
     ears = _ears(design, body, plates)
     held = tails([inlet], body, ears, design)
     stack = BalloonStack(bottom, shapes, shape_of, (AXIS,), ears=ears, tails=held)
     balloons = design.stack.balloons
     has_bore = balloons > 1
-    return Laminate(
+    laminate = Laminate(
         name=design.name,
         family=design.family,
         layers=layers(balloon_cuts(stack, design), design),
@@ -78,6 +81,7 @@ def build(design: OneDofDesign) -> Laminate:
         notes=(NOTE,) if ears else (),
         outline=plates,
     )
+    return on_panel(laminate, held_by, design)
 
 
 def _ears(design: OneDofDesign, body: Region, plates: Region) -> tuple[Ear, ...]:

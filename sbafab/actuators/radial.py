@@ -20,6 +20,7 @@ from sbafab.actuators.ears import (
     with_sheet_ears,
 )
 from sbafab.actuators.feet import film_feet, mask_feet
+from sbafab.actuators.panel import METHOD
 from sbafab.actuators.pockets import bonded, check_neck, drawn_pocket, tab_and_strip
 from sbafab.actuators.stacking import (
     BalloonShape,
@@ -135,6 +136,12 @@ class RadialDesign(Design):
 
 def build(design: RadialDesign) -> Laminate:
     """The flat laminate of a radial design. Raises DesignError where parts do not fit."""
+    if design.registration.method == METHOD:
+        raise DesignError(
+            "a radial design cannot be made in registered sheets, for its balloons' bridges would "
+            "lie on the sheet that is wrapped, and the second cut would go through it; use "
+            'registration.method = "ears"'
+        )
     bond, overhang = design.bond.width, design.mask.overhang
     pocket = _pocket(design)
     check_neck(design, [pocket], [(0.0, 0.0)])

@@ -10,7 +10,7 @@ from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import CutSettings, fixture_properties
 from sbafab.cutting.verify import verify_file
 from sbafab.geometry.boolean import union
-from sbafab.geometry.edges import Point
+from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, polygon, rectangle
 from sbafab.laminate.laminate import Laminate
@@ -38,7 +38,7 @@ def fixture(laminate: Laminate, platen: tuple[float, float]) -> Region | None:
 
 def plate_corner(laminate: Laminate, platen: tuple[float, float]) -> Point:
     """The plate's corner of least x and y, to 0.1 mm: where its holes are measured from."""
-    low_x, low_y, high_x, high_y = laminate.bounds
+    low_x, low_y, high_x, high_y = _lying(laminate)
     middle = (low_x + high_x) / 2, (low_y + high_y) / 2
     return round(middle[0] - platen[0] / 2, 1), round(middle[1] - platen[1] / 2, 1)
 
@@ -47,9 +47,14 @@ def shown(laminate: Laminate) -> Region | None:
     """The part of the base plate round the laminate, as pictures show it; None without pins."""
     if not laminate.pins:
         return None
-    low_x, low_y, high_x, high_y = laminate.bounds
+    low_x, low_y, high_x, high_y = _lying(laminate)
     low, high = (low_x - MARGIN, low_y - MARGIN), (high_x + MARGIN, high_y + MARGIN)
     return _drilled(rectangle(low, high), laminate)
+
+
+def _lying(laminate: Laminate) -> Bounds:
+    """The box round what lies on the plate: the laminate, or its registered sheets."""
+    return laminate.bounds if laminate.panel is None else laminate.panel.outline.bounds
 
 
 def _drilled(plate: Region, laminate: Laminate) -> Region:

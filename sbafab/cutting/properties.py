@@ -74,6 +74,12 @@ def fixture_properties(settings: CutSettings) -> dict[str, str]:
     return _properties(settings, "plate", "fixture", None)
 
 
+def second_cut_properties(settings: CutSettings) -> dict[str, str]:
+    """Custom properties of the second cut of registered sheets: it goes through masks as well."""
+    properties = _properties(settings, "TPE", "second cut", settings.kerf_width("TPE"))
+    return {**properties, "WARNING": PTFE_WARNING}
+
+
 def coupon_properties(generator: str) -> dict[str, str]:
     """Custom properties of the calibration piece: never compensated, for it measures the kerf."""
     return {

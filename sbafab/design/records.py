@@ -32,6 +32,8 @@ RuleName = Literal[
     "piece-count",
     "pin-holes",
     "pin-fit",
+    "bridges",
+    "scrap",
     "film-limits",
     "press-fit",
     "registration-nominal",
@@ -158,11 +160,12 @@ class Inlet(Section):
 class Registration(Section):
     """What keeps the layers in register, and how far off they may lie."""
 
-    method: Literal["channel-pin", "ears"] = "channel-pin"
+    method: Literal["channel-pin", "ears", "sheet"] = "channel-pin"
     """"channel-pin": dowel pins in the channel bores, and in the lumen if there is one (the
-    paper's). "ears": tooling holes outside the outline, pinned in every press step."""
+    paper's). "ears": tooling holes outside the outline, pinned in every press step. "sheet": films
+    stay whole sheets on corner pins, hold all copies of a batch and are cut free last."""
     pin_diameter: Length = 1.5
-    """Dowel pins of the ears."""
+    """Dowel pins of the ears, and of the corners of registered sheets."""
     full_bond_pins: Literal["out", "in"] = "out"
     """Ears: "out" tacks base and cap on the pins by a flash bond and draws the pins before the full
     bond, as the paper keeps pins out of molten TPE; "in" leaves them in, under a release sleeve or
@@ -192,6 +195,27 @@ class Registration(Section):
     def hole_diameter(self) -> float:
         """Diameter of the holes in ears and tails."""
         return self.pin_diameter + self.pin_clearance
+
+
+class PanelSection(Section):
+    """Registered sheets (``registration.method = "sheet"``); all ours, no bench has tried any."""
+
+    bridge_width: Length = 1.0
+    """Width of the bridges that hold a film's part in its sheet until the second cut."""
+    stub: LengthOrZero = 0.25
+    """How far past the outline the second cut goes through a bridge."""
+    margin: Annotated[float, Millimetres(10, 100)] = 12.0
+    """Sheet round all copies, for pins and fiducials."""
+    web: Annotated[float, Millimetres(1, 100)] = 4.0
+    """Sheet between two copies."""
+    carrier: str = Field(default="transfer film of low tack", max_length=80)
+    """What holds the masks in register until they are tacked to their film."""
+    tack_minutes: float = Field(default=1.0, gt=0, le=60)
+    """How long the press tacks the masks of one sheet to their film."""
+    sheet_error: LengthOrZero = 0.05
+    """The most by which film or mask lies off its place in its sheet: stretch, sag, transfer."""
+    second_cut_error: LengthOrZero = 0.2
+    """The most by which the second cut lies off the first."""
 
 
 class Press(Section):
@@ -377,6 +401,7 @@ class Design(Section):
     inlet: Inlet = Inlet()
     films: Films = Films()
     registration: Registration = Registration()
+    panel: PanelSection = PanelSection()
     press: Press = Press()
     laser: Laser = Laser()
     sheets: Sheets = Sheets()

@@ -44,7 +44,8 @@ def assembly(laminate: Laminate) -> tuple[AssemblyStep, ...]:
     Flash bonds hold layers in place on their pins. With channel pins full bonds are pressed
     without any: base and cap have no bore for one, and a lumen pin, though it would pass, stays
     out as in the paper. With ears base and cap are tacked on the pins by a flash bond, and the full
-    bond after it has no pins either, unless ``laminate.pins_in_full_bonds``.
+    bond after it has no pins either, unless ``laminate.pins_in_full_bonds``. In registered
+    sheets the pins, which stand in the frame, are in every time.
     """
     plans = [plan for plan in _plans(laminate) if plan.adds]
     if laminate.registration == "ears" and not laminate.pins_in_full_bonds:
@@ -63,6 +64,13 @@ class _Plan(NamedTuple):
 
 def _plans(laminate: Laminate) -> tuple[_Plan, ...]:
     indices = tuple(layer.index for layer in laminate.layers)
+    if laminate.panel is not None:
+        # Corner pins hold the base as well: nothing has to be pressed by itself first.
+        below, cap = indices[:-1], indices[-1:]
+        return (
+            _Plan("flash_middle", "flash", (below,), below),
+            _Plan("bond_all", "full", (below, cap), cap),
+        )
     films = [layer for layer in laminate.layers if not layer.is_mask]
     base = next((layer for layer in films if layer.role == "base"), films[0]).index
     upper = tuple(index for index in indices if base < index <= base + 2)
@@ -92,8 +100,10 @@ def _tacked(plan: _Plan) -> tuple[_Plan, ...]:
 
 def _step(number: int, plan: _Plan, laminate: Laminate) -> AssemblyStep:
     layers = [index for stack in plan.stacks for index in stack]
-    pinned = plan.bond == "flash" or (
-        laminate.registration == "ears" and laminate.pins_in_full_bonds
+    pinned = (
+        plan.bond == "flash"
+        or laminate.registration == "sheet"
+        or (laminate.registration == "ears" and laminate.pins_in_full_bonds)
     )
     pins = _pins_in(laminate, layers) if pinned else ()
     stacks = tuple(stack for stack in plan.stacks if stack)

@@ -15,6 +15,7 @@ from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Film
 from sbafab.laminate.interfaces import Interface, InterfaceKind, interface_regions
+from sbafab.laminate.panel import SheetPanel
 
 Role = Literal["base", "wall", "cap", "sheet", "chamber-mask", "separator-mask"]
 
@@ -122,7 +123,7 @@ class Laminate:
 
     ``outline`` is that of the films of all balloons laid over each other, without inlet tabs and
     ears; empty where only the layers are known. ``pins_in_full_bonds``: whether the pins of ears
-    stay in while TPE melts.
+    stay in while TPE melts. ``panel``: the registered sheets that it is made in, if it is.
     """
 
     name: str
@@ -138,6 +139,7 @@ class Laminate:
     notes: tuple[str, ...] = ()
     outline: Region = NOTHING
     pins_in_full_bonds: bool = False
+    panel: SheetPanel | None = None
 
     def __repr__(self) -> str:
         return f"Laminate({self.name!r}, {self.family!r}, {len(self.layers)} layers)"
@@ -195,12 +197,24 @@ class Laminate:
         """The layer with this index, counted from 1 at the bottom."""
         return self.layers[index - 1]
 
+    def first_cut(self, layer: Layer) -> Region:
+        """What the cut file of a layer cuts: its profile, or its registered sheet.
+
+        A mask sheet is laid face down, so it is cut turned over.
+        """
+        if self.panel is None:
+            return layer.profile
+        sheet = self.panel.sheets[layer.index - 1]
+        return sheet.mirrored() if layer.is_mask else sheet
+
     def pins_holding(self, layer: Layer) -> tuple[Pin, ...]:
         """The pins on which the layer has a hole that fits; a wider opening does not hold it."""
         return self.pins_in(layer.profile)
 
     def pins_in(self, part: Region) -> tuple[Pin, ...]:
-        """The pins on which this part of a layer has a hole that fits."""
+        """The pins on which this part of a layer, or its registered sheet, has a hole that fits."""
+        if self.panel is not None:
+            return self.pins
         circles = [hole.circle for hole in part.holes if hole.circle is not None]
         return tuple(
             pin

@@ -11,6 +11,7 @@ from typing import Any
 
 from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.properties import PTFE_WARNING, CutSettings, layer_path, said_of
+from sbafab.cutting.second_cut import PATH as SECOND_CUT
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
@@ -18,12 +19,14 @@ from sbafab.geometry.beam import Kerf
 from sbafab.laminate.films import Film
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.panel import SheetPanel
 from sbafab.meshing.files import MeshFile
 from sbafab.models.sizes import sizes
 from sbafab.output.manifest_records import (
     BatchSchema,
     BoreClaim,
     DesignClaim,
+    FiducialClaim,
     FilmClaim,
     FilmUseClaim,
     InletClaim,
@@ -33,7 +36,9 @@ from sbafab.output.manifest_records import (
     LayerClaim,
     Manifest,
     MeshClaim,
+    PanelClaim,
     PinClaim,
+    PlaceClaim,
     RegistrationClaim,
     SheetClaim,
     SheetPartClaim,
@@ -66,6 +71,8 @@ def manifest(
     optional: dict[str, Any] = {}
     if curves is not None:
         optional["curves"] = curves
+    if is_cut and laminate.panel is not None:
+        optional["panel"] = _panel(laminate.panel)
     if planned.conforming is not None:
         optional["mesh_statistics"] = planned.conforming.statistics
     return Manifest(
@@ -155,6 +162,21 @@ def job_manifest(
 
 def kerf_claim(width: Kerf | None) -> KerfClaim:
     return KerfClaim(state="uncalibrated" if width is None else "compensated", width=width)
+
+
+def _panel(panel: SheetPanel) -> PanelClaim:
+    width, length = (round(side, 6) for side in panel.size)
+    return PanelClaim(
+        size=(width, length),
+        places=tuple(PlaceClaim(**_place(place)) for place in panel.places),
+        batches=panel.batches,
+        second_cut=SECOND_CUT,
+        fiducials=tuple(
+            FiducialClaim(**_place(place), diameter=panel.fiducial_diameter)
+            for place in panel.fiducials
+        ),
+        turned_over="PTFE",
+    )
 
 
 def _place(point: tuple[float, float]) -> dict[str, float]:

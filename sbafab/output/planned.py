@@ -11,6 +11,7 @@ from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.cutting.files import compensated_paths
 from sbafab.cutting.properties import CutSettings
 from sbafab.design.records import Design
+from sbafab.errors import DesignError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.parts import parts_of
@@ -80,6 +81,11 @@ def plan(checked: Checked, wanted: Collection[RunPart], curves: Curves = TRUE_AR
     planned = Planned(checked, frozenset(wanted), settings, pressing)
     if "cut" not in wanted:
         return planned
+    if laminate.panel is not None and curves.in_chords:
+        raise DesignError(
+            'registered sheets (registration.method = "sheet") are not drawn in chords; write '
+            "bulges or arcs"
+        )
     paths = compensated_paths(laminate, settings)
     if curves.in_chords:
         refuse_coarse(laminate, paths, settings, limits(design))

@@ -42,6 +42,8 @@ def limits(design: Design) -> Limits:
             pin=design.registration.pin_error,
             placement=design.registration.hand_placement,
             turn=design.registration.hand_turn,
+            sheet=design.panel.sheet_error,
+            second_cut=design.panel.second_cut_error,
         ),
         unknown_kerf=design.laser.unknown_kerf,
         pin_stretch=design.registration.pin_stretch,
@@ -86,6 +88,7 @@ def press_settings(design: Design) -> PressSettings:
         release_thickness=press.release_thickness,
         pin_standard=design.registration.pin_standard,
         pin_lengths=design.registration.pin_lengths,
+        tack=design.panel.tack_minutes,
     )
 
 

@@ -97,11 +97,13 @@ def gent_modulus(shore_a: float) -> float:
 
 
 def footprint(laminate: Laminate, layers: Sequence[int]) -> Footprint:
-    """Of a stack of layers, given by index."""
+    """Of a stack of layers, given by index, or of the registered sheets that they are part of."""
     films = [laminate.layer(index) for index in layers]
     widest = max(
         (layer.profile for layer in distinct_layers(laminate, layers)), key=lambda part: part.area
     )
+    if laminate.panel is not None:
+        widest = laminate.panel.outline
     masks = {
         role: sum(layer.film.thickness for layer in films if layer.role == role)
         for role in ("chamber-mask", "separator-mask")

@@ -20,7 +20,7 @@ from sbafab.laminate.assembly import (
     stack_count,
 )
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing import build_up
+from sbafab.pressing import build_up, sheets
 from sbafab.pressing.build_up import BuildUpPart, Footprint, Pad
 from sbafab.pressing.dowels import PinSetting, Standard, is_sold, plate_thickness, settings_by_step
 
@@ -82,6 +82,7 @@ class PressSettings:
     release_thickness: float = 0.05
     pin_standard: Standard = "ISO 8734"
     pin_lengths: tuple[float, ...] = ()
+    tack: float = 1.0
 
     @property
     def force_n(self) -> float:
@@ -176,14 +177,20 @@ def schedule(laminate: Laminate, press: PressSettings) -> Schedule:
         for part, stack, own in zip(parts, under, pins, strict=True)
     )
     total = sum(step.minutes for step in steps)
+    tacking = press.tack * sheets.tackings(laminate)
     return Schedule(
         steps,
         total,
-        total + HANDLING_MINUTES,
-        f"{total:g} min in the press and {HANDLING_MINUTES:g} min to cut, lay up, pin and fit the "
-        "tubing; the latter is assumed the same for every design (paper: 1.75 h in all)",
+        total + tacking + HANDLING_MINUTES,
+        f"{total:g} min in the press{_tacked(tacking)} and {HANDLING_MINUTES:g} min to cut, lay "
+        "up, pin and fit the tubing; the latter is assumed the same for every design (paper: "
+        "1.75 h in all)",
         tuple(_warnings(laminate, press, steps)),
     )
+
+
+def _tacked(minutes: float) -> str:
+    return f", {minutes:g} min to tack masks to their films" if minutes else ""
 
 
 class _Setting(NamedTuple):
@@ -200,9 +207,13 @@ def _step(
 ) -> Step:
     count = stack_count(laminate, part.layers)
     found = build_up.pressures(press.pressure_kpa, press.platen, press.pad, own.pad, own.under)
+    title = TITLES[part.name] if count == 1 else TITLES_OF_SEVERAL[part.name]
+    words = _instructions(part, count) + after
+    if laminate.panel is not None:
+        title, words = sheets.title(part), sheets.instructions(part)
     return Step(
         step=part.number,
-        title=TITLES[part.name] if count == 1 else TITLES_OF_SEVERAL[part.name],
+        title=title,
         bond=part.bond,
         layers=part.layers,
         adds=part.adds,
@@ -220,7 +231,7 @@ def _step(
         + _round_pins(press, own),
         build_up=tuple(_items(press, own)),
         pin_settings=own.pins,
-        instructions=_instructions(part, count) + after,
+        instructions=words,
     )
 
 
@@ -307,6 +318,8 @@ def _refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
 
 
 def _warnings(laminate: Laminate, press: PressSettings, steps: Sequence[Step]) -> Iterator[str]:
+    if laminate.panel is not None:
+        yield sheets.UNTRIED
     if press.temperature_c > HOTTEST_TRIED:
         yield (
             f"{press.temperature_c:g} C is hotter than the {HOTTEST_TRIED:g} C of earlier work, "
@@ -334,9 +347,9 @@ def _warnings(laminate: Laminate, press: PressSettings, steps: Sequence[Step]) -
     if laminate.registration == "ears" and laminate.pins:
         yield PINS_IN if laminate.pins_in_full_bonds else PINS_OUT
     pad = next(item.thickness_mm for item in steps[0].build_up if item.part == PAD)
-    if (sheets := build_up.pieces(pad)) > 1:
+    if (pile := build_up.pieces(pad)) > 1:
         yield (
-            f"the press pad is a pile of {sheets} sheets, {pad:g} mm high together, which may "
+            f"the press pad is a pile of {pile} sheets, {pad:g} mm high together, which may "
             "slide aside: hold it in a frame, and see whether the press opens so far"
         )
     unsold = {

@@ -10,6 +10,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.progress import Progress
 from sbafab.rules import (
     bond_width,
+    bridges,
     channel_clear,
     facing_films,
     film_limits,
@@ -21,6 +22,7 @@ from sbafab.rules import (
     registration_nominal,
     registration_worst_case,
     registration_yield,
+    scrap,
     sealing,
     tube_fit,
 )
@@ -61,6 +63,8 @@ RULES = (
     Rule(piece_count.NAME, _alone(piece_count.check)),
     Rule(pin_holes.NAME, _alone(pin_holes.check)),
     Rule(pin_fit.NAME, _alone(pin_fit.check)),
+    Rule(bridges.NAME, _alone(bridges.check)),
+    Rule(scrap.NAME, _alone(scrap.check)),
     Rule(film_limits.NAME, _alone(film_limits.check)),
     Rule(press_fit.NAME, _alone(press_fit.check)),
     Rule(registration_nominal.NAME, _alone(registration_nominal.check)),

@@ -39,7 +39,8 @@ class Freedom(NamedTuple):
     ``centre`` is given, turned about it by up to ``most`` radians.
 
     The body reaches from layer ``lowest`` to ``highest``; ``body`` tells it from others in the
-    same ``step``. ``pins`` are those that hold it.
+    same ``step``. ``pins`` are those that hold it. ``in_sheet``: it is what a registered sheet
+    stretches, or what moves while it is transferred.
     """
 
     step: int
@@ -49,11 +50,12 @@ class Freedom(NamedTuple):
     pins: int
     most: float
     centre: Point | None = None
+    in_sheet: bool = False
 
     @property
     def by_hand(self) -> bool:
         """Whether the hand decides it: every turn, and the place of what no pin holds."""
-        return self.centre is not None or self.pins == 0
+        return self.centre is not None or self.pins == 0 or self.in_sheet
 
     def lever(self, p: Point, normal: Point) -> float:
         """How many mm the body moves along ``normal`` at ``p`` per radian of its turn."""
@@ -64,7 +66,7 @@ class Freedom(NamedTuple):
     def like(self) -> tuple[object, ...]:
         """Equal for freedoms that differ in step and body only."""
         centre = self.centre and (round(self.centre[0], 6), round(self.centre[1], 6))
-        return self.most, centre, self.pins
+        return self.most, centre, self.pins, self.in_sheet
 
 
 Freedoms = Mapping[Part, tuple[Freedom, ...]]
@@ -75,6 +77,8 @@ def freedoms(laminate: Laminate, tolerances: Tolerances) -> Freedoms:
 
     Two pieces lie off each other by what one of them does and the other does not.
     """
+    if laminate.panel is not None:
+        return _in_sheets(laminate, tolerances)
     shapes = _Shapes(laminate)
     bodies = [[part] for layer in laminate.layers for part in shapes.parts(layer.index)]
     found: dict[Part, tuple[Freedom, ...]] = {body[0]: () for body in bodies}
@@ -94,6 +98,28 @@ def freedoms(laminate: Laminate, tolerances: Tolerances) -> Freedoms:
                 found[part] += own
         bodies = [body for body in bodies if body[0].layer not in layers]
         bodies += shapes.joined(present)
+    return found
+
+
+def _in_sheets(laminate: Laminate, tolerances: Tolerances) -> Freedoms:
+    """The same for registered sheets: all parts of a sheet move as one, masks with the film below.
+
+    A mask is tacked to that film before the sheets are stacked.
+    """
+    found: dict[Part, tuple[Freedom, ...]] = {}
+    under: tuple[Freedom, ...] = ()
+    added = {index: step.number for step in assembly(laminate) for index in step.adds}
+    for layer in laminate.layers:
+        number, step, pins = layer.index, added[layer.index], len(laminate.pins)
+        on_pins = Freedom(step, number, number, number, pins, tolerances.pin)
+        both = on_pins, on_pins._replace(body=-number, most=tolerances.sheet, in_sheet=True)
+        own = tuple(one for one in both if one.most > 0)
+        if layer.is_mask:
+            own = (*under, *own)
+        else:
+            under = own
+        for piece in range(len(layer.profile.pieces)):
+            found[Part(layer.index, piece)] = own
     return found
 
 

@@ -19,12 +19,15 @@ class Tolerances:
     ``cutting``: mm, any cut edge along its normal; ``pin``: mm, a layer on its pins; ``placement``
     mm and ``turn`` degrees: a layer laid by hand. The first two are the paper's (Sec. 2); the hand
     is calibrated on its success rate (``docs/hand.py``).
+    ``sheet``: mm, a part in its registered sheet; ``second_cut``: mm, the second cut of these.
     """
 
     cutting: float = 0.1
     pin: float = 0.004
     placement: float = 0.08
     turn: float = 0.4
+    sheet: float = 0.05
+    second_cut: float = 0.2
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,8 @@ KEYS = (
     _Key("pin_error", WORST, lambda own: own.tolerances.pin),
     _Key("hand_placement", WORST, lambda own: own.tolerances.placement, "default"),
     _Key("hand_turn", WORST, lambda own: own.tolerances.turn, "default"),
+    _Key("sheet_error", WORST, lambda own: own.tolerances.sheet, "default"),
+    _Key("second_cut_error", ("bridges",), lambda own: own.tolerances.second_cut, "default"),
 )
 """Smaller tolerances assume a better shop than is usual, so they weaken the rules as well."""
 

@@ -232,6 +232,7 @@ def test_a_pin_too_thick_for_its_holes_fails_pin_fit_alone(good: Callable[..., L
 
 def test_every_rule_has_a_fault_of_its_own() -> None:
     tested_apart = {"press-fit", "pin-fit", "registration-worst-case", "registration-yield"}
+    tested_apart |= {"bridges", "scrap"}
     assert {fault.rule for fault in FAULTS.values()} | tested_apart == set(rule_names())
 
 

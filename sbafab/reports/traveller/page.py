@@ -25,7 +25,7 @@ from sbafab.pressing.schedule import Schedule
 from sbafab.reports.canvas import COLOURS, KEY
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.features import balloons, layer_numbers
-from sbafab.reports.traveller import base_plate, bench, bill, notes, process, times
+from sbafab.reports.traveller import base_plate, bench, bill, notes, panel, process, times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.cautions import cautions, for_the_designer
 from sbafab.reports.traveller.code import code_svg, record_text
@@ -113,6 +113,7 @@ def context(work: Work) -> dict[str, Any]:
         "times": times.times(work),
         "kerf_notes": notes.kerf_notes(work),
         "expected_sizes": notes.expected_sizes(work),
+        **panel.chapter(work),
     }
 
 
