@@ -31,9 +31,11 @@ if TYPE_CHECKING:
 FILM_ELEMENTS = 40
 RIM_ELEMENTS = 8
 NECK_ELEMENTS = 2
-FARTHEST = 0.12
-"""Share of the pocket's radius that a node may move in one step."""
+FARTHEST = 0.7
+"""Share of its length by which an element may change in one step."""
 MOST_STEPS = 400
+ROUNDING = 1e-13
+"""Share of the energy that is lost in its own digits."""
 HALVINGS = 12
 CLOSE = 1e-9
 """Force out of balance, as a share of pressure times pocket area, that is none."""
@@ -207,25 +209,27 @@ def _settled(balloon: Balloon, load: _Load, r: Array, z: Array) -> tuple[Array, 
     Raises DesignError where it does not end.
     """
     freedoms = balloon.freedoms
-    count = len(r)
-    damping = np.zeros(count)
+    damping = np.zeros(len(r))
     small = CLOSE * load.pressure * math.pi * balloon.pocket**2
     eye = np.eye(freedoms.shape[1])
     term, _ = _total(balloon, load, r, z)
     for _ in range(MOST_STEPS):
         gradient = term.gradient @ freedoms
-        if (np.abs(gradient).max(-1) <= small).all():
-            return r, z
         stiffness = freedoms.T @ term.hessian @ freedoms
         size = np.abs(np.einsum("nii->ni", stiffness))
         stiffness += (damping[:, None] * size)[..., None] * eye
         move = -np.linalg.solve(stiffness, gradient[..., None])[..., 0]
         slope = (move * gradient).sum(-1)
-        ahead = move @ freedoms.T
+        still = np.abs(gradient).max(-1) <= small
+        # Where rounding alone decides whether the energy falls, there is nothing left to gain.
+        still |= (np.abs(slope) <= ROUNDING * np.abs(term.energy)) & (damping == 0.0)
+        if still.all():
+            return r, z
+        ahead = np.where(still[:, None], 0.0, move) @ freedoms.T
         share = _downhill(balloon, load, (r, z), ahead, term.energy, slope)
         r, z = r + share[:, None] * ahead[:, ::2], z + share[:, None] * ahead[:, 1::2]
         term, _ = _total(balloon, load, r, z)
-        damping = np.where(share > 0, damping / 10, np.maximum(10 * damping, 1e-3))
+        damping = np.where(share > 0, damping / 10, np.clip(10 * damping, 1e-3, 1e9))
         damping[damping < 1e-6] = 0.0
     raise DesignError(
         f"a balloon of radius {balloon.pocket:g} mm finds no balance; try another load"
@@ -241,8 +245,10 @@ def _downhill(
     slope: Array,
 ) -> Array:
     """The share of each step that lowers the energy; 0 where none does or it leads uphill."""
-    longest = np.maximum(np.abs(ahead).max(-1), 1e-300)
-    share = np.minimum(1.0, FARTHEST * balloon.pocket / longest)
+    # No element is stretched, turned or shortened by more than its own length: none collapses.
+    length = np.hypot(np.diff(at[0]), np.diff(at[1]))
+    change = np.hypot(np.diff(ahead[:, ::2]), np.diff(ahead[:, 1::2]))
+    share = np.minimum(1.0, FARTHEST / np.maximum((change / length).max(-1), 1e-300))
     share = np.where(slope <= 0, share, 0.0)
     room = 1e-12 * np.abs(energy)
     for _ in range(HALVINGS):
@@ -267,6 +273,6 @@ def _wrinkling(balloon: Balloon, r: Array, z: Array, zone: Array) -> Array:
     """The hoop stress in kPa that wrinkles over a zone carry, for each element's tension."""
     tension = balloon.modulus * balloon.thickness * strain(balloon.film, r, z).meridian
     force = math.tau / zone[:, None] * np.sqrt(balloon.rigidity * np.maximum(tension, 0.0))
-    carried = np.full_like(force, math.inf)
+    carried: Array = np.full_like(force, math.inf)
     carried[:, balloon.may_wrinkle] = force[:, balloon.may_wrinkle] / balloon.thickness
     return carried
