@@ -20,13 +20,20 @@ from sbafab.actuators.ears import (
     with_sheet_ears,
 )
 from sbafab.actuators.feet import film_feet, mask_feet
+from sbafab.actuators.panel import METHOD
 from sbafab.actuators.pockets import bonded, check_neck, drawn_pocket, tab_and_strip
-from sbafab.actuators.stacking import BalloonShape, Cut, Stack, balloon_cuts, layers
+from sbafab.actuators.stacking import (
+    BalloonShape,
+    BalloonStack,
+    CutFilm,
+    balloon_cuts,
+    channel_pin,
+    layers,
+)
 from sbafab.actuators.tails import head_reach, tails
 from sbafab.design.form import Drawn, Form, Slots, Wrap
 from sbafab.design.records import Chamber as ChamberSection
-from sbafab.design.records import Design, Inlet, Section
-from sbafab.design.records import Stack as StackSection
+from sbafab.design.records import Design, Inlet, Section, Stack
 from sbafab.design.units import Length, LengthOrZero
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import union
@@ -34,7 +41,7 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import fillet, grow
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import rectangle, stadium, strip
-from sbafab.laminate.laminate import Bore, Chamber, Laminate, Pin
+from sbafab.laminate.laminate import Bore, Chamber, Laminate
 from sbafab.laminate.laminate import Inlet as LaminateInlet
 
 
@@ -54,6 +61,9 @@ class Tube(Section):
 
     outer_diameter: Length = 15.0
     """The tube that the sheet is wrapped round."""
+    glue: str = Field(default="3M 1587", min_length=1, max_length=120)
+    """What holds the sheet round its tube. The paper does not say; this is the adhesive that it
+    takes between actuators and silicone tubes."""
 
 
 class SheetSection(Section):
@@ -81,7 +91,7 @@ class RadialInlet(Inlet):
     """One shared inlet: the bottom pockets joined by strips."""
 
 
-class RadialStack(StackSection):
+class RadialStack(Stack):
     """How high each SBA is."""
 
     balloons: int = Field(default=1, ge=1, le=1000)
@@ -110,7 +120,7 @@ class RadialDesign(Design):
         drawn = self.chamber.outline is not None
         width, length = _slot(self)
         pockets = Drawn() if drawn else Slots(width, length - width)
-        wrap = Wrap(self.tube.outer_diameter, self.pitch)
+        wrap = Wrap(self.tube.outer_diameter, self.pitch, self.tube.glue, self.sheet.overlap)
         words = "radial expansion stacked balloon actuator"
         return Form(words, self.chamber.count, pockets, wrap=wrap)
 
@@ -126,6 +136,12 @@ class RadialDesign(Design):
 
 def build(design: RadialDesign) -> Laminate:
     """The flat laminate of a radial design. Raises DesignError where parts do not fit."""
+    if design.registration.method == METHOD:
+        raise DesignError(
+            "a radial design cannot be made in registered sheets, for its balloons' bridges would "
+            "lie on the sheet that is wrapped, and the second cut would go through it; use "
+            'registration.method = "ears"'
+        )
     bond, overhang = design.bond.width, design.mask.overhang
     pocket = _pocket(design)
     check_neck(design, [pocket], [(0.0, 0.0)])
@@ -141,15 +157,17 @@ def build(design: RadialDesign) -> Laminate:
     sheet = _sheet(design, outline)
     ears = _ears(design, bottom, sheet, outline, centres)
     held = tails(inlets, bottom.outline, ears, design, sheet)
-    stack = Stack(bottom, (shape,), (0,) * design.stack.balloons, centres, ears=ears, tails=held)
+    stack = BalloonStack(
+        bottom, (shape,), (0,) * design.stack.balloons, centres, ears=ears, tails=held
+    )
     window = _window(design, pocket, outline)
     windows = union(window.moved(*centre) for centre in centres)
     fillet_radius = design.fillet.radius
     eared = with_film_ears(bottom.outline, ears, fillet_radius)
     carrier_mask = with_mask_ears(grow(eared, overhang), ears, overhang) - windows
     carrier = [
-        Cut("sheet", with_sheet_ears(sheet, ears, fillet_radius), None, 1),
-        Cut("separator-mask", carrier_mask, None, bottom.outline_pieces),
+        CutFilm("sheet", with_sheet_ears(sheet, ears, fillet_radius), None, 1),
+        CutFilm("separator-mask", carrier_mask, None, bottom.outline_pieces),
     ]
     manifold = design.inlet.manifold
     names = ["chamber1"] * count if manifold else [f"chamber{i + 1}" for i in range(count)]
@@ -166,7 +184,7 @@ def build(design: RadialDesign) -> Laminate:
         inlets=inlets,
         pins=(
             *(
-                Pin(f"channel{number}", bore.centre, bore.diameter)
+                channel_pin(f"channel{number}", bore.centre, design.bore)
                 for number, bore in enumerate(bores, start=1)
             ),
             *(ear.pin for ear in ears),
@@ -175,6 +193,7 @@ def build(design: RadialDesign) -> Laminate:
         lumen=None,
         balloons=design.stack.balloons,
         registration=design.registration.method,
+        pins_in_full_bonds=design.registration.full_bond_pins == "in",
         notes=(NOTE,) if ears else (),
     )
 
@@ -255,7 +274,7 @@ def _bottom(
     tabs = [tab for tab, _, _ in made]
     strips = [mask for _, mask, _ in made]
     if manifold and count > 1:
-        width = design.inlet.strip_width
+        width = design.strip_width
         tabs.append(strip(centres[0], centres[-1], width + 2 * design.bond.width))
         strips.append(strip(centres[0], centres[-1], width))
     if manifold:

@@ -20,7 +20,7 @@ from sbafab.as_built.claims import (
 from sbafab.as_built.cut_files import CutPart, LayerFile, inside, read_layers
 from sbafab.as_built.derived import derived_job_problems, derived_problems
 from sbafab.as_built.joined import joined_findings, lowered_between
-from sbafab.as_built.meant import Meant, Work, departure, meant_by
+from sbafab.as_built.meant import Meant, RunWork, departure, meant_by
 from sbafab.as_built.measures import (
     fixture_problems,
     interface_problems,
@@ -30,12 +30,12 @@ from sbafab.as_built.measures import (
     size_problems,
     with_plate_pins,
 )
+from sbafab.as_built.panels import read_panel
 from sbafab.as_built.pieces import Lot
 from sbafab.as_built.records import (
     CLAIMS,
     DESIGNED,
     INTEGRITY,
-    Manifest,
     Problem,
     findings_of,
     is_job,
@@ -43,7 +43,7 @@ from sbafab.as_built.records import (
     read_claims,
     read_job,
 )
-from sbafab.as_built.sheets import Order, sheet_problems
+from sbafab.as_built.sheets import SheetOrder, sheet_problems
 from sbafab.as_built.stack import laminate_of, stacked_layers
 from sbafab.design.reading import validated
 from sbafab.design.records import Design
@@ -51,14 +51,17 @@ from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.panel import SheetPanel
 from sbafab.models.sizes import sizes
-from sbafab.output.contents import Checked
+from sbafab.output.manifest_records import Manifest
+from sbafab.output.planned import Checked
 from sbafab.output.settings import limits as limits_of
 from sbafab.rules import film_limits
 from sbafab.rules.deck import RULES, Rule, run_deck, run_rule
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits
 from sbafab.rules.lowered import lowered
+from sbafab.rules.measures import Measures
 
 AS_DESIGNED = "all that lies here is what design.toml makes"
 BY_LAYER = (film_limits.NAME,)
@@ -87,6 +90,9 @@ class AsBuilt:
 
     @property
     def is_meant(self) -> bool:
+        own, meant = self.laminate, self.meant
+        if own is not None and meant is not None and own.panel is not meant.laminate.panel:
+            return False
         return all(file.part is not None and file.part.is_meant for file in self.files)
 
 
@@ -105,7 +111,7 @@ def check_folder(folder: Path) -> tuple[Finding, ...]:
     return (*_findings(built, measured), *findings_of(DESIGNED, problems, AS_DESIGNED))
 
 
-def check_written(folder: Path, works: Mapping[str, Work]) -> tuple[Finding, ...]:
+def check_written(folder: Path, works: Mapping[str, RunWork]) -> tuple[Finding, ...]:
     """What is found in a folder that has just been written, of ``works`` by their designs' names.
 
     Everything is read from the disk. Where every layer's file cuts what the design check measured,
@@ -125,9 +131,8 @@ def _deck(built: AsBuilt) -> tuple[Finding, ...]:
         return _by_layer(built)
     if built.is_meant and built.known is not None:
         return built.known
-    return tuple(
-        finding for rule in RULES for finding in _measured(rule, built.laminate, built.limits)
-    )
+    measures = Measures(built.laminate, built.limits)
+    return tuple(finding for rule in RULES for finding in _measured(rule, measures))
 
 
 def _findings(built: AsBuilt, measured: Sequence[Finding]) -> tuple[Finding, ...]:
@@ -142,7 +147,7 @@ def _findings(built: AsBuilt, measured: Sequence[Finding]) -> tuple[Finding, ...
     )
 
 
-def _check_job(folder: Path, works: Mapping[str, Work] | None = None) -> tuple[Finding, ...]:
+def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tuple[Finding, ...]:
     """What is found in every design of a job, its name before it, and on the job's sheets.
 
     In an assembly's folder, also what is found between its parts. ``works``: what the run that has
@@ -166,28 +171,15 @@ def _check_job(folder: Path, works: Mapping[str, Work] | None = None) -> tuple[F
         named += findings_of(DESIGNED, layers, AS_DESIGNED) if layers else []
         found += [replace(f, message=f"{told.name}: {f.message}") for f in named]
         checked.append(_as_designed(built, measured) if works is None else None)
-        lots.append(Lot(told.name, told.copies, built.files))
+        lots.append(Lot(told.name, told.copies, built.files, built.design.order.spares))
         own = (built.claims.name, built.claims.copies, built.claims.design_sha256)
         if own != (told.name, told.copies, told.design_sha256):
             message = f"{told.folder}: name, copies or design_sha256 are not those of its manifest"
             problems.append(claim(message))
     first = folders[0]
     problems += file_problems(folder, job)
-    problems += sheet_problems(
-        folder,
-        Order(
-            job.name,
-            job.designs_sha256,
-            first.design,
-            first.claims.kerf,
-            job.waived,
-            job.lowered_limits,
-            job.films,
-            job.sheets,
-            job.files,
-            lots,
-        ),
-    )
+    order = SheetOrder(job, first.design, first.claims.kerf, lots)
+    problems += sheet_problems(folder, order)
     if is_joined(job):
         weak += lowered_between(folder)
         between, wrong = joined_findings(folder)
@@ -206,7 +198,7 @@ def _check_job(folder: Path, works: Mapping[str, Work] | None = None) -> tuple[F
     )
 
 
-def read_folder(folder: Path, of_job: bool = False, work: Work | None = None) -> AsBuilt:
+def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None) -> AsBuilt:
     """The laminate that a folder's cut files make, and what is wrong with files and claims.
 
     The folder of a design ``of_job`` has no film sheets of its own. ``work``: what the run that has
@@ -229,19 +221,21 @@ def read_folder(folder: Path, of_job: bool = False, work: Work | None = None) ->
     expected = meant.layers(count) if meant is not None else [None] * count
     files, unread = read_layers(folder, claims, _drawn_in_chords(design), expected)
     problems += unread
+    panel, files, unread = read_panel(folder, claims, files, meant)
+    problems += unread
     layers = stacked_layers(files, design)
     problems += height_problems(claims, layers, design)
     problems += property_problems(files, claims)
     problems += layer_problems(files, claims)
     problems += pattern_problems(layers, claims)
-    if not of_job:
+    if not of_job and panel is None:
         problems += _own_sheet_problems(folder, claims, design, files)
     laminate: Laminate | None = None
     parts = [file.part for file in files if file.part is not None]
     chord_error = max((part.chord_error for part in parts), default=0.0)
     if len(parts) == len(files):
         try:
-            laminate = _laminate(files, claims, design, meant)
+            laminate = _laminate(files, claims, design, meant, panel)
             problems += _laminate_problems(folder, laminate, claims, parts)
             room = 2 * (TOLERANCE + chord_error)
             outline = meant.laminate.outline if meant is not None else Region()
@@ -258,7 +252,11 @@ def read_folder(folder: Path, of_job: bool = False, work: Work | None = None) ->
 
 
 def _laminate(
-    files: Sequence[LayerFile], claims: Manifest, design: Design, meant: Meant | None
+    files: Sequence[LayerFile],
+    claims: Manifest,
+    design: Design,
+    meant: Meant | None,
+    panel: SheetPanel | None,
 ) -> Laminate:
     """The layers as they are cut, with bores, inlets and pins where the design wants them.
 
@@ -268,10 +266,11 @@ def _laminate(
     if meant is None or len(meant.laminate.layers) != len(files):
         return laminate_of(files, claims, design)
     if all(file.part is not None and file.part.is_meant for file in files):
-        return meant.laminate
+        own = meant.laminate
+        return own if panel is own.panel else replace(own, panel=panel)
     layers = zip(stacked_layers(files, design), meant.laminate.layers, strict=True)
     cut = tuple(replace(layer, pieces=wanted.pieces) for layer, wanted in layers)
-    return replace(meant.laminate, layers=cut)
+    return replace(meant.laminate, layers=cut, panel=panel)
 
 
 def design_problems_of(folder: Path, built: AsBuilt, measured: Sequence[Finding]) -> list[Problem]:
@@ -321,21 +320,8 @@ def _own_sheet_problems(
     if not claims.sheets and is_job(folder.absolute().parent):
         message = "the film sheets are those of the job, and were not looked at; check the folder "
         return [Problem(CLAIMS, f"{message}above this one", verdict="warn")]
-    return sheet_problems(
-        folder,
-        Order(
-            claims.name,
-            claims.design_sha256,
-            design,
-            claims.kerf,
-            claims.waived,
-            claims.lowered_limits,
-            claims.films,
-            claims.sheets,
-            claims.files,
-            [Lot(claims.name, claims.copies, files)],
-        ),
-    )
+    lots = [Lot(claims.name, claims.copies, files, design.order.spares)]
+    return sheet_problems(folder, SheetOrder(claims, design, claims.kerf, lots))
 
 
 def _laminate_problems(
@@ -378,10 +364,10 @@ def _drawn_in_chords(design: Design) -> bool:
         return False
 
 
-def _measured(rule: Rule, laminate: Laminate, limits: Limits) -> list[Finding]:
+def _measured(rule: Rule, measures: Measures) -> list[Finding]:
     """What a rule finds; doctored files can make shapes that no rule can measure, which fails."""
     try:
-        return run_rule(rule, laminate, limits)
+        return run_rule(rule, measures.laminate, measures.limits, measures)
     except UNMEASURED as error:
         message = f"cannot be measured on these files ({error}); write them anew"
         return [Finding(rule.name, "fail", None, None, "", Place(), message)]
@@ -405,9 +391,10 @@ def _by_layer(built: AsBuilt) -> tuple[Finding, ...]:
     )
     why = "it needs every layer, and not all could be read" if lost else "there is no whole stack"
     found: list[Finding] = []
+    measures = Measures(some, built.limits)
     for rule in RULES:
         if layers and rule.name in BY_LAYER:
-            found += _measured(rule, some, built.limits)
+            found += _measured(rule, measures)
         else:
             message = f"not run: {why}"
             found.append(Finding(rule.name, "warn", None, None, "", Place(None, lost), message))

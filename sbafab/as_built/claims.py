@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from sbafab.as_built.cut_files import LayerFile
-from sbafab.as_built.records import CLAIMS, Job, KerfClaim, LayerClaim, Manifest, Problem
+from sbafab.as_built.records import CLAIMS, Problem
+from sbafab.cutting.lightburn import ENDING
 from sbafab.cutting.properties import (
     LIMITS,
     PTFE_WARNING,
@@ -16,9 +17,9 @@ from sbafab.cutting.properties import (
     limit_properties,
 )
 from sbafab.design.records import Design
-from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Layer
-from sbafab.output.manifest import file_hashes
+from sbafab.output.manifest import file_hashes, kerf_claim
+from sbafab.output.manifest_records import JobManifest, KerfClaim, LayerClaim, Manifest
 from sbafab.output.settings import kerf_widths, limits
 from sbafab.rules.lowered import lowered
 
@@ -30,7 +31,7 @@ def claim(message: str, *layers: int) -> Problem:
     return Problem(CLAIMS, message, layers)
 
 
-def file_problems(folder: Path, claims: Manifest | Job) -> list[Problem]:
+def file_problems(folder: Path, claims: Manifest | JobManifest) -> list[Problem]:
     """Files that are missing, changed, or not in the manifest (a cut file is worse than a note)."""
     found = file_hashes(folder)
     found.pop("manifest.json", None)
@@ -52,7 +53,7 @@ def file_problems(folder: Path, claims: Manifest | Job) -> list[Problem]:
     for path in found:
         if path not in claims.files:
             message = f"{path} lies in the folder and is not in the manifest; remove it"
-            is_cut = path.lower().endswith(".dxf")
+            is_cut = path.lower().endswith((".dxf", ENDING))
             problems.append(Problem(CLAIMS, message, verdict="fail" if is_cut else "warn"))
     return problems
 
@@ -164,8 +165,8 @@ def design_problems(claims: Manifest, design: Design, digest: str) -> list[Probl
         if said != stated
     ]
     for material, width in kerf_widths(design).items():
-        said = claims.kerf.get(_material(material))
-        wanted = KerfClaim(state="uncalibrated" if width is None else "compensated", width=width)
+        said = claims.kerf.get(material)
+        wanted = kerf_claim(width)
         if said != wanted:
             problems.append(
                 claim(
@@ -188,10 +189,6 @@ def lowered_problems(told: Sequence[str], own: Sequence[str]) -> list[Problem]:
         *(claim(f"design.toml lowers {said}, which the manifest does not say") for said in missing),
         *(claim(f"{said} is lowered in the manifest and not in design.toml") for said in added),
     ]
-
-
-def _material(name: str) -> Material:
-    return "PTFE" if name == "PTFE" else "TPE"
 
 
 def _kerf(said: KerfClaim | None) -> str:

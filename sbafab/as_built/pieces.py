@@ -10,12 +10,13 @@ from dataclasses import dataclass, field
 from sbafab.as_built.agreement import AGREED
 from sbafab.as_built.claims import claim
 from sbafab.as_built.cut_files import LayerFile
-from sbafab.as_built.records import CLAIMS, Problem, SheetClaim
+from sbafab.as_built.records import CLAIMS, Problem
 from sbafab.cutting.verify import check_contours
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Mark, Region
 from sbafab.laminate.films import Material
 from sbafab.nesting.records import MATERIALS, Turn
+from sbafab.output.manifest_records import SheetClaim
 
 
 @dataclass(frozen=True)
@@ -28,11 +29,12 @@ class CutSheet:
 
 @dataclass(frozen=True)
 class Lot:
-    """The layers' files of a design, of which ``copies`` are cut."""
+    """The layers' files of a design, of which ``copies`` are cut, and ``spares`` of every mask."""
 
     design: str
     copies: int
     files: Sequence[LayerFile]
+    spares: int = 0
 
 
 _Outline = frozenset[tuple[Mark, ...]]
@@ -108,8 +110,8 @@ def piece_problems(
             cut += found
         problems += [
             claim(
-                f"the {material} sheets cut {cut[id(kind)]} pieces of {kind.name}, and the layers "
-                f"and copies take {kind.wanted.total()}"
+                f"the {material} sheets cut {cut[id(kind)]} pieces of {kind.name}, and the layers, "
+                f"copies and spares take {kind.wanted.total()}"
             )
             for kind in kinds.all
             if cut[id(kind)] != kind.wanted.total()
@@ -127,10 +129,11 @@ def _kinds_of(
             for file in lot.files
             if file.part is not None and file.claim.material == material
         )
+        spares = lot.spares if material == "PTFE" else 0
         for (path, pattern), count in drawn.items():
             for piece in path.pieces:
                 kind = kinds.find(piece) or kinds.add(piece)
-                kind.wanted[lot.design, pattern] += count * lot.copies
+                kind.wanted[lot.design, pattern] += count * lot.copies + spares
     return kinds
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from sbafab.assemblies.build import Assembled, PlacedPart
+from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
 from sbafab.assemblies.fits import WHOLE, found
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Tube
+from sbafab.assemblies.supply import folded_diameter_with_tubes, reach
 from sbafab.design.form import Discs
 from sbafab.models.folded import LOBES, folded_diameter
 from sbafab.models.sizes import deflated_diameter, inflated_diameter, outline_diameter
@@ -53,7 +54,7 @@ def aperture(assembled: Assembled) -> Iterator[Finding]:
 
 def _passage(placed: PlacedPart) -> _Passage:
     part = placed.part
-    if placed.made is None:
+    if not isinstance(placed, PlacedSba):
         size = _girth(placed)
         soft = isinstance(part, Cup)
         return _Passage(
@@ -74,9 +75,8 @@ def _passage(placed: PlacedPart) -> _Passage:
     return _Passage(placed.name, _flat_diameter(placed), 0.0, "unfolded")
 
 
-def _lobe_width(placed: PlacedPart) -> float | None:
+def _lobe_width(placed: PlacedSba) -> float | None:
     """Width in mm of a lobe of a three-lobed actuator; None for others."""
-    assert placed.made is not None
     design = placed.made.design
     form = design.form
     if not form.is_parallel or form.stacks != LOBES or not isinstance(form.pockets, Discs):
@@ -84,9 +84,8 @@ def _lobe_width(placed: PlacedPart) -> float | None:
     return max(form.pockets.diameters) + 2 * design.bond.width
 
 
-def _flat_diameter(placed: PlacedPart) -> float:
+def _flat_diameter(placed: PlacedSba) -> float:
     """Circle round an SBA's axis that holds its widest film, tabs and ears taken off, mm."""
-    assert placed.made is not None
     return outline_diameter(placed.made.laminate)
 
 
@@ -103,21 +102,31 @@ def _girth(placed: PlacedPart) -> float:
 
 
 def lumen_pass(assembled: Assembled) -> Iterator[Finding]:
-    """Whether the deflated assembly passes the lumen; inlet tabs fold and are not counted."""
+    """Whether the deflated assembly passes the lumen, tabs folded back with a tube in each."""
     lumen = assembled.assembly.deploy.lumen_diameter
     if lumen is None:
         return
-    sizes = [(_deflated(placed, assembled), placed.name) for placed in assembled.parts]
-    widest, name = max(sizes, key=lambda pair: pair[0])
+    sizes = [(_deflated(placed, assembled), placed, "") for placed in assembled.parts]
+    sizes += [
+        (folded, placed, "tabs folded back with their tubes")
+        for placed in assembled.parts
+        if (folded := folded_diameter_with_tubes(placed, assembled)) is not None
+    ]
+    widest, part, how = max(sizes, key=lambda entry: (round(entry[0], 6), entry[1].radius is None))
     good = widest < lumen
-    message = f"deflated, {name} is the widest part, {widest:.2f} in a lumen of {lumen:g}"
+    message = f"deflated, {part.name} is the widest part, {widest:.2f} in a lumen of {lumen:g}"
+    if how:
+        message += f", {how}"
+        if part.radius is None and reach(part) > lumen:
+            message += f" (unfolded they reach {reach(part):.2f}: tie them before it goes in)"
     if not good:
         message += "; make it narrower or its laminate thinner"
+        message += ", or take thinner supply tubes" if how else ""
     yield found("lumen-pass", good, lumen, widest, message)
 
 
 def _deflated(placed: PlacedPart, assembled: Assembled) -> float:
-    if placed.made is None:
+    if not isinstance(placed, PlacedSba):
         return _girth(placed)
     wrap, laminate = placed.made.design.form.wrap, placed.made.laminate
     if wrap is not None:

@@ -15,7 +15,7 @@ from sbafab.design.records import NAME_PATTERN, Laser, Order, Press, RuleName, S
 from sbafab.design.units import Length, LengthOrZero, Millimetres
 
 FAMILY = "assembly"
-Place = Literal["top", "bottom", "start", "end", "outside", "lumen", "inlet"]
+Seat = Literal["top", "bottom", "start", "end", "outside", "lumen", "inlet"]
 CheckName = Literal[
     "tube-match",
     "inlet-match",
@@ -25,6 +25,7 @@ CheckName = Literal[
     "aperture",
     "lumen-pass",
     "lumen-brace",
+    "supply-tubes",
 ]
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 Shift = Annotated[float, Millimetres(-1000, 1000)]
@@ -37,7 +38,7 @@ class Fixed(Section):
 
     on: str | None = None
     """The part that this one is fixed on."""
-    at: Place | None = None
+    at: Seat | None = None
     """Where on it: top or bottom (of an SBA, a magnet, a base), start, end or outside (of a tube),
     lumen (lines only: of an SBA or a tube), inlet (lines only: of an SBA)."""
     angle: Degrees = 0.0

@@ -9,10 +9,24 @@ from functools import cache
 from typing import Literal, NamedTuple
 
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER, CUT_SHEET, ENGRAVE, REFERENCE
-from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point
+from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, quarter_arcs
 from sbafab.geometry.region import Contour
 
 DxfProfile = Literal["bulges", "arcs", "chords"]
+
+
+class Curves(NamedTuple):
+    """How cut files draw arcs; ``chord_error`` in mm counts for chords only."""
+
+    profile: DxfProfile = "bulges"
+    chord_error: float = 0.005
+
+    @property
+    def in_chords(self) -> bool:
+        return self.profile == "chords"
+
+
+TRUE_ARCS = Curves()
 """How curves are written: polylines with bulges, LINE and ARC, or polylines of short chords."""
 
 DATUM_ARM = 1.0
@@ -23,12 +37,13 @@ class Surroundings(NamedTuple):
     """What a film sheet has beside its parts: open runs of points, and its frame's far corner.
 
     ``engraved`` strokes are burnt into the waste; ``parting`` cuts the sheet off its roll; the
-    frame from the origin to ``frame`` is for reference, as a check of scale.
+    frame from the origin to ``frame`` is for reference, as a check of scale, and so are ``marks``.
     """
 
     engraved: Sequence[Sequence[Point]] = ()
     parting: Sequence[Sequence[Point]] = ()
     frame: Point | None = None
+    marks: Sequence[Sequence[Point]] = ()
 
 
 class _Entity(NamedTuple):
@@ -75,7 +90,7 @@ def dxf_text(
             *(_stroke(ENGRAVE, run) for run in sheet.engraved),
             *cuts,
             *(_stroke(CUT_SHEET, run) for run in sheet.parting),
-            *(_stroke(REFERENCE, run) for run in _frames(sheet)),
+            *(_stroke(REFERENCE, run) for run in (*_frames(sheet), *sheet.marks)),
         ]
         low, high = (0.0, 0.0), sheet.frame or (0.0, 0.0)
     seed = skeleton.first_handle + len(entities)
@@ -115,15 +130,11 @@ def _cuts(contours: Iterable[Contour], profile: DxfProfile) -> Iterator[_Entity]
                 yield _polyline(layer, [(*edge.start, edge.bulge) for edge in edges])
 
 
-def _quarters(edge: Edge) -> list[Edge]:
+def _quarters(edge: Edge) -> Sequence[Edge]:
     """The edge in arcs of at most a quarter turn."""
-    count = 1
-    if isinstance(edge, Arc):
-        count = max(1, math.ceil(abs(edge.sweep) / (math.pi / 2) - 1e-6))
-    if count == 1:
+    if not isinstance(edge, Arc):
         return [edge]
-    stops = [edge.start, *(edge.at(i / count) for i in range(1, count)), edge.end]
-    return [edge.part(stops[i], stops[i + 1]) for i in range(count)]
+    return quarter_arcs(edge.start, edge.end, edge.centre, edge.radius, edge.sweep)
 
 
 def _frames(sheet: Surroundings) -> Iterator[Sequence[Point]]:

@@ -6,9 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from sbafab.cutting.dxf_write import DxfProfile
+from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
+from sbafab.design.records import is_kerf
 from sbafab.errors import OutputError
-from sbafab.geometry.beam import Kerf, is_kerf, widths
+from sbafab.geometry.beam import Kerf, widths
 from sbafab.laminate.films import Material
 
 UNCALIBRATED = "uncalibrated: nominal edges"
@@ -29,18 +30,19 @@ class CutSettings:
     ``kerf_widths``: full width in mm (or along x and along y) by material, None or absent where
     it was not measured.
     ``waived``: names of the waived rules; ``lowered``: limits below the usual ones, as
-    ``rules.lowered`` says them. ``chord_error`` in mm counts for profile "chords" only.
-    ``generator``: program and version, for example ``sbafab 1.0.0``.
+    ``rules.lowered`` says them.
+    ``generator``: program and version, for example ``sbafab 1.0.0``. ``platen``: size of the base
+    plate in mm.
     """
 
     design: str
     design_sha256: str
-    kerf_widths: Mapping[str, Kerf | None] = field(default_factory=dict)
+    kerf_widths: Mapping[Material, Kerf | None] = field(default_factory=dict)
     waived: tuple[str, ...] = ()
     lowered: tuple[str, ...] = ()
-    profile: DxfProfile = "bulges"
-    chord_error: float = 0.005
+    curves: Curves = TRUE_ARCS
     generator: str = "sbafab"
+    platen: tuple[float, float] = (152.4, 152.4)
 
     def kerf_width(self, material: Material) -> Kerf | None:
         return self.kerf_widths.get(material)
@@ -72,6 +74,12 @@ def fixture_properties(settings: CutSettings) -> dict[str, str]:
     return _properties(settings, "plate", "fixture", None)
 
 
+def second_cut_properties(settings: CutSettings) -> dict[str, str]:
+    """Custom properties of the second cut of registered sheets: it goes through masks as well."""
+    properties = _properties(settings, "TPE", "second cut", settings.kerf_width("TPE"))
+    return {**properties, "WARNING": PTFE_WARNING}
+
+
 def coupon_properties(generator: str) -> dict[str, str]:
     """Custom properties of the calibration piece: never compensated, for it measures the kerf."""
     return {
@@ -97,7 +105,7 @@ def _properties(
         "WAIVED": ", ".join(settings.waived) or "none",
         **limit_properties(settings.lowered),
         "GENERATOR": settings.generator,
-        **curves_property(curves_of(settings)),
+        **curves_property(said_of(settings.curves)),
     }
 
 
@@ -150,9 +158,15 @@ def layer_path(name: str, kerf: Kerf | None) -> str:
     return f"{FOLDER}/{name}{kerf_suffix(kerf)}.dxf"
 
 
-def curves_of(settings: CutSettings) -> str | None:
+def said_of(curves: Curves) -> str | None:
     """What files and manifest say of chords; nothing of true arcs."""
-    return f"{CHORDS} {settings.chord_error:g} mm" if settings.profile == "chords" else None
+    return f"{CHORDS} {curves.chord_error:g} mm" if curves.in_chords else None
+
+
+def curves_of(said: str | None) -> Curves:
+    """How arcs are drawn where a manifest says that. Raises OutputError as ``chord_error_of``."""
+    error = chord_error_of(curves_property(said))
+    return Curves("chords", error) if error else TRUE_ARCS
 
 
 def curves_property(said: str | None) -> dict[str, str]:

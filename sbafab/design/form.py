@@ -33,11 +33,14 @@ Pockets = Discs | Slots | Drawn
 @dataclass(frozen=True)
 class Wrap:
     """A laminate that is wrapped round a tube: its outer diameter, and the pitch of the stacks
-    round it, both in mm.
+    round it, both in mm; ``glue`` is the adhesive that holds it there, and ``overlap`` by how much
+    (mm) one end of the sheet lies over the other.
     """
 
     tube_diameter: float
     pitch: float
+    glue: str
+    overlap: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -45,13 +48,15 @@ class Form:
     """What an actuator is like, whichever family made it.
 
     ``words`` is what a technician calls it; ``stacks`` of balloons stand side by side, all with the
-    same ``pockets``; ``lumen`` is the diameter in mm of the channel through all layers.
+    same ``pockets``; ``lumen`` is the diameter in mm of the channel through all layers,
+    ``lumen_pin`` its dowel pin's.
     """
 
     words: str
     stacks: int
     pockets: Pockets
     lumen: float | None = None
+    lumen_pin: float | None = None
     wrap: Wrap | None = None
 
     @property

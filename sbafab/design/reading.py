@@ -19,7 +19,7 @@ from sbafab.errors import DesignError
 Change = str | Mapping[str, Any]
 """A key to set: "key.path=value", or a table of keys, which may be dotted, with their values."""
 OUTLINE = "chamber.outline"
-Record = TypeVar("Record", bound=BaseModel)
+AnyRecord = TypeVar("AnyRecord", bound=BaseModel)
 AnyDesign = TypeVar("AnyDesign", bound=Design)
 MOST_BYTES = 1_000_000
 ASSEMBLY = "assembly"
@@ -208,11 +208,11 @@ def validated(
 
 
 def checked(
-    record: type[Record],
+    record: type[AnyRecord],
     data: Mapping[str, Any],
     families: Mapping[str, type[Design]],
     prefix: str = "",
-) -> Record:
+) -> AnyRecord:
     """The record of a table; ``prefix`` leads to it. Raises DesignError with one sentence."""
     try:
         return record.model_validate(data)

@@ -14,8 +14,8 @@ from itertools import pairwise
 from typing import Literal, NamedTuple
 
 from sbafab.geometry.biarc import biarc, ellipse
-from sbafab.geometry.boolean import GeometryError, left_turn
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, distance_to
+from sbafab.geometry.boolean import GeometryError
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, distance_to, left_turn
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Contour, Region
@@ -59,11 +59,6 @@ class BeamPath:
 def widths(kerf: Kerf) -> tuple[float, float]:
     """Full width along x and along y."""
     return kerf if isinstance(kerf, tuple) else (kerf, kerf)
-
-
-def is_kerf(x: float, y: float) -> bool:
-    """Whether a beam may be so wide: up to a millimetre, and nowhere ten times as wide."""
-    return min(x, y) >= 0 and max(x, y) <= min(1.0, 10 * min(x, y)) and math.isfinite(x + y)
 
 
 def beam_path(region: Region, kerf: Kerf) -> BeamPath:

@@ -3,30 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 from xml.sax.saxutils import escape
 
 from sbafab.geometry.edges import Bounds
 from sbafab.geometry.svg import number, path_data
+from sbafab.laminate.inks import INK
 from sbafab.notebook import table_html
 
 if TYPE_CHECKING:
-    from sbafab.laminate.films import Material
     from sbafab.laminate.laminate import Laminate, Layer
 
-
-class Ink(NamedTuple):
-    """Fill and line colour of a film."""
-
-    fill: str
-    line: str
-
-
-# Blue against orange: told apart in every common colour blindness, and in grey by lightness.
-INK: dict[Material, Ink] = {
-    "TPE": Ink("#a9cfea", "#0b4f86"),
-    "PTFE": Ink("#fbe3bd", "#b35a00"),
-}
 
 SHOWN_MM = 80.0
 BARS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)

@@ -19,10 +19,10 @@ from sbafab.models.figures import (
     Asked,
     Figure,
     LeftOut,
-    Line,
     Model,
     Prediction,
     Relation,
+    Trace,
 )
 from sbafab.models.inlet import largest_tube
 from sbafab.models.sizes import sizes
@@ -131,9 +131,12 @@ def _mass(laminate: Laminate) -> Figure:
 def _tubes(one: Actuator) -> Iterator[Figure]:
     inlet = min(one.laminate.inlets, key=lambda inlet: inlet.width - inlet.tube_diameter)
     model = Model(
-        "half the perimeter", "a flat strip opened round", "films do not stretch; glue not counted"
+        "half the perimeter",
+        "a flat strip opened round, its PTFE beside the tube",
+        "cut at its narrowest; films do not stretch; glue not counted",
     )
-    most = largest_tube(inlet.width)
+    narrowest = inlet.width - one.design.strip_loss
+    most = largest_tube(narrowest, one.design.films.ptfe.thickness)
     yield Figure("inlet", "largest tube that the inlet opens to", most, "mm", model)
     spare = most - inlet.tube_diameter
     name = f"room round the tube of {inlet.tube_diameter:g} mm"
@@ -175,10 +178,10 @@ def _diameter_relation(one: Actuator, wrap: Wrap) -> Relation:
     k = one.kinematics[0]
     stroke = np.linspace(0, k.largest_stroke, axial.SAMPLES)
     around = wrap.tube_diameter + 2 * (one.thickness + stroke)
-    lines = [Line(k.model.name, k.volume(stroke).tolist(), around.tolist(), k.model)]
+    lines = [Trace(k.model.name, k.volume(stroke).tolist(), around.tolist(), k.model)]
     label = f"paper: about {paper.RADIAL_FULL.value:g} mm inflated"
     if (one.form.pockets, one.balloons) == (PAPER_SLOTS, 1):
-        lines.append(Line(label, [0.0, k.largest_volume], [paper.RADIAL_FULL.value] * 2))
+        lines.append(Trace(label, [0.0, k.largest_volume], [paper.RADIAL_FULL.value] * 2))
     return Relation(
         "diameter",
         "Diameter round the tube against volume",

@@ -6,17 +6,24 @@ from collections.abc import Mapping
 
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from sbafab.nesting.records import Part
+from sbafab.nesting.records import NestPart
 
 
-def parts_of(laminate: Laminate, paths: Mapping[str, Region], copies: int) -> tuple[Part, ...]:
+def parts_of(
+    laminate: Laminate, paths: Mapping[str, Region], copies: int, spares: int = 0
+) -> tuple[NestPart, ...]:
     """Every piece of every pattern, by pattern in stacking order.
 
-    ``paths`` holds each pattern's path of the beam, kerf compensated. Pieces of one pattern that
-    differ only in their place are one part, named after the first of them.
+    ``paths`` holds each pattern's path of the beam, kerf compensated; ``spares`` more of every
+    mask are cut than the ``copies`` take. Pieces of one pattern that
+    differ only in their place are one part, named after the first of them. None where the
+    layers are registered sheets: these are not nested.
     """
-    parts: list[Part] = []
+    if laminate.panel is not None:
+        return ()
+    parts: list[NestPart] = []
     for pattern, layers in laminate.patterns.items():
+        layers_cut = len(layers) * copies + (spares if layers[0].is_mask else 0)
         alike: dict[Region, list[int]] = {}
         pieces = paths[pattern].pieces
         for number, piece in enumerate(pieces):
@@ -24,13 +31,13 @@ def parts_of(laminate: Laminate, paths: Mapping[str, Region], copies: int) -> tu
             alike.setdefault(piece.moved(-low_x, -low_y), []).append(number)
         for numbers in alike.values():
             parts.append(
-                Part(
+                NestPart(
                     design=laminate.name,
                     pattern=pattern,
                     piece=numbers[0] + 1,
                     material=layers[0].film.material,
                     region=pieces[numbers[0]],
-                    count=len(numbers) * len(layers) * copies,
+                    count=len(numbers) * layers_cut,
                 )
             )
     return tuple(parts)

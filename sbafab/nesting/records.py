@@ -21,7 +21,7 @@ MATERIALS: tuple[Material, ...] = ("TPE", "PTFE")
 
 
 @dataclass(frozen=True)
-class Part:
+class NestPart:
     """One piece that is to be cut ``count`` times.
 
     ``region`` is the path of the beam, kerf compensated, in the frame of its layer; ``design`` and
@@ -85,7 +85,7 @@ class Nest:
     engine: EngineName
     material: Material
     stock: Stock
-    parts: tuple[Part, ...]
+    parts: tuple[NestPart, ...]
     placements: tuple[Placement, ...]
 
     @property

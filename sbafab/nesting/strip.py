@@ -7,14 +7,14 @@ result is no function of the design: it is worth saving.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from sbafab.errors import SbafabError
-from sbafab.geometry.edges import Arc, Edge, Point
+from sbafab.geometry.edges import Point
+from sbafab.geometry.facets import run_chords
 from sbafab.geometry.region import Contour
-from sbafab.nesting.records import TURNS, Part, Placement, Stock, placed
+from sbafab.nesting.records import TURNS, NestPart, Placement, Stock, placed
 from sbafab.nesting.refusals import pins_unknown, too_tight
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ ROOM = 0.002
 SEED = 1
 
 
-def strip(parts: Sequence[Part], stock: Stock, seconds: float) -> tuple[Placement, ...]:
+def strip(parts: Sequence[NestPart], stock: Stock, seconds: float) -> tuple[Placement, ...]:
     """Places for every part, after about ``seconds`` of search for each sheet.
 
     Raises DesignError if the sheet has pins or a part fits it only just, SbafabError if spyrrow
@@ -47,7 +47,7 @@ def strip(parts: Sequence[Part], stock: Stock, seconds: float) -> tuple[Placemen
 
 
 def _sheet(
-    parts: Sequence[Part], left: Sequence[int], stock: Stock, sheet: int, seconds: float
+    parts: Sequence[NestPart], left: Sequence[int], stock: Stock, sheet: int, seconds: float
 ) -> list[Placement]:
     """What of the best strip ends before the sheet does; at least one part."""
     found = [_placement(item, sheet, stock) for item in _solved(parts, left, stock, seconds)]
@@ -62,7 +62,7 @@ def _sheet(
 
 
 def _solved(
-    parts: Sequence[Part], left: Sequence[int], stock: Stock, seconds: float
+    parts: Sequence[NestPart], left: Sequence[int], stock: Stock, seconds: float
 ) -> list[PlacedItem]:
     try:
         import spyrrow
@@ -89,7 +89,7 @@ def _height(stock: Stock) -> float:
     return stock.usable[2] - stock.usable[0] - 2 * ROOM
 
 
-def _item(number: int, part: Part, count: int, stock: Stock) -> Item | None:
+def _item(number: int, part: NestPart, count: int, stock: Stock) -> Item | None:
     from spyrrow import Item
 
     if count == 0:
@@ -121,7 +121,7 @@ def _placement(item: PlacedItem, sheet: int, stock: Stock) -> Placement:
     return Placement(int(item.id), sheet, TURNS[(round(item.rotation / 90) + 1) % 4], shift)
 
 
-def _extent(part: Part, place: Placement) -> tuple[float, float]:
+def _extent(part: NestPart, place: Placement) -> tuple[float, float]:
     """Lowest and highest y of a placed part."""
     _, low, _, high = placed(part.region, place.turn, place.shift).bounds
     return low, high
@@ -129,23 +129,4 @@ def _extent(part: Part, place: Placement) -> tuple[float, float]:
 
 def _outline(contour: Contour) -> list[Point]:
     """A polygon that holds the contour, nowhere more than ``SAGITTA`` outside it."""
-    points: list[Point] = []
-    for edge in contour.edges:
-        points.append(edge.start)
-        points += _around(edge)
-    return points
-
-
-def _around(edge: Edge) -> list[Point]:
-    """Corners between an edge's ends: of tangents outside a convex arc, on a concave one."""
-    if not isinstance(edge, Arc):
-        return []
-    half = math.acos(max(0.5, 1 / (1 + SAGITTA / edge.radius)))
-    count = max(1, math.ceil(abs(edge.sweep) / (2 * half)))
-    step = edge.sweep / count
-    if not edge.ccw:
-        return [edge.at(i / count) for i in range(1, count)]
-    radius = edge.radius / math.cos(step / 2)
-    angles = [edge.start_angle + (i + 0.5) * step for i in range(count)]
-    (x, y) = edge.centre
-    return [(x + radius * math.cos(angle), y + radius * math.sin(angle)) for angle in angles]
+    return [p for run in contour.runs for p in run_chords(run, True, SAGITTA)]

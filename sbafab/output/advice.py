@@ -24,6 +24,14 @@ MOST_STEPS = 128
 CHECK_SEED = SEED + 1
 
 
+OTHERWISE = {
+    "channel-pin": 'registration.method = "ears" pins every film',
+    "ears": "smaller registration.hand_turn and registration.hand_placement do",
+    "sheet": "a smaller panel.sheet_error does",
+}
+"""What reaches a yield that bond and overhang do not, by registration method."""
+
+
 @dataclass(frozen=True)
 class Advice:
     """The least ``bond`` and ``overhang`` (mm) that reach ``target``, and the share of good builds
@@ -39,11 +47,7 @@ class Advice:
     @property
     def sentence(self) -> str:
         if self.share is None:
-            other = (
-                'registration.method = "ears" pins every film'
-                if self.method == "channel-pin"
-                else "smaller registration.hand_turn and registration.hand_placement do"
-            )
+            other = OTHERWISE.get(self.method, OTHERWISE["ears"])
             return (
                 f"No bond and overhang up to {MOST_STEPS * STEP:g} mm above the rules' limits "
                 f"reach a yield of {self.target:.4g} with registration.method = "
@@ -91,7 +95,7 @@ def advise(design: Design, target: float) -> Advice:
     return Advice(target, design.registration.method)
 
 
-Verdict = Literal["short", "reached", "impossible"]
+Outcome = Literal["short", "reached", "impossible"]
 
 
 class _Trial:
@@ -100,7 +104,7 @@ class _Trial:
     def __init__(self, design: Design, target: float) -> None:
         self.design = design
         self.target = target
-        self.verdicts: dict[tuple[int, int], Verdict] = {}
+        self.verdicts: dict[tuple[int, int], Outcome] = {}
 
     def lengths(self, bond: int, overhang: int) -> tuple[float, float]:
         rules = self.design.rules
@@ -130,7 +134,7 @@ class _Trial:
         asked = replace(limits(self.design), target_yield=None)
         return not has_failed(run_deck(build(self._changed(bond, overhang)), asked))
 
-    def verdict(self, bond: int, overhang: int) -> Verdict:
+    def verdict(self, bond: int, overhang: int) -> Outcome:
         key = bond, overhang
         if key not in self.verdicts:
             share = self.share(bond, overhang, SEED)
@@ -141,7 +145,7 @@ class _Trial:
         return self.verdicts[key]
 
 
-def _least(verdict: Callable[[int], Verdict], known: int | None = None) -> int | None:
+def _least(verdict: Callable[[int], Outcome], known: int | None = None) -> int | None:
     """The fewest steps that are not short, if they reach; ``known`` steps are known to reach.
 
     With more steps a design goes from short to reached, and may become impossible.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sbafab import __version__
-from sbafab.cutting.dxf_write import DxfProfile
+from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import Machine
 from sbafab.design.records import Design, Sheet
@@ -11,6 +11,7 @@ from sbafab.design.writing import design_sha256
 from sbafab.geometry.beam import Kerf
 from sbafab.laminate.films import Material
 from sbafab.nesting.records import TURNS, Stock
+from sbafab.pressing.build_up import Pad
 from sbafab.pressing.schedule import PressSettings
 from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.lowered import lowered
@@ -18,10 +19,13 @@ from sbafab.rules.lowered import lowered
 GENERATOR = f"sbafab {__version__}"
 
 
-def kerf_widths(design: Design) -> dict[str, Kerf | None]:
+def kerf_widths(design: Design) -> dict[Material, Kerf | None]:
     """Full kerf width (or that along x and y) by material, None where it was not measured."""
-    widths = {"TPE": design.laser.kerf_tpe, "PTFE": design.laser.kerf_ptfe}
-    return {name: None if isinstance(kerf, str) else kerf for name, kerf in widths.items()}
+    tpe, ptfe = design.laser.kerf_tpe, design.laser.kerf_ptfe
+    return {
+        "TPE": None if isinstance(tpe, str) else tpe,
+        "PTFE": None if isinstance(ptfe, str) else ptfe,
+    }
 
 
 def limits(design: Design) -> Limits:
@@ -38,7 +42,11 @@ def limits(design: Design) -> Limits:
             pin=design.registration.pin_error,
             placement=design.registration.hand_placement,
             turn=design.registration.hand_turn,
+            sheet=design.panel.sheet_error,
+            second_cut=design.panel.second_cut_error,
         ),
+        unknown_kerf=design.laser.unknown_kerf,
+        pin_stretch=design.registration.pin_stretch,
         worst_bond_width=design.rules.worst_bond_width,
         worst_mask_overhang=design.rules.worst_mask_overhang,
         target_yield=design.rules.target_yield,
@@ -48,10 +56,7 @@ def limits(design: Design) -> Limits:
 
 
 def cut_settings(
-    design: Design,
-    waived: tuple[str, ...],
-    profile: DxfProfile = "bulges",
-    chord_error: float = 0.005,
+    design: Design, waived: tuple[str, ...], curves: Curves = TRUE_ARCS
 ) -> CutSettings:
     return CutSettings(
         design=design.name,
@@ -59,9 +64,9 @@ def cut_settings(
         kerf_widths=kerf_widths(design),
         waived=waived,
         lowered=lowered(limits(design)),
-        profile=profile,
-        chord_error=chord_error,
+        curves=curves,
         generator=GENERATOR,
+        platen=(design.press.platen_width, design.press.platen_length),
     )
 
 
@@ -76,6 +81,14 @@ def press_settings(design: Design) -> PressSettings:
         flash_middle=press.flash_middle_minutes,
         bond_all=press.bond_all_minutes,
         validated_balloons=design.rules.validated_balloons,
+        pad=Pad(press.pad_material, press.pad_thickness, press.pad_hardness),
+        plate_material=press.plate_material,
+        plate_thickness=press.plate_thickness,
+        release_film=press.release_film,
+        release_thickness=press.release_thickness,
+        pin_standard=design.registration.pin_standard,
+        pin_lengths=design.registration.pin_lengths,
+        tack=design.panel.tack_minutes,
     )
 
 

@@ -3,90 +3,69 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from sbafab.cutting.files import CutFile, compensated_paths, write_layer_files
+from sbafab.cutting.files import write_layer_files
 from sbafab.cutting.fixture import write_fixture
-from sbafab.cutting.properties import CutSettings, curves_of
+from sbafab.cutting.properties import CutSettings
+from sbafab.cutting.second_cut import write_second_cut
 from sbafab.cutting.sheets import FOLDER, SheetFile, write_sheets
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
-from sbafab.geometry.region import Region
+from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import nest
-from sbafab.nesting.parts import parts_of
-from sbafab.nesting.records import Nest, Part
+from sbafab.nesting.records import Nest, NestPart
 from sbafab.nesting.saved import as_dict, from_dict
-from sbafab.output.coarse import refuse_coarse
+from sbafab.output.planned import Planned
 from sbafab.output.settings import machine, stocks
-from sbafab.rules.limits import Limits
+from sbafab.progress import Progress
 
 PLACES = f"{FOLDER}/nest.json"
 MOST_BYTES = 50_000_000
 """Of saved places; more are not read but searched anew."""
-Progress = Callable[[str, int, int], None]
-"""Told what is being done, and how much of how much is done."""
-
-
-@dataclass(frozen=True)
-class CutPlan:
-    """What is to be cut of a laminate: the beam's path for every pattern, and its parts."""
-
-    paths: Mapping[str, Region]
-    parts: tuple[Part, ...]
-
-
-@dataclass(frozen=True)
-class CutSet:
-    """The cut files of one laminate; ``fixture`` is the pin plate's path, if it has pins.
-
-    ``curves`` says within what chords stay; None for true arcs.
-    """
-
-    files: tuple[CutFile, ...]
-    fixture: str | None
-    curves: str | None = None
-
-
-def plan_cuts(laminate: Laminate, copies: int, settings: CutSettings, limits: Limits) -> CutPlan:
-    """Raises DesignError where the kerf leaves no path, or chords do not hold the limits."""
-    paths = compensated_paths(laminate, settings)
-    if settings.profile == "chords":
-        refuse_coarse(laminate, paths, settings, limits)
-    return CutPlan(paths, parts_of(laminate, paths, copies))
 
 
 def find_nests(
-    parts: Sequence[Part], design: Design, old_folder: Path, tell: Progress
+    parts: Sequence[NestPart], design: Design, old_folder: Path, tell: Progress
 ) -> tuple[Nest, ...]:
     """Places for the parts on the design's film sheets.
 
     Places that an earlier run found for the same parts and sheets are taken over, not searched
     for again. Raises DesignError where parts do not fit.
     """
+    if not parts:
+        return ()
     tell("nesting", 0, 1)
     saved = _saved(parts, design, old_folder / PLACES)
     return saved or nest(parts, stocks(design), design.sheets.engine, design.sheets.seconds)
 
 
-def write_cut_set(
-    laminate: Laminate, plan: CutPlan, folder: Path, settings: CutSettings, tell: Progress
-) -> CutSet:
-    """Writes the layer files and the pin plate of a laminate."""
-    files = write_layer_files(
-        laminate, plan.paths, folder, settings, lambda done, total: tell("cut files", done, total)
-    )
-    return CutSet(tuple(files), write_fixture(laminate, folder, settings), curves_of(settings))
+def write_cut_files(planned: Planned, folder: Path, tell: Progress) -> None:
+    """Writes the layer files and the pin plate of a design."""
+    laminate, settings = planned.checked.laminate, planned.settings
+    told = partial(tell, "cut files")
+    write_layer_files(laminate, planned.paths, folder, settings, told)
+    write_fixture(laminate, folder, settings)
+    write_second(laminate, folder, settings)
+
+
+def write_second(laminate: Laminate, folder: Path, settings: CutSettings) -> None:
+    """Writes the second cut of registered sheets, if the laminate is made in any."""
+    if laminate.panel is not None:
+        write_second_cut(laminate.panel, folder, settings)
 
 
 def write_nested_sheets(
     nests: Sequence[Nest], design: Design, folder: Path, settings: CutSettings, tell: Progress
 ) -> list[SheetFile]:
-    """Writes the film sheets, and beside them the places for a later run."""
+    """Writes the film sheets, and beside them the places for a later run; nothing for no nest."""
+    if not nests:
+        return []
     sheets = write_sheets(
         nests,
         folder,
@@ -100,7 +79,7 @@ def write_nested_sheets(
     return sheets
 
 
-def _saved(parts: Sequence[Part], design: Design, path: Path) -> tuple[Nest, ...] | None:
+def _saved(parts: Sequence[NestPart], design: Design, path: Path) -> tuple[Nest, ...] | None:
     """The places of an earlier run; None where there are none for these parts, or bad ones."""
     try:
         if not path.is_file() or path.stat().st_size > MOST_BYTES:
@@ -122,9 +101,9 @@ def _is_possible(nest: Nest) -> bool:
     return nest.sheets <= nest.stock.most and all(p.turn in turns for p in nest.placements)
 
 
-def film_use(sheets: Sequence[SheetFile]) -> dict[str, dict[str, float]]:
+def film_use(sheets: Sequence[SheetFile]) -> dict[Material, dict[str, Any]]:
     """Sheets, their area, the parts' share and the waste in mm2, by material."""
-    used: dict[str, dict[str, float]] = {}
+    used: dict[Material, dict[str, float]] = {}
     for sheet in sheets:
         entry = used.setdefault(sheet.material, {"sheets": 0, "sheet_area": 0.0, "parts_area": 0.0})
         entry["sheets"] += 1

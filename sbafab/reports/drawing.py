@@ -12,7 +12,7 @@ from xml.sax.saxutils import escape
 
 from sbafab.geometry.edges import Point
 from sbafab.geometry.svg import number
-from sbafab.laminate.picture import INK
+from sbafab.laminate.inks import INK
 
 Anchor = Literal["start", "middle", "end"]
 

@@ -20,6 +20,7 @@ from tests.faults.record import Fault, Kind
 from tests.faults.specimen import Specimen
 
 RULE = "as-designed"
+PROJECT = "sheets/TPE_1.lbrn2"
 SOLID, GLB, MODEL = "mesh/solid.stl", "mesh/solid.glb", "mesh/solid.3mf"
 
 
@@ -151,6 +152,14 @@ KIND = Kind(
         changed("sheet's picture emptied", "sheets/TPE_1.svg", lambda data: b""),
         replaced("sheet's picture of another size", "sheets/TPE_1.svg", r'height="\d', 'height="9'),
         replaced("part lost in a sheet's picture", "sheets/PTFE_1.svg", r"<path [^>]*/>\n", ""),
+        lost("sheet's LightBurn project missing", PROJECT),
+        replaced("vertex off in a LightBurn project", PROJECT, r"(V\d+\.\d)\d*", r"\g<1>"),
+        replaced("part lost in a LightBurn project", PROJECT, r'<Shape [^\n]*CutIndex="2".*\n', ""),
+        replaced("frame cut by a LightBurn project", PROJECT, r'put Value="0"', 'put Value="1"'),
+        replaced("LightBurn project mirrored", PROJECT, r'MirrorX="False"', 'MirrorX="True"'),
+        replaced(
+            "power set in a LightBurn project", PROJECT, r'maxPower Value="0', 'maxPower Value="9'
+        ),
         Fault("stray engraving in the waste", RULE, engraved, beside=True),
         told("parts placed otherwise", "sheets/nest.json", lambda d: d["nests"]["TPE"].reverse()),
         plate("pin plate turned over", flipped),
@@ -164,6 +173,14 @@ KIND = Kind(
         replaced("traveller at 270 C", "traveller.html", r"135(\s|&nbsp;|\u00a0)", r"270\1"),
         changed("traveller cut short", "traveller.html", lambda data: data[: len(data) // 2]),
         lost("traveller missing", "traveller.html"),
+        replaced(
+            "warning hidden from the designer", "findings.html", r"<td>warn</td>", "<td>pass</td>"
+        ),
+        lost("findings missing", "findings.html"),
+        changed(
+            "underlay at 98 %", "underlay.pdf", lambda data: data.replace(b"2.8346", b"2.7779")
+        ),
+        lost("underlay missing", "underlay.pdf"),
         changed("solid with a corner elsewhere", SOLID, moved_corner),
         changed("solid scaled by 1.002", SOLID, scaled),
         changed("solid without its last triangle", SOLID, lambda data: data[:-50]),

@@ -19,10 +19,12 @@ WEAKER = [
     ("rules.worst_mask_overhang=0.1", "worst_mask_overhang 0.1 (default 0.25)"),
     ("rules.validated_balloons=40", "validated_balloons 40 (paper 20)"),
     ("laser.least_feature=0.1", "least_feature 0.1 (default 0.2)"),
+    ("laser.unknown_kerf=0.05", "unknown_kerf 0.05 (default 0.1)"),
+    ("registration.pin_stretch=0.5", "pin_stretch 0.5 (default 0.3)"),
     ("registration.cutting_error=0.05", "cutting_error 0.05 (paper 0.1)"),
     ("registration.pin_error=0.001", "pin_error 0.001 (paper 0.004)"),
-    ("registration.hand_placement=0.1", "hand_placement 0.1 (default 0.2)"),
-    ("registration.hand_turn=0.5", "hand_turn 0.5 (default 1)"),
+    ("registration.hand_placement=0.05", "hand_placement 0.05 (default 0.08)"),
+    ("registration.hand_turn=0.2", "hand_turn 0.2 (default 0.4)"),
 ]
 STRICTER = [
     "rules.bond_width=0.8",

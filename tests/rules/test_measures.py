@@ -18,6 +18,7 @@ from sbafab.rules import (
     channel_clear,
     film_limits,
     mask_overhang,
+    measures,
     piece_count,
     press_fit,
     sealing,
@@ -229,10 +230,11 @@ def test_channel_through_a_square_hole(good: Good, spoil: Spoil) -> None:
     assert found.measured == pytest.approx(0.95, abs=1e-4)
 
 
-def test_tube_fit_states_half_the_perimeter(good: Good) -> None:
+def test_tube_fit_states_half_the_perimeter_of_tube_and_strip(good: Good) -> None:
     found = only(tube_fit.check(good("1dof-5mm"), LIMITS))
-    assert found.limit == pytest.approx(1.596, abs=5e-4)
-    assert found.measured == pytest.approx(1.6, abs=1e-9)
+    # Half a circle of 0.8 and half one of 0.85; the strip of 1.6 less 2 x 0.1 and a kerf of 0.1.
+    assert found.limit == pytest.approx(math.pi * (0.8 + 0.85) / 4)
+    assert found.measured == pytest.approx(1.3, abs=1e-9)
 
 
 def test_tube_fit_wants_bond_beside_the_strip(good: Good, spoil: Spoil) -> None:
@@ -277,9 +279,9 @@ def test_a_laminate_may_lie_either_way_round(good: Good) -> None:
         assert press_fit.check(laminate, limits)[0].verdict == verdict
 
 
-@pytest.mark.parametrize("module", [bond_width, film_limits])
+@pytest.mark.parametrize(("rule", "module"), [(bond_width, measures), (film_limits, film_limits)])
 def test_equal_profiles_are_measured_once(
-    module: object, good: Good, monkeypatch: pytest.MonkeyPatch
+    rule: object, module: object, good: Good, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     measured: list[Region] = []
     original = module.least_width
@@ -292,6 +294,6 @@ def test_equal_profiles_are_measured_once(
     counts = []
     for balloons in (4, 40):
         measured.clear()
-        module.check(good("1dof-5mm", f"stack.balloons={balloons}"), LIMITS)
+        rule.check(good("1dof-5mm", f"stack.balloons={balloons}"), LIMITS)
         counts.append(len(measured))
     assert counts[0] == counts[1] > 0

@@ -11,17 +11,18 @@ from typing import Any
 
 from sbafab.assemblies.build import Assembled
 from sbafab.assemblies.colours import colours
-from sbafab.cutting.fixture import fixture
+from sbafab.cutting.fixture import shown
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
 from sbafab.pressing.together import Runs, press_runs
 from sbafab.reports.drawing import TIMES
-from sbafab.reports.traveller import bill, joining, notes, process, times
+from sbafab.reports.traveller import bench, bill, joining, notes, times
 from sbafab.reports.traveller import quantities as say
-from sbafab.reports.traveller.cautions import cautions
+from sbafab.reports.traveller.cautions import cautions, for_the_designer
 from sbafab.reports.traveller.code import code_svg, code_text
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.page import context, environment, frame, materials, sheet_rows
+from sbafab.reports.traveller.page import films as page_films
 from sbafab.reports.traveller.shapes import definitions, pattern_regions
 from sbafab.reports.traveller.sheet_map import part_regions
 from sbafab.rules.finding import Finding
@@ -69,8 +70,8 @@ class AssemblyJob:
 
 
 def runs_of(work: Work) -> Runs:
-    """Press runs for all copies of a design, each on a pin plate of its own if it has pins."""
-    plate = fixture(work.laminate)
+    """Press runs for all copies of a design, each with its own holes in the base plate."""
+    plate = shown(work.laminate)
     press = work.design.press
     bounds = work.laminate.bounds if plate is None else plate.bounds
     return press_runs(work.job.copies, bounds, (press.platen_width, press.platen_length))
@@ -97,6 +98,8 @@ def assembly_html(job: AssemblyJob) -> str:
             tested=[name for made in job.assembled.designs for name in made.parts],
             cautions=_cautions(job),
             bill=_bill(job),
+            before_cutting=bench.before_cutting(f for w in works for f in page_films(w.laminate)),
+            after_cutting=bench.after_cutting(works),
             kerf=bill.kerf_states(works[0].job, films),
             sheet_rows=sheet_rows(job.sheets, _marks(job)),
             laser_minutes=times.laser_minutes(works[0]),
@@ -123,7 +126,6 @@ def _chapter(one: DesignWork, number: int, mark: str) -> str:
     said["shapes"] = definitions(pattern_regions(one.work.laminate))
     # The sheet goes round its tube when the assembly is put together.
     said["wrapping"] = []
-    said["force_notes"] = process.force_notes(one.work, one.runs.together)
     html = (
         environment()
         .get_template(CHAPTER)
@@ -154,19 +156,15 @@ def _cautions(job: AssemblyJob) -> list[tuple[str, str]]:
         found.append(("Waived checks", words))
     if job.lowered:
         found.append(("Lowered limits", f"{CHECKED_AGAINST}{', '.join(job.lowered)}."))
-    found += [
-        (f"Check {finding.rule} warns", finding.message)
-        for finding in job.findings
-        if finding.verdict == "warn"
-    ]
     for one in job.works:
         for title, text in cautions(one.work):
-            is_own = title.startswith(("Rule", "Press", "Waived", "Lowered"))
+            is_own = title.startswith(("Press", "Waived", "Lowered"))
             found.append((f"{title} ({one.name})" if is_own else title, text))
     if any(placed.part.kind == "magnet" for placed in job.assembled.parts):
         words = "small and brittle, they snap together; keep them from what a magnet harms."
         found.append(("Magnets", words))
-    return list(dict.fromkeys(found))
+    every = [*job.findings, *(finding for one in job.works for finding in one.work.job.findings)]
+    return list(dict.fromkeys([*found, *for_the_designer(every)]))
 
 
 def _bill(job: AssemblyJob) -> list[bill.Item]:
@@ -180,14 +178,14 @@ def _bill(job: AssemblyJob) -> list[bill.Item]:
 
 def _is_elsewhere(item: bill.Item) -> bool:
     """Films are summed over the designs, and the tube to wrap is a part of the assembly."""
-    return item.name in ("TPE film", "PTFE film", "Tube to wrap")
+    return item.name in ("TPE film", "PTFE film", "Tube to wrap", "Adhesive of the wrap")
 
 
 def _named(item: bill.Item, one: DesignWork) -> bill.Item:
-    """A design's item with the design's name; pins and plate for all copies pressed at once."""
+    """A design's item with its name; pins, plate and underlay for all copies pressed at once."""
     if item.name == "Release film":
         return item
-    often = one.runs.together if item.name in ("Dowel pins", "Pin plate") else 1
+    often = one.runs.together if item.name in ("Dowel pins", "Pin plate", "Underlay") else 1
     quantity = f"{often} {TIMES} {item.quantity}" if often > 1 else item.quantity
     return bill.Item(f"{item.name} ({one.name})", item.what, quantity)
 

@@ -7,22 +7,20 @@ from dataclasses import dataclass, field
 
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
+from sbafab.geometry.beam import Kerf
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.schedule import Schedule
 from sbafab.rules.finding import Finding
-
-Kerf = float | tuple[float, float] | None
-"""Full kerf width in mm, one or along x and y; None where it was not measured."""
 
 
 @dataclass(frozen=True)
 class Job:
     """The order behind a traveller.
 
-    ``kerf`` by material, ``fixture`` the path of the pin plate's cut file, ``solid_png`` the bytes
-    of the picture of the solid. ``lowered`` are limits below the usual ones. ``extras`` are further
-    rows of the bill of materials: item and quantity. Empty ``made_for`` leaves a blank to fill in
-    by hand.
+    ``kerf`` by material, None where it was not measured; ``fixture`` the path of the pin plate's
+    cut file, ``underlay`` that of the page to lay up on, ``solid_png`` the bytes of the picture of
+    the solid. ``lowered`` are limits below the usual ones. ``extras`` are further rows of the bill
+    of materials: item and quantity. Empty ``made_for`` leaves a blank to fill in by hand.
     """
 
     design_sha256: str
@@ -31,7 +29,8 @@ class Job:
     lowered: Sequence[str] = ()
     findings: Sequence[Finding] = ()
     fixture: str | None = None
-    kerf: Mapping[str, Kerf] = field(default_factory=dict)
+    underlay: str | None = None
+    kerf: Mapping[str, Kerf | None] = field(default_factory=dict)
     copies: int = 1
     made_for: str = ""
     note: str = ""

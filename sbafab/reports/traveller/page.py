@@ -17,21 +17,23 @@ from typing import TYPE_CHECKING, Any
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
 from sbafab.laminate.assembly import pins_when_added
-from sbafab.laminate.films import Material
+from sbafab.laminate.films import Film, Material
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.models.paper import BURST
 from sbafab.models.sizes import sizes
 from sbafab.pressing.schedule import Schedule
+from sbafab.reports.canvas import COLOURS, KEY
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.features import balloons, layer_numbers
-from sbafab.reports.traveller import bill, notes, process, times
+from sbafab.reports.traveller import base_plate, bench, bill, notes, panel, process, times
 from sbafab.reports.traveller import quantities as say
-from sbafab.reports.traveller.cautions import cautions
-from sbafab.reports.traveller.code import code_svg, code_text
+from sbafab.reports.traveller.cautions import cautions, for_the_designer
+from sbafab.reports.traveller.code import code_svg, record_text
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.layup import Round, rounds
 from sbafab.reports.traveller.shapes import definitions, pattern_regions
-from sbafab.reports.traveller.sheet_map import is_long, marked, part_regions, rows_said, sheet_map
+from sbafab.reports.traveller.sheet_map import marked, part_regions, rows_said, sheet_map
+from sbafab.reports.traveller.wrapping import wrapping
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -72,7 +74,7 @@ def environment() -> Environment:
 def context(work: Work) -> dict[str, Any]:
     """What the templates say of one design."""
     laminate, job = work.laminate, work.job
-    text = code_text(laminate.name, job.design_sha256, job.generator)
+    text = record_text(laminate.name, job.design_sha256, job.generator)
     others = _others(work)
     return {
         **frame(laminate.name, job.design_sha256, job.generator),
@@ -86,8 +88,11 @@ def context(work: Work) -> dict[str, Any]:
         "facts": _facts(work),
         "code": code_svg(text),
         "code_text": text,
+        "legend": [(words, f"#{bytes(COLOURS[tone]).hex()}") for tone, words in KEY],
         "solid": None if job.solid_png is None else b64encode(job.solid_png).decode("ascii"),
-        "cautions": cautions(work),
+        "cautions": [*cautions(work), *for_the_designer(job.findings)],
+        "before_cutting": bench.before_cutting(films(laminate)),
+        "after_cutting": bench.after_cutting([work]),
         "bill": bill.bill(work),
         "others": others,
         "sheet_rows": sheet_rows(work.sheets, {work.design.name: "", **others}),
@@ -96,17 +101,19 @@ def context(work: Work) -> dict[str, Any]:
         "laser_minutes": times.laser_minutes(work),
         "laser_basis": times.laser_basis(work),
         "lay_up": _lay_up(work),
-        "force_notes": process.force_notes(work),
+        "force_notes": base_plate.build_up_notes(work),
+        "plate_holes": base_plate.holes(work),
         "step_pages": process.step_pages(work),
         "finishing": process.finishing(work),
         "tubing": process.tubing(work),
         "leak_test": process.leak_test(work),
-        "wrapping": process.wrapping(work),
+        "wrapping": wrapping(work),
         "leak_kilopascals": process.LEAK_KILOPASCALS,
         "burst": f"{BURST.value:g} ± {BURST.error:g}",
         "times": times.times(work),
         "kerf_notes": notes.kerf_notes(work),
         "expected_sizes": notes.expected_sizes(work),
+        **panel.chapter(work),
     }
 
 
@@ -135,6 +142,10 @@ def materials(laminate: Laminate) -> list[Material]:
     return list(dict.fromkeys(layer.film.material for layer in laminate.layers))
 
 
+def films(laminate: Laminate) -> list[Film]:
+    return list(dict.fromkeys(layer.film for layer in laminate.layers))
+
+
 def _facts(work: Work) -> list[tuple[str, str]]:
     laminate = work.laminate
     extras = "tabs and ears" if laminate.registration == "ears" else "tabs"
@@ -157,7 +168,8 @@ def _facts(work: Work) -> list[tuple[str, str]]:
             (names.get(name, name.replace("_", " ")), say.millimetres(value))
             for name, value in sizes(work.design, laminate).items()
         ),
-        ("Inlets", f"{len(laminate.inlets)}, tube {work.design.inlet.tube}"),
+        ("Inlets", str(len(laminate.inlets))),
+        ("Tube", work.design.inlet.tube),
     ]
 
 
@@ -171,7 +183,6 @@ class SheetRow:
     size: str
     minutes: str
     said: str
-    is_wide: bool
 
 
 def sheet_rows(sheets: Sequence[SheetFile], marks: Mapping[str, str]) -> list[SheetRow]:
@@ -190,7 +201,6 @@ def sheet_rows(sheets: Sequence[SheetFile], marks: Mapping[str, str]) -> list[Sh
                 say.size(sheet.width, sheet.length),
                 say.minutes(sheet.minutes),
                 rows_said(sheet),
-                is_long(sheet),
             )
         )
     return rows

@@ -11,10 +11,13 @@ from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.pressing.schedule import Step
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller.action import Action
+from sbafab.reports.traveller.bench import on_the_lumen, reseat, underlay, warm_plate
+from sbafab.reports.traveller.build_up_svg import build_up_svg, pin_lines
 from sbafab.reports.traveller.exploded import exploded
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.layup import Bed, Round, beds, inlets_in, rounds
-from sbafab.reports.traveller.placing import Place, Things, over_tab, pitch, places
+from sbafab.reports.traveller.placing import PiecePlace, Things, over_tab, pitch, places
 from sbafab.reports.traveller.plan import plan
 
 LEAK_KILOPASCALS = 5.0
@@ -29,15 +32,6 @@ BONDS = {
 
 
 @dataclass(frozen=True)
-class Action:
-    """One thing to do. ``layers`` are laid in it; ``ticks`` label one box each, or there is one."""
-
-    text: str
-    layers: tuple[int, ...] = ()
-    ticks: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
 class StepPage:
     """One press step as it stands on the page; pictures are inline SVG.
 
@@ -47,8 +41,9 @@ class StepPage:
     step: Step
     bond: str
     dials: tuple[tuple[str, str], ...]
-    notes: tuple[str, ...]
-    places: tuple[Place, ...]
+    build_up: str
+    pins: str
+    places: tuple[PiecePlace, ...]
     pitch: float | None
     plan: str
     exploded: str
@@ -58,7 +53,6 @@ class StepPage:
 def step_pages(work: Work) -> list[StepPage]:
     """The press steps in order, each with its pictures, dial settings and actions."""
     parts = assembly(work.laminate)
-    first_pinned = next((part.number for part in parts if part.pins), None)
     found = []
     for part, step in zip(parts, work.schedule.steps, strict=True):
         lying = beds(parts, part)
@@ -68,12 +62,13 @@ def step_pages(work: Work) -> list[StepPage]:
                 step,
                 BONDS[step.bond],
                 _dials(step),
-                _pin_notes(work, part) if part.number == first_pinned else (),
+                build_up_svg(step, f"build-up-{step.step}"),
+                pin_lines(step),
                 placed,
                 pitch(placed),
                 plan(work.laminate, part, lying, f"plan-{step.step}"),
                 exploded(work.laminate, part, lying, f"exploded-{step.step}"),
-                tuple(_actions(work.laminate, part, step, lying)),
+                _bench_actions(work, part, step, lying),
             )
         )
     return found
@@ -85,42 +80,23 @@ def _dials(step: Step) -> tuple[tuple[str, str], ...]:
         ("Both platens", say.temperature(step.temperature_c)),
         ("Force on the whole platen", say.force(step.force_n)),
         (f"Pressure on {say.size(width, length)}", say.pressure(step.pressure_kpa)),
+        ("On the films (estimate)", f"about {step.film_kpa:.0f} kPa"),
         ("Timer", say.minutes(step.minutes)),
         ("Pins", f"{len(step.pins)} in" if step.pins else "none"),
     )
 
 
-def force_notes(work: Work, together: int = 1) -> tuple[str, ...]:
-    """What the force means, with so many laminates in the press: the paper gives only a pressure
-    and an area.
-    """
-    step = work.schedule.steps[0]
-    newtons, kilopascals = f"{step.force_n:.0f} N", f"{step.pressure_kpa:g} kPa"
-    top = together * work.laminate.layers[-1].profile.area
-    alone = "the laminate alone" if together == 1 else f"the {together} laminates alone"
-    return (
-        f"The paper gives a pressure and a heated area, no force. {newtons} is {kilopascals} on "
-        f"the whole platen of {say.size(*step.platen_mm)}. It reaches the laminate as "
-        f"{kilopascals} only if something compliant that fills the platen, such as a silicone "
-        "sheet, spreads it (ours: the paper does not say what it used).",
-        f"Between bare platens the same force on {alone} ({top:.0f} mm² at the top) "
-        f"would be {step.force_n / top:.1f} MPa.",
-    )
-
-
-def _pin_notes(work: Work, part: AssemblyStep) -> tuple[str, ...]:
-    """How long pins may be and how they come out."""
-    twice = f"cut {work.job.fixture} twice" if work.job.fixture else "cut it twice"
-    return (
-        "Pins and plate (ours: the paper gives no sizes): a plate as the shop has, 3 mm or "
-        "thicker. Pins no longer than the plate and the stack of the step together, here the "
-        f"plate + {_height(work.laminate, part)}; or, with a second plate with the same holes on "
-        f"top ({twice}), no longer than both plates and the stack.",
-    )
-
-
 def _height(laminate: Laminate, part: AssemblyStep) -> str:
     return say.millimetres(sum(laminate.layer(index).film.thickness for index in part.layers))
+
+
+def _bench_actions(
+    work: Work, part: AssemblyStep, step: Step, lying: Sequence[Bed]
+) -> tuple[Action, ...]:
+    """A step's actions; what it is laid up on comes right after the press is set."""
+    first, *others = _actions(work.laminate, part, step, lying)
+    own = (*underlay(work, part), *on_the_lumen(work.laminate, part))
+    return (first, *own, *others)
 
 
 def _actions(
@@ -133,13 +109,17 @@ def _actions(
     )
     if part.pins:
         yield Action(
-            f"Lay the pin plate down, cut corner at the back right. Pins in: {_pins(part.pins)}. "
-            "Prick a release film over them."
+            "Lay the base plate down, cut corner at the back right. Drive in the pins to their "
+            "heights (above) and prick a release film over them."
         )
     else:
-        yield Action("Lay a release film on a flat plate. No pins: lay by eye, as each line says.")
+        yield Action(
+            "Lay the base plate down, cut corner at the back right, no pins in it, and a release "
+            "film on it. Lay by eye, as each line says."
+        )
     for bed in lying:
         yield from _lay(things, bed, part.pins)
+    yield from reseat(laminate, part.adds, bool(part.pins))
     many = stack_count(laminate, part.layers)
     lies = "stack lies" if many == 1 else f"{many} stacks lie"
     yield Action(
@@ -147,25 +127,18 @@ def _actions(
         f"dust or hair between the films, the {lies} flat (about {_height(laminate, part)})."
     )
     if part.pins:
-        yield Action(
-            "Check: every pin reaches through the highest layer that has its hole, and none stands "
-            f"higher than the stack, {_height(laminate, part)} over the plate, or a second plate "
-            "with the same holes lies on top."
-        )
-    yield Action("Cover with a release film.")
+        yield Action("Check: every pin reaches through the highest layer that has its hole.")
+    yield Action(
+        "Cover with a release film and the press pad, flush with the platen all round. No second "
+        "plate on top."
+    )
+    yield warm_plate(step)
     yield Action(f"Close the press and start the timer: {say.minutes(step.minutes)}.")
     yield Action("Take it out: it is as hot as the platens. Let it cool flat before you touch it.")
     if part.pins:
         names = say.listed([pin.name for pin in part.pins])
         yield Action(f"Pins out, pushed from below through the plate: {names}.")
     yield Action(f"Take off the release films. You now hold {_product(laminate, part)}.")
-
-
-def _pins(pins: Sequence[Pin]) -> str:
-    sizes: dict[float, list[str]] = {}
-    for pin in pins:
-        sizes.setdefault(pin.diameter, []).append(pin.name)
-    return "; ".join(f"⌀{say.millimetres(d)}: {say.listed(names)}" for d, names in sizes.items())
 
 
 def _lay(things: Things, bed: Bed, pins: Sequence[Pin]) -> Iterator[Action]:
@@ -280,17 +253,6 @@ def finishing(work: Work) -> list[Action]:
     ]
 
 
-def pin_lengths(work: Work) -> str:
-    """How long pins are in each step that has any; no one length suits a thin and a high stack."""
-    laminate = work.laminate
-    found = [
-        f"plate + {_height(laminate, part)} in step {part.number}"
-        for part in assembly(laminate)
-        if part.pins
-    ]
-    return say.listed(found)
-
-
 def tubing(work: Work) -> list[Action]:
     """The paper's step 5, one box an inlet where it is done for each of them."""
     inlets = work.laminate.inlets
@@ -315,6 +277,7 @@ def tubing(work: Work) -> list[Action]:
             (),
             names,
         ),
+        Action("Snip off what of the strip stands out of the tab, flush with its end.", (), names),
         Action(
             "Seal the mouth all round with a small drop of Loctite Vinyl, Fabric & Plastic; keep "
             "it out of the tube.",
@@ -328,20 +291,6 @@ def tubing(work: Work) -> list[Action]:
 def _apart(names: Sequence[str]) -> tuple[str, ...]:
     """A box for each of several; a single one needs no name."""
     return tuple(names) if len(names) > 1 else ()
-
-
-def wrapping(work: Work) -> list[Action]:
-    """Some laminates go round a tube in the end; empty for others."""
-    wrap = work.design.form.wrap
-    if wrap is None:
-        return []
-    return [
-        Action(
-            f"Wrap the sheet round its tube, outer diameter "
-            f"{say.millimetres(wrap.tube_diameter)}, balloons outward, its straight edges "
-            "along the tube. The paper does not say what holds it there."
-        )
-    ]
 
 
 def leak_test(work: Work) -> list[Action]:

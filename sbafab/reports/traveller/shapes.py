@@ -13,8 +13,8 @@ from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.svg import number, path_data
 from sbafab.laminate.films import Material
+from sbafab.laminate.inks import INK
 from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.picture import INK
 from sbafab.reports import drawing as draw
 
 LINE = 0.22
