@@ -266,7 +266,8 @@ def _compressed(balloon: Balloon, r: Array, z: Array) -> Array:
     strains = strain(balloon.film, r, z)
     is_film = balloon.may_wrinkle & ~balloon.inextensible
     pressed = (strains.hoop + balloon.poisson * strains.meridian < 0) & is_film
-    return np.maximum((pressed * balloon.film.lengths).sum(-1), balloon.film.lengths.min())
+    shortest = balloon.film.lengths.min()
+    return np.asarray(np.maximum((pressed * balloon.film.lengths).sum(-1), shortest))
 
 
 def _wrinkling(balloon: Balloon, r: Array, z: Array, zone: Array) -> Array:

@@ -11,7 +11,7 @@ import pytest
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
-from sbafab.simulators.calculix.axisymmetric import Section, axisymmetric_strokes
+from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_strokes
 
 TPE = Balloon()
 IDEAL = Balloon(thickness=1e-4, modulus=1e11, inextensible=True)
@@ -53,7 +53,7 @@ def test_without_plates_it_is_a_mylar_balloon() -> None:
 @pytest.mark.parametrize(("pocket", "neck"), [(5.0, 0.0), (5.0, 2.5), (10.0, 0.0)])
 def test_smooth_strokes_are_those_of_an_axisymmetric_mesh(pocket: float, neck: float) -> None:
     pressures = [0.5, 2.0, 10.0]
-    mesh = axisymmetric_strokes(pressures, Section(pocket=pocket, neck=neck))
+    mesh = axisymmetric_strokes(pressures, MeridianSection(pocket=pocket, neck=neck))
     own = inflate(replace(TPE, pocket=pocket / 2, neck=neck / 2, wrinkles=False), pressures)
     assert own.height == pytest.approx(mesh, rel=0.015)
 
