@@ -72,8 +72,13 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def pattern_problems(layers: Sequence[Layer], claims: Manifest) -> list[Problem]:
-    """Layers that share a pattern in the manifest and not on disk, or the other way round."""
+    """Layers that share a pattern in the manifest and not on disk, or the other way round.
+
+    Patterns that differ by no more than files can tell, such as by a tab of 1 um, may be equal on
+    disk: the manifest then says that their areas differ.
+    """
     problems = []
+    areas = [layer.area for layer in claims.layers]
     said_of: dict[str, tuple[str, int]] = {}
     found_of: dict[str, tuple[str, int]] = {}
     for layer in layers:
@@ -83,7 +88,8 @@ def pattern_problems(layers: Sequence[Layer], claims: Manifest) -> list[Problem]
             message = f"layers {first} and {layer.index} are both of pattern {said} and differ"
             problems.append(claim(message, first, layer.index))
         name, twin = said_of.setdefault(layer.pattern, (said, layer.index))
-        if name != said and pattern == layer.pattern:
+        one_area = areas[twin - 1] == areas[layer.index - 1]
+        if name != said and pattern == layer.pattern and one_area:
             message = f"layers {twin} and {layer.index} are equal, and of patterns {name}, {said}"
             problems.append(claim(message, twin, layer.index))
     return problems
