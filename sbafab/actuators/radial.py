@@ -25,8 +25,9 @@ from sbafab.actuators.stacking import BalloonShape, Cut, Stack, balloon_cuts, la
 from sbafab.actuators.tails import head_reach, tails
 from sbafab.design.form import Drawn, Form, Slots, Wrap
 from sbafab.design.records import Chamber as ChamberSection
-from sbafab.design.records import Design, Inlet, Section
+from sbafab.design.records import Design, Inlet
 from sbafab.design.records import Stack as StackSection
+from sbafab.design.section import Section
 from sbafab.design.units import Length, LengthOrZero
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import union

@@ -82,11 +82,15 @@ def findings_table(findings: Sequence[Finding]) -> Table:
 
 
 def notes_of(checked: Iterable[Checked]) -> list[str]:
-    """What is to be known of several designs: each sentence once, with the names it is true of."""
+    """What is to be known of several designs, their kits first: each sentence once, with the names
+    it is true of.
+    """
+    from sbafab.design.kits import cited
+
     names: dict[str, list[str]] = {}
     designs = list(checked)
     for one in designs:
-        for note in one.laminate.notes:
+        for note in (cited(one.design), *one.laminate.notes):
             names.setdefault(note, []).append(one.design.name)
     return [
         note if len(of) == len(designs) else f"{', '.join(of)}: {note}"
@@ -194,8 +198,6 @@ def job_json(job: Job) -> dict[str, object]:
 
 
 def _made(run: Run) -> Iterator[tuple[str, str]]:
-    from sbafab.cutting.properties import PTFE_WARNING
-
     index = run.manifest
     lam = run.laminate
     counts: dict[str, int] = {}
@@ -208,6 +210,7 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
         "design",
         f"{lam.name} ({lam.family}, {balloons}), {index['design_sha256'][:12]}",
     )
+    yield "kit", f"{index['kit']['name']}, version {index['kit']['version']}"
     yield "sizes", ", ".join(f"{k.replace('_', ' ')} {v:.3f}" for k, v in sizes.items()) + " mm"
     yield (
         "layers",
@@ -234,7 +237,8 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
         )
     yield from _for_simulation(run)
     if cut:
-        yield "warning", PTFE_WARNING
+        for said in index["warnings"]:
+            yield "warning", said
     for note in lam.notes:
         yield "note", note
     for warning in run.schedule.warnings if run.schedule is not None else ():

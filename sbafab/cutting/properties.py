@@ -9,17 +9,13 @@ from dataclasses import dataclass, field
 from sbafab.cutting.dxf_write import DxfProfile
 from sbafab.errors import OutputError
 from sbafab.geometry.beam import Kerf, is_kerf, widths
-from sbafab.laminate.films import Material
+from sbafab.laminate.films import PTFE_WARNING, Material
 
 UNCALIBRATED = "uncalibrated: nominal edges"
 COMPENSATED = "compensated"
 LIMITS = "LIMITS"
 CHORDS = "chords within"
 FOLDER = "layers"
-PTFE_WARNING = (
-    "Hot PTFE gives off toxic fumes (COF2, HF): cut it with a laser only on a machine whose owner "
-    "permits PTFE, or use a drag knife."
-)
 
 
 @dataclass(frozen=True)
@@ -30,7 +26,8 @@ class CutSettings:
     it was not measured.
     ``waived``: names of the waived rules; ``lowered``: limits below the usual ones, as
     ``rules.lowered`` says them. ``chord_error`` in mm counts for profile "chords" only.
-    ``generator``: program and version, for example ``sbafab 1.0.0``.
+    ``generator``: program and version, for example ``sbafab 1.0.0``. ``warnings``: what the files
+    of a material must say.
     """
 
     design: str
@@ -41,6 +38,7 @@ class CutSettings:
     profile: DxfProfile = "bulges"
     chord_error: float = 0.005
     generator: str = "sbafab"
+    warnings: Mapping[str, str] = field(default_factory=lambda: {"PTFE": PTFE_WARNING})
 
     def kerf_width(self, material: Material) -> Kerf | None:
         return self.kerf_widths.get(material)
@@ -49,9 +47,7 @@ class CutSettings:
 def file_properties(settings: CutSettings, material: Material, pattern: str) -> dict[str, str]:
     """Custom properties of the cut file of one pattern, equal for all layers that share it."""
     properties = _properties(settings, material, pattern, settings.kerf_width(material))
-    if material == "PTFE":
-        properties["WARNING"] = PTFE_WARNING
-    return properties
+    return {**properties, **warning_property(settings.warnings.get(material))}
 
 
 def sheet_properties(
@@ -62,9 +58,7 @@ def sheet_properties(
         **_properties(settings, material, f"sheet {sheet}", settings.kerf_width(material)),
         "PARTS": parts,
     }
-    if material == "PTFE":
-        properties["WARNING"] = PTFE_WARNING
-    return properties
+    return {**properties, **warning_property(settings.warnings.get(material))}
 
 
 def fixture_properties(settings: CutSettings) -> dict[str, str]:
@@ -99,6 +93,11 @@ def _properties(
         "GENERATOR": settings.generator,
         **curves_property(curves_of(settings)),
     }
+
+
+def warning_property(said: str | None) -> dict[str, str]:
+    """What a cut file says of the dangers of its film."""
+    return {"WARNING": said} if said else {}
 
 
 def limit_properties(lowered: Sequence[str]) -> dict[str, str]:

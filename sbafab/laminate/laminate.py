@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, get_args
 
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
@@ -17,6 +17,7 @@ from sbafab.laminate.films import Film
 from sbafab.laminate.interfaces import Interface, InterfaceKind, interface_regions
 
 Role = Literal["base", "wall", "cap", "sheet", "chamber-mask", "separator-mask"]
+ROLES: tuple[Role, ...] = get_args(Role)
 
 NOTHING = Region()
 LOOSE = 0.2
@@ -52,7 +53,7 @@ class Layer:
 
     @property
     def is_mask(self) -> bool:
-        return self.film.material == "PTFE"
+        return self.film.is_mask
 
     def _repr_html_(self) -> str:
         from sbafab.laminate.picture import layer_html
@@ -214,6 +215,7 @@ __all__ = [
     "InterfaceKind",
     "Laminate",
     "Layer",
+    "ROLES",
     "Pin",
     "Role",
 ]

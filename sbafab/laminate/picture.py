@@ -11,7 +11,7 @@ from sbafab.geometry.svg import number, path_data
 from sbafab.notebook import table_html
 
 if TYPE_CHECKING:
-    from sbafab.laminate.films import Material
+    from sbafab.laminate.films import Film
     from sbafab.laminate.laminate import Laminate, Layer
 
 
@@ -23,13 +23,27 @@ class Ink(NamedTuple):
 
 
 # Blue against orange: told apart in every common colour blindness, and in grey by lightness.
-INK: dict[Material, Ink] = {
-    "TPE": Ink("#a9cfea", "#0b4f86"),
-    "PTFE": Ink("#fbe3bd", "#b35a00"),
-}
+# Further films follow in hues apart from both; masks stay light, and pictures hatch them.
+STRUCTURAL = (
+    Ink("#a9cfea", "#0b4f86"),
+    Ink("#8fd0b5", "#0b6b4b"),
+    Ink("#c9b8e6", "#54308f"),
+    Ink("#b9c2cc", "#3c4650"),
+)
+MASKS = (
+    Ink("#fbe3bd", "#b35a00"),
+    Ink("#f8cfd4", "#a3213a"),
+    Ink("#ecebae", "#6f6a00"),
+)
 
 SHOWN_MM = 80.0
 BARS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
+
+
+def ink(film: Film) -> Ink:
+    """The colours of a film; the fifth of a kind begins again with the first one's."""
+    inks = MASKS if film.is_mask else STRUCTURAL
+    return inks[film.shade % len(inks)]
 
 
 def laminate_html(laminate: Laminate) -> str:
@@ -60,8 +74,8 @@ def _legend(bounds: Bounds, layers: Iterable[Layer]) -> str:
     bar = max((step for step in BARS if step < longer / 3), default=BARS[0])
     films = dict.fromkeys(layer.film for layer in layers)
     swatches = "".join(
-        f'<span style="background:{INK[film.material].fill};border:1px solid '
-        f'{INK[film.material].line}">&emsp;</span> {film.material}, {escape(film.product)}, '
+        f'<span style="background:{ink(film).fill};border:1px solid '
+        f'{ink(film).line}">&emsp;</span> {film.material}, {escape(film.product)}, '
         f"{number(film.thickness)} mm &ensp; "
         for film in films
     )
@@ -86,9 +100,9 @@ def laminate_svg(laminate: Laminate) -> str:
 
 
 def _profile(layer: Layer, opacity: float) -> str:
-    ink = INK[layer.film.material]
+    own = ink(layer.film)
     return (
-        f'<path d="{path_data(layer.profile)}" fill="{ink.fill}" stroke="{ink.line}" '
+        f'<path d="{path_data(layer.profile)}" fill="{own.fill}" stroke="{own.line}" '
         f'fill-opacity="{number(opacity)}"/>'
     )
 

@@ -15,6 +15,7 @@ from sbafab.assemblies.records import Assembly
 from sbafab.assemblies.shapes import placed_surface
 from sbafab.assemblies.writing import DESIGN_FILE, assembly_sha256, assembly_toml, part_entry
 from sbafab.cutting.dxf_write import DxfProfile
+from sbafab.design.kits import citation
 from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import GeometryError
@@ -201,7 +202,8 @@ def write_whole(
         (folder / "mesh").mkdir()
         index["meshes"] = [_write_solid(assembled, folder)]
         write_text(folder / TRAVELLER, _traveller(checked, batch, written, bare))
-    write_text(folder / "checks.json", as_json(checks(checked.findings, "design")))
+    designs = [one.design for one in checked.designs]
+    write_text(folder / "checks.json", as_json(checks(checked.findings, "design", designs)))
     write_text(folder / DESIGN_FILE, assembly_toml(assembled))
     return index
 
@@ -276,6 +278,7 @@ def _uncut_manifest(name: str, designs: Sequence[Checked]) -> dict[str, Any]:
                 "folder": one.design.name,
                 "copies": one.design.order.copies,
                 "design_sha256": design_sha256(one.design),
+                "kit": citation(one.design),
             }
             for one in designs
         ],

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from sbafab.cutting.dxf_write import DxfProfile
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import SheetFile
+from sbafab.design.kits import citation
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError
@@ -18,7 +19,7 @@ from sbafab.nesting.nest import refuse_unfit
 from sbafab.nesting.records import Nest
 from sbafab.output.contents import Checked, Made, Part, close_folder, schedule_of, write_contents
 from sbafab.output.manifest import sheet_entry
-from sbafab.output.settings import GENERATOR, cut_settings, kerf_widths, limits, stocks
+from sbafab.output.settings import GENERATOR, cut_settings, kerf_widths, limits, stocks, warnings
 from sbafab.output.shop import (
     CutPlan,
     CutSet,
@@ -31,7 +32,7 @@ from sbafab.output.shop import (
 )
 from sbafab.pressing.schedule import Schedule
 
-SHARED = ("sheets", "laser")
+SHARED = ("films", "sheets", "laser")
 """Sections that must be alike in all designs that are cut from the same film."""
 
 
@@ -136,6 +137,7 @@ def _settings(
         profile=drawing.profile,
         chord_error=drawing.chord_error,
         generator=GENERATOR,
+        warnings={name: said for one in checked for name, said in warnings(one.design).items()},
     )
 
 
@@ -183,6 +185,7 @@ def batch_manifest(
                 "folder": one.design.name,
                 "copies": one.design.order.copies,
                 "design_sha256": design_sha256(one.design),
+                "kit": citation(one.design),
             }
             for one in checked
         ],

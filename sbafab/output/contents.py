@@ -10,6 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from sbafab.cutting.sheets import SheetFile
+from sbafab.design.kits import FILE as KIT_FILE
+from sbafab.design.kits import kit_of
+from sbafab.design.reading import kit_names
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256, design_toml
 from sbafab.laminate.laminate import Laminate
@@ -120,7 +123,9 @@ def write_contents(
     if paged and made.cut is not None and made.pressing is not None:
         page = _traveller(checked, made.cut, made.sheets, made.pressing, folder)
         write_text(folder / TRAVELLER, page)
-    write_text(folder / "checks.json", as_json(checks(checked.findings, "design")))
+    write_text(
+        folder / "checks.json", as_json(checks(checked.findings, "design", [checked.design]))
+    )
     _write_design(checked.design, folder)
     index = manifest(
         checked.design, checked.laminate, checked.waived, made.cut, made.sheets, meshes
@@ -199,4 +204,7 @@ def _write_design(design: Design, folder: Path) -> None:
         shutil.copyfile(design.drawing, folder / name)
         chamber = design.chamber.model_copy(update={"outline": name})
         design = design.model_copy(update={"chamber": chamber})
+    if design.kit not in kit_names():
+        (folder / KIT_FILE).write_bytes(kit_of(design).text)
+        design = design.model_copy(update={"kit": KIT_FILE})
     write_text(folder / "design.toml", design_toml(design))

@@ -8,15 +8,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sbafab.cutting.properties import PTFE_WARNING
 from sbafab.cutting.sheets import SheetFile
+from sbafab.design.kits import citation
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.meshing.files import MeshFile
 from sbafab.models.sizes import sizes
-from sbafab.output.settings import GENERATOR, kerf_widths, limits
+from sbafab.output.settings import GENERATOR, kerf_widths, limits, warnings
 from sbafab.output.shop import CutSet, film_use
 from sbafab.output.swap import SCHEMA
 from sbafab.rules.finding import Finding
@@ -28,9 +28,15 @@ def as_json(value: object) -> str:
     return json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def checks(findings: Sequence[Finding], source: str) -> dict[str, Any]:
-    """``checks.json``; ``source`` is "design" or "as-built"."""
-    return {"source": source, "findings": [finding.as_dict() for finding in findings]}
+def checks(
+    findings: Sequence[Finding], source: str, designs: Sequence[Design] = ()
+) -> dict[str, Any]:
+    """``checks.json``; ``source`` is "design" or "as-built", ``designs`` are what was checked."""
+    return {
+        "source": source,
+        "kits": [{"design": design.name, **citation(design)} for design in designs],
+        "findings": [finding.as_dict() for finding in findings],
+    }
 
 
 def manifest(
@@ -50,6 +56,7 @@ def manifest(
         "units": "mm",
         "design_sha256": design_sha256(design),
         "generator": GENERATOR,
+        "kit": citation(design),
         "registration": {
             "method": laminate.registration,
             "pins": [
@@ -68,7 +75,7 @@ def manifest(
         "notes": list(laminate.notes),
         "copies": design.order.copies,
         "films": _films(laminate, sheets),
-        "warnings": [PTFE_WARNING],
+        "warnings": list(dict.fromkeys(warnings(design).values())),
         "layers": [_layer(laminate, layer, paths.get(layer.index)) for layer in laminate.layers],
         "interfaces": [_interface(interface) for interface in laminate.interfaces],
         "bores": [

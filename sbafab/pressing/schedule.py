@@ -21,6 +21,7 @@ from sbafab.laminate.assembly import (
     distinct_layers,
     stack_count,
 )
+from sbafab.laminate.films import FIRST
 from sbafab.laminate.laminate import Laminate
 
 TITLES: dict[StepName, str] = {
@@ -129,7 +130,8 @@ def schedule(laminate: Laminate, press: PressSettings) -> Schedule:
 
     Flash bonds hold layers in place on their pins. Full bonds are pressed without any: base and
     cap have no bore for a channel pin, and a lumen pin, though it would pass, stays out as in the
-    paper. Raises DesignError at a temperature that would not bond TPE or that PTFE does not stand.
+    paper. Raises DesignError at a temperature that would not bond the films or that one of them
+    does not stand.
     """
     _refuse_temperature(laminate, press)
     *parts, last = assembly(laminate)
@@ -208,7 +210,8 @@ def _named(layers: Sequence[int]) -> str:
 
 def _refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
     for film in dict.fromkeys(layer.film for layer in laminate.layers):
-        if film.material == "TPE" and press.temperature_c <= film.softens_above:
+        melts = not film.is_mask and film.softens_above is not None
+        if melts and press.temperature_c <= (film.softens_above or 0.0):
             raise DesignError(
                 f"press.temperature_c = {press.temperature_c:g} does not bond {film.product}, "
                 f"which melts at {film.softens_above:g} C; raise it (the paper presses at 135 C)"
@@ -218,6 +221,19 @@ def _refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
                 f"press.temperature_c = {press.temperature_c:g} reaches the limit of the masks, "
                 f"{film.limit:g} C for {film.product}; lower it, for hotter PTFE gives off toxic "
                 "fumes"
+            )
+        if film.material not in FIRST and press.temperature_c >= film.limit:
+            raise DesignError(
+                f"press.temperature_c = {press.temperature_c:g} reaches the limit of "
+                f"{film.material}, {film.limit:g} C for {film.product}; lower it"
+            )
+    for interface in laminate.interfaces:
+        below, above = interface.below, interface.above
+        if below.film.softens_above is None and above.film.softens_above is None:
+            raise DesignError(
+                f"layers {below.index} and {above.index} are of {below.film.material} and "
+                f"{above.film.material}, which both stay solid in the press and do not bond; give "
+                f"the {below.role} or the {above.role} another film in [layup]"
             )
 
 

@@ -6,12 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sbafab.cutting.properties import PTFE_WARNING
 from sbafab.geometry.edges import Point
 from sbafab.geometry.svg import number
 from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.picture import INK
+from sbafab.laminate.picture import ink
 from sbafab.reports import drawing as draw
 from sbafab.reports.features import balloons
 from sbafab.reports.pattern_card import Card, cells, drawn, pattern_card, pin_mark
@@ -78,7 +77,7 @@ def _title_block(laminate: Laminate, grid: Grid, block: float, pinned: bool) -> 
     low = (MARGIN, height - MARGIN - block)
     x, y = low
     needed = len(laminate.layers)
-    masked = any(layer.is_mask for layer in laminate.layers)
+    warnings = dict.fromkeys(layer.film.warning for layer in laminate.layers)
     facts = (
         f"{laminate.family}: {balloons(laminate)}, "
         f"{_count(len(laminate.chambers), 'chamber')}, {needed} layers of "
@@ -92,7 +91,7 @@ def _title_block(laminate: Laminate, grid: Grid, block: float, pinned: bool) -> 
             draw.text((x + 3.0, y + 16.2 + NOTE_ROW * row), note, bold=True)
             for row, note in enumerate(laminate.notes or ("",))
         ),
-        draw.text((x + 3.0, y + block - 2.1), PTFE_WARNING if masked else ""),
+        draw.text((x + 3.0, y + block - 2.1), " ".join(filter(None, warnings))),
         *_films(laminate, pinned, (width / 2 + 18.0, y)),
         *_scale_bar(grid.scale, (width - MARGIN - 4.0, y)),
     ]
@@ -108,9 +107,8 @@ def _films(laminate: Laminate, pinned: bool, at: Point) -> list[str]:
     films = dict.fromkeys(layer.film for layer in laminate.layers)
     for row, film in enumerate(films):
         x, y = at[0], at[1] + 3.4 + 5.4 * row
-        ink = INK[film.material]
-        fill = ink.fill if film.material == "TPE" else "url(#PTFE)"
-        parts.append(draw.box((x, y), (x + 6.0, y + 3.6), fill=fill, stroke=ink.line))
+        fill = draw.film_fill(film)
+        parts.append(draw.box((x, y), (x + 6.0, y + 3.6), fill=fill, stroke=ink(film).line))
         known = film.product.startswith(film.material)
         name = film.product if known else f"{film.material}, {film.product}"
         words = f"{name}, {number(film.thickness)} thick"

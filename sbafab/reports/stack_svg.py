@@ -10,7 +10,7 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.section import Interval
 from sbafab.geometry.svg import number
 from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.picture import INK
+from sbafab.laminate.picture import ink
 from sbafab.reports import drawing as draw
 from sbafab.reports.features import length
 from sbafab.reports.stack_labels import Label, feature_labels, layer_labels, pin_labels
@@ -102,13 +102,13 @@ def _view(section: Section) -> View:
 
 def _slab(slab: Slab, view: View) -> list[str]:
     layer = slab.layer
-    ink = INK[layer.film.material]
+    line = ink(layer.film).line
     inset = SLIT * layer.film.thickness if layer.is_mask else 0.0
     bottom = view.y(layer.z + inset, layer.index)
     top = view.y(layer.z + layer.film.thickness - inset, layer.index)
-    fill = "url(#PTFE)" if layer.is_mask else ink.fill
+    fill = draw.film_fill(layer.film)
     return [
-        draw.box((view.x(start), top), (view.x(end), bottom), fill=fill, stroke=ink.line)
+        draw.box((view.x(start), top), (view.x(end), bottom), fill=fill, stroke=line)
         for start, end in slab.spans
     ]
 
@@ -287,7 +287,7 @@ def _label(label: Label, feature: Point, at: Point, side: int) -> list[str]:
     x, row = at
     elbow = (x - 2.2 * side, row)
     anchor: draw.Anchor = "start" if side > 0 else "end"
-    colour = INK[label.material].line if label.material else draw.DARK
+    colour = ink(label.film).line if label.film else draw.DARK
     return [
         *draw.leader(feature, elbow, (x - 0.6 * side, row)),
         draw.text((x + 0.4 * side, row + 1.05), label.words, anchor=anchor, colour=colour),
@@ -298,10 +298,9 @@ def _legend(view: View, page: float) -> list[str]:
     y = page - 10.0
     films = dict.fromkeys(slab.layer.film for slab in view.section.slabs)
     entries = [
-        (f"{film.material} film, {number(film.thickness)}", _swatch(film.material))
-        for film in films
+        (f"{film.material} film, {number(film.thickness)}", draw.film_fill(film)) for film in films
     ]
-    entries.append(("bond: the gap filled with TPE", BOND))
+    entries.append((f"bond: the gap filled with {view.section.slabs[0].layer.film.material}", BOND))
     entries.append(("unbonded: drawn as a slit beside the mask", "#ffffff"))
     if view.section.rods:
         entries.append(("dowel pin", STEEL))
@@ -312,7 +311,3 @@ def _legend(view: View, page: float) -> list[str]:
         parts.append(draw.text((x + 7.6, y), words))
         x += 7.6 + draw.text_width(words) + 7.0
     return parts
-
-
-def _swatch(material: str) -> str:
-    return "url(#PTFE)" if material == "PTFE" else INK["TPE"].fill

@@ -220,7 +220,7 @@ def read_folder(folder: Path, of_job: bool = False, work: Work | None = None) ->
         meant: Meant | None = work.meant
     else:
         meant = meant_by(design, claims.curves) if is_own else None
-    problems += order_problems(claims)
+    problems += order_problems(claims, design)
     try:
         problems += file_problems(folder, claims)
     except OSError as error:
@@ -231,7 +231,7 @@ def read_folder(folder: Path, of_job: bool = False, work: Work | None = None) ->
     problems += unread
     layers = stacked_layers(files, design)
     problems += height_problems(claims, layers, design)
-    problems += property_problems(files, claims)
+    problems += property_problems(files, claims, design)
     problems += layer_problems(files, claims)
     problems += pattern_problems(layers, claims)
     if not of_job:

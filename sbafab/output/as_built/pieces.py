@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from sbafab.cutting.verify import check_contours
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
-from sbafab.laminate.films import Material
-from sbafab.nesting.records import MATERIALS, Turn
+from sbafab.laminate.films import Material, in_order
+from sbafab.nesting.records import TURNS, Turn
 from sbafab.output.as_built.agreement import AGREED
 from sbafab.output.as_built.claims import claim
 from sbafab.output.as_built.cut_files import LayerFile
@@ -96,9 +96,11 @@ def piece_problems(
 ) -> list[Problem]:
     """Pieces on the sheets that no layer has, or not as often as layers and copies ask for."""
     problems = []
-    for material in MATERIALS:
+    told = {sheet.told.material for sheet in sheets}
+    drawn = {file.claim.material for lot in lots for file in lot.files}
+    for material in in_order(told | drawn):
         own = [sheet for sheet in sheets if sheet.told.material == material]
-        kinds = _kinds_of(lots, material, turns[material], AGREED)
+        kinds = _kinds_of(lots, material, turns.get(material, TURNS), AGREED)
         cut: Counter[int] = Counter()
         for sheet in own:
             found, strangers = _sorted_out(sheet, kinds)

@@ -69,6 +69,9 @@ def sheet_problems(folder: Path, order: Order) -> list[Problem]:
     sheets: list[CutSheet] = []
     bare: list[ReadBack] = []
     for told in order.sheets:
+        if told.material not in stock_of:
+            problems.append(claim(f"{told.file} is of {told.material}, no film of design.toml"))
+            continue
         try:
             found = _read(folder, told)
         except OutputError as error:

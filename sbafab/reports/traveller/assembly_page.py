@@ -98,7 +98,7 @@ def assembly_html(job: AssemblyJob) -> str:
             cautions=_cautions(job),
             bill=_bill(job),
             kerf=bill.kerf_states(works[0].job, films),
-            sheet_rows=sheet_rows(job.sheets, _marks(job)),
+            sheet_rows=sheet_rows(works[0].design, job.sheets, _marks(job)),
             laser_minutes=times.laser_minutes(works[0]),
             laser_basis=times.laser_basis(works[0]),
             press_plan=[_press_words(one) for one in job.works],
@@ -180,7 +180,8 @@ def _bill(job: AssemblyJob) -> list[bill.Item]:
 
 def _is_elsewhere(item: bill.Item) -> bool:
     """Films are summed over the designs, and the tube to wrap is a part of the assembly."""
-    return item.name in ("TPE film", "PTFE film", "Tube to wrap")
+    name, _, rest = item.name.partition(" ")
+    return (name.isupper() and rest == "film") or item.name == "Tube to wrap"
 
 
 def _named(item: bill.Item, one: DesignWork) -> bill.Item:

@@ -15,6 +15,7 @@ from string import ascii_uppercase
 from typing import TYPE_CHECKING, Any
 
 from sbafab.cutting.sheets import SheetFile
+from sbafab.design.kits import cited, departures
 from sbafab.design.records import Design
 from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.films import Material
@@ -84,13 +85,15 @@ def context(work: Work) -> dict[str, Any]:
         "shapes": definitions(chain(pattern_regions(laminate), part_regions(work.sheets))),
         "family": work.design.form.words,
         "facts": _facts(work),
+        "kit": cited(work.design),
+        "departures": departures(work.design),
         "code": code_svg(text),
         "code_text": text,
         "solid": None if job.solid_png is None else b64encode(job.solid_png).decode("ascii"),
         "cautions": cautions(work),
         "bill": bill.bill(work),
         "others": others,
-        "sheet_rows": sheet_rows(work.sheets, {work.design.name: "", **others}),
+        "sheet_rows": sheet_rows(work.design, work.sheets, {work.design.name: "", **others}),
         "cuts": bill.cut_list(work),
         "kerf": bill.kerf_states(job, materials(laminate)),
         "laser_minutes": times.laser_minutes(work),
@@ -174,8 +177,11 @@ class SheetRow:
     is_wide: bool
 
 
-def sheet_rows(sheets: Sequence[SheetFile], marks: Mapping[str, str]) -> list[SheetRow]:
-    """The film sheets; patterns go with the mark of their design, or with the design's name."""
+def sheet_rows(
+    design: Design, sheets: Sequence[SheetFile], marks: Mapping[str, str]
+) -> list[SheetRow]:
+    """The film sheets of a design; patterns go with the mark or the name of theirs."""
+    films = {film.material: film for film in design.films.stock.values()}
     rows = []
     for number, sheet in enumerate(sheets, 1):
         counts = [
@@ -185,7 +191,7 @@ def sheet_rows(sheets: Sequence[SheetFile], marks: Mapping[str, str]) -> list[Sh
         rows.append(
             SheetRow(
                 sheet,
-                sheet_map(sheet, marks, f"sheet-{number}"),
+                sheet_map(sheet, films[sheet.material], marks, f"sheet-{number}"),
                 ", ".join(counts),
                 say.size(sheet.width, sheet.length),
                 say.minutes(sheet.minutes),

@@ -241,7 +241,10 @@ def _turned(laminate: Laminate, layers: Sequence[int]) -> str:
     mask = over_tab(laminate, layers)
     if mask is None:
         return ""
-    return f" Turn it so that layer {mask.index}, the PTFE mask that reaches out, covers the tab."
+    return (
+        f" Turn it so that layer {mask.index}, the {mask.film.material} mask that reaches out, "
+        "covers the tab."
+    )
 
 
 def _named(layer: Layer) -> str:
@@ -299,6 +302,7 @@ def tubing(work: Work) -> list[Action]:
     names = _apart([inlet.chamber for inlet in inlets])
     diameter = say.millimetres(inlets[0].tube_diameter)
     straight = say.millimetres(min(inlet.length for inlet in inlets))
+    strip = work.laminate.interfaces[-1].masks[0].film.material
     first = f"the tab of {inlets[0].chamber}" if len(inlets) > 1 else "the tab"
     return [
         Action(
@@ -308,7 +312,9 @@ def tubing(work: Work) -> list[Action]:
             f"Cut {say.count(len(inlets), 'piece')} of {work.design.inlet.tube}, outer diameter "
             f"{diameter}, square and without burr, as long as your rig needs."
         ),
-        Action("Part the two films at the tab's end; the PTFE strip lies between them.", (), names),
+        Action(
+            f"Part the two films at the tab's end; the {strip} strip lies between them.", (), names
+        ),
         Action(
             f"Push the tube in beside the strip, up to {straight} deep: so long is the straight "
             "run of the tab.",
@@ -316,8 +322,8 @@ def tubing(work: Work) -> list[Action]:
             names,
         ),
         Action(
-            "Seal the mouth all round with a small drop of Loctite Vinyl, Fabric & Plastic; keep "
-            "it out of the tube.",
+            f"Seal the mouth all round with a small drop of {work.design.inlet.adhesive}; keep it "
+            "out of the tube.",
             (),
             names,
         ),
