@@ -81,7 +81,7 @@ def check(source: Source, *changes: Change, **tables: Any) -> Findings:
 
 def check_folder(folder: str | Path) -> Findings:
     """What the rule deck finds in the cut files of an output folder as they lie on disk."""
-    from sbafab.output.as_built.check import check_folder as read_and_check
+    from sbafab.as_built.check import check_folder as read_and_check
     from sbafab.rules.finding import Findings
 
     return Findings(read_and_check(Path(folder)))

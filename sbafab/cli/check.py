@@ -137,7 +137,7 @@ def _findings(
         )
     import logging
 
-    from sbafab.output.as_built.check import check_folder
+    from sbafab.as_built.check import check_folder
 
     # A broken file is told of in a finding; what ezdxf logs of it would stand in between.
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())

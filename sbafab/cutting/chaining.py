@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
 from sbafab.geometry.boolean import LEAST_AREA, tidy
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, edge_from_bulge
+from sbafab.geometry.edges import EPSILON, Edge, Point, edge_from_bulge
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
 from sbafab.geometry.region import Contour, Region, same_support
@@ -97,8 +97,8 @@ def _full_circle(contour: Contour) -> tuple[Point, float] | None:
     """Centre and radius of a contour that is one circle, run through once, so clear of itself."""
     if contour.circle is None:
         return None
-    turn = sum(edge.sweep for edge in contour.edges if isinstance(edge, Arc))
-    return contour.circle if abs(abs(turn) - math.tau) < 1e-6 else None
+    once = math.pi * contour.circle[1] ** 2
+    return contour.circle if abs(abs(contour.area) - once) < 1e-6 * once else None
 
 
 def _are_clear(a: tuple[Point, float] | None, b: tuple[Point, float] | None) -> bool:
@@ -111,7 +111,7 @@ def _are_clear(a: tuple[Point, float] | None, b: tuple[Point, float] | None) -> 
 
 def _check_own(contour: Contour) -> None:
     count = len(contour.edges)
-    for i, j in close_pairs([edge.bounds for edge in contour.edges], EPSILON):
+    for i, j in close_pairs(contour.boxes, EPSILON):
         a, b = contour.edges[i], contour.edges[j]
         neighbours = (i - j) % count in (1, count - 1)
         # One goes on where the other ends, and neither is more than half a turn: of neighbours,
@@ -139,8 +139,7 @@ def _reaching(one: Contour, other: Contour) -> list[Edge]:
     left, bottom, right, top = widened(other.bounds, EPSILON)
     return [
         edge
-        for edge in one.edges
-        for low_x, low_y, high_x, high_y in (edge.bounds,)
+        for edge, (low_x, low_y, high_x, high_y) in zip(one.edges, one.boxes, strict=True)
         if low_x <= right and high_x >= left and low_y <= top and high_y >= bottom
     ]
 

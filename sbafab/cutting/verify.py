@@ -141,6 +141,8 @@ def check_contours(found: Region, expected: Region, tolerance: float) -> None:
     ):
         if len(ours) != len(theirs):
             raise OutputError(f"it has {len(theirs)} {kind}, not {len(ours)}.")
+        if all(map(_same, ours, theirs)):
+            continue
         for contour, nearest in _paired(ours, theirs):
             if _same(contour, nearest):
                 continue

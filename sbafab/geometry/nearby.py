@@ -50,9 +50,10 @@ def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, in
 class EdgeIndex:
     """Edges filed by the cells of a square grid that their bounding boxes touch."""
 
-    def __init__(self, edges: Sequence[Edge]) -> None:
+    def __init__(self, edges: Sequence[Edge], boxes: Sequence[Bounds] | None = None) -> None:
+        """``boxes``: the bounds of the edges, where they are known."""
         self.edges = edges
-        self._boxes = [edge.bounds for edge in edges]
+        self._boxes = boxes if boxes is not None else [edge.bounds for edge in edges]
         boxes = self._boxes or [(0.0, 0.0, 0.0, 0.0)]
         self._low = min(box[0] for box in boxes), min(box[1] for box in boxes)
         self._high = max(box[2] for box in boxes), max(box[3] for box in boxes)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -35,8 +35,7 @@ MANY = 32
 NOWHERE: Bounds = (math.inf, math.inf, -math.inf, -math.inf)
 
 
-def _join(bounds: Iterable[Bounds]) -> Bounds:
-    boxes = tuple(bounds)
+def _join(boxes: Sequence[Bounds]) -> Bounds:
     if not boxes:
         return NOWHERE
     left, bottom, right, top = zip(*boxes, strict=True)
@@ -90,8 +89,13 @@ class Contour:
         return sum(edge.length for edge in self.edges)
 
     @cached_property
+    def boxes(self) -> tuple[Bounds, ...]:
+        """The bounds of each edge."""
+        return tuple([edge.bounds for edge in self.edges])
+
+    @cached_property
     def bounds(self) -> Bounds:
-        return _join(edge.bounds for edge in self.edges)
+        return _join(self.boxes)
 
     @property
     def is_hole(self) -> bool:
@@ -139,7 +143,9 @@ class Contour:
         )
 
     def reversed(self) -> Contour:
-        return Contour(tuple(edge.reversed() for edge in reversed(self.edges)))
+        turned = Contour(tuple([edge.reversed() for edge in reversed(self.edges)]))
+        turned.__dict__["circle"] = self.circle
+        return turned
 
     def winding(self, p: Point) -> int:
         """How many times the contour runs counter-clockwise round ``p`` (not on an edge)."""
@@ -163,8 +169,7 @@ class Contour:
         count = len(self.edges) // 4
         step = (high - low) / count
         rows: list[list[Edge]] = [[] for _ in range(count)]
-        for edge in self.edges:
-            _, bottom, _, top = edge.bounds
+        for edge, (_, bottom, _, top) in zip(self.edges, self.boxes, strict=True):
             # One row more at both ends: a row's own limits are rounded.
             first, last = int((bottom - low) / step) - 1, int((top - low) / step) + 1
             for row in range(max(0, first), min(count - 1, last) + 1):
@@ -243,7 +248,7 @@ class Region:
     @cached_property
     def bounds(self) -> Bounds:
         """Least x, least y, largest x, largest y."""
-        return _join(contour.bounds for contour in self.contours)
+        return _join([contour.bounds for contour in self.contours])
 
     @property
     def is_empty(self) -> bool:
@@ -264,7 +269,7 @@ class Region:
     @cached_property
     def index(self) -> EdgeIndex:
         """The edges filed by place."""
-        return EdgeIndex(self.edges)
+        return EdgeIndex(self.edges, [box for contour in self.contours for box in contour.boxes])
 
     @cached_property
     def pieces(self) -> tuple[Region, ...]:
@@ -348,14 +353,25 @@ class Region:
     def mapped(self, point: Callable[[Point], Point], scale: float, mirror: bool) -> Region:
         """The region under a similarity given by its effect on points."""
 
-        def edge_of(edge: Edge) -> Edge:
-            start, end = point(edge.start), point(edge.end)
-            if isinstance(edge, Line):
-                return Line(start, end)
-            return Arc(start, end, point(edge.centre), edge.radius * scale, edge.ccw ^ mirror)
+        def mapped_contour(contour: Contour) -> Contour:
+            # Each edge starts where the one before it ends.
+            starts = [point(edge.start) for edge in contour.edges]
+            ends = [*starts[1:], starts[0]]
+            edges = tuple(
+                [
+                    Line(start, end)
+                    if isinstance(edge, Line)
+                    else Arc(start, end, point(edge.centre), edge.radius * scale, edge.ccw ^ mirror)
+                    for edge, start, end in zip(contour.edges, starts, ends, strict=True)
+                ]
+            )
+            image = Contour(edges)
+            if contour.circle is not None:
+                centre, radius = contour.circle
+                image.__dict__["circle"] = point(centre), radius * scale
+            return image.reversed() if mirror else image
 
-        contours = (Contour(tuple(map(edge_of, contour.edges))) for contour in self.contours)
-        return Region(tuple(c.reversed() if mirror else c for c in contours))
+        return Region(tuple(map(mapped_contour, self.contours)))
 
     def moved(self, dx: float, dy: float) -> Region:
         return self.mapped(lambda p: (p[0] + dx, p[1] + dy), 1.0, False)

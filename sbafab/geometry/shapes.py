@@ -13,9 +13,12 @@ def circle(centre: Point, radius: float) -> Contour:
     """A full circle, counter-clockwise, as four quarter arcs."""
     x, y = centre
     compass = [(x + radius, y), (x, y + radius), (x - radius, y), (x, y - radius)]
-    return Contour(
-        tuple(Arc(compass[i], compass[(i + 1) % 4], centre, radius, True) for i in range(4))
+    contour = Contour(
+        tuple([Arc(compass[i], compass[(i + 1) % 4], centre, radius, True) for i in range(4)])
     )
+    # Known without a look at the arcs.
+    contour.__dict__["circle"] = centre, radius
+    return contour
 
 
 def disc(centre: Point, radius: float) -> Region:

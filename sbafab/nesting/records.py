@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.edges import Bounds, Point, unit
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
 
@@ -108,4 +108,5 @@ class Nest:
 
 def placed(region: Region, turn: Turn, shift: Point) -> Region:
     """A region turned by exact quarter turns about the origin and then moved."""
-    return region.turned(90.0 * turn).moved(*shift)
+    (c, s), (dx, dy) = unit(90.0 * turn), shift
+    return region.mapped(lambda p: (p[0] * c - p[1] * s + dx, p[0] * s + p[1] * c + dy), 1.0, False)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from sbafab.as_built.agreement import in_agreement, with_circles
+from sbafab.as_built.uncut import uncut
 from sbafab.cutting.chaining import check_clear
 from sbafab.cutting.properties import CutSettings
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.boolean import GeometryError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.as_built.agreement import in_agreement, with_circles
-from sbafab.output.as_built.uncut import uncut
 from sbafab.rules import registration_yield
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from sbafab.as_built.check import check_written
+from sbafab.as_built.meant import Meant, Work
+from sbafab.as_built.records import CLAIMS, DESIGNED, INTEGRITY
 from sbafab.cutting.properties import CutSettings
 from sbafab.errors import DefectError, OutputError
 from sbafab.geometry.region import Region
-from sbafab.output.as_built.check import check_written
-from sbafab.output.as_built.meant import Meant, Work
-from sbafab.output.as_built.records import CLAIMS, DESIGNED, INTEGRITY
 from sbafab.output.batch import Batch
 from sbafab.output.contents import Checked
 from sbafab.output.shop import Progress

@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
+from sbafab.as_built.check import check_folder
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.as_built.check import check_folder
 from sbafab.output.run import generate
 from sbafab.rules import pin_holes
 from sbafab.rules.deck import has_failed, run_deck

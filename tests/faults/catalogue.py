@@ -10,13 +10,13 @@ from pathlib import Path
 from filelock import FileLock
 
 from sbafab.actuators import load_design
+from sbafab.as_built.check import read_folder
 from sbafab.design.writing import design_sha256
-from sbafab.output.as_built.check import read_folder
 from sbafab.output.run import generate
+from tests.as_built.doctoring import Doctor
 from tests.faults import beside, chords, claims, files, holes, layers, masks, sheets
 from tests.faults.record import Fault, Kind
 from tests.faults.specimen import Specimen, failing, unabridged
-from tests.output.doctoring import Doctor
 
 TEMPLATES = ("1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm")
 BALLOONS = 2

@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 
 import pytest
 
-from sbafab.output.as_built.cut_files import CutPart
+from sbafab.as_built.cut_files import CutPart
 from tests.faults.catalogue import Goods, good_folders
 from tests.faults.once import remembering
 

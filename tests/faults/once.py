@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+from sbafab.as_built import check as as_built
+from sbafab.as_built import derived
+from sbafab.as_built.records import Manifest
 from sbafab.design.writing import design_sha256
-from sbafab.output.as_built import check as as_built
-from sbafab.output.as_built import derived
-from sbafab.output.as_built.records import Manifest
 from sbafab.output.contents import Checked
 
 

@@ -11,6 +11,12 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+from sbafab.as_built import check as as_built
+from sbafab.as_built import cut_files, stack
+from sbafab.as_built.check import check_folder, design_problems_of, read_folder
+from sbafab.as_built.cut_files import CutPart, read_part
+from sbafab.as_built.meant import Expected
+from sbafab.as_built.sheets import sheet_problems
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.order import cutting_order
@@ -19,16 +25,10 @@ from sbafab.laminate import laminate
 from sbafab.laminate.interfaces import interface_regions
 from sbafab.laminate.laminate import Laminate, Layer, Role
 from sbafab.output import run
-from sbafab.output.as_built import check as as_built
-from sbafab.output.as_built import cut_files, stack
-from sbafab.output.as_built.check import check_folder, design_problems_of, read_folder
-from sbafab.output.as_built.cut_files import CutPart, read_part
-from sbafab.output.as_built.meant import Expected
-from sbafab.output.as_built.sheets import sheet_problems
 from sbafab.output.manifest import manifest
 from sbafab.rules import registration_worst_case, registration_yield
 from sbafab.rules.deck import RULES, run_deck
-from tests.output.doctoring import Doctor
+from tests.as_built.doctoring import Doctor
 
 Change = Callable[[Region, Laminate], Region]
 Pick = Callable[[Laminate], Layer]

@@ -13,13 +13,13 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import load_design
+from sbafab.as_built.check import check_folder
 from sbafab.errors import OutputError
-from sbafab.output.as_built.check import check_folder
 from sbafab.output.run import generate
+from tests.as_built.doctoring import Doctor
 from tests.faults.harmless import changes_nothing
 from tests.faults.mutants import mutated
 from tests.faults.once import remembering
-from tests.output.doctoring import Doctor
 
 COUNT = int(os.environ.get("SBAFAB_FAULTS", "16"))
 SEED = int(os.environ.get("SBAFAB_FAULTS_SEED", "12"))

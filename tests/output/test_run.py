@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
+from sbafab.as_built.check import check_folder
 from sbafab.design.writing import design_sha256
 from sbafab.meshing.conforming.settings import MeshSettings
 from sbafab.output import contents
-from sbafab.output.as_built.check import check_folder
 from sbafab.output.contents import Conforming
 from sbafab.output.run import Extras, generate
 

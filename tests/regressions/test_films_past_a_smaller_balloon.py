@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
+from sbafab.as_built.check import check_folder
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc
-from sbafab.output.as_built.check import check_folder
 from sbafab.output.run import generate
 from sbafab.reports.traveller.placing import over_tab
 from sbafab.rules.finding import Finding
-from tests.output.doctoring import Doctor
+from tests.as_built.doctoring import Doctor
 
 AXIS = (0.0, 0.0)
 

@@ -9,7 +9,7 @@ import ezdxf
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.output.as_built.check import check_folder
+from sbafab.as_built.check import check_folder
 from sbafab.output.run import generate
 
 FEW = ("rules.yield_builds=100", "registration.method=ears")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sbafab.actuators import load_design
-from sbafab.output.as_built.check import check_folder
+from sbafab.as_built.check import check_folder
 from sbafab.output.run import generate
 
 

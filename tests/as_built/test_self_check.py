@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
 import pytest
 
 from sbafab.actuators import load_design
+from sbafab.as_built import check as as_built
+from sbafab.as_built.check import check_folder
 from sbafab.cli.ending import ended_plainly
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
@@ -18,16 +21,16 @@ from sbafab.errors import DefectError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.models.figures import Asked
 from sbafab.models.prediction import predict
+from sbafab.nesting.bottom_left import bottom_left
+from sbafab.nesting.records import Part, Placement, Stock
 from sbafab.output import run as run_module
-from sbafab.output.as_built import check as as_built
-from sbafab.output.as_built.check import check_folder
 from sbafab.output.job import generate_job
 from sbafab.output.manifest import file_hashes
 from sbafab.output.predicting import with_prediction
 from sbafab.output.run import Extras, generate
 from sbafab.output.shop import write_cut_set
 from sbafab.rules.deck import Rule
-from tests.output.doctoring import Doctor
+from tests.as_built.doctoring import Doctor
 
 FEW = ("stack.balloons=1", "rules.yield_builds=100")
 Edit = Callable[[Path], object]
@@ -144,3 +147,22 @@ def test_chords_that_are_too_coarse_are_the_users_choice(tmp_path: Path) -> None
         pytest.raises(OutputError, match=r"smaller --chord-error than 0\.005"),
     ):
         generate(design, tmp_path, ("cut",), dxf_profile="chords")
+
+
+@pytest.mark.parametrize(
+    ("shift", "said"), [((0.5, 0.0), "mm apart at x"), ((-4.5, 0.0), "into the border")]
+)
+def test_parts_of_a_nest_that_lie_badly_are_not_let_through(
+    shift: tuple[float, float], said: str, tmp_path: Path
+) -> None:
+    def moved(parts: Sequence[Part], stock: Stock) -> tuple[Placement, ...]:
+        first, *others = bottom_left(parts, stock)
+        x, y = first.shift
+        return (replace(first, shift=(x + shift[0], y + shift[1])), *others)
+
+    with (
+        patch("sbafab.nesting.bottom_left.bottom_left", moved),
+        pytest.raises(DefectError, match=said),
+    ):
+        generate(load_design("1dof-5mm", FEW), tmp_path, ("cut",))
+    assert not (tmp_path / "1dof-5mm").exists()

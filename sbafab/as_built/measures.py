@@ -7,13 +7,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from sbafab.as_built.claims import claim, waiver_properties
+from sbafab.as_built.cut_files import CutPart, LayerFile, read_part, told_of
+from sbafab.as_built.records import CLAIMS, INTEGRITY, Manifest, Problem
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
-from sbafab.output.as_built.claims import claim, waiver_properties
-from sbafab.output.as_built.cut_files import CutPart, LayerFile, read_part, told_of
-from sbafab.output.as_built.records import CLAIMS, INTEGRITY, Manifest, Problem
 from sbafab.rules.limits import TOLERANCE, at
 
 SHARE = 1e-4

@@ -13,6 +13,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from sbafab.as_built.likeness import file_difference, index_difference
+from sbafab.as_built.meant import drawn_settings
+from sbafab.as_built.meshes import bodies
+from sbafab.as_built.records import DESIGNED, Job, Manifest, Problem, is_joined
 from sbafab.cutting.files import CutFile
 from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.fixture import write_fixture
@@ -23,10 +27,6 @@ from sbafab.geometry.boolean import GeometryError
 from sbafab.geometry.region import Region
 from sbafab.nesting.parts import parts_of
 from sbafab.nesting.records import Part as NestPart
-from sbafab.output.as_built.likeness import file_difference, index_difference
-from sbafab.output.as_built.meant import drawn_settings
-from sbafab.output.as_built.meshes import bodies
-from sbafab.output.as_built.records import DESIGNED, Job, Manifest, Problem, is_joined
 from sbafab.output.batch import Drawing, plan_batch, write_batch
 from sbafab.output.contents import TRAVELLER, Checked, Made, Part, schedule_of, write_contents
 from sbafab.output.earlier import PRESS

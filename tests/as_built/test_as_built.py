@@ -13,15 +13,15 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import load_design
+from sbafab.as_built.check import check_folder, read_folder
 from sbafab.cli import main
 from sbafab.cutting.chords import in_chords
 from sbafab.errors import OutputError
 from sbafab.geometry.offset import grow, shrink
-from sbafab.output.as_built.check import check_folder, read_folder
 from sbafab.output.run import generate
 from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding
-from tests.output.doctoring import Doctor
+from tests.as_built.doctoring import Doctor
 
 
 def failed(folder: Path) -> dict[str, Finding]:

@@ -16,7 +16,7 @@ from sbafab.cutting.chords import in_chords
 from sbafab.errors import DesignError
 from sbafab.geometry.shapes import disc, rectangle
 from sbafab.output.run import generate
-from tests.output.doctoring import Doctor
+from tests.as_built.doctoring import Doctor
 
 EARS = "registration.method=ears"
 FEW = ("stack.balloons=2", "rules.yield_builds=100")

@@ -11,16 +11,16 @@ from typing import Any
 import pytest
 
 from sbafab.actuators import load_design
+from sbafab.as_built.check import check_folder, read_folder
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.order import cutting_order
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc
-from sbafab.output.as_built.check import check_folder, read_folder
 from sbafab.output.job import generate_job
 from sbafab.output.run import generate
-from tests.output.doctoring import Doctor
+from tests.as_built.doctoring import Doctor
 
 Claims = dict[str, Any]
 

@@ -18,12 +18,12 @@ from ezdxf.addons import r12export
 from ezdxf.document import Drawing
 
 from sbafab.actuators import load_design
+from sbafab.as_built.check import check_folder
 from sbafab.cutting.dxf_write import DxfProfile
-from sbafab.output.as_built.check import check_folder
 from sbafab.output.run import generate
 from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding
-from tests.output.doctoring import Doctor
+from tests.as_built.doctoring import Doctor
 
 Move = Callable[[float], float]
 FOLDERS: list[tuple[str, tuple[str, ...], DxfProfile]] = [

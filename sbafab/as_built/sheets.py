@@ -6,6 +6,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
+from sbafab.as_built.agreement import AGREED
+from sbafab.as_built.claims import bare_problem, claim
+from sbafab.as_built.cut_files import check_sequence, inside, sound_digest
+from sbafab.as_built.measures import SHARE
+from sbafab.as_built.pieces import CutSheet, Lot, piece_problems
+from sbafab.as_built.records import (
+    INTEGRITY,
+    FilmUseClaim,
+    KerfClaim,
+    Problem,
+    SheetClaim,
+)
 from sbafab.cutting.cut_layers import ENGRAVE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import Surroundings
@@ -20,18 +32,6 @@ from sbafab.geometry.intersect import meeting_points
 from sbafab.laminate.films import Material
 from sbafab.nesting.check import check_placed
 from sbafab.nesting.records import Stock
-from sbafab.output.as_built.agreement import AGREED
-from sbafab.output.as_built.claims import bare_problem, claim
-from sbafab.output.as_built.cut_files import check_sequence, inside, sound_digest
-from sbafab.output.as_built.measures import SHARE
-from sbafab.output.as_built.pieces import CutSheet, Lot, piece_problems
-from sbafab.output.as_built.records import (
-    INTEGRITY,
-    FilmUseClaim,
-    KerfClaim,
-    Problem,
-    SheetClaim,
-)
 from sbafab.output.settings import stocks
 
 ROUNDED = 2e-3

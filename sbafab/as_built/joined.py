@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from sbafab.as_built.claims import claim
+from sbafab.as_built.records import Joined, Problem, read_joined
 from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
 from sbafab.assemblies.reading import load_assembly
 from sbafab.assemblies.writing import DESIGN_FILE, assembly_sha256, part_entry
 from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError
-from sbafab.output.as_built.claims import claim
-from sbafab.output.as_built.records import Joined, Problem, read_joined
 from sbafab.rules.finding import Finding
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
+from sbafab.as_built.check import check_folder, read_folder
 from sbafab.cutting.dxf_write import DxfProfile
-from sbafab.output.as_built.check import check_folder, read_folder
 from sbafab.output.run import generate
 from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding

@@ -7,15 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sbafab.actuators import build, load_design, records
-from sbafab.design.reading import validated
-from sbafab.design.records import Design
-from sbafab.design.writing import design_sha256
-from sbafab.errors import DesignError, OutputError
-from sbafab.geometry.region import Region
-from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.models.sizes import sizes
-from sbafab.output.as_built.chords import chorded_place
-from sbafab.output.as_built.claims import (
+from sbafab.as_built.chords import chorded_place
+from sbafab.as_built.claims import (
     claim,
     design_problems,
     file_problems,
@@ -24,11 +17,11 @@ from sbafab.output.as_built.claims import (
     order_problems,
     property_problems,
 )
-from sbafab.output.as_built.cut_files import CutPart, LayerFile, inside, read_layers
-from sbafab.output.as_built.derived import derived_job_problems, derived_problems
-from sbafab.output.as_built.joined import joined_findings, lowered_between
-from sbafab.output.as_built.meant import Meant, Work, departure, meant_by
-from sbafab.output.as_built.measures import (
+from sbafab.as_built.cut_files import CutPart, LayerFile, inside, read_layers
+from sbafab.as_built.derived import derived_job_problems, derived_problems
+from sbafab.as_built.joined import joined_findings, lowered_between
+from sbafab.as_built.meant import Meant, Work, departure, meant_by
+from sbafab.as_built.measures import (
     fixture_problems,
     interface_problems,
     layer_problems,
@@ -37,8 +30,8 @@ from sbafab.output.as_built.measures import (
     size_problems,
     with_plate_pins,
 )
-from sbafab.output.as_built.pieces import Lot
-from sbafab.output.as_built.records import (
+from sbafab.as_built.pieces import Lot
+from sbafab.as_built.records import (
     CLAIMS,
     DESIGNED,
     INTEGRITY,
@@ -50,8 +43,15 @@ from sbafab.output.as_built.records import (
     read_claims,
     read_job,
 )
-from sbafab.output.as_built.sheets import Order, sheet_problems
-from sbafab.output.as_built.stack import laminate_of, stacked_layers
+from sbafab.as_built.sheets import Order, sheet_problems
+from sbafab.as_built.stack import laminate_of, stacked_layers
+from sbafab.design.reading import validated
+from sbafab.design.records import Design
+from sbafab.design.writing import design_sha256
+from sbafab.errors import DesignError, OutputError
+from sbafab.geometry.region import Region
+from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.models.sizes import sizes
 from sbafab.output.contents import Checked
 from sbafab.output.settings import limits as limits_of
 from sbafab.rules import film_limits

@@ -16,11 +16,11 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from sbafab.as_built.cut_files import sound_digest
+from sbafab.as_built.meshes import mesh_difference
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.verify import TOLERANCE, check_contours
 from sbafab.errors import OutputError
-from sbafab.output.as_built.cut_files import sound_digest
-from sbafab.output.as_built.meshes import mesh_difference
 
 SHARE, LEAST = 1e-6, 1e-6
 """Numbers that differ by less, relatively or at all, say the same: libraries round otherwise."""

@@ -7,15 +7,15 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from sbafab.as_built.agreement import AGREED
+from sbafab.as_built.claims import claim
+from sbafab.as_built.cut_files import LayerFile
+from sbafab.as_built.records import CLAIMS, Problem, SheetClaim
 from sbafab.cutting.verify import check_contours
 from sbafab.errors import OutputError
-from sbafab.geometry.region import Region
+from sbafab.geometry.region import Mark, Region
 from sbafab.laminate.films import Material, in_order
 from sbafab.nesting.records import TURNS, Turn
-from sbafab.output.as_built.agreement import AGREED
-from sbafab.output.as_built.claims import claim
-from sbafab.output.as_built.cut_files import LayerFile
-from sbafab.output.as_built.records import CLAIMS, Problem, SheetClaim
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,7 @@ class Lot:
     files: Sequence[LayerFile]
 
 
+_Outline = frozenset[tuple[Mark, ...]]
 _Pattern = tuple[str, str]
 """A design and one of its patterns."""
 
@@ -62,13 +63,14 @@ class _Kinds:
         self.all: list[_Kind] = []
         self._turns = turns
         self._room = room
-        self._known: dict[str, _Kind] = {}
+        self._known: dict[_Outline, _Kind] = {}
 
     def find(self, piece: Region) -> _Kind | None:
         """The kind that a piece is of, wherever it lies and however it may be turned."""
-        lying = _at_origin(piece)
-        known = self._known.get(lying.key)
+        outline = _outline(piece)
+        known = self._known.get(outline)
         if known is None:
+            lying = _at_origin(piece)
             known = next(
                 (
                     kind
@@ -78,14 +80,13 @@ class _Kinds:
                 None,
             )
             if known is not None:
-                self._known[lying.key] = known
+                self._known[outline] = known
         return known
 
     def add(self, piece: Region) -> _Kind:
         forms = (_at_origin(piece.turned(90.0 * turn)) for turn in self._turns)
         kind = _Kind(tuple({form.key: form for form in forms}.values()))
         self.all.append(kind)
-        self._known.update({form.key: kind for form in kind.forms})
         return kind
 
 
@@ -183,6 +184,17 @@ def _groups(kinds: Sequence[_Kind]) -> dict[_Pattern, _Pattern]:
         groups |= dict.fromkeys(kind.wanted, first)
         groups |= {pattern: first for pattern, group in groups.items() if group in joined}
     return groups
+
+
+def _outline(piece: Region) -> _Outline:
+    """Its contours from the lower left corner of its box, in nm: most copies have one."""
+    x, y, _, _ = piece.bounds
+    return frozenset(
+        tuple(
+            [(round(px - x, 6), round(py - y, 6), round(third, 6)) for px, py, third in own.marks]
+        )
+        for own in piece.contours
+    )
 
 
 def _at_origin(piece: Region) -> Region:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from sbafab.as_built.chords import with_arcs
 from sbafab.cutting.chaining import check_clear
 from sbafab.errors import OutputError
 from sbafab.geometry.beam import Kerf, widths
@@ -14,7 +15,6 @@ from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
 from sbafab.geometry.offset import shrink
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.tracks import rim
-from sbafab.output.as_built.chords import with_arcs
 
 KINK = 0.05
 """Radians: arcs along one curve turn less where they join, corners of a path more."""

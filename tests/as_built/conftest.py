@@ -9,7 +9,7 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.output.run import generate
-from tests.output.doctoring import Doctor
+from tests.as_built.doctoring import Doctor
 
 FEW_BUILDS = "rules.yield_builds=100"
 

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from sbafab.actuators.stacking import film_of
+from sbafab.as_built.cut_files import LayerFile
+from sbafab.as_built.records import CLAIMS, Job, KerfClaim, LayerClaim, Manifest, Problem
 from sbafab.cutting.properties import (
     LIMITS,
     curves_property,
@@ -17,8 +19,6 @@ from sbafab.cutting.properties import (
 )
 from sbafab.design.records import Design
 from sbafab.laminate.laminate import Layer
-from sbafab.output.as_built.cut_files import LayerFile
-from sbafab.output.as_built.records import CLAIMS, Job, KerfClaim, LayerClaim, Manifest, Problem
 from sbafab.output.manifest import file_hashes
 from sbafab.output.settings import kerf_widths, limits, warnings
 from sbafab.rules.lowered import lowered
