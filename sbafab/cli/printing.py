@@ -82,15 +82,11 @@ def findings_table(findings: Sequence[Finding]) -> Table:
 
 
 def notes_of(checked: Iterable[Checked]) -> list[str]:
-    """What is to be known of several designs, their kits first: each sentence once, with the names
-    it is true of.
-    """
-    from sbafab.design.kits import cited
-
+    """What is to be known of several designs: each sentence once, with the names it is true of."""
     names: dict[str, list[str]] = {}
     designs = list(checked)
     for one in designs:
-        for note in (cited(one.design), *one.laminate.notes):
+        for note in one.laminate.notes:
             names.setdefault(note, []).append(one.design.name)
     return [
         note if len(of) == len(designs) else f"{', '.join(of)}: {note}"

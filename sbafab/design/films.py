@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 from sbafab.design.section import Section
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
 from sbafab.geometry.beam import Kerf, is_kerf
-from sbafab.laminate.films import PTFE_WARNING, Film, FilmKind, Material
+from sbafab.laminate.films import PAPER_TPE, PTFE_WARNING, Film, FilmKind, Material
 
 UNCALIBRATED: Literal["uncalibrated"] = "uncalibrated"
 FILM_NAME = re.compile(r"[a-z][a-z0-9]{0,15}")
@@ -110,6 +110,10 @@ class OtherFilm(Section):
     bonds only to films that melt on it."""
     temperature_limit: float | None = Field(default=None, gt=0, le=HOTTEST)
     """C; the press must stay below. A mask has one."""
+    modulus: float | None = Field(default=None, gt=0, le=1e6)
+    """MPa, Young's; CalculiX needs it. TPE has the paper's 10."""
+    poisson: float = Field(default=0.3, ge=0, lt=0.5)
+    """Poisson's ratio, for CalculiX too; TPE has the paper's 0.2."""
     warning: str = Field(default="", max_length=200)
     """What every cut file of it says, for instance of its fumes."""
     kerf: KerfWidth = UNCALIBRATED
@@ -158,7 +162,15 @@ class Films(Section):
         tpe, ptfe = self.tpe, self.ptfe
         limit = ptfe.temperature_limit
         found = {
-            "tpe": Film("TPE", tpe.product, tpe.thickness, tpe.density, tpe.melting_point, limit),
+            "tpe": Film(
+                "TPE",
+                tpe.product,
+                tpe.thickness,
+                tpe.density,
+                tpe.melting_point,
+                limit,
+                elastic=PAPER_TPE,
+            ),
             "ptfe": Film(
                 "PTFE",
                 ptfe.product,
@@ -180,6 +192,7 @@ class Films(Section):
                 limit=HOTTEST if film.temperature_limit is None else film.temperature_limit,
                 kind=film.kind,
                 warning=film.warning,
+                elastic=None if film.modulus is None else (film.modulus, film.poisson),
                 shade=sum(known.kind == film.kind for known in found.values()),
             )
         return found

@@ -28,9 +28,9 @@ from sbafab.design.reading import (
     write_copy,
 )
 from sbafab.design.records import NAME_PATTERN, Design, Laser, Press, Registration, Rules, Sheets
-from sbafab.design.section import Section
+from sbafab.design.section import Section, writable
 from sbafab.design.units import Length, millimetres
-from sbafab.design.writing import resolved
+from sbafab.design.writing import plain_tables, resolved
 from sbafab.errors import DesignError
 
 DEFAULT = "paper"
@@ -104,6 +104,10 @@ def kit_path(kit: object, folder: Path) -> Path:
     """The file of the kit that a design in ``folder`` names. Raises DesignError."""
     if not isinstance(kit, str):
         raise DesignError(f"kit = {shown(kit)} must be a text in quotes: a kit's name or its file")
+    try:
+        writable(kit)
+    except ValueError as error:
+        raise DesignError(f"kit = {shown(kit)} {error}") from None
     if kit in kit_names():
         return templates_folder() / KITS / f"{kit}.toml"
     path = folder / kit
@@ -247,24 +251,22 @@ def _inlet(kit: Kit, own: Mapping[str, Any], is_named: bool) -> dict[str, Any]:
 
 
 def without_kit(data: Mapping[str, Any], design: Design) -> dict[str, Any]:
-    """A design's tables without the values that are its kit's, so that another kit can give its."""
+    """A design's tables without values that its kit or a default gives: another kit may."""
     kit = kit_of(design)
     given = {**kit.tables, "inlet": _inlet(kit, {}, False)}
-    usual = type(design).model_validate(
-        {"name": design.name, "family": design.family, **{s: given[s] for s in given}}
-    )
-    return _less(data, resolved(usual), given)
+    usual = type(design).model_validate({"name": "x", "family": design.family, **given})
+    tables = {key: table for key, table in data.items() if isinstance(table, dict)}
+    return {**data, **dict.fromkeys(tables, {}), **_less(tables, plain_tables(usual))}
 
 
-def _less(
-    data: Mapping[str, Any], usual: Mapping[str, Any], given: Mapping[str, Any]
-) -> dict[str, Any]:
+def _less(data: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
+    """What differs from the usual values, tables that are left with nothing taken out."""
     left: dict[str, Any] = {}
     for key, value in data.items():
-        if isinstance(value, dict) and isinstance(given.get(key), dict):
-            left[key] = _less(value, usual[key], given[key])
-        elif key not in given or value != usual[key]:
-            left[key] = value
+        inner = usual.get(key)
+        own = _less(value, inner) if isinstance(value, dict) and isinstance(inner, dict) else value
+        if own != inner and own != {}:
+            left[key] = own
     return left
 
 

@@ -162,8 +162,8 @@ def start_where_the_user_stands(data: dict[str, Any], changes: Iterable[Change])
     if OUTLINE in keys:
         chamber = data["chamber"]
         chamber["outline"] = str(Path(str(chamber["outline"])).absolute())
-    if KIT in keys and data[KIT] not in kit_names():
-        data[KIT] = str(Path(str(data[KIT])).absolute())
+    if KIT in keys and isinstance(data[KIT], str) and data[KIT] not in kit_names():
+        data[KIT] = str(Path(data[KIT]).absolute())
 
 
 def changed(design: AnyDesign, changes: Iterable[Change]) -> AnyDesign:

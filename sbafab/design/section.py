@@ -24,10 +24,15 @@ class Section(BaseModel):
     @field_validator("*")
     @classmethod
     def _can_be_written(cls, value: object) -> object:
-        found = _UNWRITABLE.search(value) if isinstance(value, str) else None
-        if found is not None:
-            raise ValueError(
-                f"must be plain text; remove the character U+{ord(found[0]):04X} "
-                f"at place {found.start() + 1}"
-            )
-        return value
+        return writable(value)
+
+
+def writable(value: object) -> object:
+    """The same value. Raises ValueError for a text that pages and pictures cannot hold."""
+    found = _UNWRITABLE.search(value) if isinstance(value, str) else None
+    if found is not None:
+        raise ValueError(
+            f"must be plain text; remove the character U+{ord(found[0]):04X} "
+            f"at place {found.start() + 1}"
+        )
+    return value

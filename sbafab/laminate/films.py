@@ -18,6 +18,10 @@ PTFE_WARNING = (
 )
 
 
+PAPER_TPE = (10.0, 0.2)
+"""Young's modulus in MPa and Poisson's ratio of the paper's model (Sec. 3.2.1)."""
+
+
 @dataclass(frozen=True)
 class Film:
     """A film as it comes off the roll.
@@ -25,7 +29,8 @@ class Film:
     ``thickness`` mm, ``density`` kg/m3. ``softens_above`` is what the film bonds at (the melting
     point of a TPE; None for one that stays solid and bonds to what melts on it), ``limit`` the
     temperature it must not exceed; both in C. ``shade`` counts the films of a kind,
-    for colours; ``warning`` is what its cut files say.
+    for colours; ``warning`` is what its cut files say; ``elastic`` are Young's modulus in MPa and
+    Poisson's ratio, for simulators.
     """
 
     material: Material
@@ -37,6 +42,7 @@ class Film:
     kind: FilmKind = "structural"
     shade: int = 0
     warning: str = ""
+    elastic: tuple[float, float] | None = None
 
     @property
     def is_mask(self) -> bool:

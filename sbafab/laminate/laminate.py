@@ -13,7 +13,7 @@ from typing import Literal, get_args
 
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
-from sbafab.laminate.films import Film
+from sbafab.laminate.films import Film, in_order
 from sbafab.laminate.interfaces import Interface, InterfaceKind, interface_regions
 
 Role = Literal["base", "wall", "cap", "sheet", "chamber-mask", "separator-mask"]
@@ -155,7 +155,13 @@ class Laminate:
 
     @cached_property
     def tpe_layers(self) -> tuple[Layer, ...]:
+        """The layers that bond: all of structural films, TPE or further ones."""
         return tuple(layer for layer in self.layers if not layer.is_mask)
+
+    @property
+    def bonded_materials(self) -> str:
+        """The materials of the films that bond, in words."""
+        return ", ".join(in_order(layer.film.material for layer in self.tpe_layers))
 
     @cached_property
     def patterns(self) -> dict[str, tuple[Layer, ...]]:

@@ -55,8 +55,8 @@ class Canvas:
         colour = min(255, round(r * step)), min(255, round(g * step)), min(255, round(b * step))
         return self._index.setdefault(colour, len(self._index))
 
-    def png(self, footprint: Sequence[Sequence[Point]], caption: str) -> bytes:
-        """The picture over the soft shadow of ``footprint``, with caption and key."""
+    def png(self, footprint: Sequence[Sequence[Point]], caption: str, films: str) -> bytes:
+        """The picture over the soft shadow of ``footprint``, with caption and key of ``films``."""
         from PIL import ImageChops
 
         self._image.putpalette([part for colour in self._index for part in colour])
@@ -67,7 +67,7 @@ class Canvas:
         # in proportion, leaves no bright rim round the solid.
         lack = ImageChops.multiply(ImageChops.invert(backdrop).convert("RGB"), empty.convert("RGB"))
         picture = ImageChops.subtract(painted, lack)
-        self._write(picture, caption)
+        self._write(picture, caption, films)
         out = BytesIO()
         picture.save(out, "PNG", compress_level=6)
         return out.getvalue()
@@ -84,7 +84,7 @@ class Canvas:
             draw.polygon([(x / shrink + 2, y / shrink + 4) for x, y in ring], fill=255 - SHADOW)
         return small.filter(ImageFilter.GaussianBlur(BLUR)).resize(self._size)
 
-    def _write(self, picture: Image, caption: str) -> None:
+    def _write(self, picture: Image, caption: str, films: str) -> None:
         """Caption and colour key along the foot, in Pillow's own font."""
         from PIL import ImageDraw, ImageFont
 
@@ -95,7 +95,7 @@ class Canvas:
         x, y = round(0.03 * width), height - 2 * size
         draw.text((x, y - 1.7 * size), caption, fill=INK, font=font)
         key: list[tuple[Tone, str]] = [
-            ("film", "TPE"),
+            ("film", films),
             ("cut film", "film, cut"),
             ("cut bond", "bond, cut"),
             ("shade", "open gap"),
