@@ -256,7 +256,7 @@ def without_kit(data: Mapping[str, Any], design: Design) -> dict[str, Any]:
     given = {**kit.tables, "inlet": _inlet(kit, {}, False)}
     usual = type(design).model_validate({"name": "x", "family": design.family, **given})
     tables = {key: table for key, table in data.items() if isinstance(table, dict)}
-    return {**data, **dict.fromkeys(tables, {}), **_less(tables, plain_tables(usual))}
+    return {**data, **{key: {} for key in tables}, **_less(tables, plain_tables(usual))}
 
 
 def _less(data: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
@@ -265,7 +265,7 @@ def _less(data: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
     for key, value in data.items():
         inner = usual.get(key)
         own = _less(value, inner) if isinstance(value, dict) and isinstance(inner, dict) else value
-        if own != inner and own != {}:
+        if own not in (inner, {}):
             left[key] = own
     return left
 

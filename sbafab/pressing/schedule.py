@@ -230,10 +230,11 @@ def _refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
     for interface in laminate.interfaces:
         below, above = interface.below, interface.above
         if below.film.softens_above is None and above.film.softens_above is None:
+            roles = " or the ".join(dict.fromkeys((below.role, above.role)))
             raise DesignError(
                 f"layers {below.index} and {above.index} are of {below.film.material} and "
                 f"{above.film.material}, which both stay solid in the press and do not bond; give "
-                f"the {below.role} or the {above.role} another film in [layup]"
+                f"the {roles} another film in [layup]"
             )
 
 
