@@ -22,6 +22,7 @@ from sbafab.as_built.derived import derived_job_problems, derived_problems
 from sbafab.as_built.joined import joined_findings, lowered_between
 from sbafab.as_built.meant import Meant, Work, departure, meant_by
 from sbafab.as_built.measures import (
+    batch_problems,
     fixture_problems,
     interface_problems,
     layer_problems,
@@ -242,7 +243,7 @@ def read_folder(folder: Path, of_job: bool = False, work: Work | None = None) ->
     if len(parts) == len(files):
         try:
             laminate = _laminate(files, claims, design, meant)
-            problems += _laminate_problems(folder, laminate, claims, parts)
+            problems += _laminate_problems(folder, laminate, claims, parts, design)
             room = 2 * (TOLERANCE + chord_error)
             outline = meant.laminate.outline if meant is not None else Region()
             outlined = replace(laminate, outline=outline)
@@ -343,11 +344,13 @@ def _laminate_problems(
     laminate: Laminate,
     claims: Manifest,
     parts: Sequence[CutPart],
+    design: Design,
 ) -> list[Problem]:
     return [
         *interface_problems(laminate, claims, parts),
         *place_problems(laminate, claims),
         *fixture_problems(folder, laminate, claims),
+        *batch_problems(laminate, claims, design),
     ]
 
 

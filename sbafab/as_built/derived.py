@@ -33,6 +33,7 @@ from sbafab.output.earlier import PRESS
 from sbafab.output.manifest import as_json
 from sbafab.output.settings import GENERATOR, cut_settings
 from sbafab.output.shop import CutSet, find_nests, write_nested_sheets
+from sbafab.pressing.together import design_runs
 
 INDEX = "manifest.json"
 UNMADE = (DesignError, OutputError, GeometryError, ArithmeticError, LookupError)
@@ -123,7 +124,7 @@ def _write_anew(
     if parts is not None:
         nests = find_nests(parts, design, folder, _quiet)
         sheets = write_nested_sheets(nests, design, fresh, settings, _quiet)
-    write_fixture(laminate, fresh, settings)
+    write_fixture(laminate, fresh, settings, design_runs(design, laminate).places)
     cut = CutSet(_cut_files(checked), FIXTURE if laminate.pins else None, claims.curves)
     pressing = schedule_of(checked) if "press" in wanted else None
     made = Made(cut, sheets, pressing, traveller=has_page)

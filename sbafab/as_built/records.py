@@ -140,6 +140,17 @@ class SheetClaim(_Claim):
     cut_length: float
 
 
+class PlaceClaim(_Claim):
+    x: float
+    y: float
+
+
+class BatchClaim(_Claim):
+    at_once: Count
+    cycles: Annotated[tuple[Count, ...], Field(max_length=1000)]
+    places: Annotated[tuple[PlaceClaim, ...], Field(min_length=1, max_length=1000)]
+
+
 class Manifest(_Claim):
     """The part of ``manifest.json`` that a check compares with what lies on disk."""
 
@@ -155,6 +166,7 @@ class Manifest(_Claim):
     waived: tuple[str, ...]
     lowered_limits: tuple[str, ...] = ()
     copies: Annotated[int, Field(ge=1, le=1000)] = 1
+    batch: BatchClaim | None = None
     sizes: dict[str, float]
     films: tuple[FilmClaim, ...]
     layers: Annotated[tuple[LayerClaim, ...], Field(min_length=1, max_length=10_000)]

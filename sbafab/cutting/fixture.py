@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from sbafab.cutting.chords import in_chords
@@ -10,35 +11,46 @@ from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import CutSettings, fixture_properties
 from sbafab.cutting.verify import verify_file
 from sbafab.geometry.boolean import union
+from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, polygon
+from sbafab.laminate.assembly import PLATE_MARGIN
 from sbafab.laminate.laminate import Laminate
 
 PATH = "sheets/fixture.dxf"
-MARGIN = 6.0
-"""mm of plate round everything that lies on it."""
 CHAMFER = 5.0
+ONE: tuple[Point, ...] = ((0.0, 0.0),)
+"""The place of a laminate that is pressed by itself."""
 
 
-def fixture(laminate: Laminate) -> Region | None:
+def fixture(laminate: Laminate, places: Sequence[Point] = ONE) -> Region | None:
     """The pin plate in the layers' own frame; None for a laminate without pins.
 
-    One corner is cut off, at the largest x and y: it tells which way round layers and plate go.
+    At each of the ``places`` it has all holes of a laminate that is moved there. One corner is cut
+    off, at the largest x and y: it tells which way round layers and plate go.
     """
     if not laminate.pins:
         return None
     low_x, low_y, high_x, high_y = laminate.bounds
-    x0, y0, x1, y1 = low_x - MARGIN, low_y - MARGIN, high_x + MARGIN, high_y + MARGIN
+    xs, ys = [x for x, _ in places], [y for _, y in places]
+    x0, y0 = min(xs) + low_x - PLATE_MARGIN, min(ys) + low_y - PLATE_MARGIN
+    x1, y1 = max(xs) + high_x + PLATE_MARGIN, max(ys) + high_y + PLATE_MARGIN
     plate = polygon([(x0, y0), (x1, y0), (x1, y1 - CHAMFER), (x1 - CHAMFER, y1), (x0, y1)])
-    return plate - union(disc(pin.centre, pin.diameter / 2) for pin in laminate.pins)
+    return plate - union(
+        disc((pin.centre[0] + x, pin.centre[1] + y), pin.diameter / 2)
+        for x, y in places
+        for pin in laminate.pins
+    )
 
 
-def write_fixture(laminate: Laminate, folder: Path, settings: CutSettings) -> str | None:
+def write_fixture(
+    laminate: Laminate, folder: Path, settings: CutSettings, places: Sequence[Point] = ONE
+) -> str | None:
     """Writes and reads back the plate's cut file; its path in ``folder``, None without pins.
 
     Nominal edges: the holes are to be reamed to the pins.
     """
-    plate = fixture(laminate)
+    plate = fixture(laminate, places)
     if plate is None:
         return None
     properties = fixture_properties(settings)

@@ -13,6 +13,8 @@ from sbafab.laminate.laminate import Laminate, Layer, Pin
 
 Bond = Literal["flash", "full"]
 StepName = Literal["flash_bottom", "bond_bottom", "flash_middle", "bond_all"]
+PLATE_MARGIN = 6.0
+"""mm of pin plate round everything that lies on it."""
 
 
 @dataclass(frozen=True)

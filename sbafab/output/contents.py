@@ -21,6 +21,7 @@ from sbafab.output.manifest import as_json, checks, file_hashes, manifest
 from sbafab.output.settings import GENERATOR, kerf_widths, limits, press_settings
 from sbafab.output.shop import CutSet, Progress
 from sbafab.pressing.schedule import Schedule, press_csv, press_json, schedule
+from sbafab.pressing.together import batch_json, design_runs
 from sbafab.rules.deck import has_failed
 from sbafab.rules.finding import Finding
 from sbafab.rules.lowered import CHECKED_AGAINST, lowered
@@ -106,7 +107,7 @@ def write_contents(
     """
     meshes: list[MeshFile] = []
     if made.pressing is not None:
-        write_text(folder / "press.json", as_json(press_json(made.pressing)))
+        write_text(folder / "press.json", as_json(_press(checked, made.pressing)))
         write_text(folder / "press.csv", press_csv(made.pressing))
     if "mesh" in wanted:
         meshes = write_meshes(
@@ -133,6 +134,12 @@ def write_contents(
     if made.conforming is not None:
         index["mesh_statistics"] = made.conforming.statistics
     return index
+
+
+def _press(checked: Checked, plan: Schedule) -> dict[str, Any]:
+    runs = design_runs(checked.design, checked.laminate)
+    batch = {"batch": batch_json(checked.laminate, runs, plan)} if runs.copies > 1 else {}
+    return {**press_json(plan), **batch}
 
 
 def close_folder(folder: Path, index: dict[str, Any]) -> None:

@@ -19,6 +19,7 @@ from sbafab.models.sizes import sizes
 from sbafab.output.settings import GENERATOR, kerf_widths, limits, warnings
 from sbafab.output.shop import CutSet, film_use
 from sbafab.output.swap import SCHEMA
+from sbafab.pressing.together import design_runs
 from sbafab.rules.finding import Finding
 from sbafab.rules.lowered import lowered
 
@@ -74,6 +75,7 @@ def manifest(
         "sizes": {name: round(value, 6) for name, value in sizes(design, laminate).items()},
         "notes": list(laminate.notes),
         "copies": design.order.copies,
+        **_batch(design, laminate),
         "films": _films(laminate, sheets),
         "warnings": list(dict.fromkeys(warnings(design).values())),
         "layers": [_layer(laminate, layer, paths.get(layer.index)) for layer in laminate.layers],
@@ -106,6 +108,15 @@ def manifest(
             for mesh in meshes
         ],
     }
+
+
+def _batch(design: Design, laminate: Laminate) -> dict[str, Any]:
+    """How several copies are pressed, and where each lies on the pin plate."""
+    runs = design_runs(design, laminate)
+    if runs.copies == 1:
+        return {}
+    places = [_place(place) for place in runs.places]
+    return {"batch": {"at_once": runs.together, "cycles": list(runs.cycles), "places": places}}
 
 
 def _place(point: tuple[float, float]) -> dict[str, float]:

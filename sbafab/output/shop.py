@@ -14,6 +14,7 @@ from sbafab.cutting.properties import CutSettings, curves_of
 from sbafab.cutting.sheets import FOLDER, SheetFile, write_sheets
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
+from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.check import check_nest
@@ -23,6 +24,7 @@ from sbafab.nesting.records import Nest, Part
 from sbafab.nesting.saved import as_dict, from_dict
 from sbafab.output.coarse import refuse_coarse
 from sbafab.output.settings import machine, stocks
+from sbafab.pressing.together import runs_of
 from sbafab.rules.limits import Limits
 
 PLACES = f"{FOLDER}/nest.json"
@@ -38,6 +40,8 @@ class CutPlan:
 
     paths: Mapping[str, Region]
     parts: tuple[Part, ...]
+    places: tuple[Point, ...]
+    """Where on the pin plate the copies of a press cycle lie."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +61,8 @@ def plan_cuts(laminate: Laminate, copies: int, settings: CutSettings, limits: Li
     paths = compensated_paths(laminate, settings)
     if settings.profile == "chords":
         refuse_coarse(laminate, paths, settings, limits)
-    return CutPlan(paths, parts_of(laminate, paths, copies))
+    runs = runs_of(laminate, copies, (limits.heated_width, limits.heated_length))
+    return CutPlan(paths, parts_of(laminate, paths, copies), runs.places)
 
 
 def find_nests(
@@ -80,7 +85,8 @@ def write_cut_set(
     files = write_layer_files(
         laminate, plan.paths, folder, settings, lambda done, total: tell("cut files", done, total)
     )
-    return CutSet(tuple(files), write_fixture(laminate, folder, settings), curves_of(settings))
+    plate = write_fixture(laminate, folder, settings, plan.places)
+    return CutSet(tuple(files), plate, curves_of(settings))
 
 
 def write_nested_sheets(

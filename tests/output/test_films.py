@@ -139,7 +139,7 @@ def test_the_press_knows_what_melts(design: Design) -> None:
     with pytest.raises(DesignError, match="reaches the limit of PET, 220 C"):
         press("press.temperature_c=230")
     with pytest.raises(
-        DesignError, match="layers 3 and 5 are of PET and PET, .* give the wall another film"
+        DesignError, match=r"layers 3 and 5 are of PET and PET, .* give the wall another film"
     ):
         press("layup.wall=pet")
 

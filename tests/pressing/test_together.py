@@ -4,7 +4,19 @@ from __future__ import annotations
 
 import pytest
 
-from sbafab.pressing.together import press_runs
+from sbafab.actuators import build, load_design
+from sbafab.cutting.fixture import fixture
+from sbafab.laminate.laminate import Laminate
+from sbafab.pressing.schedule import PressSettings, schedule
+from sbafab.pressing.together import (
+    Runs,
+    a_day,
+    are_apart,
+    batch_json,
+    batch_times,
+    press_runs,
+    runs_of,
+)
 
 INCH = 25.4
 
@@ -26,3 +38,57 @@ def test_as_many_as_the_heated_area_takes(
 ) -> None:
     runs = press_runs(copies, (-3.0, 2.0, size[0] - 3.0, size[1] + 2.0), (6 * INCH, 6 * INCH))
     assert (runs.together, runs.count) == expected
+
+
+def laminate(*changes: str) -> Laminate:
+    return build(load_design("1dof-5mm", changes))
+
+
+def test_a_batch_fills_the_plate_in_rows_and_ends_in_a_smaller_cycle() -> None:
+    # A plate of 6 mm round 4 columns of 20 and 3 rows of 30, 5 apart: 107 x 112.
+    runs = press_runs(30, (-10.0, -5.0, 10.0, 25.0), (107.0, 112.0), 6.0)
+    assert runs.cycles == (12, 12, 6)
+    assert runs.places[:5] == ((0, 0), (25, 0), (50, 0), (75, 0), (0, 35))
+    assert press_runs(30, (-10.0, -5.0, 10.0, 25.0), (106.99, 112.0), 6.0).together == 9
+    assert are_apart(runs.places, (-10.0, -5.0, 10.0, 25.0), 1e-9)
+    assert not are_apart(runs.places, (-10.0, -5.0, 10.01, 25.0), 1e-9)
+
+
+def test_the_plate_is_turned_where_more_lie_on_it() -> None:
+    # 50 x 10 in 100 x 60: a column of four; turned, in 60 x 100, one of seven.
+    assert press_runs(99, (0.0, 0.0, 50.0, 10.0), (100.0, 60.0)).together == 7
+    assert press_runs(99, (0.0, 0.0, 10.0, 50.0), (100.0, 60.0)).together == 7
+    assert press_runs(99, (0.0, 0.0, 90.0, 10.0), (60.0, 100.0)).together == 4
+
+
+def test_times_of_a_batch_are_those_of_the_paper_a_copy_and_a_cycle() -> None:
+    plan = schedule(laminate(), PressSettings())
+    assert plan.total_press_minutes == 45
+    times = batch_times(Runs(30, ((0.0, 0.0),) * 12), plan)
+    assert (times.press, times.hands, times.total) == (3 * 45, 30 * 60, 135 + 1800)
+    # 480 min: 4 x 105 fit and 5 x 105 do not; 45 + 7 x 60 = 465 fits and 45 + 8 x 60 does not.
+    assert (a_day(plan, 1), a_day(plan, 12)) == (4, 7)
+    # Two cycles of 4: 90 + 60 n.
+    assert a_day(plan, 4) == 6
+
+
+def test_one_plate_has_every_hole_of_every_place() -> None:
+    column = laminate("stack.balloons=2")
+    runs = runs_of(column, 7, (152.4, 152.4))
+    plate = fixture(column, runs.places)
+    assert plate is not None
+    holes = {(round(h.circle[0][0], 6), round(h.circle[0][1], 6)) for h in plate.holes if h.circle}
+    assert holes == set(runs.places)
+    low_x, low_y, high_x, high_y = plate.bounds
+    assert max(high_x - low_x, high_y - low_y) <= 152.4
+    assert fixture(column, ((0.0, 0.0),)) == fixture(column)
+
+
+def test_patterns_are_counted_a_cycle() -> None:
+    column = laminate("stack.balloons=2")
+    runs = Runs(5, ((0.0, 0.0),) * 3)
+    said = batch_json(column, runs, schedule(column, PressSettings()))
+    assert said["cycles"] == [3, 2]
+    for row in said["patterns"]:
+        assert row["each"] == len(column.patterns[row["pattern"]])
+        assert row["cycles"] == [3 * row["each"], 2 * row["each"]]

@@ -11,11 +11,9 @@ from typing import Any
 
 from sbafab.assemblies.build import Assembled
 from sbafab.assemblies.colours import colours
-from sbafab.cutting.fixture import fixture
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
-from sbafab.pressing.together import Runs, press_runs
-from sbafab.reports.drawing import TIMES
+from sbafab.pressing.together import Runs, design_runs
 from sbafab.reports.traveller import bill, joining, notes, process, times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.cautions import cautions
@@ -69,11 +67,8 @@ class AssemblyJob:
 
 
 def runs_of(work: Work) -> Runs:
-    """Press runs for all copies of a design, each on a pin plate of its own if it has pins."""
-    plate = fixture(work.laminate)
-    press = work.design.press
-    bounds = work.laminate.bounds if plate is None else plate.bounds
-    return press_runs(work.job.copies, bounds, (press.platen_width, press.platen_length))
+    """Press runs for all copies of a design, on one pin plate if it has pins."""
+    return design_runs(work.design, work.laminate)
 
 
 def assembly_html(job: AssemblyJob) -> str:
@@ -185,12 +180,10 @@ def _is_elsewhere(item: bill.Item) -> bool:
 
 
 def _named(item: bill.Item, one: DesignWork) -> bill.Item:
-    """A design's item with the design's name; pins and plate for all copies pressed at once."""
+    """A design's item with the design's name."""
     if item.name == "Release film":
         return item
-    often = one.runs.together if item.name in ("Dowel pins", "Pin plate") else 1
-    quantity = f"{often} {TIMES} {item.quantity}" if often > 1 else item.quantity
-    return bill.Item(f"{item.name} ({one.name})", item.what, quantity)
+    return bill.Item(f"{item.name} ({one.name})", item.what, item.quantity)
 
 
 def _films(job: AssemblyJob) -> list[bill.Item]:

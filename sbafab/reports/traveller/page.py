@@ -23,10 +23,12 @@ from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.models.paper import BURST
 from sbafab.models.sizes import sizes
 from sbafab.pressing.schedule import Schedule
+from sbafab.pressing.together import design_runs
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.features import balloons, layer_numbers
 from sbafab.reports.traveller import bill, notes, process, times
 from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller.batch import batch_page
 from sbafab.reports.traveller.cautions import cautions
 from sbafab.reports.traveller.code import code_svg, code_text
 from sbafab.reports.traveller.job import Job, Work
@@ -99,7 +101,8 @@ def context(work: Work) -> dict[str, Any]:
         "laser_minutes": times.laser_minutes(work),
         "laser_basis": times.laser_basis(work),
         "lay_up": _lay_up(work),
-        "force_notes": process.force_notes(work),
+        "force_notes": process.force_notes(work, design_runs(work.design, laminate).together),
+        "batch": batch_page(work),
         "step_pages": process.step_pages(work),
         "finishing": process.finishing(work),
         "tubing": process.tubing(work),

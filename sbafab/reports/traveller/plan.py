@@ -54,9 +54,14 @@ def _view(bounds: Bounds) -> _View:
     return _View(bounds, min(WIDEST / (high_x - low_x), TALLEST / (high_y - low_y)))
 
 
-def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: str) -> str:
-    """The step from above; earlier stacks grey, what joins in its own colour."""
-    plate = fixture(laminate)
+def plan(
+    laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: str, alone: bool = True
+) -> str:
+    """The step from above; earlier stacks grey, what joins in its own colour.
+
+    A laminate that is not ``alone`` on the pin plate is drawn without it: one place of many.
+    """
+    plate = fixture(laminate) if alone else None
     view = _view(plate.bounds if plate is not None else _widened(laminate.bounds))
     state = "pins in" if step.pins else "no pins"
     words = f"step {step.number} from above, {state}; the text beside it says the same"

@@ -9,6 +9,7 @@ from itertools import groupby
 from sbafab.laminate.assembly import AssemblyStep, assembly, stack_count
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.pressing.schedule import Step
+from sbafab.pressing.together import Runs, design_runs
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.exploded import exploded
@@ -58,6 +59,7 @@ class StepPage:
 def step_pages(work: Work) -> list[StepPage]:
     """The press steps in order, each with its pictures, dial settings and actions."""
     parts = assembly(work.laminate)
+    runs = design_runs(work.design, work.laminate)
     first_pinned = next((part.number for part in parts if part.pins), None)
     found = []
     for part, step in zip(parts, work.schedule.steps, strict=True):
@@ -68,12 +70,15 @@ def step_pages(work: Work) -> list[StepPage]:
                 step,
                 BONDS[step.bond],
                 _dials(step),
-                _pin_notes(work, part) if part.number == first_pinned else (),
+                (
+                    *_place_notes(runs),
+                    *(_pin_notes(work, part) if part.number == first_pinned else ()),
+                ),
                 placed,
                 pitch(placed),
-                plan(work.laminate, part, lying, f"plan-{step.step}"),
+                plan(work.laminate, part, lying, f"plan-{step.step}", runs.copies == 1),
                 exploded(work.laminate, part, lying, f"exploded-{step.step}"),
-                tuple(_actions(work.laminate, part, step, lying)),
+                tuple(_actions(work.laminate, part, step, lying, runs)),
             )
         )
     return found
@@ -123,8 +128,19 @@ def _height(laminate: Laminate, part: AssemblyStep) -> str:
     return say.millimetres(sum(laminate.layer(index).film.thickness for index in part.layers))
 
 
+def _place_notes(runs: Runs) -> tuple[str, ...]:
+    """What is done for every laminate of a cycle, and how often the step comes round."""
+    if runs.copies == 1:
+        return ()
+    again = "" if runs.count == 1 else f" The step comes round {runs.count} times, once a cycle."
+    return (
+        f"Lay every layer at each of the {runs.together} places of the plate before the next one, "
+        f"then close the press once for all; the pictures show one place.{again}",
+    )
+
+
 def _actions(
-    laminate: Laminate, part: AssemblyStep, step: Step, lying: Sequence[Bed]
+    laminate: Laminate, part: AssemblyStep, step: Step, lying: Sequence[Bed], runs: Runs
 ) -> Iterator[Action]:
     things = Things(laminate, lying)
     yield Action(
@@ -153,7 +169,12 @@ def _actions(
             "with the same holes lies on top."
         )
     yield Action("Cover with a release film.")
-    yield Action(f"Close the press and start the timer: {say.minutes(step.minutes)}.")
+    cycles = tuple(f"cycle {n}" for n in range(1, runs.count + 1))
+    yield Action(
+        f"Close the press and start the timer: {say.minutes(step.minutes)}.",
+        (),
+        cycles if 1 < len(cycles) <= MOST_LINES else (),
+    )
     yield Action("Take it out: it is as hot as the platens. Let it cool flat before you touch it.")
     if part.pins:
         names = say.listed([pin.name for pin in part.pins])
