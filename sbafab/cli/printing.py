@@ -194,6 +194,8 @@ def job_json(job: Job) -> dict[str, object]:
 
 
 def _made(run: Run) -> Iterator[tuple[str, str]]:
+    from sbafab.pressing.together import batch_times, design_runs
+
     index = run.manifest
     lam = run.laminate
     counts: dict[str, int] = {}
@@ -231,6 +233,15 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
             f"{len(run.schedule.steps)} steps, {run.schedule.total_press_minutes:g} min at "
             f"{run.schedule.steps[0].temperature_c:g} C, {force:.3f} kN; press.json, press.csv",
         )
+        runs = design_runs(run.design, lam)
+        if runs.copies > 1:
+            took = batch_times(runs, run.schedule)
+            sizes = ", ".join(map(str, dict.fromkeys(runs.cycles)))
+            yield (
+                "batch",
+                f"{runs.copies} copies in {runs.count} press cycle{'s' if runs.count > 1 else ''} "
+                f"of {sizes}: {took.press:g} min in the press, {took.total:g} min in all",
+            )
     yield from _for_simulation(run)
     if cut:
         for said in index["warnings"]:

@@ -60,7 +60,8 @@ def press_runs(
     size = high_x - low_x, high_y - low_y
     room = platen[0] - 2 * margin, platen[1] - 2 * margin
     grids = [_grid(room, size), _grid((room[1], room[0]), size)]
-    columns, rows = max(grids, key=lambda grid: grid[0] * grid[1])
+    # What is larger than the heated area breaks the rule press-fit, or is waived: one by one.
+    columns, rows = max((*grids, (1, 1)), key=lambda grid: grid[0] * grid[1])
     together = min(copies, columns * rows)
     # A few copies lie in a block, not in one long row.
     columns = min(columns, max(math.ceil(together / rows), math.ceil(math.sqrt(together))))
@@ -84,7 +85,7 @@ def design_runs(design: Design, laminate: Laminate) -> Runs:
 def _grid(room: tuple[float, float], size: tuple[float, float]) -> tuple[int, int]:
     """Columns and rows."""
     columns, rows = (
-        max(1, math.floor((most + APART + ROUNDING) / (own + APART)))
+        max(0, math.floor((most + APART + ROUNDING) / (own + APART)))
         for most, own in zip(room, size, strict=True)
     )
     return columns, rows
