@@ -17,10 +17,11 @@ if TYPE_CHECKING:
 @click.argument("measurements", type=click.Path(path_type=Path))
 @click.option(
     "--material",
-    type=click.Choice(["tpe", "ptfe"]),
+    callback=lambda context, option, name: _film(name),
     default="tpe",
     show_default=True,
-    help="The film that the coupon was cut from.",
+    metavar="FILM",
+    help="The film that the coupon was cut from: tpe, ptfe or a further one of a kit.",
 )
 @click.option(
     "--resolution",
@@ -45,7 +46,8 @@ def kerf(
     found = calibrated(read_measurements(measurements), resolution)
     if split_xy and (found.x is None or found.y is None):
         raise DesignError("--split-xy needs two sizes along x and two along y; fill in more rows")
-    line = f"kerf_{material} = {_setting(found, split_xy)}"
+    section, key = _place_in_design(material)
+    line = f"{key} = {_setting(found, split_xy)}"
     if as_json:
         print_json(
             {
@@ -54,7 +56,7 @@ def kerf(
                 "y": _as_dict(found.y),
                 "difference": found.difference and found.difference._asdict(),
                 "differs": found.differs,
-                "toml": f"[laser]\n{line}\n",
+                "toml": f"{section}\n{line}\n",
             }
         )
         return
@@ -63,7 +65,20 @@ def kerf(
             click.echo(f"{name:8} kerf {_told(estimate.kerf)}, from {estimate.count} sizes")
     for remark in _remarks(found, split_xy):
         click.echo(remark)
-    click.echo(f"\nPaste into the design file:\n\n[laser]\n{line}")
+    click.echo(f"\nPaste into the design file:\n\n{section}\n{line}")
+
+
+def _film(name: str) -> str:
+    from sbafab.design.films import FILM_NAME
+
+    if not FILM_NAME.fullmatch(name):
+        raise click.BadParameter(f"{name!r} names no film; give tpe, ptfe or another's table")
+    return name
+
+
+def _place_in_design(film: str) -> tuple[str, str]:
+    """Table and key of a film's kerf."""
+    return ("[laser]", f"kerf_{film}") if film in ("tpe", "ptfe") else (f"[films.{film}]", "kerf")
 
 
 def _as_dict(estimate: Estimate | None) -> dict[str, object] | None:

@@ -222,8 +222,8 @@ def test_the_bill_counts_what_is_needed(sheet_files: Any) -> None:
     bill = [[words_of(cell) for cell in row][1:] for row in rows]
     found = {(name, what): quantity for name, what, quantity in bill}
     lengths = "plate + 0.063 mm in step 1 and plate + 1.726 mm in step 3"
-    assert found["Dowel pins", f"⌀1 mm; {lengths}"] == "3"
-    assert found["Dowel pins", f"⌀2 mm; {lengths}"] == "1"
+    assert found["Dowel pins", f"⌀1 mm; {lengths}"] == "6"
+    assert found["Dowel pins", f"⌀2 mm; {lengths}"] == "2"
     assert found["Tube", "Braintree RPT040, outer diameter 1.016 mm"] == "6 pieces"
     assert found["Magnet", ""] == "1"
     area = 2 * sum(

@@ -13,7 +13,7 @@ from sbafab.assemblies.build import Assembled
 from sbafab.assemblies.colours import colours
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
-from sbafab.pressing.together import Runs, design_runs
+from sbafab.pressing.together import Runs
 from sbafab.reports.traveller import bill, joining, notes, process, times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.cautions import cautions
@@ -42,7 +42,7 @@ class DesignWork:
 
     @property
     def runs(self) -> Runs:
-        return runs_of(self.work)
+        return self.work.runs
 
 
 @dataclass(frozen=True)
@@ -64,11 +64,6 @@ class AssemblyJob:
     copies: int = 1
     made_for: str = ""
     note: str = ""
-
-
-def runs_of(work: Work) -> Runs:
-    """Press runs for all copies of a design, on one pin plate if it has pins."""
-    return design_runs(work.design, work.laminate)
 
 
 def assembly_html(job: AssemblyJob) -> str:

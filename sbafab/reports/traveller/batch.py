@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from sbafab.cutting.fixture import fixture
 from sbafab.geometry.svg import number, path_data
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.together import Runs, batch_times, design_runs
+from sbafab.pressing.together import Runs, batch_times
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.job import Work
@@ -53,7 +53,7 @@ class BatchPage:
 
 def batch_page(work: Work) -> BatchPage | None:
     """The batch of a design; None for a single copy."""
-    runs = design_runs(work.design, work.laminate)
+    runs = work.runs
     if runs.copies == 1:
         return None
     sizes = tuple(dict.fromkeys(runs.cycles))

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sbafab.laminate.laminate import Layer
-from sbafab.pressing.together import design_runs
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.job import Job, Work
@@ -40,7 +39,7 @@ def bill(work: Work) -> list[Item]:
         diameter = say.millimetres(wrap.tube_diameter)
         what = f"to wrap the sheet round, outer diameter {diameter}"
         items.append(Item("Tube to wrap", what, str(job.copies)))
-    together = design_runs(work.design, laminate).together
+    together = work.runs.together
     pins = Counter(pin.diameter for pin in laminate.pins for _ in range(together))
     items += [
         Item("Dowel pins", f"⌀{say.millimetres(diameter)}; {pin_lengths(work)}", str(number))

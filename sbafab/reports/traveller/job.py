@@ -9,6 +9,7 @@ from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.schedule import Schedule
+from sbafab.pressing.together import Runs, runs_of
 from sbafab.rules.finding import Finding
 
 Kerf = float | tuple[float, float] | None
@@ -48,3 +49,10 @@ class Work:
     schedule: Schedule
     sheets: Sequence[SheetFile]
     job: Job
+
+    @property
+    def runs(self) -> Runs:
+        """How all copies are pressed."""
+        press = self.design.press
+        platen = press.platen_width, press.platen_length
+        return runs_of(self.laminate, self.job.copies, platen)

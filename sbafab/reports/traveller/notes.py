@@ -18,7 +18,6 @@ from sbafab.cutting.cut_layers import (
     REFERENCE,
 )
 from sbafab.cutting.fixture import fixture
-from sbafab.pressing.together import design_runs
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.bill import kerf_states
 from sbafab.reports.traveller.job import Work
@@ -108,7 +107,7 @@ def cut_layers() -> list[CutLayer]:
 def expected_sizes(work: Work) -> list[tuple[str, str]]:
     """For every sheet and the pin plate: file, and how large it must be after opening."""
     found = [(sheet.path, say.size(sheet.width, sheet.length)) for sheet in work.sheets]
-    plate = fixture(work.laminate, design_runs(work.design, work.laminate).places)
+    plate = fixture(work.laminate, work.runs.places)
     if work.job.fixture is not None and plate is not None:
         low_x, low_y, high_x, high_y = plate.bounds
         found.append((work.job.fixture, say.size(high_x - low_x, high_y - low_y)))

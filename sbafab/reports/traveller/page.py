@@ -23,7 +23,6 @@ from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.models.paper import BURST
 from sbafab.models.sizes import sizes
 from sbafab.pressing.schedule import Schedule
-from sbafab.pressing.together import design_runs
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.features import balloons, layer_numbers
 from sbafab.reports.traveller import bill, notes, process, times
@@ -101,7 +100,7 @@ def context(work: Work) -> dict[str, Any]:
         "laser_minutes": times.laser_minutes(work),
         "laser_basis": times.laser_basis(work),
         "lay_up": _lay_up(work),
-        "force_notes": process.force_notes(work, design_runs(work.design, laminate).together),
+        "force_notes": process.force_notes(work, work.runs.together),
         "batch": batch_page(work),
         "step_pages": process.step_pages(work),
         "finishing": process.finishing(work),

@@ -9,7 +9,7 @@ from itertools import groupby
 from sbafab.laminate.assembly import AssemblyStep, assembly, stack_count
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.pressing.schedule import Step
-from sbafab.pressing.together import Runs, design_runs
+from sbafab.pressing.together import Runs
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.exploded import exploded
@@ -59,7 +59,7 @@ class StepPage:
 def step_pages(work: Work) -> list[StepPage]:
     """The press steps in order, each with its pictures, dial settings and actions."""
     parts = assembly(work.laminate)
-    runs = design_runs(work.design, work.laminate)
+    runs = work.runs
     first_pinned = next((part.number for part in parts if part.pins), None)
     found = []
     for part, step in zip(parts, work.schedule.steps, strict=True):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sbafab.pressing.together import batch_times, design_runs
+from sbafab.pressing.together import batch_times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.job import Work
 
@@ -37,7 +37,7 @@ def laser_basis(work: Work) -> str:
 
 def _batch(work: Work) -> list[Time]:
     """The whole batch, for a design of several copies."""
-    runs, plan = design_runs(work.design, work.laminate), work.schedule
+    runs, plan = work.runs, work.schedule
     if runs.copies == 1:
         return []
     took = batch_times(runs, plan)
