@@ -239,7 +239,7 @@ def _write_solid(assembled: Assembled, folder: Path) -> dict[str, Any]:
 
 def _material(placed: PlacedPart) -> str:
     if placed.made is not None:
-        return "TPE"
+        return placed.made.laminate.bonded_materials
     return str(getattr(placed.part, "material", placed.part.kind))
 
 

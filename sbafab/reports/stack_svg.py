@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from sbafab.geometry.edges import Point
 from sbafab.geometry.section import Interval
 from sbafab.geometry.svg import number
+from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.picture import ink
 from sbafab.reports import drawing as draw
@@ -300,14 +301,23 @@ def _legend(view: View, page: float) -> list[str]:
     entries = [
         (f"{film.material} film, {number(film.thickness)}", draw.film_fill(film)) for film in films
     ]
-    entries.append((f"bond: the gap filled with {view.section.slabs[0].layer.film.material}", BOND))
+    entries.append((f"bond: the gap filled with {_bonding(films)}", BOND))
     entries.append(("unbonded: drawn as a slit beside the mask", "#ffffff"))
     if view.section.rods:
         entries.append(("dowel pin", STEEL))
     parts: list[str] = []
     x = 10.0
     for words, fill in entries:
+        width = 7.6 + draw.text_width(words) + 7.0
+        if x + width - 7.0 > PAGE_WIDTH - 5.0:
+            x, y = 10.0, y + 5.0
         parts.append(draw.box((x, y - 2.6), (x + 6.0, y + 0.6), fill=fill, stroke=draw.GREY))
         parts.append(draw.text((x + 7.6, y), words))
-        x += 7.6 + draw.text_width(words) + 7.0
+        x += width
     return parts
+
+
+def _bonding(films: Iterable[Film]) -> str:
+    """What flows into a gap: the structural film, if there is one alone."""
+    found = [film.material for film in films if not film.is_mask]
+    return found[0] if len(found) == 1 else "the film that melts"
