@@ -24,7 +24,7 @@ def rules_and_cut_files(balloons: int) -> float:
         began = time.perf_counter()
         laminate = build(design)
         run_deck(laminate, limits(design))
-        settings = cut_settings(design, (), "bulges", 0.005)
+        settings = cut_settings(design, ())
         paths = compensated_paths(laminate, settings)
         files = write_layer_files(laminate, paths, folder, settings)
         taken = time.perf_counter() - began

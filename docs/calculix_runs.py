@@ -11,7 +11,7 @@ from pathlib import Path
 
 import sbafab
 from sbafab.meshing.conforming.settings import MeshSettings
-from sbafab.reports.chart import Curve, Panel, chart_svg
+from sbafab.reports.chart import ChartCurve, Panel, chart_svg
 from sbafab.simulators.calculix.axisymmetric import axisymmetric_strokes
 from sbafab.simulators.calculix.history import State
 from sbafab.simulators.calculix.job import simulate
@@ -50,10 +50,12 @@ def main() -> None:
             "pressure, kPa",
             "stroke, mm",
             [
-                Curve("section, CAX8R", [0.0, *SECTION], [0.0, *axisymmetric_strokes(SECTION)]),
-                Curve("quarter, with ripples", pressures(one), [s.stroke for s in one]),
-                Curve("paper: 1.2 mm a balloon", [0.0, 6.0], [STROKE] * 2, is_reference=True),
-                Curve("", [REGIME] * 2, [0.0, STROKE], is_reference=True),
+                ChartCurve(
+                    "section, CAX8R", [0.0, *SECTION], [0.0, *axisymmetric_strokes(SECTION)]
+                ),
+                ChartCurve("quarter, with ripples", pressures(one), [s.stroke for s in one]),
+                ChartCurve("paper: 1.2 mm a balloon", [0.0, 6.0], [STROKE] * 2, is_reference=True),
+                ChartCurve("", [REGIME] * 2, [0.0, STROKE], is_reference=True),
             ],
         ),
         Panel(
@@ -61,8 +63,8 @@ def main() -> None:
             "pressure, kPa",
             "height, mm",
             [
-                Curve("quarter, with ripples", pressures(stack), heights),
-                Curve("paper: 17.5 mm, 3-DoF", [0.0, 6.0], [HEIGHT] * 2, is_reference=True),
+                ChartCurve("quarter, with ripples", pressures(stack), heights),
+                ChartCurve("paper: 17.5 mm, 3-DoF", [0.0, 6.0], [HEIGHT] * 2, is_reference=True),
             ],
         ),
     ]

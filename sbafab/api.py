@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from sbafab.laminate.laminate import Laminate, Layer
     from sbafab.meshing.surface import Surface
     from sbafab.models.figures import Prediction
-    from sbafab.output.assembly import AssemblyRun
-    from sbafab.output.job import Job
     from sbafab.output.run import Run
     from sbafab.output.simulating import Simulated
     from sbafab.rules.finding import Findings
@@ -87,9 +85,7 @@ def check_folder(folder: str | Path) -> Findings:
     return Findings(read_and_check(Path(folder)))
 
 
-def generate(
-    source: Source, *changes: Change, out: str | Path = "out", **tables: Any
-) -> Run | AssemblyRun:
+def generate(source: Source, *changes: Change, out: str | Path = "out", **tables: Any) -> Run:
     """Writes everything into ``out/<name>/``; the run tells whether a rule failed."""
     from sbafab.assemblies.records import Assembly
     from sbafab.output.assembly import generate_assembly
@@ -120,10 +116,11 @@ def cut(
     **tables: Any,
 ) -> Run:
     """Writes the cut files and film sheets; ``chord_error`` mm counts for the profile "chords"."""
+    from sbafab.cutting.dxf_write import Curves
     from sbafab.output.run import generate as run_generate
 
     design = load(source, *changes, **tables)
-    return run_generate(design, Path(out), ("cut",), None, dxf_profile, chord_error)
+    return run_generate(design, Path(out), ("cut",), None, Curves(dxf_profile, chord_error))
 
 
 def press(source: Source, *changes: Change, out: str | Path = "out", **tables: Any) -> Run:
@@ -146,8 +143,7 @@ def mesh(
     beside tables of the design. Takes the extra "mesh".
     """
     from sbafab.meshing.conforming.settings import MeshSettings
-    from sbafab.output.contents import Conforming
-    from sbafab.output.run import Extras
+    from sbafab.output.run import Conforming, Extras
     from sbafab.output.run import generate as run_generate
 
     settings, tables = _parted(asked, MeshSettings)
@@ -164,7 +160,7 @@ def _parted(asked: Mapping[str, Any], record: type) -> tuple[dict[str, Any], dic
     )
 
 
-def nest(sources: Sequence[Source], name: str = "job", out: str | Path = "out") -> Job:
+def nest(sources: Sequence[Source], name: str = "job", out: str | Path = "out") -> Run:
     """Writes several designs into ``out/<name>/``, cut from the same film sheets."""
     from sbafab.output.job import generate_job
 
@@ -206,10 +202,10 @@ def predict(
 
     Raises DesignError for what is out of every model's range.
     """
-    from sbafab.models.figures import Asked, Calibration
+    from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict as model_predict
 
-    factors = Calibration(press_factor, contact_factor)
+    factors = Factors(press_factor, contact_factor)
     asked = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), factors)
     return model_predict(load(source, *changes, **tables), asked)
 

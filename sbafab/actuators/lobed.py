@@ -17,7 +17,7 @@ from sbafab.actuators.pockets import (
     round_pockets,
     tab_and_strip,
 )
-from sbafab.actuators.stacking import BalloonShape, Stack, balloon_cuts, layers
+from sbafab.actuators.stacking import BalloonShape, BalloonStack, balloon_cuts, layers
 from sbafab.actuators.tails import tails
 from sbafab.design.form import Form, degrees_of_freedom
 from sbafab.design.records import Design
@@ -133,7 +133,7 @@ def build(design: LobedDesign) -> Laminate:
     body = bottom.outline | plates
     ears = _ears(design, body, plates, axes)
     held = tails([inlet for _, _, inlet in inlets], body, ears, design)
-    stack = Stack(bottom, shapes, shape_of, axes, design.lumen.diameter, ears, held)
+    stack = BalloonStack(bottom, shapes, shape_of, axes, design.lumen.diameter, ears, held)
     has_bores = design.stack.balloons > 1
     bore = design.bore.diameter
     pins = [Pin(n, axis, bore) for n, axis in zip(names, axes, strict=True) if has_bores]

@@ -13,7 +13,7 @@ from sbafab.actuators.pockets import (
     round_pockets,
     tab_and_strip,
 )
-from sbafab.actuators.stacking import BalloonShape, Stack, balloon_cuts, layers
+from sbafab.actuators.stacking import BalloonShape, BalloonStack, balloon_cuts, layers
 from sbafab.actuators.tails import tails
 from sbafab.design.form import Form, degrees_of_freedom
 from sbafab.design.records import Design
@@ -56,7 +56,7 @@ def build(design: OneDofDesign) -> Laminate:
     body = bottom.outline | plates
     ears = _ears(design, body, plates)
     held = tails([inlet], body, ears, design)
-    stack = Stack(bottom, shapes, shape_of, (AXIS,), ears=ears, tails=held)
+    stack = BalloonStack(bottom, shapes, shape_of, (AXIS,), ears=ears, tails=held)
     balloons = design.stack.balloons
     has_bore = balloons > 1
     return Laminate(

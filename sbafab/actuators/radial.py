@@ -21,12 +21,11 @@ from sbafab.actuators.ears import (
 )
 from sbafab.actuators.feet import film_feet, mask_feet
 from sbafab.actuators.pockets import bonded, check_neck, drawn_pocket, tab_and_strip
-from sbafab.actuators.stacking import BalloonShape, Cut, Stack, balloon_cuts, layers
+from sbafab.actuators.stacking import BalloonShape, BalloonStack, CutFilm, balloon_cuts, layers
 from sbafab.actuators.tails import head_reach, tails
 from sbafab.design.form import Drawn, Form, Slots, Wrap
 from sbafab.design.records import Chamber as ChamberSection
-from sbafab.design.records import Design, Inlet
-from sbafab.design.records import Stack as StackSection
+from sbafab.design.records import Design, Inlet, Stack
 from sbafab.design.section import Section
 from sbafab.design.units import Length, LengthOrZero
 from sbafab.errors import DesignError
@@ -82,7 +81,7 @@ class RadialInlet(Inlet):
     """One shared inlet: the bottom pockets joined by strips."""
 
 
-class RadialStack(StackSection):
+class RadialStack(Stack):
     """How high each SBA is."""
 
     balloons: int = Field(default=1, ge=1, le=1000)
@@ -142,15 +141,17 @@ def build(design: RadialDesign) -> Laminate:
     sheet = _sheet(design, outline)
     ears = _ears(design, bottom, sheet, outline, centres)
     held = tails(inlets, bottom.outline, ears, design, sheet)
-    stack = Stack(bottom, (shape,), (0,) * design.stack.balloons, centres, ears=ears, tails=held)
+    stack = BalloonStack(
+        bottom, (shape,), (0,) * design.stack.balloons, centres, ears=ears, tails=held
+    )
     window = _window(design, pocket, outline)
     windows = union(window.moved(*centre) for centre in centres)
     fillet_radius = design.fillet.radius
     eared = with_film_ears(bottom.outline, ears, fillet_radius)
     carrier_mask = with_mask_ears(grow(eared, overhang), ears, overhang) - windows
     carrier = [
-        Cut("sheet", with_sheet_ears(sheet, ears, fillet_radius), None, 1),
-        Cut("separator-mask", carrier_mask, None, bottom.outline_pieces),
+        CutFilm("sheet", with_sheet_ears(sheet, ears, fillet_radius), None, 1),
+        CutFilm("separator-mask", carrier_mask, None, bottom.outline_pieces),
     ]
     manifold = design.inlet.manifold
     names = ["chamber1"] * count if manifold else [f"chamber{i + 1}" for i in range(count)]

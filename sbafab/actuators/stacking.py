@@ -40,7 +40,7 @@ class BalloonShape:
 
 
 @dataclass(frozen=True)
-class Stack:
+class BalloonStack:
     """Balloons bottom to top, what runs through them, and what holds them in register.
 
     ``shapes`` holds the distinct balloons and ``shape_of`` the index of each balloon's own;
@@ -57,7 +57,7 @@ class Stack:
 
 
 @dataclass(frozen=True)
-class Cut:
+class CutFilm:
     """One film with its profile, not yet placed in a laminate."""
 
     role: Role
@@ -66,7 +66,7 @@ class Cut:
     pieces: int
 
 
-def balloon_cuts(stack: Stack, design: Design) -> list[Cut]:
+def balloon_cuts(stack: BalloonStack, design: Design) -> list[CutFilm]:
     """The films of a stack of balloons, base to cap (geometry of the laminate table)."""
     count = len(stack.shape_of)
     back, ears = film_setback(design), stack.ears
@@ -112,23 +112,25 @@ def balloon_cuts(stack: Stack, design: Design) -> list[Cut]:
         grown = grow(shared, design.mask.overhang)
         return with_mask_ears(grown, ears, design.mask.overhang) - union([lumen(0.0), rings])
 
-    cuts: list[Cut] = []
+    cuts: list[CutFilm] = []
     below = frozenset([0])
     for number in range(1, count + 1):
         shape = 0 if number == 1 else stack.shape_of[number - 1] + 1
         parts = shapes[shape].outline_pieces
         if number == 1:
-            cuts.append(Cut("base", plate(shape), number, parts))
+            cuts.append(CutFilm("base", plate(shape), number, parts))
         else:
-            cuts.append(Cut("wall", wall(shape), number, parts))
-        cuts.append(Cut("chamber-mask", chamber_mask(shape), number, shapes[shape].pocket_pieces))
+            cuts.append(CutFilm("wall", wall(shape), number, parts))
+        cuts.append(
+            CutFilm("chamber-mask", chamber_mask(shape), number, shapes[shape].pocket_pieces)
+        )
         if number == count:
-            cuts.append(Cut("cap", plate(shape), number, parts))
+            cuts.append(CutFilm("cap", plate(shape), number, parts))
         else:
-            cuts.append(Cut("wall", wall(shape), number, parts))
+            cuts.append(CutFilm("wall", wall(shape), number, parts))
             below = below | {shape}
             mask = separator_mask(below, stack.shape_of[number] + 1)
-            cuts.append(Cut("separator-mask", mask, number, stack.shapes[0].outline_pieces))
+            cuts.append(CutFilm("separator-mask", mask, number, stack.shapes[0].outline_pieces))
     return cuts
 
 
@@ -161,7 +163,7 @@ def used_films(design: Design) -> dict[str, Film]:
     return {material: named[material] for material in in_order(named)}
 
 
-def layers(cuts: Iterable[Cut], design: Design) -> tuple[Layer, ...]:
+def layers(cuts: Iterable[CutFilm], design: Design) -> tuple[Layer, ...]:
     """The films in their order, with heights and pattern names."""
     used_films(design)
     patterns: dict[tuple[str, Region], str] = {}

@@ -20,7 +20,7 @@ from sbafab.as_built.claims import (
 from sbafab.as_built.cut_files import CutPart, LayerFile, inside, read_layers
 from sbafab.as_built.derived import derived_job_problems, derived_problems
 from sbafab.as_built.joined import joined_findings, lowered_between
-from sbafab.as_built.meant import Meant, Work, departure, meant_by
+from sbafab.as_built.meant import Meant, RunWork, departure, meant_by
 from sbafab.as_built.measures import (
     batch_problems,
     fixture_problems,
@@ -36,7 +36,6 @@ from sbafab.as_built.records import (
     CLAIMS,
     DESIGNED,
     INTEGRITY,
-    Manifest,
     Problem,
     findings_of,
     is_job,
@@ -44,7 +43,7 @@ from sbafab.as_built.records import (
     read_claims,
     read_job,
 )
-from sbafab.as_built.sheets import Order, sheet_problems
+from sbafab.as_built.sheets import SheetOrder, sheet_problems
 from sbafab.as_built.stack import laminate_of, stacked_layers
 from sbafab.design.reading import validated
 from sbafab.design.records import Design
@@ -53,7 +52,8 @@ from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.models.sizes import sizes
-from sbafab.output.contents import Checked
+from sbafab.output.manifest_records import Manifest
+from sbafab.output.planned import Checked
 from sbafab.output.settings import limits as limits_of
 from sbafab.rules import film_limits
 from sbafab.rules.deck import RULES, Rule, run_deck, run_rule
@@ -106,7 +106,7 @@ def check_folder(folder: Path) -> tuple[Finding, ...]:
     return (*_findings(built, measured), *findings_of(DESIGNED, problems, AS_DESIGNED))
 
 
-def check_written(folder: Path, works: Mapping[str, Work]) -> tuple[Finding, ...]:
+def check_written(folder: Path, works: Mapping[str, RunWork]) -> tuple[Finding, ...]:
     """What is found in a folder that has just been written, of ``works`` by their designs' names.
 
     Everything is read from the disk. Where every layer's file cuts what the design check measured,
@@ -143,7 +143,7 @@ def _findings(built: AsBuilt, measured: Sequence[Finding]) -> tuple[Finding, ...
     )
 
 
-def _check_job(folder: Path, works: Mapping[str, Work] | None = None) -> tuple[Finding, ...]:
+def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tuple[Finding, ...]:
     """What is found in every design of a job, its name before it, and on the job's sheets.
 
     In an assembly's folder, also what is found between its parts. ``works``: what the run that has
@@ -174,21 +174,8 @@ def _check_job(folder: Path, works: Mapping[str, Work] | None = None) -> tuple[F
             problems.append(claim(message))
     first = folders[0]
     problems += file_problems(folder, job)
-    problems += sheet_problems(
-        folder,
-        Order(
-            job.name,
-            job.designs_sha256,
-            first.design,
-            first.claims.kerf,
-            job.waived,
-            job.lowered_limits,
-            job.films,
-            job.sheets,
-            job.files,
-            lots,
-        ),
-    )
+    order = SheetOrder(job, first.design, first.claims.kerf, lots)
+    problems += sheet_problems(folder, order)
     if is_joined(job):
         weak += lowered_between(folder)
         between, wrong = joined_findings(folder)
@@ -207,7 +194,7 @@ def _check_job(folder: Path, works: Mapping[str, Work] | None = None) -> tuple[F
     )
 
 
-def read_folder(folder: Path, of_job: bool = False, work: Work | None = None) -> AsBuilt:
+def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None) -> AsBuilt:
     """The laminate that a folder's cut files make, and what is wrong with files and claims.
 
     The folder of a design ``of_job`` has no film sheets of its own. ``work``: what the run that has
@@ -322,21 +309,8 @@ def _own_sheet_problems(
     if not claims.sheets and is_job(folder.absolute().parent):
         message = "the film sheets are those of the job, and were not looked at; check the folder "
         return [Problem(CLAIMS, f"{message}above this one", verdict="warn")]
-    return sheet_problems(
-        folder,
-        Order(
-            claims.name,
-            claims.design_sha256,
-            design,
-            claims.kerf,
-            claims.waived,
-            claims.lowered_limits,
-            claims.films,
-            claims.sheets,
-            claims.files,
-            [Lot(claims.name, claims.copies, files)],
-        ),
-    )
+    lots = [Lot(claims.name, claims.copies, files)]
+    return sheet_problems(folder, SheetOrder(claims, design, claims.kerf, lots))
 
 
 def _laminate_problems(

@@ -18,7 +18,7 @@ WIDEST_STEP = math.radians(20)
 """So many chords, each turning less than this on one circle, are meant as an arc."""
 
 
-class Run(NamedTuple):
+class ChordRun(NamedTuple):
     """Consecutive chords of one circle: their ends, and the circle."""
 
     points: tuple[Point, ...]
@@ -65,7 +65,7 @@ def _ends(contour: Contour) -> list[Point]:
     return points
 
 
-def _arcs(run: Run) -> tuple[Edge, ...]:
+def _arcs(run: ChordRun) -> tuple[Edge, ...]:
     """The run as arcs of at most a quarter turn."""
     stops, swept = [run.points[0]], 0.0
     for a, b in pairwise(run.points):
@@ -79,7 +79,7 @@ def _arcs(run: Run) -> tuple[Edge, ...]:
     return tuple(Arc(a, b, run.centre, run.radius, ccw) for a, b in pairwise(stops))
 
 
-def _runs(points: list[Point]) -> Iterator[Run]:
+def _runs(points: list[Point]) -> Iterator[ChordRun]:
     """Longest runs of at least three short chords on one circle, turning one way."""
     count = len(points)
     if count < 4:
@@ -88,7 +88,7 @@ def _runs(points: list[Point]) -> Iterator[Run]:
     if first is None:
         found = _circle(points[0], points[count // 3], points[2 * count // 3])
         if found is not None:
-            yield Run((*points, points[0]), *found)
+            yield ChordRun((*points, points[0]), *found)
         return
     # No run reaches over both ends of this ring, whose first chord comes again as its last.
     ring = [points[(first + i) % count] for i in range(count + 2)]
@@ -104,7 +104,7 @@ def _runs(points: list[Point]) -> Iterator[Run]:
             continue
         if start == 0:
             last -= 1
-        yield Run(run, *found)
+        yield ChordRun(run, *found)
         start = end
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from sbafab.actuators.stacking import film_of
 from sbafab.as_built.cut_files import LayerFile
-from sbafab.as_built.records import CLAIMS, Job, KerfClaim, LayerClaim, Manifest, Problem
+from sbafab.as_built.records import CLAIMS, Problem
 from sbafab.cutting.properties import (
     LIMITS,
     curves_property,
@@ -19,7 +19,8 @@ from sbafab.cutting.properties import (
 )
 from sbafab.design.records import Design
 from sbafab.laminate.laminate import Layer
-from sbafab.output.manifest import file_hashes
+from sbafab.output.manifest import file_hashes, kerf_claim
+from sbafab.output.manifest_records import JobManifest, KerfClaim, LayerClaim, Manifest
 from sbafab.output.settings import kerf_widths, limits, warnings
 from sbafab.rules.lowered import lowered
 
@@ -31,7 +32,7 @@ def claim(message: str, *layers: int) -> Problem:
     return Problem(CLAIMS, message, layers)
 
 
-def file_problems(folder: Path, claims: Manifest | Job) -> list[Problem]:
+def file_problems(folder: Path, claims: Manifest | JobManifest) -> list[Problem]:
     """Files that are missing, changed, or not in the manifest (a cut file is worse than a note)."""
     found = file_hashes(folder)
     found.pop("manifest.json", None)
@@ -167,7 +168,7 @@ def design_problems(claims: Manifest, design: Design, digest: str) -> list[Probl
     ]
     for material, width in kerf_widths(design).items():
         said = claims.kerf.get(material)
-        wanted = KerfClaim(state="uncalibrated" if width is None else "compensated", width=width)
+        wanted = kerf_claim(width)
         if said != wanted:
             problems.append(
                 claim(

@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 from sbafab.as_built.agreement import in_agreement, with_circles, without_specks
 from sbafab.as_built.chords import chorded_place
 from sbafab.as_built.meant import Expected, departure
-from sbafab.as_built.records import INTEGRITY, LayerClaim, Manifest, Problem
+from sbafab.as_built.records import INTEGRITY, Problem
 from sbafab.as_built.uncut import uncut
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER, CUT_SEQUENCE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
@@ -27,6 +27,7 @@ from sbafab.cutting.verify import check_datum
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
+from sbafab.output.manifest_records import LayerClaim, Manifest
 
 MOST_BYTES = 20_000_000
 MOST_MARKS = 100_000

@@ -13,27 +13,30 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from pydantic import BaseModel
+
 from sbafab.as_built.likeness import file_difference, index_difference
 from sbafab.as_built.meant import drawn_settings
 from sbafab.as_built.meshes import bodies
-from sbafab.as_built.records import DESIGNED, Job, Manifest, Problem, is_joined
-from sbafab.cutting.files import CutFile
-from sbafab.cutting.fixture import PATH as FIXTURE
+from sbafab.as_built.records import DESIGNED, Problem, is_joined
 from sbafab.cutting.fixture import write_fixture
-from sbafab.cutting.properties import chord_error_of, curves_property, layer_path
+from sbafab.cutting.properties import curves_of
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.boolean import GeometryError
 from sbafab.geometry.region import Region
 from sbafab.nesting.parts import parts_of
-from sbafab.nesting.records import Part as NestPart
-from sbafab.output.batch import Drawing, plan_batch, write_batch
-from sbafab.output.contents import TRAVELLER, Checked, Made, Part, schedule_of, write_contents
+from sbafab.nesting.records import NestPart
+from sbafab.output.batch import plan_batch, write_batch
+from sbafab.output.contents import TRAVELLER, write_contents
 from sbafab.output.earlier import PRESS
 from sbafab.output.manifest import as_json
-from sbafab.output.settings import GENERATOR, cut_settings
-from sbafab.output.shop import CutSet, find_nests, write_nested_sheets
+from sbafab.output.manifest_records import JobManifest, Manifest
+from sbafab.output.planned import EVERYTHING, Checked, Planned, RunPart, plan, schedule_of
+from sbafab.output.settings import GENERATOR
+from sbafab.output.shop import find_nests, write_nested_sheets
 from sbafab.pressing.together import design_runs
+from sbafab.progress import unheard
 
 INDEX = "manifest.json"
 UNMADE = (DesignError, OutputError, GeometryError, ArithmeticError, LookupError)
@@ -59,36 +62,26 @@ def derived_problems(
 
 
 def derived_job_problems(
-    folder: Path, job: Job, checked: Sequence[Checked], curves: str | None
+    folder: Path, job: JobManifest, checked: Sequence[Checked], curves: str | None
 ) -> list[Problem]:
     """Files of a job, and of its designs' folders, that are not what the designs make.
 
     ``curves`` is what the manifests of the designs say of their chords.
     """
     with _made_anew(folder) as (fresh, problems):
-        whole = None
-        waived: tuple[str, ...] = ()
-        lowered: tuple[str, ...] = ()
         if is_joined(job):
             # An assembly's run checks what it has written, and so imports this module.
-            from sbafab.output.assembly import checked_again
+            from sbafab.output.assembly import checked_again, plan_assembly, write_assembly
 
             whole = checked_again(folder, checked)
-            waived, lowered = whole.waived, whole.lowered
-        error = chord_error_of(curves_property(curves))
-        drawing = Drawing("chords", error) if error else Drawing()
-        batch = plan_batch(checked, job.name, folder, drawing, _quiet, waived, lowered)
-        written = write_batch(batch, fresh, ("press", "mesh", "preview"), whole is None, _quiet)
-        if whole is not None:
-            from sbafab.output.assembly import write_whole
-
-            write_whole(whole, batch, written, fresh, _quiet)
+            batch = plan_assembly(whole, folder, unheard, curves_of(curves))
+            write_assembly(whole, batch, fresh, unheard)
+        else:
+            planned = [plan(one, EVERYTHING, curves_of(curves)) for one in checked]
+            batch = plan_batch(job.schema_name, job.name, planned, folder, unheard)
+            write_batch(batch, fresh, unheard)
         problems.extend(_differences(folder, fresh, job.files, job.generator))
     return problems
-
-
-def _quiet(what: str, done: int, total: int) -> None:
-    pass
 
 
 @contextmanager
@@ -122,28 +115,17 @@ def _write_anew(
     wanted |= {"press", "preview"} if has_page else set()
     sheets: list[SheetFile] = []
     if parts is not None:
-        nests = find_nests(parts, design, folder, _quiet)
-        sheets = write_nested_sheets(nests, design, fresh, settings, _quiet)
+        nests = find_nests(parts, design, folder, unheard)
+        sheets = write_nested_sheets(nests, design, fresh, settings, unheard)
     write_fixture(laminate, fresh, settings, design_runs(design, laminate).places)
-    cut = CutSet(_cut_files(checked), FIXTURE if laminate.pins else None, claims.curves)
     pressing = schedule_of(checked) if "press" in wanted else None
-    made = Made(cut, sheets, pressing, traveller=has_page)
-    return write_contents(checked, wanted, made, fresh, _quiet)
+    planned = Planned(checked, frozenset(wanted), settings, pressing)
+    return write_contents(planned, sheets, fresh, unheard, has_page)
 
 
-def _cut_files(checked: Checked) -> tuple[CutFile, ...]:
-    settings = cut_settings(checked.design, checked.waived)
-    return tuple(
-        CutFile(
-            layer.index, layer_path(layer.name, settings.kerf_width(layer.film.material)), "", 0, 0
-        )
-        for layer in checked.laminate.layers
-    )
-
-
-def _parts(files: Collection[str]) -> set[Part]:
+def _parts(files: Collection[str]) -> set[RunPart]:
     """The parts of a run that a folder's files are of."""
-    parts: set[Part] = {"cut"}
+    parts: set[RunPart] = {"cut"}
     if any(path in files for path in PRESS):
         parts.add("press")
     if any(path.startswith("preview/") for path in files):
@@ -216,25 +198,38 @@ def _mesh_difference(folder: Path, found: dict[str, Any], wanted: dict[str, Any]
     return ""
 
 
+class _Wish(BaseModel):
+    pressures_kpa: tuple[float, ...]
+    flow_ml_min: float
+    volumes_ul: tuple[float, ...]
+    press_factor: float
+    contact_factor: float
+
+
+class _Predicted(BaseModel):
+    """What of ``predict.json`` says what was asked for."""
+
+    asked: _Wish
+
+
 def _prediction_problems(
     folder: Path, fresh: Path, claims: Manifest, checked: Checked
 ) -> list[Problem]:
     """The prediction, asked for again what the file says that was asked for."""
     if "predict.json" not in claims.files:
         return []
-    from sbafab.models.figures import Asked, Calibration
+    from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict
     from sbafab.output.predicting import FOLDER, with_prediction
 
     try:
-        asked = _index(folder / "predict.json")["asked"]
-        factors = Calibration(float(asked["press_factor"]), float(asked["contact_factor"]))
-        pressures, volumes = (tuple(map(float, asked[k])) for k in ("pressures_kpa", "volumes_ul"))
-        wish = Asked(pressures, float(asked["flow_ml_min"]), volumes, factors)
+        told = _Predicted.model_validate_json((folder / "predict.json").read_bytes()).asked
+        factors = Factors(told.press_factor, told.contact_factor)
+        wish = Asked(told.pressures_kpa, told.flow_ml_min, told.volumes_ul, factors)
         apart = fresh / FOLDER
         apart.mkdir()
         with_prediction(checked.design, predict(checked.design, wish))(checked.laminate, apart)
-    except (TypeError, ValueError, LookupError, OSError) as error:
+    except (ValueError, OSError) as error:
         said = f"predict.json does not say what was asked for ({error})"
         return [_other(said, claims.generator, is_done=False)]
     return _differences(folder, apart, claims.files, claims.generator)

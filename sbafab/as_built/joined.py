@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from sbafab.as_built.claims import claim
-from sbafab.as_built.records import Joined, Problem, read_joined
+from sbafab.as_built.records import Problem, read_joined
 from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
 from sbafab.assemblies.reading import load_assembly
 from sbafab.assemblies.writing import DESIGN_FILE, assembly_sha256, part_entry
 from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError
+from sbafab.output.manifest_records import AssemblyManifest
 from sbafab.rules.finding import Finding
 
 
@@ -40,7 +41,7 @@ def lowered_between(folder: Path) -> tuple[str, ...]:
         return ()
 
 
-def _assembly_problems(claims: Joined, assembled: Assembled) -> list[Problem]:
+def _assembly_problems(claims: AssemblyManifest, assembled: Assembled) -> list[Problem]:
     problems = []
     if claims.name != assembled.assembly.name:
         problems.append(claim(f"design.toml names the assembly {assembled.assembly.name}"))
@@ -58,7 +59,7 @@ def _assembly_problems(claims: Joined, assembled: Assembled) -> list[Problem]:
     return problems
 
 
-def _unsaid_waivers(claims: Joined, between: tuple[Finding, ...]) -> list[Problem]:
+def _unsaid_waivers(claims: AssemblyManifest, between: tuple[Finding, ...]) -> list[Problem]:
     waived = dict.fromkeys(finding.rule for finding in between if finding.by_user)
     return [
         claim(f"{rule} fails and is waived by design.toml, which the manifest does not say")

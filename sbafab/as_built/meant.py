@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from sbafab.actuators import build
+from sbafab.as_built.coarse import as_cut
 from sbafab.cutting.files import compensated_paths
-from sbafab.cutting.properties import CutSettings, chord_error_of, curves_property
+from sbafab.cutting.properties import CutSettings, curves_of
 from sbafab.cutting.verify import TOLERANCE, check_contours
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.boolean import GeometryError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.coarse import as_cut
 from sbafab.output.settings import cut_settings
 from sbafab.rules.finding import Finding
 
@@ -43,7 +43,7 @@ class Meant(NamedTuple):
         return [Expected(layer.profile, self.paths[layer.pattern]) for layer in layers]
 
 
-class Work(NamedTuple):
+class RunWork(NamedTuple):
     """What a run that has just written a folder knows of it: its design's part and findings."""
 
     meant: Meant
@@ -59,7 +59,7 @@ def meant_by(design: Design, curves: str | None) -> Meant | None:
         settings = drawn_settings(design, (), curves)
         laminate = build(design)
         paths = compensated_paths(laminate, settings)
-        if settings.profile == "chords":
+        if settings.curves.in_chords:
             laminate = as_cut(laminate, paths, settings)
         return Meant(laminate, paths)
     except (DesignError, GeometryError, OutputError, ArithmeticError):
@@ -68,10 +68,7 @@ def meant_by(design: Design, curves: str | None) -> Meant | None:
 
 def drawn_settings(design: Design, waived: tuple[str, ...], curves: str | None) -> CutSettings:
     """How a design's files are drawn with what the manifest says of their ``curves``."""
-    error = chord_error_of(curves_property(curves))
-    if not error:
-        return cut_settings(design, waived)
-    return cut_settings(design, waived, "chords", error)
+    return cut_settings(design, waived, curves_of(curves))
 
 
 def departure(path: Region, expected: Region) -> str:

@@ -10,12 +10,13 @@ from dataclasses import dataclass, field
 from sbafab.as_built.agreement import AGREED
 from sbafab.as_built.claims import claim
 from sbafab.as_built.cut_files import LayerFile
-from sbafab.as_built.records import CLAIMS, Problem, SheetClaim
+from sbafab.as_built.records import CLAIMS, Problem
 from sbafab.cutting.verify import check_contours
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Mark, Region
 from sbafab.laminate.films import Material, in_order
 from sbafab.nesting.records import TURNS, Turn
+from sbafab.output.manifest_records import SheetClaim
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,15 @@
-"""What ``manifest.json`` claims, taken in with its types checked, and problems as data."""
+"""What ``manifest.json`` claims, read with its types checked, and problems as data."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 
 from sbafab.errors import OutputError
-from sbafab.laminate.films import Material
-from sbafab.laminate.interfaces import InterfaceKind
-from sbafab.laminate.laminate import Role
+from sbafab.output.manifest_records import AssemblyManifest, JobManifest, Manifest
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA, read_manifest
 from sbafab.rules.finding import Finding, Place, Verdict
 
@@ -21,192 +19,6 @@ DESIGNED = "as-designed"
 MOST_BYTES = 50_000_000
 MOST_SHOWN = 12
 """Problems of one rule that are reported one by one."""
-
-MOST_SIZE = 10_000.0
-"""mm, of a film sheet."""
-
-Count = Annotated[int, Field(ge=1, le=10_000_000)]
-Size = Annotated[float, Field(gt=0, le=MOST_SIZE)]
-Thickness = Annotated[float, Field(gt=0, le=10)]
-
-
-class _Claim(BaseModel):
-    model_config = ConfigDict(extra="ignore", frozen=True, strict=True, allow_inf_nan=False)
-
-
-class LayerClaim(_Claim):
-    index: int
-    name: str
-    material: Material
-    role: Role
-    balloon: int | None
-    thickness: Thickness
-    z: float
-    file: str | None
-    pattern: str
-    area: float
-    pieces: int
-    bores: tuple[str, ...]
-
-
-class InterfaceClaim(_Claim):
-    below: int
-    above: int
-    masks: tuple[int, ...]
-    kind: InterfaceKind
-    contact_area: float
-    bond_area: float
-
-
-class BoreClaim(_Claim):
-    chamber: str
-    x: float
-    y: float
-    diameter: float
-
-
-class InletClaim(_Claim):
-    chamber: str
-    x: float
-    y: float
-    width: float
-    tube_outer_diameter: float
-
-
-class PinClaim(_Claim):
-    name: str
-    x: float
-    y: float
-    diameter: float
-
-
-class RegistrationClaim(_Claim):
-    method: str
-    pins: tuple[PinClaim, ...]
-
-
-class KerfClaim(_Claim):
-    state: Literal["uncalibrated", "compensated"]
-    width: float | tuple[float, float] | None
-    """Full width in mm, or that along x and along y."""
-
-
-class FilmUseClaim(_Claim):
-    """Sheets of a film and their area in mm2; nothing where there are none."""
-
-    material: Material
-    sheets: int = 0
-    sheet_area: float = 0.0
-    waste: float = 0.0
-    density: float = 0.0
-
-
-class FilmClaim(FilmUseClaim):
-    product: str
-    thickness: Thickness
-    layers: int
-    area: float
-
-
-class SheetPinClaim(_Claim):
-    x: float
-    y: float
-    diameter: float
-
-
-class SheetPartClaim(_Claim):
-    design: str
-    pattern: str
-    count: Count
-
-
-class SheetClaim(_Claim):
-    """A film sheet; lengths in mm, areas in mm2."""
-
-    file: str
-    picture: str
-    material: Material
-    number: Count
-    width: Size
-    length: Size
-    border: Annotated[float, Field(ge=0, le=MOST_SIZE)]
-    spacing: Annotated[float, Field(gt=0, le=MOST_SIZE)]
-    pins: Annotated[tuple[SheetPinClaim, ...], Field(max_length=100)]
-    engine: str
-    parts: tuple[SheetPartClaim, ...]
-    parts_area: float
-    density: float
-    contours: Count
-    cut_length: float
-
-
-class PlaceClaim(_Claim):
-    x: float
-    y: float
-
-
-class BatchClaim(_Claim):
-    at_once: Count
-    cycles: Annotated[tuple[Count, ...], Field(max_length=1000)]
-    places: Annotated[tuple[PlaceClaim, ...], Field(min_length=1, max_length=1000)]
-
-
-class Manifest(_Claim):
-    """The part of ``manifest.json`` that a check compares with what lies on disk."""
-
-    schema_name: Literal["sbafab/manifest@1"] = Field(alias="schema")
-    name: str
-    family: str
-    units: Literal["mm"]
-    design_sha256: str
-    generator: str
-    registration: RegistrationClaim
-    kerf: dict[Material, KerfClaim]
-    curves: str | None = None
-    waived: tuple[str, ...]
-    lowered_limits: tuple[str, ...] = ()
-    copies: Annotated[int, Field(ge=1, le=1000)] = 1
-    batch: BatchClaim | None = None
-    sizes: dict[str, float]
-    films: tuple[FilmClaim, ...]
-    layers: Annotated[tuple[LayerClaim, ...], Field(min_length=1, max_length=10_000)]
-    interfaces: tuple[InterfaceClaim, ...]
-    bores: tuple[BoreClaim, ...]
-    inlets: tuple[InletClaim, ...]
-    lumen: float | None
-    fixture: str | None = None
-    sheets: Annotated[tuple[SheetClaim, ...], Field(max_length=2000)] = ()
-    files: dict[str, str]
-
-
-class DesignClaim(_Claim):
-    name: str
-    folder: str
-    copies: Annotated[int, Field(ge=1, le=1000)]
-    design_sha256: str
-
-
-class Job(_Claim):
-    """The part of a job's ``manifest.json`` that a check compares with what lies on disk."""
-
-    schema_name: Literal["sbafab/job@1", "sbafab/assembly@1"] = Field(alias="schema")
-    name: str
-    units: Literal["mm"]
-    designs_sha256: str
-    generator: str
-    waived: tuple[str, ...]
-    lowered_limits: tuple[str, ...] = ()
-    designs: Annotated[tuple[DesignClaim, ...], Field(min_length=1, max_length=100)]
-    films: tuple[FilmUseClaim, ...]
-    sheets: Annotated[tuple[SheetClaim, ...], Field(max_length=2000)]
-    files: dict[str, str]
-
-
-class Joined(Job):
-    """What the manifest of an assembly says beyond that of a job."""
-
-    design_sha256: str
-    parts: Annotated[tuple[dict[str, Any], ...], Field(max_length=1000)]
 
 
 def read_claims(folder: Path) -> Manifest:
@@ -228,22 +40,22 @@ def is_job(folder: Path) -> bool:
     return is_small and (read_manifest(folder) or {}).get("schema") in (JOB_SCHEMA, ASSEMBLY_SCHEMA)
 
 
-def read_job(folder: Path) -> Job:
+def read_job(folder: Path) -> JobManifest:
     """The manifest of a job's folder. Raises OutputError as ``read_claims`` does."""
-    return _read(folder, Job, JOB_SCHEMA)
+    return _read(folder, JobManifest, JOB_SCHEMA)
 
 
-def is_joined(job: Job) -> bool:
+def is_joined(job: JobManifest) -> bool:
     """Whether a job's designs are the parts of an assembly."""
     return job.schema_name == ASSEMBLY_SCHEMA
 
 
-def read_joined(folder: Path) -> Joined:
+def read_joined(folder: Path) -> AssemblyManifest:
     """The manifest of an assembly's folder. Raises OutputError as ``read_claims`` does."""
-    return _read(folder, Joined, ASSEMBLY_SCHEMA)
+    return _read(folder, AssemblyManifest, ASSEMBLY_SCHEMA)
 
 
-Read = TypeVar("Read", Manifest, Job, Joined)
+Read = TypeVar("Read", Manifest, JobManifest, AssemblyManifest)
 
 
 def _read(folder: Path, kind: type[Read], schema: str) -> Read:

@@ -11,13 +11,7 @@ from sbafab.as_built.claims import bare_problem, claim
 from sbafab.as_built.cut_files import check_sequence, inside, sound_digest
 from sbafab.as_built.measures import SHARE
 from sbafab.as_built.pieces import CutSheet, Lot, piece_problems
-from sbafab.as_built.records import (
-    INTEGRITY,
-    FilmUseClaim,
-    KerfClaim,
-    Problem,
-    SheetClaim,
-)
+from sbafab.as_built.records import INTEGRITY, Problem
 from sbafab.cutting.cut_layers import ENGRAVE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import Surroundings
@@ -32,6 +26,13 @@ from sbafab.geometry.intersect import meeting_points
 from sbafab.laminate.films import Material
 from sbafab.nesting.check import check_placed
 from sbafab.nesting.records import Stock
+from sbafab.output.manifest_records import (
+    FilmUseClaim,
+    JobManifest,
+    KerfClaim,
+    Manifest,
+    SheetClaim,
+)
 from sbafab.output.settings import stocks
 
 ROUNDED = 2e-3
@@ -39,27 +40,27 @@ ROUNDED = 2e-3
 
 
 @dataclass(frozen=True)
-class Order:
-    """What the sheets of a folder are claimed to be, and the layers that they must hold.
+class SheetOrder:
+    """What a manifest claims of film sheets, and the layers that they must hold.
 
-    ``design`` states the stock; ``sha256`` is that of the design, or of all designs of a job.
+    ``design`` states the stock; all designs of a job have the same, and the same ``kerf``.
     """
 
-    name: str
-    sha256: str
+    claims: Manifest | JobManifest
     design: Design
     kerf: Mapping[Material, KerfClaim]
-    waived: Sequence[str]
-    lowered: Sequence[str]
-    films: Sequence[FilmUseClaim]
-    sheets: Sequence[SheetClaim]
-    files: Mapping[str, str]
     lots: Sequence[Lot]
 
+    @property
+    def sha256(self) -> str:
+        """That of the design, or of all designs of a job."""
+        claims = self.claims
+        return claims.design_sha256 if isinstance(claims, Manifest) else claims.designs_sha256
 
-def sheet_problems(folder: Path, order: Order) -> list[Problem]:
+
+def sheet_problems(folder: Path, order: SheetOrder) -> list[Problem]:
     """Every sheet: sound, laid out as its stock asks, and cutting the layers' pieces, no others."""
-    if not order.sheets:
+    if not order.claims.sheets:
         return [claim("the manifest lists no film sheets; write them with sbafab cut")]
     problems = _order_problems(order)
     stock_of = stocks(order.design)
@@ -68,7 +69,7 @@ def sheet_problems(folder: Path, order: Order) -> list[Problem]:
     curves = parts[0].properties.get("CURVES") if parts else None
     sheets: list[CutSheet] = []
     bare: list[ReadBack] = []
-    for told in order.sheets:
+    for told in order.claims.sheets:
         if told.material not in stock_of:
             problems.append(claim(f"{told.file} is of {told.material}, no film of design.toml"))
             continue
@@ -87,7 +88,7 @@ def sheet_problems(folder: Path, order: Order) -> list[Problem]:
     if bare:
         of = "the files of " + (f"{len(bare)} film sheets" if len(bare) > 1 else "a film sheet")
         problems.append(bare_problem(of, all(found.units for found in bare)))
-    if len(sheets) == len(order.sheets) and len(parts) == len(files):
+    if len(sheets) == len(order.claims.sheets) and len(parts) == len(files):
         turns = {material: stock.turns for material, stock in stock_of.items()}
         problems += piece_problems(sheets, order.lots, turns)
     return problems
@@ -105,7 +106,7 @@ def _read(folder: Path, told: SheetClaim) -> ReadBack:
         return found
     except OutputError:
         raise
-    except (ArithmeticError, ValueError, LookupError, TypeError, AttributeError) as error:
+    except (ArithmeticError, ValueError, LookupError) as error:
         raise OutputError(f"holds no sound contours ({error}); write it anew") from error
 
 
@@ -115,11 +116,11 @@ def _unsound(told: SheetClaim, error: OutputError, place: Point | None = None) -
     return Problem(INTEGRITY, f"{told.file}: {said}", x=x, y=y)
 
 
-def _order_problems(order: Order) -> list[Problem]:
+def _order_problems(order: SheetOrder) -> list[Problem]:
     """Sheets by number, name and stock against the design; films against sheets."""
     problems = []
     for material, stock in stocks(order.design).items():
-        own = [sheet for sheet in order.sheets if sheet.material == material]
+        own = [sheet for sheet in order.claims.sheets if sheet.material == material]
         if [sheet.number for sheet in own] != [*range(1, len(own) + 1)] or len(own) > stock.most:
             message = f"the {material} sheets are not numbered from 1 to at most {stock.most}"
             problems.append(claim(message))
@@ -128,14 +129,14 @@ def _order_problems(order: Order) -> list[Problem]:
             problems += _stock_problems(sheet, stock, order.design.sheets.engine)
         problems += [
             problem
-            for film in order.films
+            for film in order.claims.films
             if film.material == material
             for problem in _film_problems(film, own)
         ]
     return problems
 
 
-def _name_problems(sheet: SheetClaim, order: Order) -> list[Problem]:
+def _name_problems(sheet: SheetClaim, order: SheetOrder) -> list[Problem]:
     stem = f"{FOLDER}/{sheet.material}_{sheet.number}{kerf_suffix(_kerf(order, sheet.material))}"
     return [
         *(
@@ -146,12 +147,12 @@ def _name_problems(sheet: SheetClaim, order: Order) -> list[Problem]:
         *(
             claim(f"{path} has no hash in the manifest")
             for path in (sheet.file, sheet.picture)
-            if path not in order.files
+            if path not in order.claims.files
         ),
     ]
 
 
-def _kerf(order: Order, material: Material) -> Kerf | None:
+def _kerf(order: SheetOrder, material: Material) -> Kerf | None:
     said = order.kerf.get(material)
     return said.width if said is not None else None
 
@@ -193,19 +194,19 @@ def _film_problems(film: FilmUseClaim, sheets: Sequence[SheetClaim]) -> list[Pro
 
 
 def _property_problems(
-    told: SheetClaim, found: ReadBack, order: Order, curves: str | None
+    told: SheetClaim, found: ReadBack, order: SheetOrder, curves: str | None
 ) -> list[Problem]:
     """Custom properties that are not what the manifest says, or curves unlike the layers'."""
-    of = sum(sheet.material == told.material for sheet in order.sheets)
+    of = sum(sheet.material == told.material for sheet in order.claims.sheets)
     expected: dict[str, str | None] = {
-        "DESIGN": order.name,
+        "DESIGN": order.claims.name,
         "DESIGN_SHA256": order.sha256,
         "PATTERN": f"sheet {told.number} of {of}",
         "MATERIAL": told.material,
         "UNITS": "mm",
         **kerf_properties(_kerf(order, told.material)),
-        "WAIVED": ", ".join(order.waived) or "none",
-        LIMITS: limit_properties(order.lowered).get(LIMITS),
+        "WAIVED": ", ".join(order.claims.waived) or "none",
+        LIMITS: limit_properties(order.claims.lowered_limits).get(LIMITS),
         "PARTS": ", ".join(f"{part.count} x {part.design} {part.pattern}" for part in told.parts),
         "CURVES": curves,
     }

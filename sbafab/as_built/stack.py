@@ -10,12 +10,12 @@ from sbafab.actuators.stacking import film_of
 from sbafab.as_built.cut_files import LayerFile
 from sbafab.as_built.inlets import Tab, feeding, inner_point, tabs
 from sbafab.as_built.openings import ORIGIN, bores, tooling
-from sbafab.as_built.records import LayerClaim, Manifest
 from sbafab.design.records import Design
 from sbafab.geometry.edges import Point
 from sbafab.laminate.films import Film
 from sbafab.laminate.interfaces import Interface, interface_regions
 from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Layer, Pin
+from sbafab.output.manifest_records import LayerClaim, Manifest
 
 
 def laminate_of(files: Sequence[LayerFile], claims: Manifest, design: Design) -> Laminate:

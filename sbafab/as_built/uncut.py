@@ -26,14 +26,14 @@ STILL = 0.15
 """Share of its way on the path that the part's edge covers less of, where it has a corner."""
 
 
-class Part(NamedTuple):
+class UncutPart(NamedTuple):
     """What is left, and the most area that corners lose or gain because the beam rounds them."""
 
     region: Region
     corner_room: float
 
 
-def uncut(path: Region, kerf: Kerf) -> Part:
+def uncut(path: Region, kerf: Kerf) -> UncutPart:
     """The part inside a path; empty or OutputError where such a beam cannot have left one."""
     a, b = (width / 2 for width in widths(kerf))
     if a == b:
@@ -41,11 +41,11 @@ def uncut(path: Region, kerf: Kerf) -> Part:
         rounded = sum(
             isinstance(e, Arc) and not e.ccw and abs(e.radius - a) < 5e-5 for e in region.edges
         )
-        return Part(region, rounded * a * a)
+        return UncutPart(region, rounded * a * a)
     region = Region(tuple(_inside(contour, a, b) for contour in path.contours))
     check_clear(region.contours)
     joints = [joint for contour in path.contours for joint in _joints(contour)]
-    return Part(region, sum(_corner_room(*joint, a, b) for joint in joints))
+    return UncutPart(region, sum(_corner_room(*joint, a, b) for joint in joints))
 
 
 class _Spot(NamedTuple):

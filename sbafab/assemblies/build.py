@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from sbafab.actuators import build
@@ -12,7 +12,6 @@ from sbafab.assemblies.poses import (
     LYING,
     OUTWARD,
     Pose,
-    Vector,
     about_axis,
     along,
     shifted,
@@ -26,6 +25,7 @@ from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import GeometryError
 from sbafab.laminate.laminate import Inlet, Laminate
+from sbafab.meshing.surface import Vector
 
 if TYPE_CHECKING:
     import numpy as np
@@ -51,17 +51,16 @@ class PartDesign:
 
 @dataclass(frozen=True)
 class PlacedPart:
-    """A part in its place.
+    """A part in its place: ``turn`` about its own axis comes first, ``pose`` is last.
 
-    ``turn`` about its own axis comes first; ``radius`` is that of the tube which it is bent
-    round, None for what stays flat; ``pose`` is last. ``made`` is an SBA's design.
+    Only an SBA is ``made`` from a design or bent round a ``radius``.
     """
 
     name: str
     part: AnyPart
     pose: Pose
-    radius: float | None = None
-    made: PartDesign | None = None
+    made: PartDesign | None = field(default=None, init=False)
+    radius: float | None = field(default=None, init=False)
 
     @property
     def turn(self) -> float:
@@ -77,8 +76,7 @@ class PlacedPart:
             return part.thickness
         if isinstance(part, Cup):
             return part.height
-        assert self.made is not None
-        return self.made.laminate.thickness
+        raise TypeError(f"{self.name} is placed without its design")
 
     def at(self, p: Vector) -> Vector:
         """Where a point of the part's own frame lies in the assembly."""
@@ -88,6 +86,18 @@ class PlacedPart:
     def turned(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points (n, 3) turned about the part's own axis, before they are bent or placed."""
         return about_axis(self.turn).points(points)
+
+
+@dataclass(frozen=True)
+class PlacedSba(PlacedPart):
+    """An SBA in its place; ``radius`` is that of the tube which it is bent round, if it is."""
+
+    made: PartDesign
+    radius: float | None = None
+
+    @property
+    def height(self) -> float:
+        return self.made.laminate.thickness
 
 
 @dataclass(frozen=True)
@@ -118,7 +128,7 @@ def assemble(assembly: Assembly) -> Assembled:
         if part.on is None:
             _check_root(name, own)
             pose = LYING if assembly.pose == "lying" else Pose()
-            placed[name] = PlacedPart(name, part, pose, None, own)
+            placed[name] = _at_pose(name, part, pose, own)
         else:
             placed[name] = _placed(name, part, own, placed[part.on])
     return Assembled(assembly, designs, tuple(placed.values()))
@@ -172,13 +182,16 @@ def _placed(name: str, part: AnyPart, made: PartDesign | None, other: PlacedPart
         side = about_axis(part.angle)
         if made is not None:
             pose = _frame(other).then(side).then(shifted(0.0, 0.0, part.along))
-            return PlacedPart(name, part, pose, radius, made)
+            return PlacedSba(name, part, pose, made, radius)
         pose = _frame(other).then(side).then(shifted(radius, 0.0, part.along)).then(OUTWARD)
-        return PlacedPart(name, part, pose, None, made)
-    if part.at == "inlet":
-        assert isinstance(part, Line)
+        return PlacedPart(name, part, pose)
+    if isinstance(part, Line) and isinstance(other, PlacedSba) and part.at == "inlet":
         return PlacedPart(name, part, _at_inlet(name, part, other))
-    return PlacedPart(name, part, _frame(other).then(_on_axis(part, other)), None, made)
+    return _at_pose(name, part, _frame(other).then(_on_axis(part, other)), made)
+
+
+def _at_pose(name: str, part: AnyPart, pose: Pose, made: PartDesign | None) -> PlacedPart:
+    return PlacedPart(name, part, pose) if made is None else PlacedSba(name, part, pose, made)
 
 
 def _frame(placed: PlacedPart) -> Pose:
@@ -195,11 +208,10 @@ def _on_axis(part: AnyPart, other: PlacedPart) -> Pose:
     return shifted(x, y, 0.0).then(FLIPPED)
 
 
-def _at_inlet(name: str, line: Line, other: PlacedPart) -> Pose:
+def _at_inlet(name: str, line: Line, other: PlacedSba) -> Pose:
     """At the mouth of a chamber's inlet, pointing outward."""
     inlet = inlet_of(name, line, other)
     (x, y), (u, v) = inlet.mouth, inlet.direction
-    assert other.made is not None
     middle = other.made.laminate.layers[0].film.thickness
     start, beyond = other.at((x, y, middle)), other.at((x + 1e-4 * u, y + 1e-4 * v, middle))
     way = [(b - a) / 1e-4 for a, b in zip(start, beyond, strict=True)]
@@ -207,9 +219,8 @@ def _at_inlet(name: str, line: Line, other: PlacedPart) -> Pose:
     return along((way[0] / size, way[1] / size, way[2] / size), start)
 
 
-def inlet_of(name: str, line: Line, other: PlacedPart) -> Inlet:
+def inlet_of(name: str, line: Line, other: PlacedSba) -> Inlet:
     """The inlet that a line goes into. Raises DesignError where there is none."""
-    assert other.made is not None
     inlets: Mapping[str, Inlet] = {inlet.chamber: inlet for inlet in other.made.laminate.inlets}
     if line.chamber not in inlets:
         raise DesignError(

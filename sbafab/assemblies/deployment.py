@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from sbafab.assemblies.build import Assembled, PlacedPart
+from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
 from sbafab.assemblies.fits import WHOLE, found
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Tube
 from sbafab.design.form import Discs
@@ -53,7 +53,7 @@ def aperture(assembled: Assembled) -> Iterator[Finding]:
 
 def _passage(placed: PlacedPart) -> _Passage:
     part = placed.part
-    if placed.made is None:
+    if not isinstance(placed, PlacedSba):
         size = _girth(placed)
         soft = isinstance(part, Cup)
         return _Passage(
@@ -74,9 +74,8 @@ def _passage(placed: PlacedPart) -> _Passage:
     return _Passage(placed.name, _flat_diameter(placed), 0.0, "unfolded")
 
 
-def _lobe_width(placed: PlacedPart) -> float | None:
+def _lobe_width(placed: PlacedSba) -> float | None:
     """Width in mm of a lobe of a three-lobed actuator; None for others."""
-    assert placed.made is not None
     design = placed.made.design
     form = design.form
     if not form.is_parallel or form.stacks != LOBES or not isinstance(form.pockets, Discs):
@@ -84,9 +83,8 @@ def _lobe_width(placed: PlacedPart) -> float | None:
     return max(form.pockets.diameters) + 2 * design.bond.width
 
 
-def _flat_diameter(placed: PlacedPart) -> float:
+def _flat_diameter(placed: PlacedSba) -> float:
     """Circle round an SBA's axis that holds its widest film, tabs and ears taken off, mm."""
-    assert placed.made is not None
     return outline_diameter(placed.made.laminate)
 
 
@@ -117,7 +115,7 @@ def lumen_pass(assembled: Assembled) -> Iterator[Finding]:
 
 
 def _deflated(placed: PlacedPart, assembled: Assembled) -> float:
-    if placed.made is None:
+    if not isinstance(placed, PlacedSba):
         return _girth(placed)
     wrap, laminate = placed.made.design.form.wrap, placed.made.laminate
     if wrap is not None:

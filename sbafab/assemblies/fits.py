@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from sbafab.assemblies.build import Assembled, PlacedPart, inlet_of
+from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba, inlet_of
 from sbafab.assemblies.records import Line, Tube
 from sbafab.assemblies.shapes import face
 from sbafab.geometry.region import Region
@@ -39,7 +39,9 @@ def tube_match(assembled: Assembled) -> Iterator[Finding]:
     """What is bent round a tube was made for it, or at least goes round it once."""
     tolerance = assembled.assembly.rules.tube_tolerance
     for placed, other in joints(assembled):
-        if placed.radius is None or placed.made is None or not isinstance(other.part, Tube):
+        if not isinstance(placed, PlacedSba) or not isinstance(other.part, Tube):
+            continue
+        if placed.radius is None:
             continue
         outer = other.part.outer_diameter
         wrap = placed.made.design.form.wrap
@@ -73,6 +75,8 @@ def inlet_match(assembled: Assembled) -> Iterator[Finding]:
     for placed, other in joints(assembled):
         if placed.part.at != "inlet" or not isinstance(placed.part, Line):
             continue
+        if not isinstance(other, PlacedSba):
+            continue
         inlet = inlet_of(placed.name, placed.part, other)
         limit = 2 * inlet.width / math.pi
         outer = placed.part.outer_diameter
@@ -94,6 +98,8 @@ def line_clearance(assembled: Assembled) -> Iterator[Finding]:
         if placed.part.at != "lumen" or not isinstance(placed.part, Line):
             continue
         lumen = _opening(other)
+        if lumen is None:
+            continue
         left = lumen - placed.part.outer_diameter
         good = holds(left, limit)
         yield found(
@@ -107,13 +113,11 @@ def line_clearance(assembled: Assembled) -> Iterator[Finding]:
         )
 
 
-def _opening(placed: PlacedPart) -> float:
+def _opening(placed: PlacedPart) -> float | None:
+    """Diameter of what a line runs through, mm; None for a part without lumen."""
     if isinstance(placed.part, Tube):
         return placed.part.inner_diameter
-    assert placed.made is not None
-    lumen = placed.made.laminate.lumen
-    assert lumen is not None
-    return lumen
+    return placed.made.laminate.lumen if placed.made is not None else None
 
 
 def seat(assembled: Assembled) -> Iterator[Finding]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+from sbafab.meshing.surface import Vector
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-Vector = tuple[float, float, float]
 Rows = tuple[Vector, Vector, Vector]
 
 

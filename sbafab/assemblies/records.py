@@ -16,7 +16,7 @@ from sbafab.design.section import Section
 from sbafab.design.units import Length, LengthOrZero, Millimetres
 
 FAMILY = "assembly"
-Place = Literal["top", "bottom", "start", "end", "outside", "lumen", "inlet"]
+Seat = Literal["top", "bottom", "start", "end", "outside", "lumen", "inlet"]
 CheckName = Literal[
     "tube-match",
     "inlet-match",
@@ -38,7 +38,7 @@ class Fixed(Section):
 
     on: str | None = None
     """The part that this one is fixed on."""
-    at: Place | None = None
+    at: Seat | None = None
     """Where on it: top or bottom (of an SBA, a magnet, a base), start, end or outside (of a tube),
     lumen (lines only: of an SBA or a tube), inlet (lines only: of an SBA)."""
     angle: Degrees = 0.0

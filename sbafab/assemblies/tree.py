@@ -5,11 +5,11 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Mapping
 
-from sbafab.assemblies.records import AnyPart, Line, Place
+from sbafab.assemblies.records import AnyPart, Line, Seat
 from sbafab.design.reading import listed, shown
 from sbafab.errors import DesignError
 
-PLACES: Mapping[str, tuple[Place, ...]] = {
+PLACES: Mapping[str, tuple[Seat, ...]] = {
     "sba": ("top", "bottom", "lumen", "inlet"),
     "tube": ("start", "end", "outside", "lumen"),
     "magnet": ("top", "bottom"),
@@ -19,7 +19,7 @@ PLACES: Mapping[str, tuple[Place, ...]] = {
     "line": (),
 }
 """Where parts are fixed on a part of each kind."""
-FOR_LINES: tuple[Place, ...] = ("lumen", "inlet")
+FOR_LINES: tuple[Seat, ...] = ("lumen", "inlet")
 
 
 def building_order(parts: Mapping[str, AnyPart]) -> tuple[str, ...]:
@@ -84,7 +84,7 @@ def _check_joint(name: str, part: AnyPart, parts: Mapping[str, AnyPart]) -> None
         )
 
 
-def places_for(part: AnyPart, other: AnyPart) -> tuple[Place, ...]:
+def places_for(part: AnyPart, other: AnyPart) -> tuple[Seat, ...]:
     """Where a part may be fixed on another: lines run inside, all else sits outside."""
     is_line = isinstance(part, Line)
     return tuple(place for place in PLACES[other.kind] if (place in FOR_LINES) == is_line)

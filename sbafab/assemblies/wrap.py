@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from sbafab.assemblies.poses import Vector
-from sbafab.meshing.surface import Surface
+from sbafab.meshing.surface import Surface, Vector
 
 if TYPE_CHECKING:
     import numpy as np

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
     from sbafab.design.records import Design
     from sbafab.output.advice import Advice
-    from sbafab.output.shop import Progress
+    from sbafab.progress import Progress
     from sbafab.rules.finding import Finding
 
     Told = tuple[str, tuple[Finding, ...], list[str], list[Design]]
@@ -73,7 +73,7 @@ def _of_design(design: Design, progress: Progress) -> Told:
     """The findings and notes; what press and sheets cannot do is refused, as a run would do."""
     from sbafab.cli.printing import notes_of
     from sbafab.output.batch import refuse_undoable
-    from sbafab.output.contents import Checked
+    from sbafab.output.planned import Checked
     from sbafab.output.run import check as run_check
 
     checked = Checked(design, *run_check(design, progress))

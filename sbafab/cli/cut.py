@@ -10,13 +10,13 @@ from sbafab.cli.options import Request, dxf_options, run_options, sheet_options
 from sbafab.cli.working import run_parts
 
 if TYPE_CHECKING:
-    from sbafab.cutting.dxf_write import DxfProfile
+    from sbafab.cutting.dxf_write import Curves
 
 
 @click.command()
 @run_options
 @dxf_options
 @sheet_options
-def cut(request: Request, dxf_profile: DxfProfile, chord_error: float) -> None:
+def cut(request: Request, curves: Curves) -> None:
     """Write the cut files: one DXF a layer, and the layers nested on film sheets."""
-    run_parts(request, ("cut",), dxf_profile, chord_error)
+    run_parts(request, ("cut",), curves)

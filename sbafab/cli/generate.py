@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import click
 
 from sbafab.cli.options import Request, dxf_options, run_options, sheet_options
-from sbafab.cli.working import RULE_FAILED, run_design
+from sbafab.cli.working import run_design, tell
 
 if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
-    from sbafab.cutting.dxf_write import DxfProfile
+    from sbafab.cutting.dxf_write import Curves
     from sbafab.laminate.laminate import Laminate
 
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @dxf_options
 @sheet_options
 @click.option("--decks", is_flag=True, help="Write what each simulator reads, too.")
-def generate(request: Request, dxf_profile: DxfProfile, chord_error: float, decks: bool) -> None:
+def generate(request: Request, curves: Curves, decks: bool) -> None:
     """Write everything: cut files, film sheets, press schedule, traveller, meshes, pictures.
 
     With --decks also calculix/, sofa/ and mujoco/, as `sbafab simulate --export` writes them.
@@ -29,33 +29,27 @@ def generate(request: Request, dxf_profile: DxfProfile, chord_error: float, deck
     """
     from sbafab.assemblies.reading import load
     from sbafab.assemblies.records import Assembly
-    from sbafab.output.run import EVERYTHING, Extras
+    from sbafab.output.planned import EVERYTHING
+    from sbafab.output.run import Extras
 
     found = load(request.designs[0], request.assignments, request.waivers)
     if isinstance(found, Assembly):
         if decks:
             raise click.UsageError("--decks goes with one design; leave it out for an assembly")
-        _generate_assembly(found, request, dxf_profile, chord_error)
+        _generate_assembly(found, request, curves)
         return
     extras = Extras(also=_write_decks) if decks else None
-    run_design(found, request, EVERYTHING, dxf_profile, chord_error, extras)
+    run_design(found, request, EVERYTHING, curves, extras)
 
 
-def _generate_assembly(
-    assembly: Assembly, request: Request, dxf_profile: DxfProfile, chord_error: float
-) -> None:
-    from sbafab.cli.printing import print_json, shown_progress
-    from sbafab.cli.printing_assembly import assembly_json, print_assembly
+def _generate_assembly(assembly: Assembly, request: Request, curves: Curves) -> None:
+    from sbafab.cli.printing import run_json, shown_progress
+    from sbafab.cli.printing_assembly import print_assembly
     from sbafab.output.assembly import generate_assembly
 
     with shown_progress(request.as_json) as progress:
-        run = generate_assembly(assembly, request.out, progress, dxf_profile, chord_error)
-    if request.as_json:
-        print_json(assembly_json(run))
-    else:
-        print_assembly(run)
-    if run.failed:
-        click.get_current_context().exit(RULE_FAILED)
+        run = generate_assembly(assembly, request.out, progress, curves)
+    tell(run, request, run_json, print_assembly)
 
 
 def _write_decks(laminate: Laminate, folder: Path) -> None:

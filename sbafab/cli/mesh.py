@@ -88,8 +88,7 @@ def mesh(
     The conforming ones take the extra "mesh": pip install "sbafab[mesh]".
     """
     from sbafab.meshing.conforming.settings import MeshSettings
-    from sbafab.output.contents import Conforming
-    from sbafab.output.run import Extras
+    from sbafab.output.run import Conforming, Extras
 
     settings = MeshSettings(size, element, symmetry, fill, gaps)
     conforming = Conforming(settings, formats or FORMATS)

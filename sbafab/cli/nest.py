@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import click
 
 from sbafab.cli.options import Request, dxf_options, several_run_options, sheet_options
-from sbafab.cli.working import RULE_FAILED
+from sbafab.cli.working import tell
 
 if TYPE_CHECKING:
-    from sbafab.cutting.dxf_write import DxfProfile
+    from sbafab.cutting.dxf_write import Curves
 
 
 @click.command()
@@ -18,24 +18,19 @@ if TYPE_CHECKING:
 @click.option("--name", default="job", show_default=True, help="Names the folder OUT/<name>/.")
 @dxf_options
 @sheet_options
-def nest(request: Request, name: str, dxf_profile: DxfProfile, chord_error: float) -> None:
+def nest(request: Request, name: str, curves: Curves) -> None:
     """Cut several designs from the same film sheets.
 
     OUT/<name>/ gets a folder for each DESIGN and sheets/ with the parts of all. Overrides count
     for every design; how many of each is its own order.copies, or --copies of every one.
     """
     from sbafab.actuators import load_design
-    from sbafab.cli.printing import job_json, print_job, print_json, shown_progress
+    from sbafab.cli.printing import job_json, print_job, shown_progress
     from sbafab.output.job import generate_job
 
     designs = [
         load_design(design, request.assignments, request.waivers) for design in request.designs
     ]
     with shown_progress(request.as_json) as progress:
-        job = generate_job(designs, name, request.out, progress, dxf_profile, chord_error)
-    if request.as_json:
-        print_json(job_json(job))
-    else:
-        print_job(job)
-    if job.failed:
-        click.get_current_context().exit(RULE_FAILED)
+        job = generate_job(designs, name, request.out, progress, curves)
+    tell(job, request, job_json, print_job)

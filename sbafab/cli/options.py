@@ -7,12 +7,14 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+if TYPE_CHECKING:
+    from sbafab.cutting.dxf_write import DxfProfile
+
 Command = Callable[..., Any]
-CHORD_ERROR = 0.005
 
 set_option = click.option(
     "--set",
@@ -133,9 +135,14 @@ def dxf_options(command: Command) -> Command:
     )
 
     @functools.wraps(command)
-    def said(dxf_profile: str, chord_error: float | None, **others: Any) -> Any:
+    def said(dxf_profile: DxfProfile, chord_error: float | None, **others: Any) -> Any:
         if chord_error is not None and dxf_profile != "chords":
             raise click.UsageError("--chord-error goes with --dxf-profile chords; add it")
-        return command(dxf_profile=dxf_profile, chord_error=chord_error or CHORD_ERROR, **others)
+        from sbafab.cutting.dxf_write import Curves
+
+        curves = Curves(dxf_profile)
+        if chord_error is not None:
+            curves = curves._replace(chord_error=chord_error)
+        return command(curves=curves, **others)
 
     return profile(chord(said))

@@ -73,14 +73,14 @@ def predict(
     from sbafab.actuators import load_design
     from sbafab.cli.printing import print_json, shown_progress
     from sbafab.errors import OutputError
-    from sbafab.models.figures import Asked, Calibration
+    from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict as predicted
     from sbafab.output.earlier import PREDICTION
     from sbafab.output.predicting import prediction_json, with_prediction
     from sbafab.output.run import Extras, generate
 
     design = load_design(request.designs[0], request.assignments, request.waivers)
-    wish = Asked(pressures or Asked.pressures_kpa, flow, volumes, Calibration(**factors))
+    wish = Asked(pressures or Asked.pressures_kpa, flow, volumes, Factors(**factors))
     found = predicted(design, wish)
     with shown_progress(request.as_json) as tell:
         extras = Extras(also=with_prediction(design, found), own=PREDICTION)

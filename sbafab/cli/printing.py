@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sbafab.progress import Progress, unheard
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from sbafab.output.contents import Checked
-    from sbafab.output.job import Job
+    from sbafab.output.planned import Checked
     from sbafab.output.run import Run
-    from sbafab.output.shop import Progress
     from sbafab.rules.finding import Finding
 
 DECKS = ("calculix/actuator.inp", "sofa/actuator.scn", "mujoco/actuator.xml")
@@ -50,7 +50,7 @@ def console() -> Console:
 def shown_progress(quiet: bool) -> Iterator[Progress]:
     """A progress line on standard error, where that is a terminal."""
     if quiet or not sys.stderr.isatty():
-        yield lambda what, done, total: None
+        yield unheard
         return
     from rich.console import Console
     from rich.status import Status
@@ -104,6 +104,30 @@ def facts_table() -> Table:
     return made
 
 
+def add_batch(table: Table, run: Run) -> None:
+    """Rows on several designs: how many of each, whether it holds, what was written of them."""
+    from rich.text import Text
+
+    for one in run.checked:
+        warned = sorted({f.rule for f in one.findings if f.verdict == "warn"})
+        said = f"; warns: {', '.join(warned)}" if warned else ""
+        waived = f"; waived: {', '.join(one.waived)}" if one.waived else ""
+        verdict = "a rule failed" if one.failed else "every rule holds"
+        words = f"{one.design.order.copies} x, {verdict}{waived}{said}"
+        table.add_row(one.design.name, Text(words))
+    for note in notes_of(run.checked):
+        table.add_row("note", Text(note))
+    index = run.manifest
+    for film in index.get("films", ()):
+        table.add_row(f"{film['material']} film", Text(film_said(film, index["sheets"], 1)))
+    for mesh in index.get("meshes", ()):
+        table.add_row("solid", Text(f"{mesh['file']}, a node a part"))
+    for label, text in replaced(run.dropped):
+        table.add_row(label, Text(text))
+    if index:
+        table.add_row("folder", Text(str(run.folder)))
+
+
 def print_failed(findings: Iterable[Finding], written: str, change: str) -> None:
     """What failed, what was ``written`` all the same, and the two ways on."""
     from rich.text import Text
@@ -143,27 +167,13 @@ def print_run(run: Run) -> None:
             out.print(Text(f"{run.folder} {LEFT_AS_IT_WAS}"), soft_wrap=True)
 
 
-def print_job(job: Job) -> None:
+def print_job(job: Run) -> None:
     """What a job made; for a design that a rule stopped, what the rules found."""
     from rich.text import Text
 
     out = console()
     made = facts_table()
-    for one in job.checked:
-        warned = sorted({f.rule for f in one.findings if f.verdict == "warn"})
-        said = f"; warns: {', '.join(warned)}" if warned else ""
-        waived = f"; waived: {', '.join(one.waived)}" if one.waived else ""
-        verdict = "a rule failed" if one.failed else "every rule holds"
-        made.add_row(one.design.name, Text(f"{one.design.order.copies} x, {verdict}{waived}{said}"))
-    for note in notes_of(job.checked):
-        made.add_row("note", Text(note))
-    for film in job.manifest.get("films", ()):
-        sheets = film_said(film, job.manifest["sheets"], 1)
-        made.add_row(f"{film['material']} film", Text(sheets))
-    for label, text in replaced(job.dropped):
-        made.add_row(label, Text(text))
-    if not job.failed:
-        made.add_row("folder", Text(str(job.folder)))
+    add_batch(made, job)
     out.print(made)
     for one in job.checked:
         if one.failed:
@@ -175,7 +185,7 @@ def print_job(job: Job) -> None:
         print_failed(every, f"Nothing was written, {job.folder} is as it was", "designs")
 
 
-def job_json(job: Job) -> dict[str, object]:
+def job_json(job: Run) -> dict[str, object]:
     """The result of a job for programs."""
     return {
         "folder": str(job.folder),
@@ -306,6 +316,6 @@ def run_json(run: Run) -> dict[str, object]:
         "folder": str(run.folder),
         "failed": run.failed,
         "findings": [finding.as_dict() for finding in run.findings],
-        "notes": list(run.laminate.notes),
+        "notes": notes_of(run.checked),
         "files": [] if run.kept else sorted(run.manifest["files"]),
     }

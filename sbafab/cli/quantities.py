@@ -15,7 +15,7 @@ _WRITTEN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s
 
 
 @dataclass(frozen=True)
-class Quantity:
+class MeasuredQuantity:
     """A number with or without one of ``units``, whose sizes are in the first one's."""
 
     name: str
@@ -34,14 +34,16 @@ class Quantity:
         return number
 
 
-LENGTH = Quantity("length", {"mm": 1.0, "um": 0.001, "cm": 10.0, "in": 25.4}, '0.35 or "350 um"')
-PRESSURE = Quantity(
+LENGTH = MeasuredQuantity(
+    "length", {"mm": 1.0, "um": 0.001, "cm": 10.0, "in": 25.4}, '0.35 or "350 um"'
+)
+PRESSURE = MeasuredQuantity(
     "pressure",
     {"kPa": 1.0, "Pa": 0.001, "MPa": 1000.0, "mbar": 0.1, "bar": 100.0, "psi": 6.894757},
     '6, "6 kPa" or "60 mbar"',
 )
-VOLUME = Quantity("volume", {"ul": 1.0, "ml": 1000.0, "mm3": 1.0}, '5, 5ul or "0.005 ml"')
-FLOW = Quantity(
+VOLUME = MeasuredQuantity("volume", {"ul": 1.0, "ml": 1000.0, "mm3": 1.0}, '5, 5ul or "0.005 ml"')
+FLOW = MeasuredQuantity(
     "flow",
     {"ml/min": 1.0, "ul/min": 0.001, "ml/s": 60.0, "l/min": 1000.0},
     '35, "35 ml/min" or "0.6 ml/s"',
@@ -52,7 +54,7 @@ FLOW = Quantity(
 class OfChamber:
     """``NAME=QUANTITY``; where ``all_chambers``, also a quantity alone, with "" for the name."""
 
-    quantity: Quantity
+    quantity: MeasuredQuantity
     all_chambers: bool = False
 
     def read(self, written: str) -> tuple[str, float]:

@@ -34,7 +34,7 @@ LETTER = 2.4
 TITLE = "KERF COUPON"
 
 
-class Frame(NamedTuple):
+class CouponFrame(NamedTuple):
     """A frame of film: its name, lower left corner, outside and window along x and y, in mm."""
 
     name: str
@@ -52,10 +52,10 @@ class Frame(NamedTuple):
 
 
 FRAMES = (
-    Frame("A", (4.0, 34.0), (24.0, 20.0), (14.0, 10.0)),
-    Frame("B", (32.0, 34.0), (24.0, 20.0), (14.0, 10.0)),
-    Frame("C", (8.0, 12.0), (16.0, 12.0), (8.0, 6.0)),
-    Frame("D", (36.0, 12.0), (16.0, 12.0), (8.0, 6.0)),
+    CouponFrame("A", (4.0, 34.0), (24.0, 20.0), (14.0, 10.0)),
+    CouponFrame("B", (32.0, 34.0), (24.0, 20.0), (14.0, 10.0)),
+    CouponFrame("C", (8.0, 12.0), (16.0, 12.0), (8.0, 6.0)),
+    CouponFrame("D", (36.0, 12.0), (16.0, 12.0), (8.0, 6.0)),
 )
 
 

@@ -13,6 +13,20 @@ from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point
 from sbafab.geometry.region import Contour
 
 DxfProfile = Literal["bulges", "arcs", "chords"]
+
+
+class Curves(NamedTuple):
+    """How cut files draw arcs; ``chord_error`` in mm counts for chords only."""
+
+    profile: DxfProfile = "bulges"
+    chord_error: float = 0.005
+
+    @property
+    def in_chords(self) -> bool:
+        return self.profile == "chords"
+
+
+TRUE_ARCS = Curves()
 """How curves are written: polylines with bulges, LINE and ARC, or polylines of short chords."""
 
 DATUM_ARM = 1.0

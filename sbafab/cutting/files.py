@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,9 +18,7 @@ from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.beam import widths
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
-
-Progress = Callable[[int, int], None]
-"""Told how many of how many layers are written."""
+from sbafab.progress import Counted
 
 
 @dataclass(frozen=True)
@@ -45,16 +43,16 @@ def compensated_paths(laminate: Laminate, settings: CutSettings) -> dict[str, Re
 
 
 def _compensated(layer: Layer, settings: CutSettings) -> Region:
-    kerf = settings.kerf_width(layer.film.material)
+    kerf, curves = settings.kerf_width(layer.film.material), settings.curves
     try:
-        if isinstance(kerf, tuple) and settings.profile == "chords":
+        if isinstance(kerf, tuple) and curves.in_chords:
             raise DesignError(
                 "chords do not tell how a kerf along x and y was compensated; write bulges or arcs."
             )
         path = compensate(layer.profile, kerf or 0.0)
-        if settings.profile != "chords":
+        if not curves.in_chords:
             return path
-        return in_chords(path, layer.role, settings.chord_error, max(widths(kerf or 0.0)) / 2)
+        return in_chords(path, layer.role, curves.chord_error, max(widths(kerf or 0.0)) / 2)
     except DesignError as error:
         raise DesignError(f"layer {layer.name}: {error}") from error
 
@@ -64,7 +62,7 @@ def write_layer_files(
     paths: Mapping[str, Region],
     folder: Path,
     settings: CutSettings,
-    progress: Progress | None = None,
+    progress: Counted | None = None,
 ) -> list[CutFile]:
     """Writes ``layers/<layer name>.dxf`` under ``folder`` for every layer, bottom to top.
 
@@ -91,7 +89,7 @@ def _write_pattern(
     kerf = settings.kerf_width(material)
     properties = file_properties(settings, material, first.pattern)
     contours = cutting_order(path)
-    text = dxf_text(contours, properties, settings.profile)
+    text = dxf_text(contours, properties, settings.curves.profile)
     data = text.encode()
     original = folder / layer_path(first.name, kerf)
     original.write_bytes(data)

@@ -54,9 +54,9 @@ def write_fixture(
     if plate is None:
         return None
     properties = fixture_properties(settings)
-    if settings.profile == "chords":
-        plate = in_chords(plate, None, settings.chord_error)
-    text = dxf_text(cutting_order(plate), properties, settings.profile)
+    if settings.curves.in_chords:
+        plate = in_chords(plate, None, settings.curves.chord_error)
+    text = dxf_text(cutting_order(plate), properties, settings.curves.profile)
     path = folder / PATH
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(text.encode())

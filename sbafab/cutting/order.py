@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
-from sbafab.cutting.remaining import Remaining
+from sbafab.cutting.remaining import PointsLeft
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Contour, Region
 
@@ -46,7 +46,7 @@ def _short(contours: Iterable[Contour], here: Point) -> list[Contour]:
     """A short path through all contours: on to the nearest, then crossings undone."""
     rest = list(contours)
     starts = [_start(contour) for contour in rest]
-    remaining = Remaining(starts)
+    remaining = PointsLeft(starts)
     path: list[Contour] = []
     place = here
     while len(path) < len(rest):

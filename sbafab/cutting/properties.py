@@ -6,9 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from sbafab.cutting.dxf_write import DxfProfile
+from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
+from sbafab.design.films import is_kerf
 from sbafab.errors import OutputError
-from sbafab.geometry.beam import Kerf, is_kerf, widths
+from sbafab.geometry.beam import Kerf, widths
 from sbafab.laminate.films import PTFE_WARNING, Material
 
 UNCALIBRATED = "uncalibrated: nominal edges"
@@ -25,18 +26,17 @@ class CutSettings:
     ``kerf_widths``: full width in mm (or along x and along y) by material, None or absent where
     it was not measured.
     ``waived``: names of the waived rules; ``lowered``: limits below the usual ones, as
-    ``rules.lowered`` says them. ``chord_error`` in mm counts for profile "chords" only.
+    ``rules.lowered`` says them.
     ``generator``: program and version, for example ``sbafab 1.0.0``. ``warnings``: what the files
     of a material must say.
     """
 
     design: str
     design_sha256: str
-    kerf_widths: Mapping[str, Kerf | None] = field(default_factory=dict)
+    kerf_widths: Mapping[Material, Kerf | None] = field(default_factory=dict)
     waived: tuple[str, ...] = ()
     lowered: tuple[str, ...] = ()
-    profile: DxfProfile = "bulges"
-    chord_error: float = 0.005
+    curves: Curves = TRUE_ARCS
     generator: str = "sbafab"
     warnings: Mapping[str, str] = field(default_factory=lambda: {"PTFE": PTFE_WARNING})
 
@@ -91,7 +91,7 @@ def _properties(
         "WAIVED": ", ".join(settings.waived) or "none",
         **limit_properties(settings.lowered),
         "GENERATOR": settings.generator,
-        **curves_property(curves_of(settings)),
+        **curves_property(said_of(settings.curves)),
     }
 
 
@@ -149,9 +149,15 @@ def layer_path(name: str, kerf: Kerf | None) -> str:
     return f"{FOLDER}/{name}{kerf_suffix(kerf)}.dxf"
 
 
-def curves_of(settings: CutSettings) -> str | None:
+def said_of(curves: Curves) -> str | None:
     """What files and manifest say of chords; nothing of true arcs."""
-    return f"{CHORDS} {settings.chord_error:g} mm" if settings.profile == "chords" else None
+    return f"{CHORDS} {curves.chord_error:g} mm" if curves.in_chords else None
+
+
+def curves_of(said: str | None) -> Curves:
+    """How arcs are drawn where a manifest says that. Raises OutputError as ``chord_error_of``."""
+    error = chord_error_of(curves_property(said))
+    return Curves("chords", error) if error else TRUE_ARCS
 
 
 def curves_property(said: str | None) -> dict[str, str]:

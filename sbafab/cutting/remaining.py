@@ -11,7 +11,7 @@ SLACK = 1e-5
 """mm by which a measure may fall short of the distance of two points: it may be rounded."""
 
 
-class Remaining:
+class PointsLeft:
     """Points filed by the cells of a square grid, which is made anew as they grow few."""
 
     def __init__(self, points: Sequence[Point]) -> None:

@@ -11,7 +11,6 @@ from typing import Literal
 
 from sbafab.cutting.dxf_read import ReadBack
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
-from sbafab.cutting.files import Progress
 from sbafab.cutting.label import label
 from sbafab.cutting.order import cutting_order, travel
 from sbafab.cutting.properties import CutSettings, kerf_suffix, sheet_properties
@@ -22,6 +21,7 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Contour, Region
 from sbafab.laminate.films import Material
 from sbafab.nesting.records import Nest, Placement
+from sbafab.progress import Counted
 
 FOLDER = "sheets"
 
@@ -81,7 +81,7 @@ def write_sheets(
     settings: CutSettings,
     machine: Machine,
     labelled: bool = True,
-    progress: Progress | None = None,
+    progress: Counted | None = None,
 ) -> list[SheetFile]:
     """Writes ``sheets/<material>_<number>.dxf`` and ``.svg`` for every sheet of every nest.
 
@@ -113,7 +113,7 @@ def _write_sheet(
     )
     stem = f"{nest.material}_{sheet + 1}{kerf_suffix(settings.kerf_width(nest.material))}"
     path = folder / FOLDER / f"{stem}.dxf"
-    text = dxf_text(contours, properties, settings.profile, around)
+    text = dxf_text(contours, properties, settings.curves.profile, around)
     path.write_bytes(text.encode())
     # In the order of the file, so that each contour is compared with its own first.
     found = verify_file(path, Region(contours), properties)

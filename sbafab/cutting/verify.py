@@ -10,7 +10,7 @@ from pathlib import Path
 from sbafab.cutting.cut_layers import CUT_SEQUENCE, CUT_SHEET, ENGRAVE, REFERENCE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import DATUM_ARM, Surroundings
-from sbafab.cutting.remaining import Remaining
+from sbafab.cutting.remaining import PointsLeft
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Bounds, Edge, Line, Point, distance_to
 from sbafab.geometry.region import Contour, Region
@@ -159,7 +159,7 @@ def _paired(
 ) -> Iterator[tuple[Contour, Contour]]:
     """Each of our contours with that of theirs, not yet taken, whose box is most like its own."""
     boxes = [contour.bounds for contour in theirs]
-    rest = Remaining([box[:2] for box in boxes])
+    rest = PointsLeft([box[:2] for box in boxes])
     for contour in ours:
         box = contour.bounds
 

@@ -5,6 +5,7 @@ Lengths are mm.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Annotated, Literal, Self
@@ -13,7 +14,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from sbafab.design.section import Section
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
-from sbafab.geometry.beam import Kerf, is_kerf
+from sbafab.geometry.beam import Kerf
 from sbafab.laminate.films import PAPER_TPE, PTFE_WARNING, Film, FilmKind, Material
 
 UNCALIBRATED: Literal["uncalibrated"] = "uncalibrated"
@@ -22,6 +23,11 @@ MOST_FILMS = 20
 """Beside TPE and PTFE."""
 HOTTEST = 400.0
 """C, of any film."""
+
+
+def is_kerf(x: float, y: float) -> bool:
+    """Whether a beam may be so wide: up to a millimetre, and nowhere ten times as wide."""
+    return min(x, y) >= 0 and max(x, y) <= min(1.0, 10 * min(x, y)) and math.isfinite(x + y)
 
 
 def _kerf(value: object) -> Kerf | str:

@@ -64,7 +64,7 @@ MARK = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[A-Za-z]")
 """What a path is written with: numbers, and letters for its commands."""
 
 
-class Drawn(NamedTuple):
+class DrawnShape(NamedTuple):
     """A shape and what takes it to the drawing's user units."""
 
     shape: Sized
@@ -88,7 +88,7 @@ def svg_strands(path: Path) -> Traced:
     return Traced(_strands(drawn, page), page.said)
 
 
-def _strands(drawn: list[Drawn], page: Page) -> Iterator[Strand]:
+def _strands(drawn: list[DrawnShape], page: Page) -> Iterator[Strand]:
     from svgelements import Path as PathData
 
     for shape, matrix in drawn:
@@ -142,7 +142,7 @@ def _refuse_excess(root: ElementTree.Element) -> None:
         refuse_more_than_limit(count)
 
 
-def _drawn(root: ElementTree.Element) -> Iterator[Drawn]:
+def _drawn(root: ElementTree.Element) -> Iterator[DrawnShape]:
     """The shapes that are drawn, in their order."""
     if "transform" in root.attrib:
         raise DesignError("has a transform on svg, which programs read differently; put it on a g")
@@ -165,7 +165,7 @@ def _drawn(root: ElementTree.Element) -> Iterator[Drawn]:
         if is_group:
             waiting += [(inner, matrix, shown) for inner in reversed(element)]
         elif shown:
-            yield Drawn(sized(element), matrix)
+            yield DrawnShape(sized(element), matrix)
 
 
 def _refuse_undrawn(root: ElementTree.Element) -> None:
@@ -214,10 +214,10 @@ def _product(outer: Matrix, inner: Matrix) -> Matrix:
     )
 
 
-Placement = Callable[[Any], Point]
+ToUserUnits = Callable[[Any], Point]
 
 
-def _placement(matrix: Matrix, across: float, up: float) -> Placement:
+def _placement(matrix: Matrix, across: float, up: float) -> ToUserUnits:
     """Takes a point of a shape to mm: by the shape's own transform, then by the drawing's scale."""
     a, b, c, d, e, f = matrix
 
@@ -227,7 +227,7 @@ def _placement(matrix: Matrix, across: float, up: float) -> Placement:
     return point
 
 
-def _subpaths(segments: list[Any], point: Placement) -> Iterator[Strand]:
+def _subpaths(segments: list[Any], point: ToUserUnits) -> Iterator[Strand]:
     """One strand from every move to the next, or to where the path is closed."""
     edges: list[Edge] = []
     for segment in segments:
@@ -243,7 +243,7 @@ def _subpaths(segments: list[Any], point: Placement) -> Iterator[Strand]:
         yield tuple(edges)
 
 
-def _edges(segment: Any, point: Placement) -> tuple[Edge, ...]:
+def _edges(segment: Any, point: ToUserUnits) -> tuple[Edge, ...]:
     kind = type(segment).__name__
     if segment.start is None or segment.end is None:
         return ()

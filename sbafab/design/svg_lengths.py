@@ -55,7 +55,7 @@ class Page(NamedTuple):
         return f"read at {self.across:.6g} mm a unit across and {self.down:.6g} down"
 
 
-class Length(NamedTuple):
+class SvgLength(NamedTuple):
     """A number and its unit, "" for user units."""
 
     number: float
@@ -81,7 +81,7 @@ def numbers(text: str) -> Iterator[str]:
             raise ValueError(",")
 
 
-def length(text: str, what: str) -> Length:
+def length(text: str, what: str) -> SvgLength:
     """A length as it is written. Raises DesignError where programs do not agree on it."""
     match = _LENGTH.fullmatch(text)
     if match is None or (match[2] not in PER_PIXEL and match[2] not in ("", "px", "%")):
@@ -92,10 +92,10 @@ def length(text: str, what: str) -> Length:
     number = float(match[1])
     if not math.isfinite(number):
         raise DesignError(f'has {what} "{match[1][:40]}", a coordinate out of all bounds')
-    return Length(number, "" if match[2] == "px" else match[2])
+    return SvgLength(number, "" if match[2] == "px" else match[2])
 
 
-def user_units(size: Length, whole: float | None, what: str) -> float:
+def user_units(size: SvgLength, whole: float | None, what: str) -> float:
     """A length in user units; ``whole`` is what a percentage is of."""
     if size.unit != "%":
         return size.number * PER_PIXEL.get(size.unit, 1.0)
@@ -160,7 +160,7 @@ def with_physical_lengths(page: Page) -> Page:
     return page._replace(across=MM_PER_PIXEL, down=MM_PER_PIXEL, physical=True)
 
 
-def _size(root: ElementTree.Element, name: str) -> Length | None:
+def _size(root: ElementTree.Element, name: str) -> SvgLength | None:
     text = root.get(name, "").strip(WHITE)
     return None if text in ("", "auto") else length(text, f"a {name} of")
 

@@ -10,8 +10,8 @@ from xml.etree import ElementTree
 from sbafab.design.svg_lengths import (
     NUMBER,
     WHITE,
-    Length,
     Page,
+    SvgLength,
     diagonal,
     length,
     numbers,
@@ -49,7 +49,7 @@ class Sized(NamedTuple):
     """A shape with its lengths as they are written; None where one is not given, or "auto"."""
 
     name: str
-    lengths: dict[str, Length | None]
+    lengths: dict[str, SvgLength | None]
     text: str = ""
     """Of a path and of polylines: what they are drawn by."""
 
@@ -61,7 +61,7 @@ class Sized(NamedTuple):
 def sized(element: ElementTree.Element) -> Sized:
     """The shape of an element. Raises DesignError where programs would not agree on it."""
     name = local(element)
-    found: dict[str, Length | None] = {}
+    found: dict[str, SvgLength | None] = {}
     for key in LENGTHS.get(name, ()):
         text = element.get(key, "").strip(WHITE)
         absent = text == "" or (text == "auto" and key in SIZES)

@@ -61,11 +61,6 @@ def widths(kerf: Kerf) -> tuple[float, float]:
     return kerf if isinstance(kerf, tuple) else (kerf, kerf)
 
 
-def is_kerf(x: float, y: float) -> bool:
-    """Whether a beam may be so wide: up to a millimetre, and nowhere ten times as wide."""
-    return min(x, y) >= 0 and max(x, y) <= min(1.0, 10 * min(x, y)) and math.isfinite(x + y)
-
-
 def beam_path(region: Region, kerf: Kerf) -> BeamPath:
     """The path of the beam's middle that leaves ``region``; both widths 0, or neither.
 

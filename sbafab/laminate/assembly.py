@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 
-Bond = Literal["flash", "full"]
+BondState = Literal["flash", "full"]
 StepName = Literal["flash_bottom", "bond_bottom", "flash_middle", "bond_all"]
 PLATE_MARGIN = 6.0
 """mm of pin plate round everything that lies on it."""
@@ -27,7 +27,7 @@ class AssemblyStep:
 
     number: int
     name: StepName
-    bond: Bond
+    bond: BondState
     stacks: tuple[tuple[int, ...], ...]
     adds: tuple[int, ...]
     pins: tuple[Pin, ...]
@@ -54,7 +54,7 @@ class _Plan(NamedTuple):
     """A step before it has its number and pins."""
 
     name: StepName
-    bond: Bond
+    bond: BondState
     stacks: tuple[tuple[int, ...], ...]
     adds: tuple[int, ...]
 

@@ -3,47 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 from xml.sax.saxutils import escape
 
 from sbafab.geometry.edges import Bounds
 from sbafab.geometry.svg import number, path_data
+from sbafab.laminate.inks import ink
 from sbafab.notebook import table_html
 
 if TYPE_CHECKING:
-    from sbafab.laminate.films import Film
     from sbafab.laminate.laminate import Laminate, Layer
 
 
-class Ink(NamedTuple):
-    """Fill and line colour of a film."""
-
-    fill: str
-    line: str
-
-
-# Blue against orange: told apart in every common colour blindness, and in grey by lightness.
-# Further films follow in hues apart from both; masks stay light, and pictures hatch them.
-STRUCTURAL = (
-    Ink("#a9cfea", "#0b4f86"),
-    Ink("#8fd0b5", "#0b6b4b"),
-    Ink("#c9b8e6", "#54308f"),
-    Ink("#b9c2cc", "#3c4650"),
-)
-MASKS = (
-    Ink("#fbe3bd", "#b35a00"),
-    Ink("#f8cfd4", "#a3213a"),
-    Ink("#ecebae", "#6f6a00"),
-)
-
 SHOWN_MM = 80.0
 BARS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
-
-
-def ink(film: Film) -> Ink:
-    """The colours of a film; the fifth of a kind begins again with the first one's."""
-    inks = MASKS if film.is_mask else STRUCTURAL
-    return inks[film.shade % len(inks)]
 
 
 def laminate_html(laminate: Laminate) -> str:

@@ -17,7 +17,7 @@ from sbafab.meshing.write_3mf import write_3mf
 from sbafab.meshing.write_glb import write_glb
 from sbafab.meshing.write_stl import write_stl
 
-Kind = Literal["solid", "cavity", "volume", "shell"]
+MeshKind = Literal["solid", "cavity", "volume", "shell"]
 Writer = Callable[[Surface, Path], None]
 
 SOLID_WRITERS: dict[str, Writer] = {
@@ -37,7 +37,7 @@ class MeshFile:
     """
 
     file: str
-    kind: Kind
+    kind: MeshKind
     chamber: str | None
     fill_ul: float
     volume_mm3: float
@@ -82,5 +82,5 @@ def _meshes(laminate: Laminate, sagitta: float) -> Iterator[tuple[MeshFile, Surf
         yield _described(file, "cavity", chamber.name, surface), surface, write_stl
 
 
-def _described(file: str, kind: Kind, chamber: str | None, surface: Surface) -> MeshFile:
+def _described(file: str, kind: MeshKind, chamber: str | None, surface: Surface) -> MeshFile:
     return MeshFile(file, kind, chamber, 0.0, surface.volume, len(surface.faces))

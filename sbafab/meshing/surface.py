@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     import trimesh
     from numpy.typing import NDArray
 
+Vector = tuple[float, float, float]
+"""A point or a way in space, mm, or a direction."""
+
 
 class Surface(NamedTuple):
     """A triangulated surface.

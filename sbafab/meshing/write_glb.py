@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from sbafab.meshing.surface import Surface
 
-Colour = tuple[float, float, float]
-FILM: Colour = (0.78, 0.74, 0.65)
+LinearRGB = tuple[float, float, float]
+FILM: LinearRGB = (0.78, 0.74, 0.65)
 """Linear red, green and blue: the off-white of TPE film."""
 
 FLOAT, UNSIGNED_INT = 5126, 5125
@@ -24,7 +24,7 @@ class Node(NamedTuple):
     name: str
     surface: Surface
     material: str
-    colour: Colour
+    colour: LinearRGB
 
 
 def write_glb(surface: Surface, path: Path, material: str = "TPE") -> None:

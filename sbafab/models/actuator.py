@@ -9,7 +9,7 @@ from sbafab.design.form import Discs, Form, Slots
 from sbafab.design.records import Design
 from sbafab.geometry.edges import Point
 from sbafab.laminate.laminate import Laminate
-from sbafab.models.figures import Calibration
+from sbafab.models.figures import Factors
 from sbafab.models.kinematics import Kinematics, full_stroke, round_stack, slot_stack
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class Actuator:
         return self.form.wrap is None and self.form.stacks == stacks and set(self.radii) == {radius}
 
 
-def actuator(design: Design, laminate: Laminate, calibration: Calibration) -> Actuator:
+def actuator(design: Design, laminate: Laminate, calibration: Factors) -> Actuator:
     """The actuator of a design of any family."""
     balloons, form = design.stack.balloons, design.form
     radii: tuple[float, ...] = ()

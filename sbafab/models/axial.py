@@ -10,7 +10,7 @@ import numpy as np
 from sbafab.errors import DesignError
 from sbafab.models import paper
 from sbafab.models.actuator import Actuator
-from sbafab.models.figures import Asked, Figure, LeftOut, Line, Model, Points, Relation
+from sbafab.models.figures import Asked, Figure, LeftOut, Model, Points, Relation, Trace
 from sbafab.models.flow import seconds
 from sbafab.models.force import force, work_uj
 from sbafab.models.kinematics import Kinematics
@@ -170,7 +170,7 @@ def stroke_relation(actuator: Actuator) -> Relation:
     lines = []
     for k in actuator.kinematics:
         stroke = np.linspace(0, k.largest_stroke, SAMPLES)
-        lines.append(Line(k.model.name, k.volume(stroke).tolist(), stroke.tolist(), k.model))
+        lines.append(Trace(k.model.name, k.volume(stroke).tolist(), stroke.tolist(), k.model))
     points = []
     if actuator.is_like_paper(1, paper.VALID_RADIUS):
         first = actuator.kinematics[0]
@@ -181,7 +181,7 @@ def stroke_relation(actuator: Actuator) -> Relation:
     if actuator.is_like_paper(3, 2.5) and actuator.balloons == paper.BALLOONS:
         ends = [0.0, max(k.largest_volume for k in actuator.kinematics)]
         label = f"paper: {paper.FULL_HEIGHT.value:g} mm high when full"
-        lines.append(Line(label, ends, [paper.FULL_HEIGHT.value] * 2))
+        lines.append(Trace(label, ends, [paper.FULL_HEIGHT.value] * 2))
     return Relation(
         "stroke",
         "Stroke against volume",
@@ -201,7 +201,7 @@ def force_relation(actuator: Actuator, asked: Asked) -> Relation:
             values = _force(actuator, k, pressure, stroke, asked)
             model = _force_model(actuator, k, asked)
             label = f"{k.model.name}, {pressure:g} kPa"
-            lines.append(Line(label, stroke.tolist(), values.tolist(), model))
+            lines.append(Trace(label, stroke.tolist(), values.tolist(), model))
     measured = None
     if actuator.is_like_paper(1, 2.5):
         measured = "1-DoF", paper.FORCE_1DOF

@@ -52,7 +52,7 @@ class Figure:
 
 
 @dataclass(frozen=True)
-class Line:
+class Trace:
     """A predicted curve; without a model, what the paper measured along it."""
 
     label: str
@@ -79,7 +79,7 @@ class Relation:
     title: str
     x_label: str
     y_label: str
-    lines: tuple[Line, ...]
+    lines: tuple[Trace, ...]
     points: tuple[Points, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
@@ -119,7 +119,7 @@ class LeftOut:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class Factors:
     """Factors from a measurement of one's own; 1 leaves a model as it is.
 
     ``press_factor`` is what is left of the films' thickness after pressing, ``contact_factor`` the
@@ -145,7 +145,7 @@ class Asked:
     pressures_kpa: tuple[float, ...] = (10.0, 100.0)
     flow_ml_min: float = 35.0
     volumes_ul: tuple[float, ...] = ()
-    calibration: Calibration = field(default_factory=Calibration)
+    calibration: Factors = field(default_factory=Factors)
 
 
 @dataclass(frozen=True, repr=False)

@@ -11,7 +11,7 @@ import numpy as np
 from sbafab.models import paper
 from sbafab.models.actuator import Actuator
 from sbafab.models.bending import bend
-from sbafab.models.figures import Asked, Figure, LeftOut, Line, Model, Points, Relation
+from sbafab.models.figures import Asked, Figure, LeftOut, Model, Points, Relation, Trace
 from sbafab.models.flow import seconds
 from sbafab.models.folded import LOBES, folded_diameter
 
@@ -100,7 +100,7 @@ def bending_relation(actuator: Actuator, asked: Asked) -> Relation:
         held = first.volume(path.stroke) * actuator.balloons
         time = seconds(held, asked.flow_ml_min)
         label = f"{_chambers(path.chambers)} inflated, the others flat"
-        lines.append(Line(label, time.tolist(), np.degrees(path.angle).tolist(), model))
+        lines.append(Trace(label, time.tolist(), np.degrees(path.angle).tolist(), model))
     points = []
     if actuator.is_like_paper(3, 2.5) and actuator.balloons == paper.BALLOONS:
         ends = [0.0, max(max(line.x) for line in lines)]
@@ -112,7 +112,7 @@ def bending_relation(actuator: Actuator, asked: Asked) -> Relation:
             points.append(Points(label, x, y, [angle.error for _, angle in paper.BENDING]))
             ends[1] = max(x)
         label = f"paper: largest bend, {largest.value:g} +- {largest.error:g} deg"
-        lines.append(Line(label, ends, [largest.value] * 2))
+        lines.append(Trace(label, ends, [largest.value] * 2))
     return Relation(
         "bending",
         "Bending against time",
@@ -129,7 +129,7 @@ def workspace_relation(actuator: Actuator) -> Relation:
     for rest, others_full in (("flat", False), ("full", True)):
         for path in paths(actuator, others_full):
             label = f"{_chambers(path.chambers)}, the others {rest}"
-            lines.append(Line(label, path.aside.tolist(), path.height.tolist(), CURVATURE))
+            lines.append(Trace(label, path.aside.tolist(), path.height.tolist(), CURVATURE))
     points = []
     if actuator.is_like_paper(3, 2.5) and actuator.balloons == paper.BALLOONS:
         label = f"paper: all full, {paper.FULL_HEIGHT.value:g} mm"

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 MODEL = "Eqs. 1-3"
 
 
-class Fullest(NamedTuple):
+class FullestHalf(NamedTuple):
     """One half at its largest volume: slope of the edge, height, radius (mm), volume (ul)."""
 
     slope: float
@@ -37,7 +37,7 @@ class Fullest(NamedTuple):
 
 
 @cache
-def fullest(length: float) -> Fullest:
+def fullest(length: float) -> FullestHalf:
     """The half balloon that holds most: at l = 2.5 mm 8.47 ul, 1.33 mm high (both: 16.947 ul)."""
     low, high = 1.0, 10.0
     for _ in range(ROUNDS):
@@ -45,7 +45,7 @@ def fullest(length: float) -> Fullest:
         low, high = (k, high) if math.hypot(1, k) < 2 * math.asinh(k) / k else (low, k)
     radius = 2 * length / (math.hypot(1, high) + math.asinh(high) / high)
     height = high * radius / 2
-    return Fullest(high, height, radius, math.pi * radius**2 * height / 2)
+    return FullestHalf(high, height, radius, math.pi * radius**2 * height / 2)
 
 
 def radius(h: ArrayLike, length: float) -> NDArray[np.float64]:

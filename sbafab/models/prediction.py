@@ -19,10 +19,10 @@ from sbafab.models.figures import (
     Asked,
     Figure,
     LeftOut,
-    Line,
     Model,
     Prediction,
     Relation,
+    Trace,
 )
 from sbafab.models.inlet import largest_tube
 from sbafab.models.sizes import sizes
@@ -178,10 +178,10 @@ def _diameter_relation(one: Actuator, wrap: Wrap) -> Relation:
     k = one.kinematics[0]
     stroke = np.linspace(0, k.largest_stroke, axial.SAMPLES)
     around = wrap.tube_diameter + 2 * (one.thickness + stroke)
-    lines = [Line(k.model.name, k.volume(stroke).tolist(), around.tolist(), k.model)]
+    lines = [Trace(k.model.name, k.volume(stroke).tolist(), around.tolist(), k.model)]
     label = f"paper: about {paper.RADIAL_FULL.value:g} mm inflated"
     if (one.form.pockets, one.balloons) == (PAPER_SLOTS, 1):
-        lines.append(Line(label, [0.0, k.largest_volume], [paper.RADIAL_FULL.value] * 2))
+        lines.append(Trace(label, [0.0, k.largest_volume], [paper.RADIAL_FULL.value] * 2))
     return Relation(
         "diameter",
         "Diameter round the tube against volume",

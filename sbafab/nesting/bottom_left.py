@@ -14,16 +14,16 @@ import numpy as np
 
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
-from sbafab.nesting.grid import ROUNDING, Form, Grid, grid_of, strike
+from sbafab.nesting.grid import ROUNDING, Grid, TurnedShape, grid_of, strike
 from sbafab.nesting.raster import Cells
-from sbafab.nesting.records import Part, Placement, Stock, placed
+from sbafab.nesting.records import NestPart, Placement, Stock, placed
 from sbafab.nesting.refusals import no_place
 
 MANY = 600
 """Parts from which on only the first few ways to fill a sheet are tried."""
 
 
-def bottom_left(parts: Sequence[Part], stock: Stock) -> tuple[Placement, ...]:
+def bottom_left(parts: Sequence[NestPart], stock: Stock) -> tuple[Placement, ...]:
     """Places for every part; each must fit the usable area.
 
     Raises DesignError where the pins leave no place for one.
@@ -66,12 +66,12 @@ def _score(filled: _Filled) -> tuple[bool, int, float]:
     return filled.stuck is not None, filled.sheets, round(filled.reach, 3)
 
 
-def _size(part: Part) -> tuple[float, float]:
+def _size(part: NestPart) -> tuple[float, float]:
     low_x, low_y, high_x, high_y = part.region.bounds
     return high_x - low_x, high_y - low_y
 
 
-def _ways(parts: Sequence[Part]) -> list[_Way]:
+def _ways(parts: Sequence[NestPart]) -> list[_Way]:
     """Large parts first, and the same by longest side: small ones find room between them."""
     orders = []
     for measure in (math.prod, max):
@@ -81,7 +81,7 @@ def _ways(parts: Sequence[Part]) -> list[_Way]:
     return ways if sum(part.count for part in parts) < MANY else ways[:2]
 
 
-def _length_needed(parts: Sequence[Part], stock: Stock) -> float:
+def _length_needed(parts: Sequence[NestPart], stock: Stock) -> float:
     """A length that most likely holds all parts, to keep the maps of long rolls small."""
     area, longest = 0.0, 0.0
     for part in parts:
@@ -93,7 +93,7 @@ def _length_needed(parts: Sequence[Part], stock: Stock) -> float:
     return 1.3 * (area + pins) / (right - left) + 2 * longest
 
 
-def _shapes(parts: Sequence[Part]) -> tuple[list[Region], list[int]]:
+def _shapes(parts: Sequence[NestPart]) -> tuple[list[Region], list[int]]:
     """The different outlines, and each part's.
 
     Holes count as full: they are cut before all outlines, and what lay in one would drop out.
@@ -109,7 +109,7 @@ class _Filler:
     """Fills sheets of one grid, in one way or another."""
 
     def __init__(
-        self, parts: tuple[Part, ...], shape_of: tuple[int, ...], stock: Stock, grid: Grid
+        self, parts: tuple[NestPart, ...], shape_of: tuple[int, ...], stock: Stock, grid: Grid
     ) -> None:
         self.parts, self.shape_of, self.stock, self.grid = parts, shape_of, stock, grid
         self.empty = [grid.places(form, stock) for form in grid.forms]
@@ -179,7 +179,7 @@ class _Free:
         self.grid, self.maps, self.share = grid, maps, share
         self.searched = [0] * len(maps)
 
-    def lowest(self, forms: Sequence[Form]) -> tuple[Form, int, int] | None:
+    def lowest(self, forms: Sequence[TurnedShape]) -> tuple[TurnedShape, int, int] | None:
         """The form that lies lowest, by the share of its height that counts; row and column."""
         spots = []
         for form in forms:
@@ -205,7 +205,7 @@ class _Free:
         columns: int = self.maps[number].shape[1]
         return divmod(start, columns)
 
-    def occupy(self, form: Form, place: tuple[int, int], shapes: set[int]) -> None:
+    def occupy(self, form: TurnedShape, place: tuple[int, int], shapes: set[int]) -> None:
         """Takes what a form at ``place`` makes impossible from the maps of these shapes."""
         for other in self.grid.forms:
             if other.shape in shapes and self.searched[other.number] < self.maps[other.number].size:

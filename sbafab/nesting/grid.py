@@ -27,7 +27,7 @@ ROUNDING = 5e-7
 
 
 @dataclass(frozen=True)
-class Form:
+class TurnedShape:
     """A shape in one of its turns.
 
     ``cells`` fill ``frame``, ``bounds`` are those of the shape itself; both mm, in the shape's
@@ -49,7 +49,7 @@ class Grid:
     area: Bounds
     margin: float
     cell: float
-    forms: tuple[Form, ...]
+    forms: tuple[TurnedShape, ...]
     _clear: dict[tuple[int, int], Cells] = field(default_factory=dict, repr=False)
 
     @property
@@ -57,7 +57,7 @@ class Grid:
         """The grid's corner; what is grown by the margin may reach past the border by it."""
         return self.area[0] - self.margin, self.area[1] - self.margin
 
-    def clear(self, a: Form, b: Form) -> Cells:
+    def clear(self, a: TurnedShape, b: TurnedShape) -> Cells:
         """Offsets of ``b`` from ``a`` that keep them apart, from one less than b's size below 0."""
         key = (a.number, b.number)
         if key not in self._clear:
@@ -69,12 +69,12 @@ class Grid:
             )
         return self._clear[key]
 
-    def shift(self, form: Form, row: int, column: int) -> Point:
+    def shift(self, form: TurnedShape, row: int, column: int) -> Point:
         """What moves the turned shape to a place, in mm."""
         x, y = self.origin
         return x + column * self.cell - form.frame[0], y + row * self.cell - form.frame[1]
 
-    def places(self, form: Form, stock: Stock) -> Cells:
+    def places(self, form: TurnedShape, stock: Stock) -> Cells:
         """Where the form lies inside the border and clear of the pins."""
         x, y = self.shift(form, 0, 0)
         rows = self._count(self.area[3] - form.bounds[3] - y)
@@ -90,7 +90,7 @@ class Grid:
         return max(0, math.floor((room + ROUNDING) / self.cell) + 1)
 
 
-def strike(free: Cells, clear: Cells, form: Form, place: tuple[int, int]) -> None:
+def strike(free: Cells, clear: Cells, form: TurnedShape, place: tuple[int, int]) -> None:
     """Takes from a form's free places those that are not ``clear`` of what lies at ``place``."""
     row, column = (at - size + 1 for at, size in zip(place, form.cells.shape, strict=True))
     rows = slice(max(0, row), max(0, row + clear.shape[0]))
@@ -105,7 +105,7 @@ def grid_of(shapes: Sequence[Region], area: Bounds, spacing: float, turns: Seque
     margin = spacing / 2
     cell = _cell_size(shapes, area, spacing, len(turns))
     grown = [grow(shape, margin) for shape in shapes]
-    forms: list[Form] = []
+    forms: list[TurnedShape] = []
     for number, shape in enumerate(shapes):
         cells, frame = raster(grown[number], cell)
         seen: set[tuple[tuple[int, ...], bytes]] = set()
@@ -116,7 +116,7 @@ def grid_of(shapes: Sequence[Region], area: Bounds, spacing: float, turns: Seque
             if mark not in seen:
                 seen.add(mark)
                 boxes = _turned(frame, turn), _turned(shape.bounds, turn)
-                forms.append(Form(len(forms), number, turn, turned, *boxes))
+                forms.append(TurnedShape(len(forms), number, turn, turned, *boxes))
     return Grid(area, margin, cell, tuple(forms))
 
 

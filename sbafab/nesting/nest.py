@@ -6,14 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 
 from sbafab.laminate.films import Material, in_order
-from sbafab.nesting.records import EngineName, Nest, Part, Stock
+from sbafab.nesting.records import EngineName, Nest, NestPart, Stock
 from sbafab.nesting.refusals import no_usable_area, too_large, too_many
 
 ROUNDING = 5e-7
 
 
 def nest(
-    parts: Sequence[Part],
+    parts: Sequence[NestPart],
     stocks: Mapping[Material, Stock],
     engine: EngineName = "bottom-left",
     seconds: float = 20.0,
@@ -30,24 +30,24 @@ def nest(
     return tuple(nests)
 
 
-def refuse_unfit(parts: Sequence[Part], stocks: Mapping[Material, Stock]) -> None:
+def refuse_unfit(parts: Sequence[NestPart], stocks: Mapping[Material, Stock]) -> None:
     """Raises DesignError where no search is needed to see that the sheets are too small or few."""
     for material in materials_of(parts):
         _check_fit(material, of_material(parts, material), stocks[material])
 
 
-def materials_of(parts: Sequence[Part]) -> list[Material]:
+def materials_of(parts: Sequence[NestPart]) -> list[Material]:
     """The materials that have parts, TPE first."""
     return in_order(part.material for part in parts if part.count > 0)
 
 
-def of_material(parts: Sequence[Part], material: Material) -> tuple[Part, ...]:
+def of_material(parts: Sequence[NestPart], material: Material) -> tuple[NestPart, ...]:
     return tuple(part for part in parts if part.material == material and part.count > 0)
 
 
 def _nest(
     material: Material,
-    parts: tuple[Part, ...],
+    parts: tuple[NestPart, ...],
     stock: Stock,
     engine: EngineName,
     seconds: float,
@@ -68,7 +68,7 @@ def _nest(
     return found
 
 
-def _check_fit(material: Material, parts: Sequence[Part], stock: Stock) -> None:
+def _check_fit(material: Material, parts: Sequence[NestPart], stock: Stock) -> None:
     left, bottom, right, top = stock.usable
     if right - left <= 0 or top - bottom <= 0:
         raise no_usable_area(material, stock)
@@ -86,7 +86,7 @@ def _check_fit(material: Material, parts: Sequence[Part], stock: Stock) -> None:
         raise too_many(material, total, f"at least {least} sheets", stock)
 
 
-def _least_sheets(parts: Sequence[Part], stock: Stock) -> int:
+def _least_sheets(parts: Sequence[NestPart], stock: Stock) -> int:
     """Sheets that the parts' bare areas fill: no nest can do with fewer."""
     left, bottom, right, top = stock.usable
     area = sum(part.count * part.region.area for part in parts)

@@ -6,16 +6,16 @@ from collections.abc import Mapping
 
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from sbafab.nesting.records import Part
+from sbafab.nesting.records import NestPart
 
 
-def parts_of(laminate: Laminate, paths: Mapping[str, Region], copies: int) -> tuple[Part, ...]:
+def parts_of(laminate: Laminate, paths: Mapping[str, Region], copies: int) -> tuple[NestPart, ...]:
     """Every piece of every pattern, by pattern in stacking order.
 
     ``paths`` holds each pattern's path of the beam, kerf compensated. Pieces of one pattern that
     differ only in their place are one part, named after the first of them.
     """
-    parts: list[Part] = []
+    parts: list[NestPart] = []
     for pattern, layers in laminate.patterns.items():
         alike: dict[Region, list[int]] = {}
         pieces = paths[pattern].pieces
@@ -24,7 +24,7 @@ def parts_of(laminate: Laminate, paths: Mapping[str, Region], copies: int) -> tu
             alike.setdefault(piece.moved(-low_x, -low_y), []).append(number)
         for numbers in alike.values():
             parts.append(
-                Part(
+                NestPart(
                     design=laminate.name,
                     pattern=pattern,
                     piece=numbers[0] + 1,

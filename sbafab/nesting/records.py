@@ -20,7 +20,7 @@ TURNS: tuple[Turn, ...] = (0, 1, 2, 3)
 
 
 @dataclass(frozen=True)
-class Part:
+class NestPart:
     """One piece that is to be cut ``count`` times.
 
     ``region`` is the path of the beam, kerf compensated, in the frame of its layer; ``design`` and
@@ -84,7 +84,7 @@ class Nest:
     engine: EngineName
     material: Material
     stock: Stock
-    parts: tuple[Part, ...]
+    parts: tuple[NestPart, ...]
     placements: tuple[Placement, ...]
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sbafab.errors import DesignError
 from sbafab.laminate.films import FIRST, Material
-from sbafab.nesting.records import Part, Stock
+from sbafab.nesting.records import NestPart, Stock
 
 
 def field(material: Material) -> str:
@@ -21,7 +21,7 @@ def no_usable_area(material: Material, stock: Stock) -> DesignError:
     )
 
 
-def too_large(part: Part, stock: Stock) -> DesignError:
+def too_large(part: NestPart, stock: Stock) -> DesignError:
     where = field(part.material)
     low_x, low_y, high_x, high_y = part.region.bounds
     left, bottom, right, top = stock.usable
@@ -32,7 +32,7 @@ def too_large(part: Part, stock: Stock) -> DesignError:
     )
 
 
-def no_place(part: Part, stock: Stock) -> DesignError:
+def no_place(part: NestPart, stock: Stock) -> DesignError:
     where = field(part.material)
     return DesignError(
         f"pattern {part.pattern} of {part.design} finds no place {stock.spacing:g} mm clear of the "
@@ -57,7 +57,7 @@ def pins_unknown(material: Material, stock: Stock) -> DesignError:
     )
 
 
-def too_tight(part: Part) -> DesignError:
+def too_tight(part: NestPart) -> DesignError:
     where = field(part.material)
     return DesignError(
         f"pattern {part.pattern} of {part.design} fits {where} too tightly for engine "

@@ -11,7 +11,7 @@ from typing import Any
 
 from sbafab.laminate.films import Material
 from sbafab.nesting.nest import materials_of, of_material
-from sbafab.nesting.records import TURNS, EngineName, Nest, Part, Placement, Stock
+from sbafab.nesting.records import TURNS, EngineName, Nest, NestPart, Placement, Stock
 
 
 def as_dict(nests: Sequence[Nest]) -> dict[str, Any]:
@@ -26,7 +26,7 @@ def as_dict(nests: Sequence[Nest]) -> dict[str, Any]:
 
 
 def from_dict(
-    data: object, parts: Sequence[Part], stocks: Mapping[Material, Stock], engine: EngineName
+    data: object, parts: Sequence[NestPart], stocks: Mapping[Material, Stock], engine: EngineName
 ) -> tuple[Nest, ...] | None:
     """The saved nests if they were made of these parts, stocks and engine; otherwise None.
 
@@ -48,7 +48,7 @@ def from_dict(
         return None
 
 
-def _key(nests: Iterable[tuple[EngineName, Stock, Sequence[Part]]]) -> str:
+def _key(nests: Iterable[tuple[EngineName, Stock, Sequence[NestPart]]]) -> str:
     told = [
         (
             engine,
@@ -60,7 +60,7 @@ def _key(nests: Iterable[tuple[EngineName, Stock, Sequence[Part]]]) -> str:
     return hashlib.sha256(repr(told).encode()).hexdigest()
 
 
-def _placements(rows: object, parts: Sequence[Part]) -> tuple[Placement, ...]:
+def _placements(rows: object, parts: Sequence[NestPart]) -> tuple[Placement, ...]:
     """Raises TypeError or ValueError for rows that are no placements of all the parts."""
     if not isinstance(rows, list):
         raise TypeError

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from sbafab.errors import SbafabError
 from sbafab.geometry.edges import Arc, Edge, Point
 from sbafab.geometry.region import Contour
-from sbafab.nesting.records import TURNS, Part, Placement, Stock, placed
+from sbafab.nesting.records import TURNS, NestPart, Placement, Stock, placed
 from sbafab.nesting.refusals import pins_unknown, too_tight
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ ROOM = 0.002
 SEED = 1
 
 
-def strip(parts: Sequence[Part], stock: Stock, seconds: float) -> tuple[Placement, ...]:
+def strip(parts: Sequence[NestPart], stock: Stock, seconds: float) -> tuple[Placement, ...]:
     """Places for every part, after about ``seconds`` of search for each sheet.
 
     Raises DesignError if the sheet has pins or a part fits it only just, SbafabError if spyrrow
@@ -47,7 +47,7 @@ def strip(parts: Sequence[Part], stock: Stock, seconds: float) -> tuple[Placemen
 
 
 def _sheet(
-    parts: Sequence[Part], left: Sequence[int], stock: Stock, sheet: int, seconds: float
+    parts: Sequence[NestPart], left: Sequence[int], stock: Stock, sheet: int, seconds: float
 ) -> list[Placement]:
     """What of the best strip ends before the sheet does; at least one part."""
     found = [_placement(item, sheet, stock) for item in _solved(parts, left, stock, seconds)]
@@ -62,7 +62,7 @@ def _sheet(
 
 
 def _solved(
-    parts: Sequence[Part], left: Sequence[int], stock: Stock, seconds: float
+    parts: Sequence[NestPart], left: Sequence[int], stock: Stock, seconds: float
 ) -> list[PlacedItem]:
     try:
         import spyrrow
@@ -89,7 +89,7 @@ def _height(stock: Stock) -> float:
     return stock.usable[2] - stock.usable[0] - 2 * ROOM
 
 
-def _item(number: int, part: Part, count: int, stock: Stock) -> Item | None:
+def _item(number: int, part: NestPart, count: int, stock: Stock) -> Item | None:
     from spyrrow import Item
 
     if count == 0:
@@ -121,7 +121,7 @@ def _placement(item: PlacedItem, sheet: int, stock: Stock) -> Placement:
     return Placement(int(item.id), sheet, TURNS[(round(item.rotation / 90) + 1) % 4], shift)
 
 
-def _extent(part: Part, place: Placement) -> tuple[float, float]:
+def _extent(part: NestPart, place: Placement) -> tuple[float, float]:
     """Lowest and highest y of a placed part."""
     _, low, _, high = placed(part.region, place.turn, place.shift).bounds
     return low, high

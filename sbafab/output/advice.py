@@ -91,7 +91,7 @@ def advise(design: Design, target: float) -> Advice:
     return Advice(target, design.registration.method)
 
 
-Verdict = Literal["short", "reached", "impossible"]
+Outcome = Literal["short", "reached", "impossible"]
 
 
 class _Trial:
@@ -100,7 +100,7 @@ class _Trial:
     def __init__(self, design: Design, target: float) -> None:
         self.design = design
         self.target = target
-        self.verdicts: dict[tuple[int, int], Verdict] = {}
+        self.verdicts: dict[tuple[int, int], Outcome] = {}
 
     def lengths(self, bond: int, overhang: int) -> tuple[float, float]:
         rules = self.design.rules
@@ -130,7 +130,7 @@ class _Trial:
         asked = replace(limits(self.design), target_yield=None)
         return not has_failed(run_deck(build(self._changed(bond, overhang)), asked))
 
-    def verdict(self, bond: int, overhang: int) -> Verdict:
+    def verdict(self, bond: int, overhang: int) -> Outcome:
         key = bond, overhang
         if key not in self.verdicts:
             share = self.share(bond, overhang, SEED)
@@ -141,7 +141,7 @@ class _Trial:
         return self.verdicts[key]
 
 
-def _least(verdict: Callable[[int], Verdict], known: int | None = None) -> int | None:
+def _least(verdict: Callable[[int], Outcome], known: int | None = None) -> int | None:
     """The fewest steps that are not short, if they reach; ``known`` steps are known to reach.
 
     With more steps a design goes from short to reached, and may become impossible.

@@ -1,74 +1,54 @@
-"""Designs that are cut from the same film: planned and nested together, a folder for each."""
+"""Designs that are cut from the same film, one or several: placed together, then written."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from sbafab.cutting.dxf_write import DxfProfile
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import SheetFile
-from sbafab.design.kits import citation
 from sbafab.design.records import Design
-from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError
 from sbafab.nesting.nest import refuse_unfit
 from sbafab.nesting.records import Nest
-from sbafab.output.contents import Checked, Made, Part, close_folder, schedule_of, write_contents
-from sbafab.output.manifest import sheet_entry
-from sbafab.output.settings import GENERATOR, cut_settings, kerf_widths, limits, stocks, warnings
+from sbafab.output.contents import close_folder, write_contents
+from sbafab.output.manifest import job_manifest
+from sbafab.output.manifest_records import Schema
+from sbafab.output.planned import Checked, Planned, plan
+from sbafab.output.settings import stocks
 from sbafab.output.shop import (
-    CutPlan,
-    CutSet,
-    Progress,
-    film_use,
     find_nests,
-    plan_cuts,
-    write_cut_set,
     write_nested_sheets,
 )
-from sbafab.pressing.schedule import Schedule
+from sbafab.output.swap import ASSEMBLY_SCHEMA, SCHEMA
+from sbafab.progress import Progress
 
 SHARED = ("films", "sheets", "laser")
 """Sections that must be alike in all designs that are cut from the same film."""
 
 
-class Drawing(NamedTuple):
-    """How cut files draw arcs."""
-
-    profile: DxfProfile = "bulges"
-    chord_error: float = 0.005
-
-
-class Planned(NamedTuple):
-    """One design before it is written."""
-
-    checked: Checked
-    settings: CutSettings
-    plan: CutPlan
-    pressing: Schedule
-
-
 @dataclass(frozen=True)
 class Batch:
-    """All designs before they are written; ``settings`` are those of the shared sheets."""
+    """All designs before they are written; ``settings`` are those of the film sheets.
 
+    ``schema`` is that of the folder's manifest: of one design, of a job or of an assembly.
+    """
+
+    schema: Schema
+    name: str
     designs: tuple[Planned, ...]
     settings: CutSettings
     nests: tuple[Nest, ...]
 
-
-class Written(NamedTuple):
-    """The shared film sheets, and what the shop gets of each design."""
-
-    sheets: list[SheetFile]
-    cut: list[CutSet]
+    @property
+    def is_cut(self) -> bool:
+        return bool(self.nests)
 
 
-def refuse_unlike(designs: Sequence[Design]) -> None:
+def refuse_other_film(designs: Sequence[Design]) -> None:
     """Raises DesignError where two designs are not cut from the same film by one machine."""
     first, *others = designs
     for other in others:
@@ -81,83 +61,74 @@ def refuse_unlike(designs: Sequence[Design]) -> None:
 
 
 def plan_batch(
-    checked: Sequence[Checked],
+    schema: Schema,
     name: str,
+    designs: Sequence[Planned],
     old_folder: Path,
-    drawing: Drawing,
     tell: Progress,
     waived: Sequence[str] = (),
     lowered: Sequence[str] = (),
 ) -> Batch:
-    """Cut paths, schedules and places on film sheets.
+    """Planned designs with places for their parts on the film sheets of the first.
 
-    ``waived`` checks and ``lowered`` limits are said on the sheets as well.
-
-    Film, kerf and machine are those of the first design. Raises DesignError where a design or a
-    sheet refuses.
+    ``waived`` checks and ``lowered`` limits beside those of the designs are said on the sheets as
+    well. Raises DesignError where a sheet refuses.
     """
-    designs = []
-    for one in checked:
-        settings = cut_settings(one.design, one.waived, drawing.profile, drawing.chord_error)
-        plan = plan_cuts(one.laminate, one.design.order.copies, settings, limits(one.design))
-        designs.append(Planned(one, settings, plan, schedule_of(one)))
-    parts = [part for one in designs for part in one.plan.parts]
-    nests = find_nests(parts, checked[0].design, old_folder, tell)
-    return Batch(tuple(designs), _settings(checked, name, drawing, waived, lowered), nests)
+    parts = [part for one in designs for part in one.parts]
+    nests = find_nests(parts, designs[0].checked.design, old_folder, tell) if parts else ()
+    settings = designs[0].settings
+    if schema != SCHEMA:
+        settings = _settings(name, designs, waived, lowered)
+    return Batch(schema, name, tuple(designs), settings, nests)
 
 
 def refuse_undoable(checked: Sequence[Checked]) -> None:
     """Raises DesignError where press, kerf or film sheets cannot do designs that hold."""
     for one in checked:
-        design = one.design
-        schedule_of(one)
-        settings = cut_settings(design, one.waived)
-        plan = plan_cuts(one.laminate, design.order.copies, settings, limits(design))
-        refuse_unfit(plan.parts, stocks(design))
+        refuse_unfit(plan(one, ("press", "cut")).parts, stocks(one.design))
 
 
 def _settings(
-    checked: Sequence[Checked],
-    name: str,
-    drawing: Drawing,
-    waived: Sequence[str],
-    lowered: Sequence[str],
+    name: str, designs: Sequence[Planned], waived: Sequence[str], lowered: Sequence[str]
 ) -> CutSettings:
     """Those of the shared sheets: one hash over all designs, every waiver and limit of any."""
-    hashes = "".join(design_sha256(one.design) for one in checked)
-    own = (rule for one in checked for rule in one.waived)
-    return CutSettings(
+    own = [one.settings for one in designs]
+    hashes = "".join(one.design_sha256 for one in own)
+    return replace(
+        own[0],
         design=name,
         design_sha256=hashlib.sha256(hashes.encode()).hexdigest(),
-        kerf_widths=kerf_widths(checked[0].design),
-        waived=tuple(dict.fromkeys([*own, *waived])),
-        lowered=tuple(
-            dict.fromkeys([*(said for one in checked for said in one.lowered), *lowered])
-        ),
-        profile=drawing.profile,
-        chord_error=drawing.chord_error,
-        generator=GENERATOR,
-        warnings={name: said for one in checked for name, said in warnings(one.design).items()},
+        waived=tuple(dict.fromkeys([*(said for one in own for said in one.waived), *waived])),
+        lowered=tuple(dict.fromkeys([*(said for one in own for said in one.lowered), *lowered])),
+        warnings={name: said for one in own for name, said in one.warnings.items()},
     )
 
 
 def write_batch(
-    batch: Batch, folder: Path, parts: Collection[Part], traveller: bool, tell: Progress
-) -> Written:
-    """Writes ``sheets/`` and a folder for each design, named after it."""
-    first = batch.designs[0].checked.design
-    sheets = write_nested_sheets(batch.nests, first, folder, batch.settings, tell)
+    batch: Batch, folder: Path, tell: Progress
+) -> tuple[dict[str, Any], list[SheetFile]]:
+    """Writes film sheets and designs; the manifest without the files' hashes, and the sheets.
+
+    Several designs get a folder each, named after it.
+    """
+    first, *_ = batch.designs
+    sheets: list[SheetFile] = []
+    if batch.is_cut:
+        design = first.checked.design
+        sheets = write_nested_sheets(batch.nests, design, folder, batch.settings, tell)
+    if batch.schema == SCHEMA:
+        return write_contents(first, sheets, folder, tell), sheets
     seen = _seen_from_below(sheets)
-    cut = []
     for one in batch.designs:
         own = folder / one.checked.design.name
         own.mkdir()
-        cut.append(write_cut_set(one.checked.laminate, one.plan, own, one.settings, tell))
-        made = Made(cut[-1], seen, one.pressing, traveller=traveller)
-        index = write_contents(one.checked, parts, made, own, tell)
+        # An assembly has one page for all designs.
+        index = write_contents(one, seen, own, tell, batch.schema != ASSEMBLY_SCHEMA)
         # The folder above has the sheets; a design's own is one without.
         close_folder(own, {**index, "sheets": []})
-    return Written(sheets, cut)
+    own_designs = [one.checked.design for one in batch.designs]
+    index = job_manifest(batch.schema, batch.name, batch.settings, own_designs, sheets)
+    return index, sheets
 
 
 def _seen_from_below(sheets: Sequence[SheetFile]) -> list[SheetFile]:
@@ -165,30 +136,3 @@ def _seen_from_below(sheets: Sequence[SheetFile]) -> list[SheetFile]:
     return [
         replace(sheet, path=f"../{sheet.path}", picture=f"../{sheet.picture}") for sheet in sheets
     ]
-
-
-def batch_manifest(
-    schema: str, name: str, checked: Sequence[Checked], batch: Batch, sheets: Sequence[SheetFile]
-) -> dict[str, Any]:
-    """The index of the folder of several designs, without the files' hashes."""
-    return {
-        "schema": schema,
-        "name": name,
-        "units": "mm",
-        "designs_sha256": batch.settings.design_sha256,
-        "generator": GENERATOR,
-        "waived": list(batch.settings.waived),
-        "lowered_limits": list(batch.settings.lowered),
-        "designs": [
-            {
-                "name": one.design.name,
-                "folder": one.design.name,
-                "copies": one.design.order.copies,
-                "design_sha256": design_sha256(one.design),
-                "kit": citation(one.design),
-            }
-            for one in checked
-        ],
-        "films": [{"material": material, **use} for material, use in film_use(sheets).items()],
-        "sheets": [sheet_entry(sheet) for sheet in sheets],
-    }

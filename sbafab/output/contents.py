@@ -1,14 +1,15 @@
-"""What lies in the output folder of one design beside its cut files."""
+"""What lies in the output folder of one design."""
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
+from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.kits import FILE as KIT_FILE
 from sbafab.design.kits import kit_of
@@ -18,122 +19,54 @@ from sbafab.design.writing import design_sha256, design_toml
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.files import MeshFile, write_meshes
 from sbafab.output.manifest import as_json, checks, file_hashes, manifest
-from sbafab.output.settings import GENERATOR, kerf_widths, limits, press_settings
-from sbafab.output.shop import CutSet, Progress
-from sbafab.pressing.schedule import Schedule, press_csv, press_json, schedule
+from sbafab.output.planned import Checked, Planned
+from sbafab.output.settings import GENERATOR, kerf_widths
+from sbafab.output.shop import write_cut_files
+from sbafab.pressing.schedule import Schedule, press_csv, press_json
 from sbafab.pressing.together import batch_json, design_runs
-from sbafab.rules.deck import has_failed
-from sbafab.rules.finding import Finding
-from sbafab.rules.lowered import CHECKED_AGAINST, lowered
+from sbafab.progress import Progress
 
 if TYPE_CHECKING:
-    from sbafab.meshing.conforming.meshes import ConformingMeshes
-    from sbafab.meshing.conforming.settings import MeshSettings
+    from sbafab.reports.traveller.job import Job
 
-Part = Literal["cut", "press", "mesh", "preview"]
 TRAVELLER = "traveller.html"
 
 
-@dataclass(frozen=True)
-class Conforming:
-    """Volume and shell meshes that are asked for, in the formats of these file endings."""
-
-    settings: MeshSettings
-    formats: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Made:
-    """What was made before the rest is written; None or empty for what was not asked for.
-
-    Without ``traveller`` the folder gets none of its own: an assembly has one for all designs.
-    """
-
-    cut: CutSet | None = None
-    sheets: Sequence[SheetFile] = ()
-    pressing: Schedule | None = None
-    conforming: ConformingMeshes | None = None
-    formats: tuple[str, ...] = ()
-    traveller: bool = True
-
-
-@dataclass(frozen=True)
-class Checked:
-    """A design, its laminate, and what the rules found in it."""
-
-    design: Design
-    laminate: Laminate
-    findings: tuple[Finding, ...]
-
-    @property
-    def failed(self) -> bool:
-        """Whether a rule failed that the design does not waive."""
-        return has_failed(self.findings)
-
-    @property
-    def waived(self) -> tuple[str, ...]:
-        """The rules that fail and that the design waives by name."""
-        return tuple(dict.fromkeys(finding.rule for finding in self.findings if finding.by_user))
-
-    @property
-    def lowered(self) -> tuple[str, ...]:
-        """The limits that the design sets below the usual ones."""
-        return lowered(limits(self.design))
-
-
-def schedule_of(checked: Checked) -> Schedule:
-    """The press schedule; its first step and its warnings name waived rules and lowered limits."""
-    made = schedule(checked.laminate, press_settings(checked.design))
-    said = []
-    if checked.waived:
-        rules = ", ".join(checked.waived)
-        said.append(f"made although it breaks rules that the design waives: {rules}")
-    if checked.lowered:
-        said.append(f"{CHECKED_AGAINST}{', '.join(checked.lowered)}")
-    if not said:
-        return made
-    first, *others = made.steps
-    words = " ".join(f"{one[:1].upper()}{one[1:]}." for one in said)
-    marked = replace(first, instructions=f"{words} {first.instructions}")
-    return replace(made, steps=(marked, *others), warnings=(*said, *made.warnings))
-
-
 def write_contents(
-    checked: Checked, wanted: Collection[Part], made: Made, folder: Path, tell: Progress
+    planned: Planned,
+    sheets: Sequence[SheetFile],
+    folder: Path,
+    tell: Progress,
+    has_page: bool = True,
 ) -> dict[str, Any]:
-    """Writes what is wanted beside the cut files; the manifest, without the files' hashes.
+    """Writes what is wanted of a design; the manifest, without the files' hashes.
 
-    The traveller needs cut files, schedule and pictures.
+    The traveller, which a folder without a page of its own does not get, needs cut files, schedule
+    and pictures.
     """
+    checked, wanted = planned.checked, planned.wanted
     meshes: list[MeshFile] = []
-    if made.pressing is not None:
-        write_text(folder / "press.json", as_json(_press(checked, made.pressing)))
-        write_text(folder / "press.csv", press_csv(made.pressing))
+    solid: bytes | None = None
+    if planned.paths:
+        write_cut_files(planned, folder, tell)
+    if planned.pressing is not None:
+        write_text(folder / "press.json", as_json(_press(checked, planned.pressing)))
+        write_text(folder / "press.csv", press_csv(planned.pressing))
     if "mesh" in wanted:
-        meshes = write_meshes(
-            checked.laminate, folder, progress=lambda done, total: tell("meshes", done, total)
-        )
-    if made.conforming is not None:
+        meshes = write_meshes(checked.laminate, folder, progress=partial(tell, "meshes"))
+    if planned.conforming is not None:
         from sbafab.meshing.conforming.meshes import write_conforming
 
         told = partial(tell, "conforming meshes")
-        meshes += write_conforming(made.conforming, folder, told, made.formats)
+        meshes += write_conforming(planned.conforming, folder, told, planned.formats)
     if "preview" in wanted:
-        _write_pictures(checked, folder, tell)
-    paged = made.traveller and "preview" in wanted
-    if paged and made.cut is not None and made.pressing is not None:
-        page = _traveller(checked, made.cut, made.sheets, made.pressing, folder)
-        write_text(folder / TRAVELLER, page)
-    write_text(
-        folder / "checks.json", as_json(checks(checked.findings, "design", [checked.design]))
-    )
+        solid = _write_pictures(checked, folder, tell)
+    if has_page and wanted >= {"cut", "press", "preview"}:
+        write_text(folder / TRAVELLER, _traveller(planned, sheets, solid))
+    found = checks(checked.findings, "design", [checked.design])
+    write_text(folder / "checks.json", as_json(found))
     _write_design(checked.design, folder)
-    index = manifest(
-        checked.design, checked.laminate, checked.waived, made.cut, made.sheets, meshes
-    )
-    if made.conforming is not None:
-        index["mesh_statistics"] = made.conforming.statistics
-    return index
+    return manifest(planned, sheets, meshes)
 
 
 def _press(checked: Checked, plan: Schedule) -> dict[str, Any]:
@@ -144,6 +77,7 @@ def _press(checked: Checked, plan: Schedule) -> dict[str, Any]:
 
 def close_folder(folder: Path, index: dict[str, Any]) -> None:
     """Writes the manifest, with the hashes of all that lies in the folder."""
+    index.pop("files", None)
     index["files"] = file_hashes(folder)
     write_text(folder / "manifest.json", as_json(index))
 
@@ -152,31 +86,30 @@ def write_text(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8", newline="\n")
 
 
-def _traveller(
-    checked: Checked,
-    cut: CutSet,
-    sheets: Sequence[SheetFile],
-    pressing: Schedule,
-    folder: Path,
-) -> str:
-    from sbafab.reports.traveller.job import Job
+def _traveller(planned: Planned, sheets: Sequence[SheetFile], solid: bytes | None) -> str:
     from sbafab.reports.traveller.page import traveller_html
 
+    checked, order = planned.checked, planned.checked.design.order
+    job = replace(order_of(checked), made_for=order.made_for, note=order.note, solid_png=solid)
+    assert planned.pressing is not None
+    return traveller_html(checked.design, checked.laminate, planned.pressing, sheets, job)
+
+
+def order_of(checked: Checked, folder: str = "") -> Job:
+    """What a traveller says of the order of a design whose files lie in ``folder``."""
+    from sbafab.reports.traveller.job import Job
+
     design = checked.design
-    job = Job(
+    return Job(
         design_sha256=design_sha256(design),
         generator=GENERATOR,
         waived=checked.waived,
         lowered=checked.lowered,
         findings=checked.findings,
-        fixture=cut.fixture,
-        kerf=kerf_widths(design),
+        fixture=f"{folder}{FIXTURE}" if checked.laminate.pins else None,
+        kerf={str(name): kerf for name, kerf in kerf_widths(design).items()},
         copies=design.order.copies,
-        made_for=design.order.made_for,
-        note=design.order.note,
-        solid_png=(folder / "preview" / "solid.png").read_bytes(),
     )
-    return traveller_html(design, checked.laminate, pressing, sheets, job)
 
 
 def _marked(checked: Checked) -> Laminate:
@@ -189,7 +122,8 @@ def _marked(checked: Checked) -> Laminate:
     return replace(laminate, notes=(*laminate.notes, *notes)) if notes else laminate
 
 
-def _write_pictures(checked: Checked, folder: Path, tell: Progress) -> None:
+def _write_pictures(checked: Checked, folder: Path, tell: Progress) -> bytes:
+    """Writes the pictures; that of the solid is returned as well."""
     from sbafab.reports.layers_svg import layers_svg
     from sbafab.reports.solid_png import solid_png
     from sbafab.reports.stack_svg import stack_svg
@@ -201,8 +135,10 @@ def _write_pictures(checked: Checked, folder: Path, tell: Progress) -> None:
     tell("pictures", 1, 3)
     write_text(preview / "stack.svg", stack_svg(laminate))
     tell("pictures", 2, 3)
-    (preview / "solid.png").write_bytes(solid_png(laminate))
+    solid = solid_png(laminate)
+    (preview / "solid.png").write_bytes(solid)
     tell("pictures", 3, 3)
+    return solid
 
 
 def _write_design(design: Design, folder: Path) -> None:

@@ -4,42 +4,22 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from sbafab.cutting.dxf_write import DxfProfile
+from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.design.records import NAME_PATTERN, Design
 from sbafab.errors import DesignError
-from sbafab.output.batch import Drawing, batch_manifest, plan_batch, refuse_unlike, write_batch
-from sbafab.output.contents import Checked, Part, close_folder
-from sbafab.output.earlier import removed_files
-from sbafab.output.run import check
-from sbafab.output.self_check import refuse_batch
-from sbafab.output.shop import Progress
-from sbafab.output.swap import JOB_SCHEMA, listed_files, replaced_folder
+from sbafab.output.batch import plan_batch, refuse_other_film, write_batch
+from sbafab.output.planned import EVERYTHING, Checked, plan
+from sbafab.output.run import Run, check, swapped_in
+from sbafab.output.swap import JOB_SCHEMA
+from sbafab.progress import Progress, unheard
 
 RESERVED = {
     "sheets": "the job's folder of film sheets",
     "manifest.json": "the job's index",
 }
 """What lies in a job's folder beside those of its designs."""
-PARTS: tuple[Part, ...] = ("press", "mesh", "preview")
-
-
-@dataclass(frozen=True)
-class Job:
-    """What was made of several designs; nothing was written if one of them ``failed``."""
-
-    checked: tuple[Checked, ...]
-    folder: Path
-    manifest: dict[str, Any]
-    dropped: tuple[str, ...] = ()
-    """Files of an earlier run in the folder that this one removed."""
-
-    @property
-    def failed(self) -> bool:
-        return any(checked.failed for checked in self.checked)
 
 
 def generate_job(
@@ -47,30 +27,24 @@ def generate_job(
     name: str,
     out: Path = Path("out"),
     progress: Progress | None = None,
-    dxf_profile: DxfProfile = "bulges",
-    chord_error: float = 0.005,
-) -> Job:
+    curves: Curves = TRUE_ARCS,
+) -> Run:
     """Writes ``out/<name>/``: a folder for each design, and ``sheets/`` with the parts of all.
 
     Film sheets, kerf and machine are those of the first design, and must be alike in all.
     Raises DesignError where they are not, or where two designs have one name. If a rule fails in
-    any design, nothing is written.
+    any design, nothing is written (``Run.kept``).
     """
-    tell = progress or (lambda what, done, total: None)
+    tell = progress or unheard
     _refuse_names([design.name for design in designs], name)
-    refuse_unlike(designs)
+    refuse_other_film(designs)
     checked = tuple(Checked(design, *check(design, tell)) for design in designs)
     target = out / name
     if any(one.failed for one in checked):
-        return Job(checked, target, {})
-    batch = plan_batch(checked, name, target, Drawing(dxf_profile, chord_error), tell)
-    listed = listed_files(target)
-    with replaced_folder(target) as folder:
-        written = write_batch(batch, folder, PARTS, True, tell)
-        index = batch_manifest(JOB_SCHEMA, name, checked, batch, written.sheets)
-        close_folder(folder, index)
-        refuse_batch(batch, folder, tell)
-    return Job(checked, target, index, removed_files(listed, index))
+        return Run(checked, target, kept=True)
+    planned = [plan(one, EVERYTHING, curves) for one in checked]
+    batch = plan_batch(JOB_SCHEMA, name, planned, target, tell)
+    return swapped_in(batch, target, lambda folder: write_batch(batch, folder, tell)[0], tell)
 
 
 def _refuse_names(names: Sequence[str], name: str) -> None:

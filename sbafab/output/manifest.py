@@ -5,23 +5,50 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from sbafab.cutting.fixture import PATH as FIXTURE
+from sbafab.cutting.properties import CutSettings, layer_path, said_of
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.kits import citation
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
+from sbafab.geometry.beam import Kerf
+from sbafab.laminate.films import Film
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.meshing.files import MeshFile
 from sbafab.models.sizes import sizes
-from sbafab.output.settings import GENERATOR, kerf_widths, limits, warnings
-from sbafab.output.shop import CutSet, film_use
+from sbafab.output.manifest_records import (
+    BatchClaim,
+    BatchSchema,
+    BoreClaim,
+    DesignClaim,
+    FilmClaim,
+    FilmUseClaim,
+    InletClaim,
+    InterfaceClaim,
+    JobManifest,
+    KerfClaim,
+    KitClaim,
+    LayerClaim,
+    Manifest,
+    MeshClaim,
+    PinClaim,
+    PlaceClaim,
+    RegistrationClaim,
+    SheetClaim,
+    SheetPartClaim,
+    SheetPinClaim,
+)
+from sbafab.output.planned import Planned
+from sbafab.output.settings import GENERATOR, kerf_widths, warnings
+from sbafab.output.shop import film_use
 from sbafab.output.swap import SCHEMA
-from sbafab.pressing.together import design_runs
+from sbafab.pressing.together import Runs, design_runs
 from sbafab.rules.finding import Finding
-from sbafab.rules.lowered import lowered
 
 
 def as_json(value: object) -> str:
@@ -41,82 +68,115 @@ def checks(
 
 
 def manifest(
-    design: Design,
-    laminate: Laminate,
-    waived: Sequence[str],
-    cut: CutSet | None,
-    sheets: Sequence[SheetFile],
-    meshes: Sequence[MeshFile],
+    planned: Planned, sheets: Sequence[SheetFile], meshes: Sequence[MeshFile]
 ) -> dict[str, Any]:
     """The index of an output folder, but for the hashes of its files."""
-    paths = {file.layer: file.path for file in cut.files} if cut else {}
-    return {
-        "schema": SCHEMA,
-        "name": laminate.name,
-        "family": laminate.family,
-        "units": "mm",
-        "design_sha256": design_sha256(design),
-        "generator": GENERATOR,
-        "kit": citation(design),
-        "registration": {
-            "method": laminate.registration,
-            "pins": [
-                {"name": pin.name, **_place(pin.centre), "diameter": pin.diameter}
-                for pin in laminate.pins
-            ],
-        },
-        "kerf": {
-            material: {"state": "uncalibrated" if width is None else "compensated", "width": width}
-            for material, width in kerf_widths(design).items()
-        },
-        **({"curves": cut.curves} if cut and cut.curves else {}),
-        "waived": list(waived),
-        "lowered_limits": list(lowered(limits(design))),
-        "sizes": {name: round(value, 6) for name, value in sizes(design, laminate).items()},
-        "notes": list(laminate.notes),
-        "copies": design.order.copies,
-        **_batch(design, laminate),
-        "films": _films(laminate, sheets),
-        "warnings": list(dict.fromkeys(warnings(design).values())),
-        "layers": [_layer(laminate, layer, paths.get(layer.index)) for layer in laminate.layers],
-        "interfaces": [_interface(interface) for interface in laminate.interfaces],
-        "bores": [
-            {"chamber": bore.chamber, **_place(bore.centre), "diameter": bore.diameter}
-            for bore in laminate.bores
-        ],
-        "inlets": [
-            {
-                "chamber": inlet.chamber,
-                **_place(inlet.mouth),
-                "width": inlet.width,
-                "tube_outer_diameter": inlet.tube_diameter,
-            }
-            for inlet in laminate.inlets
-        ],
-        "lumen": laminate.lumen,
-        "fixture": cut.fixture if cut else None,
-        "sheets": [sheet_entry(sheet) for sheet in sheets],
-        "meshes": [
-            {
-                "file": mesh.file,
-                "kind": mesh.kind,
-                "chamber": mesh.chamber,
-                "fill_ul": mesh.fill_ul,
-                "volume_mm3": round(mesh.volume_mm3, 6),
-                "elements": mesh.elements,
-            }
-            for mesh in meshes
-        ],
-    }
-
-
-def _batch(design: Design, laminate: Laminate) -> dict[str, Any]:
-    """How several copies are pressed, and where each lies on the pin plate."""
+    checked, is_cut = planned.checked, "cut" in planned.wanted
+    design, laminate = checked.design, checked.laminate
+    curves = said_of(planned.settings.curves) if is_cut else None
+    optional: dict[str, Any] = {}
+    if curves is not None:
+        optional["curves"] = curves
     runs = design_runs(design, laminate)
-    if runs.copies == 1:
-        return {}
-    places = [_place(place) for place in runs.places]
-    return {"batch": {"at_once": runs.together, "cycles": list(runs.cycles), "places": places}}
+    if runs.copies > 1:
+        optional["batch"] = _batch(runs)
+    if planned.conforming is not None:
+        optional["mesh_statistics"] = planned.conforming.statistics
+    return Manifest(
+        schema=SCHEMA,
+        name=laminate.name,
+        family=laminate.family,
+        units="mm",
+        design_sha256=design_sha256(design),
+        generator=GENERATOR,
+        kit=KitClaim.model_validate_json(as_json(citation(design))),
+        registration=RegistrationClaim(
+            method=laminate.registration,
+            pins=tuple(
+                PinClaim(name=pin.name, **_place(pin.centre), diameter=pin.diameter)
+                for pin in laminate.pins
+            ),
+        ),
+        kerf={name: kerf_claim(width) for name, width in kerf_widths(design).items()},
+        waived=checked.waived,
+        lowered_limits=checked.lowered,
+        sizes={name: round(value, 6) for name, value in sizes(design, laminate).items()},
+        notes=laminate.notes,
+        copies=design.order.copies,
+        films=_films(laminate, sheets),
+        warnings=tuple(dict.fromkeys(warnings(design).values())),
+        layers=tuple(_layer(planned, layer) for layer in laminate.layers),
+        interfaces=tuple(_interface(interface) for interface in laminate.interfaces),
+        bores=tuple(
+            BoreClaim(chamber=bore.chamber, **_place(bore.centre), diameter=bore.diameter)
+            for bore in laminate.bores
+        ),
+        inlets=tuple(
+            InletClaim(
+                chamber=inlet.chamber,
+                **_place(inlet.mouth),
+                width=inlet.width,
+                tube_outer_diameter=inlet.tube_diameter,
+            )
+            for inlet in laminate.inlets
+        ),
+        lumen=laminate.lumen,
+        fixture=FIXTURE if is_cut and laminate.pins else None,
+        sheets=tuple(_sheet(sheet) for sheet in sheets),
+        meshes=tuple(
+            MeshClaim(**{**asdict(mesh), "volume_mm3": round(mesh.volume_mm3, 6)})
+            for mesh in meshes
+        ),
+        **optional,
+        files={},
+    ).as_dict()
+
+
+def job_manifest(
+    schema: BatchSchema,
+    name: str,
+    settings: CutSettings,
+    designs: Sequence[Design],
+    sheets: Sequence[SheetFile],
+) -> dict[str, Any]:
+    """The index of the folder of several designs, but for the hashes of its files.
+
+    ``settings`` are those of the shared ``sheets``.
+    """
+    return JobManifest(
+        schema=schema,
+        name=name,
+        units="mm",
+        designs_sha256=settings.design_sha256,
+        generator=GENERATOR,
+        waived=settings.waived,
+        lowered_limits=settings.lowered,
+        designs=tuple(
+            DesignClaim(
+                name=design.name,
+                folder=design.name,
+                copies=design.order.copies,
+                design_sha256=design_sha256(design),
+                kit=KitClaim.model_validate_json(as_json(citation(design))),
+            )
+            for design in designs
+        ),
+        films=tuple(
+            FilmUseClaim(material=material, **use) for material, use in film_use(sheets).items()
+        ),
+        sheets=tuple(_sheet(sheet) for sheet in sheets),
+        files={},
+    ).as_dict()
+
+
+def kerf_claim(width: Kerf | None) -> KerfClaim:
+    return KerfClaim(state="uncalibrated" if width is None else "compensated", width=width)
+
+
+def _batch(runs: Runs) -> BatchClaim:
+    """How several copies are pressed, and where each lies on the pin plate."""
+    places = tuple(PlaceClaim(**_place(place)) for place in runs.places)
+    return BatchClaim(at_once=runs.together, cycles=runs.cycles, places=places)
 
 
 def _place(point: tuple[float, float]) -> dict[str, float]:
@@ -124,88 +184,85 @@ def _place(point: tuple[float, float]) -> dict[str, float]:
     return {"x": round(point[0], 6) + 0.0, "y": round(point[1], 6) + 0.0}
 
 
-def sheet_entry(sheet: SheetFile) -> dict[str, Any]:
+def _sheet(sheet: SheetFile) -> SheetClaim:
     """A film sheet as the manifest lists it; lengths mm, areas mm2."""
     stock = sheet.nest.stock
-    return {
-        "file": sheet.path,
-        "picture": sheet.picture,
-        "material": sheet.material,
-        "number": sheet.number,
-        "width": sheet.width,
-        "length": round(sheet.length, 6),
-        "border": stock.border,
-        "spacing": stock.spacing,
-        "pins": [{"x": x, "y": y, "diameter": d} for x, y, d in stock.pins],
-        "engine": sheet.nest.engine,
-        "parts": [
-            {"design": design, "pattern": pattern, "count": count}
+    return SheetClaim(
+        file=sheet.path,
+        picture=sheet.picture,
+        material=sheet.material,
+        number=sheet.number,
+        width=sheet.width,
+        length=round(sheet.length, 6),
+        border=stock.border,
+        spacing=stock.spacing,
+        pins=tuple(SheetPinClaim(x=x, y=y, diameter=d) for x, y, d in stock.pins),
+        engine=sheet.nest.engine,
+        parts=tuple(
+            SheetPartClaim(design=design, pattern=pattern, count=count)
             for design, pattern, count in sheet.counts
-        ],
-        "parts_area": round(sheet.parts_area, 6),
-        "density": round(sheet.density, 4),
-        "label": sheet.label,
-        "contours": sheet.contours,
-        "cut_length": round(sheet.cut_length, 3),
-        "travel": round(sheet.travel, 3),
-        "unsorted_travel": round(sheet.unsorted_travel, 3),
-        "estimated_minutes": round(sheet.minutes, 2),
-    }
+        ),
+        parts_area=round(sheet.parts_area, 6),
+        density=round(sheet.density, 4),
+        label=sheet.label,
+        contours=sheet.contours,
+        cut_length=round(sheet.cut_length, 3),
+        travel=round(sheet.travel, 3),
+        unsorted_travel=round(sheet.unsorted_travel, 3),
+        estimated_minutes=round(sheet.minutes, 2),
+    )
 
 
-def _films(laminate: Laminate, sheets: Sequence[SheetFile]) -> list[dict[str, Any]]:
+def _films(laminate: Laminate, sheets: Sequence[SheetFile]) -> tuple[FilmClaim, ...]:
     use = film_use(sheets)
-    used: dict[str, dict[str, Any]] = {}
+    layers: dict[Film, list[Layer]] = {}
     for layer in laminate.layers:
-        film = layer.film
-        entry = used.setdefault(
-            film.material,
-            {
-                "material": film.material,
-                "product": film.product,
-                "thickness": film.thickness,
-                "layers": 0,
-                "area": 0.0,
-            },
+        layers.setdefault(layer.film, []).append(layer)
+    return tuple(
+        FilmClaim(
+            material=film.material,
+            product=film.product,
+            thickness=film.thickness,
+            layers=len(own),
+            area=round(sum(layer.profile.area for layer in own), 6),
+            **use.get(film.material, {}),
         )
-        entry["layers"] += 1
-        entry["area"] += layer.profile.area
-    return [
-        {**entry, "area": round(entry["area"], 6), **use.get(material, {})}
-        for material, entry in used.items()
-    ]
+        for film, own in layers.items()
+    )
 
 
-def _layer(laminate: Laminate, layer: Layer, path: str | None) -> dict[str, Any]:
-    return {
-        "index": layer.index,
-        "name": layer.name,
-        "material": layer.film.material,
-        "role": layer.role,
-        "balloon": layer.balloon,
-        "thickness": layer.film.thickness,
-        "z": layer.z,
-        "file": path,
-        "pattern": layer.pattern,
-        "area": round(layer.profile.area, 6),
-        "pieces": len(layer.profile.pieces),
-        "bores": [bore.chamber for bore in laminate.bores if _is_open(layer, bore.centre)],
-    }
+def _layer(planned: Planned, layer: Layer) -> LayerClaim:
+    kerf = planned.settings.kerf_width(layer.film.material)
+    bores = planned.checked.laminate.bores
+    return LayerClaim(
+        index=layer.index,
+        name=layer.name,
+        material=layer.film.material,
+        role=layer.role,
+        balloon=layer.balloon,
+        thickness=layer.film.thickness,
+        z=layer.z,
+        file=layer_path(layer.name, kerf) if "cut" in planned.wanted else None,
+        pattern=layer.pattern,
+        area=round(layer.profile.area, 6),
+        pieces=len(layer.profile.pieces),
+        bores=tuple(bore.chamber for bore in bores if _is_open(layer, bore.centre)),
+    )
 
 
 def _is_open(layer: Layer, place: tuple[float, float]) -> bool:
     return any(hole.winding(place) != 0 for hole in layer.profile.holes)
 
 
-def _interface(interface: Interface) -> dict[str, Any]:
-    return {
-        "below": interface.below.index,
-        "above": interface.above.index,
-        "masks": [mask.index for mask in interface.masks],
-        "kind": interface.kind,
-        "contact_area": round(interface.contact.area, 6),
-        "bond_area": round(interface.bond.area, 6),
-    }
+def _interface(interface: Interface) -> InterfaceClaim:
+    return InterfaceClaim(
+        below=interface.below.index,
+        above=interface.above.index,
+        masks=tuple(mask.index for mask in interface.masks),
+        kind=interface.kind,
+        contact_area=round(interface.contact.area, 6),
+        bond_area=round(interface.bond.area, 6),
+    )
 
 
 def file_hashes(folder: Path) -> dict[str, str]:

@@ -4,27 +4,19 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sbafab.actuators import build
-from sbafab.cutting.dxf_write import DxfProfile
-from sbafab.cutting.sheets import SheetFile
+from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import GeometryError
 from sbafab.laminate.laminate import Laminate
 from sbafab.notebook import table_html
-from sbafab.output.contents import (
-    Checked,
-    Conforming,
-    Made,
-    Part,
-    close_folder,
-    schedule_of,
-    write_contents,
-)
+from sbafab.output.batch import Batch, plan_batch, write_batch
+from sbafab.output.contents import close_folder
 from sbafab.output.earlier import (
     CUT,
     MESH,
@@ -35,30 +27,31 @@ from sbafab.output.earlier import (
     would_replace,
 )
 from sbafab.output.manifest import identity
-from sbafab.output.self_check import refuse_unlike, work_of
-from sbafab.output.settings import cut_settings, limits
-from sbafab.output.shop import (
-    CutPlan,
-    CutSet,
-    Progress,
-    find_nests,
-    plan_cuts,
-    write_cut_set,
-    write_nested_sheets,
-)
-from sbafab.output.swap import listed_files, replaced_folder
+from sbafab.output.planned import EVERYTHING, PICTURES, Checked, RunPart, plan
+from sbafab.output.self_check import refuse_unlike
+from sbafab.output.settings import limits
+from sbafab.output.swap import SCHEMA, listed_files, replaced_folder
 from sbafab.pressing.schedule import Schedule
+from sbafab.progress import Progress, unheard
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding, Findings
 
 if TYPE_CHECKING:
     from sbafab.meshing.conforming.meshes import ConformingMeshes
+    from sbafab.meshing.conforming.settings import MeshSettings
 
 ExtraFiles = Callable[[Laminate, Path], None]
 """Writes something of its own for a laminate into the folder of a run."""
-EVERYTHING: tuple[Part, ...] = ("cut", "press", "mesh", "preview")
-OWN: dict[Part, tuple[str, ...]] = {"cut": CUT, "press": PRESS, "mesh": MESH, "preview": ()}
+OWN: dict[RunPart, tuple[str, ...]] = {"cut": CUT, "press": PRESS, "mesh": MESH, "preview": ()}
 """What of an earlier run is made anew with a part."""
+
+
+@dataclass(frozen=True)
+class Conforming:
+    """Volume and shell meshes that are asked for, in the formats of these file endings."""
+
+    settings: MeshSettings
+    formats: tuple[str, ...]
 
 
 class Extras(NamedTuple):
@@ -78,19 +71,45 @@ NO_EXTRAS = Extras()
 
 @dataclass(frozen=True, repr=False)
 class Run:
-    """What a run made. ``findings`` tell whether the design holds; without cut files if not."""
+    """What a run made of one design or several; nothing to cut where it ``failed``.
 
-    design: Design
-    laminate: Laminate
-    findings: tuple[Finding, ...]
+    ``manifest`` is empty where nothing was written. ``between``: what was found between the parts
+    of an assembly.
+    """
+
+    checked: tuple[Checked, ...]
     folder: Path
-    manifest: dict[str, Any]
-    schedule: Schedule | None
-    conforming: ConformingMeshes | None = None
+    manifest: dict[str, Any] = field(default_factory=dict)
+    batch: Batch | None = None
+    between: tuple[Finding, ...] | None = None
     dropped: tuple[str, ...] = ()
     """Files of an older run of another design or version that this one removed."""
     kept: bool = False
-    """Whether the design fails and ``folder`` was left to an older run of another one."""
+    """Whether it failed and ``folder`` was left as it was."""
+
+    @property
+    def design(self) -> Design:
+        """The design, the first one of several."""
+        return self.checked[0].design
+
+    @property
+    def laminate(self) -> Laminate:
+        return self.checked[0].laminate
+
+    @property
+    def schedule(self) -> Schedule | None:
+        return self.batch.designs[0].pressing if self.batch is not None else None
+
+    @property
+    def conforming(self) -> ConformingMeshes | None:
+        return self.batch.designs[0].conforming if self.batch is not None else None
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What the rules found; of several designs, each with its design's name."""
+        if len(self.checked) == 1 and self.between is None:
+            return self.checked[0].findings
+        return found_in(self.checked, self.between or ())
 
     @property
     def failed(self) -> bool:
@@ -103,7 +122,18 @@ class Run:
     def _repr_html_(self) -> str:
         files = [(str(self.folder / name),) for name in self.manifest.get("files", ())]
         table = table_html(("files written",), files)
-        return self.laminate._repr_html_() + Findings(self.findings)._repr_html_() + table
+        pictures = "".join(one.laminate._repr_html_() for one in self.checked)
+        return pictures + Findings(self.findings)._repr_html_() + table
+
+
+def found_in(checked: Sequence[Checked], between: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Findings in designs, each with its design's name, then those between parts."""
+    named = (
+        replace(finding, message=f"{one.design.name}: {finding.message}")
+        for one in checked
+        for finding in one.findings
+    )
+    return (*named, *between)
 
 
 def check(design: Design, progress: Progress | None = None) -> tuple[Laminate, tuple[Finding, ...]]:
@@ -118,10 +148,9 @@ def check(design: Design, progress: Progress | None = None) -> tuple[Laminate, t
 def generate(
     design: Design,
     out: Path = Path("out"),
-    parts: Sequence[Part] = EVERYTHING,
+    parts: Sequence[RunPart] = EVERYTHING,
     progress: Progress | None = None,
-    dxf_profile: DxfProfile = "bulges",
-    chord_error: float = 0.005,
+    curves: Curves = TRUE_ARCS,
     extras: Extras = NO_EXTRAS,
 ) -> Run:
     """Writes ``out/<design name>/`` and returns what was made.
@@ -132,55 +161,58 @@ def generate(
     Raises DesignError or OutputError, also where other parts are another design's, and DefectError
     where the cut files read back are not what was checked; the old folder is then whole.
     """
-    tell = progress or (lambda what, done, total: None)
+    tell = progress or unheard
     checked = Checked(design, *check(design, tell))
     wanted = set(parts)
     target = out / design.name
     if checked.failed:
-        kept = would_replace(target, identity(design, checked.waived))
-        if kept:
-            return Run(design, checked.laminate, checked.findings, target, {}, None, kept=True)
-        wanted &= {"preview"}
+        if would_replace(target, identity(design, checked.waived)):
+            return Run((checked,), target, kept=True)
+        wanted &= set(PICTURES)
     elif wanted < set(EVERYTHING):
         own = [name for part in wanted for name in OWN[part]]
         refuse_to_replace(target, identity(design, checked.waived), (*own, *extras.own))
     # Schedule, nest and meshes are made before anything is written: they may refuse the design.
-    pressing = schedule_of(checked) if "press" in wanted else None
-    settings = cut_settings(design, checked.waived, dxf_profile, chord_error)
-    plan: CutPlan | None = None
-    if "cut" in wanted:
-        plan = plan_cuts(checked.laminate, design.order.copies, settings, limits(design))
-    nests = find_nests(plan.parts, design, target, tell) if plan is not None else ()
-    meshes = _meshed(checked, extras.conforming, tell) if "mesh" in wanted else None
-    listed = listed_files(target)
-    with replaced_folder(target) as folder:
-        cut: CutSet | None = None
-        sheets: list[SheetFile] = []
-        if plan is not None:
-            cut = write_cut_set(checked.laminate, plan, folder, settings, tell)
-            sheets = write_nested_sheets(nests, design, folder, settings, tell)
-        formats = extras.conforming.formats if extras.conforming else ()
-        made = Made(cut, sheets, pressing, meshes, formats)
-        index = write_contents(checked, wanted, made, folder, tell)
+    planned = plan(checked, wanted, curves)
+    batch = plan_batch(SCHEMA, design.name, [planned], target, tell)
+    if extras.conforming is not None and "mesh" in wanted:
+        from sbafab.meshing.conforming.meshes import conforming_meshes
+
+        tell("meshing", 0, 1)
+        meshes = conforming_meshes(checked.laminate, extras.conforming.settings)
+        planned = replace(planned, conforming=meshes, formats=extras.conforming.formats)
+        batch = replace(batch, designs=(planned,))
+
+    def write(folder: Path) -> dict[str, Any]:
+        index, _ = write_batch(batch, folder, tell)
         if not checked.failed:
             if extras.also is not None:
                 extras.also(checked.laminate, folder)
             carry_over(target, folder, index)
+        return index
+
+    return swapped_in(batch, target, write, tell)
+
+
+def swapped_in(
+    batch: Batch,
+    target: Path,
+    write: Callable[[Path], dict[str, Any]],
+    tell: Progress,
+    between: tuple[Finding, ...] | None = None,
+) -> Run:
+    """Has a folder written, reads it back and puts it in the place of ``target``.
+
+    ``write`` returns the manifest without the files' hashes. Raises as ``generate`` does.
+    """
+    listed = listed_files(target)
+    with replaced_folder(target) as folder:
+        index = write(folder)
         close_folder(folder, index)
-        if plan is not None:
-            tell("reading back", 0, 1)
-            refuse_unlike(folder, {design.name: work_of(checked, plan.paths)}, settings)
-    dropped = removed_files(listed, index)
-    return Run(design, checked.laminate, checked.findings, target, index, pressing, meshes, dropped)
-
-
-def _meshed(checked: Checked, asked: Conforming | None, tell: Progress) -> ConformingMeshes | None:
-    if asked is None:
-        return None
-    from sbafab.meshing.conforming.meshes import conforming_meshes
-
-    tell("meshing", 0, 1)
-    return conforming_meshes(checked.laminate, asked.settings)
+        if batch.is_cut:
+            refuse_unlike(batch, folder, tell)
+    checked = tuple(one.checked for one in batch.designs)
+    return Run(checked, target, index, batch, between, removed_files(listed, index))
 
 
 def with_folder(made: Path) -> ExtraFiles:

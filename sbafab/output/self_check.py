@@ -2,42 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 
 from sbafab.as_built.check import check_written
-from sbafab.as_built.meant import Meant, Work
+from sbafab.as_built.meant import Meant, RunWork
 from sbafab.as_built.records import CLAIMS, DESIGNED, INTEGRITY
-from sbafab.cutting.properties import CutSettings
 from sbafab.errors import DefectError, OutputError
-from sbafab.geometry.region import Region
 from sbafab.output.batch import Batch
-from sbafab.output.contents import Checked
-from sbafab.output.shop import Progress
+from sbafab.output.planned import Planned
+from sbafab.progress import Progress
 from sbafab.rules.finding import Finding
 
 MOST_NAMED = 3
 
 
-def work_of(checked: Checked, paths: Mapping[str, Region]) -> Work:
-    """What a run knows of a design: its laminate, the beam's paths by pattern, the findings."""
-    return Work(Meant(checked.laminate, paths), checked.findings)
-
-
-def refuse_unlike(folder: Path, works: Mapping[str, Work], settings: CutSettings) -> None:
+def refuse_unlike(batch: Batch, folder: Path, tell: Progress) -> None:
     """Raises DefectError where the files of a folder are not what its designs were found to be.
 
     The folder is then not swapped in, for either the files or the check of them are wrong, and no
     user can tell which. Raises OutputError where the chords that were asked for are too coarse.
     """
+    tell("reading back", 0, 1)
+    curves = batch.settings.curves
+    works = {one.checked.design.name: _work(one) for one in batch.designs}
     failed = [finding for finding in check_written(folder, works) if finding.verdict == "fail"]
     if not failed:
         return
     said = _said(failed)
-    if settings.profile == "chords":
+    if curves.in_chords:
         raise OutputError(
             f"drawn with chords, the cut files do not hold: {said}; nothing was written: ask for "
-            f"a smaller --chord-error than {settings.chord_error:g}, or for arcs or bulges"
+            f"a smaller --chord-error than {curves.chord_error:g}, or for arcs or bulges"
         )
     raise DefectError(
         f"the design holds and its cut files do not: {said}; this is a defect of sbafab and "
@@ -45,11 +41,10 @@ def refuse_unlike(folder: Path, works: Mapping[str, Work], settings: CutSettings
     )
 
 
-def refuse_batch(batch: Batch, folder: Path, tell: Progress) -> None:
-    """The same of the folder of several designs."""
-    tell("reading back", 0, 1)
-    works = {one.checked.design.name: work_of(one.checked, one.plan.paths) for one in batch.designs}
-    refuse_unlike(folder, works, batch.settings)
+def _work(planned: Planned) -> RunWork:
+    """What a run knows of a design: its laminate, the beam's paths by pattern, the findings."""
+    checked = planned.checked
+    return RunWork(Meant(checked.laminate, planned.paths), checked.findings)
 
 
 def _said(failed: Iterable[Finding]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sbafab import __version__
 from sbafab.actuators.stacking import used_films
-from sbafab.cutting.dxf_write import DxfProfile
+from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import Machine
 from sbafab.design.films import KerfWidth, Sheet, material
@@ -20,7 +20,7 @@ from sbafab.rules.lowered import lowered
 GENERATOR = f"sbafab {__version__}"
 
 
-def kerf_widths(design: Design) -> dict[str, Kerf | None]:
+def kerf_widths(design: Design) -> dict[Material, Kerf | None]:
     """Full kerf width (or that along x and y) by material, None where it was not measured."""
     widths = _kerfs(design).items()
     return {name: None if isinstance(kerf, str) else kerf for name, kerf in widths}
@@ -60,10 +60,7 @@ def limits(design: Design) -> Limits:
 
 
 def cut_settings(
-    design: Design,
-    waived: tuple[str, ...],
-    profile: DxfProfile = "bulges",
-    chord_error: float = 0.005,
+    design: Design, waived: tuple[str, ...], curves: Curves = TRUE_ARCS
 ) -> CutSettings:
     return CutSettings(
         design=design.name,
@@ -71,8 +68,7 @@ def cut_settings(
         kerf_widths=kerf_widths(design),
         waived=waived,
         lowered=lowered(limits(design)),
-        profile=profile,
-        chord_error=chord_error,
+        curves=curves,
         generator=GENERATOR,
         warnings=warnings(design),
     )

@@ -3,70 +3,34 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from sbafab.cutting.files import CutFile, compensated_paths, write_layer_files
+from sbafab.cutting.files import write_layer_files
 from sbafab.cutting.fixture import write_fixture
-from sbafab.cutting.properties import CutSettings, curves_of
+from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import FOLDER, SheetFile, write_sheets
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
-from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Region
-from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.films import Material
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import nest
-from sbafab.nesting.parts import parts_of
-from sbafab.nesting.records import Nest, Part
+from sbafab.nesting.records import Nest, NestPart
 from sbafab.nesting.saved import as_dict, from_dict
-from sbafab.output.coarse import refuse_coarse
+from sbafab.output.planned import Planned
 from sbafab.output.settings import machine, stocks
-from sbafab.pressing.together import runs_of
-from sbafab.rules.limits import Limits
+from sbafab.pressing.together import design_runs
+from sbafab.progress import Progress
 
 PLACES = f"{FOLDER}/nest.json"
 MOST_BYTES = 50_000_000
 """Of saved places; more are not read but searched anew."""
-Progress = Callable[[str, int, int], None]
-"""Told what is being done, and how much of how much is done."""
-
-
-@dataclass(frozen=True)
-class CutPlan:
-    """What is to be cut of a laminate: the beam's path for every pattern, and its parts."""
-
-    paths: Mapping[str, Region]
-    parts: tuple[Part, ...]
-    places: tuple[Point, ...]
-    """Where on the pin plate the copies of a press cycle lie."""
-
-
-@dataclass(frozen=True)
-class CutSet:
-    """The cut files of one laminate; ``fixture`` is the pin plate's path, if it has pins.
-
-    ``curves`` says within what chords stay; None for true arcs.
-    """
-
-    files: tuple[CutFile, ...]
-    fixture: str | None
-    curves: str | None = None
-
-
-def plan_cuts(laminate: Laminate, copies: int, settings: CutSettings, limits: Limits) -> CutPlan:
-    """Raises DesignError where the kerf leaves no path, or chords do not hold the limits."""
-    paths = compensated_paths(laminate, settings)
-    if settings.profile == "chords":
-        refuse_coarse(laminate, paths, settings, limits)
-    runs = runs_of(laminate, copies, (limits.heated_width, limits.heated_length))
-    return CutPlan(paths, parts_of(laminate, paths, copies), runs.places)
 
 
 def find_nests(
-    parts: Sequence[Part], design: Design, old_folder: Path, tell: Progress
+    parts: Sequence[NestPart], design: Design, old_folder: Path, tell: Progress
 ) -> tuple[Nest, ...]:
     """Places for the parts on the design's film sheets.
 
@@ -78,15 +42,12 @@ def find_nests(
     return saved or nest(parts, stocks(design), design.sheets.engine, design.sheets.seconds)
 
 
-def write_cut_set(
-    laminate: Laminate, plan: CutPlan, folder: Path, settings: CutSettings, tell: Progress
-) -> CutSet:
-    """Writes the layer files and the pin plate of a laminate."""
-    files = write_layer_files(
-        laminate, plan.paths, folder, settings, lambda done, total: tell("cut files", done, total)
-    )
-    plate = write_fixture(laminate, folder, settings, plan.places)
-    return CutSet(tuple(files), plate, curves_of(settings))
+def write_cut_files(planned: Planned, folder: Path, tell: Progress) -> None:
+    """Writes the layer files and the pin plate of a design."""
+    laminate, settings = planned.checked.laminate, planned.settings
+    told = partial(tell, "cut files")
+    write_layer_files(laminate, planned.paths, folder, settings, told)
+    write_fixture(laminate, folder, settings, design_runs(planned.checked.design, laminate).places)
 
 
 def write_nested_sheets(
@@ -106,7 +67,7 @@ def write_nested_sheets(
     return sheets
 
 
-def _saved(parts: Sequence[Part], design: Design, path: Path) -> tuple[Nest, ...] | None:
+def _saved(parts: Sequence[NestPart], design: Design, path: Path) -> tuple[Nest, ...] | None:
     """The places of an earlier run; None where there are none for these parts, or bad ones."""
     try:
         if not path.is_file() or path.stat().st_size > MOST_BYTES:
@@ -128,9 +89,9 @@ def _is_possible(nest: Nest) -> bool:
     return nest.sheets <= nest.stock.most and all(p.turn in turns for p in nest.placements)
 
 
-def film_use(sheets: Sequence[SheetFile]) -> dict[str, dict[str, float]]:
+def film_use(sheets: Sequence[SheetFile]) -> dict[Material, dict[str, Any]]:
     """Sheets, their area, the parts' share and the waste in mm2, by material."""
-    used: dict[str, dict[str, float]] = {}
+    used: dict[Material, dict[str, float]] = {}
     for sheet in sheets:
         entry = used.setdefault(sheet.material, {"sheets": 0, "sheet_area": 0.0, "parts_area": 0.0})
         entry["sheets"] += 1

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sbafab.design.records import Design
-from sbafab.output.contents import Checked
 from sbafab.output.earlier import refuse_to_replace
 from sbafab.output.manifest import as_json, identity
+from sbafab.output.planned import Checked
 from sbafab.output.run import Extras, check, generate, with_folder
-from sbafab.output.shop import Progress
+from sbafab.progress import Progress, unheard
 from sbafab.rules.finding import Finding
 from sbafab.simulators.simulator import Name, Result, Wish, simulator
 
@@ -56,7 +56,7 @@ def simulate(
     Raises DesignError or OutputError for what it cannot do, before it starts where that can be
     told.
     """
-    tell = progress or (lambda what, done, total: None)
+    tell = progress or unheard
     found = Result((), {})
     with tempfile.TemporaryDirectory() as place:
         checked = Checked(design, *check(design, tell))

@@ -11,15 +11,16 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Final
 
 from filelock import FileLock, Timeout
 
 from sbafab.errors import OutputError, SbafabError
 
-SCHEMA = "sbafab/manifest@1"
-JOB_SCHEMA = "sbafab/job@1"
+SCHEMA: Final = "sbafab/manifest@1"
+JOB_SCHEMA: Final = "sbafab/job@1"
 """Of a folder that holds several designs cut together."""
-ASSEMBLY_SCHEMA = "sbafab/assembly@1"
+ASSEMBLY_SCHEMA: Final = "sbafab/assembly@1"
 """Of a folder that holds the designs of an assembly, cut together."""
 SCHEMAS = (SCHEMA, JOB_SCHEMA, ASSEMBLY_SCHEMA)
 MANIFEST = "manifest.json"

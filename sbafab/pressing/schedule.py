@@ -15,7 +15,7 @@ from typing import Any
 from sbafab.errors import DesignError
 from sbafab.laminate.assembly import (
     AssemblyStep,
-    Bond,
+    BondState,
     StepName,
     assembly,
     distinct_layers,
@@ -102,7 +102,7 @@ class Step:
 
     step: int
     title: str
-    bond: Bond
+    bond: BondState
     layers: tuple[int, ...]
     adds: tuple[int, ...]
     pins: tuple[str, ...]

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 from sbafab.assemblies.build import Assembled
 from sbafab.assemblies.colours import RGB, colours
 from sbafab.assemblies.shapes import placed_surface
-from sbafab.meshing.surface import Surface
 from sbafab.reports.canvas import INK
-from sbafab.reports.depth import Buffer, View, seen
+from sbafab.reports.depth import Buffer, seen, view_of
 from sbafab.reports.length_bar import draw_length_bar
 
 if TYPE_CHECKING:
@@ -45,8 +44,10 @@ def assembly_pngs(
     """The same, and once more without caption and legend, for a page that says those itself."""
     surfaces = [placed_surface(placed, filled=True) for placed in assembled.parts]
     # What lies inside a tube shows through nothing: no part is transparent.
-    view = _view(surfaces, width * ENLARGED, height * ENLARGED)
-    buffer = seen(surfaces, view, width * ENLARGED, height * ENLARGED, _unit(LAMP))
+    size = width * ENLARGED, height * ENLARGED
+    box = MARGIN * size[0], MARGIN * size[1], (1 - MARGIN) * size[0], (1 - MARGIN - FOOT) * size[1]
+    view = view_of(surfaces, ELEVATION, AZIMUTH, box)
+    buffer = seen(surfaces, view, *size, _unit(LAMP))
     paints = colours(assembled)
     picture = _coloured(buffer, [paints[placed.name] for placed in assembled.parts])
     picture = picture.reduce(ENLARGED)
@@ -77,24 +78,6 @@ def _write_bar(picture: Image, pixels_per_mm: float) -> None:
 def _unit(v: Sequence[float]) -> list[float]:
     size = math.hypot(*v)
     return [value / size for value in v]
-
-
-def _view(surfaces: Sequence[Surface], width: int, height: int) -> View:
-    import numpy as np
-
-    e, a = math.radians(ELEVATION), math.radians(AZIMUTH)
-    toward = [math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)]
-    right = [-math.sin(a), math.cos(a), 0.0]
-    axes = np.array([right, np.cross(toward, right), toward])
-    points = np.concatenate([surface.points for surface in surfaces]) @ axes.T
-    (low_x, low_y, _), (high_x, high_y, _) = points.min(axis=0), points.max(axis=0)
-    room_x, room_y = width * (1 - 2 * MARGIN), height * (1 - 2 * MARGIN - FOOT)
-    scale = min(room_x / (high_x - low_x), room_y / (high_y - low_y))
-    centre = (
-        width / 2 - scale * (low_x + high_x) / 2,
-        height * (1 - FOOT) / 2 + scale * (low_y + high_y) / 2,
-    )
-    return View(axes, scale, centre)
 
 
 def _coloured(buffer: Buffer, paints: Sequence[RGB]) -> Image:

@@ -37,7 +37,7 @@ STYLE: Any = {
 PLAIN: dict[str, Any] = dict.fromkeys(("Date", "Creator", "Format", "Type"))
 
 
-class Curve(NamedTuple):
+class ChartCurve(NamedTuple):
     """A line through (x, y). ``is_reference`` draws it thin and grey, ``dotted`` marks values."""
 
     label: str
@@ -47,7 +47,7 @@ class Curve(NamedTuple):
     dotted: bool = False
 
 
-class Points(NamedTuple):
+class ChartPoints(NamedTuple):
     """Measured points, +- an error each (0 draws no bar)."""
 
     label: str
@@ -62,8 +62,8 @@ class Panel(NamedTuple):
     title: str
     x_label: str
     y_label: str
-    curves: Sequence[Curve]
-    points: Sequence[Points] = ()
+    curves: Sequence[ChartCurve]
+    points: Sequence[ChartPoints] = ()
 
 
 def chart_svg(title: str, panels: Sequence[Panel]) -> str:
@@ -127,7 +127,7 @@ def _begin_at_zero(axes: Axes, panel: Panel) -> None:
         axes.set_ylim(bottom=0.0)
 
 
-def _items(panel: Panel) -> list[Curve | Points]:
+def _items(panel: Panel) -> list[ChartCurve | ChartPoints]:
     return [*panel.curves, *panel.points]
 
 

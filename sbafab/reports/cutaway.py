@@ -14,7 +14,7 @@ LEAST_SECTOR = math.radians(44.0)
 
 
 @dataclass(frozen=True)
-class Cut:
+class RemovedSector:
     """A sector with its tip at ``apex``, counter-clockwise from angle ``first`` to ``last``."""
 
     chamber: str
@@ -33,7 +33,7 @@ class Cut:
         )
 
 
-def cutaway(laminate: Laminate) -> Cut:
+def cutaway(laminate: Laminate) -> RemovedSector:
     """The sector beside one chamber: a face runs through its middle and along its inlet.
 
     Round a lumen the tip is on the actuator's axis and the other face runs between two lobes;
@@ -54,13 +54,15 @@ def cutaway(laminate: Laminate) -> Cut:
     return _sector(laminate, name, apex, last - math.pi / 2, last)
 
 
-def _sector(laminate: Laminate, chamber: str, apex: Point, first: float, last: float) -> Cut:
+def _sector(
+    laminate: Laminate, chamber: str, apex: Point, first: float, last: float
+) -> RemovedSector:
     low_x, low_y, high_x, high_y = laminate.bounds
     reach = 4.0 * math.hypot(high_x - low_x, high_y - low_y)
     x, y = apex
     rays = [first, (first + last) / 2, last]
     tips = [(x + reach * math.cos(a), y + reach * math.sin(a)) for a in rays]
-    return Cut(chamber, apex, first, last, polygon([apex, *tips]))
+    return RemovedSector(chamber, apex, first, last, polygon([apex, *tips]))
 
 
 def _off_ray(apex: Point, angle: float, p: Point) -> float:

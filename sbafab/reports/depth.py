@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -36,11 +37,36 @@ class View(NamedTuple):
 
 
 class Buffer(NamedTuple):
-    """For each pixel the depth, the number of the surface seen (-1: none) and its light."""
+    """For each pixel the depth, the number of the surface seen (-1: none), its face and light."""
 
     depth: NDArray[np.float64]
     body: NDArray[np.int16]
+    face: NDArray[np.int32]
     light: NDArray[np.float64]
+
+
+def view_of(
+    surfaces: Sequence[Surface], elevation: float, azimuth: float, box: Sequence[float]
+) -> View:
+    """The view from so many degrees over the bench and round it from x, filling a box.
+
+    The ``box`` is left, top, right, bottom in pixels.
+    """
+    import numpy as np
+
+    e, a = math.radians(elevation), math.radians(azimuth)
+    toward = [math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)]
+    right = [-math.sin(a), math.cos(a), 0.0]
+    axes = np.array([right, np.cross(toward, right), toward])
+    points = np.concatenate([surface.points for surface in surfaces]) @ axes.T
+    (low_x, low_y, _), (high_x, high_y, _) = points.min(axis=0), points.max(axis=0)
+    x0, y0, x1, y1 = box
+    scale = min((x1 - x0) / (high_x - low_x), (y1 - y0) / (high_y - low_y))
+    centre = (
+        (x0 + x1) / 2 - scale * (low_x + high_x) / 2,
+        (y0 + y1) / 2 + scale * (low_y + high_y) / 2,
+    )
+    return View(axes, scale, centre)
 
 
 def seen(
@@ -51,13 +77,19 @@ def seen(
 
     size = width * height
     buffer = Buffer(
-        np.full(size, -np.inf), np.full(size, -1, dtype=np.int16), np.zeros(size, dtype=np.float64)
+        np.full(size, -np.inf),
+        np.full(size, -1, dtype=np.int16),
+        np.zeros(size, dtype=np.int32),
+        np.zeros(size, dtype=np.float64),
     )
     for body, surface in enumerate(surfaces):
         _paint(buffer, body, surface, view, (width, height), np.array(lamp))
-    depth, numbers, light = buffer
-    shape = height, width
-    return Buffer(depth.reshape(shape), numbers.reshape(shape), light.reshape(shape))
+    return Buffer(
+        buffer.depth.reshape(height, width),
+        buffer.body.reshape(height, width),
+        buffer.face.reshape(height, width),
+        buffer.light.reshape(height, width),
+    )
 
 
 def _paint(
@@ -74,7 +106,8 @@ def _paint(
     # Pixels count downward: what faces the eye runs clockwise there.
     a, b, c = (corners[:, i, :2] for i in range(3))
     twice = (c - a)[:, 0] * (b - a)[:, 1] - (c - a)[:, 1] * (b - a)[:, 0]
-    corners, twice = corners[twice > 1e-12], twice[twice > 1e-12]
+    front = np.flatnonzero(twice > 1e-12)
+    corners, twice = corners[front], twice[front]
     light = _light(corners, view.scale, lamp)
     corners, long = _longest_first(corners)
     along = np.ceil(DENSITY * long).astype(np.int64) + 2
@@ -84,7 +117,8 @@ def _paint(
     for n, m in np.unique(grids, axis=0):
         own = np.flatnonzero((grids == (n, m)).all(axis=1))
         for part in np.array_split(own, max(1, len(own) * n * m // MOST)):
-            _sample(buffer, body, corners[part], light[part], (int(n), int(m)), size)
+            seen_as = _Triangles(body, front[part], corners[part], light[part])
+            _sample(buffer, seen_as, (int(n), int(m)), size)
 
 
 def _light(
@@ -119,29 +153,32 @@ def _power_of_two(counts: NDArray[np.int64]) -> NDArray[np.int64]:
     return 2 ** np.ceil(np.log2(counts)).astype(np.int64)
 
 
-def _sample(
-    buffer: Buffer,
-    body: int,
-    corners: NDArray[np.float64],
-    light: NDArray[np.float64],
-    grid: tuple[int, int],
-    size: tuple[int, int],
-) -> None:
+class _Triangles(NamedTuple):
+    """Triangles of one surface: their numbers in it, corners (n, 3, 3) in the view, and light."""
+
+    body: int
+    face: NDArray[np.int64]
+    corners: NDArray[np.float64]
+    light: NDArray[np.float64]
+
+
+def _sample(buffer: Buffer, own: _Triangles, grid: tuple[int, int], size: tuple[int, int]) -> None:
     """Points of each triangle: along its first side, and from there towards its third corner."""
     import numpy as np
 
     s = np.linspace(0, 1, grid[0])[None, :, None, None]
     t = np.linspace(0, 1, grid[1])[None, None, :, None]
-    a, b, c = (corners[:, i][:, None, None, :] for i in range(3))
+    a, b, c = (own.corners[:, i][:, None, None, :] for i in range(3))
     points = (1 - t) * (a + s * (b - a)) + t * c
-    shade = np.broadcast_to(light[:, None, None], points.shape[:3]).ravel()
+    number = np.repeat(np.arange(len(own.face)), grid[0] * grid[1])
     x, y, depth = points.reshape(-1, 3).T
     column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
     inside = (column >= 0) & (column < size[0]) & (row >= 0) & (row < size[1])
     place = row[inside] * size[0] + column[inside]
-    depth, shade = depth[inside], shade[inside]
+    depth, number = depth[inside], number[inside]
     np.maximum.at(buffer.depth, place, depth)
     won = depth == buffer.depth[place]
-    place = place[won]
-    buffer.light[place] = shade[won]
-    buffer.body[place] = body
+    place, number = place[won], number[won]
+    buffer.light[place] = own.light[number]
+    buffer.face[place] = own.face[number]
+    buffer.body[place] = own.body

@@ -13,7 +13,7 @@ from xml.sax.saxutils import escape
 from sbafab.geometry.edges import Point
 from sbafab.geometry.svg import number
 from sbafab.laminate.films import Film
-from sbafab.laminate.picture import MASKS, Ink, ink
+from sbafab.laminate.inks import MASKS, Ink, ink
 
 Anchor = Literal["start", "middle", "end"]
 

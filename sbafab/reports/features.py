@@ -28,7 +28,7 @@ class Circle:
 
 
 @dataclass(frozen=True)
-class Width:
+class WidthDimension:
     """A width to draw across, from ``start`` to ``end``."""
 
     words: str
@@ -118,7 +118,7 @@ def circumscribed(profile: Region) -> Circle | None:
     return Circle(f"fits ⌀{length(2 * radius)}", axis, radius, phantom=True)
 
 
-def piece_width(profile: Region) -> Width | None:
+def piece_width(profile: Region) -> WidthDimension | None:
     """The width of one of several equal pieces that are not discs (oblong chambers)."""
     boxes = [outer.bounds for outer in profile.outers]
     sizes = {(round(b[2] - b[0], 4), round(b[3] - b[1], 4)) for b in boxes}
@@ -127,10 +127,10 @@ def piece_width(profile: Region) -> Width | None:
     low_x, low_y, high_x, high_y = max(boxes)
     y = low_y + 0.3 * (high_y - low_y)
     words = _counted(len(boxes), f"{length(high_x - low_x)} wide")
-    return Width(words, (low_x, y), (high_x, y))
+    return WidthDimension(words, (low_x, y), (high_x, y))
 
 
-def inlet_width(laminate: Laminate, layer: Layer) -> Width | None:
+def inlet_width(laminate: Laminate, layer: Layer) -> WidthDimension | None:
     """The width of the inlet strip or tab, if any, at the inlet farthest right."""
     if layer.role == "separator-mask":
         return None
@@ -142,7 +142,7 @@ def inlet_width(laminate: Laminate, layer: Layer) -> Width | None:
     (x, y), (u, v) = _station(inlet), inlet.direction
     ends = sorted(((x - s * v, y + s * u) for s in (start, end)), key=lambda p: (p[1], p[0]))
     words = _counted(len(found), f"{name} {length(end - start)} wide")
-    return Width(words, ends[0], ends[1])
+    return WidthDimension(words, ends[0], ends[1])
 
 
 def _across(layer: Layer, inlet: Inlet) -> tuple[float, float] | None:

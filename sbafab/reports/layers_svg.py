@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from sbafab.geometry.edges import Point
 from sbafab.geometry.svg import number
 from sbafab.laminate.assembly import pins_when_added
+from sbafab.laminate.inks import ink
 from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.picture import ink
 from sbafab.reports import drawing as draw
 from sbafab.reports.features import balloons
 from sbafab.reports.pattern_card import Card, cells, drawn, pattern_card, pin_mark
@@ -25,7 +25,7 @@ LEAST_DRAWN = 30.0
 
 
 @dataclass(frozen=True)
-class Grid:
+class PageGrid:
     """Equal cells on a page, and the scale of everything drawn in them."""
 
     scale: float
@@ -51,11 +51,11 @@ def layers_svg(laminate: Laminate) -> str:
     return draw.document(*grid.page, f"{laminate.name}: layers", elements)
 
 
-def _grid(cards: Sequence[Card], block: float) -> Grid:
+def _grid(cards: Sequence[Card], block: float) -> PageGrid:
     """The largest scale at which all cards fit A3; a longer page rather than tiny drawings."""
     wide = PAGE[0] - 2 * MARGIN
     largest = max(max(card.size) for card in cards)
-    best: Grid | None = None
+    best: PageGrid | None = None
     for scale in SCALES:
         cell = cells(cards, scale)
         columns = min(len(cards), math.floor(wide / cell[0]))
@@ -65,17 +65,17 @@ def _grid(cards: Sequence[Card], block: float) -> Grid:
         columns = math.ceil(len(cards) / rows)
         height = rows * cell[1] + 2 * MARGIN + block
         if best is None or height <= PAGE[1] or largest * scale >= LEAST_DRAWN:
-            best = Grid(scale, columns, (wide / columns, cell[1]), (PAGE[0], height))
+            best = PageGrid(scale, columns, (wide / columns, cell[1]), (PAGE[0], height))
         if height <= PAGE[1]:
             break
     if best is not None:
         return best
     cell = cells(cards, SCALES[-1])
     page = cell[0] + 2 * MARGIN, len(cards) * cell[1] + 2 * MARGIN + block
-    return Grid(SCALES[-1], 1, cell, page)
+    return PageGrid(SCALES[-1], 1, cell, page)
 
 
-def _title_block(laminate: Laminate, grid: Grid, block: float, pinned: bool) -> list[str]:
+def _title_block(laminate: Laminate, grid: PageGrid, block: float, pinned: bool) -> list[str]:
     width, height = grid.page
     low = (MARGIN, height - MARGIN - block)
     x, y = low

@@ -9,12 +9,12 @@ from functools import cached_property
 
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.svg import number, path_data
+from sbafab.laminate.inks import ink
 from sbafab.laminate.laminate import Laminate, Layer, Pin
-from sbafab.laminate.picture import ink
 from sbafab.reports import drawing as draw
 from sbafab.reports.features import (
     Circle,
-    Width,
+    WidthDimension,
     circles,
     circumscribed,
     inlet_width,
@@ -31,7 +31,7 @@ LEAD = 5.0
 
 
 @dataclass(frozen=True)
-class Frame:
+class CardFrame:
     """Where profile coordinates land on the page."""
 
     left: float
@@ -51,7 +51,7 @@ class Card:
 
     layers: tuple[Layer, ...]
     pins: tuple[Pin, ...]
-    marks: tuple[Circle | Width, ...]
+    marks: tuple[Circle | WidthDimension, ...]
     bounds: Bounds
 
     @property
@@ -87,7 +87,7 @@ def pattern_card(
 ) -> Card:
     """The card of the layers that share one pattern; ``held`` says which pins hold each layer."""
     profile = layers[0].profile
-    marks: list[Circle | Width] = [*circles(laminate, layers[0]), *radii(profile)]
+    marks: list[Circle | WidthDimension] = [*circles(laminate, layers[0]), *radii(profile)]
     low_x, low_y, high_x, high_y = profile.bounds
     around = circumscribed(profile)
     if around is not None:
@@ -112,7 +112,7 @@ def drawn(card: Card, scale: float, corner: Point, cell: Point) -> list[str]:
     width, height = card.size[0] * scale, card.size[1] * scale
     spare_x = cell[0] - LEFT - width - card.words_width
     spare_y = cell[1] - CAPTION - UNDER - height
-    frame = Frame(
+    frame = CardFrame(
         x + LEFT + spare_x / 2 - low_x * scale,
         y + CAPTION + spare_y / 2 + high_y * scale,
         scale,
@@ -147,7 +147,7 @@ def _heading(card: Card, corner: Point, cell: Point) -> list[str]:
     ]
 
 
-def _outline(card: Card, frame: Frame) -> list[str]:
+def _outline(card: Card, frame: CardFrame) -> list[str]:
     layer = card.layers[0]
     shape = layer.profile.mapped(frame.at, frame.scale, mirror=True)
     parts = [
@@ -187,7 +187,7 @@ def _centre_mark(centre: Point, radius: float) -> list[str]:
     ]
 
 
-def _overall(card: Card, frame: Frame) -> list[str]:
+def _overall(card: Card, frame: CardFrame) -> list[str]:
     """Width below and height at the left, outside everything that is drawn."""
     profile = card.layers[0].profile
     low_x, low_y, high_x, high_y = profile.bounds
@@ -205,7 +205,7 @@ def _overall(card: Card, frame: Frame) -> list[str]:
     ]
 
 
-def _callouts(card: Card, frame: Frame, column: float, room: Point) -> list[str]:
+def _callouts(card: Card, frame: CardFrame, column: float, room: Point) -> list[str]:
     """Words in a column at the right, each with a leader to what it measures."""
     aims = sorted(((_aim(mark, frame), mark) for mark in card.marks), key=lambda item: item[0][1])
     rows = draw.spread([aim[1] for aim, _ in aims], ROW, *room)
@@ -213,7 +213,7 @@ def _callouts(card: Card, frame: Frame, column: float, room: Point) -> list[str]
     for (aim, mark), row in zip(aims, rows, strict=True):
         elbow, label = (column - 1.6, row), (column - 0.4, row)
         parts.append(draw.text((column, row + 1.05), mark.words))
-        if isinstance(mark, Width):
+        if isinstance(mark, WidthDimension):
             start, end = frame.at(mark.start), frame.at(mark.end)
             parts += draw.across(start, end)
             parts.append(draw.line([aim, elbow, label], colour=draw.GREY))
@@ -222,9 +222,9 @@ def _callouts(card: Card, frame: Frame, column: float, room: Point) -> list[str]
     return parts
 
 
-def _aim(mark: Circle | Width, frame: Frame) -> Point:
+def _aim(mark: Circle | WidthDimension, frame: CardFrame) -> Point:
     """Where on the page a mark pulls its words to."""
-    if isinstance(mark, Width):
+    if isinstance(mark, WidthDimension):
         return min(frame.at(mark.start), frame.at(mark.end), key=lambda p: (-p[0], p[1]))
     if mark.phantom:
         r = mark.radius * math.sqrt(0.5)
@@ -232,7 +232,7 @@ def _aim(mark: Circle | Width, frame: Frame) -> Point:
     return frame.at(mark.toward or mark.centre)
 
 
-def _touch(mark: Circle, frame: Frame, elbow: Point) -> Point:
+def _touch(mark: Circle, frame: CardFrame, elbow: Point) -> Point:
     """Where the arrow meets the circle: radially under its leader, or on the arc itself."""
     if mark.toward is not None or mark.phantom:
         return _aim(mark, frame)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from sbafab.models.figures import Relation
-from sbafab.reports.chart import Curve, Panel, Points, chart_svg
+from sbafab.reports.chart import ChartCurve, ChartPoints, Panel, chart_svg
 
 
 def relation_svg(name: str, relation: Relation) -> str:
     """The chart of a relation of the design called ``name``."""
-    curves = [Curve(line.label, line.x, line.y, line.model is None) for line in relation.lines]
-    points = [Points(p.label, p.x, p.y, p.error) for p in relation.points]
+    curves = [ChartCurve(line.label, line.x, line.y, line.model is None) for line in relation.lines]
+    points = [ChartPoints(p.label, p.x, p.y, p.error) for p in relation.points]
     panel = Panel(relation.title, relation.x_label, relation.y_label, curves, points)
     return chart_svg(name, [panel])

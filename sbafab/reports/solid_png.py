@@ -14,7 +14,7 @@ from sbafab.geometry.edges import Line, Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 from sbafab.reports.canvas import Canvas, Tone, keyhole
-from sbafab.reports.cutaway import Cut, cutaway
+from sbafab.reports.cutaway import RemovedSector, cutaway
 
 ELEVATION = math.radians(36.0)
 TURN = math.radians(62.0)
@@ -106,7 +106,7 @@ def _factor(laminate: Laminate) -> int:
     return max(step for step in FACTORS if step <= max(most, 1.0))
 
 
-def _camera(laminate: Laminate, cut: Cut, factor: int, width: int, height: int) -> Camera:
+def _camera(laminate: Laminate, cut: RemovedSector, factor: int, width: int, height: int) -> Camera:
     """The camera that looks into the cut and fills the picture."""
     angle = cut.last - TURN
     toward = math.cos(angle), math.sin(angle)
@@ -145,7 +145,7 @@ def _prisms(laminate: Laminate) -> Iterator[Prism]:
         yield Prism(f"bond {name}", interface.bond, Region(), interface.z, interface.gap, True)
 
 
-def _shape(prism: Prism, cut: Cut, camera: Camera) -> Shape:
+def _shape(prism: Prism, cut: RemovedSector, camera: Camera) -> Shape:
     region = prism.region - cut.removed
     sagitta = SAGITTA_PX / camera.scale
     walls = sorted(_walls(region, prism.bond, cut, camera, sagitta), key=_depth)
@@ -160,7 +160,9 @@ def _depth(wall: Wall) -> float:
     return wall.start[1] + wall.end[1]
 
 
-def _walls(region: Region, bond: bool, cut: Cut, camera: Camera, sagitta: float) -> Iterator[Wall]:
+def _walls(
+    region: Region, bond: bool, cut: RemovedSector, camera: Camera, sagitta: float
+) -> Iterator[Wall]:
     """The facets that face the eye; material lies on the left of each, so right is outward."""
     light = cut.last - TURN + LIGHT
     for contour in region.contours:

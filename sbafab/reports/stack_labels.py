@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 from sbafab.laminate.films import Film
 from sbafab.reports.features import length
-from sbafab.reports.stack_section import Joint, Section, Slab, opening
+from sbafab.reports.stack_section import Joint, SectionSlab, StackSection, opening
 
 
-class Label(NamedTuple):
+class StackLabel(NamedTuple):
     """Words for the place ``s`` along the section, ``z`` high in or beside a layer (its index)."""
 
     words: str
@@ -20,7 +20,7 @@ class Label(NamedTuple):
     film: Film | None = None
 
 
-def layer_labels(section: Section) -> list[Label]:
+def layer_labels(section: StackSection) -> list[StackLabel]:
     """Number and role of every layer shown, pointing near its end at the inlet's side."""
     base_end = max(slab.spans[-1][1] for slab in section.slabs if not slab.layer.is_mask)
     labels = []
@@ -36,7 +36,7 @@ def layer_labels(section: Section) -> list[Label]:
     return labels
 
 
-def pin_labels(section: Section, beyond_tab: bool) -> list[Label]:
+def pin_labels(section: StackSection, beyond_tab: bool) -> list[StackLabel]:
     """Name and press steps of the pins on this side of the tab's end, or beyond it."""
     mouth = section.tab[1] if section.tab else section.high
     slabs = {slab.layer.index: slab for slab in section.slabs}
@@ -47,7 +47,7 @@ def pin_labels(section: Section, beyond_tab: bool) -> list[Label]:
     ]
 
 
-def feature_labels(section: Section) -> list[Label]:
+def feature_labels(section: StackSection) -> list[StackLabel]:
     """Bond, neck ring, overhang, bore, pocket and lumen, where the section has them."""
     found = [
         _bond(section),
@@ -60,16 +60,16 @@ def feature_labels(section: Section) -> list[Label]:
     return [label for label in found if label is not None]
 
 
-def _joints(section: Section, kind: str) -> list[Joint]:
+def _joints(section: StackSection, kind: str) -> list[Joint]:
     return [joint for joint in section.joints if joint.interface.kind == kind and joint.spans]
 
 
-def _in_gap(words: str, s: float, joint: Joint) -> Label:
+def _in_gap(words: str, s: float, joint: Joint) -> StackLabel:
     interface = joint.interface
-    return Label(words, s, interface.z + interface.gap / 2, interface.masks[0].index)
+    return StackLabel(words, s, interface.z + interface.gap / 2, interface.masks[0].index)
 
 
-def _bond(section: Section) -> Label | None:
+def _bond(section: StackSection) -> StackLabel | None:
     """The bonded ring beside the bottom pocket, on the side away from the inlet."""
     for joint in _joints(section, "chamber"):
         beside = [span for span in joint.spans if span[1] < 0]
@@ -79,7 +79,7 @@ def _bond(section: Section) -> Label | None:
     return None
 
 
-def _pocket(section: Section) -> Label | None:
+def _pocket(section: StackSection) -> StackLabel | None:
     """The pocket of the second balloon, or of the only one (open toward its inlet)."""
     joints = _joints(section, "chamber")[:2]
     for joint in reversed(joints):
@@ -93,7 +93,7 @@ def _pocket(section: Section) -> Label | None:
     return None
 
 
-def _neck_ring(section: Section) -> Label | None:
+def _neck_ring(section: StackSection) -> StackLabel | None:
     """The bond beside the bore that carries one balloon on the next, or a sheet's window."""
     for joint in _joints(section, "separator"):
         for start, end in joint.spans:
@@ -106,7 +106,7 @@ def _neck_ring(section: Section) -> Label | None:
     return None
 
 
-def _overhang(section: Section) -> Label | None:
+def _overhang(section: StackSection) -> StackLabel | None:
     """The lowest separator mask past the wall above it, away from the inlet if that shows."""
     for mask, wall in pairwise(section.slabs):
         if mask.layer.role != "separator-mask" or not mask.spans or not wall.spans:
@@ -119,7 +119,7 @@ def _overhang(section: Section) -> Label | None:
     return None
 
 
-def _bore(section: Section) -> Label | None:
+def _bore(section: StackSection) -> StackLabel | None:
     for slab in section.slabs:
         through = opening(slab.spans, 0.0)
         if not slab.layer.is_mask and through is not None:
@@ -127,7 +127,7 @@ def _bore(section: Section) -> Label | None:
     return None
 
 
-def _lumen(section: Section) -> Label | None:
+def _lumen(section: StackSection) -> StackLabel | None:
     if section.lumen is None:
         return None
     cap = section.slabs[-1]
@@ -137,6 +137,6 @@ def _lumen(section: Section) -> Label | None:
     return _in_slab(f"lumen ⌀{length(through[1] - through[0])}", section.lumen, cap)
 
 
-def _in_slab(words: str, s: float, slab: Slab) -> Label:
+def _in_slab(words: str, s: float, slab: SectionSlab) -> StackLabel:
     layer = slab.layer
-    return Label(words, s, layer.z + layer.film.thickness / 2, layer.index)
+    return StackLabel(words, s, layer.z + layer.film.thickness / 2, layer.index)

@@ -17,7 +17,7 @@ BEYOND_LUMEN = 3.25
 
 
 @dataclass(frozen=True)
-class Slab:
+class SectionSlab:
     """A layer cut by the plane: where along it there is film."""
 
     layer: Layer
@@ -33,7 +33,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Section:
+class StackSection:
     """The cut, in mm along the plane from the chamber's axis, positive toward its inlet.
 
     ``hidden`` balloons are left out above the layer ``break_above`` (an index; 0 for none).
@@ -42,7 +42,7 @@ class Section:
     """
 
     chamber: str
-    slabs: tuple[Slab, ...]
+    slabs: tuple[SectionSlab, ...]
     joints: tuple[Joint, ...]
     low: float
     high: float
@@ -54,7 +54,7 @@ class Section:
     rods: tuple[Rod, ...]
 
 
-def chamber_section(laminate: Laminate) -> Section:
+def chamber_section(laminate: Laminate) -> StackSection:
     """The section in the plane of the first chamber's axis and its inlet."""
     chamber = laminate.chambers[0]
     origin = next(
@@ -76,8 +76,8 @@ def chamber_section(laminate: Laminate) -> Section:
         for interface in laminate.interfaces
         if interface.masks and shown.issuperset(mask.index for mask in interface.masks)
     ]
-    slabs = [Slab(layer, _clipped(cuts[layer.pattern], crop)) for layer in layers]
-    return Section(
+    slabs = [SectionSlab(layer, _clipped(cuts[layer.pattern], crop)) for layer in layers]
+    return StackSection(
         chamber.name,
         tuple(slabs),
         tuple(joints),

@@ -10,13 +10,13 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.section import Interval
 from sbafab.geometry.svg import number
 from sbafab.laminate.films import Film
+from sbafab.laminate.inks import ink
 from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.picture import ink
 from sbafab.reports import drawing as draw
 from sbafab.reports.features import length
-from sbafab.reports.stack_labels import Label, feature_labels, layer_labels, pin_labels
+from sbafab.reports.stack_labels import StackLabel, feature_labels, layer_labels, pin_labels
 from sbafab.reports.stack_pins import Rod
-from sbafab.reports.stack_section import Joint, Section, Slab, chamber_section, opening
+from sbafab.reports.stack_section import Joint, SectionSlab, StackSection, chamber_section, opening
 
 PAGE_WIDTH = 297.0
 LEFT, RIGHT = 56.0, 56.0
@@ -38,10 +38,10 @@ Dimension = tuple[Interval, str]
 
 
 @dataclass(frozen=True)
-class View:
+class StackView:
     """Where the section lands on the page."""
 
-    section: Section
+    section: StackSection
     across: float
     factor: int
     height: float
@@ -91,17 +91,17 @@ def stack_svg(laminate: Laminate) -> str:
     return draw.document(PAGE_WIDTH, page, f"{laminate.name}: section", elements)
 
 
-def _view(section: Section) -> View:
+def _view(section: StackSection) -> StackView:
     across = (PAGE_WIDTH - LEFT - RIGHT) / (section.high - section.low)
     thickness = sum(slab.layer.film.thickness for slab in section.slabs)
     thickest = max(slab.layer.film.thickness for slab in section.slabs)
     most = min(TALLEST / thickness, TALLEST_FILM / thickest) / across
     factor = max(step for step in EXAGGERATIONS if step <= max(most, 1.0))
     height = thickness * across * factor + (BREAK if section.hidden else 0.0)
-    return View(section, across, factor, height)
+    return StackView(section, across, factor, height)
 
 
-def _slab(slab: Slab, view: View) -> list[str]:
+def _slab(slab: SectionSlab, view: StackView) -> list[str]:
     layer = slab.layer
     line = ink(layer.film).line
     inset = SLIT * layer.film.thickness if layer.is_mask else 0.0
@@ -114,7 +114,7 @@ def _slab(slab: Slab, view: View) -> list[str]:
     ]
 
 
-def _joint(joint: Joint, view: View) -> list[str]:
+def _joint(joint: Joint, view: StackView) -> list[str]:
     interface = joint.interface
     index = interface.masks[0].index
     bottom, top = view.y(interface.z, index), view.y(interface.z + interface.gap, index)
@@ -124,7 +124,7 @@ def _joint(joint: Joint, view: View) -> list[str]:
     ]
 
 
-def _rod(rod: Rod, view: View) -> list[str]:
+def _rod(rod: Rod, view: StackView) -> list[str]:
     """A dowel pin behind the films, stack by stack, and its axis; nothing across the break."""
     parts: list[str] = []
     x = view.x(rod.middle)
@@ -141,7 +141,7 @@ def _rod(rod: Rod, view: View) -> list[str]:
     return parts
 
 
-def _heading(laminate: Laminate, view: View) -> list[str]:
+def _heading(laminate: Laminate, view: StackView) -> list[str]:
     what = (
         f"Section through {view.section.chamber} along its inlet. "
         f"Height exaggerated {view.factor}{draw.TIMES}, {number(laminate.thickness)} in all "
@@ -157,7 +157,7 @@ def _heading(laminate: Laminate, view: View) -> list[str]:
     ]
 
 
-def _breaks(view: View) -> list[str]:
+def _breaks(view: StackView) -> list[str]:
     section = view.section
     parts: list[str] = []
     if section.hidden:
@@ -177,7 +177,7 @@ def _breaks(view: View) -> list[str]:
     return parts
 
 
-def _reach(section: Section) -> float:
+def _reach(section: StackSection) -> float:
     """How far the layers above the break go toward the inlet."""
     above = [s for s in section.slabs if s.layer.index > section.break_above]
     return max(end for slab in above for _, end in slab.spans)
@@ -198,7 +198,7 @@ def _wave(start: Point, end: Point, white: float = 0.0) -> str:
     return draw.box((x0 - white, y0), (x0, end[1]), fill="#ffffff") + curve
 
 
-def _dimensions_above(view: View) -> list[str]:
+def _dimensions_above(view: StackView) -> list[str]:
     """Over the top balloon: chamber, the bonds beside it, the lumen, and the whole width."""
     cap = view.section.slabs[-1]
     chambers = [j for j in view.section.joints if j.interface.kind == "chamber"]
@@ -222,7 +222,7 @@ def _dimensions_above(view: View) -> list[str]:
     return parts
 
 
-def _dimensions_below(view: View) -> list[str]:
+def _dimensions_below(view: StackView) -> list[str]:
     """Under the stack: the tab, and how far the inlet strip reaches past its mouth."""
     section = view.section
     if section.tab is None:
@@ -240,7 +240,7 @@ def _dimensions_below(view: View) -> list[str]:
 
 
 def _levels(
-    view: View, measured: Sequence[Dimension], y: float, away: Point
+    view: StackView, measured: Sequence[Dimension], y: float, away: Point
 ) -> tuple[list[str], int]:
     """Dimensions in as few rows as keep their words apart, and how many rows that took."""
     rows: list[list[Interval]] = []
@@ -258,7 +258,9 @@ def _levels(
     return parts, len(rows)
 
 
-def _level(view: View, measured: Dimension, y: float, away: Point, distance: float) -> list[str]:
+def _level(
+    view: StackView, measured: Dimension, y: float, away: Point, distance: float
+) -> list[str]:
     (start, end), name = measured
     words = _words((start, end), name)
     return draw.dimension((view.x(start), y), (view.x(end), y), words, away, distance)
@@ -268,7 +270,7 @@ def _words(span: Interval, name: str) -> str:
     return f"{name} {length(span[1] - span[0])}".strip()
 
 
-def _labels(view: View) -> list[str]:
+def _labels(view: StackView) -> list[str]:
     """Layer names at the right, features at the left, each with a leader."""
     low, high = HEAD - 4.0, HEAD + view.height + 6.0
     right = view.x(view.section.high) + 5.0
@@ -284,7 +286,7 @@ def _labels(view: View) -> list[str]:
     return parts
 
 
-def _label(label: Label, feature: Point, at: Point, side: int) -> list[str]:
+def _label(label: StackLabel, feature: Point, at: Point, side: int) -> list[str]:
     x, row = at
     elbow = (x - 2.2 * side, row)
     anchor: draw.Anchor = "start" if side > 0 else "end"
@@ -295,7 +297,7 @@ def _label(label: Label, feature: Point, at: Point, side: int) -> list[str]:
     ]
 
 
-def _legend(view: View, page: float) -> list[str]:
+def _legend(view: StackView, page: float) -> list[str]:
     y = page - 10.0
     films = dict.fromkeys(slab.layer.film for slab in view.section.slabs)
     entries = [

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from sbafab.laminate.laminate import Laminate
+from sbafab.progress import Progress
 from sbafab.rules import (
     bond_width,
     channel_clear,
@@ -25,9 +26,6 @@ from sbafab.rules import (
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import Limits
 from sbafab.rules.lowered import lowered
-
-Progress = Callable[[str, int, int], None]
-"""Told which rule runs next, and how many of how many are done."""
 
 
 class Rule(NamedTuple):

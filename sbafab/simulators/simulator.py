@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -11,9 +11,8 @@ from typing import Any, Literal, Protocol, cast
 
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
+from sbafab.progress import Progress
 
-Progress = Callable[[str, int, int], None]
-"""Told what is being done, and how much of how much is."""
 Name = Literal["calculix", "sofa", "mujoco"]
 NAMES: tuple[Name, ...] = ("calculix", "sofa", "mujoco")
 LONGEST = 1e5

@@ -19,7 +19,7 @@ from ezdxf.document import Drawing
 
 from sbafab.actuators import load_design
 from sbafab.as_built.check import check_folder
-from sbafab.cutting.dxf_write import DxfProfile
+from sbafab.cutting.dxf_write import Curves, DxfProfile
 from sbafab.output.run import generate
 from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding
@@ -38,7 +38,7 @@ def good(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     template, settings, profile = request.param
     design = load_design(template, [*settings, "rules.yield_builds=100"])
     out = tmp_path_factory.mktemp("good")
-    return generate(design, out, ("cut",), dxf_profile=profile).folder
+    return generate(design, out, ("cut",), curves=Curves(profile)).folder
 
 
 @pytest.fixture

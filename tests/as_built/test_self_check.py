@@ -15,20 +15,22 @@ from sbafab.as_built import check as as_built
 from sbafab.as_built.check import check_folder
 from sbafab.cli.ending import ended_plainly
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import dxf_text
+from sbafab.cutting.dxf_write import Curves, dxf_text
 from sbafab.cutting.order import cutting_order
 from sbafab.errors import DefectError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.models.figures import Asked
 from sbafab.models.prediction import predict
 from sbafab.nesting.bottom_left import bottom_left
-from sbafab.nesting.records import Part, Placement, Stock
-from sbafab.output import run as run_module
+from sbafab.nesting.records import NestPart, Placement, Stock
+from sbafab.output import contents
 from sbafab.output.job import generate_job
 from sbafab.output.manifest import file_hashes
+from sbafab.output.planned import Planned
 from sbafab.output.predicting import with_prediction
 from sbafab.output.run import Extras, generate
-from sbafab.output.shop import write_cut_set
+from sbafab.output.shop import write_cut_files
+from sbafab.progress import Progress
 from sbafab.rules.deck import Rule
 from tests.as_built.doctoring import Doctor
 
@@ -39,12 +41,9 @@ Edit = Callable[[Path], object]
 def spoilt(edit: Edit) -> Callable[..., object]:
     """Writes the cut files, and then one of them once more, as a defect of the program might."""
 
-    def write(*args: object) -> object:
-        written = write_cut_set(*args)  # type: ignore[arg-type]
-        folder = args[2]
-        assert isinstance(folder, Path)
+    def write(planned: Planned, folder: Path, tell: Progress) -> None:
+        write_cut_files(planned, folder, tell)
         edit(next((folder / "layers").glob("003_TPE_*.dxf")))
-        return written
 
     return write
 
@@ -75,7 +74,7 @@ def test_a_run_whose_files_are_not_its_design_changes_nothing(
     design = load_design("1dof-5mm", FEW)
     before = file_hashes(generate(design, tmp_path, ("cut",)).folder)
     with (
-        patch.object(run_module, "write_cut_set", spoilt(edit)),
+        patch.object(contents, "write_cut_files", spoilt(edit)),
         pytest.raises(DefectError, match=f"(?s){said}.*a defect of sbafab.*report"),
     ):
         generate(design, tmp_path, ("cut",))
@@ -143,10 +142,10 @@ def test_a_job_is_made_again_whole(tmp_path: Path) -> None:
 def test_chords_that_are_too_coarse_are_the_users_choice(tmp_path: Path) -> None:
     design = load_design("1dof-5mm", FEW)
     with (
-        patch.object(run_module, "write_cut_set", spoilt(in_inches)),
+        patch.object(contents, "write_cut_files", spoilt(in_inches)),
         pytest.raises(OutputError, match=r"smaller --chord-error than 0\.005"),
     ):
-        generate(design, tmp_path, ("cut",), dxf_profile="chords")
+        generate(design, tmp_path, ("cut",), curves=Curves("chords"))
 
 
 @pytest.mark.parametrize(
@@ -155,7 +154,7 @@ def test_chords_that_are_too_coarse_are_the_users_choice(tmp_path: Path) -> None
 def test_parts_of_a_nest_that_lie_badly_are_not_let_through(
     shift: tuple[float, float], said: str, tmp_path: Path
 ) -> None:
-    def moved(parts: Sequence[Part], stock: Stock) -> tuple[Placement, ...]:
+    def moved(parts: Sequence[NestPart], stock: Stock) -> tuple[Placement, ...]:
         first, *others = bottom_left(parts, stock)
         x, y = first.shift
         return (replace(first, shift=(x + shift[0], y + shift[1])), *others)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 import pytest
 
-from sbafab.cli.quantities import FLOW, PRESSURE, VOLUME, OfChamber, Quantity, by_chamber
+from sbafab.cli.quantities import FLOW, PRESSURE, VOLUME, MeasuredQuantity, OfChamber, by_chamber
 
 OPTION = click.Option(["--volume"], multiple=True)
 CONTEXT = click.Context(click.Command("any"))
@@ -25,7 +25,7 @@ CONTEXT = click.Context(click.Command("any"))
         (FLOW, "0.035 l/min", 35),
     ],
 )
-def test_units(quantity: Quantity, written: str, value: float) -> None:
+def test_units(quantity: MeasuredQuantity, written: str, value: float) -> None:
     assert quantity.read(written) == pytest.approx(value)
 
 

@@ -14,11 +14,12 @@ import pytest
 import sbafab
 from sbafab.cutting import files
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import DxfProfile
-from sbafab.cutting.files import CutFile, Progress, compensated_paths, write_layer_files
+from sbafab.cutting.dxf_write import Curves, DxfProfile
+from sbafab.cutting.files import CutFile, compensated_paths, write_layer_files
 from sbafab.cutting.properties import CutSettings
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
+from sbafab.progress import Counted
 
 SETTINGS = CutSettings("two-plates", "ab" * 32)
 CALIBRATED = CutSettings(
@@ -31,7 +32,7 @@ CALIBRATED = CutSettings(
 
 
 def written(
-    laminate: Laminate, folder: Path, settings: CutSettings, progress: Progress | None = None
+    laminate: Laminate, folder: Path, settings: CutSettings, progress: Counted | None = None
 ) -> list[CutFile]:
     paths = compensated_paths(laminate, settings)
     return write_layer_files(laminate, paths, folder, settings, progress)
@@ -102,7 +103,7 @@ def test_ptfe_carries_the_fume_warning(laminate: Laminate, tmp_path: Path) -> No
 def test_other_ways_of_writing_curves(
     profile: DxfProfile, kinds: set[str], laminate: Laminate, tmp_path: Path
 ) -> None:
-    settings = CutSettings("two-plates", "", profile=profile, chord_error=0.01)
+    settings = CutSettings("two-plates", "", curves=Curves(profile, 0.01))
     base, *_ = written(laminate, tmp_path, settings)
     model = ezdxf.readfile(tmp_path / base.path).modelspace()
     assert {entity.dxftype() for entity in model.query('*[layer!="REFERENCE"]')} == kinds

@@ -9,7 +9,7 @@ from itertools import pairwise
 import pytest
 
 from sbafab.cutting import order
-from sbafab.cutting.remaining import Remaining
+from sbafab.cutting.remaining import PointsLeft
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import circle, disc
@@ -33,7 +33,7 @@ def scattered(seed: int) -> list[Point]:
 def test_the_nearest_is_taken_and_of_equal_ones_the_first(seed: int) -> None:
     points = scattered(seed)
     draw = random.Random(seed + 100)
-    remaining, left = Remaining(points), list(range(len(points)))
+    remaining, left = PointsLeft(points), list(range(len(points)))
     while left:
         p = (draw.uniform(-50, 150), draw.uniform(-50, 150))
         expected = min(left, key=lambda i: (round(math.dist(p, points[i]), 6), i))

@@ -17,7 +17,7 @@ from sbafab.cutting.sheets import Machine, SheetFile, write_sheets
 from sbafab.errors import OutputError
 from sbafab.geometry.shapes import disc, rectangle
 from sbafab.nesting.nest import nest
-from sbafab.nesting.records import Nest, Part, Placement, Stock
+from sbafab.nesting.records import Nest, NestPart, Placement, Stock
 
 SETTINGS = CutSettings("demo", "cd" * 32, generator="sbafab 1.2.3")
 STOCK = Stock(60.0, 80.0, 6.0, 1.0)
@@ -26,7 +26,7 @@ MACHINE = Machine(cut_speed=10.0, travel_speed=100.0, pierce_seconds=0.5, heat_d
 
 
 def ring_nest(count: int, stock: Stock = STOCK) -> Nest:
-    (found,) = nest([Part("demo", "P01", 1, "TPE", RING, count)], {"TPE": stock})
+    (found,) = nest([NestPart("demo", "P01", 1, "TPE", RING, count)], {"TPE": stock})
     return found
 
 
@@ -158,7 +158,7 @@ def test_a_compensated_sheet_says_so_in_its_name(tmp_path: Path) -> None:
 
 
 def test_parts_that_overlap_are_not_let_through(tmp_path: Path) -> None:
-    part = Part("demo", "P01", 1, "TPE", RING, 2)
+    part = NestPart("demo", "P01", 1, "TPE", RING, 2)
     places = (Placement(0, 0, 0, (11.0, 11.0)), Placement(0, 0, 0, (12.0, 11.0)))
     bad = Nest("bottom-left", "TPE", STOCK, (part,), places)
     with pytest.raises(OutputError, match="touch or cross"):
@@ -205,6 +205,6 @@ def test_every_letter_is_another() -> None:
 
 def test_engraving_does_not_touch_a_part_that_fills_its_sheet(tmp_path: Path) -> None:
     full = rectangle((0.0, 0.0), (48.0, 68.0))
-    (whole,) = nest([Part("demo", "P01", 1, "TPE", full, 1)], {"TPE": STOCK})
+    (whole,) = nest([NestPart("demo", "P01", 1, "TPE", full, 1)], {"TPE": STOCK})
     (sheet,) = write_sheets([whole], tmp_path, SETTINGS, MACHINE)
     assert "ENGRAVE" in read_profile(tmp_path / sheet.path).layers

@@ -9,7 +9,7 @@ import shapely
 from pyogrio import raw
 
 from sbafab.actuators import load_design
-from sbafab.cutting.dxf_write import DxfProfile
+from sbafab.cutting.dxf_write import Curves, DxfProfile
 from sbafab.laminate.films import Material
 from sbafab.output.run import Run, generate
 
@@ -44,7 +44,9 @@ def write_design(design: str, profile: DxfProfile, folder: Path) -> Run:
         for key in (f"width={WIDTH}", f"length={LENGTH}", f"border={BORDER}")
     ]
     overrides = [f"stack.balloons={DESIGNS[design]}", *sizes]
-    return generate(load_design(design, overrides), folder / profile, ("cut",), None, profile)
+    return generate(
+        load_design(design, overrides), folder / profile, ("cut",), None, Curves(profile)
+    )
 
 
 def sheet_of(runs: dict[DxfProfile, Run], material: Material) -> Sheet:

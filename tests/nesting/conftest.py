@@ -8,11 +8,11 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.nesting.parts import parts_of
-from sbafab.nesting.records import Part
+from sbafab.nesting.records import NestPart
 
 
 @pytest.fixture
-def lobed_plates() -> list[Part]:
+def lobed_plates() -> list[NestPart]:
     """40 walls without tabs and 39 separators of the 15 mm actuator, taken as one material."""
     laminate = build(load_design("3dof-15mm"))
     paths = {pattern: layers[0].profile for pattern, layers in laminate.patterns.items()}

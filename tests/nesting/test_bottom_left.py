@@ -16,14 +16,14 @@ from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, polygon, rectangle, stadium
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import nest
-from sbafab.nesting.records import Nest, Part, Stock
+from sbafab.nesting.records import Nest, NestPart, Stock
 
 
-def part(region: Region, count: int, pattern: str = "P01") -> Part:
-    return Part("demo", pattern, 1, "TPE", region, count)
+def part(region: Region, count: int, pattern: str = "P01") -> NestPart:
+    return NestPart("demo", pattern, 1, "TPE", region, count)
 
 
-def nested(parts: Sequence[Part], stock: Stock) -> Nest:
+def nested(parts: Sequence[NestPart], stock: Stock) -> Nest:
     (found,) = nest(parts, {"TPE": stock})
     check_nest(found)
     return found
@@ -157,7 +157,9 @@ def test_shapely_agrees_that_random_parts_are_apart(
         assert box(4, 4, 41, 46).buffer(1e-5).contains(unary_union(shapes))
 
 
-def test_forty_lobed_plates_and_39_separators_lie_on_one_sheet(lobed_plates: list[Part]) -> None:
+def test_forty_lobed_plates_and_39_separators_lie_on_one_sheet(
+    lobed_plates: list[NestPart],
+) -> None:
     """On the 132.4 mm square that a border of 10 mm leaves of the press's heated area."""
     found = nested(lobed_plates, Stock(152.4, 152.4, 10, 1.0))
     assert len(found.placements) == 79

@@ -15,7 +15,7 @@ from sbafab.geometry.edges import Arc, Line
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, polygon, rectangle, stadium
 from sbafab.nesting.check import check_nest, check_placed, edge_distance, least_distance
-from sbafab.nesting.records import Nest, Part, Placement, Stock
+from sbafab.nesting.records import Nest, NestPart, Placement, Stock
 
 SQUARE = rectangle((0.0, 0.0), (10.0, 10.0))
 STOCK = Stock(60, 60, 5, 1.0, pins=((50.0, 50.0, 4.0),), most=2)
@@ -27,7 +27,7 @@ def nest_of(*shifts: tuple[float, float, int], count: int | None = None) -> Nest
         engine="bottom-left",
         material="TPE",
         stock=STOCK,
-        parts=(Part("demo", "P01", 1, "TPE", SQUARE, wanted),),
+        parts=(NestPart("demo", "P01", 1, "TPE", SQUARE, wanted),),
         placements=tuple(Placement(0, sheet, 0, (x, y)) for x, y, sheet in shifts),
     )
 

@@ -7,14 +7,14 @@ import pytest
 from sbafab.errors import DesignError
 from sbafab.geometry.shapes import disc, rectangle
 from sbafab.nesting.nest import nest
-from sbafab.nesting.records import Part, Stock
+from sbafab.nesting.records import NestPart, Stock
 
-PLATE = Part("demo", "P02", 1, "TPE", rectangle((0.0, 0.0), (92.0, 40.0)), 1)
-COIN = Part("demo", "P03", 1, "PTFE", disc((0.0, 0.0), 5.0), 30)
+PLATE = NestPart("demo", "P02", 1, "TPE", rectangle((0.0, 0.0), (92.0, 40.0)), 1)
+COIN = NestPart("demo", "P03", 1, "PTFE", disc((0.0, 0.0), 5.0), 30)
 LARGE = Stock(152.4, 152.4, 10, 1.0)
 
 
-def refusal(part: Part, stock: Stock) -> str:
+def refusal(part: NestPart, stock: Stock) -> str:
     with pytest.raises(DesignError) as caught:
         nest([part], {"TPE": stock, "PTFE": stock})
     message = str(caught.value)
@@ -56,5 +56,5 @@ def test_more_sheets_than_allowed() -> None:
 
 
 def test_far_more_sheets_than_allowed_are_told_without_a_search() -> None:
-    many = Part("demo", "P03", 1, "PTFE", disc((0.0, 0.0), 5.0), 1_000_000)
+    many = NestPart("demo", "P03", 1, "PTFE", disc((0.0, 0.0), 5.0), 1_000_000)
     assert "need at least 4481 sheets" in refusal(many, LARGE)

@@ -10,13 +10,13 @@ import pytest
 
 from sbafab.geometry.shapes import disc, rectangle
 from sbafab.nesting.nest import nest
-from sbafab.nesting.records import Part, Stock
+from sbafab.nesting.records import NestPart, Stock
 from sbafab.nesting.saved import as_dict, from_dict
 
 PARTS = (
-    Part("demo", "P01", 1, "TPE", rectangle((0.1, 0.2), (9.3, 7.7)), 7),
-    Part("demo", "P02", 1, "PTFE", disc((0.0, 0.0), 3.3), 5),
-    Part("demo", "P03", 1, "TPE", disc((1.0, 0.0), 4.1), 3),
+    NestPart("demo", "P01", 1, "TPE", rectangle((0.1, 0.2), (9.3, 7.7)), 7),
+    NestPart("demo", "P02", 1, "PTFE", disc((0.0, 0.0), 3.3), 5),
+    NestPart("demo", "P03", 1, "TPE", disc((1.0, 0.0), 4.1), 3),
 )
 STOCKS = {"TPE": Stock(40, 40, 5, 1.0), "PTFE": Stock(50, 40, 5, 0.7)}
 
@@ -39,7 +39,7 @@ def test_the_same_nests_come_back(saved: Any) -> None:
         (replace(PARTS[0], design="other"), *PARTS[1:]),
     ],
 )
-def test_other_parts_are_nested_anew(saved: Any, parts: tuple[Part, ...]) -> None:
+def test_other_parts_are_nested_anew(saved: Any, parts: tuple[NestPart, ...]) -> None:
     assert from_dict(saved, parts, STOCKS, "bottom-left") is None
 
 

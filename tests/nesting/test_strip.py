@@ -12,15 +12,15 @@ from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, rectangle, stadium
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import nest
-from sbafab.nesting.records import Nest, Part, Stock
+from sbafab.nesting.records import Nest, NestPart, Stock
 from sbafab.nesting.strip import SAGITTA, _outline
 
 
-def part(region: Region, count: int, pattern: str = "P01") -> Part:
-    return Part("demo", pattern, 1, "TPE", region, count)
+def part(region: Region, count: int, pattern: str = "P01") -> NestPart:
+    return NestPart("demo", pattern, 1, "TPE", region, count)
 
 
-def nested(parts: list[Part], stock: Stock, seconds: float = 1) -> Nest:
+def nested(parts: list[NestPart], stock: Stock, seconds: float = 1) -> Nest:
     pytest.importorskip("spyrrow")
     (found,) = nest(parts, {"TPE": stock}, "spyrrow", seconds)
     check_nest(found)
@@ -47,7 +47,9 @@ def test_a_part_too_long_to_be_turned_is_not() -> None:
     assert all(place.turn % 2 == 0 for place in found.placements)
 
 
-def test_forty_lobed_plates_and_39_separators_lie_on_one_sheet(lobed_plates: list[Part]) -> None:
+def test_forty_lobed_plates_and_39_separators_lie_on_one_sheet(
+    lobed_plates: list[NestPart],
+) -> None:
     found = nested(lobed_plates, Stock(152.4, 152.4, 10, 0.5), seconds=2)
     assert len(found.placements) == 79
     assert found.sheets == 1

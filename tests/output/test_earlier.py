@@ -13,9 +13,9 @@ from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.settings import MeshSettings
 from sbafab.output.assembly import generate_assembly
-from sbafab.output.contents import Conforming, Part
 from sbafab.output.manifest import file_hashes
-from sbafab.output.run import Extras, generate
+from sbafab.output.planned import RunPart
+from sbafab.output.run import Conforming, Extras, generate
 
 SMALL = ("stack.balloons=1",)
 OTHER = (*SMALL, "press.temperature_c=140")
@@ -54,7 +54,9 @@ def test_a_failing_design_takes_the_place_of_a_failed_one(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("part", ["cut", "press", "mesh", "preview"])
-def test_a_part_alone_does_not_put_away_another_designs_files(part: Part, tmp_path: Path) -> None:
+def test_a_part_alone_does_not_put_away_another_designs_files(
+    part: RunPart, tmp_path: Path
+) -> None:
     good = generate(load_design("1dof-5mm", SMALL), tmp_path)
     before = file_hashes(good.folder)
     with pytest.raises(OutputError, match="--set name=NAME"):

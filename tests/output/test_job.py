@@ -11,8 +11,9 @@ from sbafab.actuators import load_design
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.output.job import Job, generate_job
+from sbafab.output.job import generate_job
 from sbafab.output.manifest import file_hashes
+from sbafab.output.run import Run
 
 
 def designs(*assignments: str) -> list[Design]:
@@ -23,11 +24,11 @@ def designs(*assignments: str) -> list[Design]:
 
 
 @pytest.fixture(scope="module")
-def job(tmp_path_factory: pytest.TempPathFactory) -> Job:
+def job(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return generate_job(designs("order.copies=2"), "batch", tmp_path_factory.mktemp("job"))
 
 
-def test_every_design_has_its_folder_and_the_sheets_are_shared(job: Job) -> None:
+def test_every_design_has_its_folder_and_the_sheets_are_shared(job: Run) -> None:
     assert not job.failed
     assert {path.name for path in job.folder.iterdir()} == {
         "1dof-5mm",
@@ -40,7 +41,7 @@ def test_every_design_has_its_folder_and_the_sheets_are_shared(job: Job) -> None
         assert {"layers", "press.json", "traveller.html", "mesh", "manifest.json"} <= made
 
 
-def test_the_sheets_hold_every_layer_of_every_design_as_often_as_ordered(job: Job) -> None:
+def test_the_sheets_hold_every_layer_of_every_design_as_often_as_ordered(job: Run) -> None:
     for material in ("TPE", "PTFE"):
         layers = [
             read_profile(path).region.area
@@ -54,7 +55,7 @@ def test_the_sheets_hold_every_layer_of_every_design_as_often_as_ordered(job: Jo
         assert sum(sheets) == pytest.approx(2 * sum(layers), abs=1e-3)
 
 
-def test_the_manifest_lists_designs_sheets_and_files(job: Job) -> None:
+def test_the_manifest_lists_designs_sheets_and_files(job: Run) -> None:
     told = json.loads((job.folder / "manifest.json").read_text(encoding="utf-8"))
     assert told["schema"] == "sbafab/job@1"
     assert [(one["name"], one["copies"]) for one in told["designs"]] == [
@@ -68,12 +69,12 @@ def test_the_manifest_lists_designs_sheets_and_files(job: Job) -> None:
     assert {part["design"] for part in parts} == {"1dof-5mm", "3dof-15mm"}
 
 
-def test_travellers_name_the_shared_sheets(job: Job) -> None:
+def test_travellers_name_the_shared_sheets(job: Run) -> None:
     page = (job.folder / "1dof-5mm" / "traveller.html").read_text(encoding="utf-8")
     assert "../sheets/TPE_1.dxf" in page
 
 
-def test_the_same_job_gives_the_same_bytes(job: Job, tmp_path: Path) -> None:
+def test_the_same_job_gives_the_same_bytes(job: Run, tmp_path: Path) -> None:
     again = generate_job(designs("order.copies=2"), "batch", tmp_path)
     assert file_hashes(again.folder) == file_hashes(job.folder)
 

@@ -16,8 +16,7 @@ from sbafab.as_built.check import check_folder
 from sbafab.design.writing import design_sha256
 from sbafab.meshing.conforming.settings import MeshSettings
 from sbafab.output import contents
-from sbafab.output.contents import Conforming
-from sbafab.output.run import Extras, generate
+from sbafab.output.run import Conforming, Extras, generate
 
 TEMPLATES = ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"]
 

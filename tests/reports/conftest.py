@@ -10,7 +10,7 @@ import pytest
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Laminate
-from sbafab.nesting.records import Nest, Part, Placement, Stock, Turn
+from sbafab.nesting.records import Nest, NestPart, Placement, Stock, Turn
 
 STOCK = Stock(152.4, 152.4, 10.0, 1.0, pins=((5.0, 5.0, 4.0),))
 MATERIALS: tuple[Material, ...] = ("TPE", "PTFE")
@@ -19,7 +19,7 @@ TURNS: tuple[Turn, ...] = (0, 1, 2, 3)
 SheetMaker = Callable[..., list[SheetFile]]
 
 
-def _placements(parts: tuple[Part, ...]) -> Iterator[Placement]:
+def _placements(parts: tuple[NestPart, ...]) -> Iterator[Placement]:
     """Parts side by side, a quarter turn on from one to the next, a new row where one is full."""
     least, most = STOCK.border, STOCK.width - STOCK.border
     x, y, tall, sheet = least, least, 0.0, 0
@@ -38,7 +38,7 @@ def _placements(parts: tuple[Part, ...]) -> Iterator[Placement]:
 
 def _nest(laminate: Laminate, material: Material, copies: int) -> Nest:
     parts = tuple(
-        Part(laminate.name, pattern, number, material, piece, len(layers) * copies)
+        NestPart(laminate.name, pattern, number, material, piece, len(layers) * copies)
         for pattern, layers in laminate.patterns.items()
         if layers[0].film.material == material
         for number, piece in enumerate(layers[0].profile.pieces, 1)

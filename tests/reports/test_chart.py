@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 import pytest
 
 import sbafab
-from sbafab.reports.chart import COLOURS, Curve, Panel, Points, chart_svg
+from sbafab.reports.chart import COLOURS, ChartCurve, ChartPoints, Panel, chart_svg
 from sbafab.reports.relation_svg import relation_svg
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -40,7 +40,7 @@ def tick_places(svg: str, axis: str) -> dict[float, float]:
 
 
 def test_curve_lies_where_the_ticks_say() -> None:
-    svg = chart_svg("t", [Panel("p", "x, mm", "y, N", [Curve("", [0.0, 4.0], [1.0, 3.0])])])
+    svg = chart_svg("t", [Panel("p", "x, mm", "y, N", [ChartCurve("", [0.0, 4.0], [1.0, 3.0])])])
     (x0, y0), (x1, y1) = ends(group(svg, "curve1.1"))
     across, up = tick_places(svg, "x"), tick_places(svg, "y")
     assert (x0, y0) == pytest.approx((across[0.0], up[1.0]), abs=1e-3)
@@ -48,24 +48,24 @@ def test_curve_lies_where_the_ticks_say() -> None:
 
 
 def test_axes_begin_at_zero_unless_something_is_negative() -> None:
-    positive = chart_svg("t", [Panel("", "x", "y", [Curve("", [1.0, 4.0], [1.0, 3.0])])])
+    positive = chart_svg("t", [Panel("", "x", "y", [ChartCurve("", [1.0, 4.0], [1.0, 3.0])])])
     assert min(tick_places(positive, "y")) == 0
-    below = Panel("", "x", "y", [Curve("", [1.0, 4.0], [-1.0, 3.0])])
+    below = Panel("", "x", "y", [ChartCurve("", [1.0, 4.0], [-1.0, 3.0])])
     # Matplotlib writes a minus sign, not a hyphen.
     assert any(text.startswith("\N{MINUS SIGN}") for text in texts(chart_svg("t", [below])))
 
 
 def test_title_labels_and_key_are_text_as_given() -> None:
     curves = [
-        Curve("a & <b>", [0.0, 1.0], [0.0, 1.0]),
-        Curve("$5 \\alpha$", [0.0, 1.0], [1.0, 2.0]),
+        ChartCurve("a & <b>", [0.0, 1.0], [0.0, 1.0]),
+        ChartCurve("$5 \\alpha$", [0.0, 1.0], [1.0, 2.0]),
     ]
     svg = chart_svg("t < u", [Panel("panel", "x, mm", "y, N", curves)])
     assert {"t < u", "panel", "x, mm", "y, N", "a & <b>", "$5 \\alpha$"} <= set(texts(svg))
 
 
 def test_curves_differ_in_colour_and_in_dashes() -> None:
-    curves = [Curve(str(n), [0.0, 1.0], [0.0, float(n)]) for n in range(6)]
+    curves = [ChartCurve(str(n), [0.0, 1.0], [0.0, float(n)]) for n in range(6)]
     svg = chart_svg("t", [Panel("p", "x", "y", curves)])
     styles = []
     for n in range(1, 7):
@@ -77,7 +77,7 @@ def test_curves_differ_in_colour_and_in_dashes() -> None:
 
 
 def test_error_bars_are_as_long_as_the_errors() -> None:
-    panel = Panel("p", "x", "y", [], [Points("m", [1.0, 2.0], [5.0, 10.0], [1.0, 2.0])])
+    panel = Panel("p", "x", "y", [], [ChartPoints("m", [1.0, 2.0], [5.0, 10.0], [1.0, 2.0])])
     svg = chart_svg("t", [panel])
     up = tick_places(svg, "y")
     scale = (up[0.0] - up[10.0]) / 10

@@ -16,8 +16,8 @@ from sbafab.actuators import build, load_design
 from sbafab.cli import app
 from sbafab.errors import OutputError
 from sbafab.meshing.conforming.settings import MeshSettings
-from sbafab.simulators.calculix.axisymmetric import Section, axisymmetric_strokes
-from sbafab.simulators.calculix.job import Simulated, simulate
+from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_strokes
+from sbafab.simulators.calculix.job import History, simulate
 from sbafab.simulators.calculix.run import run_ccx
 from sbafab.simulators.calculix.settings import DeckSettings
 
@@ -28,7 +28,7 @@ needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="ccx is not i
 ORACLE = {0.95: 0.867, 6.0: 1.559}
 
 
-def inflated(folder: Path, settings: DeckSettings, h: float, minutes: float = 5) -> Simulated:
+def inflated(folder: Path, settings: DeckSettings, h: float, minutes: float = 5) -> History:
     """A quarter of the paper's balloon."""
     laminate = build(load_design("1dof-5mm", ("stack.balloons=1",)))
     mesh = MeshSettings(h=h, symmetry="quarter")
@@ -53,7 +53,7 @@ def test_the_section_of_an_inner_balloon_bends_as_a_plate() -> None:
     # Homogeneous: C r and C / r, chosen so that both edges keep level.
     c, d = np.linalg.solve([[neck, 1 / neck], [pocket, 1 / pocket]], -particular[[0, -1]])
     slope = particular + c * r + d / r
-    (stroke,) = axisymmetric_strokes([kilopascals], Section(neck=2 * neck, bore=2 * bore))
+    (stroke,) = axisymmetric_strokes([kilopascals], MeridianSection(neck=2 * neck, bore=2 * bore))
     # Edges that are held in one face only give a little, a plate's do not.
     assert stroke == pytest.approx(-2 * summed(slope, r)[-1], rel=0.15)
 

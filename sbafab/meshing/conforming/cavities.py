@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sbafab.errors import OutputError
-from sbafab.meshing.conforming.elements import FACES, Kind
-from sbafab.meshing.conforming.layup import Layup, Void
+from sbafab.meshing.conforming.elements import FACES, ElementKind
+from sbafab.meshing.conforming.layup import Layup, MeshedVoid
 from sbafab.meshing.conforming.plane import Plane
 from sbafab.meshing.conforming.sweep import Sweep
 
@@ -42,7 +42,9 @@ def bordering(
     return cells, sides
 
 
-def wetted(layup: Layup, swept: Sweep, void: Void, beyond: NDArray[np.int64]) -> NDArray[np.int64]:
+def wetted(
+    layup: Layup, swept: Sweep, void: MeshedVoid, beyond: NDArray[np.int64]
+) -> NDArray[np.int64]:
     """Prisms and their faces (k, 2) that the air of a void touches."""
     found: list[NDArray[np.int64]] = []
 
@@ -63,7 +65,7 @@ def wetted(layup: Layup, swept: Sweep, void: Void, beyond: NDArray[np.int64]) ->
 
 
 def mouths(
-    layup: Layup, void: Void, beyond: NDArray[np.int64]
+    layup: Layup, void: MeshedVoid, beyond: NDArray[np.int64]
 ) -> list[tuple[int, NDArray[np.int64]]]:
     """Where a void ends without a bond: plies above it, and sides (k, 3) of triangles there.
 
@@ -115,7 +117,7 @@ SQUARE_PARTS = ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7), (4, 5, 6), (4, 6, 7)
 
 
 def flat_triangles(
-    kind: Kind, cells: NDArray[np.int64], faces: NDArray[np.int64]
+    kind: ElementKind, cells: NDArray[np.int64], faces: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """The faces (k, 2: cell and face number) as flat triangles through all of their nodes."""
     found = [np.empty((0, 3), dtype=np.int64)]

@@ -12,16 +12,16 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-Kind = Literal["wedge15", "tetra10", "triangle6"]
+ElementKind = Literal["wedge15", "tetra10", "triangle6"]
 
-EDGES: dict[Kind, tuple[tuple[int, int], ...]] = {
+EDGES: dict[ElementKind, tuple[tuple[int, int], ...]] = {
     "triangle6": ((0, 1), (1, 2), (2, 0)),
     "tetra10": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
     "wedge15": ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
 }
 """Corners of each edge, in the order of the mid-edge nodes."""
 
-FACES: dict[Kind, tuple[tuple[int, ...], ...]] = {
+FACES: dict[ElementKind, tuple[tuple[int, ...], ...]] = {
     "triangle6": ((0, 2, 1, 5, 4, 3), (0, 1, 2, 3, 4, 5)),
     "tetra10": (
         (0, 2, 1, 6, 5, 4),
@@ -40,16 +40,16 @@ FACES: dict[Kind, tuple[tuple[int, ...], ...]] = {
 """Nodes of each face, counter-clockwise seen from outside; face numbers are those of Abaqus, less
 one; a triangle's are its lower side (SNEG) and its upper one (SPOS)."""
 
-CORNERS: dict[Kind, int] = {"triangle6": 3, "tetra10": 4, "wedge15": 6}
+CORNERS: dict[ElementKind, int] = {"triangle6": 3, "tetra10": 4, "wedge15": 6}
 
-_REFERENCE: dict[Kind, tuple[tuple[float, ...], ...]] = {
+_REFERENCE: dict[ElementKind, tuple[tuple[float, ...], ...]] = {
     "triangle6": ((0, 0), (1, 0), (0, 1)),
     "tetra10": ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)),
     "wedge15": ((0, 0, -1), (1, 0, -1), (0, 1, -1), (0, 0, 1), (1, 0, 1), (0, 1, 1)),
 }
 _THIRDS = ((1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3))
 _TETRA = 0.1381966011250105
-_GAUSS: dict[Kind, tuple[float, tuple[tuple[float, ...], ...]]] = {
+_GAUSS: dict[ElementKind, tuple[float, tuple[tuple[float, ...], ...]]] = {
     "triangle6": (1 / 6, _THIRDS),
     "tetra10": (
         1 / 24,
@@ -63,7 +63,7 @@ _GAUSS: dict[Kind, tuple[float, tuple[tuple[float, ...], ...]]] = {
 """Weight and places of the integration points that integrate a Jacobian exactly."""
 
 
-def _monomials(kind: Kind) -> tuple[tuple[int, ...], ...]:
+def _monomials(kind: ElementKind) -> tuple[tuple[int, ...], ...]:
     plane = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
     if kind == "triangle6":
         return plane
@@ -75,7 +75,7 @@ def _monomials(kind: Kind) -> tuple[tuple[int, ...], ...]:
 
 
 @cache
-def _slopes(kind: Kind, integration: bool) -> NDArray[np.float64]:
+def _slopes(kind: ElementKind, integration: bool) -> NDArray[np.float64]:
     """Derivatives (places, nodes, dimensions) of the shape functions, at nodes or Gauss points."""
     import numpy as np
 
@@ -94,7 +94,10 @@ def _slopes(kind: Kind, integration: bool) -> NDArray[np.float64]:
 
 
 def jacobians(
-    kind: Kind, points: NDArray[np.float64], cells: NDArray[np.int64], integration: bool = False
+    kind: ElementKind,
+    points: NDArray[np.float64],
+    cells: NDArray[np.int64],
+    integration: bool = False,
 ) -> NDArray[np.float64]:
     """Matrices (cells, places, space, dimensions) of the map from the reference element.
 
@@ -109,7 +112,7 @@ def jacobians(
 
 
 def scaled_jacobians(
-    kind: Kind, points: NDArray[np.float64], cells: NDArray[np.int64]
+    kind: ElementKind, points: NDArray[np.float64], cells: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """Least scaled Jacobian of each cell at its nodes and integration points.
 
@@ -128,7 +131,7 @@ def scaled_jacobians(
 
 
 def volumes(
-    kind: Kind, points: NDArray[np.float64], cells: NDArray[np.int64]
+    kind: ElementKind, points: NDArray[np.float64], cells: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """Volume of each cell in mm3, or area in mm2 of triangles."""
     import numpy as np
@@ -139,7 +142,7 @@ def volumes(
 
 
 def aspects(
-    kind: Kind, points: NDArray[np.float64], cells: NDArray[np.int64]
+    kind: ElementKind, points: NDArray[np.float64], cells: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """Longest edge over shortest of each cell, between its corners."""
     import numpy as np

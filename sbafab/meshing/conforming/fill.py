@@ -17,10 +17,10 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.meshing.conforming.bodies import bodies
-from sbafab.meshing.conforming.form import Form, flat
+from sbafab.meshing.conforming.form import FormedFilm, flat
 from sbafab.meshing.conforming.layup import Layup
 from sbafab.meshing.conforming.pockets import Pocket, pockets
-from sbafab.meshing.conforming.poses import UPRIGHT, Pose, set_on, slopes_of
+from sbafab.meshing.conforming.poses import UPRIGHT, RigidMotion, set_on, slopes_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,7 +40,7 @@ class Fill:
         return max(self.ul.values())
 
 
-def filled(stack: Layup, fill_ul: float | Mapping[str, float]) -> tuple[Fill, list[Form]]:
+def filled(stack: Layup, fill_ul: float | Mapping[str, float]) -> tuple[Fill, list[FormedFilm]]:
     """Every film where the air has moved it to.
 
     ``fill_ul`` is the air in every balloon in ul, or in those of the chambers named; 0 is flat.
@@ -50,7 +50,7 @@ def filled(stack: Layup, fill_ul: float | Mapping[str, float]) -> tuple[Fill, li
     fill = _fill(stack, fill_ul)
     held = pockets(stack)
     body_of_node, body_of_centre = bodies(stack)
-    forms = [Form(form.base.copy(), form.up.copy()) for form in flat(stack)]
+    forms = [FormedFilm(form.base.copy(), form.up.copy()) for form in flat(stack)]
     for body in np.unique(body_of_centre).tolist():
         nodes = np.flatnonzero(body_of_node == body)
         centres = np.flatnonzero(body_of_centre == body)
@@ -63,7 +63,7 @@ def filled(stack: Layup, fill_ul: float | Mapping[str, float]) -> tuple[Fill, li
 
 def _raised(
     stack: Layup, own: list[Pocket], centres: NDArray[np.int64], fill: Fill
-) -> dict[int, Form]:
+) -> dict[int, FormedFilm]:
     """The films of one body, by ply; sheets stay as they are."""
     lifts = np.zeros((len(stack.plies), len(stack.plane.points)))
     # Height of each stack's neck disc on each film, above the film itself.
@@ -78,7 +78,7 @@ def _raised(
         if ply.layer.role != "sheet":
             local = np.column_stack([stack.plane.points, ply.z + rise])
             up = np.broadcast_to(pose.turn[:, 2], local.shape)
-            forms[k] = Form(local @ pose.turn.T + pose.shift, up)
+            forms[k] = FormedFilm(local @ pose.turn.T + pose.shift, up)
     return forms
 
 
@@ -129,7 +129,9 @@ def _lift(
     necks[there[0].ply] = heights[1]
 
 
-def _poses(stack: Layup, places: NDArray[np.float64], necks: NDArray[np.float64]) -> list[Pose]:
+def _poses(
+    stack: Layup, places: NDArray[np.float64], necks: NDArray[np.float64]
+) -> list[RigidMotion]:
     """The place of every film: those of a balloon move as one, each balloon stands on the last."""
     poses = [UPRIGHT]
     kinds = [interface.kind for interface in stack.laminate.interfaces]

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-class Form(NamedTuple):
+class FormedFilm(NamedTuple):
     """Lower face of a film over the plane's nodes, ``base`` (n, 3) mm, and the unit vectors ``up``
     (n, 3) along which its thickness is measured.
     """
@@ -25,15 +25,15 @@ class Form(NamedTuple):
         return points
 
 
-def flat(layup: Layup) -> list[Form]:
+def flat(layup: Layup) -> list[FormedFilm]:
     """Every film flat, at its height in the stack."""
     return [level(layup, ply.z) for ply in layup.plies]
 
 
-def level(layup: Layup, z: float) -> Form:
+def level(layup: Layup, z: float) -> FormedFilm:
     """A film flat at one height in mm."""
     import numpy as np
 
     plane = layup.plane.points
     up = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (len(plane), 3))
-    return Form(np.column_stack([plane, np.full(len(plane), z)]), up)
+    return FormedFilm(np.column_stack([plane, np.full(len(plane), z)]), up)

@@ -49,7 +49,7 @@ class Ply:
 
 
 @dataclass(frozen=True)
-class Void:
+class MeshedVoid:
     """What the air of a chamber fills: triangles by ply that are open in that film, and by ply
     that are open under it. ``volume`` is the exact volume in mm3 when flat.
     """
@@ -75,7 +75,7 @@ class Layup:
     settings: MeshSettings
     plane: Plane
     plies: tuple[Ply, ...]
-    voids: Mapping[str, Void]
+    voids: Mapping[str, MeshedVoid]
     seats: NDArray[np.bool_]
     shares: Mapping[str, float]
     sector: Sector | None
@@ -269,7 +269,7 @@ def _void(
     slabs: list[tuple[int, bool, Region]],
     plies: tuple[Ply, ...],
     cells: Callable[[Region], NDArray[np.bool_]],
-) -> Void:
+) -> MeshedVoid:
     in_films: dict[int, NDArray[np.bool_]] = {}
     under: dict[int, NDArray[np.bool_]] = {}
     volume = 0.0
@@ -279,7 +279,7 @@ def _void(
         held[place] = held[place] | covered if place in held else covered
         ply = plies[place]
         volume += region.area * (ply.gap if is_under else ply.thickness)
-    return Void(in_films, under, volume)
+    return MeshedVoid(in_films, under, volume)
 
 
 def _check_apart(plane: Plane, ply: Ply) -> None:

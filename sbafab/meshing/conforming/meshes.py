@@ -25,7 +25,7 @@ from sbafab.meshing.conforming.write_obj import write_obj
 from sbafab.meshing.conforming.write_ply import write_ply
 from sbafab.meshing.conforming.write_vtk import write_vtk
 from sbafab.meshing.conforming.write_vtu import write_cavity_vtu, write_vtu
-from sbafab.meshing.files import Kind, MeshFile
+from sbafab.meshing.files import MeshFile, MeshKind
 from sbafab.meshing.surface import Surface
 from sbafab.meshing.write_stl import write_stl
 
@@ -151,7 +151,7 @@ def write_conforming(
 def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path], None]]]:
     """Every file there could be, and what writes it to a path."""
     fill = meshes.fill.largest if meshes.fill is not None else 0.0
-    kinds: tuple[tuple[Kind, Mesh], ...] = (("volume", meshes.volume), ("shell", meshes.shell))
+    kinds: tuple[tuple[MeshKind, Mesh], ...] = (("volume", meshes.volume), ("shell", meshes.shell))
     for kind, mesh in kinds:
         size = meshes.statistics[mesh.name]["volume_mm3"]
         for suffix, write in MESH_WRITERS.items():

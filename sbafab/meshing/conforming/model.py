@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from sbafab.meshing.conforming.elements import CORNERS, Kind
+from sbafab.meshing.conforming.elements import CORNERS, ElementKind
 from sbafab.meshing.conforming.sweep import split_wedges
 from sbafab.meshing.surface import Surface
 
@@ -30,7 +30,7 @@ class Mesh:
     """
 
     name: str
-    kind: Kind
+    kind: ElementKind
     points: NDArray[np.float64]
     cells: NDArray[np.int64]
     node_sets: Mapping[str, NDArray[np.int64]]

@@ -15,14 +15,14 @@ FLATNESS = 0.01
 """Part of the lift by which necks may miss a common plane."""
 
 
-class Pose(NamedTuple):
+class RigidMotion(NamedTuple):
     """A rigid motion: ``turn`` (3, 3) first, then ``shift`` (3,) in mm."""
 
     turn: NDArray[np.float64]
     shift: NDArray[np.float64]
 
 
-UPRIGHT = Pose(np.eye(3), np.zeros(3))
+UPRIGHT = RigidMotion(np.eye(3), np.zeros(3))
 
 
 def slopes_of(centres: NDArray[np.float64], heights: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -43,12 +43,12 @@ def slopes_of(centres: NDArray[np.float64], heights: NDArray[np.float64]) -> NDA
 
 
 def set_on(
-    below: Pose,
+    below: RigidMotion,
     centres: NDArray[np.float64],
     top: NDArray[np.float64],
     bottom: NDArray[np.float64],
     gap: float,
-) -> Pose:
+) -> RigidMotion:
     """The pose of a balloon whose neck discs at heights ``bottom`` meet those at ``top`` of the
     balloon below, ``gap`` mm apart.
     """
@@ -57,7 +57,7 @@ def set_on(
     meeting = below.turn @ np.array([*middle, top.mean()]) + below.shift
     normal = below.turn @ _frame(slopes_of(centres, top))[:, 2]
     start = turn @ np.array([*middle, bottom.mean()])
-    return Pose(turn, meeting + gap * normal - start)
+    return RigidMotion(turn, meeting + gap * normal - start)
 
 
 def _frame(slopes: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -16,8 +16,8 @@ from sbafab.meshing.conforming.cavities import (
     wetted,
 )
 from sbafab.meshing.conforming.checks import check_cavities, check_mesh
-from sbafab.meshing.conforming.form import Form
-from sbafab.meshing.conforming.layup import Layup, Void
+from sbafab.meshing.conforming.form import FormedFilm
+from sbafab.meshing.conforming.layup import Layup, MeshedVoid
 from sbafab.meshing.conforming.model import Mesh
 from sbafab.meshing.conforming.sets import node_sets
 from sbafab.meshing.conforming.sweep import NONE, Sweep
@@ -32,7 +32,7 @@ def thin(stack: Layup) -> Layup:
     return replace(stack, plies=plies, is_thick=False)
 
 
-def shell_mesh(stack: Layup, forms: Sequence[Form]) -> Mesh:
+def shell_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
     """The mid-surfaces of a thin layup, with their sets and cavities.
 
     A triangle where films are bonded is one for all of them and carries the sum of their
@@ -81,7 +81,7 @@ def _with_sets(stack: Layup, swept: Sweep) -> Mesh:
     face_sets, cavities = {}, {}
     beyond = neighbours(stack.plane)
     for name, void in stack.voids.items():
-        pockets = Void({}, void.under, void.volume)
+        pockets = MeshedVoid({}, void.under, void.volume)
         faces = _one_sided(wetted(stack, swept, pockets, beyond))
         face_sets[f"cavity_{name}"] = faces
         patches = [

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sbafab.meshing.conforming.elements import EDGES
-from sbafab.meshing.conforming.form import Form
+from sbafab.meshing.conforming.form import FormedFilm
 from sbafab.meshing.conforming.layup import Layup
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class Sweep:
     joint_of: NDArray[np.int64]
 
 
-def sweep(layup: Layup, forms: Sequence[Form], full_middles: bool) -> Sweep:
+def sweep(layup: Layup, forms: Sequence[FormedFilm], full_middles: bool) -> Sweep:
     """The films as prisms, bottom to top.
 
     Where films lie on each other, the nodes in the closure of a bond are one; where gaps are

@@ -16,8 +16,8 @@ from sbafab.meshing.conforming.cavities import (
     wetted,
 )
 from sbafab.meshing.conforming.checks import check_cavities, check_mesh
-from sbafab.meshing.conforming.elements import Kind
-from sbafab.meshing.conforming.form import Form
+from sbafab.meshing.conforming.elements import ElementKind
+from sbafab.meshing.conforming.form import FormedFilm
 from sbafab.meshing.conforming.layup import Layup
 from sbafab.meshing.conforming.model import Mesh
 from sbafab.meshing.conforming.sets import bond_name, node_sets
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def volume_mesh(stack: Layup, forms: Sequence[Form]) -> Mesh:
+def volume_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
     """The volume mesh with its sets and cavities. Raises OutputError where a check fails."""
     is_tet = stack.settings.element == "tet"
-    kind: Kind = "tetra10" if is_tet else "wedge15"
+    kind: ElementKind = "tetra10" if is_tet else "wedge15"
     swept = sweep(stack, forms, full_middles=is_tet)
     cells = wedges(swept.prisms)
     if is_tet:

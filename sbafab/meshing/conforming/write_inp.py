@@ -6,14 +6,14 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sbafab.meshing.conforming.elements import Kind
+from sbafab.meshing.conforming.elements import ElementKind
 from sbafab.meshing.conforming.model import Mesh
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-TYPES: dict[Kind, str] = {"wedge15": "C3D15", "tetra10": "C3D10", "triangle6": "S6"}
+TYPES: dict[ElementKind, str] = {"wedge15": "C3D15", "tetra10": "C3D10", "triangle6": "S6"}
 """CalculiX's names; Abaqus calls S6 STRI65."""
 SIDES = {0: "SNEG", 1: "SPOS"}
 NODE = "%d, %.10g, %.10g, %.10g\n"
@@ -57,7 +57,7 @@ def _listed(numbers: NDArray[np.int64]) -> Iterator[str]:
         yield ", ".join(texts[first : first + PER_LINE]) + "\n"
 
 
-def _faces(kind: Kind, faces: Iterable[tuple[int, int]]) -> Iterator[str]:
+def _faces(kind: ElementKind, faces: Iterable[tuple[int, int]]) -> Iterator[str]:
     for cell, face in faces:
         side = SIDES[face] if kind == "triangle6" else f"S{face + 1}"
         yield f"{cell + 1}, {side}\n"

@@ -7,23 +7,21 @@ from dataclasses import dataclass, field
 
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
+from sbafab.geometry.beam import Kerf
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.schedule import Schedule
 from sbafab.pressing.together import Runs, runs_of
 from sbafab.rules.finding import Finding
-
-Kerf = float | tuple[float, float] | None
-"""Full kerf width in mm, one or along x and y; None where it was not measured."""
 
 
 @dataclass(frozen=True)
 class Job:
     """The order behind a traveller.
 
-    ``kerf`` by material, ``fixture`` the path of the pin plate's cut file, ``solid_png`` the bytes
-    of the picture of the solid. ``lowered`` are limits below the usual ones. ``extras`` are further
-    rows of the bill of materials: item and quantity. Empty ``made_for`` leaves a blank to fill in
-    by hand.
+    ``kerf`` by material, None where it was not measured; ``fixture`` the path of the pin plate's
+    cut file, ``solid_png`` the bytes of the picture of the solid. ``lowered`` are limits below the
+    usual ones. ``extras`` are further rows of the bill of materials: item and quantity. Empty
+    ``made_for`` leaves a blank to fill in by hand.
     """
 
     design_sha256: str
@@ -32,7 +30,7 @@ class Job:
     lowered: Sequence[str] = ()
     findings: Sequence[Finding] = ()
     fixture: str | None = None
-    kerf: Mapping[str, Kerf] = field(default_factory=dict)
+    kerf: Mapping[str, Kerf | None] = field(default_factory=dict)
     copies: int = 1
     made_for: str = ""
     note: str = ""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from sbafab.assemblies.build import Assembled, PlacedPart
+from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Sba, Tube
 from sbafab.models.sizes import inflated_diameter
 from sbafab.reports.traveller import quantities as say
@@ -123,7 +123,7 @@ def _fix(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
     part = placed.part
     if isinstance(part, Line):
         yield from _thread(placed, part, other)
-    elif placed.radius is not None:
+    elif isinstance(placed, PlacedSba) and placed.radius is not None:
         yield from _bend(placed, other)
     else:
         yield Action(
@@ -198,9 +198,8 @@ def _round(angle: float) -> str:
     return f"{abs(angle):g} degrees {way} from the marked line, looking at the tube's end"
 
 
-def _bend(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
+def _bend(placed: PlacedSba, other: PlacedPart) -> Iterator[Action]:
     part = placed.part
-    assert placed.made is not None
     form = placed.made.design.form
     middle = say.millimetres(part.along)
     if form.wrap is None:
@@ -273,7 +272,7 @@ def _glue(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
 
 def final_checks(assembled: Assembled) -> list[Action]:
     """What the finished assembly must do; figures are predictions."""
-    made = [placed for placed in assembled.parts if placed.made is not None]
+    made = [placed for placed in assembled.parts if isinstance(placed, PlacedSba)]
     deploy = assembled.assembly.deploy
     actions = [
         Action(
@@ -305,8 +304,7 @@ def final_checks(assembled: Assembled) -> list[Action]:
     return actions
 
 
-def _inflated(placed: PlacedPart) -> float | None:
-    assert placed.made is not None
+def _inflated(placed: PlacedSba) -> float | None:
     return inflated_diameter(placed.made.design.form, placed.made.laminate)
 
 

@@ -29,7 +29,7 @@ class Lip(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Place:
+class PiecePlace:
     """Where a piece lies: mm from the lower left corner of its sheet.
 
     ``x`` and ``y`` are those of the balloon's middle, ``left`` and ``low`` of the piece's edges.
@@ -126,7 +126,7 @@ def lip(region: Region, other: Region) -> Lip | None:
     return Lip(round(usual, 2) + 0.0, alike == len(found))
 
 
-def places(laminate: Laminate, step: AssemblyStep, lying: Sequence[Bed]) -> tuple[Place, ...]:
+def places(laminate: Laminate, step: AssemblyStep, lying: Sequence[Bed]) -> tuple[PiecePlace, ...]:
     """Places of all that is laid on a sheet by hand; empty for steps without a sheet."""
     sheet = laminate.layers[0]
     if step.pins or sheet.role != "sheet" or sheet.index not in step.layers:
@@ -135,13 +135,13 @@ def places(laminate: Laminate, step: AssemblyStep, lying: Sequence[Bed]) -> tupl
     return tuple(place for thing in things[1:] for place in _places(laminate, sheet, thing))
 
 
-def pitch(found: Sequence[Place]) -> float | None:
+def pitch(found: Sequence[PiecePlace]) -> float | None:
     """From one piece to the next along x; None for a single piece."""
     first, second = (next((p for p in found if p.piece == number), None) for number in (1, 2))
     return second.x - first.x if first and second else None
 
 
-def _places(laminate: Laminate, sheet: Layer, thing: Sequence[int]) -> Iterator[Place]:
+def _places(laminate: Laminate, sheet: Layer, thing: Sequence[int]) -> Iterator[PiecePlace]:
     layer = _widest(laminate, thing, highest=False)
     left, low = sheet.profile.bounds[:2]
     named = f"layer {layer.index}, {_name(layer)}"
@@ -152,7 +152,9 @@ def _places(laminate: Laminate, sheet: Layer, thing: Sequence[int]) -> Iterator[
         outline = Region(piece.outers)
         own = [centre for centre in centres if outline.contains(centre)] or [_middle(piece.bounds)]
         x, y = (sum(values) / len(own) for values in zip(*own, strict=True))
-        yield Place(what, number, x - left, y - low, piece.bounds[0] - left, piece.bounds[1] - low)
+        yield PiecePlace(
+            what, number, x - left, y - low, piece.bounds[0] - left, piece.bounds[1] - low
+        )
 
 
 def _middle(bounds: Bounds) -> Point:

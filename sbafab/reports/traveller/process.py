@@ -15,7 +15,7 @@ from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.exploded import exploded
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.layup import Bed, Round, beds, inlets_in, rounds
-from sbafab.reports.traveller.placing import Place, Things, over_tab, pitch, places
+from sbafab.reports.traveller.placing import PiecePlace, Things, over_tab, pitch, places
 from sbafab.reports.traveller.plan import plan
 
 LEAK_KILOPASCALS = 5.0
@@ -49,7 +49,7 @@ class StepPage:
     bond: str
     dials: tuple[tuple[str, str], ...]
     notes: tuple[str, ...]
-    places: tuple[Place, ...]
+    places: tuple[PiecePlace, ...]
     pitch: float | None
     plan: str
     exploded: str

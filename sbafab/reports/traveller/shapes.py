@@ -13,8 +13,8 @@ from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.svg import number, path_data
 from sbafab.laminate.films import Film
+from sbafab.laminate.inks import Ink, ink
 from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.picture import Ink, ink
 from sbafab.reports import drawing as draw
 
 LINE = 0.22

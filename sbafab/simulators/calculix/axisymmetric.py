@@ -25,7 +25,7 @@ ELEMENTS = 26
 LIMIT = 600.0
 
 
-class Section(NamedTuple):
+class MeridianSection(NamedTuple):
     """A round balloon, lengths in mm: diameters of pocket, neck and bore, width of the ring.
 
     Without a neck both films are whole discs.
@@ -59,13 +59,13 @@ class Section(NamedTuple):
 
 
 def axisymmetric_strokes(
-    pressures: Sequence[float], section: Section | None = None, film: Elastic = TPE
+    pressures: Sequence[float], section: MeridianSection | None = None, film: Elastic = TPE
 ) -> list[float]:
     """Stroke in mm of one balloon at rising pressures in kPa (paper Fig. 7c).
 
     Raises OutputError where ccx is not installed or does not finish.
     """
-    section = section or Section()
+    section = section or MeridianSection()
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         deck = "".join(_deck(pressures, section, film))
@@ -82,7 +82,7 @@ def axisymmetric_strokes(
     ]
 
 
-def _deck(pressures: Sequence[float], section: Section, film: Elastic) -> Iterator[str]:
+def _deck(pressures: Sequence[float], section: MeridianSection, film: Elastic) -> Iterator[str]:
     """The model; its time is the pressure in kPa."""
     nodes = section.nodes
     elements = (len(section.radii) - 1) // 2
@@ -115,7 +115,7 @@ def _deck(pressures: Sequence[float], section: Section, film: Elastic) -> Iterat
         reached = kilopascals
 
 
-def _neck(nodes: Sequence[tuple[float, float]], section: Section) -> Iterator[str]:
+def _neck(nodes: Sequence[tuple[float, float]], section: MeridianSection) -> Iterator[str]:
     """What is bonded to the next balloon stays in one plane.
 
     The pull of the air in the bore, a few hundredths of all, is left out.

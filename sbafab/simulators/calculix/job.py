@@ -14,6 +14,7 @@ from sbafab.meshing.conforming.layup import layup
 from sbafab.meshing.conforming.model import Mesh
 from sbafab.meshing.conforming.settings import MeshSettings, Symmetry
 from sbafab.meshing.conforming.volume_mesh import volume_mesh
+from sbafab.progress import Progress
 from sbafab.simulators.calculix.deck import JOB, started, write_deck
 from sbafab.simulators.calculix.frd import SAME_TIME, Frame, read_frd
 from sbafab.simulators.calculix.history import State, history, history_csv
@@ -23,7 +24,6 @@ from sbafab.simulators.calculix.run import (
     DIVERGED,
     LOG,
     Ending,
-    Progress,
     find_ccx,
     run_ccx,
 )
@@ -37,7 +37,7 @@ DATED = re.compile(rb"(?m)^(    1U(?:DATE|TIME|HOST|USER|DIR)).*$")
 
 
 @dataclass(frozen=True)
-class Simulated:
+class History:
     """The states from the unloaded one on, and one sentence if the run stopped early."""
 
     states: tuple[State, ...]
@@ -57,7 +57,7 @@ def simulate(
     folder: Path,
     timeout: float,
     tell: Progress,
-) -> Simulated:
+) -> History:
     """Inflates a laminate in CalculiX; ``folder`` receives deck, results, table and pictures.
 
     ``timeout`` is in seconds. A run that diverges or takes too long keeps what it has reached.
@@ -80,7 +80,7 @@ def simulate(
     _write_results(run_mesh, laminate.name, mesh_settings.symmetry, states, frames[-1], folder)
     _tidy(folder)
     stopped = None if ending.stopped is None else _stopped(ending, states, settings)
-    return Simulated(tuple(states), stopped)
+    return History(tuple(states), stopped)
 
 
 def converged_frames(frd: Path, mesh: Mesh, ending: Ending) -> list[Frame]:

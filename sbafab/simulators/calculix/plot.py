@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sbafab.reports.chart import Curve, Panel, chart_svg
+from sbafab.reports.chart import ChartCurve, Panel, chart_svg
 from sbafab.simulators.calculix.history import State
 
 
@@ -17,8 +17,8 @@ def history_svg(title: str, states: Sequence[State]) -> str:
     x_label = "pressure, kPa" if alike else f"pressure in {fullest}, kPa"
     several = len(last.volumes) > 1
 
-    def curve(label: str, values: Sequence[float]) -> Curve:
-        return Curve(label, x, values, dotted=True)
+    def curve(label: str, values: Sequence[float]) -> ChartCurve:
+        return ChartCurve(label, x, values, dotted=True)
 
     volumes = [
         curve(name if several else "", [state.volumes[name] for state in states])

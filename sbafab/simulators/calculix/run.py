@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+from sbafab.progress import Progress
 from sbafab.simulators.calculix.frd import SAME_TIME, read_sta
 from sbafab.simulators.program import program_path, run_program
-
-Progress = Callable[[str, int, int], None]
-"""Told what is being done, and how much of how much is."""
 
 LOG = "ccx.log"
 DIVERGED = "its iterations no longer converge, however small the step"

@@ -22,7 +22,7 @@ PRESSURE = 5.0
 
 
 @dataclass(frozen=True)
-class Actuator:
+class CoarseActuator:
     """A stack of round balloons, and the pressure in kPa of every chamber."""
 
     stack: RoundStack
@@ -64,7 +64,7 @@ class Actuator:
 
 def actuator(
     laminate: Laminate, pressures: Mapping[str, float] | None = None, sectors: int = SECTORS
-) -> Actuator:
+) -> CoarseActuator:
     """An actuator under pressure: 5 kPa a chamber, or what is given by chamber in kPa, 0 elsewhere.
 
     ``sectors`` nodes make a ring. Raises DesignError where the laminate has other than round
@@ -72,7 +72,7 @@ def actuator(
     """
     stack = round_stack(laminate)
     told = checked(stack.chambers, pressures, PRESSURE, "pressure", "kPa")
-    return Actuator(stack, tuple(told.items()), sectors)
+    return CoarseActuator(stack, tuple(told.items()), sectors)
 
 
 def checked(

@@ -11,17 +11,16 @@ import math
 from dataclasses import dataclass
 
 from sbafab.geometry.edges import Point
+from sbafab.meshing.surface import Vector
 from sbafab.simulators.coarse.meridian import Meridian, Start, fullest
 from sbafab.simulators.coarse.rounds import RoundStack
-from sbafab.simulators.coarse.web import web_of
+from sbafab.simulators.coarse.web import Triangle, web_of
 
 SECTORS = 8
 """Nodes of a ring; a multiple of four."""
 RING_STEP = 0.25
 """Distance of the rings between neck and edge, in pocket radii."""
 
-Vector = tuple[float, float, float]
-Triangle = tuple[int, int, int]
 Ring = tuple[int, ...]
 
 

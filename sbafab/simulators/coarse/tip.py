@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sbafab.simulators.coarse.mesh import Vector
+from sbafab.meshing.surface import Vector
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from functools import cache
 from sbafab.geometry.edges import Point
 
 Triangle = tuple[int, int, int]
-Place = tuple[str, int]
+WebNode = tuple[str, int]
 """Which node of a half sector: pocket, outline or lumen with its step, or the junction."""
 
 
@@ -25,7 +25,7 @@ class Web:
     lobes: int
     reach: int
     junction: float
-    half: tuple[tuple[Place, Place, Place], ...]
+    half: tuple[tuple[WebNode, WebNode, WebNode], ...]
 
     @property
     def lumen_steps(self) -> int:
@@ -53,7 +53,7 @@ class Web:
         for k in range(self.lobes):
             for side in (1, -1):
 
-                def node(place: Place, k: int = k, side: int = side) -> int:
+                def node(place: WebNode, k: int = k, side: int = side) -> int:
                     kind, step = place
                     if kind == "pocket":
                         return edges[k][side * step % len(edges[k])]
@@ -85,7 +85,7 @@ def web_of(lobes: int, radii: tuple[float, float, float, float, float], sectors:
     reach = math.floor(math.atan2(y, x - axis) / step - 0.25)
     bare = Web(lobes, reach, junction, ())
     lumen_turn = half / bare.lumen_steps
-    places: dict[Place, Point] = {("outline", i): off_axis(rim, i) for i in range(reach + 1)}
+    places: dict[WebNode, Point] = {("outline", i): off_axis(rim, i) for i in range(reach + 1)}
     places["junction", 0] = x, y
     for i in range(bare.lumen_steps, -1, -1):
         places["lumen", i] = lumen * math.cos(lumen_turn * i), lumen * math.sin(lumen_turn * i)
@@ -100,7 +100,7 @@ def _junction(axis: float, rim: float, hub: float, half: float) -> float:
     return hub if apart >= rim else max(hub, axis * math.cos(half) + math.sqrt(rim**2 - apart**2))
 
 
-def _triangulated(places: dict[Place, Point]) -> tuple[tuple[Place, Place, Place], ...]:
+def _triangulated(places: dict[WebNode, Point]) -> tuple[tuple[WebNode, WebNode, WebNode], ...]:
     """Delaunay triangles of the polygon whose corners are given counter-clockwise."""
     import shapely
 

@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from sbafab.laminate.laminate import Laminate
-from sbafab.simulators.coarse.actuator import Actuator, actuator
+from sbafab.simulators.coarse.actuator import CoarseActuator, actuator
 from sbafab.simulators.coarse.rounds import why_not_round
 from sbafab.simulators.mujoco.model import START, model_text
 
@@ -45,7 +45,7 @@ def write_model(
     return [folder / name for name in texts]
 
 
-def _data(made: Actuator) -> dict[str, object]:
+def _data(made: CoarseActuator) -> dict[str, object]:
     mesh = made.mesh
     return {
         "schema": "sbafab/mujoco@1",

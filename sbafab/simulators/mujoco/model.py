@@ -5,8 +5,10 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Sequence
 
-from sbafab.simulators.coarse.actuator import POISSON, YOUNG, Actuator
-from sbafab.simulators.coarse.mesh import Triangle, Vector, area
+from sbafab.meshing.surface import Vector
+from sbafab.simulators.coarse.actuator import POISSON, YOUNG, CoarseActuator
+from sbafab.simulators.coarse.mesh import area
+from sbafab.simulators.coarse.web import Triangle
 
 DT = 0.01
 """s: a step. The integrator is implicit; four times as long does as well."""
@@ -21,7 +23,7 @@ COLOURS = {
 }
 
 
-def model_text(actuator: Actuator) -> str:
+def model_text(actuator: CoarseActuator) -> str:
     """The model as a file: node i is body ``n<i>``, which stands flat unless the key is loaded."""
     root = ET.Element("mujoco", {"model": actuator.stack.name})
     option = ET.SubElement(
@@ -46,7 +48,7 @@ def model_text(actuator: Actuator) -> str:
     return f'<?xml version="1.0"?>\n<!--\n{_note(actuator)}\n-->\n{body}\n'
 
 
-def held(actuator: Actuator) -> frozenset[int]:
+def held(actuator: CoarseActuator) -> frozenset[int]:
     """Nodes that stand still: the base; of a lone balloon its centre, so that it bulges both ways.
 
     That is how the CalculiX deck holds them.
@@ -55,7 +57,7 @@ def held(actuator: Actuator) -> frozenset[int]:
     return frozenset(mesh.roots if actuator.balloons == 1 else mesh.fixed)
 
 
-def _add_nodes(world: ET.Element, actuator: Actuator) -> None:
+def _add_nodes(world: ET.Element, actuator: CoarseActuator) -> None:
     still = held(actuator)
     masses = _masses(actuator)
     for node, place in enumerate(actuator.mesh.rest):
@@ -73,7 +75,7 @@ def _add_nodes(world: ET.Element, actuator: Actuator) -> None:
             ET.SubElement(body, "joint", {"type": "slide", "axis": axis})
 
 
-def _add_films(deformable: ET.Element, actuator: Actuator) -> None:
+def _add_films(deformable: ET.Element, actuator: CoarseActuator) -> None:
     for name, triangles, films in film_groups(actuator):
         nodes = sorted({node for triangle in triangles for node in triangle})
         place = {node: i for i, node in enumerate(nodes)}
@@ -101,7 +103,7 @@ def _add_films(deformable: ET.Element, actuator: Actuator) -> None:
         ET.SubElement(flex, "elasticity", elasticity)
 
 
-def _add_start(keyframe: ET.Element, actuator: Actuator) -> None:
+def _add_start(keyframe: ET.Element, actuator: CoarseActuator) -> None:
     still = held(actuator)
     mesh = actuator.mesh
     moved = (
@@ -113,7 +115,7 @@ def _add_start(keyframe: ET.Element, actuator: Actuator) -> None:
     ET.SubElement(keyframe, "key", {"name": START, "qpos": _numbers(moved)})
 
 
-def film_groups(actuator: Actuator) -> list[tuple[str, Sequence[Triangle], int]]:
+def film_groups(actuator: CoarseActuator) -> list[tuple[str, Sequence[Triangle], int]]:
     """Flexes with the number of films bonded in each. They share bodies where films are bonded.
 
     In one flex an edge may have two triangles at most, so that it takes several.
@@ -128,7 +130,7 @@ def film_groups(actuator: Actuator) -> list[tuple[str, Sequence[Triangle], int]]
     return [group for group in groups if group[1]]
 
 
-def _masses(actuator: Actuator) -> list[float]:
+def _masses(actuator: CoarseActuator) -> list[float]:
     """True mass in kg of each node: a third of each triangle's."""
     film = actuator.stack.film
     masses = [0.0] * len(actuator.mesh.rest)
@@ -140,7 +142,7 @@ def _masses(actuator: Actuator) -> list[float]:
     return masses
 
 
-def _note(actuator: Actuator) -> str:
+def _note(actuator: CoarseActuator) -> str:
     mesh = actuator.mesh
     triangles = len(mesh.single) + len(mesh.double)
     # Two hyphens in a row would end an XML comment.

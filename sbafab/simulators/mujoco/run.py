@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,12 +13,10 @@ from typing import Any
 
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
+from sbafab.progress import Progress
 from sbafab.simulators.coarse.tip import Tip, tip_at
 from sbafab.simulators.mujoco.files import DATA, MODEL, SECTORS, write_model
 from sbafab.simulators.simulator import refuse_time
-
-Progress = Callable[[str, int, int], None]
-"""Told what is being done, and how much of how much is."""
 
 SECONDS = 5.0
 RAMP = 1.0

@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from sbafab.laminate.laminate import Laminate
-from sbafab.simulators.coarse.actuator import POISSON, Actuator, actuator
+from sbafab.simulators.coarse.actuator import POISSON, CoarseActuator, actuator
 from sbafab.simulators.coarse.rounds import why_not_round
 from sbafab.simulators.sofa.frames import beam_scene, frames_scene
 from sbafab.simulators.sofa.parts import NODAL_STIFFNESS, film_groups
@@ -58,7 +58,7 @@ def write_scenes(
     return [folder / name for name in texts]
 
 
-def _data(made: Actuator) -> dict[str, object]:
+def _data(made: CoarseActuator) -> dict[str, object]:
     mesh = made.mesh
     membranes, bending = film_groups(made, mesh)
     groups = {

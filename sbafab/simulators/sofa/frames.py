@@ -7,9 +7,11 @@ import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 
 from sbafab.geometry.edges import Point
-from sbafab.simulators.coarse.actuator import POISSON, Actuator
+from sbafab.meshing.surface import Vector
+from sbafab.simulators.coarse.actuator import POISSON, CoarseActuator
 from sbafab.simulators.coarse.meridian import standing
-from sbafab.simulators.coarse.mesh import CoarseMesh, Triangle, Vector, coarse_mesh
+from sbafab.simulators.coarse.mesh import CoarseMesh, coarse_mesh
+from sbafab.simulators.coarse.web import Triangle
 from sbafab.simulators.sofa.markup import add, child, document, number, root_node
 from sbafab.simulators.sofa.notes import beam_note, frames_note
 from sbafab.simulators.sofa.parts import add_films, add_pressure, add_tip
@@ -45,7 +47,7 @@ class Beam:
     young: float
 
 
-def beam_of(actuator: Actuator) -> Beam:
+def beam_of(actuator: CoarseActuator) -> Beam:
     """EA = N k H0 and EI = N k R^2 H0 / 2 of a round bar: its radius is R times root 2."""
     count, axis = actuator.stack.lobes, actuator.stack.radius
     height = 7.2 * actuator.balloons / 15 * actuator.size
@@ -55,7 +57,7 @@ def beam_of(actuator: Actuator) -> Beam:
     return Beam(height, 10.9 * actuator.size**2, spring, radius, young)
 
 
-def frames_scene(actuator: Actuator) -> str:
+def frames_scene(actuator: CoarseActuator) -> str:
     """B: the films move with nine frames, by weights that are linear in z."""
     mesh = actuator.mesh
     root = root_node(FRAMES_DT)
@@ -79,7 +81,7 @@ def frames_scene(actuator: Actuator) -> str:
     return document(root, frames_note(actuator, FRAMES_DT, SOFTENING))
 
 
-def beam_scene(actuator: Actuator) -> str:
+def beam_scene(actuator: CoarseActuator) -> str:
     """D: nine frames as a beam, each chamber a prism of air; the film is only shown."""
     beam = beam_of(actuator)
     mesh = coarse_mesh(actuator.stack, standing(beam.height / actuator.balloons))

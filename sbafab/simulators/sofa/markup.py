@@ -5,7 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Sequence
 
-Value = str | float | int | Sequence[float] | Sequence[Sequence[float]]
+Attribute = str | float | int | Sequence[float] | Sequence[Sequence[float]]
 
 PLUGINS = {
     "BeamFEMForceField": "Sofa.Component.SolidMechanics.FEM.Elastic",
@@ -41,12 +41,12 @@ def child(parent: ET.Element, name: str) -> ET.Element:
     return ET.SubElement(parent, "Node", {"name": name})
 
 
-def add(parent: ET.Element, component: str, **fields: Value) -> None:
+def add(parent: ET.Element, component: str, **fields: Attribute) -> None:
     """Adds a component with its data fields, in this order."""
     ET.SubElement(parent, component, {name: text(value) for name, value in fields.items()})
 
 
-def text(value: Value) -> str:
+def text(value: Attribute) -> str:
     if isinstance(value, str):
         return value
     if isinstance(value, int | float):

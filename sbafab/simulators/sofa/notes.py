@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sbafab.simulators.coarse.actuator import Actuator
+from sbafab.simulators.coarse.actuator import CoarseActuator
 from sbafab.simulators.coarse.mesh import CoarseMesh
 from sbafab.simulators.sofa.parts import NODAL_STIFFNESS, scaled_mass
 
@@ -16,7 +16,7 @@ If the log shows Null determinant, Division by zero, NaN or [ERROR], the run is 
 runSofa then still ends with exit code 0."""
 
 
-def shell_note(actuator: Actuator, dt: float) -> str:
+def shell_note(actuator: CoarseActuator, dt: float) -> str:
     """Head of scene A."""
     return f"""\
 {_head(actuator, "A: the whole actuator as a coarse shell, core components only.")}
@@ -46,7 +46,7 @@ Not mesh converged: three meshes gave 15.0 to 18.6 mm at 5, 5, 5. Bending still 
 {HALT}"""
 
 
-def frames_note(actuator: Actuator, dt: float, share: float) -> str:
+def frames_note(actuator: CoarseActuator, dt: float, share: float) -> str:
     """Head of scene B."""
     return f"""\
 {_head(actuator, "B: nine reference frames that carry the films (the paper's description).")}
@@ -66,7 +66,7 @@ Needs calibration against scene A or a measurement: not predictive.
 {HALT}"""
 
 
-def volume_note(actuator: Actuator, mesh: CoarseMesh, dt: float, usual: float) -> str:
+def volume_note(actuator: CoarseActuator, mesh: CoarseMesh, dt: float, usual: float) -> str:
     """Head of scene C."""
     return f"""\
 {_head(actuator, "C: scene A driven by volume. Needs the plugin SoftRobots.")}
@@ -86,7 +86,9 @@ Measured with SOFA 25.06 and SoftRobots, 18.5 ms a step, for
 {HALT}"""
 
 
-def beam_note(actuator: Actuator, height: float, area: float, spring: float, dt: float) -> str:
+def beam_note(
+    actuator: CoarseActuator, height: float, area: float, spring: float, dt: float
+) -> str:
     """Head of scene D."""
     return f"""\
 {_head(actuator, "D: a SURROGATE for control loops: nine frames as a beam.")}
@@ -108,7 +110,7 @@ Needs calibration against scene A or a measurement: not predictive.
 {HALT}"""
 
 
-def _head(actuator: Actuator, title: str) -> str:
+def _head(actuator: CoarseActuator, title: str) -> str:
     # Two hyphens in a row would end an XML comment.
     name = actuator.stack.name.replace("--", "- -")
     return (
@@ -116,7 +118,7 @@ def _head(actuator: Actuator, title: str) -> str:
     )
 
 
-def _mesh(actuator: Actuator, mesh: CoarseMesh) -> str:
+def _mesh(actuator: CoarseActuator, mesh: CoarseMesh) -> str:
     triangles = len(mesh.single) + len(mesh.double)
     held = mesh.volume(actuator.stack.chambers[0]) / actuator.balloons
     return (
@@ -126,7 +128,7 @@ def _mesh(actuator: Actuator, mesh: CoarseMesh) -> str:
     )
 
 
-def _mass(actuator: Actuator, dt: float) -> str:
+def _mass(actuator: CoarseActuator, dt: float) -> str:
     mass = scaled_mass(actuator, dt)
     return (
         f"ARTIFICIAL: mass. The true one, {actuator.mass:.3g} kg, jitters to NaN; totalMass is "

@@ -5,8 +5,9 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 
-from sbafab.simulators.coarse.actuator import POISSON, Actuator
-from sbafab.simulators.coarse.mesh import CoarseMesh, Triangle
+from sbafab.simulators.coarse.actuator import POISSON, CoarseActuator
+from sbafab.simulators.coarse.mesh import CoarseMesh
+from sbafab.simulators.coarse.web import Triangle
 from sbafab.simulators.sofa.markup import add, child, number
 
 NODAL_STIFFNESS = 6.56 / 2304 / 0.02**2
@@ -18,13 +19,13 @@ RAMP = 1.0
 """s in which a pressure rises from 0."""
 
 
-def scaled_mass(actuator: Actuator, dt: float) -> float:
+def scaled_mass(actuator: CoarseActuator, dt: float) -> float:
     """Mass in kg that keeps the shell still at a time step in s: artificial."""
     return NODAL_STIFFNESS * len(actuator.mesh.rest) * dt**2
 
 
 def film_groups(
-    actuator: Actuator, mesh: CoarseMesh
+    actuator: CoarseActuator, mesh: CoarseMesh
 ) -> tuple[
     list[tuple[str, tuple[Triangle, ...], float]], list[tuple[str, tuple[Triangle, ...], float]]
 ]:
@@ -43,7 +44,9 @@ def film_groups(
     return membranes, [group for group in bending if group[1]]
 
 
-def add_films(node: ET.Element, actuator: Actuator, mesh: CoarseMesh, share: float = 1.0) -> None:
+def add_films(
+    node: ET.Element, actuator: CoarseActuator, mesh: CoarseMesh, share: float = 1.0
+) -> None:
     """The films' elasticity, of ``share`` of the true modulus, a child node a group."""
     membranes, bending = film_groups(actuator, mesh)
     for name, triangles, stiffness in membranes:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
+from sbafab.progress import Progress
 from sbafab.simulators.coarse.tip import Tip
 from sbafab.simulators.program import Ended, program_path, run_program
 from sbafab.simulators.simulator import refuse_time
@@ -19,8 +20,6 @@ from sbafab.simulators.sofa.parts import TIP_FILE, TIP_PERIOD
 from sbafab.simulators.sofa.shell_scene import DT
 from sbafab.simulators.sofa.tip import Log, read_log, read_tips
 
-Progress = Callable[[str, int, int], None]
-"""Told what is being done, and how much of how much is."""
 Scene = Literal["shell", "frames", "volume", "beam"]
 
 SCENES: dict[Scene, tuple[str, float]] = {

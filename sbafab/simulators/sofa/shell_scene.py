@@ -5,7 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 
-from sbafab.simulators.coarse.actuator import Actuator
+from sbafab.simulators.coarse.actuator import CoarseActuator
 from sbafab.simulators.coarse.meridian import partly
 from sbafab.simulators.coarse.mesh import CoarseMesh, coarse_mesh
 from sbafab.simulators.sofa.markup import add, child, document, root_node
@@ -17,7 +17,7 @@ VOLUME = 80.0
 """ul above the start in a chamber of 15 balloons of 5 mm."""
 
 
-def shell_scene(actuator: Actuator) -> str:
+def shell_scene(actuator: CoarseActuator) -> str:
     """A: core components only; each chamber under its own pressure."""
     root = root_node(DT)
     add(root, "DefaultAnimationLoop")
@@ -29,7 +29,7 @@ def shell_scene(actuator: Actuator) -> str:
     return document(root, shell_note(actuator, DT))
 
 
-def volume_scene(actuator: Actuator, volumes: Mapping[str, float] | None = None) -> str:
+def volume_scene(actuator: CoarseActuator, volumes: Mapping[str, float] | None = None) -> str:
     """C: each chamber told how many ul it holds more than at the start (plugin SoftRobots).
 
     ``volumes`` by chamber, 0 for those left out. Raises DesignError for an unknown chamber.
@@ -63,7 +63,7 @@ def volume_scene(actuator: Actuator, volumes: Mapping[str, float] | None = None)
 
 
 def _shell(
-    root: ET.Element, actuator: Actuator, mesh: CoarseMesh, *, constrained: bool
+    root: ET.Element, actuator: CoarseActuator, mesh: CoarseMesh, *, constrained: bool
 ) -> ET.Element:
     node = child(root, "sba")
     add(node, "EulerImplicitSolver", rayleighStiffness=0.05, rayleighMass=2)

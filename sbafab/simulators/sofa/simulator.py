@@ -7,8 +7,9 @@ from typing import cast
 
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
+from sbafab.progress import Progress
 from sbafab.simulators.coarse.actuator import PRESSURE
-from sbafab.simulators.simulator import Progress, Result, Wish, chamber_pressures, refuse_time
+from sbafab.simulators.simulator import Result, Wish, chamber_pressures, refuse_time
 from sbafab.simulators.sofa.files import why_no_scene, write_scenes
 from sbafab.simulators.sofa.parts import TIP_PERIOD
 from sbafab.simulators.sofa.run import USUAL, Scene, SofaJob, simulate

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from sbafab.simulators.coarse.mesh import Vector
+from sbafab.meshing.surface import Vector
 from sbafab.simulators.coarse.tip import Tip, tip_at
 
 TROUBLE = re.compile(r"\[ERROR\]|\bnan\b|Division by zero|Null determinant", re.IGNORECASE)

@@ -23,7 +23,7 @@ def refuse_coarse(
     laminate: Laminate, paths: Mapping[str, Region], settings: CutSettings, limits: Limits
 ) -> None:
     """Raises DesignError where the laminate holds and what its ``paths`` in chords cut does not."""
-    error = settings.chord_error
+    error = settings.curves.chord_error
     try:
         found = _first_failure(as_cut(laminate, paths, settings), limits)
     except (OutputError, GeometryError) as failure:
