@@ -209,7 +209,7 @@ def material(name: str) -> Material:
     return name.upper()
 
 
-class Layup(Section):
+class LayerFilms(Section):
     """Which film each layer is cut from, by the names of the tables in ``films``."""
 
     base: str = "tpe"

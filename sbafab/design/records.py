@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr
 
-from sbafab.design.films import UNCALIBRATED, Films, KerfWidth, Layup, Sheet
+from sbafab.design.films import UNCALIBRATED, Films, KerfWidth, LayerFilms, Sheet
 from sbafab.design.form import Form
 from sbafab.design.section import Section
 from sbafab.design.units import Length, LengthOrZero, Millimetres
@@ -226,7 +226,7 @@ class Design(Section):
     fillet: Fillet = Fillet()
     inlet: Inlet = Inlet()
     films: Films = Films()
-    layup: Layup = Layup()
+    layup: LayerFilms = LayerFilms()
     registration: Registration = Registration()
     press: Press = Press()
     laser: Laser = Laser()

@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from sbafab.design.films import Layup
+from sbafab.design.films import LayerFilms
 from sbafab.design.records import Design, Inlet
 
 
@@ -62,7 +62,7 @@ def _as_first_hashed(table: dict[str, Any], design: Design) -> dict[str, Any]:
     from sbafab.design.kits import DEFAULT, kit_of
 
     table["kit"] = kit_of(design).sha256 if design.kit != DEFAULT else None
-    if design.layup == Layup():
+    if design.layup == LayerFilms():
         table["layup"] = None
     if design.inlet.adhesive == Inlet().adhesive:
         table["inlet"]["adhesive"] = None
