@@ -9,6 +9,7 @@ from pathlib import Path
 from sbafab.actuators.stacking import film_of
 from sbafab.as_built.cut_files import LayerFile
 from sbafab.as_built.records import CLAIMS, Problem
+from sbafab.cutting.lightburn import ENDING
 from sbafab.cutting.properties import (
     LIMITS,
     curves_property,
@@ -54,7 +55,7 @@ def file_problems(folder: Path, claims: Manifest | JobManifest) -> list[Problem]
     for path in found:
         if path not in claims.files:
             message = f"{path} lies in the folder and is not in the manifest; remove it"
-            is_cut = path.lower().endswith(".dxf")
+            is_cut = path.lower().endswith((".dxf", ENDING))
             problems.append(Problem(CLAIMS, message, verdict="fail" if is_cut else "warn"))
     return problems
 

@@ -20,6 +20,7 @@ from sbafab.as_built.meant import drawn_settings
 from sbafab.as_built.meshes import bodies
 from sbafab.as_built.records import DESIGNED, Problem, is_joined
 from sbafab.cutting.fixture import write_fixture
+from sbafab.cutting.lightburn import ENDING
 from sbafab.cutting.properties import curves_of
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DesignError, OutputError
@@ -156,7 +157,7 @@ def _differences(
         else:
             said = file_difference(folder / name, path, name)
         if said:
-            is_done = name.endswith((*PRESS, ".dxf"))
+            is_done = name.endswith((*PRESS, ".dxf", ENDING))
             problems.append(_other(said, generator, is_done))
     return problems
 

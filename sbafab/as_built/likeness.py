@@ -19,6 +19,7 @@ from typing import Any
 from sbafab.as_built.cut_files import sound_digest
 from sbafab.as_built.meshes import mesh_difference
 from sbafab.cutting.dxf_read import ReadBack, read_profile
+from sbafab.cutting.lightburn import ENDING
 from sbafab.cutting.verify import TOLERANCE, check_contours
 from sbafab.errors import OutputError
 
@@ -73,7 +74,7 @@ def _readers() -> dict[str, Callable[[Path, Path], str]]:
         ".dxf": _drawing_difference,
         ".png": lambda found, meant: _picture_difference(found.read_bytes(), meant.read_bytes()),
         ".csv": _table_difference,
-        **dict.fromkeys((".svg", ".toml", ".html"), _text_difference),
+        **dict.fromkeys((".svg", ".toml", ".html", ENDING), _text_difference),
         **dict.fromkeys((".stl", ".3mf", ".glb"), mesh_difference),
     }
 

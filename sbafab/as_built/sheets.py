@@ -15,6 +15,7 @@ from sbafab.as_built.records import INTEGRITY, Problem
 from sbafab.cutting.cut_layers import ENGRAVE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import Surroundings
+from sbafab.cutting.lightburn import ENDING
 from sbafab.cutting.properties import LIMITS, kerf_properties, kerf_suffix, limit_properties
 from sbafab.cutting.sheets import FOLDER
 from sbafab.cutting.verify import TOLERANCE, check_surroundings
@@ -141,12 +142,16 @@ def _name_problems(sheet: SheetClaim, order: SheetOrder) -> list[Problem]:
     return [
         *(
             claim(f"{sheet.material} sheet {sheet.number} is {said!r}, not {name}")
-            for said, name in ((sheet.file, f"{stem}.dxf"), (sheet.picture, f"{stem}.svg"))
+            for said, name in (
+                (sheet.file, f"{stem}.dxf"),
+                (sheet.picture, f"{stem}.svg"),
+                (sheet.project, f"{stem}{ENDING}"),
+            )
             if said != name
         ),
         *(
             claim(f"{path} has no hash in the manifest")
-            for path in (sheet.file, sheet.picture)
+            for path in (sheet.file, sheet.picture, sheet.project)
             if path not in order.claims.files
         ),
     ]

@@ -19,6 +19,7 @@ from sbafab.cli.nest import nest
 from sbafab.cli.new import new
 from sbafab.cli.predict import predict
 from sbafab.cli.press import press
+from sbafab.cli.record import record
 from sbafab.cli.schema import schema
 from sbafab.cli.simulate import simulate
 from sbafab.cli.templates import templates
@@ -35,6 +36,7 @@ COMMANDS = (
     kerf,
     predict,
     simulate,
+    record,
     schema,
 )
 

@@ -32,10 +32,14 @@ if TYPE_CHECKING:
     metavar="MM",
     help="The least step that the instrument shows.",
 )
-@click.option("--split-xy", is_flag=True, help="Give the kerf along x and along y apart.")
+@click.option(
+    "--split-xy/--no-split-xy",
+    default=None,
+    help="Give the kerf along x and along y apart, or as one.  [default: apart where they differ]",
+)
 @json_option
 def kerf(
-    measurements: Path, material: str, resolution: float, split_xy: bool, as_json: bool
+    measurements: Path, material: str, resolution: float, split_xy: bool | None, as_json: bool
 ) -> None:
     """Compute the kerf from a filled coupon.csv (see: sbafab new coupon)."""
     from sbafab.cli.printing import print_json
@@ -46,8 +50,9 @@ def kerf(
     found = calibrated(read_measurements(measurements), resolution)
     if split_xy and (found.x is None or found.y is None):
         raise DesignError("--split-xy needs two sizes along x and two along y; fill in more rows")
-    section, key = _place_in_design(material)
-    line = f"{key} = {_setting(found, split_xy)}"
+    widths = _widths(found, split_xy)
+    warnings = _warnings(found, widths)
+    block = _to_paste(*_place_in_design(material), widths, warnings)
     if as_json:
         print_json(
             {
@@ -56,16 +61,21 @@ def kerf(
                 "y": _as_dict(found.y),
                 "difference": found.difference and found.difference._asdict(),
                 "differs": found.differs,
-                "toml": f"{section}\n{line}\n",
+                "warnings": warnings,
+                "toml": block,
             }
         )
         return
     for name, estimate in (("all", found.overall), ("along x", found.x), ("along y", found.y)):
         if estimate is not None:
             click.echo(f"{name:8} kerf {_told(estimate.kerf)}, from {estimate.count} sizes")
-    for remark in _remarks(found, split_xy):
-        click.echo(remark)
-    click.echo(f"\nPaste into the design file:\n\n{section}\n{line}")
+    click.echo(_remark(found, widths))
+    for warning in warnings:
+        click.echo(f"warning: {warning}")
+    click.echo(
+        f"\n{'Mind the warning before you paste' if warnings else 'Paste into the design file'}:"
+    )
+    click.echo(f"\n{block.rstrip()}")
 
 
 def _film(name: str) -> str:
@@ -92,39 +102,86 @@ def _as_dict(estimate: Estimate | None) -> dict[str, object] | None:
     }
 
 
-def _setting(found: Calibration, split_xy: bool) -> str:
-    if split_xy and found.x is not None and found.y is not None:
-        return f"[{found.x.kerf.value:.3f}, {found.y.kerf.value:.3f}]"
-    return f"{found.overall.kerf.value:.3f}"
+Widths = tuple["Estimate"] | tuple["Estimate", "Estimate"]
+"""What is pasted: the kerf, or those along x and along y."""
+
+
+def _widths(found: Calibration, split_xy: bool | None) -> Widths:
+    """A pair where it was asked for, or where x and y differ and nothing was asked."""
+    is_split = found.differs if split_xy is None else split_xy
+    if is_split and found.x is not None and found.y is not None:
+        return found.x, found.y
+    return (found.overall,)
+
+
+def _to_paste(table: str, key: str, widths: Widths, warnings: list[str]) -> str:
+    """The lines for the design file; doubt goes with them, so that no bare value is pasted."""
+    values = [f"{estimate.kerf.value:.3f}" for estimate in widths]
+    value = values[0] if len(values) == 1 else f"[{', '.join(values)}]"
+    doubts = "".join(f"# warning: {warning}\n" for warning in warnings)
+    return f"{table}\n{doubts}{key} = {value}\n"
 
 
 def _told(value: Value, unit: str = " mm") -> str:
-    low, high = value.value - value.half_width, value.value + value.half_width
+    low, high = value.interval
     return (
         f"{value.value:.4f}{unit}, standard uncertainty {value.uncertainty:.4f}, "
         f"95 % interval {low:.4f} to {high:.4f}"
     )
 
 
-def _remarks(found: Calibration, split_xy: bool) -> list[str]:
-    remarks = []
+def _remark(found: Calibration, widths: Widths) -> str:
     if found.difference is None:
-        remarks.append("x and y cannot be told apart: measure two sizes along each")
-    elif found.differs:
-        advice = "" if split_xy else "; --split-xy gives both"
-        remarks.append(f"x and y differ by {_told(found.difference)}{advice}")
-    else:
-        remarks.append("x and y do not differ significantly")
-    named: tuple[tuple[str, Estimate | None], ...] = (
-        ("", found.overall),
-        (" along x", found.x),
-        (" along y", found.y),
+        return "x and y cannot be told apart: measure two sizes along each"
+    if not found.differs:
+        return "x and y do not differ significantly"
+    advice = "" if len(widths) == 2 else ", which one kerf for both does not correct"
+    return f"x and y differ by {_told(found.difference)}{advice}"
+
+
+def _warnings(found: Calibration, widths: Widths) -> list[str]:
+    """What speaks against cutting with these widths, a sentence each."""
+    from sbafab.design.records import is_kerf
+
+    places = ("",) if len(widths) == 1 else (" along x", " along y")
+    told = [
+        _vague(estimate, place)
+        for estimate, place in zip(widths, places, strict=True)
+        if estimate.is_vague
+    ]
+    if not is_kerf(widths[0].kerf.value, widths[-1].kerf.value):
+        told.append(
+            "a design takes no pair of which one is over ten times the other; measure again, or "
+            "take --no-split-xy"
+        )
+    return [*told, *_off_scale(found)]
+
+
+def _vague(estimate: Estimate, place: str) -> str:
+    low, high = estimate.kerf.interval
+    why = "may be none" if low <= 0 else "is not known well enough"
+    return (
+        f"the kerf{place} {why}: its 95 % interval is {low:.3f} to {high:.3f} mm from "
+        f"{estimate.count} sizes; measure more sizes, or each again, before you cut with it"
     )
-    for where, estimate in named:
-        if estimate is not None and estimate.is_scaled and estimate.scale is not None:
-            remarks.append(
-                f"warning: outers and windows disagree{where}, which kerf does not explain: sizes "
-                f"scale by {_told(estimate.scale, '')}; the machine's or the instrument's scale is "
-                "off, or the film shrank. The kerf above is fitted apart from it"
-            )
-    return remarks
+
+
+def _off_scale(found: Calibration) -> list[str]:
+    """How to set the laser where sizes scale: along x or y where one of them tells, else both."""
+    axes = [(" along x", found.x), (" along y", found.y)]
+    along = [_steps(estimate, where) for where, estimate in axes if estimate and estimate.is_scaled]
+    if along or not found.overall.is_scaled:
+        return along
+    return [_steps(found.overall, "")]
+
+
+def _steps(estimate: Estimate, where: str) -> str:
+    assert estimate.scale is not None
+    scale = estimate.scale.value
+    low, high = estimate.scale.interval
+    return (
+        f"outers and windows disagree{where}: sizes are {scale:.4f} times what was drawn, 95 % "
+        f"interval {low:.4f} to {high:.4f}, which kerf does not explain and no cut file corrects; "
+        f"set the laser to {1 / scale:.4f} times its present steps per mm{where} and cut the "
+        "coupon again (if that changes nothing, the film shrank or the instrument is off)"
+    )

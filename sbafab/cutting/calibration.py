@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from statistics import mean, stdev
+from dataclasses import dataclass, field
+from statistics import mean, median, stdev
 from typing import Literal, NamedTuple
 
 from sbafab.errors import DesignError
@@ -23,24 +23,35 @@ WORST_SCALE = 0.1
 """Of measured over nominal sizes: no machine is so far off, another unit is."""
 LARGEST_SLIP = 0.25
 """mm; more than twice the largest error of laser cutting (paper, Sec. 2) is a slip of the pen."""
+MOST_SUSPECTS = 20
+"""Sizes that are tried as the one slip, those farthest from the middle one first."""
+WIDEST = 0.05
+"""mm; half the largest error of laser cutting: a kerf known no better deserves a warning."""
 
 Kind = Literal["outer", "window"]
 Axis = Literal["x", "y"]
 
 
-class Measurement(NamedTuple):
-    """A size of the piece, mm."""
+@dataclass(frozen=True)
+class Measurement:
+    """A size of the piece, mm; ``where`` it stands in the table, for messages."""
 
     kind: Kind
     axis: Axis
     nominal: float
     measured: float
+    where: str = field(default="", compare=False)
 
     @property
     def kerf(self) -> float:
         """What this size alone says of the kerf."""
         lost = self.nominal - self.measured
         return lost if self.kind == "outer" else -lost
+
+    def __str__(self) -> str:
+        place = f"{self.where}: " if self.where else ""
+        sizes = f"nominal {self.nominal:g} and measured {self.measured:g} mm"
+        return f"{place}the {self.kind} along {self.axis}, {sizes},"
 
 
 class Value(NamedTuple):
@@ -49,6 +60,10 @@ class Value(NamedTuple):
     value: float
     uncertainty: float
     half_width: float
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        return self.value - self.half_width, self.value + self.half_width
 
     def differs_from(self, other: float) -> bool:
         return abs(self.value - other) > self.half_width
@@ -69,6 +84,17 @@ class Estimate:
     @property
     def is_scaled(self) -> bool:
         return self.scale is not None and self.scale.differs_from(1.0)
+
+    @property
+    def is_vague(self) -> bool:
+        """Whether the kerf may as well be none, or is known too badly to compensate with."""
+        return self.kerf.interval[0] <= 0 or self.kerf.half_width > WIDEST
+
+    def gap(self, size: Measurement) -> float:
+        """How far a size lies from what kerf and scale say it should be."""
+        scale = self.scale.value if self.is_scaled and self.scale is not None else 1.0
+        sign = -1 if size.kind == "outer" else 1
+        return abs(size.measured - scale * size.nominal - sign * self.kerf.value)
 
 
 @dataclass(frozen=True)
@@ -91,8 +117,9 @@ class Calibration:
 def calibrated(measurements: Sequence[Measurement], resolution: float) -> Calibration:
     """The kerf from two sizes or more; ``resolution`` in mm is the instrument's least step.
 
-    Raises DesignError where there are fewer, or where no beam cuts so.
+    Raises DesignError where there are fewer, where one of them is a slip, or where no beam cuts so.
     """
+    _refuse_a_slip(measurements, resolution)
     overall = _estimate(measurements, resolution)
     along = {axis: [m for m in measurements if m.axis == axis] for axis in ("x", "y")}
     if min(map(len, along.values())) < 2:
@@ -109,36 +136,63 @@ def _estimate(measurements: Sequence[Measurement], resolution: float, where: str
         raise DesignError(
             f"sizes measured{where}: {len(measurements)}, and a kerf needs 2; fill in more rows"
         )
-    scale, fitted = _fitted(measurements, resolution)
-    if scale is not None and abs(scale.value - 1) > WORST_SCALE:
+    found = _found(measurements, resolution)
+    if _is_other_unit(found):
+        assert found.scale is not None
         raise DesignError(
-            f"the measured sizes{where} are about {scale.value:.3g} times the nominal ones; give "
-            "them in millimetres"
+            f"the measured sizes{where} are about {found.scale.value:.3g} times the nominal ones; "
+            "give them in millimetres"
         )
-    found = Estimate(_mean(measurements, resolution), scale, len(measurements))
-    if found.is_scaled and fitted is not None:
-        found = Estimate(fitted, scale, len(measurements))
     if not 0 <= found.kerf.value <= LARGEST:
         kind = "negative" if found.kerf.value < 0 else f"over {LARGEST:g} mm"
         raise DesignError(
             f"the kerf{where} comes out as {found.kerf.value:.3f} mm, which is {kind}; check the "
             "measurements, the unit and which rows are outers and windows"
         )
-    _refuse_slips(measurements, found)
+    worst = max(measurements, key=found.gap)
+    if found.gap(worst) > LARGEST_SLIP:
+        raise DesignError(
+            f"{worst} is {found.gap(worst):.2f} mm off what the sizes together say; measure it "
+            "again, and the others too"
+        )
     return found
 
 
-def _refuse_slips(measurements: Sequence[Measurement], found: Estimate) -> None:
-    """Raises DesignError for a size that lies far from what the others say."""
-    scale = found.scale.value if found.is_scaled and found.scale is not None else 1.0
-    signs = {"outer": -1, "window": 1}
-    gaps = [m.measured - scale * m.nominal - signs[m.kind] * found.kerf.value for m in measurements]
-    worst = max(range(len(gaps)), key=lambda n: abs(gaps[n]))
-    if abs(gaps[worst]) > LARGEST_SLIP:
-        m = measurements[worst]
+def _found(measurements: Sequence[Measurement], resolution: float) -> Estimate:
+    """Kerf and scale as they come, likely or not."""
+    scale, fitted = _fitted(measurements, resolution)
+    found = Estimate(_mean(measurements, resolution), scale, len(measurements))
+    if found.is_scaled and fitted is not None:
+        return Estimate(fitted, scale, len(measurements))
+    return found
+
+
+def _is_other_unit(found: Estimate) -> bool:
+    return found.scale is not None and abs(found.scale.value - 1) > WORST_SCALE
+
+
+def _refuse_a_slip(measurements: Sequence[Measurement], resolution: float) -> None:
+    """Raises DesignError naming the one size without which all others agree, if there is one.
+
+    A slip of the pen draws the common fit with it, so that kerf or unit would be blamed.
+    """
+    if len(measurements) < 3:
+        return
+    middle = median(m.kerf for m in measurements)
+    by_distance = sorted(measurements, key=lambda m: -abs(m.kerf - middle))
+    told: list[tuple[float, float, Measurement]] = []
+    for suspect in by_distance[:MOST_SUSPECTS]:
+        others = [m for m in measurements if m is not suspect]
+        found = _found(others, resolution)
+        spread = max(map(found.gap, others))
+        is_sound = 0 <= found.kerf.value <= LARGEST and not _is_other_unit(found)
+        if is_sound and spread <= LARGEST_SLIP < found.gap(suspect):
+            told.append((spread, found.gap(suspect), suspect))
+    if told:
+        _, off, slip = min(told, key=lambda entry: entry[0])
         raise DesignError(
-            f"the {m.kind} along {m.axis}, nominal {m.nominal:g} and measured {m.measured:g} mm, "
-            f"is {abs(gaps[worst]):.2f} mm off what the sizes together say; measure it again"
+            f"{slip} is {off:.2f} mm off what the other sizes say; mend the entry or measure it "
+            "again"
         )
 
 

@@ -23,18 +23,20 @@ _WHOLE = re.compile(r"\d+", re.ASCII)
 def read_measurements(path: Path) -> list[Measurement]:
     """The filled rows of a table with the coupon's columns; ``#`` begins a remark.
 
-    Columns are parted by commas, semicolons or tabs; numbers have a decimal point or comma. Raises
-    DesignError, also for a row whose decimal commas cannot be told from those between columns.
+    Columns are parted by commas, semicolons or tabs; numbers have a decimal point or comma. A
+    spreadsheet that parts columns by semicolons leaves our commas in its first cell; that is read
+    too. Raises DesignError, also for a row whose decimal commas cannot be told from those between
+    columns.
     """
     lines = [
         (f"{path}, line {number}", line)
-        for number, line in enumerate(_text(path).splitlines(), start=1)
+        for number, line in enumerate(table_text(path).splitlines(), start=1)
         if line.strip(' ,;\t"') and not line.lstrip(' "').startswith("#")
     ]
     separator, names = _header(path, lines[0] if lines else ("", ""))
     found = []
     for where, line in lines[1:]:
-        cells = _cells(line, separator, where)
+        cells = _row(line, separator, len(names), where)
         _refuse_two_ways(cells, names, separator, where)
         row = dict(zip(names, cells, strict=False))
         if row["measured_mm"]:
@@ -42,11 +44,12 @@ def read_measurements(path: Path) -> list[Measurement]:
     return found
 
 
-def _text(path: Path) -> str:
+def table_text(path: Path) -> str:
+    """The text of a table that someone filled in. Raises DesignError where it is none."""
     try:
         if path.stat().st_size > MOST_BYTES:
             raise DesignError(
-                f"{path} is larger than {MOST_BYTES:,} bytes; give the coupon's table"
+                f"{path} is larger than {MOST_BYTES:,} bytes; give the table that was filled in"
             )
         return path.read_text(encoding="utf-8-sig")
     except OSError as error:
@@ -69,6 +72,22 @@ def _header(path: Path, first: tuple[str, str]) -> tuple[str, list[str]]:
                 f"{path} has {many} {column}; keep the columns {', '.join(COLUMNS)}, once each"
             )
     return separator, names
+
+
+def _row(line: str, separator: str, count: int, where: str) -> list[str]:
+    """The cells of a row: parted like the header, or what stands behind a semicolon is the last."""
+    cells = _cells(line, separator, where)
+    if separator != "," or ";" not in line:
+        return cells
+    parted = _cells(line, ";", where)
+    while len(parted) > 1 and not parted[-1]:
+        parted.pop()
+    if len(parted) == count:
+        return parted
+    first = _cells(parted[0], ",", where)
+    if len(parted) == 2 and len(first) == count and not first[-1]:
+        return [*first[:-1], parted[1]]
+    return cells
 
 
 def _cells(line: str, separator: str, where: str) -> list[str]:
@@ -113,7 +132,7 @@ def _measurement(row: dict[str, str], where: str) -> Measurement:
     if axis not in ("x", "y"):
         raise DesignError(f"{where}: axis must be x or y")
     nominal, measured = (_size(row[name], name, where) for name in NUMBERS)
-    return Measurement(kind, "x" if axis == "x" else "y", nominal, measured)
+    return Measurement(kind, "x" if axis == "x" else "y", nominal, measured, where)
 
 
 def _size(text: str, column: str, where: str) -> float:

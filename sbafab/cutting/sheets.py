@@ -12,6 +12,8 @@ from typing import Literal
 from sbafab.cutting.dxf_read import ReadBack
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.label import label
+from sbafab.cutting.lightburn import ENDING, project_text
+from sbafab.cutting.lightburn_read import verify_project
 from sbafab.cutting.order import cutting_order, travel
 from sbafab.cutting.properties import CutSettings, kerf_suffix, sheet_properties
 from sbafab.cutting.svg_write import sheet_svg
@@ -51,6 +53,7 @@ class SheetFile:
 
     path: str
     picture: str
+    project: str
     sha256: str
     nest: Nest
     number: int
@@ -83,7 +86,7 @@ def write_sheets(
     labelled: bool = True,
     progress: Counted | None = None,
 ) -> list[SheetFile]:
-    """Writes ``sheets/<material>_<number>.dxf`` and ``.svg`` for every sheet of every nest.
+    """Writes ``sheets/<material>_<number>.dxf``, ``.lbrn2`` and ``.svg`` of every sheet.
 
     Each file is read back: its contours are those of the nest. Whether they lie inside the border,
     apart from each other and clear of pins is told when the whole folder is read back. Raises
@@ -118,6 +121,9 @@ def _write_sheet(
     # In the order of the file, so that each contour is compared with its own first.
     found = verify_file(path, Region(contours), properties)
     _verify_surroundings(path.name, found, around)
+    project = path.with_suffix(ENDING)
+    project.write_bytes(project_text(contours, around, properties).encode())
+    verify_project(project, contours, around)
     picture = path.with_suffix(".svg")
     title = f"{settings.design}: {nest.material} sheet {sheet + 1} of {nest.sheets}"
     picture.write_text(
@@ -128,6 +134,7 @@ def _write_sheet(
     return SheetFile(
         path=f"{FOLDER}/{path.name}",
         picture=f"{FOLDER}/{picture.name}",
+        project=f"{FOLDER}/{project.name}",
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         nest=nest,
         number=sheet + 1,

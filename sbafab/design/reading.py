@@ -22,7 +22,7 @@ OUTLINE = "chamber.outline"
 KIT = "kit"
 KITS = "kits"
 """The folder of the kits that ship, among the templates."""
-Record = TypeVar("Record", bound=BaseModel)
+AnyRecord = TypeVar("AnyRecord", bound=BaseModel)
 AnyDesign = TypeVar("AnyDesign", bound=Design)
 MOST_BYTES = 1_000_000
 ASSEMBLY = "assembly"
@@ -227,11 +227,11 @@ def validated(
 
 
 def checked(
-    record: type[Record],
+    record: type[AnyRecord],
     data: Mapping[str, Any],
     families: Mapping[str, type[Design]],
     prefix: str = "",
-) -> Record:
+) -> AnyRecord:
     """The record of a table; ``prefix`` leads to it. Raises DesignError with one sentence."""
     try:
         return record.model_validate(data)

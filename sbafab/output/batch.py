@@ -134,5 +134,11 @@ def write_batch(
 def _seen_from_below(sheets: Sequence[SheetFile]) -> list[SheetFile]:
     """The shared sheets as a design's own folder names them."""
     return [
-        replace(sheet, path=f"../{sheet.path}", picture=f"../{sheet.picture}") for sheet in sheets
+        replace(
+            sheet,
+            path=f"../{sheet.path}",
+            picture=f"../{sheet.picture}",
+            project=f"../{sheet.project}",
+        )
+        for sheet in sheets
     ]

@@ -190,6 +190,7 @@ def _sheet(sheet: SheetFile) -> SheetClaim:
     return SheetClaim(
         file=sheet.path,
         picture=sheet.picture,
+        project=sheet.project,
         material=sheet.material,
         number=sheet.number,
         width=sheet.width,

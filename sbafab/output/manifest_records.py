@@ -132,6 +132,7 @@ class SheetClaim(_Claim):
 
     file: str
     picture: str
+    project: str
     material: Material
     number: Count
     width: Size

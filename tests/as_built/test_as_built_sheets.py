@@ -124,6 +124,7 @@ CLAIMS: list[tuple[str, Callable[[Claims], object], str]] = [
     ("number", lambda m: m["sheets"][0].update(number=2), "not numbered from 1"),
     ("name", lambda m: m["sheets"][0].update(file="sheets/a.dxf"), "not sheets/TPE_1.dxf"),
     ("picture", lambda m: m["sheets"][0].update(picture="a.svg"), "not sheets/TPE_1.svg"),
+    ("project", lambda m: m["sheets"][0].update(project="a"), "not sheets/TPE_1.lbrn2"),
     ("no hash", lambda m: m["files"].pop("sheets/TPE_1.svg"), "has no hash"),
     ("border", lambda m: m["sheets"][1].update(border=5.0), "border is 5.0 in the manifest"),
     ("pins", lambda m: m["sheets"][1].update(pins=[{"x": 1, "y": 2, "diameter": 3}]), "pins is"),

@@ -43,12 +43,54 @@ def table(
     return path
 
 
-def test_the_lines_to_paste_are_toml(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_kerfs_that_differ_are_pasted_as_a_pair(
+    table: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     code, out, _ = run(["kerf", str(table), "--resolution", "0.001"], capsys)
     assert code == 0
-    assert tomllib.loads(out[out.index("[laser]") :]) == {"laser": {"kerf_tpe": 0.11}}
+    assert tomllib.loads(out[out.index("[laser]") :]) == {"laser": {"kerf_tpe": [0.12, 0.1]}}
     assert "x and y differ by 0.0200 mm" in out
-    assert "--split-xy gives both" in out
+    assert "warning" not in out
+
+
+def test_one_kerf_for_both_where_it_is_asked_for(
+    table: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, out, _ = run(["kerf", str(table), "--resolution", "0.001", "--no-split-xy"], capsys)
+    assert tomllib.loads(out[out.index("[laser]") :]) == {"laser": {"kerf_tpe": 0.11}}
+    assert "one kerf for both does not correct" in out
+
+
+def test_kerfs_that_do_not_differ_are_one(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = run(["kerf", str(table), "--resolution", "0.1"], capsys)
+    assert tomllib.loads(out[out.index("[laser]") :])["laser"]["kerf_tpe"] == 0.11
+
+
+def test_a_kerf_that_may_be_none_is_not_pasted_bare(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Kerfs 0.05 and 0.07: t = 12.7062, so that 0.06 +- 0.13; from -0.067 to 0.187."""
+    path = tmp_path / "two.csv"
+    path.write_text("feature;axis;nominal_mm;measured_mm\nA outer;x;24;23,95\nA window;y;8;8,07\n")
+    code, out, _ = run(["kerf", str(path), "--resolution", "0"], capsys)
+    assert code == 0
+    says = "the kerf may be none: its 95 % interval is -0.067 to 0.187 mm from 2 sizes"
+    assert f"\nwarning: {says}" in out
+    assert "Paste into the design file" not in out
+    pasted = out[out.index("[laser]") :]
+    assert f"# warning: {says}" in pasted
+    assert tomllib.loads(pasted) == {"laser": {"kerf_tpe": 0.06}}
+
+
+def test_a_typo_names_its_line(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = table.read_text().splitlines()
+    (row,) = (n for n, line in enumerate(lines) if line.startswith("D window,y"))
+    assert lines[row].endswith(",6.100")
+    lines[row] = lines[row].replace("6.100", "61.100")
+    table.write_text("\n".join(lines))
+    code, out, err = run(["kerf", str(table)], capsys)
+    assert (code, out) == (2, "")
+    assert f"coupon.csv, line {row + 1}: the window along y, nominal 6 and measured 61.1 mm" in err
 
 
 def test_x_and_y_apart_for_programs(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -72,7 +114,9 @@ def test_shrunk_film_draws_a_warning(table: Path, capsys: pytest.CaptureFixture[
     code, out, _ = run(["kerf", str(table), "--resolution", "0.001"], capsys)
     assert code == 0
     assert "outers and windows disagree" in out
-    assert "scale by 0.9970" in out
+    assert "sizes are 0.9970 times what was drawn" in out
+    assert f"set the laser to {1 / 0.997:.4f} times its present steps per mm along x" in out
+    assert tomllib.loads(out[out.index("[laser]") :]) == {"laser": {"kerf_tpe": [0.12, 0.1]}}
 
 
 @pytest.mark.parametrize(

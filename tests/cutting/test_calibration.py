@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -108,17 +109,44 @@ def test_a_kerf_that_no_beam_has_is_refused(kerf: float, says: str) -> None:
 
 
 def test_inches_are_refused() -> None:
-    inches = [m._replace(measured=m.measured / 25.4) for m in sizes(0.12, 0.12)]
+    inches = [replace(m, measured=m.measured / 25.4) for m in sizes(0.12, 0.12)]
     with pytest.raises(DesignError, match=r"about 0\.039\d* times .* millimetres"):
         calibrated(inches, 0.01)
 
 
 def test_a_slip_of_the_pen_is_named() -> None:
     rows = sizes(0.12, 0.12)
-    rows[2] = rows[2]._replace(nominal=25.0)
+    rows[2] = replace(rows[2], nominal=25.0)
     assert (rows[2].kind, rows[2].axis) == ("outer", "y")
     with pytest.raises(DesignError, match=r"the outer along y, nominal 25 and measured 23\.879"):
         calibrated(rows, 0.01)
+
+
+@pytest.mark.parametrize("row", range(16))
+@pytest.mark.parametrize("factor", [10.0, 0.1])
+def test_a_misplaced_decimal_point_names_its_row_only(row: int, factor: float) -> None:
+    """As 41.2 for 4.12: neither unit nor kerf is blamed, whichever row it is and whatever scale."""
+    rows = [replace(m, where=f"line {n}") for n, m in enumerate(sizes(0.12, 0.09, 0.998))]
+    rows[row] = replace(rows[row], measured=factor * rows[row].measured)
+    with pytest.raises(DesignError, match=rf"^line {row}: the (outer|window) along .* mend the"):
+        calibrated(rows, 0.01)
+
+
+def test_a_slip_among_three_sizes_is_named() -> None:
+    rows = [
+        Measurement("window", "x", 4.0, 4.12, "line 2"),
+        Measurement("window", "y", 4.0, 41.12, "line 3"),
+        Measurement("outer", "x", 12.0, 11.88, "line 4"),
+    ]
+    with pytest.raises(DesignError, match=r"^line 3: .* measured 41\.12 mm, is 37\.00 mm off"):
+        calibrated(rows, 0.01)
+
+
+def test_sizes_that_scatter_as_cutting_does_are_no_slip() -> None:
+    """0.2 mm is what two edges may be off by the paper's largest error of cutting."""
+    rows = sizes(0.3, 0.3)
+    rows[0] = replace(rows[0], measured=rows[0].measured - 0.2)
+    assert calibrated(rows, 0.01).overall.count == 16
 
 
 def table(folder: Path, text: str) -> Path:
@@ -151,6 +179,8 @@ READABLE = {
     "commas and semicolons": COMMAS,
     "points and semicolons": POINTS.replace(",", ";"),
     "commas and tabs": COMMAS.replace(";", "\t"),
+    "rows of a spreadsheet under our header": HEADER + COMMAS.partition("\n")[2],
+    "typed beside our commas": f"{HEADER}A outer,x,24,;23,9\nB window,y,10,;10,1;\n",
     "quoted": f'{HEADER}"A outer","x","24","23,9"\nB window,y,10,"10,1"\n',
     "quoted header": POINTS.replace(HEADER[:-1], '"{}"'.format(HEADER[:-1].replace(",", '","'))),
     "with remarks": f"{HEADER[:-1]},remark\nA outer,x,24,23.9,2\nB window,y,10,10.1,worn\n",

@@ -20,6 +20,7 @@ from tests.faults.record import Fault, Kind
 from tests.faults.specimen import Specimen
 
 RULE = "as-designed"
+PROJECT = "sheets/TPE_1.lbrn2"
 SOLID, GLB, MODEL = "mesh/solid.stl", "mesh/solid.glb", "mesh/solid.3mf"
 
 
@@ -151,6 +152,14 @@ KIND = Kind(
         changed("sheet's picture emptied", "sheets/TPE_1.svg", lambda data: b""),
         replaced("sheet's picture of another size", "sheets/TPE_1.svg", r'height="\d', 'height="9'),
         replaced("part lost in a sheet's picture", "sheets/PTFE_1.svg", r"<path [^>]*/>\n", ""),
+        lost("sheet's LightBurn project missing", PROJECT),
+        replaced("vertex off in a LightBurn project", PROJECT, r"(V\d+\.\d)\d*", r"\g<1>"),
+        replaced("part lost in a LightBurn project", PROJECT, r'<Shape [^\n]*CutIndex="2".*\n', ""),
+        replaced("frame cut by a LightBurn project", PROJECT, r'put Value="0"', 'put Value="1"'),
+        replaced("LightBurn project mirrored", PROJECT, r'MirrorX="False"', 'MirrorX="True"'),
+        replaced(
+            "power set in a LightBurn project", PROJECT, r'maxPower Value="0', 'maxPower Value="9'
+        ),
         Fault("stray engraving in the waste", RULE, engraved, beside=True),
         told("parts placed otherwise", "sheets/nest.json", lambda d: d["nests"]["TPE"].reverse()),
         plate("pin plate turned over", flipped),

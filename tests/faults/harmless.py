@@ -44,7 +44,7 @@ def _told(kind: str, data: bytes) -> Any:
         ".json": json.loads,
         ".toml": lambda data: tomllib.loads(data.decode()),
         ".csv": lambda data: list(csv.reader(io.StringIO(data.decode()))),
-        ".svg": lambda data: _tree(ElementTree.fromstring(data)),
+        **dict.fromkeys((".svg", ".lbrn2"), lambda data: _tree(ElementTree.fromstring(data))),
         ".html": _page,
         ".png": _picture,
     }

@@ -271,7 +271,7 @@ DRAWING = (
 CHANGES: dict[str, tuple[Change, ...]] = {
     ".dxf": DRAWING,
     ".json": (json_leaf, json_leaf, json_leaf, number, without_a_line, cut_short, emptied),
-    **dict.fromkeys((".csv", ".svg", ".html", ".toml"), TEXT),
+    **dict.fromkeys((".csv", ".svg", ".html", ".toml", ".lbrn2"), TEXT),
     ".png": (painted, painted, flipped_byte, cut_short, emptied),
     ".stl": (stl_triangle, stl_triangle, stl_triangle, cut_short, emptied),
     ".3mf": (zipped_number, zipped_number, cut_short, emptied),

@@ -53,6 +53,7 @@ def _file(nest: Nest, number: int) -> SheetFile:
     return SheetFile(
         path=f"{path}.dxf",
         picture=f"{path}.svg",
+        project=f"{path}.lbrn2",
         sha256="0" * 64,
         nest=nest,
         number=number,

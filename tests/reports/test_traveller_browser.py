@@ -15,7 +15,7 @@ from PIL import Image
 from sbafab.actuators import build, load_design
 from sbafab.output.settings import press_settings
 from sbafab.pressing.schedule import schedule
-from sbafab.reports.traveller.code import code_text
+from sbafab.reports.traveller.code import record_text
 from sbafab.reports.traveller.job import Job
 from sbafab.reports.traveller.page import traveller_html
 
@@ -121,5 +121,6 @@ def test_a_phone_reads_its_code_off_the_screen(html: str, tmp_path: Path) -> Non
     assert light == 255
     zxing = pytest.importorskip("zxingcpp")
     [code] = zxing.read_barcodes(grey)
-    assert code.text == code_text("3dof-15mm", SHA, "sbafab 1.0.0")
-    assert code.text.splitlines() == ["3dof-15mm", f"sha256 {SHA}", "sbafab 1.0.0"]
+    assert code.text == record_text("3dof-15mm", SHA, "sbafab 1.0.0")
+    find = f"sbafab record --find {SHA[:12]}"
+    assert code.text.splitlines() == ["3dof-15mm", f"sha256 {SHA}", "sbafab 1.0.0", find]

@@ -29,7 +29,7 @@ from sbafab.reports.traveller import bill, notes, process, times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.batch import batch_page
 from sbafab.reports.traveller.cautions import cautions
-from sbafab.reports.traveller.code import code_svg, code_text
+from sbafab.reports.traveller.code import code_svg, record_text
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.layup import Round, rounds
 from sbafab.reports.traveller.shapes import definitions, pattern_regions
@@ -74,7 +74,7 @@ def environment() -> Environment:
 def context(work: Work) -> dict[str, Any]:
     """What the templates say of one design."""
     laminate, job = work.laminate, work.job
-    text = code_text(laminate.name, job.design_sha256, job.generator)
+    text = record_text(laminate.name, job.design_sha256, job.generator)
     others = _others(work)
     return {
         **frame(laminate.name, job.design_sha256, job.generator),

@@ -1,0 +1,151 @@
+"""What is recorded of an actuator that was built: what came out, by whom, and what was measured."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, NamedTuple
+
+from sbafab.errors import DesignError
+
+PASS, FAIL = "pass", "fail"
+LONGEST = {"serial": 64, "operator": 80, "kit": 120, "note": 400}
+"""Characters of a text."""
+_UNWRITABLE = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+
+
+class Measurand(NamedTuple):
+    """A number that is measured: its unit, the most that can be meant, and the option's name."""
+
+    name: str
+    unit: str
+    most: float
+    option: str
+    says: str
+
+
+NUMBERS = (
+    Measurand("burst_kpa", "kPa", 10_000, "burst", "Pressure at which it burst."),
+    Measurand("stroke_mm", "mm", 10_000, "stroke", "Full stroke, as `predict` says it."),
+    Measurand("force_n", "N", 10_000, "force", "Blocked force at 100 kPa, flat."),
+    Measurand("height_mm", "mm", 10_000, "height", "Height after pressing, deflated."),
+    Measurand("mass_g", "g", 100_000, "mass", "Mass without tubes."),
+)
+"""Once an actuator."""
+ERRORS = (
+    Measurand("offset_mm", "mm", 10, "offset", "How far a layer that a hand laid lies off."),
+    Measurand("turn_deg", "deg", 45, "turn", "How far a layer that a hand laid is turned."),
+    Measurand("cut_mm", "mm", 10, "cut-error", "How far a cut edge lies off its place."),
+)
+"""As often as one likes."""
+TEXTS = ("serial", "operator", "kit", "note")
+COLUMNS = (*TEXTS[:3], "leak", *(q.name for q in (*NUMBERS, *ERRORS)), "note")
+"""Of a table of a batch."""
+
+
+@dataclass(frozen=True)
+class LabResult:
+    """What one record says of the actuator ``serial``; what it does not say is empty.
+
+    ``leak`` is "pass", "fail" or "". ``operator`` built it. Units stand in the names of NUMBERS
+    and ERRORS; errors are sizes without sign.
+    """
+
+    serial: str = ""
+    leak: str = ""
+    operator: str = ""
+    kit: str = ""
+    note: str = ""
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    errors: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    withdrawn: bool = False
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether it says nothing that came out."""
+        return not (self.leak or self.note or self.numbers or self.errors)
+
+    @property
+    def once(self) -> dict[str, str | float]:
+        """What only one record of an actuator may say."""
+        texts = {"leak": self.leak, "operator": self.operator, "kit": self.kit}
+        return {**{name: text for name, text in texts.items() if text}, **self.numbers}
+
+    def changed(self, other: LabResult) -> LabResult:
+        """The same with all that ``other`` says in its place."""
+        texts = {
+            name: getattr(other, name) for name in (*TEXTS, "leak") if getattr(other, name) != ""
+        }
+        return replace(
+            self,
+            **texts,
+            numbers={**self.numbers, **other.numbers},
+            errors={**self.errors, **other.errors},
+            withdrawn=other.withdrawn,
+        )
+
+
+@dataclass(frozen=True)
+class Record(LabResult):
+    """A result as it is stored: its number, when (UTC), of which design, what it corrects."""
+
+    id: int = 0
+    recorded: str = ""
+    design_sha256: str = ""
+    corrects: int | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        plain = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {**plain, "errors": {name: list(found) for name, found in self.errors.items()}}
+
+
+@dataclass(frozen=True)
+class Build:
+    """A design that was recorded, with what was predicted of it and the tolerances it states.
+
+    ``predicted``: quantity to value and model. ``tolerances``: key of the design to value.
+    ``good_builds``: of how many random builds how many keep every limit.
+    """
+
+    sha256: str
+    generator: str
+    name: str
+    family: str
+    method: str
+    toml: str
+    predicted: Mapping[str, tuple[float, str]]
+    tolerances: Mapping[str, float]
+    good_builds: tuple[int, int]
+
+
+def checked(result: LabResult, where: str = "") -> LabResult:
+    """The result, with texts stripped. Raises DesignError for what cannot be meant."""
+    place = f"{where}: " if where else ""
+    texts = {name: getattr(result, name).strip() for name in TEXTS}
+    for name, text in texts.items():
+        if len(text) > LONGEST[name]:
+            raise DesignError(
+                f"{place}{name} has {len(text)} characters; at most {LONGEST[name]} are kept"
+            )
+        if _UNWRITABLE.search(text):
+            raise DesignError(f"{place}{name} must be plain text in one line")
+    if result.leak not in ("", PASS, FAIL):
+        raise DesignError(f"{place}leak is {result.leak[:40]!r}; write {PASS} or {FAIL}")
+    for quantity in NUMBERS:
+        if quantity.name in result.numbers:
+            _check(quantity, result.numbers[quantity.name], place, "above 0")
+    for quantity in ERRORS:
+        for value in result.errors.get(quantity.name, ()):
+            _check(quantity, value, place, "0 or more, without sign")
+    return replace(result, **texts)
+
+
+def _check(quantity: Measurand, value: float, place: str, least: str) -> None:
+    is_low = value < 0 or (value == 0 and least == "above 0")
+    if not math.isfinite(value) or is_low or value > quantity.most:
+        raise DesignError(
+            f"{place}{quantity.name} is {value:g}; it must be {least}, at most {quantity.most:,g} "
+            f"{quantity.unit}"
+        )

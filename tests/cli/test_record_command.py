@@ -1,0 +1,147 @@
+"""``sbafab record``: from the actuator on the bench to what all records say."""
+
+from __future__ import annotations
+
+import json
+import socket
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from sbafab.cli import main
+from sbafab.reports.traveller.code import record_text
+
+FLAT = 12 * 0.038 + 11 * 0.025
+"""mm: twelve films and eleven masks between them."""
+
+
+def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    out, err = capsys.readouterr()
+    return int(ended.value.code or 0), out, err
+
+
+@pytest.fixture(autouse=True)
+def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("SBAFAB_LAB", raising=False)
+
+
+@pytest.fixture
+def offline(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*arguments: object, **named: object) -> None:
+        raise AssertionError("a record left the machine")
+
+    for name in ("connect", "connect_ex", "sendto"):
+        monkeypatch.setattr(socket.socket, name, refused)
+    monkeypatch.setattr(socket, "getaddrinfo", refused)
+
+
+@pytest.mark.usefixtures("offline")
+def test_from_the_first_record_to_the_report(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = ["--leak", "pass", "--burst", "3.5 bar", "--height", "500 um", "--operator", "Ada"]
+    code, out, err = run(["record", "1dof-5mm", "--serial", "A1", *told], capsys)
+    assert (code, err) == (0, "")
+    assert "serial A1: leak pass, operator Ada, burst_kpa 350.0, height_mm 0.5" in out
+    Path("batch.csv").write_text(
+        "serial,leak,height_mm,operator\nA2,fail,0.48,Bo\nA3,pass,0.52,Bo\n"
+    )
+    assert run(["record", "1dof-5mm", "--table", "batch.csv"], capsys)[0] == 0
+    code, out, _ = run(["record", "--correct", "2", "--leak", "pass", "--json"], capsys)
+    [new] = json.loads(out)
+    assert (code, new["corrects"], new["leak"], new["numbers"]) == (
+        0,
+        2,
+        "pass",
+        {"height_mm": 0.48},
+    )
+
+    # The code on the traveller finds the record, and with the serial the one actuator.
+    scanned = record_text("1dof-5mm", new["design_sha256"], "sbafab 1.0.0")
+    _, out, _ = run(["record", "--find", scanned, "--serial", "A2"], capsys)
+    assert [line.split(",")[0] for line in out.splitlines()] == ["record 2", "record 4"]
+    assert "corrected by 4" in out
+    # As its last line says, to be typed by hand.
+    arguments = scanned.splitlines()[-1].split()[1:]
+    assert len(run(arguments, capsys)[1].splitlines()) == 4
+
+    monkeypatch.setenv("SBAFAB_LAB", str(Path("lab.sqlite").resolve()))
+    _, out, _ = run(["record", "--report", "--json"], capsys)
+    said = json.loads(out)
+    assert (said["records"], said["actuators"]) == (4, 3)
+    shares = {(s["by"], s["name"]): (s["passed"], s["tested"]) for s in said["success"]}
+    assert shares["design", "1dof-5mm"] == (3, 3)
+    assert shares["operator", "Bo"] == (2, 2)
+    assert shares["method", "channel-pin"] == shares["kit", "not said"] == (3, 3)
+    [height] = (c for c in said["measured"] if c["quantity"] == "height_mm")
+    assert height["mean"] == pytest.approx(0.5)
+    assert height["predicted"] == pytest.approx(FLAT)
+    assert height["high"] - 0.5 == pytest.approx(4.30265 * 0.02 / 3**0.5, rel=1e-4)
+    assert height["verdict"] == "differs"
+    advice = f"1dof-5mm: sbafab predict --press-factor {0.5 / FLAT:.3f} takes the measured"
+    assert advice in run(["record", "--report"], capsys)[1]
+
+
+def test_a_folder_is_recorded_as_the_design_that_it_was_built_from(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    arguments = ["press", "1dof-5mm", "--set", "stack.balloons=2", "--set", "name=two"]
+    assert run(arguments, capsys)[0] == 0
+    _, out, _ = run(["record", "out/two", "--serial", "1", "--leak", "pass", "--json"], capsys)
+    [record] = json.loads(out)
+    manifest = json.loads(Path("out/two/manifest.json").read_text())
+    assert record["design_sha256"] == manifest["design_sha256"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ([], "name the DESIGN that was built, or give --find or --report"),
+        (["1dof-5mm"], "give --serial"),
+        (["1dof-5mm", "--serial", "A1"], "say what came out"),
+        (["1dof-5mm", "--report"], "give either DESIGN, --correct, --find or --report"),
+        (["--report", "--find", "A1"], "give either DESIGN, --correct, --find or --report"),
+        (["--report", "--leak", "pass"], "--report only shows records"),
+        (["1dof-5mm", "--serial", "A1", "--withdraw"], "--withdraw goes with --correct"),
+        (["1dof-5mm", "--table", "x.csv", "--leak", "pass"], "--table holds serials"),
+        (["1dof-5mm", "--table", "x.csv"], "x.csv cannot be read"),
+        (["--correct", "1"], "say what is right instead"),
+        (["--correct", "1", "--leak", "fail"], "lab.sqlite does not exist"),
+        (["--report"], "lab.sqlite is no file of records; record something first"),
+        (["nosuch", "--serial", "A1", "--leak", "pass"], "nosuch"),
+        (
+            ["brace", "--serial", "A1", "--leak", "pass"],
+            "brace is an assembly; record its actuators",
+        ),
+        (["1dof-5mm", "--serial", "A1", "--burst", "3 N"], "must be a pressure"),
+        (["1dof-5mm", "--serial", "A1", "--force", "nan"], "force_n is nan"),
+        (
+            ["1dof-5mm", "--serial", "A1", "--leak", "pass", "--lab", "no/lab.db"],
+            "cannot be opened",
+        ),
+    ],
+)
+def test_bad_input_is_one_sentence_and_exit_2(
+    arguments: list[str], says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, err = run(["record", *arguments], capsys)
+    assert (code, out) == (2, "")
+    assert says in err
+    assert err.count("\n") == 1
+    assert not Path("lab.sqlite").exists()
+
+
+def test_a_file_of_another_program_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+    with sqlite3.connect("lab.sqlite") as rows:
+        rows.execute("CREATE TABLE photos (id)")
+    rows.close()
+    code, _, err = run(["record", "--report"], capsys)
+    assert code == 2
+    assert err == (
+        "sbafab: lab.sqlite is a database of another program; name the lab's file with --lab\n"
+    )
+    assert run(["record", "--find", "A1", "--serial", "B"], capsys)[0] == 2
