@@ -141,7 +141,7 @@ def _remark(found: Calibration, widths: Widths) -> str:
 
 def _warnings(found: Calibration, widths: Widths) -> list[str]:
     """What speaks against cutting with these widths, a sentence each."""
-    from sbafab.design.records import is_kerf
+    from sbafab.design.films import is_kerf
 
     places = ("",) if len(widths) == 1 else (" along x", " along y")
     told = [
