@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from benchmarks import checking, copies, scaling
+from benchmarks import checking, copies, outlines, scaling
 from benchmarks.timing import HEAD, ROOT, by_turns, keep_to_one_core, row
 
 RIVALS = {"foldable": "foldable-robotics==0.0.37", "build123d": "build123d"}
@@ -28,6 +28,7 @@ def main() -> None:
     keep_to_one_core()
     plates(arguments.rivals, arguments.rounds)
     stacks(arguments.rounds)
+    drawn_outlines(arguments.rounds)
     many_copies(arguments.rounds)
     commands(arguments.rounds)
 
@@ -98,6 +99,22 @@ def stacks(rounds: int) -> None:
     for balloons, taken in times.items():
         print(row(f"{balloons} balloons", taken))
     print(f"  ratio of the least: {min(times[150]) / min(times[15]):.2f}")
+
+
+def drawn_outlines(rounds: int) -> None:
+    """Rules on outlines of many edges grow with these, not their pairs."""
+    print("\nA drawn outline: built, and all rules")
+    times: dict[int, list[float]] = {60: [], 120: [], 240: [], 480: []}
+    for turn in range(rounds + 1):
+        for edges, taken in times.items():
+            measured = sum(outlines.built_and_checked(edges))
+            if turn:
+                taken.append(measured)
+    print(HEAD)
+    for edges, taken in times.items():
+        print(row(f"{edges} edges", taken))
+    grown = copies.exponent({edges: min(taken) for edges, taken in times.items()})
+    print(f"  time grows with the edges to the power of {grown:.2f}")
 
 
 def many_copies(rounds: int) -> None:

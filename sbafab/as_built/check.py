@@ -60,6 +60,7 @@ from sbafab.rules.deck import RULES, Rule, run_deck, run_rule
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits
 from sbafab.rules.lowered import lowered
+from sbafab.rules.measures import Measures
 
 AS_DESIGNED = "all that lies here is what design.toml makes"
 BY_LAYER = (film_limits.NAME,)
@@ -126,9 +127,8 @@ def _deck(built: AsBuilt) -> tuple[Finding, ...]:
         return _by_layer(built)
     if built.is_meant and built.known is not None:
         return built.known
-    return tuple(
-        finding for rule in RULES for finding in _measured(rule, built.laminate, built.limits)
-    )
+    measures = Measures(built.laminate, built.limits)
+    return tuple(finding for rule in RULES for finding in _measured(rule, measures))
 
 
 def _findings(built: AsBuilt, measured: Sequence[Finding]) -> tuple[Finding, ...]:
@@ -355,10 +355,10 @@ def _drawn_in_chords(design: Design) -> bool:
         return False
 
 
-def _measured(rule: Rule, laminate: Laminate, limits: Limits) -> list[Finding]:
+def _measured(rule: Rule, measures: Measures) -> list[Finding]:
     """What a rule finds; doctored files can make shapes that no rule can measure, which fails."""
     try:
-        return run_rule(rule, laminate, limits)
+        return run_rule(rule, measures.laminate, measures.limits, measures)
     except UNMEASURED as error:
         message = f"cannot be measured on these files ({error}); write them anew"
         return [Finding(rule.name, "fail", None, None, "", Place(), message)]
@@ -382,9 +382,10 @@ def _by_layer(built: AsBuilt) -> tuple[Finding, ...]:
     )
     why = "it needs every layer, and not all could be read" if lost else "there is no whole stack"
     found: list[Finding] = []
+    measures = Measures(some, built.limits)
     for rule in RULES:
         if layers and rule.name in BY_LAYER:
-            found += _measured(rule, some, built.limits)
+            found += _measured(rule, measures)
         else:
             message = f"not run: {why}"
             found.append(Finding(rule.name, "warn", None, None, "", Place(None, lost), message))

@@ -17,6 +17,7 @@ from sbafab.rules import registration_yield
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import Limits
+from sbafab.rules.measures import Measures
 
 
 def refuse_coarse(
@@ -56,12 +57,13 @@ def as_cut(laminate: Laminate, paths: Mapping[str, Region], settings: CutSetting
 
 def _first_failure(laminate: Laminate, limits: Limits) -> Finding | None:
     """The first failure that is not waived; how many random builds hold is not counted again."""
+    measures = Measures(laminate, limits)
     return next(
         (
             finding
             for rule in RULES
             if rule.name != registration_yield.NAME
-            for finding in run_rule(rule, laminate, limits)
+            for finding in run_rule(rule, laminate, limits, measures)
             if finding.verdict == "fail"
         ),
         None,

@@ -14,7 +14,7 @@ from sbafab.cutting.appearance import check_appearance, check_space
 from sbafab.cutting.chaining import check_clear, closed_loops, nested_region
 from sbafab.cutting.cut_layers import COLOURS, CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
+from sbafab.geometry.edges import EPSILON, Edge, Line, Point, edge_from_bulge, quarter_arcs
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import circle
 
@@ -168,7 +168,11 @@ def _geometry(entity: DXFEntity, may_be_open: bool) -> tuple[Contour | None, lis
         return circle(centre, dxf.radius), []
     first = math.radians(dxf.start_angle)
     sweep = math.radians((dxf.end_angle - dxf.start_angle) % 360.0)
-    return None, _arcs(centre, dxf.radius, first, sweep)
+    start, end = (
+        (centre[0] + dxf.radius * math.cos(angle), centre[1] + dxf.radius * math.sin(angle))
+        for angle in (first, first + sweep)
+    )
+    return None, quarter_arcs(start, end, centre, dxf.radius, sweep)
 
 
 def _numbers(entity: DXFEntity) -> Iterator[float]:
@@ -230,23 +234,8 @@ def _polyline(
 
 
 def _bulge_edges(start: Point, end: Point, bulge: float) -> list[Edge]:
-    """What a polyline draws from a vertex to the next; arcs of more than half a turn in parts."""
-    if bulge == 0.0:
-        return [Line(start, end)]
-    (x0, y0), (x1, y1) = start, end
-    lean = (1 / bulge - bulge) / 4
-    centre = (x0 + x1) / 2 - lean * (y1 - y0), (y0 + y1) / 2 + lean * (x1 - x0)
-    first = math.atan2(y0 - centre[1], x0 - centre[0])
-    arcs = _arcs(centre, math.dist(centre, start), first, 4 * math.atan(bulge))
-    stops = [start, *(arc.end for arc in arcs[:-1]), end]
-    return [arc.part(stops[i], stops[i + 1]) for i, arc in enumerate(arcs)]
-
-
-def _arcs(centre: Point, radius: float, first: float, sweep: float) -> list[Edge]:
-    """Arcs of at most a quarter turn from the angle ``first``, together turning ``sweep``."""
-    count = max(1, math.ceil(abs(sweep) / (math.pi / 2) - 1e-6))
-    stops = [
-        (centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle))
-        for angle in (first + sweep * i / count for i in range(count + 1))
-    ]
-    return [Arc(stops[i], stops[i + 1], centre, radius, sweep > 0) for i in range(count)]
+    """What a polyline draws from a vertex to the next; arcs may turn more than half round."""
+    edge = edge_from_bulge(start, end, bulge)
+    if isinstance(edge, Line):
+        return [edge]
+    return quarter_arcs(start, end, edge.centre, edge.radius, 4 * math.atan(bulge))

@@ -9,7 +9,7 @@ from functools import cache
 from typing import Literal, NamedTuple
 
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER, CUT_SHEET, ENGRAVE, REFERENCE
-from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point
+from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, quarter_arcs
 from sbafab.geometry.region import Contour
 
 DxfProfile = Literal["bulges", "arcs", "chords"]
@@ -129,15 +129,11 @@ def _cuts(contours: Iterable[Contour], profile: DxfProfile) -> Iterator[_Entity]
                 yield _polyline(layer, [(*edge.start, edge.bulge) for edge in edges])
 
 
-def _quarters(edge: Edge) -> list[Edge]:
+def _quarters(edge: Edge) -> Sequence[Edge]:
     """The edge in arcs of at most a quarter turn."""
-    count = 1
-    if isinstance(edge, Arc):
-        count = max(1, math.ceil(abs(edge.sweep) / (math.pi / 2) - 1e-6))
-    if count == 1:
+    if not isinstance(edge, Arc):
         return [edge]
-    stops = [edge.start, *(edge.at(i / count) for i in range(1, count)), edge.end]
-    return [edge.part(stops[i], stops[i + 1]) for i in range(count)]
+    return quarter_arcs(edge.start, edge.end, edge.centre, edge.radius, edge.sweep)
 
 
 def _frames(sheet: Surroundings) -> Iterator[Sequence[Point]]:

@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 from sbafab.design.strands import JOIN, Strand, Traced, counted, joined, sealed, widest_gap
 from sbafab.errors import DesignError
-from sbafab.geometry.arrangement import split_edges
 from sbafab.geometry.biarc import FitError
 from sbafab.geometry.boolean import tidy
 from sbafab.geometry.edges import EPSILON, Point
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import close_pairs
+from sbafab.geometry.pieces import split_edges
 from sbafab.geometry.region import Contour, Region
 
 MOST_BYTES = 2_000_000
@@ -145,7 +145,7 @@ def _refuse_crossings(loop: Strand) -> None:
             if min(math.dist(p, end) for end in ends) > JOIN:
                 raise _crossing(p)
     corners: set[Point] = set()
-    for edge, pieces in zip(loop, split_edges(loop), strict=True):
+    for edge, pieces in zip(loop, split_edges(loop).parts, strict=True):
         start = pieces[0].start if pieces else edge.start
         if len(pieces) != 1 or start in corners:
             raise _crossing(pieces[0].end if len(pieces) > 1 else edge.start)

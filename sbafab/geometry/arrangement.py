@@ -1,24 +1,29 @@
-"""Closed chains of edges laid over each other: where they meet, and how often they wind round what.
+"""Closed chains of edges laid over each other, and how often they wind round what.
 
-Every edge is cut where it meets another, and pieces that coincide become one. How often the chains
-wind round the faces on both sides of a piece is told once for each connected group of pieces and
-then carried round their common points, from face to face: wherever two ways lead to a face they
-must agree, so what comes out is consistent or it is not returned.
+How often the chains wind round the faces on both sides of a piece is told once for each connected
+group of pieces and then carried round their common points, from face to face: wherever two ways
+lead to a face they must agree, so what comes out is consistent or it is not returned.
 """
 
 from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property, cmp_to_key
-from itertools import pairwise
 from typing import NamedTuple
 
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, distance_to, left_normal
-from sbafab.geometry.intersect import meeting_points
-from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
-from sbafab.geometry.pool import PointPool
+from sbafab.geometry.edges import (
+    EPSILON,
+    Arc,
+    Edge,
+    Point,
+    distance_to,
+    from_end_to_end,
+    left_normal,
+)
+from sbafab.geometry.nearby import EdgeIndex, widened
+from sbafab.geometry.pieces import Overlay
 from sbafab.geometry.region import turns_round
 
 NEAR = 0.05
@@ -27,114 +32,6 @@ NEAR = 0.05
 
 class InconsistentError(ArithmeticError):
     """Two ways to a face do not agree; the argument is the point where they meet."""
-
-
-class Piece(NamedTuple):
-    """An edge that meets others at its ends only; the chains wind ``turns`` times more on its left
-    than on its right.
-    """
-
-    edge: Edge
-    turns: int
-
-
-def split_edges(edges: Sequence[Edge], tolerance: float = EPSILON) -> list[list[Edge]]:
-    """Each edge cut where it meets another; points nearer than 2 ``tolerance`` become one.
-
-    The order of the edges has no part in where they are cut.
-    """
-    cuts: list[list[Point]] = [[] for _ in edges]
-    meeting: list[tuple[int, int]] = []
-    for i, j in close_pairs([edge.bounds for edge in edges], tolerance):
-        points = meeting_points(edges[i], edges[j], tolerance)
-        if points:
-            cuts[i] += points
-            cuts[j] += points
-            meeting.append((i, j))
-    _share(edges, cuts, meeting, tolerance)
-    ends = [p for edge in edges for p in (edge.start, edge.end)]
-    pool = PointPool(ends, [p for points in cuts for p in points], 2 * tolerance)
-    return [_cut(edge, points, pool) for edge, points in zip(edges, cuts, strict=True)]
-
-
-def _share(
-    edges: Sequence[Edge],
-    cuts: Sequence[list[Point]],
-    meeting: Sequence[tuple[int, int]],
-    tolerance: float,
-) -> None:
-    """Cuts edges that run along each other at the same points, those with a third edge too."""
-    partners: dict[int, list[int]] = defaultdict(list)
-    for i, j in meeting:
-        partners[i].append(j)
-        partners[j].append(i)
-    new = {i: points for i, points in enumerate(cuts) if points}
-    while new:
-        found: dict[int, list[Point]] = defaultdict(list)
-        for i, points in new.items():
-            for j in partners[i]:
-                low_x, low_y, high_x, high_y = widened(edges[j].bounds, tolerance)
-                for p in points:
-                    if not (low_x <= p[0] <= high_x and low_y <= p[1] <= high_y):
-                        continue
-                    if p not in cuts[j] and distance_to(edges[j], p) < tolerance:
-                        cuts[j].append(p)
-                        found[j].append(p)
-        new = found
-
-
-def _cut(edge: Edge, points: Sequence[Point], pool: PointPool) -> list[Edge]:
-    start, end = pool.snapped(edge.start), pool.snapped(edge.end)
-    if not points:
-        return [edge.part(start, end)] if start != end else []
-    along = {stop: edge.parameter(stop) for stop in map(pool.snapped, points)}
-    inner = [stop for stop, t in along.items() if stop not in (start, end) and 0 < t < 1]
-    corners = [start, *sorted(inner, key=along.__getitem__), end]
-    return [edge.part(a, b) for a, b in pairwise(corners) if a != b]
-
-
-def merged(edges: Iterable[Edge], tolerance: float = EPSILON) -> list[Piece]:
-    """Cut edges, those that coincide as one; none where the chains wind alike on both sides."""
-    between: dict[tuple[Point, Point], list[tuple[float, Edge, int]]] = defaultdict(list)
-    for edge in edges:
-        forward = edge.start < edge.end
-        a, b = (edge.start, edge.end) if forward else (edge.end, edge.start)
-        between[a, b].append((_offset(edge, a, b), edge, 1 if forward else -1))
-    return [piece for entries in between.values() for piece in _united(entries, 4 * tolerance)]
-
-
-def _offset(edge: Edge, a: Point, b: Point) -> float:
-    """How far the middle of an edge lies to the left of the chord from ``a`` to ``b``."""
-    if not isinstance(edge, Arc):
-        return 0.0
-    (x, y), (dx, dy) = edge.at(0.5), (b[0] - a[0], b[1] - a[1])
-    return (dx * (y - a[1]) - dy * (x - a[0])) / math.hypot(dx, dy)
-
-
-def _united(entries: list[tuple[float, Edge, int]], same: float) -> Iterator[Piece]:
-    """One piece for each group of edges with common ends whose middles are near each other."""
-    if len(entries) > 1:
-        entries.sort(key=lambda entry: entry[0])
-    group: list[tuple[float, Edge, int]] = []
-    for entry in entries:
-        if group and entry[0] - group[-1][0] >= same:
-            yield from _one_of(group)
-            group = []
-        group.append(entry)
-    yield from _one_of(group)
-
-
-def _one_of(group: Sequence[tuple[float, Edge, int]]) -> Iterator[Piece]:
-    turns = sum(way for _, _, way in group)
-    if turns:
-        _, edge, way = min(group, key=_plainest) if len(group) > 1 else group[0]
-        yield Piece(edge, turns * way)
-
-
-def _plainest(entry: tuple[float, Edge, int]) -> tuple[float, Point]:
-    """Lines first, then arcs by radius: the same choice in any order, and along a whole circle."""
-    edge = entry[1]
-    return (edge.radius, edge.centre) if isinstance(edge, Arc) else (0.0, (0.0, 0.0))
 
 
 class _Leaving(NamedTuple):
@@ -152,12 +49,7 @@ class _Leaving(NamedTuple):
 
     def to_left(self, p: Point) -> float:
         """How far ``p`` lies to the left of the line or circle the piece is a part of."""
-        if isinstance(self.edge, Arc):
-            inside = self.edge.radius - math.dist(p, self.edge.centre)
-            left = inside if self.edge.ccw else -inside
-        else:
-            (x, y), (ux, uy) = self.edge.start, self.edge.direction(self.edge.start)
-            left = ux * (p[1] - y) - uy * (p[0] - x)
+        left = self.edge.to_left(p)
         return -left if self.half & 1 else left
 
     def towards(self, reach: float) -> float:
@@ -179,16 +71,21 @@ def _leaving(half: int, edge: Edge) -> _Leaving:
 class Arrangement:
     """Pieces, each of them two halves: 2 i along piece i, 2 i + 1 against it."""
 
-    def __init__(self, pieces: Sequence[Piece]) -> None:
-        self.pieces = pieces
-        self.origin = [p for edge, _ in pieces for p in (edge.start, edge.end)]
+    def __init__(self, overlay: Overlay) -> None:
+        self.pieces = overlay.pieces
+        self._drawn = [from_end_to_end(edge) for edge, _ in self.pieces]
+        self.origin = [p for edge, _ in self.pieces for p in (edge.start, edge.end)]
         rings: dict[Point, list[int]] = defaultdict(list)
         for half, p in enumerate(self.origin):
             rings[p].append(half)
         self.tangled: set[Point] = set()
-        """Where pieces leave in nearly one direction, so that rounding could order them wrongly."""
+        """Where pieces leave in nearly one direction, so that rounding could order them wrongly;
+        every point, where pieces were bent and may cross between their ends.
+        """
         self.rings = {p: self._in_order(halves) for p, halves in rings.items()}
         """The halves that leave each point, counter-clockwise; the widest gap comes last."""
+        if overlay.bent:
+            self.tangled.update(self.rings)
         self.left = self._wound()
         """How often the chains wind round what is to the left of each half."""
         if self.tangled:
@@ -200,7 +97,7 @@ class Arrangement:
 
     def _in_order(self, halves: list[int]) -> list[int]:
         found = sorted(
-            (_leaving(half, self.pieces[half >> 1].edge) for half in halves),
+            (_leaving(half, self._drawn[half >> 1]) for half in halves),
             key=lambda leaving: leaving.heading,
         )
         count = len(found)
@@ -224,20 +121,20 @@ class Arrangement:
 
     @cached_property
     def _index(self) -> EdgeIndex:
-        return EdgeIndex([edge for edge, _ in self.pieces])
+        return EdgeIndex(self._drawn)
 
     def _around(self, p: Point, left: Sequence[int | None]) -> int:
         """How often the pieces that are told in ``left`` wind round a point."""
         x, y = p
         return sum(
-            self.pieces[number].turns * turns_round(self.pieces[number].edge, p)
+            self.pieces[number].turns * turns_round(self._drawn[number], p)
             for number in self._index.numbers((x, y, self._index.right, y))
             if left[2 * number] is not None
         )
 
-    def _wound(self) -> list[int | None]:
+    def _wound(self) -> list[int]:
         left: list[int | None] = [None] * len(self.origin)
-        edges = [edge.bounds[0] for edge, _ in self.pieces]
+        edges = [edge.bounds[0] for edge in self._drawn]
         told = False
         for number in sorted(range(len(edges)), key=edges.__getitem__):
             if left[2 * number] is not None:
@@ -247,7 +144,7 @@ class Arrangement:
             half, p = self._leftmost(number, edges[number])
             self._carry(half, self._around(p, left) if told else 0, left)
             told = True
-        return left
+        return [turns for turns in left if turns is not None]
 
     def _verify(self) -> None:
         """Asks beside one piece of every part that hangs together by points that leave no doubt.
@@ -269,16 +166,16 @@ class Arrangement:
                     seen |= more
                     part += more
                     waiting += more
-            half = 2 * max(part, key=lambda number: self.pieces[number].edge.length)
+            half = 2 * max(part, key=lambda number: self._drawn[number].length)
             beside = self._beside(half)
             if beside is not None and self._around(beside, self.left) != self.left[half]:
-                raise InconsistentError(self.pieces[half >> 1].edge.at(0.5))
+                raise InconsistentError(self._drawn[half >> 1].at(0.5))
 
     def _beside(self, half: int) -> Point | None:
         """A point to the left of a half, nearer to it than to any other; None if there is hardly
         room.
         """
-        edge = self.pieces[half >> 1].edge
+        edge = self._drawn[half >> 1]
         x, y = edge.at(0.5)
         room = reach = edge.length / 16
         for number in self._index.numbers(widened((x, y, x, y), reach)):
@@ -291,12 +188,12 @@ class Arrangement:
 
     def _leftmost(self, number: int, x: float) -> tuple[int, Point]:
         """A half with the plane outside its group on its left, and its leftmost point."""
-        edge = self.pieces[number].edge
+        edge = self._drawn[number]
         p = min(edge.start, edge.end)
         if isinstance(edge, Arc) and x < p[0]:
             return 2 * number + int(edge.ccw), (x, edge.centre[1])
         # All leave to the right of it, so the last of those that leave upwards most.
-        ring = [_leaving(half, self.pieces[half >> 1].edge) for half in self.rings[p]]
+        ring = [_leaving(half, self._drawn[half >> 1]) for half in self.rings[p]]
         upward = max(leaving.heading for leaving in ring) - NEAR
         return [leaving.half for leaving in ring if leaving.heading > upward][-1], p
 
@@ -333,7 +230,7 @@ class Arrangement:
         return [
             half
             for half, turns in enumerate(self.left)
-            if turns is not None and turns > above >= turns - self.turns(half)
+            if turns > above >= turns - self.turns(half)
         ]
 
     def loops(self, halves: Sequence[int]) -> Iterator[list[Edge]]:

@@ -14,8 +14,8 @@ from itertools import pairwise
 from typing import Literal, NamedTuple
 
 from sbafab.geometry.biarc import biarc, ellipse
-from sbafab.geometry.boolean import GeometryError, left_turn
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, distance_to
+from sbafab.geometry.boolean import GeometryError
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, distance_to, left_turn
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Contour, Region

@@ -9,7 +9,15 @@ import math
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, distance_to, edge_from_bulge
+from sbafab.geometry.edges import (
+    EPSILON,
+    Edge,
+    Line,
+    Point,
+    distance_to,
+    edge_from_bulge,
+    quarter_arcs,
+)
 
 Curve = Callable[[float], tuple[Point, Point]]
 
@@ -73,12 +81,10 @@ def elliptical_arc(
     skew = major[0] * minor[0] + major[1] * minor[1]
     if abs(radius - math.hypot(*minor)) > EPSILON or abs(skew) > EPSILON * radius:
         return fit_arcs(curve, first, last)
-    count = max(1, math.ceil((last - first) / (math.pi / 2) - 1e-9))
-    corners = [curve(first + (last - first) * k / count)[0] for k in range(count + 1)]
-    if last - first > math.tau - 1e-9:
-        corners[-1] = corners[0]
+    start = curve(first)[0]
+    end = start if last - first > math.tau - 1e-9 else curve(last)[0]
     ccw = major[0] * minor[1] > major[1] * minor[0]
-    return tuple(Arc(a, b, centre, radius, ccw) for a, b in pairwise(corners))
+    return tuple(quarter_arcs(start, end, centre, radius, (last - first) * (1 if ccw else -1)))
 
 
 def fit_arcs(

@@ -6,20 +6,24 @@ side of it only; the pieces that stay are chained into contours. Nothing is flat
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeVar
 
 from sbafab.errors import SbafabError
-from sbafab.geometry.arrangement import Arrangement, InconsistentError, merged, split_edges
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
-from sbafab.geometry.region import Contour, Region, same_support
+from sbafab.geometry.arrangement import Arrangement, InconsistentError
+from sbafab.geometry.edges import EPSILON, Edge, Line, Point, quarter_arcs
+from sbafab.geometry.facets import run_sweep
+from sbafab.geometry.pieces import overlaid
+from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import circle
+
+Found = TypeVar("Found")
 
 LEAST_AREA = 1e-7
 """Contours that enclose less, in mm2, are rounding dust; so are those thinner than 4 EPSILON."""
-WAYS = ((1, 1), (1, 2), (1, 3), (4, 2), (16, 2), (64, 3))
-"""How edges are cut where they meet: with how many EPSILON, how often over again. Tried in turn; by
-the last, points within a quarter of a micrometre are one.
+WAYS = (1, 4, 16, 64)
+"""With how many EPSILON edges are cut where they meet, tried in turn; by the last, points within a
+quarter of a micrometre are one.
 """
 
 
@@ -51,19 +55,25 @@ def wound(edges: Sequence[Edge], above: int) -> Region:
 
     Raises GeometryError where no way to cut the edges where they meet gives one answer.
     """
+
+    def contours(found: Arrangement) -> list[Contour]:
+        loops = found.loops(found.borders(above))
+        return [contour for contour in map(tidy, loops) if contour is not None]
+
+    return Region(tuple(sorted(arranged([edges], contours), key=_reading_order)))
+
+
+def arranged(owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Found]) -> Found:
+    """What is read from the closed chains of edges of all owners, laid over each other.
+
+    Raises GeometryError where no way to cut the edges where they meet gives one answer.
+    """
     place: Point | None = None
-    for coarser, rounds in WAYS:
-        pieces: Sequence[Edge] = edges
+    for coarser in WAYS:
         try:
-            for _ in range(rounds):
-                pieces = [p for parts in split_edges(pieces, coarser * EPSILON) for p in parts]
-            arrangement = Arrangement(merged(pieces, coarser * EPSILON))
-            loops = arrangement.loops(arrangement.borders(above))
-            contours = [contour for contour in map(tidy, loops) if contour is not None]
+            return read(Arrangement(overlaid(owners, coarser * EPSILON)))
         except InconsistentError as fault:
             place = place or fault.args[0]
-        else:
-            return Region(tuple(sorted(contours, key=_reading_order)))
     x, y = place or (0.0, 0.0)
     raise GeometryError(
         f"edges that nearly meet at x {x:.6f}, y {y:.6f} cannot be told apart; change a size "
@@ -76,25 +86,6 @@ def _reading_order(contour: Contour) -> tuple[bool, float, float, float]:
     return contour.is_hole, round(low_x, 6), round(low_y, 6), round(high_x, 6)
 
 
-def left_turn(before: Edge, after: Edge, reach: float = 0.0) -> float:
-    """Angle between -pi and pi turned to the left, from edge to edge or from chord to chord.
-
-    The chords run from the common corner to the points at distance ``reach``.
-    """
-    back = _heading(before.reversed(), reach)
-    return math.pi - (back - _heading(after, reach)) % math.tau
-
-
-def _heading(edge: Edge, reach: float) -> float:
-    """Angle from the edge's start to its point at distance ``reach``."""
-    ux, uy = edge.direction(edge.start)
-    angle = math.atan2(uy, ux)
-    if isinstance(edge, Arc):
-        bend = math.asin(min(1.0, reach / (2 * edge.radius)))
-        angle += bend if edge.ccw else -bend
-    return angle
-
-
 def tidy(loop: Sequence[Edge]) -> Contour | None:
     """One contour with edges of one support joined and arcs of at most a quarter turn."""
     contour = Contour(tuple(loop))
@@ -103,12 +94,7 @@ def tidy(loop: Sequence[Edge]) -> Contour | None:
     if contour.circle is not None:
         whole = circle(*contour.circle)
         return whole if contour.area > 0 else whole.reversed()
-    breaks = [i for i in range(len(loop)) if not same_support(loop[i - 1], loop[i])]
-    runs = [
-        list(loop[first:last]) if first < last else [*loop[first:], *loop[:last]]
-        for first, last in zip(breaks, [*breaks[1:], breaks[0]], strict=True)
-    ]
-    edges = [edge for run in runs for edge in _joined(run)]
+    edges = [edge for run in contour.runs for edge in _joined(run)]
     first = min(range(len(edges)), key=lambda i: _rounded(edges[i].start))
     return Contour((*edges[first:], *edges[:first]))
 
@@ -117,18 +103,8 @@ def _rounded(p: Point) -> Point:
     return round(p[0], 6), round(p[1], 6)
 
 
-def _joined(run: Sequence[Edge]) -> list[Edge]:
-    head = run[0]
+def _joined(run: Sequence[Edge]) -> Sequence[Edge]:
+    head, end = run[0], run[-1].end
     if isinstance(head, Line):
-        return [Line(head.start, run[-1].end)]
-    sweep = sum(edge.sweep for edge in run if isinstance(edge, Arc))
-    count = max(1, math.ceil(abs(sweep) / (math.pi / 2) - 1e-9))
-    if count == 1:
-        return [head.part(head.start, run[-1].end)]
-    first = head.start_angle
-    corners = [
-        head.start,
-        *(head.on_circle(first + sweep * i / count) for i in range(1, count)),
-        run[-1].end,
-    ]
-    return [head.part(corners[i], corners[i + 1]) for i in range(count)]
+        return [Line(head.start, end)]
+    return quarter_arcs(head.start, end, head.centre, head.radius, run_sweep(run))

@@ -7,6 +7,7 @@ Lengths are millimetres, angles radians. Every arc spans at most half a turn, so
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 Point = tuple[float, float]
@@ -17,6 +18,11 @@ EPSILON = 2e-6
 SAME = 2 * EPSILON
 """mm: points nearer to each other than this, 4 nm, are one point, and so are all that hang together
 by such steps. Far below the 1 um that the cut files promise.
+"""
+
+BENT = EPSILON / 4
+"""mm: an edge whose points were moved off its line or circle by more may run where none was looked
+for. Two edges bent by less still are within EPSILON of each other where they meet.
 """
 
 
@@ -86,6 +92,11 @@ class Line(NamedTuple):
     def farthest_along(self, origin: Point, unit: Point) -> float:
         """How far the edge reaches from ``origin`` along a unit direction."""
         return max(_along(self.start, origin, unit), _along(self.end, origin, unit))
+
+    def to_left(self, p: Point) -> float:
+        """How far ``p`` lies to the left of the infinite line."""
+        (x, y), (ux, uy) = self.start, self.direction(self.start)
+        return ux * (p[1] - y) - uy * (p[0] - x)
 
     def part(self, start: Point, end: Point) -> Line:
         """The piece between two points of the edge, taken in the direction of travel."""
@@ -205,6 +216,11 @@ class Arc(NamedTuple):
         ends = max(_along(self.start, origin, unit), _along(self.end, origin, unit))
         return _along(top, origin, unit) if 0.0 <= self.parameter(top) <= 1.0 else ends
 
+    def to_left(self, p: Point) -> float:
+        """How far ``p`` lies to the left of the whole circle."""
+        inside = self.radius - math.dist(p, self.centre)
+        return inside if self.ccw else -inside
+
     def part(self, start: Point, end: Point) -> Arc:
         """The piece between two points of the edge, taken in the direction of travel."""
         return Arc(start, end, self.centre, self.radius, self.ccw)
@@ -235,6 +251,36 @@ def edge_from_bulge(start: Point, end: Point, bulge: float) -> Edge:
     cx = (x0 + x1) / 2 - lean * (y1 - y0)
     cy = (y0 + y1) / 2 + lean * (x1 - x0)
     return Arc(start, end, (cx, cy), math.hypot(x0 - cx, y0 - cy), bulge > 0)
+
+
+def quarter_arcs(
+    start: Point, end: Point, centre: Point, radius: float, sweep: float
+) -> list[Edge]:
+    """The arcs of at most a quarter turn round ``centre`` that together turn ``sweep``."""
+    count = max(1, math.ceil(abs(sweep) / (math.pi / 2) - 1e-6))
+    circle = Arc(start, end, centre, radius, sweep > 0)
+    first = circle.start_angle
+    stops = [start, *(circle.on_circle(first + sweep * i / count) for i in range(1, count)), end]
+    return [circle.part(a, b) for a, b in pairwise(stops)]
+
+
+def from_end_to_end(edge: Edge) -> Edge:
+    """The edge; where an end was taken off an arc's circle by more than BENT, the arc of its sweep
+    through both ends.
+    """
+    if not isinstance(edge, Arc):
+        return edge
+    centre, radius = edge.centre, edge.radius
+    off = math.dist(edge.start, centre) - radius, math.dist(edge.end, centre) - radius
+    if min(off) > -BENT and max(off) < BENT:
+        return edge
+    return edge_from_bulge(edge.start, edge.end, edge.bulge)
+
+
+def left_turn(before: Edge, after: Edge) -> float:
+    """Angle between -pi and pi that a path turns to the left from one edge to the next."""
+    (ux, uy), (vx, vy) = before.direction(before.end), after.direction(after.start)
+    return math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
 
 
 def left_normal(edge: Edge, p: Point) -> Point:

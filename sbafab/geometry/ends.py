@@ -11,8 +11,9 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-from sbafab.geometry.edges import Arc, Edge, Point
-from sbafab.geometry.region import Contour, same_support
+from sbafab.geometry.edges import Arc, Edge, Point, left_turn
+from sbafab.geometry.facets import run_sweep
+from sbafab.geometry.region import Contour
 
 SMOOTH = 1e-4
 """Corners that turn by less, in radians, are none."""
@@ -35,9 +36,7 @@ class _Run(NamedTuple):
 
     def corner(self, after: _Run) -> float:
         """How far the path turns from this run to the next."""
-        ux, uy = self.last.direction(self.last.end)
-        vx, vy = after.first.direction(after.first.start)
-        return math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
+        return left_turn(self.last, after.first)
 
     def is_fillet(self, bottom: _Run) -> bool:
         """Whether it rounds a corner of the run beside it, which turns less tightly."""
@@ -49,7 +48,7 @@ def tapered_ends(contour: Contour, sharp: float) -> Iterator[tuple[Point, Point]
 
     A rounded corner is an end where the corner itself would have less than ``sharp`` degrees.
     """
-    runs = _runs(contour)
+    runs = [_Run(own[0], own[-1], run_sweep(own)) for own in contour.runs]
     for i, run in enumerate(runs):
         before, after = runs[i - 1], runs[(i + 1) % len(runs)]
         into, out = before.corner(run), run.corner(after)
@@ -60,17 +59,6 @@ def tapered_ends(contour: Contour, sharp: float) -> Iterator[tuple[Point, Point]
         stop = i + 1 if abs(out) < SMOOTH and after.is_fillet(run) else i
         if (start < i or into > SMOOTH) and (stop > i or out > SMOOTH):
             yield from _between_flanks(runs, start, stop, TAPER)
-
-
-def _runs(contour: Contour) -> list[_Run]:
-    edges = contour.edges
-    breaks = [i for i in range(len(edges)) if not same_support(edges[i - 1], edges[i])]
-    runs = []
-    for first, after in zip(breaks, [*breaks[1:], *breaks[:1]], strict=True):
-        own = edges[first:after] if first < after else edges[first:] + edges[:after]
-        sweep = sum(edge.sweep for edge in own if isinstance(edge, Arc))
-        runs.append(_Run(own[0], own[-1], sweep))
-    return runs
 
 
 def _between_flanks(

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from sbafab.geometry.boolean import left_turn, wound
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
+from sbafab.geometry.boolean import wound
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, left_turn
 from sbafab.geometry.region import Contour, Region
 
 CUSP = 3.0

@@ -112,6 +112,18 @@ class Contour:
                 return None
         return first.centre, first.radius
 
+    @cached_property
+    def runs(self) -> tuple[tuple[Edge, ...], ...]:
+        """The edges gathered by the line or circle they lie on, from the first corner on."""
+        edges = self.edges
+        breaks = [i for i in range(len(edges)) if not same_support(edges[i - 1], edges[i])]
+        if not breaks:
+            return (edges,)
+        return tuple(
+            edges[first:last] if first < last else edges[first:] + edges[:last]
+            for first, last in zip(breaks, [*breaks[1:], breaks[0]], strict=True)
+        )
+
     @property
     def vertices(self) -> tuple[tuple[float, float, float], ...]:
         """x, y and bulge of each vertex, as a DXF polyline carries them."""
@@ -177,43 +189,10 @@ class Contour:
         return low, step, rows
 
     def polygon(self, sagitta: float = 0.001) -> list[Point]:
-        """Vertices of a polygon whose chords stay within ``sagitta`` of the arcs.
+        """Vertices of a polygon whose chords stay within ``sagitta`` of the arcs."""
+        from sbafab.geometry.facets import facets
 
-        Vertices on one circle stand at the same angles whichever contour asks, so shared arcs
-        give shared vertices.
-        """
-        points: list[Point] = []
-        for before, edge in zip((self.edges[-1], *self.edges), self.edges, strict=False):
-            if not isinstance(edge, Arc):
-                points.append(edge.start)
-                continue
-            step = _chord_step(edge.radius, sagitta)
-            place = edge.start_angle / step
-            # Where an arc was only split, another contour along it need not be.
-            if not same_support(before, edge) or abs(place - round(place)) < 1e-7:
-                points.append(edge.start)
-            points.extend(_chord_points(edge, step))
-        if len(points) < 3:
-            return [edge.at(t) for edge in self.edges for t in (0.0, 0.5)]
-        return points
-
-
-def _chord_step(radius: float, sagitta: float) -> float:
-    """Angle of a chord; a whole number of them makes a quarter turn."""
-    ratio = min(1.0, sagitta / radius)
-    count = max(8, math.ceil(math.pi / math.acos(1 - ratio)))
-    return math.tau / (4 * math.ceil(count / 4))
-
-
-def _chord_points(arc: Arc, step: float) -> list[Point]:
-    """Points of the arc between its ends at whole multiples of the step."""
-    first = arc.start_angle
-    last = first + arc.sweep
-    if arc.ccw:
-        ticks = range(math.floor(first / step + 1e-7) + 1, math.ceil(last / step - 1e-7))
-    else:
-        ticks = range(math.ceil(first / step - 1e-7) - 1, math.floor(last / step + 1e-7), -1)
-    return [arc.on_circle(math.remainder(tick * step, math.tau)) for tick in ticks]
+        return facets(self, sagitta, keeps_area=False)
 
 
 def same_support(a: Edge, b: Edge) -> bool:

@@ -19,6 +19,8 @@ from sbafab.geometry.region import Contour, Region
 
 ALONGSIDE = 1e-3
 """Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
+BESIDE = 1e-5
+"""mm that an edge may miss another's normals by, for rounding."""
 TOUCH = 1e-6
 """mm within which two points are one."""
 STEP = math.radians(15)
@@ -55,14 +57,17 @@ def least_gap(region: Region, sharp: float = 90.0, below: float = math.inf) -> W
     return _least(_Boundary(outside, sharp), below)
 
 
-def facing_pairs(region: Region, slack: float, sharp: float = 90.0) -> list[Width]:
+def facing_pairs(
+    region: Region, slack: float, sharp: float = 90.0, least: Width | None = None
+) -> list[Width]:
     """Facing places that are at most ``slack`` mm wider than the narrowest, each once.
 
     Besides the places where edges are square on each other they hold samples along edges that run
-    nearly alongside: where a layer turns, those may become the narrowest.
+    nearly alongside: where a layer turns, those may become the narrowest. ``least`` is the least
+    width, where it is known.
     """
     boundary = _Boundary(region.contours, sharp)
-    least = _least(boundary, math.inf)
+    least = least or _least(boundary, math.inf)
     if least is None or least.value == 0.0:
         return [] if least is None else [least]
     gathered = _Gathered(boundary, least.value + slack)
@@ -70,7 +75,7 @@ def facing_pairs(region: Region, slack: float, sharp: float = 90.0) -> list[Widt
     for a in boundary.sides:
         samples = [_Foot(p, left_normal(a.edge, p)) for p in spread(a.edge)]
         for _, b in gathered.near(a, ASIDE):
-            if a is not b:
+            if a is not b and b.may_hold_feet(a, gathered.value):
                 _from_samples(samples, b, gathered)
     return list(gathered.found.values())
 
@@ -87,13 +92,24 @@ class _Foot(NamedTuple):
 
 
 class _Side(NamedTuple):
-    """An edge with what the search asks of it again and again."""
+    """An edge with what the search asks of it again and again.
+
+    ``half`` is how far its ends lie from its middle, ``lean`` the sine of its half turn.
+    """
 
     edge: Edge
     box: Bounds
     middle: Point
     normal: Point
     half_turn: float
+    half: float
+    lean: float
+
+    def may_hold_feet(self, other: _Side, within: float) -> bool:
+        """Whether a normal of this edge may meet the other no farther off than ``within``."""
+        (x, y), (nx, ny) = self.middle, self.normal
+        aside = abs((other.middle[0] - x) * ny - (other.middle[1] - y) * nx)
+        return aside <= self.half + other.half + within * self.lean + BESIDE
 
     def feet(self, p: Point) -> list[_Foot]:
         """Points of the edge where its normal passes through ``p``."""
@@ -224,7 +240,8 @@ class _Gathered(_Narrowest):
         value = math.dist(p, q)
         if value > self.value:
             return
-        key = min((_rounded(p), _rounded(q)), (_rounded(q), _rounded(p)))
+        one, other = _rounded(p), _rounded(q)
+        key = (one, other) if one < other else (other, one)
         if key not in self.found and self._clear(p, q):
             self.found[key] = Width(value, p, q)
 
@@ -258,7 +275,9 @@ def _search(narrowest: _Narrowest) -> None:
     boundary = narrowest.boundary
     for i, a in enumerate(boundary.sides):
         for j, b in narrowest.near(a, SQUARE):
-            if j > i:
+            if j > i and (
+                a.may_hold_feet(b, narrowest.value) or b.may_hold_feet(a, narrowest.value)
+            ):
                 _between_edges(a, b, narrowest)
     _at_corners(boundary.corners, narrowest)
     for p, q in boundary.ends:
@@ -268,7 +287,9 @@ def _search(narrowest: _Narrowest) -> None:
 def _side(edge: Edge) -> _Side:
     middle = edge.at(0.5)
     half_turn = abs(edge.sweep) / 2 if isinstance(edge, Arc) else 0.0
-    return _Side(edge, edge.bounds, middle, left_normal(edge, middle), half_turn)
+    half = max(math.dist(middle, edge.start), math.dist(middle, edge.end))
+    lean = math.sin(min(half_turn, math.pi / 2))
+    return _Side(edge, edge.bounds, middle, left_normal(edge, middle), half_turn, half, lean)
 
 
 def _corners(contour: Contour) -> Iterator[_Corner | None]:

@@ -10,8 +10,8 @@ from collections import defaultdict
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from sbafab.geometry.facets import facets
 from sbafab.geometry.region import Region
-from sbafab.meshing.facets import facets
 
 if TYPE_CHECKING:
     import numpy as np

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point
+from sbafab.geometry.facets import ticks
 from sbafab.geometry.region import Region
 
 Cells = NDArray[np.bool_]
@@ -107,14 +108,7 @@ def _monotone(edge: Edge) -> list[Edge]:
     """The edge cut where it turns back in x or in y."""
     if not isinstance(edge, Arc):
         return [edge]
-    quarter = math.pi / 2
-    first, sweep = edge.start_angle / quarter, edge.sweep / quarter
-    low, high = sorted((first, first + sweep))
-    ticks = range(math.floor(low + 1e-9) + 1, math.ceil(high - 1e-9))
-    stops = [edge.on_circle(tick * quarter) for tick in ticks]
-    if sweep < 0:
-        stops.reverse()
-    corners = [edge.start, *stops, edge.end]
+    corners = [edge.start, *map(edge.on_circle, ticks([edge], math.pi / 2, 1e-9)), edge.end]
     return [edge.part(a, b) for a, b in zip(corners, corners[1:], strict=False)]
 
 

@@ -7,12 +7,12 @@ result is no function of the design: it is worth saving.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from sbafab.errors import SbafabError
-from sbafab.geometry.edges import Arc, Edge, Point
+from sbafab.geometry.edges import Point
+from sbafab.geometry.facets import run_chords
 from sbafab.geometry.region import Contour
 from sbafab.nesting.records import TURNS, NestPart, Placement, Stock, placed
 from sbafab.nesting.refusals import pins_unknown, too_tight
@@ -129,23 +129,4 @@ def _extent(part: NestPart, place: Placement) -> tuple[float, float]:
 
 def _outline(contour: Contour) -> list[Point]:
     """A polygon that holds the contour, nowhere more than ``SAGITTA`` outside it."""
-    points: list[Point] = []
-    for edge in contour.edges:
-        points.append(edge.start)
-        points += _around(edge)
-    return points
-
-
-def _around(edge: Edge) -> list[Point]:
-    """Corners between an edge's ends: of tangents outside a convex arc, on a concave one."""
-    if not isinstance(edge, Arc):
-        return []
-    half = math.acos(max(0.5, 1 / (1 + SAGITTA / edge.radius)))
-    count = max(1, math.ceil(abs(edge.sweep) / (2 * half)))
-    step = edge.sweep / count
-    if not edge.ccw:
-        return [edge.at(i / count) for i in range(1, count)]
-    radius = edge.radius / math.cos(step / 2)
-    angles = [edge.start_angle + (i + 0.5) * step for i in range(count)]
-    (x, y) = edge.centre
-    return [(x + radius * math.cos(angle), y + radius * math.sin(angle)) for angle in angles]
+    return [p for run in contour.runs for p in run_chords(run, True, SAGITTA)]

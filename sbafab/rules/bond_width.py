@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from sbafab.geometry.width import Width, least_width
+from sbafab.geometry.width import Width
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.alike import Alike, distinct_interfaces, interface_name
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at, holds
+from sbafab.rules.measures import Measures
 
 NAME = "bond-width"
 
-SHARP = 30.0
-"""Degrees: a sharper corner is a bond that tapers to nothing. Blunter ones are where a strip leaves
-its pocket aslant, between two edges of one void, and no way for a leak."""
 
-
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
     """The least width of any bond, measured between facing edges."""
+    measures = measures or Measures(laminate, limits)
     worst: tuple[float, Width | None, Alike] | None = None
     for alike in distinct_interfaces(laminate):
         bond = alike.interface.bond
-        width = None if bond.is_empty else least_width(bond, SHARP)
+        width = measures.bond(alike.interface)
         if width is None and not bond.is_empty:
             continue
         value = width.value if width else 0.0

@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from sbafab.geometry.arrangement import split_edges
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal
 from sbafab.geometry.intersect import line_circle
 from sbafab.geometry.nearby import EdgeIndex, widened
+from sbafab.geometry.pieces import by_owner, overlaid
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import spread
 
@@ -24,24 +24,12 @@ STEEP = 0.01
 
 def edges_along(region: Region, other: Region) -> list[Edge]:
     """The stretches of ``region``'s edges that run along edges of ``other``, the same way."""
-    edges = [*region.edges, *other.edges]
-    own = len(region.edges)
-    middles: dict[tuple[Point, Point], list[Point]] = {}
-    stretches: list[Edge] = []
-    for index, pieces in enumerate(split_edges(edges)):
-        if index < own:
-            stretches += pieces
-        else:
-            for piece in pieces:
-                middles.setdefault((piece.start, piece.end), []).append(piece.at(0.5))
-    return [
-        piece
-        for piece in stretches
-        if any(
-            math.dist(piece.at(0.5), middle) < 4 * EPSILON
-            for middle in middles.get((piece.start, piece.end), ())
-        )
-    ]
+    along = []
+    for edge, turns in overlaid([region.edges, other.edges]).pieces:
+        own, others = by_owner(turns, 2)
+        if own * others > 0:
+            along.append(edge if own > 0 else edge.reversed())
+    return along
 
 
 def beside(edge: Edge, distance: float) -> Point:
@@ -63,10 +51,12 @@ def outward_reach(edge: Edge, others: EdgeIndex) -> Reach | None:
 
     Measured in the band that the edge sweeps along its normals; None if nothing lies in it.
     """
+    if edge.length < END_ROOM:
+        return None
     band = _line_band(edge) if isinstance(edge, Line) else _arc_band(edge)
     margin = 1.0
     while True:
-        best = _nearest(band, others.touching(_swept(edge, margin)))
+        best = _nearest(band, _across(edge, margin, others.touching(_swept(edge, margin))))
         if best is not None and best.value <= margin:
             return best
         if others.all_within(widened(edge.bounds, margin)):
@@ -82,6 +72,25 @@ def _swept(edge: Edge, distance: float) -> Bounds:
     one, other = edge.bounds, moved.bounds
     low = min(one[0], other[0]), min(one[1], other[1])
     return widened((*low, max(one[2], other[2]), max(one[3], other[3])), END_ROOM)
+
+
+def _across(edge: Edge, distance: float, others: Iterable[Edge]) -> Iterable[Edge]:
+    """Those that may lie in the band beside an edge; all where it turns too far to tell quickly."""
+    moved = edge.offset(distance)
+    if moved is None or (isinstance(edge, Arc) and abs(edge.sweep) > 1.0):
+        return others
+    ux, uy = edge.direction(edge.at(0.5))
+    ends = [ux * x + uy * y for x, y in (edge.start, edge.end, moved.start, moved.end)]
+    low, high = min(ends) - END_ROOM, max(ends) + END_ROOM
+
+    def may_lie_in(other: Edge) -> bool:
+        (x0, y0), (x1, y1) = other.start, other.end
+        one, two = ux * x0 + uy * y0, ux * x1 + uy * y1
+        # An arc of at most half a turn reaches past its ends by half its chord at most.
+        room = math.dist((x0, y0), (x1, y1)) / 2 if isinstance(other, Arc) else 0.0
+        return max(one, two) >= low - room and min(one, two) <= high + room
+
+    return (other for other in others if may_lie_in(other))
 
 
 def _nearest(within: _Band, others: Iterable[Edge]) -> Reach | None:

@@ -26,29 +26,44 @@ from sbafab.rules import (
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import Limits
 from sbafab.rules.lowered import lowered
+from sbafab.rules.measures import Measures
 
 
 class Rule(NamedTuple):
     """A rule's stable name and the function that measures it."""
 
     name: str
-    check: Callable[[Laminate, Limits], list[Finding]]
+    check: Callable[[Measures], list[Finding]]
+
+
+def _alone(
+    check: Callable[[Laminate, Limits], list[Finding]],
+) -> Callable[[Measures], list[Finding]]:
+    """A rule that shares nothing with others."""
+    return lambda own: check(own.laminate, own.limits)
+
+
+def _sharing(
+    check: Callable[[Laminate, Limits, Measures], list[Finding]],
+) -> Callable[[Measures], list[Finding]]:
+    """A rule that asks for what others ask for as well."""
+    return lambda own: check(own.laminate, own.limits, own)
 
 
 RULES = (
-    Rule(bond_width.NAME, bond_width.check),
-    Rule(mask_overhang.NAME, mask_overhang.check),
-    Rule(facing_films.NAME, facing_films.check),
-    Rule(sealing.NAME, sealing.check),
-    Rule(channel_clear.NAME, channel_clear.check),
-    Rule(tube_fit.NAME, tube_fit.check),
-    Rule(piece_count.NAME, piece_count.check),
-    Rule(pin_holes.NAME, pin_holes.check),
-    Rule(film_limits.NAME, film_limits.check),
-    Rule(press_fit.NAME, press_fit.check),
-    Rule(registration_nominal.NAME, registration_nominal.check),
-    Rule(registration_worst_case.NAME, registration_worst_case.check),
-    Rule(registration_yield.NAME, registration_yield.check),
+    Rule(bond_width.NAME, _sharing(bond_width.check)),
+    Rule(mask_overhang.NAME, _sharing(mask_overhang.check)),
+    Rule(facing_films.NAME, _sharing(facing_films.check)),
+    Rule(sealing.NAME, _alone(sealing.check)),
+    Rule(channel_clear.NAME, _alone(channel_clear.check)),
+    Rule(tube_fit.NAME, _alone(tube_fit.check)),
+    Rule(piece_count.NAME, _alone(piece_count.check)),
+    Rule(pin_holes.NAME, _alone(pin_holes.check)),
+    Rule(film_limits.NAME, _alone(film_limits.check)),
+    Rule(press_fit.NAME, _alone(press_fit.check)),
+    Rule(registration_nominal.NAME, _alone(registration_nominal.check)),
+    Rule(registration_worst_case.NAME, _sharing(registration_worst_case.check)),
+    Rule(registration_yield.NAME, _sharing(registration_yield.check)),
 )
 
 
@@ -57,19 +72,27 @@ def run_deck(
 ) -> tuple[Finding, ...]:
     """What every rule finds, in the deck's order; failures the user waived say so."""
     findings: list[Finding] = []
+    measures = Measures(laminate, limits)
     for number, rule in enumerate(RULES):
         if progress is not None:
             progress(rule.name, number, len(RULES))
-        findings += run_rule(rule, laminate, limits)
+        findings += run_rule(rule, laminate, limits, measures)
     return tuple(findings)
 
 
-def run_rule(rule: Rule, laminate: Laminate, limits: Limits) -> list[Finding]:
-    """What one rule finds; failures the user waived and weakened limits say so."""
+def run_rule(
+    rule: Rule, laminate: Laminate, limits: Limits, measures: Measures | None = None
+) -> list[Finding]:
+    """What one rule finds; failures the user waived and weakened limits say so.
+
+    ``measures`` are those of the same laminate and limits, for rules that share them.
+    """
     weak = lowered(limits, rule.name)
     return [
         _waived(finding) if rule.name in limits.waive and finding.verdict == "fail" else finding
-        for finding in (_against(weak, found) for found in rule.check(laminate, limits))
+        for finding in (
+            _against(weak, found) for found in rule.check(measures or Measures(laminate, limits))
+        )
     ]
 
 

@@ -7,7 +7,7 @@ ones where those in between have ended or are open.
 
 from __future__ import annotations
 
-from functools import cache, lru_cache
+from functools import cache
 from typing import NamedTuple
 
 from sbafab.geometry.boolean import union
@@ -37,11 +37,10 @@ class _Seen(NamedTuple):
     region: Region
 
 
-@lru_cache(maxsize=1)
 def facing_films(laminate: Laminate) -> tuple[Facing, ...]:
     """Every pair of films, not next to each other, that face each other but in pins' openings.
 
-    Lowest upper film first. Equal shapes are laid on each other once. Cached: three rules use it.
+    Lowest upper film first. Equal shapes are laid on each other once.
     """
     found: list[Facing] = []
     seen: list[_Seen] = []
@@ -50,10 +49,15 @@ def facing_films(laminate: Laminate) -> tuple[Facing, ...]:
     for index, film in enumerate(films):
         left: list[_Seen] = []
         for below, region in seen:
+            if below is films[index - 1]:
+                rest = shapes.left_by_next(index, below, film)
+                if rest.contours:
+                    left.append(_Seen(below, rest))
+                continue
             shared, rest = shapes.laid(region, film.profile)
             if rest.contours:
                 left.append(_Seen(below, rest))
-            if shared.contours and below is not films[index - 1]:
+            if shared.contours:
                 gap, bare = shapes.kept_apart(shared, index, below, film)
                 if gap.masks or bare.contours:
                     found.append(Facing(gap, bare))
@@ -76,6 +80,13 @@ class _Shapes:
         """What a film covers of a region, and what it leaves."""
         shared = without_slivers(seen & film)
         return shared, self.minus(seen, film) if shared.contours else seen
+
+    def left_by_next(self, index: int, below: Layer, above: Layer) -> Region:
+        """What the film next to it leaves of a film; their contact is known."""
+        if below.pattern == above.pattern:
+            return Region()
+        contact = without_slivers(self.laminate.interfaces[index - 1].contact)
+        return self.minus(below.profile, above.profile) if contact.contours else below.profile
 
     def _minus(self, region: Region, other: Region) -> Region:
         return without_slivers(region - other)

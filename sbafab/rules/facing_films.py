@@ -18,10 +18,11 @@ from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import LOOSE, Laminate, Pin
 from sbafab.rules.alike import distinct_interfaces
 from sbafab.rules.boundary import beside, edges_along, outward_reach
-from sbafab.rules.facing import Facing, facing_films, without_slivers
+from sbafab.rules.facing import Facing, without_slivers
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, at, holds
-from sbafab.rules.mask_overhang import pin_at
+from sbafab.rules.margins import pin_at
+from sbafab.rules.measures import Measures
 
 NAME = "facing-films"
 
@@ -40,15 +41,16 @@ class _Overhang(NamedTuple):
     gap: Interface
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
     """The largest place where films weld that should not; with none, the least overhang there."""
-    pairs = _distinct(facing_films(laminate))
+    measures = measures or Measures(laminate, limits)
+    pairs = _distinct(measures.facing)
     welds = [*_past_films(pairs), *_at_rims(laminate)]
     if welds:
         return [_welded(welds, laminate)]
     message = "films of two balloons meet where they are meant to bond, and nowhere else"
     clear = Finding(NAME, "pass", 0.0, 0.0, "mm2", Place(), message)
-    overhangs = [o for pair, _ in pairs for o in _overhangs(pair.gap, laminate.pins)]
+    overhangs = [o for pair, _ in pairs for o in _overhangs(pair.gap, laminate.pins, measures)]
     return [clear, _least(overhangs, limits)] if overhangs else [clear]
 
 
@@ -94,11 +96,10 @@ def _is_ear(piece: Region, laminate: Laminate) -> bool:
     return False
 
 
-def _overhangs(gap: Interface, pins: tuple[Pin, ...]) -> Iterator[_Overhang]:
+def _overhangs(gap: Interface, pins: tuple[Pin, ...], measures: Measures) -> Iterator[_Overhang]:
     """How far the masks reach past the edges of either film where these face each other."""
-    for edge in edges_along(gap.unbonded, gap.contact):
-        reach = None if pin_at(edge, pins) else outward_reach(edge, gap.mask.index)
-        if reach is not None:
+    for edge, reach in measures.reaches(gap):
+        if not pin_at(edge, pins):
             yield _Overhang(reach.value, edge.nearest(reach.at), gap)
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 from sbafab.geometry.centroid import centroid
@@ -17,7 +16,13 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.assembly import AssemblyStep, assembly
 from sbafab.laminate.laminate import Laminate
+from sbafab.rules.boundary import beside
 from sbafab.rules.limits import Tolerances
+
+INSIDE = 0.05
+"""mm from an edge at which it is looked whether two shapes meet, before they are laid over."""
+BESIDE = 4
+"""Beside so many edges of each shape, about."""
 
 
 class Part(NamedTuple):
@@ -63,12 +68,10 @@ class Freedom(NamedTuple):
 Freedoms = Mapping[Part, tuple[Freedom, ...]]
 
 
-@lru_cache(maxsize=1)
 def freedoms(laminate: Laminate, tolerances: Tolerances) -> Freedoms:
     """All that each piece of each layer can do, from every step that it goes through.
 
-    Two pieces lie off each other by what one of them does and the other does not. Kept, for two
-    rules ask for the same.
+    Two pieces lie off each other by what one of them does and the other does not.
     """
     shapes = _Shapes(laminate)
     bodies = [[part] for layer in laminate.layers for part in shapes.parts(layer.index)]
@@ -161,7 +164,9 @@ class _Shapes:
         key = (self._pattern(a.layer), a.piece, self._pattern(b.layer), b.piece)
         if key not in self.overlaps:
             one, other = self._region(a), self._region(b)
-            self.overlaps[key] = _boxes_meet(one, other) and not (one & other).is_empty
+            self.overlaps[key] = _boxes_meet(one, other) and (
+                _plainly_meet(one, other) or not (one & other).is_empty
+            )
         return self.overlaps[key]
 
     def under(self, body: Sequence[Part], present: Sequence[Sequence[Part]]) -> Part | None:
@@ -199,6 +204,16 @@ class _Shapes:
         for part in sorted(home):
             merged.setdefault(first(home[part]), []).append(part)
         return list(merged.values())
+
+
+def _plainly_meet(a: Region, b: Region) -> bool:
+    """Whether a point beside one of some edges lies well inside both, so that they surely meet."""
+    for region in (a, b):
+        for edge in region.edges[:: max(1, len(region.edges) // BESIDE)]:
+            p = beside(edge, INSIDE)
+            if all(one.contains(p) and one.distance_to_edge(p) > INSIDE / 2 for one in (a, b)):
+                return True
+    return False
 
 
 def _boxes_meet(a: Region, b: Region) -> bool:

@@ -55,7 +55,12 @@ class Limits:
 
 def holds(measured: float, limit: float) -> bool:
     """Whether a value reaches a least limit, to within TOLERANCE (with room for rounding)."""
-    return measured >= limit - TOLERANCE - 1e-9
+    return measured >= least_held(limit)
+
+
+def least_held(limit: float) -> float:
+    """The least value that still holds a least limit."""
+    return limit - TOLERANCE - 1e-9
 
 
 def at(p: Point) -> str:

@@ -7,30 +7,32 @@ change along the normal there, which is linear in every cutting error, shift and
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import product
 from typing import Literal, NamedTuple
 
-from sbafab.geometry.edges import Edge, Point, distance_to, left_normal
+from sbafab.geometry.edges import Arc, Bounds, Edge, Point, distance_to, left_normal
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Region
-from sbafab.geometry.width import facing_pairs
+from sbafab.geometry.width import Width, facing_pairs
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate, Pin
-from sbafab.rules.bond_width import SHARP
-from sbafab.rules.boundary import edges_along, outward_reach, outward_samples
-from sbafab.rules.facing import facing_films
+from sbafab.rules.boundary import Reach, outward_samples
+from sbafab.rules.facing import Facing
 from sbafab.rules.freedoms import Freedom, Freedoms, Part
-from sbafab.rules.limits import Limits, holds
-from sbafab.rules.mask_overhang import pin_at
+from sbafab.rules.limits import TOLERANCE, Limits, holds
 
 Quantity = Literal["bond", "overhang"]
 QUANTITIES: tuple[Quantity, ...] = ("bond", "overhang")
 
 ON_EDGE = 1e-5
 """mm within which a point lies on an edge: booleans keep points to 4 nm, files to 1 nm."""
+SHARP = 30.0
+"""Degrees: a sharper corner is a bond that tapers to nothing. Blunter ones are where a strip leaves
+its pocket aslant, between two edges of one void, and no way for a leak."""
+ROOM = 1e-6
+"""mm: far more than the rounding of what is compared."""
 SQUARE = 0.9
 """Cosine above which an edge counts as square to a direction (within 25 degrees)."""
 
@@ -95,48 +97,45 @@ def seated(interface: Interface) -> tuple[int, ...]:
     )
 
 
-def pushes(margin: Margin, interface: Interface, moves: Freedoms) -> list[Push]:
-    """What can narrow a margin: the freedoms that one of its two edges has and the other not."""
+def felt(
+    owners: tuple[Owner, Owner], interface: Interface, moves: Freedoms
+) -> list[tuple[Freedom, bool]]:
+    """The freedoms that one of two edges has and the other not, and whether it is the end's."""
     layers = seated(interface)
-    start, end = (moves[Part(layers[o.seat], o.piece)] for o in margin.owners)
-    sides = ((start, end, margin.start, False), (end, start, margin.end, True))
+    start, end = (moves[Part(layers[o.seat], o.piece)] for o in owners)
     return [
-        Push(freedom, freedom.most * abs(freedom.lever(p, margin.normal)), at_end)
-        for own, other, p, at_end in sides
-        for freedom in _without(own, other)
+        *((freedom, False) for freedom in start if freedom not in end),
+        *((freedom, True) for freedom in end if freedom not in start),
     ]
 
 
-@lru_cache(maxsize=1024)
-def _without(own: tuple[Freedom, ...], other: tuple[Freedom, ...]) -> tuple[Freedom, ...]:
-    return tuple(freedom for freedom in own if freedom not in other)
+def pushes(margin: Margin, interface: Interface, moves: Freedoms) -> list[Push]:
+    """What can narrow a margin, and by how much."""
+    return [
+        Push(
+            freedom,
+            freedom.most
+            * abs(freedom.lever(margin.end if at_end else margin.start, margin.normal)),
+            at_end,
+        )
+        for freedom, at_end in felt(margin.owners, interface, moves)
+    ]
 
 
-def interface_margins(
-    laminate: Laminate, limits: Limits, moves: Freedoms
-) -> list[InterfaceMargins]:
-    """Every interface's narrow places: all that could become the least under the tolerances.
+def felt_alike(
+    laminate: Laminate, facing: Iterable[Facing], moves: Freedoms
+) -> list[list[Interface]]:
+    """Interfaces by equal profiles and equal freedoms.
 
     Films that face each other past a smaller balloon count as an interface of their own; where no
     mask lies between them, facing-films tells of it.
     """
     groups: dict[object, list[Interface]] = {}
-    faced = [pair.gap for pair in facing_films(laminate) if pair.bare.is_empty]
+    faced = [pair.gap for pair in facing if pair.bare.is_empty]
     for interface in (*laminate.interfaces, *faced):
         key = interface.pattern, interface.unbonded, _signature(interface, moves)
         groups.setdefault(key, []).append(interface)
-    return [
-        InterfaceMargins(
-            tuple(group),
-            _margins(
-                group[0],
-                laminate.pins,
-                limits.mask_overhang,
-                _slack(group[0], limits, moves),
-            ),
-        )
-        for group in groups.values()
-    ]
+    return list(groups.values())
 
 
 def own_freedoms(interface: Interface, moves: Freedoms) -> list[tuple[Freedom, ...]]:
@@ -160,32 +159,108 @@ def _signature(interface: Interface, moves: Freedoms) -> tuple[object, ...]:
     )
 
 
-def _slack(interface: Interface, limits: Limits, moves: Freedoms) -> float:
-    """More than any margin of the interface can lose."""
-    low_x, low_y, high_x, high_y = interface.contact.bounds
-    corners = [(x, y) for x in (low_x, high_x) for y in (low_y, high_y)]
-    loose = dict.fromkeys(f for own in own_freedoms(interface, moves) for f in own)
-    return 2 * limits.tolerances.cutting + sum(
-        freedom.most
-        * (1.0 if freedom.centre is None else max(math.dist(freedom.centre, p) for p in corners))
-        for freedom in loose
+class _Loss(NamedTuple):
+    """What margins of an interface can lose: no two edges more than ``most``, and ``all`` of what
+    moves together, cutting counted.
+    """
+
+    most: float
+    all: float
+    cutting: float
+
+    def slack(self, least: float, drawn: float, limit: float) -> float:
+        """How much wider than the ``least`` those are that could become the worst or come short.
+
+        Where the least is short as ``drawn``, those that are not count too.
+        """
+        if not holds(least, drawn):
+            return self.all
+        return min(self.all, self.most + max(0.0, limit + self.cutting - least) + ROOM)
+
+
+def _loss(interface: Interface, limits: Limits, moves: Freedoms) -> _Loss:
+    parts = _parts(interface)
+    own = own_freedoms(interface, moves)
+    reach = [
+        {freedom: freedom.most * _farthest(freedom, region.bounds) for freedom in found}
+        for region, found in zip(parts, own, strict=True)
+    ]
+    most = max(
+        sum(cost for freedom, cost in one.items() if freedom not in other)
+        + sum(cost for freedom, cost in other.items() if freedom not in one)
+        for one in reach
+        for other in reach
     )
+    loose = dict.fromkeys(freedom for found in own for freedom in found)
+    box = interface.contact.bounds
+    cutting = 2 * limits.tolerances.cutting
+    together = sum(freedom.most * _farthest(freedom, box) for freedom in loose)
+    return _Loss(most, cutting + together, cutting)
 
 
-@lru_cache(maxsize=64)
-def _margins(
-    interface: Interface, pins: tuple[Pin, ...], flush_below: float, slack: float
+def _parts(interface: Interface) -> list[Region]:
+    """The pieces of its layers, by seat."""
+    layers = (interface.below, interface.above, *interface.masks)
+    return [piece for layer in layers for piece in layer.profile.pieces]
+
+
+def _farthest(freedom: Freedom, box: Bounds) -> float:
+    """The longest lever of a turn in a box; 1 for a shift."""
+    if freedom.centre is None:
+        return 1.0
+    return max(math.dist(freedom.centre, (x, y)) for x in box[::2] for y in box[1::2])
+
+
+def narrow_places(
+    interface: Interface,
+    pins: tuple[Pin, ...],
+    limits: Limits,
+    moves: Freedoms,
+    bond: Width | None,
+    reaches: Sequence[tuple[Edge, Reach]],
 ) -> tuple[Margin, ...]:
-    """Kept, for two rules ask for the same."""
+    """All margins that could become the least under the tolerances, or come short of a limit.
+
+    ``bond`` is the least width of its bond, ``reaches`` how far its masks reach past film edges.
+    """
     if interface.contact.is_empty:
         return ()
     owners = _Owners(interface)
-    bonds = _bond_margins(interface, slack, owners)
-    return (*bonds, *_overhang_margins(interface, pins, flush_below, slack, owners))
+    loss = _loss(interface, limits, moves)
+    found: list[Margin] = []
+    if bond is not None:
+        slack = loss.slack(bond.value, limits.bond_width, limits.worst_bond_width)
+        found += _bond_margins(interface, bond, slack, owners)
+    flush = limits.mask_overhang
+    free = [
+        (edge, reach)
+        for edge, reach in reaches
+        if holds(reach.value, flush) or not pin_at(edge, pins)
+    ]
+    if free:
+        least = min(reach.value for _, reach in free)
+        slack = loss.slack(least, flush, limits.worst_mask_overhang)
+        found += _overhang_margins(interface.mask.index, free, slack, owners)
+    return tuple(found)
 
 
-def _bond_margins(interface: Interface, slack: float, owners: _Owners) -> Iterator[Margin]:
-    for width in facing_pairs(interface.bond, slack, SHARP):
+def pin_at(edge: Edge, pins: tuple[Pin, ...]) -> Pin | None:
+    """The pin that fills a bore with this edge."""
+    if not isinstance(edge, Arc) or edge.ccw:
+        return None
+    for pin in pins:
+        if (
+            math.dist(edge.centre, pin.centre) <= TOLERANCE
+            and abs(edge.radius - pin.diameter / 2) <= TOLERANCE
+        ):
+            return pin
+    return None
+
+
+def _bond_margins(
+    interface: Interface, least: Width, slack: float, owners: _Owners
+) -> Iterator[Margin]:
+    for width in facing_pairs(interface.bond, slack, SHARP, least):
         p, q = width.start, width.end
         normal = _unit(p, q)
         for pair in product(_at(p, normal, owners.every), _at(q, normal, owners.every)):
@@ -193,22 +268,17 @@ def _bond_margins(interface: Interface, slack: float, owners: _Owners) -> Iterat
 
 
 def _overhang_margins(
-    interface: Interface,
-    pins: tuple[Pin, ...],
-    flush_below: float,
-    slack: float,
-    owners: _Owners,
+    mask: EdgeIndex, free: Sequence[tuple[Edge, Reach]], slack: float, owners: _Owners
 ) -> list[Margin]:
-    """From film edges to the mask's; not where a pin fills the bore and a flush mask is meant."""
-    mask = interface.mask.index
+    """From film edges to the mask's, wherever it is at most ``slack`` farther than the nearest."""
     found: list[Margin] = []
-    for edge in edges_along(interface.unbonded, interface.contact):
-        least = outward_reach(edge, mask)
-        if least is None or (pin_at(edge, pins) and not holds(least.value, flush_below)):
+    within = min(reach.value for _, reach in free) + slack
+    for edge, least in free:
+        if least.value > within + ROOM:
             continue
         p = edge.nearest(least.at)
         nx, ny = left_normal(edge, p)
-        places = [(p, (-nx, -ny), least), *outward_samples(edge, mask, least.value + slack)]
+        places = [(p, (-nx, -ny), least), *outward_samples(edge, mask, within + ROOM)]
         for start, outward, reach in places:
             films = _at(start, outward, owners.films)
             for pair in product(films, _at(reach.at, outward, owners.masks)):

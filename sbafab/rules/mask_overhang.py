@@ -6,16 +6,16 @@ meant (the pin holds all layers by it); it is reported as waived, by the pin's n
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
-from sbafab.geometry.edges import Arc, Edge, Point
+from sbafab.geometry.edges import Point
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate, Pin
 from sbafab.rules.alike import Alike, distinct_interfaces, interface_name
-from sbafab.rules.boundary import edges_along, outward_reach
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import TOLERANCE, Limits, at, holds
+from sbafab.rules.limits import Limits, at, holds
+from sbafab.rules.margins import pin_at
+from sbafab.rules.measures import Measures
 
 NAME = "mask-overhang"
 
@@ -26,15 +26,17 @@ class _Overhang(NamedTuple):
     alike: Alike
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
     """The least reach of any mask past an edge that bounds unbonded film, and pins' waivers."""
+    measures = measures or Measures(laminate, limits)
     free: list[_Overhang] = []
     pinned: dict[str, list[_Overhang]] = {}
     bare: list[Alike] = []
     for alike in distinct_interfaces(laminate):
         if alike.interface.kind != "bond" and alike.interface.unbonded.is_empty:
             bare.append(alike)
-        for edge, overhang in _overhangs(alike):
+        for edge, reach in measures.reaches(alike.interface):
+            overhang = _Overhang(reach.value, edge.nearest(reach.at), alike)
             pin = pin_at(edge, laminate.pins)
             if pin is not None and not holds(overhang.value, limits.mask_overhang):
                 pinned.setdefault(pin.name, []).append(overhang)
@@ -42,28 +44,6 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
                 free.append(overhang)
     waived = [_waived(pin, pinned[pin.name], limits) for pin in laminate.pins if pin.name in pinned]
     return [_main(free, bare, limits), *waived]
-
-
-def _overhangs(alike: Alike) -> list[tuple[Edge, _Overhang]]:
-    interface = alike.interface
-    found = []
-    for edge in edges_along(interface.unbonded, interface.contact):
-        reach = outward_reach(edge, interface.mask.index)
-        if reach is not None:
-            found.append((edge, _Overhang(reach.value, edge.nearest(reach.at), alike)))
-    return found
-
-
-def pin_at(edge: Edge, pins: tuple[Pin, ...]) -> Pin | None:
-    if not isinstance(edge, Arc) or edge.ccw:
-        return None
-    for pin in pins:
-        if (
-            math.dist(edge.centre, pin.centre) <= TOLERANCE
-            and abs(edge.radius - pin.diameter / 2) <= TOLERANCE
-        ):
-            return pin
-    return None
 
 
 def _main(free: list[_Overhang], bare: list[Alike], limits: Limits) -> Finding:

@@ -7,21 +7,25 @@ holds by what a hand may misplace and turn it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.alike import Alike, interface_name
 from sbafab.rules.finding import Finding, Place, Verdict
-from sbafab.rules.freedoms import Freedom, freedoms
-from sbafab.rules.limits import Limits, Tolerances, at, holds
-from sbafab.rules.margins import Margin, Push, Quantity, interface_margins, pushes
+from sbafab.rules.forms import Form
+from sbafab.rules.freedoms import Freedom, Freedoms
+from sbafab.rules.limits import Limits, Tolerances, at, holds, least_held
+from sbafab.rules.margins import InterfaceMargins, Margin, Push, Quantity, pushes
+from sbafab.rules.measures import Measures
 
 NAME = "registration-worst-case"
 
 WHAT: dict[Quantity, str] = {"bond": "bond", "overhang": "overhang of a mask past a film edge"}
 REMEDY: dict[Quantity, str] = {"bond": "bond.width", "overhang": "mask.overhang"}
+SAME = 1e-8
+"""mm: of values that differ by less, the first is the worst if they are equal when rounded."""
 
 
 class Remaining(NamedTuple):
@@ -42,45 +46,50 @@ class Remaining(NamedTuple):
         return Alike(self.interfaces[0], len(self.interfaces))
 
 
-def least_remaining(laminate: Laminate, limits: Limits) -> list[Remaining]:
+def least_remaining(
+    laminate: Laminate, limits: Limits, measures: Measures | None = None
+) -> list[Remaining]:
     """The worst place of every interface (one of each that are alike) for bond and overhang."""
-    moves = freedoms(laminate, limits.tolerances)
+    measures = measures or Measures(laminate, limits)
     found: list[Remaining] = []
-    for group in interface_margins(laminate, limits, moves):
+    for group, forms in zip(measures.margins, measures.forms, strict=True):
         for quantity in WHAT:
-            places = [
-                _remaining(margin, group.interfaces, pushes(margin, group.first, moves), limits)
-                for margin in group.margins
-                if margin.quantity == quantity
-            ]
-            if places:
-                worst = min(places, key=lambda place: round(place.worst, 9))
-                drawn = limits.bond_width if quantity == "bond" else limits.mask_overhang
-                pinned = min(
-                    (place.pinned for place in places if holds(place.margin.nominal, drawn)),
-                    default=math.inf,
-                )
-                found.append(worst._replace(pinned=pinned))
+            own = [form for form in forms if form.quantity == quantity]
+            if own:
+                found.append(_least(group, own, measures.moves, limits))
     return found
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
     """The least remaining bond and overhang, each with its place and the largest contribution."""
-    found = least_remaining(laminate, limits)
+    found = least_remaining(laminate, limits, measures)
     return [
         _finding("bond", limits.worst_bond_width, found, limits, laminate),
         _finding("overhang", limits.worst_mask_overhang, found, limits, laminate),
     ]
 
 
-def _remaining(
-    margin: Margin, interfaces: tuple[Interface, ...], found: list[Push], limits: Limits
+def _least(
+    group: InterfaceMargins, forms: Sequence[Form], moves: Freedoms, limits: Limits
 ) -> Remaining:
-    # Both edges are cut: two contours, or one that is off on either side.
-    cut = margin.nominal - 2 * limits.tolerances.cutting
-    pinned = cut - sum(push.cost for push in found if not push.freedom.by_hand)
-    worst = cut - sum(push.cost for push in found)
-    return Remaining(worst, pinned, margin, interfaces, tuple(found))
+    """What is left at the worst of one quantity's margins; the first of those that are equal."""
+    drawn = limits.bond_width if forms[0].quantity == "bond" else limits.mask_overhang
+    pinned = math.inf
+    places: list[tuple[float, int, float]] = []
+    for form in forms:
+        # Both edges are cut: two contours, or one that is off on either side.
+        cut = form.nominal - 2 * limits.tolerances.cutting
+        held = (cut - form.loss(by_hand=False))[form.nominal >= least_held(drawn)]
+        pinned = min(pinned, held.min(initial=math.inf))
+        worst = cut - form.loss()
+        places += [
+            (round(float(worst[i]), 9), int(form.numbers[i]), float(worst[i]))
+            for i in (worst <= worst.min() + SAME).nonzero()[0]
+        ]
+    _, number, value = min(places)
+    margin = group.margins[number]
+    found = pushes(margin, group.first, moves)
+    return Remaining(value, float(pinned), margin, group.interfaces, tuple(found))
 
 
 def _finding(

@@ -7,32 +7,19 @@ assumed: every cutting error and turn uniform within its most, every shift unifo
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.finding import Finding, Place, Verdict
-from sbafab.rules.freedoms import Freedom, Freedoms, freedoms
-from sbafab.rules.limits import TOLERANCE, Limits
-from sbafab.rules.margins import (
-    QUANTITIES,
-    Margin,
-    Push,
-    Quantity,
-    interface_margins,
-    own_freedoms,
-    pushes,
-    seated,
-)
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Bools = NDArray[np.bool_]
+from sbafab.rules.forms import Form
+from sbafab.rules.freedoms import Freedom, Freedoms
+from sbafab.rules.limits import Limits
+from sbafab.rules.margins import QUANTITIES, Quantity, own_freedoms, seated
+from sbafab.rules.measures import Measures
+from sbafab.rules.random_builds import Contour, Draws, Error, Rows, kept, rows_of
 
 NAME = "registration-yield"
 
@@ -72,35 +59,17 @@ class Yield:
     quantities: dict[Quantity, Share]
 
 
-class _Contour(NamedTuple):
-    """A cut contour: by how far its film reaches beyond the nominal edge."""
-
-    layer: int
-    contour: int
-
-
-_Error = _Contour | Freedom
-
-
-class _Row(NamedTuple):
-    """What is left at a margin beyond its limit: ``room`` and a sum over what is drawn."""
-
-    quantity: Quantity
-    room: float
-    terms: tuple[tuple[_Error, tuple[float, ...]], ...]
-
-
 @dataclass(frozen=True)
 class _Group:
     """Rows of the first of some alike interfaces; for each, its own errors by the first's."""
 
-    rows: tuple[_Row, ...]
-    own: dict[int, dict[_Error, _Error]]
+    rows: dict[Quantity, tuple[Rows, ...]]
+    own: dict[int, dict[Error, Error]]
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
     """The share of good builds, against ``target_yield`` if one is asked for."""
-    found = simulate(laminate, limits)
+    found = simulate(laminate, limits, SEED, measures)
     low, high = found.whole.interval
     target = limits.target_yield
     verdict: Verdict = "pass"
@@ -125,19 +94,43 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     return [Finding(NAME, verdict, target, found.whole.value, "", place, message)]
 
 
-def simulate(laminate: Laminate, limits: Limits, seed: int = SEED) -> Yield:
+def simulate(
+    laminate: Laminate, limits: Limits, seed: int = SEED, measures: Measures | None = None
+) -> Yield:
     """Random builds of a laminate; the same seed gives the same shares."""
-    moves = freedoms(laminate, limits.tolerances)
+    measures = measures or Measures(laminate, limits)
     groups = []
-    for alike in interface_margins(laminate, limits, moves):
-        rows = tuple(_rows(alike.first, alike.margins, limits, moves))
-        errors = list(dict.fromkeys(error for row in rows for error, _ in row.terms))
+    for alike, forms in zip(measures.margins, measures.forms, strict=True):
+        rows = _rows(forms, seated(alike.first), limits)
+        errors = _in_order(rows)
         own = {
-            interface.index: _renamed(errors, alike.first, interface, moves)
+            interface.index: _renamed(errors, alike.first, interface, measures.moves)
             for interface in alike.interfaces
         }
         groups.append(_Group(rows, own))
     return _counted(groups, limits, seed)
+
+
+def _rows(
+    forms: Iterable[Form], layers: Sequence[int], limits: Limits
+) -> dict[Quantity, tuple[Rows, ...]]:
+    """The rows of an interface by quantity, those of the first margins first."""
+    limit = {"bond": limits.worst_bond_width, "overhang": limits.worst_mask_overhang}
+    found = [
+        rows_of(form, layers, limit[form.quantity], limits.tolerances.cutting) for form in forms
+    ]
+    ordered = sorted((one for one in found if one is not None), key=lambda one: one[0])
+    return {
+        quantity: tuple(rows for _, rows in ordered if rows.quantity == quantity)
+        for quantity in QUANTITIES
+    }
+
+
+def _in_order(rows: Mapping[Quantity, Iterable[Rows]]) -> list[Error]:
+    """All errors, in the order in which they are drawn."""
+    return list(
+        dict.fromkeys(error for some in rows.values() for one in some for error in one.errors)
+    )
 
 
 def _counted(groups: Sequence[_Group], limits: Limits, seed: int) -> Yield:
@@ -151,16 +144,17 @@ def _counted(groups: Sequence[_Group], limits: Limits, seed: int) -> Yield:
     wanted = limits.yield_builds or _quick_number(len(interfaces))
     for first in range(0, wanted, BATCH):
         builds = min(BATCH, wanted - first)
-        draws = _Draws(generator, builds, limits.tolerances.cutting)
+        draws = Draws(generator, builds, limits.tolerances.cutting)
         good_of = {quantity: np.ones(builds, dtype=bool) for quantity in QUANTITIES}
         good_at = {index: np.ones(builds, dtype=bool) for index in interfaces}
         for group in groups:
             for index, own in group.own.items():
-                for quantity in QUANTITIES:
-                    rows = (row for row in group.rows if row.quantity == quantity)
-                    kept = _kept(rows, own, draws)
-                    good_of[quantity] &= kept
-                    good_at[index] &= kept
+                for error in own.values():
+                    draws.of(error)
+                for quantity, rows in group.rows.items():
+                    good = kept(rows, own, draws)
+                    good_of[quantity] &= good
+                    good_at[index] &= good
         whole += int(np.logical_and.reduce(list(good_of.values())).sum())
         quantities = {name: total + int(good_of[name].sum()) for name, total in quantities.items()}
         interfaces = {i: total + int(good_at[i].sum()) for i, total in interfaces.items()}
@@ -176,104 +170,21 @@ def _quick_number(interfaces: int) -> int:
     return max(1000, min(10_000, 300_000 // max(1, interfaces)))
 
 
-def _kept(rows: Iterable[_Row], own: dict[_Error, _Error], draws: _Draws) -> Bools:
-    """In which builds an interface, with its own errors, keeps room at all of the rows.
-
-    Sums are taken row by row: a matrix product would round differently on another machine.
-    """
-    import numpy as np
-
-    kept = np.ones(draws.builds, dtype=bool)
-    for row in rows:
-        left = np.full(draws.builds, row.room)
-        for error, factors in row.terms:
-            for factor, drawn in zip(factors, draws.of(own[error]), strict=True):
-                left += factor * drawn
-        kept &= left >= -TOLERANCE
-    return kept
-
-
-class _Draws:
-    """The errors of a batch of builds, each drawn when it is first asked for."""
-
-    def __init__(self, generator: np.random.Generator, builds: int, cutting: float) -> None:
-        self.generator = generator
-        self.builds = builds
-        self.cutting = cutting
-        self.drawn: dict[_Error, Floats] = {}
-
-    def of(self, error: _Error) -> Floats:
-        """X and y of a shift, or the one value of a cutting error or turn, for every build."""
-        if error not in self.drawn:
-            self.drawn[error] = self._draw(error)
-        return self.drawn[error]
-
-    def _draw(self, error: _Error) -> Floats:
-        import numpy as np
-
-        if isinstance(error, Freedom) and error.centre is None:
-            # Uniform over a disc: the radius goes with the root.
-            radius = error.most * np.sqrt(self.generator.random(self.builds))
-            angle = math.tau * self.generator.random(self.builds)
-            return np.vstack([radius * np.cos(angle), radius * np.sin(angle)])
-        most = error.most if isinstance(error, Freedom) else self.cutting
-        return self.generator.uniform(-most, most, (1, self.builds))
-
-
 def _renamed(
-    errors: Iterable[_Error], first: Interface, other: Interface, moves: Freedoms
-) -> dict[_Error, _Error]:
+    errors: Iterable[Error], first: Interface, other: Interface, moves: Freedoms
+) -> dict[Error, Error]:
     """Which errors of an interface stand where those of an alike one do."""
     layers = dict(zip(seated(first), seated(other), strict=True))
-    twins: dict[_Error, Freedom] = {}
+    twins: dict[Error, Freedom] = {}
     pairs = zip(own_freedoms(first, moves), own_freedoms(other, moves), strict=True)
     for ours, theirs in pairs:
         twins.update(zip(ours, theirs, strict=True))
     return {
         error: twins[error]
         if isinstance(error, Freedom)
-        else _Contour(layers[error.layer], error.contour)
+        else Contour(layers[error.layer], error.contour)
         for error in errors
     }
-
-
-def _rows(
-    interface: Interface, margins: Iterable[Margin], limits: Limits, moves: Freedoms
-) -> list[_Row]:
-    """The margins that can come short at all; of those that feel all errors alike, the least."""
-    limit_of = {"bond": limits.worst_bond_width, "overhang": limits.worst_mask_overhang}
-    layers = seated(interface)
-    found: dict[object, _Row] = {}
-    for margin in margins:
-        room = margin.nominal - limit_of[margin.quantity]
-        felt_by = pushes(margin, interface, moves)
-        loss = sum(push.cost for push in felt_by)
-        if room - 2 * limits.tolerances.cutting - loss < -TOLERANCE:
-            row = _Row(margin.quantity, room, tuple(_terms(margin, layers, felt_by)))
-            felt = tuple((error, *(round(f, 3) for f in factors)) for error, factors in row.terms)
-            known = found.get((margin.quantity, felt))
-            if known is None or room < known.room:
-                found[margin.quantity, felt] = row
-    return list(found.values())
-
-
-def _terms(
-    margin: Margin, layers: Sequence[int], found: Iterable[Push]
-) -> Iterator[tuple[_Error, tuple[float, ...]]]:
-    """What widens the margin, and by how much for each unit of it."""
-    nx, ny = margin.normal
-    for owner in margin.owners:
-        # More film widens a bond, more mask an overhang.
-        widens = owner.is_film == (margin.quantity == "bond")
-        yield _Contour(layers[owner.seat], owner.contour), (1.0 if widens else -1.0,)
-    for push in found:
-        sign = 1.0 if push.at_end else -1.0
-        freedom = push.freedom
-        if freedom.centre is None:
-            yield freedom, (sign * nx, sign * ny)
-        else:
-            p = margin.end if push.at_end else margin.start
-            yield freedom, (sign * freedom.lever(p, margin.normal),)
 
 
 def _by_interface(found: Yield) -> str:

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
+from sbafab.geometry.boolean import tidy
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import rectangle
@@ -81,7 +82,7 @@ def void_graph(laminate: Laminate) -> VoidGraph:
     low_x, low_y, high_x, high_y = laminate.bounds
     frame = rectangle((low_x - 10, low_y - 10), (high_x + 10, high_y + 10))
     openings = {
-        pattern: (frame - layers[0].profile).pieces
+        pattern: _around(layers[0].profile, frame).pieces
         for pattern, layers in laminate.patterns.items()
         if not layers[0].is_mask
     }
@@ -109,13 +110,28 @@ def void_graph(laminate: Laminate) -> VoidGraph:
 
 def _gap(interface: Interface, frame: Region) -> _Gap:
     unbonded = interface.unbonded.pieces
-    missing = (frame - interface.contact).pieces
+    missing = _around(interface.contact, frame).pieces
     touching = []
     for number, piece in enumerate(unbonded):
         for edge in edges_along(piece, interface.contact):
             home = _holding(missing, beside(edge, -INSET))
             touching.append((number, home, edge.at(0.5)))
     return _Gap(unbonded, missing, tuple(touching), _outside(missing, frame))
+
+
+def _around(region: Region, frame: Region) -> Region:
+    """What is left of a frame that lies well outside the region: the contours, turned round."""
+    starts = {edge.start for edge in region.edges}
+    if len(starts) < len(region.edges):
+        # Where contours touch at a point, what they leave may hang together otherwise.
+        return frame - region
+    turned = (tidy(contour.reversed().edges) for contour in region.contours)
+    contours = [*frame.contours, *(contour for contour in turned if contour is not None)]
+    return Region(tuple(sorted(contours, key=lambda c: (c.is_hole, *map(_to_nm, c.bounds[:3])))))
+
+
+def _to_nm(value: float) -> float:
+    return round(value, 6)
 
 
 def _add_gap(graph: VoidGraph, interface: Interface, gap: _Gap, inlets: tuple[Inlet, ...]) -> None:

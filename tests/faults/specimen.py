@@ -26,6 +26,8 @@ from sbafab.laminate.interfaces import interface_regions
 from sbafab.laminate.laminate import Laminate, Layer, Role
 from sbafab.output import run
 from sbafab.output.manifest import manifest
+from sbafab.output.planned import Checked, Planned
+from sbafab.output.settings import cut_settings
 from sbafab.rules import registration_worst_case, registration_yield
 from sbafab.rules.deck import RULES, run_deck
 from tests.as_built.doctoring import Doctor
@@ -63,7 +65,9 @@ class Specimen:
         """The manifest claims what lies on disk, so that only the geometry gives a fault away."""
         built = read_folder(self.doctor.folder)
         if built.laminate is not None:
-            told = manifest(built.design, built.laminate, built.claims.waived, None, (), ())
+            checked = Checked(built.design, built.laminate, ())
+            planned = Planned(checked, frozenset(), cut_settings(built.design, ()))
+            told = manifest(planned, (), ())
             self.doctor.set_manifest(lambda claims: _retold(claims, told))
         self.doctor.rehash()
 

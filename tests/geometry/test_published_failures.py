@@ -3,7 +3,8 @@
 Each is held against shapely on fine chords and against single points, as in the hunt. OCCT 191 and
 cavalier_contours 20 give no coordinates: a circle of OCCT 1452 and two arcs that overlap in part
 stand for them. Of the larger outline in cavalier_contours 42 the corners near the smaller one are
-taken, and its far end is closed with one straight edge.
+taken, and its far end is closed with one straight edge. JTS 1195, on the noding of curves, gives no
+coordinates: the failures of the same noder in GEOS, its port, stand for it.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import disc, rectangle
 from tests.hunt.oracle import OPERATIONS, complaint, offset_complaint
 
+QUARTER = math.tan(math.pi / 8)
+"""Bulge of a quarter circle."""
 Vertices = list[tuple[float, float, float]]
 
 
@@ -80,6 +83,31 @@ PAIRS: dict[str, tuple[Vertices, Vertices]] = {
     "CavalierContours 71": (
         [(100, 200, -1), (120, 200, 0), (120, 100, -1), (100, 100, 0)],
         [(110, 190, -1), (110, 210, 0), (210, 210, -1), (210, 190, 0)],
+    ),
+    # Cutting one by the other lost the curved part: they share half a circle.
+    "GEOS 1497": (
+        [(5, 0, 0), (0, 0, 0), (0, 5, 0), (5, 5, -1)],
+        [(5, 0, 0), (0, 0, 0), (5, 5, -1)],
+    ),
+    # A disc and itself were refused, for an end of an arc came out as a point inside it.
+    "GEOS 1510": (
+        [(-1, 0, -QUARTER), (0, 1, -QUARTER), (1, 0, -QUARTER), (0, -1, -QUARTER)],
+        [(-1, 0, -QUARTER), (0, 1, -QUARTER), (1, 0, -QUARTER), (0, -1, -QUARTER)],
+    ),
+    # A clover of half circles; the other shape touches none of its edges but was said to.
+    "GEOS 1456": (
+        [
+            *[(3, 19, -1), (3, 25, -1), (9, 25, 0), (14, 20, 0)],
+            *[(19, 25, -1), (25, 25, -1), (25, 19, 0), (20, 14, 0)],
+            *[(25, 9, -1), (25, 3, -1), (19, 3, 0), (14, 8, 0)],
+            *[(9, 3, -1), (3, 3, -1), (3, 9, 0), (8, 14, 0)],
+        ],
+        [(0, 0, 0), (1, 1, 0), (0, 1, 0)],
+    ),
+    # A disc in a square touches all four sides: straight on was taken for a turn.
+    "MobilityDB 2629": (
+        [(0, 0, 0), (4, 0, 0), (4, 4, 0), (0, 4, 0)],
+        [(2, 0, QUARTER), (4, 2, QUARTER), (2, 4, QUARTER), (0, 2, QUARTER)],
     ),
 }
 

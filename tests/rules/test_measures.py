@@ -18,6 +18,7 @@ from sbafab.rules import (
     channel_clear,
     film_limits,
     mask_overhang,
+    measures,
     piece_count,
     press_fit,
     sealing,
@@ -277,9 +278,9 @@ def test_a_laminate_may_lie_either_way_round(good: Good) -> None:
         assert press_fit.check(laminate, limits)[0].verdict == verdict
 
 
-@pytest.mark.parametrize("module", [bond_width, film_limits])
+@pytest.mark.parametrize(("rule", "module"), [(bond_width, measures), (film_limits, film_limits)])
 def test_equal_profiles_are_measured_once(
-    module: object, good: Good, monkeypatch: pytest.MonkeyPatch
+    rule: object, module: object, good: Good, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     measured: list[Region] = []
     original = module.least_width
@@ -292,6 +293,6 @@ def test_equal_profiles_are_measured_once(
     counts = []
     for balloons in (4, 40):
         measured.clear()
-        module.check(good("1dof-5mm", f"stack.balloons={balloons}"), LIMITS)
+        rule.check(good("1dof-5mm", f"stack.balloons={balloons}"), LIMITS)
         counts.append(len(measured))
     assert counts[0] == counts[1] > 0

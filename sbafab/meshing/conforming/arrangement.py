@@ -7,15 +7,15 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from sbafab.geometry.arrangement import split_edges
+from sbafab.geometry.arrangement import Arrangement
+from sbafab.geometry.boolean import arranged
 from sbafab.geometry.edges import Edge, Point, edge_from_bulge
+from sbafab.geometry.pieces import by_owner
 from sbafab.geometry.region import Region
 
 Label = tuple[bool, ...]
 """For each region, whether it covers a cell of the plane."""
 
-SAME = 1e-5
-"""Middles of two edges with common ends nearer than this, in mm, are of one edge."""
 CUSP = math.radians(8.0)
 """Edges that leave a point at less than this angle are joined for as far as they are near."""
 NEAR = 0.03
@@ -42,39 +42,21 @@ def arrangement(regions: Sequence[Region], h: float) -> list[Border]:
     Where two edges leave a point in one direction (a fillet and the outline it runs into) they
     are one until they are a small part of ``h`` mm apart, so that no cell ends in a cusp.
     """
-    edges = [edge for region in regions for edge in region.edges]
-    owner = [index for index, region in enumerate(regions) for _ in region.edges]
-    found: defaultdict[tuple[Point, Point], list[tuple[Edge, dict[int, int]]]] = defaultdict(list)
-    for index, pieces in enumerate(split_edges(edges)):
-        for piece in pieces:
-            ends = min(piece.start, piece.end), max(piece.start, piece.end)
-            _file(found[ends], piece, owner[index])
-    borders = [
-        _labelled(piece, cover, regions) for entries in found.values() for piece, cover in entries
-    ]
-    return _without_cusps(
-        [border for border in borders if border.left != border.right], min(h, COARSE)
-    )
+
+    def labelled(found: Arrangement) -> list[Border]:
+        sides = [_label(turns, len(regions)) for turns in found.left]
+        return [
+            Border(piece.edge, left, right)
+            for piece, left, right in zip(found.pieces, sides[::2], sides[1::2], strict=True)
+            if left != right
+        ]
+
+    borders = arranged([region.edges for region in regions], labelled)
+    return _without_cusps(borders, min(h, COARSE))
 
 
-def _file(entries: list[tuple[Edge, dict[int, int]]], piece: Edge, owner: int) -> None:
-    for other, cover in entries:
-        if math.dist(piece.at(0.5), other.at(0.5)) < SAME:
-            same_way = math.dist(other.start, piece.start) <= math.dist(other.start, piece.end)
-            cover[owner] = cover.get(owner, 0) + (1 if same_way else -1)
-            return
-    entries.append((piece, {owner: 1}))
-
-
-def _labelled(piece: Edge, cover: dict[int, int], regions: Sequence[Region]) -> Border:
-    middle = piece.at(0.5)
-    left, right = [], []
-    for index, region in enumerate(regions):
-        turns = cover.get(index, 0)
-        inside = index not in cover and region.contains(middle)
-        left.append(turns > 0 or inside)
-        right.append(turns < 0 or inside)
-    return Border(piece, tuple(left), tuple(right))
+def _label(turns: int, regions: int) -> Label:
+    return tuple(count > 0 for count in by_owner(turns, regions))
 
 
 def _without_cusps(borders: list[Border], h: float) -> list[Border]:

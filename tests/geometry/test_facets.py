@@ -4,9 +4,9 @@ import math
 
 import pytest
 
+from sbafab.geometry.facets import facets
 from sbafab.geometry.region import Contour
 from sbafab.geometry.shapes import circle, disc, rectangle, stadium
-from sbafab.meshing.facets import facets
 
 
 def shoelace(points: list[tuple[float, float]]) -> float:

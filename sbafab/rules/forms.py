@@ -1,0 +1,98 @@
+"""What is left at every margin as a linear form of all that may be off, in arrays.
+
+Margins between edges of the same two contours feel the same errors: they differ in how wide they
+are drawn, in their normal, and in the levers of what turns. Worst case and yield read these forms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from sbafab.laminate.interfaces import Interface
+from sbafab.rules.freedoms import Freedom, Freedoms
+from sbafab.rules.margins import Margin, Owner, Quantity, felt
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Form:
+    """Margins with the same two owners of their edges, in the order they were found.
+
+    ``numbers`` are their places among all margins of the interface, ``nominal`` (mm) and ``normal``
+    (2 rows) one column each. ``felt`` is what one of the edges does and the other not, whether it
+    acts at the end, and the levers (mm per radian) of what turns, None for what shifts.
+    """
+
+    quantity: Quantity
+    owners: tuple[Owner, Owner]
+    numbers: Indices
+    nominal: Floats
+    normal: Floats
+    felt: tuple[tuple[Freedom, bool, Floats | None], ...]
+
+    def loss(self, by_hand: bool = True) -> Floats:
+        """The most that all of it takes from each margin, mm; or all but what the hand does."""
+        import numpy as np
+
+        total = np.zeros(len(self.nominal))
+        for freedom, _, levers in self.felt:
+            if by_hand or not freedom.by_hand:
+                total += freedom.most if levers is None else freedom.most * np.abs(levers)
+        return total
+
+
+def linear_forms(
+    margins: Sequence[Margin], interface: Interface, moves: Freedoms
+) -> tuple[Form, ...]:
+    """The margins of an interface by quantity and owners, in the order of their first."""
+    groups: dict[tuple[Quantity, tuple[Owner, Owner]], list[int]] = {}
+    for number, margin in enumerate(margins):
+        groups.setdefault((margin.quantity, margin.owners), []).append(number)
+    return tuple(
+        _form(quantity, owners, numbers, margins, interface, moves)
+        for (quantity, owners), numbers in groups.items()
+    )
+
+
+def _form(
+    quantity: Quantity,
+    owners: tuple[Owner, Owner],
+    numbers: Sequence[int],
+    margins: Sequence[Margin],
+    interface: Interface,
+    moves: Freedoms,
+) -> Form:
+    import numpy as np
+
+    own = [margins[number] for number in numbers]
+    normal = np.array([margin.normal for margin in own]).T
+    start = np.array([margin.start for margin in own]).T
+    end = np.array([margin.end for margin in own]).T
+    return Form(
+        quantity,
+        owners,
+        np.array(numbers),
+        np.array([margin.nominal for margin in own]),
+        normal,
+        tuple(
+            (freedom, at_end, _levers(freedom, end if at_end else start, normal))
+            for freedom, at_end in felt(owners, interface, moves)
+        ),
+    )
+
+
+def _levers(freedom: Freedom, p: Floats, normal: Floats) -> Floats | None:
+    """What ``Freedom.lever`` says, for many points and normals."""
+    if freedom.centre is None:
+        return None
+    x, y = freedom.centre
+    levers: Floats = (p[0] - x) * normal[1] - (p[1] - y) * normal[0]
+    return levers

@@ -1,0 +1,77 @@
+"""What several rules ask of one laminate under one set of limits, each worked out once."""
+
+from __future__ import annotations
+
+from functools import cache, cached_property
+
+from sbafab.geometry.edges import Edge
+from sbafab.geometry.region import Region
+from sbafab.geometry.width import Width, least_width
+from sbafab.laminate.interfaces import Interface
+from sbafab.laminate.laminate import Laminate
+from sbafab.rules.boundary import Reach, edges_along, outward_reach
+from sbafab.rules.facing import Facing, facing_films
+from sbafab.rules.forms import Form, linear_forms
+from sbafab.rules.freedoms import Freedoms, freedoms
+from sbafab.rules.limits import Limits
+from sbafab.rules.margins import SHARP, InterfaceMargins, felt_alike, narrow_places
+
+
+class Measures:
+    """Measured when first asked for; the deck passes one to all rules that share them."""
+
+    def __init__(self, laminate: Laminate, limits: Limits) -> None:
+        self.laminate = laminate
+        self.limits = limits
+        self._bond = cache(_bond)
+        self._reaches = cache(_reaches)
+
+    @cached_property
+    def facing(self) -> tuple[Facing, ...]:
+        """The films that face each other past others."""
+        return facing_films(self.laminate)
+
+    def bond(self, interface: Interface) -> Width | None:
+        """The least width of its bond; None where nothing bonds or no edge faces another."""
+        return self._bond(interface.bond)
+
+    def reaches(self, interface: Interface) -> list[tuple[Edge, Reach]]:
+        """Film edges that bound unbonded film, and how far off the mask's edge lies."""
+        return self._reaches(interface.unbonded, interface.contact, interface.mask)
+
+    @cached_property
+    def moves(self) -> Freedoms:
+        """What every piece of every layer can do."""
+        return freedoms(self.laminate, self.limits.tolerances)
+
+    @cached_property
+    def margins(self) -> list[InterfaceMargins]:
+        """The narrow places of every interface."""
+        return [
+            InterfaceMargins(
+                tuple(alike),
+                narrow_places(
+                    alike[0],
+                    self.laminate.pins,
+                    self.limits,
+                    self.moves,
+                    self.bond(alike[0]),
+                    self.reaches(alike[0]),
+                ),
+            )
+            for alike in felt_alike(self.laminate, self.facing, self.moves)
+        ]
+
+    @cached_property
+    def forms(self) -> list[tuple[Form, ...]]:
+        """The same as linear forms."""
+        return [linear_forms(own.margins, own.first, self.moves) for own in self.margins]
+
+
+def _bond(bond: Region) -> Width | None:
+    return None if bond.is_empty else least_width(bond, SHARP)
+
+
+def _reaches(unbonded: Region, contact: Region, mask: Region) -> list[tuple[Edge, Reach]]:
+    found = ((edge, outward_reach(edge, mask.index)) for edge in edges_along(unbonded, contact))
+    return [(edge, reach) for edge, reach in found if reach is not None]
