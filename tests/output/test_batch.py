@@ -120,14 +120,3 @@ def test_cycles_that_leave_a_copy_out_fail(doctor: Doctor) -> None:
         doctor.set_manifest(lambda m: m["batch"].update(cycles=[4]))
 
     assert "manifest-claims" in doctored(doctor, "press.json", put)
-
-
-def test_a_schedule_with_another_batch_fails(doctor: Doctor) -> None:
-    path = doctor.folder / "press.json"
-
-    def put() -> None:
-        said = json.loads(path.read_text())
-        said["batch"]["total_minutes"] = 60
-        path.write_text(json.dumps(said))
-
-    assert doctored(doctor, "press.json", put) == {"as-designed"}
