@@ -54,6 +54,9 @@ class Tube(Section):
 
     outer_diameter: Length = 15.0
     """The tube that the sheet is wrapped round."""
+    glue: str = Field(default="3M 1587", min_length=1, max_length=120)
+    """What holds the sheet round its tube. The paper does not say; this is the adhesive that it
+    takes between actuators and silicone tubes."""
 
 
 class SheetSection(Section):
@@ -110,7 +113,7 @@ class RadialDesign(Design):
         drawn = self.chamber.outline is not None
         width, length = _slot(self)
         pockets = Drawn() if drawn else Slots(width, length - width)
-        wrap = Wrap(self.tube.outer_diameter, self.pitch)
+        wrap = Wrap(self.tube.outer_diameter, self.pitch, self.tube.glue, self.sheet.overlap)
         words = "radial expansion stacked balloon actuator"
         return Form(words, self.chamber.count, pockets, wrap=wrap)
 

@@ -54,7 +54,8 @@ def derived_problems(
     ``paths`` holds the beam's path for every pattern of the design's laminate.
     """
     with _made_anew(folder) as (fresh, problems):
-        parts = parts_of(checked.laminate, paths, checked.design.order.copies)
+        order = checked.design.order
+        parts = parts_of(checked.laminate, paths, order.copies, order.spares)
         index = _write_anew(folder, fresh, claims, checked, None if of_job else parts)
         problems.extend(_differences(folder, fresh, claims.files, claims.generator))
         problems.extend(_index_problems(folder, index, of_job))
@@ -121,7 +122,7 @@ def _write_anew(
     write_fixture(laminate, fresh, settings, design_runs(design, laminate).places)
     pressing = schedule_of(checked) if "press" in wanted else None
     planned = Planned(checked, frozenset(wanted), settings, pressing)
-    return write_contents(planned, sheets, fresh, unheard, has_page)
+    return write_contents(planned, sheets, fresh, unheard, parts is not None)
 
 
 def _parts(files: Collection[str]) -> set[RunPart]:

@@ -74,6 +74,7 @@ def _readers() -> dict[str, Callable[[Path, Path], str]]:
         ".dxf": _drawing_difference,
         ".png": lambda found, meant: _picture_difference(found.read_bytes(), meant.read_bytes()),
         ".csv": _table_difference,
+        ".pdf": lambda found, meant: "it shows something else",
         **dict.fromkeys((".svg", ".toml", ".html", ENDING), _text_difference),
         **dict.fromkeys((".stl", ".3mf", ".glb"), mesh_difference),
     }

@@ -29,11 +29,12 @@ class CutSheet:
 
 @dataclass(frozen=True)
 class Lot:
-    """The layers' files of a design, of which ``copies`` are cut."""
+    """The layers' files of a design, of which ``copies`` are cut, and ``spares`` of every mask."""
 
     design: str
     copies: int
     files: Sequence[LayerFile]
+    spares: int = 0
 
 
 _Outline = frozenset[tuple[Mark, ...]]
@@ -111,8 +112,8 @@ def piece_problems(
             cut += found
         problems += [
             claim(
-                f"the {material} sheets cut {cut[id(kind)]} pieces of {kind.name}, and the layers "
-                f"and copies take {kind.wanted.total()}"
+                f"the {material} sheets cut {cut[id(kind)]} pieces of {kind.name}, and the layers, "
+                f"copies and spares take {kind.wanted.total()}"
             )
             for kind in kinds.all
             if cut[id(kind)] != kind.wanted.total()
@@ -130,10 +131,11 @@ def _kinds_of(
             for file in lot.files
             if file.part is not None and file.claim.material == material
         )
+        spares = lot.spares if material == "PTFE" else 0
         for (path, pattern), count in drawn.items():
             for piece in path.pieces:
                 kind = kinds.find(piece) or kinds.add(piece)
-                kind.wanted[lot.design, pattern] += count * lot.copies
+                kind.wanted[lot.design, pattern] += count * lot.copies + spares
     return kinds
 
 

@@ -34,7 +34,8 @@ if TYPE_CHECKING:
 RESERVED = frozenset(
     {
         *("sheets", "mesh", "preview"),
-        *("checks.json", "design.toml", "manifest.json", "traveller.html"),
+        *("checks.json", "design.toml", "manifest.json"),
+        *("findings.html", "traveller.html"),
     }
 )
 """What lies in an assembly's folder beside the folders of its designs."""

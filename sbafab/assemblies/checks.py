@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
-from sbafab.assemblies import collisions, deployment, fits
+from sbafab.assemblies import collisions, deployment, fits, supply
 from sbafab.assemblies.build import Assembled
 from sbafab.assemblies.records import AssemblyRules, CheckName
 from sbafab.rules.finding import Finding
@@ -20,6 +20,7 @@ CHECKS: Mapping[CheckName, Callable[[Assembled], Iterator[Finding]]] = {
     "aperture": deployment.aperture,
     "lumen-pass": deployment.lumen_pass,
     "lumen-brace": deployment.lumen_brace,
+    "supply-tubes": supply.supply_tubes,
 }
 
 

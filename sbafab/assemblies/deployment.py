@@ -8,6 +8,7 @@ from typing import NamedTuple
 from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
 from sbafab.assemblies.fits import WHOLE, found
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Tube
+from sbafab.assemblies.supply import folded_diameter_with_tubes, reach
 from sbafab.design.form import Discs
 from sbafab.models.folded import LOBES, folded_diameter
 from sbafab.models.sizes import deflated_diameter, inflated_diameter, outline_diameter
@@ -101,16 +102,26 @@ def _girth(placed: PlacedPart) -> float:
 
 
 def lumen_pass(assembled: Assembled) -> Iterator[Finding]:
-    """Whether the deflated assembly passes the lumen; inlet tabs fold and are not counted."""
+    """Whether the deflated assembly passes the lumen, tabs folded back with a tube in each."""
     lumen = assembled.assembly.deploy.lumen_diameter
     if lumen is None:
         return
-    sizes = [(_deflated(placed, assembled), placed.name) for placed in assembled.parts]
-    widest, name = max(sizes, key=lambda pair: pair[0])
+    sizes = [(_deflated(placed, assembled), placed, "") for placed in assembled.parts]
+    sizes += [
+        (folded, placed, "tabs folded back with their tubes")
+        for placed in assembled.parts
+        if (folded := folded_diameter_with_tubes(placed, assembled)) is not None
+    ]
+    widest, part, how = max(sizes, key=lambda entry: (round(entry[0], 6), entry[1].radius is None))
     good = widest < lumen
-    message = f"deflated, {name} is the widest part, {widest:.2f} in a lumen of {lumen:g}"
+    message = f"deflated, {part.name} is the widest part, {widest:.2f} in a lumen of {lumen:g}"
+    if how:
+        message += f", {how}"
+        if part.radius is None and reach(part) > lumen:
+            message += f" (unfolded they reach {reach(part):.2f}: tie them before it goes in)"
     if not good:
         message += "; make it narrower or its laminate thinner"
+        message += ", or take thinner supply tubes" if how else ""
     yield found("lumen-pass", good, lumen, widest, message)
 
 

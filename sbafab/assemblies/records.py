@@ -26,6 +26,7 @@ CheckName = Literal[
     "aperture",
     "lumen-pass",
     "lumen-brace",
+    "supply-tubes",
 ]
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 Shift = Annotated[float, Millimetres(-1000, 1000)]

@@ -33,11 +33,14 @@ Pockets = Discs | Slots | Drawn
 @dataclass(frozen=True)
 class Wrap:
     """A laminate that is wrapped round a tube: its outer diameter, and the pitch of the stacks
-    round it, both in mm.
+    round it, both in mm; ``glue`` is the adhesive that holds it there, and ``overlap`` by how much
+    (mm) one end of the sheet lies over the other.
     """
 
     tube_diameter: float
     pitch: float
+    glue: str
+    overlap: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -95,6 +95,21 @@ def _pins_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Pin, ...]:
     )
 
 
+def laying_pins(laminate: Laminate, step: AssemblyStep) -> tuple[Pin, ...]:
+    """Pins of the plate on which a step without any may be laid up, to be drawn before it closes.
+
+    Every film of the step must have their opening: a lumen's pin has that, a bore's has not.
+    """
+    if step.pins:
+        return ()
+    films = [layer for layer in distinct_layers(laminate, step.layers) if not layer.is_mask]
+    return tuple(
+        pin
+        for pin in _pins_in(laminate, step.layers)
+        if all(pin in laminate.pins_holding(layer) for layer in films)
+    )
+
+
 def pins_when_added(laminate: Laminate) -> dict[int, tuple[Pin, ...]]:
     """By layer index: the pins that hold the layer in the step that adds it.
 

@@ -57,6 +57,8 @@ WATER_TIME = Measured(0.92, 0.08, "s", "Sec. 4.5")
 AIR_TIME = Measured(0.067, 0.011, "s", "Sec. 4.5")
 MODULUS_1DOF = Measured(35, 0, "kPa", "Sec. 4.4")
 MODULUS_3DOF = Measured(60, 0, "kPa", "Sec. 4.4")
+SUCCESS = Measured(0.9, 0, "", "Sec. 6")
+"""Share of the actuators built that held."""
 BURST = Measured(367, 18, "kPa", "Sec. 4")
 FOLDED = Measured(9.25, 0, "mm", "Sec. 2")
 RADIAL_FLAT = Measured(15.33, 0, "mm", "Sec. 2.1")

@@ -9,14 +9,18 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.records import NestPart
 
 
-def parts_of(laminate: Laminate, paths: Mapping[str, Region], copies: int) -> tuple[NestPart, ...]:
+def parts_of(
+    laminate: Laminate, paths: Mapping[str, Region], copies: int, spares: int = 0
+) -> tuple[NestPart, ...]:
     """Every piece of every pattern, by pattern in stacking order.
 
-    ``paths`` holds each pattern's path of the beam, kerf compensated. Pieces of one pattern that
+    ``paths`` holds each pattern's path of the beam, kerf compensated; ``spares`` more of every
+    mask are cut than the ``copies`` take. Pieces of one pattern that
     differ only in their place are one part, named after the first of them.
     """
     parts: list[NestPart] = []
     for pattern, layers in laminate.patterns.items():
+        layers_cut = len(layers) * copies + (spares if layers[0].is_mask else 0)
         alike: dict[Region, list[int]] = {}
         pieces = paths[pattern].pieces
         for number, piece in enumerate(pieces):
@@ -30,7 +34,7 @@ def parts_of(laminate: Laminate, paths: Mapping[str, Region], copies: int) -> tu
                     piece=numbers[0] + 1,
                     material=layers[0].film.material,
                     region=pieces[numbers[0]],
-                    count=len(numbers) * len(layers) * copies,
+                    count=len(numbers) * layers_cut,
                 )
             )
     return tuple(parts)

@@ -20,7 +20,7 @@ from sbafab.errors import DesignError
 from sbafab.geometry.boolean import GeometryError
 from sbafab.meshing.write_glb import Node, write_scene
 from sbafab.output.batch import Batch, plan_batch, refuse_other_film, write_batch
-from sbafab.output.contents import TRAVELLER, order_of, write_text
+from sbafab.output.contents import TRAVELLER, order_of, write_findings, write_text
 from sbafab.output.earlier import would_replace
 from sbafab.output.manifest import as_json, checks
 from sbafab.output.manifest_records import AssemblyManifest
@@ -142,6 +142,8 @@ def write_assembly(
         (folder / "mesh").mkdir()
         meshes.append(_write_solid(assembled, folder))
         write_text(folder / TRAVELLER, _traveller(checked, batch, sheets, bare))
+    sha256 = assembly_sha256(assembled)
+    write_findings(assembled.assembly.name, sha256, checked.designs, checked.between, folder)
     designs = [one.design for one in checked.designs]
     write_text(folder / "checks.json", as_json(checks(checked.findings, "design", designs)))
     write_text(folder / DESIGN_FILE, assembly_toml(assembled))

@@ -20,16 +20,18 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.files import MeshFile, write_meshes
 from sbafab.output.manifest import as_json, checks, file_hashes, manifest
 from sbafab.output.planned import Checked, Planned
-from sbafab.output.settings import GENERATOR, kerf_widths
+from sbafab.output.settings import GENERATOR, kerf_widths, limits
 from sbafab.output.shop import write_cut_files
 from sbafab.pressing.schedule import Schedule, press_csv, press_json
 from sbafab.pressing.together import batch_json, design_runs
 from sbafab.progress import Progress
+from sbafab.rules.finding import Finding
 
 if TYPE_CHECKING:
     from sbafab.reports.traveller.job import Job
 
 TRAVELLER = "traveller.html"
+FINDINGS = "findings.html"
 
 
 def write_contents(
@@ -41,9 +43,12 @@ def write_contents(
 ) -> dict[str, Any]:
     """Writes what is wanted of a design; the manifest, without the files' hashes.
 
-    The traveller, which a folder without a page of its own does not get, needs cut files, schedule
-    and pictures.
+    A folder without pages of its own gets neither findings nor a traveller, which needs cut files,
+    schedule and pictures.
     """
+    from sbafab.reports.underlay import NAME as UNDERLAY
+    from sbafab.reports.underlay import underlay_pdf
+
     checked, wanted = planned.checked, planned.wanted
     meshes: list[MeshFile] = []
     solid: bytes | None = None
@@ -52,6 +57,9 @@ def write_contents(
     if planned.pressing is not None:
         write_text(folder / "press.json", as_json(_press(checked, planned.pressing)))
         write_text(folder / "press.csv", press_csv(planned.pressing))
+        underlay = underlay_pdf(checked.laminate, design_sha256(checked.design))
+        if underlay is not None:
+            (folder / UNDERLAY).write_bytes(underlay)
     if "mesh" in wanted:
         meshes = write_meshes(checked.laminate, folder, progress=partial(tell, "meshes"))
     if planned.conforming is not None:
@@ -63,6 +71,8 @@ def write_contents(
         solid = _write_pictures(checked, folder, tell)
     if has_page and wanted >= {"cut", "press", "preview"}:
         write_text(folder / TRAVELLER, _traveller(planned, sheets, solid))
+    if has_page and "preview" in wanted:
+        write_findings(checked.design.name, design_sha256(checked.design), [checked], (), folder)
     found = checks(checked.findings, "design", [checked.design])
     write_text(folder / "checks.json", as_json(found))
     _write_design(checked.design, folder)
@@ -73,6 +83,25 @@ def _press(checked: Checked, plan: Schedule) -> dict[str, Any]:
     runs = design_runs(checked.design, checked.laminate)
     batch = {"batch": batch_json(checked.laminate, runs, plan)} if runs.copies > 1 else {}
     return {**press_json(plan), **batch}
+
+
+def write_findings(
+    name: str,
+    sha256: str,
+    designs: Sequence[Checked],
+    between: Sequence[Finding],
+    folder: Path,
+) -> None:
+    """The designer's page: of every design, and of the checks ``between`` an assembly's parts."""
+    from sbafab.reports.traveller.findings import Inspected, findings_html
+
+    inspected = [
+        Inspected(one.design.name, one.findings, one.laminate, limits(one.design))
+        for one in designs
+    ]
+    if between:
+        inspected.append(Inspected("Between the parts", between))
+    write_text(folder / FINDINGS, findings_html(name, sha256, GENERATOR, inspected))
 
 
 def close_folder(folder: Path, index: dict[str, Any]) -> None:
@@ -98,6 +127,8 @@ def _traveller(planned: Planned, sheets: Sequence[SheetFile], solid: bytes | Non
 def order_of(checked: Checked, folder: str = "") -> Job:
     """What a traveller says of the order of a design whose files lie in ``folder``."""
     from sbafab.reports.traveller.job import Job
+    from sbafab.reports.underlay import NAME as UNDERLAY
+    from sbafab.reports.underlay import guides
 
     design = checked.design
     return Job(
@@ -107,6 +138,7 @@ def order_of(checked: Checked, folder: str = "") -> Job:
         lowered=checked.lowered,
         findings=checked.findings,
         fixture=f"{folder}{FIXTURE}" if checked.laminate.pins else None,
+        underlay=f"{folder}{UNDERLAY}" if guides(checked.laminate) else None,
         kerf={str(name): kerf for name, kerf in kerf_widths(design).items()},
         copies=design.order.copies,
     )

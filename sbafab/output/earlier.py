@@ -13,7 +13,7 @@ from sbafab.output.swap import listed_files, read_manifest
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 
 CUT = ("layers", "sheets", "traveller.html")
-PRESS = ("press.json", "press.csv")
+PRESS = ("press.json", "press.csv", "underlay.pdf")
 MESH = ("mesh",)
 PREDICTION = ("predict", "predict.json")
 RESULTS = "result.json"

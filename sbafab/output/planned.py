@@ -83,7 +83,8 @@ def plan(checked: Checked, wanted: Collection[RunPart], curves: Curves = TRUE_AR
     paths = compensated_paths(laminate, settings)
     if curves.in_chords:
         refuse_coarse(laminate, paths, settings, limits(design))
-    return replace(planned, paths=paths, parts=parts_of(laminate, paths, design.order.copies))
+    parts = parts_of(laminate, paths, design.order.copies, design.order.spares)
+    return replace(planned, paths=paths, parts=parts)
 
 
 def schedule_of(checked: Checked) -> Schedule:

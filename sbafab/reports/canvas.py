@@ -22,6 +22,13 @@ COLOURS: dict[Tone, Colour] = {
     "shade": (72, 84, 98),
     "line": (58, 104, 142),
 }
+KEY: tuple[tuple[Tone, str], ...] = (
+    ("film", "TPE"),
+    ("cut film", "film, cut"),
+    ("cut bond", "bond, cut"),
+    ("shade", "open gap"),
+)
+"""What the colours are, in the picture's foot and beside it on a page."""
 LEVELS = 60
 PAPER = (255, 255, 255)
 INK = (40, 44, 50)
@@ -94,13 +101,8 @@ class Canvas:
         draw = ImageDraw.Draw(picture)
         x, y = round(0.03 * width), height - 2 * size
         draw.text((x, y - 1.7 * size), caption, fill=INK, font=font)
-        key: list[tuple[Tone, str]] = [
-            ("film", films),
-            ("cut film", "film, cut"),
-            ("cut bond", "bond, cut"),
-            ("shade", "open gap"),
-        ]
-        for tone, words in key:
+        for tone, said in KEY:
+            words = films if tone == "film" else said
             draw.rectangle((x, y, x + 1.6 * size, y + size), fill=COLOURS[tone], outline=INK)
             draw.text((x + 2.1 * size, y - 0.1 * size), words, fill=INK, font=font)
             x += round(3.6 * size + draw.textlength(words, font=font))

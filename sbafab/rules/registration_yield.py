@@ -16,7 +16,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.forms import Form
 from sbafab.rules.freedoms import Freedom, Freedoms
-from sbafab.rules.limits import Limits
+from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.margins import QUANTITIES, Quantity, own_freedoms, seated
 from sbafab.rules.measures import Measures
 from sbafab.rules.random_builds import Contour, Draws, Error, Rows, kept, rows_of
@@ -81,7 +81,7 @@ def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) 
         f"{found.whole.value:.2%} of {found.whole.builds} random builds keep every limit "
         f"(95 % interval {low:.2%} to {high:.2%}){_by_interface(found)}; errors are assumed spread "
         f"evenly, up to {limits.tolerances.placement:g} mm and "
-        f"{limits.tolerances.turn:g} degree where a hand places"
+        f"{limits.tolerances.turn:g} degree where a hand places{_calibrated(limits.tolerances)}"
     )
     if verdict == "fail":
         message += (
@@ -92,6 +92,14 @@ def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) 
     if worst is not None and found.interfaces[worst].good < found.whole.builds:
         place = Place(worst, laminate.interfaces[worst - 1].layer_indices)
     return [Finding(NAME, verdict, target, found.whole.value, "", place, message)]
+
+
+def _calibrated(tolerances: Tolerances) -> str:
+    """Where the hand's figures come from, if they are the usual ones."""
+    usual = Tolerances()
+    if (tolerances.placement, tolerances.turn) != (usual.placement, usual.turn):
+        return ""
+    return f" (calibrated on the paper's success rate of {PAPER_SUCCESS:.0%}, not measured)"
 
 
 def simulate(

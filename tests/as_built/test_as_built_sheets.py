@@ -89,7 +89,7 @@ def test_a_missing_piece_is_told_with_its_pattern_and_counts(doctor: Doctor) -> 
     pattern = next(name for name in dict.fromkeys(counts) if f"pieces of 1dof-5mm {name}" in lost)
     count = counts.count(pattern)
     assert f"cut {count - 1} pieces" in lost
-    assert lost.endswith(f"and copies take {count}")
+    assert lost.endswith(f"copies and spares take {count}")
 
 
 def test_a_mirrored_piece_is_told_as_turned_over(tmp_path: Path) -> None:
@@ -114,7 +114,7 @@ def test_a_stranger_is_told_with_its_place(doctor: Doctor) -> None:
 def test_a_layer_that_is_not_what_the_sheet_cuts_is_told(doctor: Doctor) -> None:
     doctor.redraw(5, lambda region: region.scaled(1.001))
     doctor.rehash()
-    assert any("layers and copies take" in message for message in told(doctor))
+    assert any("layers, copies and spares take" in message for message in told(doctor))
 
 
 CLAIMS: list[tuple[str, Callable[[Claims], object], str]] = [
@@ -250,4 +250,4 @@ def test_a_piece_of_another_design_is_told(clean_job: Path, tmp_path: Path) -> N
     doctor = Doctor(Path(shutil.copytree(clean_job, tmp_path / "batch")))
     redraw(doctor, lambda pieces: sorted(pieces, key=lambda piece: piece.area)[1:])
     found = [f.message for f in check_folder(doctor.folder) if f.verdict == "fail"]
-    assert any("layers and copies take" in message for message in found)
+    assert any("layers, copies and spares take" in message for message in found)

@@ -33,6 +33,7 @@ FAULTS: dict[CheckName, tuple[str, dict[str, Any]]] = {
     "aperture": ("aperture", {"arm": {"set": {"chamber": {"diameter": 6}}}}),
     "lumen-pass": ("brace", {"cup": {"diameter": 26}}),
     "lumen-brace": ("brace", {"grip": {"set": {"chamber": {"width": 9}}}}),
+    "supply-tubes": ("brace", {"arm": {"turn": 0}}),
 }
 
 

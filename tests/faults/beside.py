@@ -173,6 +173,14 @@ KIND = Kind(
         replaced("traveller at 270 C", "traveller.html", r"135(\s|&nbsp;|\u00a0)", r"270\1"),
         changed("traveller cut short", "traveller.html", lambda data: data[: len(data) // 2]),
         lost("traveller missing", "traveller.html"),
+        replaced(
+            "warning hidden from the designer", "findings.html", r"<td>warn</td>", "<td>pass</td>"
+        ),
+        lost("findings missing", "findings.html"),
+        changed(
+            "underlay at 98 %", "underlay.pdf", lambda data: data.replace(b"2.8346", b"2.7779")
+        ),
+        lost("underlay missing", "underlay.pdf"),
         changed("solid with a corner elsewhere", SOLID, moved_corner),
         changed("solid scaled by 1.002", SOLID, scaled),
         changed("solid without its last triangle", SOLID, lambda data: data[:-50]),

@@ -80,6 +80,7 @@ def _parts(folders: Sequence[Folder]) -> list[Part]:
             counts[layer.shape] = counts.get(layer.shape, 0) + 1
             first.setdefault(layer.shape, layer)
         copies = int(folder.wish("order", "copies", 1))
+        spares = int(folder.wish("order", "spares", 2))
         for number, layer in first.items():
             for piece in pieces(layer.path):
                 shape = _centred(piece)
@@ -89,7 +90,7 @@ def _parts(folders: Sequence[Folder]) -> list[Part]:
                         layer.material,
                         shape,
                         shapely.get_coordinates(shape),
-                        counts[number] * copies,
+                        counts[number] * copies + (spares if layer.material == "PTFE" else 0),
                     )
                 )
     return parts

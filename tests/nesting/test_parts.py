@@ -30,3 +30,13 @@ def test_masks_of_three_equal_discs_are_one_part() -> None:
     (discs,) = (part for part in parts_of(laminate, paths, 2) if part.count == 2 * 14 * 3)
     assert discs.piece == 1
     assert laminate.patterns[discs.pattern][0].role == "chamber-mask"
+
+
+def test_spares_are_cut_of_every_mask_and_of_no_film() -> None:
+    laminate = build(load_design("3dof-15mm"))
+    paths = {pattern: layers[0].profile for pattern, layers in laminate.patterns.items()}
+    plain, spared = parts_of(laminate, paths, 2), parts_of(laminate, paths, 2, 3)
+    for part, more in zip(plain, spared, strict=True):
+        masks = 2 * len(laminate.patterns[part.pattern])
+        sets = 3 if part.material == "PTFE" else 0
+        assert more.count - part.count == sets * part.count / masks

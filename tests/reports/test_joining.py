@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.reading import assembly_of
+from sbafab.assemblies.supply import runs
 from sbafab.design.reading import read_toml, templates_folder
 from sbafab.reports.traveller.joining import join_pages
 
@@ -90,3 +92,31 @@ def test_a_tube_on_an_actuator_says_its_end_and_its_line() -> None:
     tube = {"kind": "tube", "on": "arm", "at": "top", "turn": 30}
     said = words(together("aperture", tube=tube), "tube")
     assert "its start glued, the marked line 30 degrees anti-clockwise from there" in said
+
+
+def test_supply_tubes_run_where_no_balloon_opens() -> None:
+    said = words(together("brace"), "arm")
+    # Three SBAs at 0, 120 and 240 degrees round the tube; the gaps are half way between.
+    assert "chamber1 at 60, chamber2 at 180 and chamber3 at 300 degrees;" in said
+    assert "toward its start" in said
+    assert "leave it slack" not in said
+    crossing = words(together("brace", arm={"turn": 0}), "arm")
+    assert "where one crosses grip, leave it slack" in crossing
+    assert "Gather its tubes below the base" in words(together("aperture"), "arm")
+
+
+@pytest.mark.parametrize("turn", [0, 20, 60, 100])
+def test_the_gaps_are_those_of_the_sheet(turn: float) -> None:
+    made = together("brace", arm={"turn": turn})
+    # 11.5 of 15.708 mm are covered; a tube 1.016 wide needs room on both sides.
+    half = math.degrees((11.5 / 2 + 1.016 / 2) / 7.5)
+    for run in runs(made["arm"], made):
+        off = min(run.angle % 120, 120 - run.angle % 120)
+        assert bool(run.over) == (off < half)
+
+
+def test_a_wrap_is_glued_with_what_its_design_names() -> None:
+    bare = together("brace")
+    part = bare["grip"].part.model_copy(update={"glue": None})
+    parts = tuple(replace(p, part=part) if p.name == "grip" else p for p in bare.parts)
+    assert "Glue: 3M 1587" in words(replace(bare, parts=parts), "grip")

@@ -304,7 +304,9 @@ def test_warnings_are_all_there(sheet_files: Any) -> None:
     assert "COF2" in said["PTFE fumes"]
     assert "sbafab new coupon" in said["TPE kerf uncalibrated"]
     assert "PTFE kerf uncalibrated" not in said
-    assert "too near the limit" in said["Rule film-limits warns"]
+    # What the rules warn of is the designer's, on a page of its own.
+    assert "the rules warn 1 time" in said["For the designer"]
+    assert not any("too near the limit" in words for words in said.values())
     assert "bond-width" in said["Waived rules"]
     assert "too narrow" in said["Waived rules"]
     assert "21 balloons are more than the 20 validated" in said["Press schedule"]
@@ -326,11 +328,11 @@ def test_times_add_up_to_the_papers(sheet_files: Any) -> None:
     assert rows["The paper"] == "105 min = 1.75 h"
 
 
-def test_import_notes_come_last_and_name_every_file(sheet_files: Any) -> None:
+def test_import_notes_stand_where_is_cut_and_name_every_file(sheet_files: Any) -> None:
     work = work_of(sheet_files, "3dof-15mm")
-    sections = parsed(work).findall(".//section")
-    words = words_of(sections[-1])
-    assert sections[-1].get("class") == "import"
+    cut = parsed(work).get_element_by_id("cut").getparent()
+    (notes,) = cut.findall("./section[@class='import']")
+    words = words_of(notes)
     for sheet in work.sheets:
         assert f"{sheet.path}152.4 {TIMES} 152.4 mm" in words
     # Outline of the bottom balloon with tabs and masks, and 6 mm of plate all round.
@@ -360,3 +362,8 @@ def test_ears_are_trimmed_and_tubes_wrapped(sheet_files: Any) -> None:
     assert "Snip off every ear" not in plain
     assert "Wrap the sheet round its tube, outer diameter 15 mm" in radial
     assert "Wrap the sheet" not in plain
+    assert "Glue: 3M 1587" in radial
+    other = page_of(work_of(sheet_files, "radial-15mm", 'tube.glue="Sil-Poxy"'))
+    assert other.count("Sil-Poxy") == 2
+    for page in (ears, plain, radial):
+        assert "Snip off what of the strip stands out of the tab" in page

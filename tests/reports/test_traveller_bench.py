@@ -21,6 +21,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.records import Nest
 from sbafab.output.settings import press_settings
 from sbafab.pressing.schedule import schedule
+from sbafab.reports.traveller.bill import cut_list
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import traveller_html
 from sbafab.reports.traveller.sheet_map import sheet_map
@@ -169,6 +170,74 @@ def test_the_legend_names_the_cross_only_where_it_is_seen(sheet_files: Any) -> N
     assert all("+ datum" in step for step in steps(eared))
 
 
+def test_what_good_hands_know_stands_where_it_happens(sheet_files: Any) -> None:
+    tree = page(sheet_files, "3dof-15mm")
+    cut = words_of(tree.get_element_by_id("cut").getparent())
+    assert (
+        cut.index("lint-free") < cut.index("backing of card") < cut.index("sheets/TPE_1.dxf: TPE")
+    )
+    assert cut.index("sheets/PTFE_1.dxf: PTFE") < cut.index("Wipe the soot")
+    # 15 masks in three pieces, on 15 storeys.
+    assert "45 loose mask pieces: pick them up with antistatic tweezers" in cut
+    first, second, third, fourth = steps(tree)
+    for step, minutes in ((first, 3), (second, 12), (third, 10), (fourth, 20)):
+        warm = step.index(f"the {minutes} min count from when it reads 130 °C")
+        assert warm < step.index("start the timer")
+    assert "push it down on its pin" in first
+    assert "push it down on its pin" in third
+    assert "Has a mask slipped?" not in second
+    # The lumen is open in base and cap too.
+    for step, says in ((first, False), (second, True), (third, False), (fourth, True)):
+        assert ("with the pin of the lumen (⌀2 mm) alone" in step) == says
+    assert "the pin of the lumen" not in " ".join(steps(page(sheet_files, "1dof-5mm")))
+
+
+def test_the_underlay_is_laid_where_it_has_a_line(sheet_files: Any) -> None:
+    design, laminate = built("1dof-5mm")
+    plan = schedule(laminate, press_settings(design))
+    job = Job(SHA, "sbafab 1.0.0", underlay="underlay.pdf")
+    tree = lxml_html.fromstring(traveller_html(design, laminate, plan, [], job))
+    told = [re.search(r"It has the edges of ([^.]*)\.", step) for step in steps(tree)]
+    assert [found and found[1] for found in told] == [
+        None,
+        "P01 and P03",
+        "P04",
+        "P01, P03, P04 and P07",
+    ]
+    assert "the pins pricked through" in steps(tree)[2]
+    assert "underlay" not in words_of(page(sheet_files, "1dof-5mm"))
+
+
+def test_spares_are_told_beside_what_is_needed(sheet_files: Any) -> None:
+    design, laminate = built("3dof-15mm")
+    plan = schedule(laminate, press_settings(design))
+    more = {"P02": 6, "P06": 6}
+    sheets = [
+        replace(
+            sheet,
+            counts=tuple(
+                (name, pattern, n + more.get(pattern, 0)) for name, pattern, n in sheet.counts
+            ),
+        )
+        for sheet in sheet_files(laminate)
+    ]
+    job = Job(SHA, "sbafab 1.0.0")
+    work = Work(design, laminate, plan, sheets, job)
+    assert {row.pattern: row.spares for row in cut_list(work) if row.spares} == {"P02": 2, "P06": 2}
+    assert "14 + 2 spare" in words_of(
+        lxml_html.fromstring(traveller_html(design, laminate, plan, sheets, job))
+    )
+
+
+def test_the_cover_says_what_its_colours_are(sheet_files: Any) -> None:
+    design, laminate = built("1dof-5mm")
+    plan = schedule(laminate, press_settings(design))
+    job = Job(SHA, "sbafab 1.0.0", solid_png=b"\x89PNG")
+    tree = lxml_html.fromstring(traveller_html(design, laminate, plan, [], job))
+    keys = [words_of(key) for key in tree.findall(".//span[@class='key']")]
+    assert keys == ["TPE", "film, cut", "bond, cut", "open gap"]
+
+
 def boxes(svg: Any) -> list[Any]:
     """What the labels of a picture cover, by Helvetica's widest letters in them: 0.667 em."""
     found = []
@@ -181,7 +250,7 @@ def boxes(svg: Any) -> list[Any]:
 
 def test_labels_do_not_lie_over_each_other_or_windows(sheet_files: Any) -> None:
     _, laminate = built("radial-15mm")
-    for template in ("3dof-15mm", "radial-15mm"):
+    for template in ("1dof-5mm", "3dof-15mm", "radial-15mm"):
         for sheet in sheet_files(built(template)[1]):
             # Two designs on a sheet: every label begins with the design's name.
             for marks in ({template: ""}, {template: "B"}):
@@ -192,13 +261,13 @@ def test_labels_do_not_lie_over_each_other_or_windows(sheet_files: Any) -> None:
                     assert all(box.intersection(other).area < 0.05 for other in covered[:i])
     masks = [sheet for sheet in sheet_files(laminate) if sheet.material == "PTFE"]
     for sheet in masks:
-        scale = 84.0 / sheet.width
         svg = lxml_html.fromstring(sheet_map(sheet, film_of(sheet), {"radial-15mm": ""}, "sheet-1"))
+        frame = max(svg.iter("rect"), key=lambda rect: float(rect.get("width")))
+        scale = float(frame.get("width")) / sheet.width
+        foot = float(frame.get("y")) + float(frame.get("height"))
         for placement in sheet.nest.on_sheet(sheet.number - 1):
             for hole in sheet.nest.region(placement).holes:
-                points = [
-                    (0.5 + scale * x, 0.5 + scale * (sheet.length - y)) for x, y in hole.polygon()
-                ]
+                points = [(0.5 + scale * x, foot - scale * y) for x, y in hole.polygon()]
                 window = shapely.Polygon(points)
                 hidden = sum(box.intersection(window).area for box in boxes(svg))
                 assert hidden < 0.2 * window.area

@@ -21,8 +21,8 @@ WEAKER = [
     ("laser.least_feature=0.1", "least_feature 0.1 (default 0.2)"),
     ("registration.cutting_error=0.05", "cutting_error 0.05 (paper 0.1)"),
     ("registration.pin_error=0.001", "pin_error 0.001 (paper 0.004)"),
-    ("registration.hand_placement=0.1", "hand_placement 0.1 (default 0.2)"),
-    ("registration.hand_turn=0.5", "hand_turn 0.5 (default 1)"),
+    ("registration.hand_placement=0.05", "hand_placement 0.05 (default 0.08)"),
+    ("registration.hand_turn=0.2", "hand_turn 0.2 (default 0.4)"),
 ]
 STRICTER = [
     "rules.bond_width=0.8",

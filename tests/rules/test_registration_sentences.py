@@ -70,7 +70,7 @@ def test_a_layer_on_several_pins_cannot_turn(good: Good) -> None:
 
 
 def test_a_failure_says_what_is_left_without_the_hand(good: Good) -> None:
-    limits = Limits(tolerances=Tolerances(cutting=0.2))
+    limits = Limits(tolerances=Tolerances(0.2, 0.004, 0.2, 1.0))
     bond, overhang = worst_of(good(*ONE), limits)
     assert (bond.verdict, overhang.verdict) == ("fail", "fail")
     # 0.75 - 2 x 0.2 - 2 x 0.004, and likewise from 0.5; less than nothing is reported as none.

@@ -163,9 +163,9 @@ def test_a_neck_ring_that_just_holds_as_drawn_is_caught_by_this_rule_alone(
     findings = run_deck(narrow, Limits(bond_width=0.7))
     assert by_rule(findings, "fail") == {"registration-worst-case"}
     (found,) = [f for f in findings if f.verdict == "fail"]
-    # 0.7 - 0.2 - 0.008, and 0.2 less by hand.
+    # 0.7 - 0.2 - 0.008, and at least 0.08 less by hand.
     assert "0.492 mm is left" in found.message
-    assert 8 in found.where.layers or found.measured < 0.292
+    assert 8 in found.where.layers or found.measured < 0.412
 
 
 def test_what_is_short_as_drawn_only_warns_here(good: Good, spoil: Spoil) -> None:

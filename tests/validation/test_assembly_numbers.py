@@ -9,6 +9,7 @@ import pytest
 from sbafab.assemblies.build import assemble
 from sbafab.assemblies.checks import run_checks
 from sbafab.assemblies.reading import load_assembly
+from sbafab.models.sizes import sizes
 
 
 def measured(template: str, rule: str) -> tuple[float | None, float | None, str]:
@@ -19,7 +20,11 @@ def measured(template: str, rule: str) -> tuple[float | None, float | None, str]
 def test_the_brace_passes_the_lumen_deflated_and_holds_in_it_inflated() -> None:
     deflated, lumen, verdict = measured("brace", "lumen-pass")
     assert lumen == 25.4
-    assert deflated == pytest.approx(15.33, abs=0.005)
+    # Tabs folded back over the tube: two films, the strip and the supply tube, on both sides.
+    assert deflated == pytest.approx(15 + 2 * (2 * 0.038 + 0.025 + 1.016), abs=1e-6)
+    grip = assemble(load_assembly("brace"))["grip"].made
+    assert grip is not None
+    assert sizes(grip.design, grip.laminate)["deflated_diameter"] == pytest.approx(15.33, abs=0.005)
     assert verdict == "pass"
     inflated, lumen, verdict = measured("brace", "lumen-brace")
     assert lumen == 25.4

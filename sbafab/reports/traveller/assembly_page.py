@@ -14,12 +14,14 @@ from sbafab.assemblies.colours import colours
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
 from sbafab.pressing.together import Runs
-from sbafab.reports.traveller import bill, joining, notes, process, times
+from sbafab.reports.drawing import TIMES
+from sbafab.reports.traveller import bench, bill, joining, notes, process, times
 from sbafab.reports.traveller import quantities as say
-from sbafab.reports.traveller.cautions import cautions
+from sbafab.reports.traveller.cautions import cautions, for_the_designer
 from sbafab.reports.traveller.code import code_svg, code_text
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.page import context, environment, frame, materials, sheet_rows
+from sbafab.reports.traveller.page import films as page_films
 from sbafab.reports.traveller.shapes import definitions, pattern_regions
 from sbafab.reports.traveller.sheet_map import part_regions
 from sbafab.rules.finding import Finding
@@ -87,6 +89,8 @@ def assembly_html(job: AssemblyJob) -> str:
             tested=[name for made in job.assembled.designs for name in made.parts],
             cautions=_cautions(job),
             bill=_bill(job),
+            before_cutting=bench.before_cutting(f for w in works for f in page_films(w.laminate)),
+            after_cutting=bench.after_cutting(works),
             kerf=bill.kerf_states(works[0].job, films),
             sheet_rows=sheet_rows(works[0].design, job.sheets, _marks(job)),
             laser_minutes=times.laser_minutes(works[0]),
@@ -144,19 +148,15 @@ def _cautions(job: AssemblyJob) -> list[tuple[str, str]]:
         found.append(("Waived checks", words))
     if job.lowered:
         found.append(("Lowered limits", f"{CHECKED_AGAINST}{', '.join(job.lowered)}."))
-    found += [
-        (f"Check {finding.rule} warns", finding.message)
-        for finding in job.findings
-        if finding.verdict == "warn"
-    ]
     for one in job.works:
         for title, text in cautions(one.work):
-            is_own = title.startswith(("Rule", "Press", "Waived", "Lowered"))
+            is_own = title.startswith(("Press", "Waived", "Lowered"))
             found.append((f"{title} ({one.name})" if is_own else title, text))
     if any(placed.part.kind == "magnet" for placed in job.assembled.parts):
         words = "small and brittle, they snap together; keep them from what a magnet harms."
         found.append(("Magnets", words))
-    return list(dict.fromkeys(found))
+    every = [*job.findings, *(finding for one in job.works for finding in one.work.job.findings)]
+    return list(dict.fromkeys([*found, *for_the_designer(every)]))
 
 
 def _bill(job: AssemblyJob) -> list[bill.Item]:
@@ -171,14 +171,17 @@ def _bill(job: AssemblyJob) -> list[bill.Item]:
 def _is_elsewhere(item: bill.Item) -> bool:
     """Films are summed over the designs, and the tube to wrap is a part of the assembly."""
     name, _, rest = item.name.partition(" ")
-    return (name.isupper() and rest == "film") or item.name == "Tube to wrap"
+    is_film = name.isupper() and rest == "film"
+    return is_film or item.name in ("Tube to wrap", "Adhesive of the wrap")
 
 
 def _named(item: bill.Item, one: DesignWork) -> bill.Item:
-    """A design's item with the design's name."""
+    """A design's item with its name; an underlay for each copy that is pressed at once."""
     if item.name == "Release film":
         return item
-    return bill.Item(f"{item.name} ({one.name})", item.what, item.quantity)
+    often = one.runs.together if item.name == "Underlay" else 1
+    quantity = f"{often} {TIMES} {item.quantity}" if often > 1 else item.quantity
+    return bill.Item(f"{item.name} ({one.name})", item.what, quantity)
 
 
 def _films(job: AssemblyJob) -> list[bill.Item]:

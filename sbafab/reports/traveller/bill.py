@@ -39,6 +39,8 @@ def bill(work: Work) -> list[Item]:
         diameter = say.millimetres(wrap.tube_diameter)
         what = f"to wrap the sheet round, outer diameter {diameter}"
         items.append(Item("Tube to wrap", what, str(job.copies)))
+        what = f"{wrap.glue}, between sheet and tube (ours: the paper does not say what holds it)"
+        items.append(Item("Adhesive of the wrap", what, "as needed"))
     together = work.runs.together
     pins = Counter(pin.diameter for pin in laminate.pins for _ in range(together))
     items += [
@@ -48,6 +50,9 @@ def bill(work: Work) -> list[Item]:
     if job.fixture is not None:
         what = f"cut from {job.fixture}, holes reamed to the pins; a second one lies on top"
         items.append(Item("Pin plate", f"{what} of longer pins", "1 or 2"))
+    if job.underlay is not None:
+        what = f"{job.underlay} printed at 100 % on plain paper; its bars must measure 100 mm"
+        items.append(Item("Underlay", what, "1 page"))
     items.append(
         Item(
             "Release film",
@@ -89,6 +94,7 @@ class Cut:
     roles: str
     layers: str
     count: int
+    spares: int
     pieces: int
     cut_length: float
     sheets: str
@@ -115,10 +121,24 @@ def _cut(work: Work, layers: tuple[Layer, ...]) -> Cut:
         ", ".join(dict.fromkeys(layer.role.replace("-", " ") for layer in layers)),
         layer_numbers([layer.index for layer in layers]),
         len(layers) * work.job.copies,
+        _spares(work, layers),
         len(profile.pieces),
         sum(contour.length for contour in profile.contours),
         ", ".join(holding),
     )
+
+
+def _spares(work: Work, layers: Sequence[Layer]) -> int:
+    """How many more of a pattern lie on the sheets than its layers take."""
+    own = work.design.name, layers[0].pattern
+    cut = sum(
+        count
+        for sheet in work.sheets
+        for design, pattern, count in sheet.counts
+        if (design, pattern) == own
+    )
+    needed = len(layers) * work.job.copies
+    return max(0, cut // len(layers[0].profile.pieces) - needed)
 
 
 def kerf_states(job: Job, materials: Sequence[str]) -> list[tuple[str, str, bool]]:

@@ -1,17 +1,31 @@
-"""What the technician must know before starting."""
+"""What the technician must know before starting; the rules' findings have their own page."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
+from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.bill import kerf_states
 from sbafab.reports.traveller.job import Work
+from sbafab.rules.finding import Finding
 from sbafab.rules.lowered import CHECKED_AGAINST
 
 
 def cautions(work: Work) -> list[tuple[str, str]]:
     """Every warning once: a short title and what it says."""
     return list(dict.fromkeys(_all(work)))
+
+
+def for_the_designer(findings: Iterable[Finding]) -> list[tuple[str, str]]:
+    """Where the rules' warnings stand: nobody at the press can mend them; empty without any."""
+    warns = sum(finding.verdict == "warn" for finding in findings)
+    if not warns:
+        return []
+    words = (
+        f"the rules warn {say.count(warns, 'time')}. findings.html says of what, and what helps; "
+        "at the press do as the steps say."
+    )
+    return [("For the designer", words)]
 
 
 def _all(work: Work) -> Iterator[tuple[str, str]]:
@@ -34,17 +48,19 @@ def _all(work: Work) -> Iterator[tuple[str, str]]:
             f"{CHECKED_AGAINST}{', '.join(job.lowered)}. What holds here may fail the usual "
             "limits: make sure that this is meant.",
         )
-    for material, _, measured in kerf_states(job, materials):
-        if not measured:
-            yield (
-                f"{material} kerf uncalibrated",
-                "edges are nominal, so outlines come out smaller and holes larger by half a kerf. "
-                "Make a calibration piece with “sbafab new coupon”, cut and measure it, compute "
-                "the width with “sbafab kerf”, and generate again.",
-            )
-    for finding in job.findings:
-        if finding.verdict == "warn":
-            yield f"Rule {finding.rule} warns", finding.message
+    nominal = [material for material, _, measured in kerf_states(job, materials) if not measured]
+    if nominal:
+        yield (
+            f"{' and '.join(nominal)} kerf uncalibrated",
+            "edges are nominal, so outlines come out smaller and holes larger by half a kerf. "
+            "Cut, measure and compute a calibration piece (“sbafab new coupon”, “sbafab kerf”), "
+            "and generate again.",
+        )
     for warning in schedule.warnings:
-        if not warning.startswith(("made although", CHECKED_AGAINST)):
+        if not warning.startswith(("made although", CHECKED_AGAINST)) and not _is_in_step(warning):
             yield "Press schedule", warning
+
+
+def _is_in_step(warning: str) -> bool:
+    """Whether the press step itself says it where the layer is laid."""
+    return warning.endswith("align by hand")

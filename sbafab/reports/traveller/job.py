@@ -19,9 +19,9 @@ class Job:
     """The order behind a traveller.
 
     ``kerf`` by material, None where it was not measured; ``fixture`` the path of the pin plate's
-    cut file, ``solid_png`` the bytes of the picture of the solid. ``lowered`` are limits below the
-    usual ones. ``extras`` are further rows of the bill of materials: item and quantity. Empty
-    ``made_for`` leaves a blank to fill in by hand.
+    cut file, ``underlay`` that of the page to lay up on, ``solid_png`` the bytes of the picture of
+    the solid. ``lowered`` are limits below the usual ones. ``extras`` are further rows of the bill
+    of materials: item and quantity. Empty ``made_for`` leaves a blank to fill in by hand.
     """
 
     design_sha256: str
@@ -30,6 +30,7 @@ class Job:
     lowered: Sequence[str] = ()
     findings: Sequence[Finding] = ()
     fixture: str | None = None
+    underlay: str | None = None
     kerf: Mapping[str, Kerf | None] = field(default_factory=dict)
     copies: int = 1
     made_for: str = ""

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 
 from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Sba, Tube
+from sbafab.assemblies.supply import runs
 from sbafab.models.sizes import inflated_diameter
 from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller.action import Action
 from sbafab.reports.traveller.bill import Item
-from sbafab.reports.traveller.process import LEAK_KILOPASCALS, Action
+from sbafab.reports.traveller.process import LEAK_KILOPASCALS
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,7 @@ def join_pages(assembled: Assembled) -> list[JoinPage]:
             if early and isinstance(other.part, Tube):
                 actions.append(Action(f"Lead {say.listed(lines)} through {other.name}."))
             actions += _fix(placed, other)
+        actions += _supply(placed, other, assembled)
         if placed.part.note:
             actions.append(Action(placed.part.note))
         if actions:
@@ -253,7 +256,7 @@ def _thread(placed: PlacedPart, line: Line, other: PlacedPart) -> Iterator[Actio
 
 
 def _glue(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
-    glue = placed.part.glue
+    glue = _adhesive(placed)
     if glue is None:
         if placed.part.at == "outside" or not isinstance(placed.part, Line):
             yield Action("No adhesive is named for this joint: say how it holds, or it is loose.")
@@ -268,6 +271,38 @@ def _glue(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
     clear = "the line" if isinstance(placed.part, Line) else "lumen"
     yield Action(f"Glue: {glue}, {how}. Keep it out of {clear}, bores, inlets and balloons.")
     yield Action("Hold it in place and let it cure as the package says before the next step.")
+
+
+def _adhesive(placed: PlacedPart) -> str | None:
+    """The part's own; a sheet that is wrapped round its tube has its design's else."""
+    wrap = None if placed.made is None else placed.made.design.form.wrap
+    return placed.part.glue or (wrap.glue if wrap is not None else None)
+
+
+def _supply(placed: PlacedPart, other: PlacedPart | None, assembled: Assembled) -> Iterator[Action]:
+    """Where an actuator's tubes run, and how its tabs are folded."""
+    if placed.made is None or not placed.made.laminate.inlets:
+        return
+    tie = "tie them there with a turn of thread, loose enough for tubes to slide"
+    own = runs(placed, assembled)
+    if other is not None and own:
+        away = "start" if placed.part.at == "end" else "end"
+        over = say.listed(list(dict.fromkeys(name for run in own for name in run.over)))
+        past = f"; where one crosses {over}, leave it slack" if over else ""
+        places = say.listed([f"{run.chamber} at {round(run.angle, 1) % 360:g}" for run in own])
+        yield Action(
+            f"Fold each tab back over the rim, round its tube and not flat, and lead the tubes "
+            f"along the outside of {other.name} toward its {away}: {places} degrees{past}; {tie}."
+        )
+    elif other is not None and placed.radius is not None:
+        yield Action(
+            f"Lead its tubes along {other.name}, the way the tabs point, off all balloons; {tie}."
+        )
+    else:
+        yield Action(
+            "Gather its tubes below the base, away from what bends or opens, and tie them 10 mm "
+            "behind the tabs, so that they trail and no pull reaches a tab."
+        )
 
 
 def final_checks(assembled: Assembled) -> list[Action]:
@@ -311,9 +346,9 @@ def _inflated(placed: PlacedSba) -> float | None:
 def bought(assembled: Assembled, copies: int) -> list[Item]:
     """Rows of the bill of materials for what is not cut from film."""
     items = [_item(placed, copies) for placed in assembled.parts if placed.made is None]
-    glues = dict.fromkeys(p.part.glue for p in assembled.parts if p.part.glue is not None)
+    glues = dict.fromkeys(filter(None, map(_adhesive, assembled.parts)))
     for glue in glues:
-        joints = [placed.name for placed in assembled.parts if placed.part.glue == glue]
+        joints = [placed.name for placed in assembled.parts if _adhesive(placed) == glue]
         items.append(Item("Adhesive", f"{glue}, for {say.listed(joints)}", "as needed"))
     return items
 

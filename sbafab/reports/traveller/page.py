@@ -18,22 +18,24 @@ from sbafab.cutting.sheets import SheetFile
 from sbafab.design.kits import cited, departures
 from sbafab.design.records import Design
 from sbafab.laminate.assembly import pins_when_added
-from sbafab.laminate.films import Material
+from sbafab.laminate.films import Film, Material
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.models.paper import BURST
 from sbafab.models.sizes import sizes
 from sbafab.pressing.schedule import Schedule
+from sbafab.reports.canvas import COLOURS, KEY
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.features import balloons, layer_numbers
-from sbafab.reports.traveller import bill, notes, process, times
+from sbafab.reports.traveller import bench, bill, notes, process, times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.batch import batch_page
-from sbafab.reports.traveller.cautions import cautions
+from sbafab.reports.traveller.cautions import cautions, for_the_designer
 from sbafab.reports.traveller.code import code_svg, record_text
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.layup import Round, rounds
 from sbafab.reports.traveller.shapes import definitions, pattern_regions
-from sbafab.reports.traveller.sheet_map import is_long, marked, part_regions, rows_said, sheet_map
+from sbafab.reports.traveller.sheet_map import marked, part_regions, rows_said, sheet_map
+from sbafab.reports.traveller.wrapping import wrapping
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -90,8 +92,11 @@ def context(work: Work) -> dict[str, Any]:
         "departures": departures(work.design),
         "code": code_svg(text),
         "code_text": text,
+        "legend": [(words, f"#{bytes(COLOURS[tone]).hex()}") for tone, words in KEY],
         "solid": None if job.solid_png is None else b64encode(job.solid_png).decode("ascii"),
-        "cautions": cautions(work),
+        "cautions": [*cautions(work), *for_the_designer(job.findings)],
+        "before_cutting": bench.before_cutting(films(laminate)),
+        "after_cutting": bench.after_cutting([work]),
         "bill": bill.bill(work),
         "others": others,
         "sheet_rows": sheet_rows(work.design, work.sheets, {work.design.name: "", **others}),
@@ -106,7 +111,7 @@ def context(work: Work) -> dict[str, Any]:
         "finishing": process.finishing(work),
         "tubing": process.tubing(work),
         "leak_test": process.leak_test(work),
-        "wrapping": process.wrapping(work),
+        "wrapping": wrapping(work),
         "leak_kilopascals": process.LEAK_KILOPASCALS,
         "burst": f"{BURST.value:g} ± {BURST.error:g}",
         "times": times.times(work),
@@ -140,6 +145,10 @@ def materials(laminate: Laminate) -> list[Material]:
     return list(dict.fromkeys(layer.film.material for layer in laminate.layers))
 
 
+def films(laminate: Laminate) -> list[Film]:
+    return list(dict.fromkeys(layer.film for layer in laminate.layers))
+
+
 def _facts(work: Work) -> list[tuple[str, str]]:
     laminate = work.laminate
     extras = "tabs and ears" if laminate.registration == "ears" else "tabs"
@@ -162,7 +171,8 @@ def _facts(work: Work) -> list[tuple[str, str]]:
             (names.get(name, name.replace("_", " ")), say.millimetres(value))
             for name, value in sizes(work.design, laminate).items()
         ),
-        ("Inlets", f"{len(laminate.inlets)}, tube {work.design.inlet.tube}"),
+        ("Inlets", str(len(laminate.inlets))),
+        ("Tube", work.design.inlet.tube),
     ]
 
 
@@ -176,7 +186,6 @@ class SheetRow:
     size: str
     minutes: str
     said: str
-    is_wide: bool
 
 
 def sheet_rows(
@@ -198,7 +207,6 @@ def sheet_rows(
                 say.size(sheet.width, sheet.length),
                 say.minutes(sheet.minutes),
                 rows_said(sheet),
-                is_long(sheet),
             )
         )
     return rows

@@ -12,6 +12,8 @@ from sbafab.pressing.schedule import Step
 from sbafab.pressing.together import Runs
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller.action import Action
+from sbafab.reports.traveller.bench import on_the_lumen, reseat, underlay, warm_plate
 from sbafab.reports.traveller.exploded import exploded
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.layup import Bed, Round, beds, inlets_in, rounds
@@ -27,15 +29,6 @@ BONDS = {
     "flash": "Flash bond: the layers just barely stick together.",
     "full": "Full bond: all TPE that touches melts into one.",
 }
-
-
-@dataclass(frozen=True)
-class Action:
-    """One thing to do. ``layers`` are laid in it; ``ticks`` label one box each, or there is one."""
-
-    text: str
-    layers: tuple[int, ...] = ()
-    ticks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -78,7 +71,7 @@ def step_pages(work: Work) -> list[StepPage]:
                 pitch(placed),
                 plan(work.laminate, part, lying, f"plan-{step.step}", runs.copies == 1),
                 exploded(work.laminate, part, lying, f"exploded-{step.step}"),
-                tuple(_actions(work.laminate, part, step, lying, runs)),
+                _bench_actions(work, part, step, lying, runs),
             )
         )
     return found
@@ -139,6 +132,15 @@ def _place_notes(runs: Runs) -> tuple[str, ...]:
     )
 
 
+def _bench_actions(
+    work: Work, part: AssemblyStep, step: Step, lying: Sequence[Bed], runs: Runs
+) -> tuple[Action, ...]:
+    """A step's actions; what it is laid up on comes right after the press is set."""
+    first, *others = _actions(work.laminate, part, step, lying, runs)
+    own = (*underlay(work, part), *on_the_lumen(work.laminate, part))
+    return (first, *own, *others)
+
+
 def _actions(
     laminate: Laminate, part: AssemblyStep, step: Step, lying: Sequence[Bed], runs: Runs
 ) -> Iterator[Action]:
@@ -156,6 +158,7 @@ def _actions(
         yield Action("Lay a release film on a flat plate. No pins: lay by eye, as each line says.")
     for bed in lying:
         yield from _lay(things, bed, part.pins)
+    yield from reseat(laminate, part.adds, bool(part.pins))
     many = stack_count(laminate, part.layers)
     lies = "stack lies" if many == 1 else f"{many} stacks lie"
     yield Action(
@@ -169,6 +172,7 @@ def _actions(
             "with the same holes lies on top."
         )
     yield Action("Cover with a release film.")
+    yield warm_plate(step)
     cycles = tuple(f"cycle {n}" for n in range(1, runs.count + 1))
     yield Action(
         f"Close the press and start the timer: {say.minutes(step.minutes)}.",
@@ -342,6 +346,7 @@ def tubing(work: Work) -> list[Action]:
             (),
             names,
         ),
+        Action("Snip off what of the strip stands out of the tab, flush with its end.", (), names),
         Action(
             f"Seal the mouth all round with a small drop of {work.design.inlet.adhesive}; keep it "
             "out of the tube.",
@@ -355,20 +360,6 @@ def tubing(work: Work) -> list[Action]:
 def _apart(names: Sequence[str]) -> tuple[str, ...]:
     """A box for each of several; a single one needs no name."""
     return tuple(names) if len(names) > 1 else ()
-
-
-def wrapping(work: Work) -> list[Action]:
-    """Some laminates go round a tube in the end; empty for others."""
-    wrap = work.design.form.wrap
-    if wrap is None:
-        return []
-    return [
-        Action(
-            f"Wrap the sheet round its tube, outer diameter "
-            f"{say.millimetres(wrap.tube_diameter)}, balloons outward, its straight edges "
-            "along the tube. The paper does not say what holds it there."
-        )
-    ]
 
 
 def leak_test(work: Work) -> list[Action]:

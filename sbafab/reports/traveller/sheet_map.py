@@ -16,8 +16,8 @@ from sbafab.reports import drawing as draw
 from sbafab.reports.traveller.part_labels import PlacedLabel, first_free, labels
 from sbafab.reports.traveller.shapes import Picture, label
 
-SHOWN = 84.0
-"""mm on the page of a sheet's longer side."""
+HIGHEST = 118.0
+"""mm on the page that a sheet which is not long may take down."""
 ROW, TALLEST, LARGEST = 180.0, 210.0, 0.7
 """mm on the page that a long sheet may take across and down, and its largest scale."""
 LONG = 2.0
@@ -89,9 +89,10 @@ def is_long(sheet: SheetFile) -> bool:
 
 
 def rows_said(sheet: SheetFile) -> str:
-    """How to read the picture of a long sheet; empty for others."""
+    """What is not seen at once in the picture of a sheet: rows, a turn, an empty rest."""
     if not is_long(sheet):
-        return ""
+        used = _used(sheet)
+        return f"the sheet above {used:.0f} mm is empty" if used < sheet.length else ""
     strips = _strips(sheet)
     said = f"shown in {len(strips)} rows, one after the other" if len(strips) > 1 else ""
     if not strips[0].turned:
@@ -123,8 +124,9 @@ def sheet_map(sheet: SheetFile, film: Film, marks: Mapping[str, str], name: str)
 def _strips(sheet: SheetFile) -> list[_Strip]:
     width, length = sheet.width, sheet.length
     if not is_long(sheet):
-        scale = SHOWN / max(width, length)
-        return [_Strip((0.0, 0.0, width, length), (EDGE, EDGE), scale, False)]
+        used = _used(sheet)
+        scale = min(ROW / width, HIGHEST / used)
+        return [_Strip((0.0, 0.0, width, used), (EDGE, EDGE), scale, False)]
     long, short = max(width, length), min(width, length)
     count = 1
     while (
@@ -141,6 +143,14 @@ def _strips(sheet: SheetFile) -> list[_Strip]:
         corner = EDGE, EDGE + row * (short * scale + GAP)
         strips.append(_Strip(bounds, corner, scale, turned))
     return strips
+
+
+def _used(sheet: SheetFile) -> float:
+    """How far up a sheet its parts and pins reach, and a border more; mm."""
+    nest = sheet.nest
+    tops = [nest.region(placement).bounds[3] for placement in nest.on_sheet(sheet.number - 1)]
+    tops += [y + diameter / 2 for _, y, diameter in nest.stock.pins]
+    return min(sheet.length, max(tops) + nest.stock.border)
 
 
 def _window(strip: _Strip) -> list[str]:

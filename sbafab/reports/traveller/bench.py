@@ -1,0 +1,117 @@
+"""What good hands know: one line each where it happens. All of it is ours; the paper gives none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from sbafab.laminate.assembly import AssemblyStep, distinct_layers, laying_pins
+from sbafab.laminate.films import Film
+from sbafab.laminate.laminate import Laminate
+from sbafab.pressing.schedule import Step
+from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller.action import Action
+from sbafab.reports.traveller.job import Work
+from sbafab.reports.underlay import guides
+
+WARM = 5.0
+"""C by which a plate may be colder than the platens when the timer starts."""
+
+
+def before_cutting(films: Iterable[Film]) -> list[Action]:
+    """How films come clean and flat under the beam."""
+    actions = [
+        Action(
+            "Wipe bench and film with isopropanol and a lint-free cloth, let them dry. Gloves on; "
+            "hold film by its border: grease and dust keep TPE from bonding."
+        )
+    ]
+    masks = [film for film in films if film.material == "PTFE"]
+    if masks:
+        thin = say.millimetres(min(film.thickness for film in masks))
+        actions.append(
+            Action(
+                f"Lay PTFE on a backing of card, smooth it flat, and hold it down all along its "
+                f"border (tape, magnets or vacuum): {thin} of it lifts in the exhaust's draught."
+            )
+        )
+    return actions
+
+
+def after_cutting(works: Sequence[Work]) -> list[Action]:
+    """How parts leave the sheet: clean, and none lost."""
+    actions = [
+        Action(
+            "Wipe the soot off both faces of every part with isopropanol, let it dry: soot in a "
+            "bond is a leak."
+        )
+    ]
+    loose = sum(_loose(work.laminate) * work.job.copies for work in works)
+    if loose:
+        actions.append(
+            Action(
+                f"{say.count(loose, 'loose mask piece')}: pick them up with antistatic tweezers on "
+                "an earthed mat, keep them in a dish with a lid. PTFE charges itself and flies."
+            )
+        )
+    return actions
+
+
+def _loose(laminate: Laminate) -> int:
+    """Pieces of masks that fall into several."""
+    pieces = (len(layer.profile.pieces) for layer in laminate.layers if layer.is_mask)
+    return sum(count for count in pieces if count > 1)
+
+
+def underlay(work: Work, part: AssemblyStep) -> list[Action]:
+    """The printed page below the release film, in steps in which it has a line to lay by."""
+    patterns = [
+        pattern
+        for guide in guides(work.laminate)
+        if part.number in guide.steps
+        for pattern in guide.patterns
+    ]
+    if work.job.underlay is None or not patterns:
+        return []
+    prick = ", the pins pricked through" if part.pins else ""
+    return [
+        Action(
+            f"{work.job.underlay}, printed at 100 % and its bars measured: tape it to the plate"
+            f"{prick}, release film over it. It has the edges of {say.listed(patterns)}."
+        )
+    ]
+
+
+def on_the_lumen(laminate: Laminate, part: AssemblyStep) -> list[Action]:
+    """A pin that a step without pins may be laid up on; empty where none passes all its films."""
+    pins = laying_pins(laminate, part)
+    if not pins:
+        return []
+    names = say.listed([f"{pin.name} (⌀{say.millimetres(pin.diameter)})" for pin in pins])
+    return [
+        Action(
+            f"Better than by eye: lay up on the pin plate with the pin of the {names} alone, which "
+            "passes every film here; then only the turn is yours. Draw it before the press closes."
+        )
+    ]
+
+
+def reseat(laminate: Laminate, adds: Sequence[int], pinned: bool) -> list[Action]:
+    """What to do with a mask that has slipped; empty for a step that lays none."""
+    if not any(layer.is_mask for layer in distinct_layers(laminate, adds)):
+        return []
+    home = "down on its pin" if pinned else "to its edge"
+    return [
+        Action(
+            f"Has a mask slipped? Lift what lies over it with tweezers, push it {home}, lay the "
+            "rest back and stroke it flat. After the flash bond it cannot be moved: cut anew."
+        )
+    ]
+
+
+def warm_plate(step: Step) -> Action:
+    """When a timer starts whose plate goes in cold."""
+    return Action(
+        "The plate goes in cold. Keep a thermocouple at its edge: the "
+        f"{say.minutes(step.minutes)} count from when it reads "
+        f"{step.temperature_c - WARM:g} °C, not from when the press closes."
+    )

@@ -1,0 +1,97 @@
+"""findings.html: what the rules found, for whoever designs; the bench has the traveller."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from sbafab.laminate.laminate import Laminate
+from sbafab.reports.traveller.hand import Hand, on_laying_pins, rougher_hands
+from sbafab.reports.traveller.page import environment, frame
+from sbafab.rules.finding import Finding
+from sbafab.rules.limits import Limits
+
+TEMPLATE = "findings.html.j2"
+YIELD, WORST = "registration-yield", "registration-worst-case"
+
+
+@dataclass(frozen=True)
+class Inspected:
+    """A design's laminate, or None for an assembly's own checks, and what was found in it."""
+
+    name: str
+    findings: Sequence[Finding]
+    laminate: Laminate | None = None
+    limits: Limits | None = None
+
+
+class _Chapter(NamedTuple):
+    """What the page says of one design; ``own`` is the share of good builds of its own hand."""
+
+    name: str
+    open: Sequence[Finding]
+    rest: Sequence[Finding]
+    own: Hand | None
+    hands: Sequence[Hand]
+    helps: Sequence[str]
+
+
+def findings_html(title: str, sha256: str, generator: str, inspected: Sequence[Inspected]) -> str:
+    """The whole page, a chapter a design."""
+    said = frame(title, sha256, generator)
+    chapters = [_chapter(one) for one in inspected]
+    return environment().get_template(TEMPLATE).render(**said, shapes="", chapters=chapters)
+
+
+def _chapter(one: Inspected) -> _Chapter:
+    is_open = [f for f in one.findings if f.verdict in ("fail", "warn") or f.by_user]
+    rest = [f for f in one.findings if f not in is_open]
+    hands = _hands(one)
+    return _Chapter(one.name, is_open, rest, _own(one), hands, tuple(_helps(one, hands)))
+
+
+def _own(one: Inspected) -> Hand | None:
+    found = next((f for f in one.findings if f.rule == YIELD), None)
+    if found is None or found.measured is None or one.limits is None:
+        return None
+    own = one.limits.tolerances
+    return Hand(own.placement, own.turn, found.measured)
+
+
+def _hands(one: Inspected) -> tuple[Hand, ...]:
+    """A rougher hand is asked about where the laminate could be counted at all."""
+    if one.laminate is None or one.limits is None or _own(one) is None:
+        return ()
+    return rougher_hands(one.laminate, one.limits)
+
+
+def _helps(one: Inspected, hands: Sequence[Hand]) -> Iterator[str]:
+    """What leaves less to the hand, cheapest first."""
+    laminate = one.laminate
+    if laminate is None or not hands:
+        return
+    yield (
+        "Print underlay.pdf at 1:1 and lay up on it: its lines show where every edge goes that no "
+        "pin holds. How much steadier that makes a hand nobody has measured; half the error "
+        "gives the first row."
+    )
+    pinned = on_laying_pins(laminate, one.limits) if one.limits is not None else None
+    if pinned is not None:
+        yield (
+            f"Lay up the steps without pins on the lumen's pin, and draw it before the press "
+            f"closes: {pinned.share:.0%} of builds are then good, if the hand turns as before."
+        )
+    yield (
+        "sbafab check design.toml --target-yield 0.99 says how much wider bonds and overhangs "
+        "reach 99 % with the hand as it is."
+    )
+    if laminate.registration == "channel-pin":
+        yield (
+            'registration.method = "ears" pins every film and separator in every step; the ears '
+            "are snipped off afterwards."
+        )
+    yield (
+        "Count your own builds and set registration.hand_placement and registration.hand_turn to "
+        "what they say."
+    )

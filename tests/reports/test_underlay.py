@@ -1,0 +1,119 @@
+"""underlay.pdf read back by PDFium: the sizes of page and bars, and every line in its place."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import pypdfium2
+import pypdfium2.raw as pdfium
+import pytest
+import shapely
+import shapely.affinity
+
+from sbafab.actuators import build, load_design
+from sbafab.laminate.laminate import Laminate
+from sbafab.reports.underlay import guides, underlay_pdf
+
+SHA = "0123456789abcdef" * 4
+MM = 25.4 / 72
+FILM, MASK, BLACK = (13, 64, 140), (217, 102, 0), (0, 0, 0)
+Points = list[tuple[float, float]]
+
+
+def printed(*given: str) -> tuple[Laminate, pypdfium2.PdfDocument]:
+    laminate = build(load_design(*given[:1], given[1:]))
+    data = underlay_pdf(laminate, SHA)
+    assert data is not None
+    return laminate, pypdfium2.PdfDocument(data)
+
+
+def paths(document: pypdfium2.PdfDocument, colour: tuple[int, int, int]) -> Iterator[Points]:
+    """Points in mm along every path of a colour, curves followed in eight steps."""
+    for thing in document[0].get_objects(filter=[pdfium.FPDF_PAGEOBJ_PATH]):
+        shades = [ctypes.c_uint() for _ in range(4)]
+        assert pdfium.FPDFPageObj_GetStrokeColor(thing.raw, *shades)
+        if tuple(int(shade.value) for shade in shades[:3]) == colour:
+            yield _followed(thing)
+
+
+def _followed(thing: Any) -> Points:
+    matrix = thing.get_matrix()
+    corners: Points = []
+    kinds = []
+    for index in range(pdfium.FPDFPath_CountSegments(thing.raw)):
+        segment = pdfium.FPDFPath_GetPathSegment(thing.raw, index)
+        x, y = ctypes.c_float(), ctypes.c_float()
+        assert pdfium.FPDFPathSegment_GetPoint(segment, x, y)
+        px, py = matrix.on_point(x.value, y.value)
+        corners.append((px * MM, py * MM))
+        kinds.append(pdfium.FPDFPathSegment_GetType(segment))
+    found, index = corners[:1], 1
+    while index < len(corners):
+        if kinds[index] == pdfium.FPDF_SEGMENT_BEZIERTO:
+            handles = [found[-1], *corners[index : index + 3]]
+            found += [_bezier(handles, step / 8) for step in range(1, 9)]
+            index += 3
+        else:
+            found.append(corners[index])
+            index += 1
+    return found
+
+
+def _bezier(p: Points, t: float) -> tuple[float, float]:
+    shares = [math.comb(3, n) * t**n * (1 - t) ** (3 - n) for n in range(4)]
+    return (
+        sum(share * x for share, (x, _) in zip(shares, p, strict=True)),
+        sum(share * y for share, (_, y) in zip(shares, p, strict=True)),
+    )
+
+
+@pytest.mark.parametrize("template", ["3dof-15mm", "1dof-5mm", "radial-15mm"])
+def test_the_print_is_at_actual_size(template: str) -> None:
+    laminate, document = printed(template)
+    assert len(document) == 1
+    width, height = document[0].get_size()
+    assert (width * MM, height * MM) == pytest.approx((210.0, 297.0), abs=0.01)
+    # What a printer's window asks is answered in the file: no scaling.
+    assert b"/PrintScaling /None" in (underlay_pdf(laminate, SHA) or b"")
+    lengths = [math.dist(path[0], path[-1]) for path in paths(document, BLACK)]
+    assert sorted(lengths)[-2:] == pytest.approx([100.0, 100.0], abs=1e-3)
+
+
+@pytest.mark.parametrize("template", ["3dof-15mm", "1dof-5mm", "radial-15mm"])
+def test_every_line_is_the_edge_of_what_is_laid_there(template: str) -> None:
+    laminate, document = printed(template)
+    drawn = [line for colour in (FILM, MASK) for line in paths(document, colour) if len(line) > 2]
+    laid = [laminate.patterns[guide.patterns[0]][0].profile for guide in guides(laminate)]
+    rings = [piece[0] for profile in laid for piece in profile.polygons(1e-5)]
+    meant = shapely.MultiLineString([[*ring, ring[0]] for ring in rings])
+    found = shapely.MultiLineString([[*line, line[0]] for line in drawn])
+    shift = [a - b for a, b in zip(meant.bounds, found.bounds, strict=True)]
+    assert shift[:2] == pytest.approx(shift[2:], abs=2e-3)
+    # Chords of the followed curves leave them by up to 0.004 mm.
+    back = shapely.affinity.translate(found, *shift[:2])
+    assert shapely.hausdorff_distance(meant, back, densify=0.1) < 0.01
+    assert len(drawn) == len(rings)
+
+
+def test_it_shows_what_a_hand_lays() -> None:
+    # Base and cap; a 1-DoF separator, whose hole is wider than the pin, in step 3 as well.
+    one = {guide.patterns[0]: guide.steps for guide in guides(printed("1dof-5mm")[0])}
+    assert one == {"P01": (2, 4), "P04": (3, 4), "P07": (4,)}
+    three = {guide.patterns[0]: guide.steps for guide in guides(printed("3dof-15mm")[0])}
+    assert three == {"P01": (2, 4), "P04": (4,), "P07": (4,)}
+
+
+def test_with_ears_there_is_nothing_to_lay_by() -> None:
+    eared = build(load_design("1dof-5mm", ('registration.method="ears"',)))
+    assert underlay_pdf(eared, SHA) is None
+
+
+def test_words_stand_as_they_were_given() -> None:
+    _, document = printed("1dof-5mm", "name=a.b_c-d")
+    words = document[0].get_textpage().get_text_range()
+    assert "a.b_c-d: alignment underlay" in words
+    assert "“actual size”" in words
+    assert "(TPE): outer edge" in words
