@@ -127,15 +127,19 @@ def _kinds_of(
     kinds = _Kinds(turns, room)
     for lot in lots:
         drawn = Counter(
-            (file.part.path, file.claim.pattern)
+            (file.part.path, file.claim.pattern, file.claim.role.endswith("-mask"))
             for file in lot.files
             if file.part is not None and file.claim.material == material
         )
-        spares = lot.spares if material == "PTFE" else 0
-        for (path, pattern), count in drawn.items():
+        # Spares are cut of masks alone, whatever film they are of.
+        counts: dict[tuple[Region, str], int] = {}
+        for (path, pattern, is_mask), count in drawn.items():
+            more = counts.get((path, pattern), lot.spares if is_mask else 0)
+            counts[path, pattern] = more + count * lot.copies
+        for (path, pattern), total in counts.items():
             for piece in path.pieces:
                 kind = kinds.find(piece) or kinds.add(piece)
-                kind.wanted[lot.design, pattern] += count * lot.copies + spares
+                kind.wanted[lot.design, pattern] += total
     return kinds
 
 
