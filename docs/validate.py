@@ -101,7 +101,7 @@ def sizes(three: Prediction) -> Iterator[Row]:
         exact(1.016, "mm", "Sec. 2"),
         three.value("largest tube that the inlet opens to"),
         "half the perimeter",
-        "the strip is cut 1.6 wide, the next 0.05 above 1.596",
+        "a strip of 1.95 is cut 1.65 at its narrowest; with its PTFE the tube needs 1.635",
     )
     tall = "sum of the films"
     yield Row(

@@ -68,6 +68,7 @@ class Ear:
     end: float
     width: float
     pin_diameter: float
+    clearance: float
 
     @property
     def name(self) -> str:
@@ -79,15 +80,15 @@ class Ear:
 
     @property
     def pin(self) -> Pin:
-        return Pin(self.ray.name, self.ray.at(self.hole), self.pin_diameter)
+        return Pin(self.ray.name, self.ray.at(self.hole), self.pin_diameter, self.clearance)
 
 
 def film_setback(design: Design) -> float:
     """How far bores and lumen of the TPE stand back from those of the masks.
 
-    With channel pins all share the pin's edge; with ears every mask overhangs.
+    With channel pins all share the pin's edge; without, every mask overhangs.
     """
-    return design.mask.overhang if design.registration.method == "ears" else 0.0
+    return 0.0 if design.registration.method == "channel-pin" else design.mask.overhang
 
 
 def placed(rays: Sequence[Ray], body: Region, plates: Region, design: Design) -> tuple[Ear, ...]:
@@ -125,9 +126,13 @@ def placed(rays: Sequence[Ray], body: Region, plates: Region, design: Design) ->
 
 
 def _ear(ray: Ray, root: float, design: Design) -> Ear:
-    bond, pin = design.bond.width, design.registration.pin_diameter
+    bond, pin = design.bond.width, design.registration.hole_diameter
     hole = root + bond + pin / 2
-    return Ear(ray, root, hole, hole + pin / 2 + bond, pin + 2 * bond, pin)
+    return Ear(ray, root, hole, hole + pin / 2 + bond, pin + 2 * bond, *_pin_of(design))
+
+
+def _pin_of(design: Design) -> tuple[float, float]:
+    return design.registration.pin_diameter, design.registration.pin_clearance
 
 
 def _longer(ray: Ray) -> float:
@@ -136,7 +141,7 @@ def _longer(ray: Ray) -> float:
 
 def _reach(ray: Ray, body: Region, design: Design) -> float:
     """How far out along a ray the body stands in the way of an ear and the mask round it."""
-    width = design.registration.pin_diameter + 2 * design.bond.width
+    width = design.registration.hole_diameter + 2 * design.bond.width
     band = strip(ray.start, ray.at(FAR), width + 4 * design.mask.overhang) & body
     return max((edge.farthest_along(ray.start, ray.direction) for edge in band.edges), default=0.0)
 
@@ -164,7 +169,7 @@ def film_holes(ears: Sequence[Ear]) -> Region:
 
 def _holes(ears: Sequence[Ear], holder: Holder) -> Region:
     own = [ear for ear in ears if ear.ray.holder == holder]
-    return union(disc(ear.pin.centre, ear.pin_diameter / 2) for ear in own) if own else Region()
+    return union(disc(ear.pin.centre, ear.pin.hole / 2) for ear in own) if own else Region()
 
 
 def with_mask_ears(mask: Region, ears: Sequence[Ear], overhang: float) -> Region:

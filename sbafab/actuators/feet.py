@@ -43,7 +43,7 @@ def mask_feet(
     With each the point of the outline that it is joined from, where it starts beside the outline.
     """
     half, overhang = _half(design), design.mask.overhang
-    tab = max(design.inlet.strip_width / 2 + design.bond.width, head)
+    tab = max(design.strip_width / 2 + design.bond.width, head)
     beside = tab + 2 * overhang + half
     found: list[tuple[Point, Point | None]] = []
     for x in (-beside, beside):
@@ -68,7 +68,7 @@ def _no_room(width: float) -> str:
 
 def _half(design: Design) -> float:
     """Half the width of an ear."""
-    return design.registration.pin_diameter / 2 + design.bond.width
+    return design.registration.hole_diameter / 2 + design.bond.width
 
 
 def _apart(design: Design) -> float:

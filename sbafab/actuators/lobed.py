@@ -8,6 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from sbafab.actuators.ears import NOTE, Ear, Holder, Ray, film_setback, placed
+from sbafab.actuators.panel import on_panel, roots, with_stubs
 from sbafab.actuators.pockets import (
     RoundChamber,
     bonded,
@@ -17,7 +18,7 @@ from sbafab.actuators.pockets import (
     round_pockets,
     tab_and_strip,
 )
-from sbafab.actuators.stacking import BalloonShape, BalloonStack, balloon_cuts, layers
+from sbafab.actuators.stacking import BalloonShape, BalloonStack, balloon_cuts, channel_pin, layers
 from sbafab.actuators.tails import tails
 from sbafab.design.form import Form, degrees_of_freedom
 from sbafab.design.records import Design
@@ -48,6 +49,13 @@ class Lumen(Section):
 
     diameter: Length = 2.0
     """The central channel, open in every layer."""
+    pin_diameter: Length | None = None
+    """Its dowel pin; by default the lumen's diameter: films stretch over it (rule pin-fit)."""
+
+    @property
+    def pin(self) -> float:
+        """Diameter of the lumen's dowel pin."""
+        return self.diameter if self.pin_diameter is None else self.pin_diameter
 
 
 class LobedDesign(Design):
@@ -61,7 +69,9 @@ class LobedDesign(Design):
     @property
     def form(self) -> Form:
         pockets, count = round_pockets(self, self.chamber), self.chamber.count
-        return Form(degrees_of_freedom(count), count, pockets, lumen=self.lumen.diameter)
+        lumen = self.lumen
+        words = degrees_of_freedom(count)
+        return Form(words, count, pockets, lumen=lumen.diameter, lumen_pin=lumen.pin)
 
 
 def axis_radius(design: LobedDesign, pockets: list[Region]) -> tuple[float, str | None]:
@@ -130,15 +140,19 @@ def build(design: LobedDesign) -> Laminate:
         count,
     )
     plates = union(shape.outline for shape in shapes)
+    held_by = roots(design, shapes, bottom.outline, [inlet for _, _, inlet in inlets])
+    bottom, shapes = with_stubs(bottom, held_by), tuple(with_stubs(s, held_by) for s in shapes)
     body = bottom.outline | plates
     ears = _ears(design, body, plates, axes)
     held = tails([inlet for _, _, inlet in inlets], body, ears, design)
     stack = BalloonStack(bottom, shapes, shape_of, axes, design.lumen.diameter, ears, held)
     has_bores = design.stack.balloons > 1
     bore = design.bore.diameter
-    pins = [Pin(n, axis, bore) for n, axis in zip(names, axes, strict=True) if has_bores]
-    lumen_pin = Pin("lumen", (0.0, 0.0), design.lumen.diameter)
-    return Laminate(
+    pins = [
+        channel_pin(n, axis, design.bore) for n, axis in zip(names, axes, strict=True) if has_bores
+    ]
+    lumen_pin = Pin("lumen", (0.0, 0.0), design.lumen.pin, design.lumen.diameter - design.lumen.pin)
+    laminate = Laminate(
         name=design.name,
         family=design.family,
         layers=layers(balloon_cuts(stack, design), design),
@@ -153,9 +167,11 @@ def build(design: LobedDesign) -> Laminate:
         lumen=design.lumen.diameter,
         balloons=design.stack.balloons,
         registration=design.registration.method,
+        pins_in_full_bonds=design.registration.full_bond_pins == "in",
         notes=(*((note,) if note else ()), *((NOTE,) if ears else ())),
         outline=plates,
     )
+    return on_panel(laminate, held_by, design)
 
 
 def _hub_radius(design: LobedDesign, pockets: list[Region], axis: float) -> float:

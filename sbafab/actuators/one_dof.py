@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from sbafab.actuators.ears import NOTE, Ear, Ray, placed
+from sbafab.actuators.panel import on_panel, roots, with_stubs
 from sbafab.actuators.pockets import (
     RoundChamber,
     bonded,
@@ -13,7 +14,7 @@ from sbafab.actuators.pockets import (
     round_pockets,
     tab_and_strip,
 )
-from sbafab.actuators.stacking import BalloonShape, BalloonStack, balloon_cuts, layers
+from sbafab.actuators.stacking import BalloonShape, BalloonStack, balloon_cuts, channel_pin, layers
 from sbafab.actuators.tails import tails
 from sbafab.design.form import Form, degrees_of_freedom
 from sbafab.design.records import Design
@@ -21,7 +22,7 @@ from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import unit
 from sbafab.geometry.offset import fillet
 from sbafab.geometry.region import Region
-from sbafab.laminate.laminate import Bore, Chamber, Laminate, Pin
+from sbafab.laminate.laminate import Bore, Chamber, Laminate
 
 AXIS = (0.0, 0.0)
 
@@ -53,13 +54,15 @@ def build(design: OneDofDesign) -> Laminate:
         fillet(first.outline | tab, design.fillet.radius), first.pockets | strip, 1, 1
     )
     plates = union(shape.outline for shape in shapes)
+    held_by = roots(design, shapes, bottom.outline, [inlet])
+    bottom, shapes = with_stubs(bottom, held_by), tuple(with_stubs(s, held_by) for s in shapes)
     body = bottom.outline | plates
     ears = _ears(design, body, plates)
     held = tails([inlet], body, ears, design)
     stack = BalloonStack(bottom, shapes, shape_of, (AXIS,), ears=ears, tails=held)
     balloons = design.stack.balloons
     has_bore = balloons > 1
-    return Laminate(
+    laminate = Laminate(
         name=design.name,
         family=design.family,
         layers=layers(balloon_cuts(stack, design), design),
@@ -67,16 +70,18 @@ def build(design: OneDofDesign) -> Laminate:
         bores=(Bore("chamber1", AXIS, design.bore.diameter),) if has_bore else (),
         inlets=(inlet,),
         pins=(
-            *((Pin("chamber1", AXIS, design.bore.diameter),) if has_bore else ()),
+            *((channel_pin("chamber1", AXIS, design.bore),) if has_bore else ()),
             *(ear.pin for ear in ears),
             *(pin for tail in held for pin in tail.pins),
         ),
         lumen=None,
         balloons=balloons,
         registration=design.registration.method,
+        pins_in_full_bonds=design.registration.full_bond_pins == "in",
         notes=(NOTE,) if ears else (),
         outline=plates,
     )
+    return on_panel(laminate, held_by, design)
 
 
 def _ears(design: OneDofDesign, body: Region, plates: Region) -> tuple[Ear, ...]:

@@ -108,7 +108,7 @@ def tab_and_strip(
     ``edge`` mm from there. The strip reaches one overhang past the tab's end. Raises DesignError
     where the strip is wider than the pocket.
     """
-    width = design.inlet.strip_width
+    width = design.strip_width
     for side in (1, -1):
         corner = (
             start[0] - side * direction[1] * width / 2,

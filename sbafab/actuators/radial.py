@@ -20,8 +20,16 @@ from sbafab.actuators.ears import (
     with_sheet_ears,
 )
 from sbafab.actuators.feet import film_feet, mask_feet
+from sbafab.actuators.panel import METHOD
 from sbafab.actuators.pockets import bonded, check_neck, drawn_pocket, tab_and_strip
-from sbafab.actuators.stacking import BalloonShape, BalloonStack, CutFilm, balloon_cuts, layers
+from sbafab.actuators.stacking import (
+    BalloonShape,
+    BalloonStack,
+    CutFilm,
+    balloon_cuts,
+    channel_pin,
+    layers,
+)
 from sbafab.actuators.tails import head_reach, tails
 from sbafab.design.form import Drawn, Form, Slots, Wrap
 from sbafab.design.records import Chamber as ChamberSection
@@ -34,7 +42,7 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import fillet, grow
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import rectangle, stadium, strip
-from sbafab.laminate.laminate import Bore, Chamber, Laminate, Pin
+from sbafab.laminate.laminate import Bore, Chamber, Laminate
 from sbafab.laminate.laminate import Inlet as LaminateInlet
 
 
@@ -129,6 +137,12 @@ class RadialDesign(Design):
 
 def build(design: RadialDesign) -> Laminate:
     """The flat laminate of a radial design. Raises DesignError where parts do not fit."""
+    if design.registration.method == METHOD:
+        raise DesignError(
+            "a radial design cannot be made in registered sheets, for its balloons' bridges would "
+            "lie on the sheet that is wrapped, and the second cut would go through it; use "
+            'registration.method = "ears"'
+        )
     bond, overhang = design.bond.width, design.mask.overhang
     pocket = _pocket(design)
     check_neck(design, [pocket], [(0.0, 0.0)])
@@ -171,7 +185,7 @@ def build(design: RadialDesign) -> Laminate:
         inlets=inlets,
         pins=(
             *(
-                Pin(f"channel{number}", bore.centre, bore.diameter)
+                channel_pin(f"channel{number}", bore.centre, design.bore)
                 for number, bore in enumerate(bores, start=1)
             ),
             *(ear.pin for ear in ears),
@@ -180,6 +194,7 @@ def build(design: RadialDesign) -> Laminate:
         lumen=None,
         balloons=design.stack.balloons,
         registration=design.registration.method,
+        pins_in_full_bonds=design.registration.full_bond_pins == "in",
         notes=(NOTE,) if ears else (),
     )
 
@@ -260,7 +275,7 @@ def _bottom(
     tabs = [tab for tab, _, _ in made]
     strips = [mask for _, mask, _ in made]
     if manifold and count > 1:
-        width = design.inlet.strip_width
+        width = design.strip_width
         tabs.append(strip(centres[0], centres[-1], width + 2 * design.bond.width))
         strips.append(strip(centres[0], centres[-1], width))
     if manifold:

@@ -15,6 +15,7 @@ from sbafab.actuators.ears import (
 )
 from sbafab.actuators.tails import Tail, with_tails
 from sbafab.design.reading import listed, shown
+from sbafab.design.records import Bore as BoreSection
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import union
@@ -23,7 +24,7 @@ from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc
 from sbafab.laminate.films import Film, in_order
-from sbafab.laminate.laminate import ROLES, Layer, Role
+from sbafab.laminate.laminate import ROLES, Layer, Pin, Role
 
 
 @dataclass(frozen=True)
@@ -132,6 +133,11 @@ def balloon_cuts(stack: BalloonStack, design: Design) -> list[CutFilm]:
             mask = separator_mask(below, stack.shape_of[number] + 1)
             cuts.append(CutFilm("separator-mask", mask, number, stack.shapes[0].outline_pieces))
     return cuts
+
+
+def channel_pin(name: str, centre: Point, bore: BoreSection) -> Pin:
+    """The dowel pin of a channel bore."""
+    return Pin(name, centre, bore.pin, round(bore.diameter - bore.pin, 9))
 
 
 def film_of(design: Design, role: Role) -> Film:

@@ -60,12 +60,13 @@ def tails(
 
 def head_reach(design: Design) -> float:
     """How far a tail's head reaches to the side from its strip's axis."""
-    return (ASIDE + 0.5) * design.registration.pin_diameter + design.bond.width
+    return (ASIDE + 0.5) * design.registration.hole_diameter + design.bond.width
 
 
 def _tail(number: int, inlet: Inlet, body: Region, design: Design) -> Tail:
     bond, overhang = design.bond.width, design.mask.overhang
-    pin = design.registration.pin_diameter
+    pin = design.registration.hole_diameter
+    own = design.registration.pin_diameter, design.registration.pin_clearance
     width = pin + 2 * bond
     (x, y), (dx, dy) = inlet.mouth, inlet.direction
 
@@ -85,7 +86,7 @@ def _tail(number: int, inlet: Inlet, body: Region, design: Design) -> Tail:
         f"the tail of the inlet strip of {inlet.chamber}",
         strip(at(0.0), at(end), inlet.width),
         strip(at(root, aside), at(end, aside), width),
-        tuple(Pin(name, at(place, aside), pin) for name, place in zip(names, places, strict=True)),
+        tuple(Pin(name, at(place, aside), *own) for name, place in zip(names, places, strict=True)),
     )
 
 
@@ -95,4 +96,4 @@ def with_tails(pockets: Region, made: Iterable[Tail]) -> Region:
     if not made:
         return pockets
     grown = union([pockets, *(part for tail in made for part in (tail.strip, tail.head))])
-    return grown - union(disc(pin.centre, pin.diameter / 2) for tail in made for pin in tail.pins)
+    return grown - union(disc(pin.centre, pin.hole / 2) for tail in made for pin in tail.pins)

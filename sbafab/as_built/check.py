@@ -31,6 +31,7 @@ from sbafab.as_built.measures import (
     size_problems,
     with_plate_pins,
 )
+from sbafab.as_built.panels import read_panel
 from sbafab.as_built.pieces import Lot
 from sbafab.as_built.records import (
     CLAIMS,
@@ -51,6 +52,7 @@ from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.panel import SheetPanel
 from sbafab.models.sizes import sizes
 from sbafab.output.manifest_records import Manifest
 from sbafab.output.planned import Checked
@@ -89,6 +91,9 @@ class AsBuilt:
 
     @property
     def is_meant(self) -> bool:
+        own, meant = self.laminate, self.meant
+        if own is not None and meant is not None and own.panel is not meant.laminate.panel:
+            return False
         return all(file.part is not None and file.part.is_meant for file in self.files)
 
 
@@ -217,19 +222,21 @@ def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None)
     expected = meant.layers(count) if meant is not None else [None] * count
     files, unread = read_layers(folder, claims, _drawn_in_chords(design), expected)
     problems += unread
+    panel, files, unread = read_panel(folder, claims, files, meant)
+    problems += unread
     layers = stacked_layers(files, design)
     problems += height_problems(claims, layers, design)
     problems += property_problems(files, claims, design)
     problems += layer_problems(files, claims)
     problems += pattern_problems(layers, claims)
-    if not of_job:
+    if not of_job and panel is None:
         problems += _own_sheet_problems(folder, claims, design, files)
     laminate: Laminate | None = None
     parts = [file.part for file in files if file.part is not None]
     chord_error = max((part.chord_error for part in parts), default=0.0)
     if len(parts) == len(files):
         try:
-            laminate = _laminate(files, claims, design, meant)
+            laminate = _laminate(files, claims, design, meant, panel)
             problems += _laminate_problems(folder, laminate, claims, parts, design)
             room = 2 * (TOLERANCE + chord_error)
             outline = meant.laminate.outline if meant is not None else Region()
@@ -246,7 +253,11 @@ def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None)
 
 
 def _laminate(
-    files: Sequence[LayerFile], claims: Manifest, design: Design, meant: Meant | None
+    files: Sequence[LayerFile],
+    claims: Manifest,
+    design: Design,
+    meant: Meant | None,
+    panel: SheetPanel | None,
 ) -> Laminate:
     """The layers as they are cut, with bores, inlets and pins where the design wants them.
 
@@ -256,10 +267,11 @@ def _laminate(
     if meant is None or len(meant.laminate.layers) != len(files):
         return laminate_of(files, claims, design)
     if all(file.part is not None and file.part.is_meant for file in files):
-        return meant.laminate
+        own = meant.laminate
+        return own if panel is own.panel else replace(own, panel=panel)
     layers = zip(stacked_layers(files, design), meant.laminate.layers, strict=True)
     cut = tuple(replace(layer, pieces=wanted.pieces) for layer, wanted in layers)
-    return replace(meant.laminate, layers=cut)
+    return replace(meant.laminate, layers=cut, panel=panel)
 
 
 def design_problems_of(folder: Path, built: AsBuilt, measured: Sequence[Finding]) -> list[Problem]:

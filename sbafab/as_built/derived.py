@@ -35,7 +35,7 @@ from sbafab.output.manifest import as_json
 from sbafab.output.manifest_records import JobManifest, Manifest
 from sbafab.output.planned import EVERYTHING, Checked, Planned, RunPart, plan, schedule_of
 from sbafab.output.settings import GENERATOR
-from sbafab.output.shop import find_nests, write_nested_sheets
+from sbafab.output.shop import find_nests, write_nested_sheets, write_second
 from sbafab.pressing.together import design_runs
 from sbafab.progress import unheard
 
@@ -120,6 +120,7 @@ def _write_anew(
         nests = find_nests(parts, design, folder, unheard)
         sheets = write_nested_sheets(nests, design, fresh, settings, unheard)
     write_fixture(laminate, fresh, settings, design_runs(design, laminate).places)
+    write_second(laminate, fresh, settings)
     pressing = schedule_of(checked) if "press" in wanted else None
     planned = Planned(checked, frozenset(wanted), settings, pressing)
     return write_contents(planned, sheets, fresh, unheard, parts is not None)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from sbafab.actuators.stacking import film_of
+from sbafab.actuators.stacking import channel_pin, film_of
 from sbafab.as_built.cut_files import LayerFile
 from sbafab.as_built.inlets import Tab, feeding, inner_point, tabs
 from sbafab.as_built.openings import ORIGIN, bores, tooling
@@ -36,6 +36,7 @@ def laminate_of(files: Sequence[LayerFile], claims: Manifest, design: Design) ->
         lumen=design.form.lumen,
         balloons=sum(layer.role == "chamber-mask" for layer in layers),
         registration=design.registration.method,
+        pins_in_full_bonds=design.registration.full_bond_pins == "in",
     )
     drilled = sorted(
         (hole.centre for hole in bores(layers, design.bore.diameter, bare.lumen)),
@@ -177,9 +178,10 @@ def _channel_pins(
     named: Sequence[Bore], bare: Laminate, claims: Manifest, design: Design
 ) -> list[Pin]:
     """A pin in every bore, and in the lumen where the channels register the layers."""
-    pins = [Pin(bore.chamber, bore.centre, bore.diameter) for bore in named]
+    pins = [channel_pin(bore.chamber, bore.centre, design.bore) for bore in named]
     if bare.lumen is not None and design.registration.method == "channel-pin":
-        pins.append(Pin("lumen", ORIGIN, bare.lumen))
+        pin = design.form.lumen_pin or bare.lumen
+        pins.append(Pin("lumen", ORIGIN, pin, bare.lumen - pin))
     return [replace(pin, name=_pin_name(pin.centre, pin.name, claims)) for pin in pins]
 
 
@@ -188,11 +190,11 @@ def _tooling_pins(
 ) -> tuple[Pin, ...]:
     if design.registration.method != "ears":
         return ()
-    diameter = design.registration.pin_diameter
+    diameter, clearance = design.registration.pin_diameter, design.registration.pin_clearance
     taken = [*drilled, ORIGIN]
     return tuple(
-        Pin(_pin_name(hole.centre, f"ear{number}", claims), hole.centre, diameter)
-        for number, hole in enumerate(tooling(bare.layers, diameter, taken), start=1)
+        Pin(_pin_name(hole.centre, f"ear{number}", claims), hole.centre, diameter, clearance)
+        for number, hole in enumerate(tooling(bare.layers, diameter + clearance, taken), start=1)
     )
 
 

@@ -233,6 +233,15 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
             "cut files",
             f"{len(cut)} in layers/{plate}, each read back and compared with its profile",
         )
+    panel = index.get("panel")
+    if panel:
+        width, length = panel["size"]
+        batches = "1 batch" if panel["batches"] == 1 else f"{panel['batches']} batches"
+        yield (
+            "panel",
+            f"one sheet a layer, {width:.2f} x {length:.2f} mm; {batches} with places for "
+            f"{len(panel['places'])} each; freed by {panel['second_cut']}",
+        )
     for film in index["films"]:
         if "sheets" in film:
             yield f"{film['material']} film", film_said(film, index["sheets"], index["copies"])

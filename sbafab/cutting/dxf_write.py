@@ -37,12 +37,13 @@ class Surroundings(NamedTuple):
     """What a film sheet has beside its parts: open runs of points, and its frame's far corner.
 
     ``engraved`` strokes are burnt into the waste; ``parting`` cuts the sheet off its roll; the
-    frame from the origin to ``frame`` is for reference, as a check of scale.
+    frame from the origin to ``frame`` is for reference, as a check of scale, and so are ``marks``.
     """
 
     engraved: Sequence[Sequence[Point]] = ()
     parting: Sequence[Sequence[Point]] = ()
     frame: Point | None = None
+    marks: Sequence[Sequence[Point]] = ()
 
 
 class _Entity(NamedTuple):
@@ -89,7 +90,7 @@ def dxf_text(
             *(_stroke(ENGRAVE, run) for run in sheet.engraved),
             *cuts,
             *(_stroke(CUT_SHEET, run) for run in sheet.parting),
-            *(_stroke(REFERENCE, run) for run in _frames(sheet)),
+            *(_stroke(REFERENCE, run) for run in (*_frames(sheet), *sheet.marks)),
         ]
         low, high = (0.0, 0.0), sheet.frame or (0.0, 0.0)
     seed = skeleton.first_handle + len(entities)

@@ -38,18 +38,19 @@ def compensated_paths(laminate: Laminate, settings: CutSettings) -> dict[str, Re
     Raises DesignError where the kerf leaves none.
     """
     return {
-        pattern: _compensated(layers[0], settings) for pattern, layers in laminate.patterns.items()
+        pattern: _compensated(layers[0], laminate.first_cut(layers[0]), settings)
+        for pattern, layers in laminate.patterns.items()
     }
 
 
-def _compensated(layer: Layer, settings: CutSettings) -> Region:
+def _compensated(layer: Layer, shape: Region, settings: CutSettings) -> Region:
     kerf, curves = settings.kerf_width(layer.film.material), settings.curves
     try:
         if isinstance(kerf, tuple) and curves.in_chords:
             raise DesignError(
                 "chords do not tell how a kerf along x and y was compensated; write bulges or arcs."
             )
-        path = compensate(layer.profile, kerf or 0.0)
+        path = compensate(shape, kerf or 0.0)
         if not curves.in_chords:
             return path
         return in_chords(path, layer.role, curves.chord_error, max(widths(kerf or 0.0)) / 2)

@@ -1,4 +1,4 @@
-"""The fixture: a pin plate that holds the layers in register, with a hole for every dowel pin."""
+"""The fixture: the base plate of the press, with a hole for every dowel pin of a press cycle."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import CutSettings, fixture_properties
 from sbafab.cutting.verify import verify_file
 from sbafab.geometry.boolean import union
-from sbafab.geometry.edges import Point
+from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, polygon
+from sbafab.geometry.shapes import disc, polygon, rectangle
 from sbafab.laminate.assembly import PLATE_MARGIN
 from sbafab.laminate.laminate import Laminate
 
@@ -23,19 +23,66 @@ ONE: tuple[Point, ...] = ((0.0, 0.0),)
 """The place of a laminate that is pressed by itself."""
 
 
-def fixture(laminate: Laminate, places: Sequence[Point] = ONE) -> Region | None:
-    """The pin plate in the layers' own frame; None for a laminate without pins.
+def fixture(
+    laminate: Laminate, platen: tuple[float, float], places: Sequence[Point] = ONE
+) -> Region | None:
+    """The base plate in the layers' own frame; None for a laminate without pins.
 
-    At each of the ``places`` it has all holes of a laminate that is moved there. One corner is cut
+    As large as the platen (mm), so that the pad rests on it all round; in its middle lie the
+    ``places``, and at each it has all holes of a laminate that is moved there. One corner is cut
     off, at the largest x and y: it tells which way round layers and plate go.
     """
+    return whole_plate(laminate, platen, places) if laminate.pins else None
+
+
+def whole_plate(
+    laminate: Laminate, platen: tuple[float, float], places: Sequence[Point] = ONE
+) -> Region:
+    """The base plate in the layers' own frame, plain where the laminate has no pins."""
+    x0, y0 = plate_corner(laminate, platen, places)
+    width, length = _as_it_lies(platen, _lying(laminate, places))
+    x1, y1 = x0 + width, y0 + length
+    plate = polygon([(x0, y0), (x1, y0), (x1, y1 - CHAMFER), (x1 - CHAMFER, y1), (x0, y1)])
+    return _drilled(plate, laminate, places)
+
+
+def plate_corner(
+    laminate: Laminate, platen: tuple[float, float], places: Sequence[Point] = ONE
+) -> Point:
+    """The plate's corner of least x and y, to 0.1 mm: where its holes are measured from."""
+    box = low_x, low_y, high_x, high_y = _lying(laminate, places)
+    width, length = _as_it_lies(platen, box)
+    return round((low_x + high_x - width) / 2, 1), round((low_y + high_y - length) / 2, 1)
+
+
+def shown(laminate: Laminate) -> Region | None:
+    """The part of the base plate round one laminate, as pictures show it; None without pins."""
     if not laminate.pins:
         return None
-    low_x, low_y, high_x, high_y = laminate.bounds
+    low_x, low_y, high_x, high_y = _lying(laminate)
+    low, high = (
+        (low_x - PLATE_MARGIN, low_y - PLATE_MARGIN),
+        (high_x + PLATE_MARGIN, high_y + PLATE_MARGIN),
+    )
+    return _drilled(rectangle(low, high), laminate)
+
+
+def _as_it_lies(platen: tuple[float, float], box: Bounds) -> tuple[float, float]:
+    """Width and length of the plate, turned where what lies on it fits in that way only."""
+    wide, high = box[2] - box[0], box[3] - box[1]
+    width, length = platen
+    turn = (wide > width or high > length) and wide <= length and high <= width
+    return (length, width) if turn else platen
+
+
+def _lying(laminate: Laminate, places: Sequence[Point] = ONE) -> Bounds:
+    """The box round what lies on the plate: the laminates, or their registered sheets."""
+    box = laminate.bounds if laminate.panel is None else laminate.panel.outline.bounds
     xs, ys = [x for x, _ in places], [y for _, y in places]
-    x0, y0 = min(xs) + low_x - PLATE_MARGIN, min(ys) + low_y - PLATE_MARGIN
-    x1, y1 = max(xs) + high_x + PLATE_MARGIN, max(ys) + high_y + PLATE_MARGIN
-    plate = polygon([(x0, y0), (x1, y0), (x1, y1 - CHAMFER), (x1 - CHAMFER, y1), (x0, y1)])
+    return min(xs) + box[0], min(ys) + box[1], max(xs) + box[2], max(ys) + box[3]
+
+
+def _drilled(plate: Region, laminate: Laminate, places: Sequence[Point] = ONE) -> Region:
     return plate - union(
         disc((pin.centre[0] + x, pin.centre[1] + y), pin.diameter / 2)
         for x, y in places
@@ -50,7 +97,7 @@ def write_fixture(
 
     Nominal edges: the holes are to be reamed to the pins.
     """
-    plate = fixture(laminate, places)
+    plate = fixture(laminate, settings.platen, places)
     if plate is None:
         return None
     properties = fixture_properties(settings)

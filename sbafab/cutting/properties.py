@@ -28,7 +28,7 @@ class CutSettings:
     ``waived``: names of the waived rules; ``lowered``: limits below the usual ones, as
     ``rules.lowered`` says them.
     ``generator``: program and version, for example ``sbafab 1.0.0``. ``warnings``: what the files
-    of a material must say.
+    of a material must say. ``platen``: size of the base plate in mm.
     """
 
     design: str
@@ -39,6 +39,7 @@ class CutSettings:
     curves: Curves = TRUE_ARCS
     generator: str = "sbafab"
     warnings: Mapping[str, str] = field(default_factory=lambda: {"PTFE": PTFE_WARNING})
+    platen: tuple[float, float] = (152.4, 152.4)
 
     def kerf_width(self, material: Material) -> Kerf | None:
         return self.kerf_widths.get(material)
@@ -64,6 +65,12 @@ def sheet_properties(
 def fixture_properties(settings: CutSettings) -> dict[str, str]:
     """Custom properties of the pin plate's cut file; its edges are nominal."""
     return _properties(settings, "plate", "fixture", None)
+
+
+def second_cut_properties(settings: CutSettings) -> dict[str, str]:
+    """Custom properties of the second cut of registered sheets: it goes through masks as well."""
+    properties = _properties(settings, "TPE", "second cut", settings.kerf_width("TPE"))
+    return {**properties, "WARNING": PTFE_WARNING}
 
 
 def coupon_properties(generator: str) -> dict[str, str]:

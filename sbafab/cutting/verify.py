@@ -54,7 +54,13 @@ def check_surroundings(found: ReadBack, expected: Surroundings) -> None:
     for layer, runs in (
         (ENGRAVE, expected.engraved),
         (CUT_SHEET, expected.parting),
-        (REFERENCE, [((0.0, 0.0), (x, 0.0), (x, y), (0.0, y), (0.0, 0.0)) for x, y in frame]),
+        (
+            REFERENCE,
+            [
+                *(((0.0, 0.0), (x, 0.0), (x, y), (0.0, y), (0.0, 0.0)) for x, y in frame),
+                *expected.marks,
+            ],
+        ),
     ):
         drawn = [edges for name, edges in found.strokes if name == layer]
         if len(drawn) != len(runs):

@@ -48,13 +48,15 @@ class Form:
     """What an actuator is like, whichever family made it.
 
     ``words`` is what a technician calls it; ``stacks`` of balloons stand side by side, all with the
-    same ``pockets``; ``lumen`` is the diameter in mm of the channel through all layers.
+    same ``pockets``; ``lumen`` is the diameter in mm of the channel through all layers,
+    ``lumen_pin`` its dowel pin's.
     """
 
     words: str
     stacks: int
     pockets: Pockets
     lumen: float | None = None
+    lumen_pin: float | None = None
     wrap: Wrap | None = None
 
     @property

@@ -42,7 +42,7 @@ SECTIONS = ("films", "registration", "press", "laser", "sheets", "rules")
 """Sections of a design that a kit fills in."""
 OF_A_DESIGN = ("registration.method", "rules.waive", "rules.target_yield", "rules.yield_builds")
 """Keys in them that are no lab's to say."""
-TEXTS = ("product", "use", "warning")
+TEXTS = ("product", "use", "warning", "plate_material", "release_film")
 """Keys that are no numbers, whatever they say."""
 Product = Annotated[str, Field(min_length=1, max_length=120)]
 

@@ -17,7 +17,7 @@ from pydantic import Field, PrivateAttr
 from sbafab.design.films import UNCALIBRATED, Films, KerfWidth, LayerFilms, Sheet
 from sbafab.design.form import Form
 from sbafab.design.section import Section
-from sbafab.design.units import Length, LengthOrZero, Millimetres
+from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres
 from sbafab.notebook import table_html
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
@@ -30,6 +30,9 @@ RuleName = Literal[
     "tube-fit",
     "piece-count",
     "pin-holes",
+    "pin-fit",
+    "bridges",
+    "scrap",
     "film-limits",
     "press-fit",
     "registration-nominal",
@@ -55,8 +58,21 @@ class Mask(Section):
 class Bore(Section):
     """The channel along the axis of a chamber."""
 
-    diameter: Length = 1.0
-    """Channel between the balloons of a chamber, and its dowel pin (the paper gives none)."""
+    diameter: Length = 1.04
+    """Channel between the balloons of a chamber, and hole for its dowel pin (the paper gives
+    none)."""
+    clearance: Annotated[float, Millimetres(0, 1)] = 0.04
+    """By how much the bore is wider than its dowel pin. Ours: what registration leaves, for 0.75 -
+    2 x (0.1 + 0.004 + 0.02) is just the 0.5 that must be left of a bond at worst."""
+    pin_diameter: Length | None = None
+    """Dowel pin of the bore; by default the bore less the clearance."""
+
+    @property
+    def pin(self) -> float:
+        """Diameter of the bore's dowel pin."""
+        if self.pin_diameter is not None:
+            return self.pin_diameter
+        return round(max(self.diameter - self.clearance, self.diameter / 2), 6)
 
 
 class Fillet(Section):
@@ -78,26 +94,34 @@ class Inlet(Section):
     )
     """What seals tube and mouth (paper Sec. 2)."""
     width: Length | None = None
-    """Width of the inlet strip; by default half the tube's perimeter, rounded up to 0.05."""
+    """Width of the inlet strip; by default what tube and strip need together, with cutting error
+    and an unknown kerf taken off, rounded up to 0.05."""
     tab_length: Length = 5.0
     """How far the inlet tab reaches past the outline (the paper gives none)."""
-
-    @property
-    def strip_width(self) -> float:
-        """The strip's width: as given, or the least that opens to the tube, up to 0.05 mm."""
-        if self.width is not None:
-            return self.width
-        return round(math.ceil(math.pi * self.tube_outer_diameter / 2 / 0.05 - 1e-9) * 0.05, 4)
 
 
 class Registration(Section):
     """What keeps the layers in register, and how far off they may lie."""
 
-    method: Literal["channel-pin", "ears"] = "channel-pin"
+    method: Literal["channel-pin", "ears", "sheet"] = "channel-pin"
     """"channel-pin": dowel pins in the channel bores, and in the lumen if there is one (the
-    paper's). "ears": tooling holes outside the outline, pinned in every press step."""
+    paper's). "ears": tooling holes outside the outline, pinned in every press step. "sheet": films
+    stay whole sheets on corner pins, hold all copies of a batch and are cut free last."""
     pin_diameter: Length = 1.5
-    """Dowel pins of the ears."""
+    """Dowel pins of the ears, and of the corners of registered sheets."""
+    full_bond_pins: Literal["out", "in"] = "out"
+    """Ears: "out" tacks base and cap on the pins by a flash bond and draws the pins before the full
+    bond, as the paper keeps pins out of molten TPE; "in" leaves them in, under a release sleeve or
+    coat. Neither was tried."""
+    pin_clearance: Annotated[float, Millimetres(0, 1)] = 0.0
+    """By how much the holes of the ears are wider than their pins; up to three steps add it up."""
+    pin_stretch: float = Field(default=0.3, ge=0, le=2)
+    """The most by which a hole may be stretched over its pin, as a share of itself. Ours, untested:
+    a tenth of the 300 % that PTFE film must stand before it tears (ASTM D3308); TPE stands more."""
+    pin_standard: Literal["ISO 8734", "ISO 2338"] = "ISO 8734"
+    """Whose diameters and lengths the dowel pins have; both are ground to m6."""
+    pin_lengths: tuple[Length, ...] = Field(default=(), max_length=30, strict=False)
+    """Lengths of pins that you have, in place of the standard's."""
     cutting_error: Annotated[float, Millimetres(0, 1)] = 0.1
     """The most by which a cut edge lies off its place (paper Sec. 2)."""
     pin_error: Annotated[float, Millimetres(0, 1)] = 0.004
@@ -109,6 +133,32 @@ class Registration(Section):
     hand_turn: float = Field(default=0.4, ge=0, le=10)
     """Degrees: the most by which what fewer than two pins hold is turned. Calibrated together with
     hand_placement."""
+
+    @property
+    def hole_diameter(self) -> float:
+        """Diameter of the holes in ears and tails."""
+        return self.pin_diameter + self.pin_clearance
+
+
+class PanelSection(Section):
+    """Registered sheets (``registration.method = "sheet"``); all ours, no bench has tried any."""
+
+    bridge_width: Length = 1.0
+    """Width of the bridges that hold a film's part in its sheet until the second cut."""
+    stub: LengthOrZero = 0.25
+    """How far past the outline the second cut goes through a bridge."""
+    margin: Annotated[float, Millimetres(10, 100)] = 12.0
+    """Sheet round all copies, for pins and fiducials."""
+    web: Annotated[float, Millimetres(1, 100)] = 4.0
+    """Sheet between two copies."""
+    carrier: str = Field(default="transfer film of low tack", max_length=80)
+    """What holds the masks in register until they are tacked to their film."""
+    tack_minutes: float = Field(default=1.0, gt=0, le=60)
+    """How long the press tacks the masks of one sheet to their film."""
+    sheet_error: LengthOrZero = 0.05
+    """The most by which film or mask lies off its place in its sheet: stretch, sag, transfer."""
+    second_cut_error: LengthOrZero = 0.2
+    """The most by which the second cut lies off the first."""
 
 
 class Press(Section):
@@ -122,6 +172,21 @@ class Press(Section):
     """Heated area; the paper's press has 6 x 6 in."""
     platen_length: Length = 152.4
     """Heated area, the other way."""
+    plate_material: str = Field(default="steel", max_length=80)
+    """Base plate, as large as the platen: under every lay-up, with the holes for the pins."""
+    plate_thickness: Length | None = None
+    """Of the base plate; by default the thinnest plate sold, from 6 mm, that takes the pins."""
+    release_film: str = Field(default="PTFE film", max_length=80)
+    """What TPE does not stick to, one sheet below and one above (the paper names none)."""
+    release_thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.05
+    """Thickness of one release film; PTFE film is sold in this thickness."""
+    pad_material: Literal["silicone sponge", "silicone rubber"] = "silicone sponge"
+    """Press pad: the compliant sheet, as large as the platen, that spreads the force (ours)."""
+    pad_thickness: Length | None = None
+    """Of the press pad; by default the thinnest sold that gives films 1.5 times the pressure."""
+    pad_hardness: float = Field(default=10.0, ge=5, le=90)
+    """Shore A; 10 is a soft closed-cell silicone sponge, grade 4 of ASTM D1056 by Gent's formula;
+    sheets of solid silicone rubber have 40 to 70."""
     flash_bottom_minutes: float = Field(default=3.0, gt=0, le=600)
     """Step 1: the bottom balloon's upper two layers."""
     bond_bottom_minutes: float = Field(default=12.0, gt=0, le=600)
@@ -150,6 +215,8 @@ class Laser(Section):
     and says so."""
     kerf_ptfe: KerfWidth = UNCALIBRATED
     """Full kerf width in PTFE, measured, likewise."""
+    unknown_kerf: Annotated[float, Millimetres(0, 1)] = 0.1
+    """What a kerf that was not measured may take off the width of a part: ours."""
 
 
 class Sheets(Section):
@@ -234,6 +301,7 @@ class Design(Section):
     films: Films = Films()
     layup: LayerFilms = LayerFilms()
     registration: Registration = Registration()
+    panel: PanelSection = PanelSection()
     press: Press = Press()
     laser: Laser = Laser()
     sheets: Sheets = Sheets()
@@ -252,6 +320,25 @@ class Design(Section):
     def drawing(self) -> Path | None:
         """The file of the pockets' drawn outline, if there is one."""
         return None if self.chamber.outline is None else self.folder / self.chamber.outline
+
+    @property
+    def strip_width(self) -> float:
+        """Width of the inlet strips, mm: as given, or the least that opens to the tube.
+
+        A flat channel opens to half the perimeter of what is in it: the tube, and the PTFE strip
+        along one side of it (rule tube-fit). Up to 0.05 mm.
+        """
+        if self.inlet.width is not None:
+            return self.inlet.width
+        opened = math.pi / 2 * (self.inlet.tube_outer_diameter + self.films.ptfe.thickness)
+        return round(math.ceil((opened + self.strip_loss) / 0.05 - 1e-9) * 0.05, 4)
+
+    @property
+    def strip_loss(self) -> float:
+        """By how much a strip may come out narrower than drawn, mm, whether a kerf is known or not:
+        one that is measured later changes no strip.
+        """
+        return 2 * self.registration.cutting_error + self.laser.unknown_kerf
 
     @property
     @abstractmethod
@@ -278,7 +365,7 @@ class Design(Section):
 
     def completed(self) -> Self:
         """The same design with every default that depends on another value filled in."""
-        inlet = self.inlet.model_copy(update={"width": self.inlet.strip_width})
+        inlet = self.inlet.model_copy(update={"width": self.strip_width})
         return self.model_copy(update={"inlet": inlet})
 
     def placed(self, folder: Path) -> Self:

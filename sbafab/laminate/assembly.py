@@ -1,6 +1,7 @@
 """How a laminate is put together: which stacks are laid on each other in which step, on which pins.
 
-The paper's four steps (Sec. 2), less those that have nothing to press.
+The paper's four steps (Sec. 2), less those that have nothing to press. Ears register layers in the
+full bonds too: there a flash bond on the pins comes first, and the full bond after it without them.
 """
 
 from __future__ import annotations
@@ -12,9 +13,11 @@ from typing import Literal, NamedTuple
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 
 BondState = Literal["flash", "full"]
-StepName = Literal["flash_bottom", "bond_bottom", "flash_middle", "bond_all"]
+StepName = Literal[
+    "flash_bottom", "tack_bottom", "bond_bottom", "flash_middle", "tack_all", "bond_all"
+]
 PLATE_MARGIN = 6.0
-"""mm of pin plate round everything that lies on it."""
+"""mm of base plate round everything that lies on it."""
 
 
 @dataclass(frozen=True)
@@ -42,12 +45,14 @@ def assembly(laminate: Laminate) -> tuple[AssemblyStep, ...]:
 
     Flash bonds hold layers in place on their pins. With channel pins full bonds are pressed
     without any: base and cap have no bore for one, and a lumen pin, though it would pass, stays
-    out as in the paper. With ears the pins are in every time.
+    out as in the paper. With ears base and cap are tacked on the pins by a flash bond, and the full
+    bond after it has no pins either, unless ``laminate.pins_in_full_bonds``. In registered
+    sheets the pins, which stand in the frame, are in every time.
     """
-    return tuple(
-        _step(number, plan, laminate)
-        for number, plan in enumerate((plan for plan in _plans(laminate) if plan.adds), 1)
-    )
+    plans = [plan for plan in _plans(laminate) if plan.adds]
+    if laminate.registration == "ears" and not laminate.pins_in_full_bonds:
+        plans = [one for plan in plans for one in _tacked(plan)]
+    return tuple(_step(number, plan, laminate) for number, plan in enumerate(plans, 1))
 
 
 class _Plan(NamedTuple):
@@ -61,6 +66,13 @@ class _Plan(NamedTuple):
 
 def _plans(laminate: Laminate) -> tuple[_Plan, ...]:
     indices = tuple(layer.index for layer in laminate.layers)
+    if laminate.panel is not None:
+        # Corner pins hold the base as well: nothing has to be pressed by itself first.
+        below, cap = indices[:-1], indices[-1:]
+        return (
+            _Plan("flash_middle", "flash", (below,), below),
+            _Plan("bond_all", "full", (below, cap), cap),
+        )
     films = [layer for layer in laminate.layers if not layer.is_mask]
     base = next((layer for layer in films if layer.role == "base"), films[0]).index
     upper = tuple(index for index in indices if base < index <= base + 2)
@@ -76,9 +88,25 @@ def _plans(laminate: Laminate) -> tuple[_Plan, ...]:
     )
 
 
+def _tacked(plan: _Plan) -> tuple[_Plan, ...]:
+    """A full bond as two steps: the same stacks flash bonded, then the full bond of them."""
+    if plan.bond == "flash":
+        return (plan,)
+    tack: StepName = "tack_bottom" if plan.name == "bond_bottom" else "tack_all"
+    whole = tuple(index for stack in plan.stacks for index in stack)
+    return (
+        plan._replace(name=tack, bond="flash"),
+        plan._replace(stacks=(whole,), adds=()),
+    )
+
+
 def _step(number: int, plan: _Plan, laminate: Laminate) -> AssemblyStep:
     layers = [index for stack in plan.stacks for index in stack]
-    pinned = plan.bond == "flash" or laminate.registration == "ears"
+    pinned = (
+        plan.bond == "flash"
+        or laminate.registration == "sheet"
+        or (laminate.registration == "ears" and laminate.pins_in_full_bonds)
+    )
     pins = _pins_in(laminate, layers) if pinned else ()
     stacks = tuple(stack for stack in plan.stacks if stack)
     return AssemblyStep(number, plan.name, plan.bond, stacks, plan.adds, pins)

@@ -15,6 +15,7 @@ from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Film, in_order
 from sbafab.laminate.interfaces import Interface, InterfaceKind, interface_regions
+from sbafab.laminate.panel import SheetPanel
 
 Role = Literal["base", "wall", "cap", "sheet", "chamber-mask", "separator-mask"]
 ROLES: tuple[Role, ...] = get_args(Role)
@@ -101,11 +102,20 @@ class Inlet:
 
 @dataclass(frozen=True)
 class Pin:
-    """A dowel pin of the press fixture; it holds every layer with an opening at its place."""
+    """A dowel pin of the press fixture; it holds every layer with an opening at its place.
+
+    ``clearance``: by how much the layers' hole for it is wider than the pin.
+    """
 
     name: str
     centre: Point
     diameter: float
+    clearance: float = 0.0
+
+    @property
+    def hole(self) -> float:
+        """Diameter of the layers' hole for the pin."""
+        return self.diameter + self.clearance
 
 
 @dataclass(frozen=True, repr=False)
@@ -113,7 +123,8 @@ class Laminate:
     """A stack of layers, bottom to top, with what the layers alone do not tell.
 
     ``outline`` is that of the films of all balloons laid over each other, without inlet tabs and
-    ears; empty where only the layers are known.
+    ears; empty where only the layers are known. ``pins_in_full_bonds``: whether the pins of ears
+    stay in while TPE melts. ``panel``: the registered sheets that it is made in, if it is.
     """
 
     name: str
@@ -128,6 +139,8 @@ class Laminate:
     registration: str
     notes: tuple[str, ...] = ()
     outline: Region = NOTHING
+    pins_in_full_bonds: bool = False
+    panel: SheetPanel | None = None
 
     def __repr__(self) -> str:
         return f"Laminate({self.name!r}, {self.family!r}, {len(self.layers)} layers)"
@@ -191,18 +204,30 @@ class Laminate:
         """The layer with this index, counted from 1 at the bottom."""
         return self.layers[index - 1]
 
+    def first_cut(self, layer: Layer) -> Region:
+        """What the cut file of a layer cuts: its profile, or its registered sheet.
+
+        A mask sheet is laid face down, so it is cut turned over.
+        """
+        if self.panel is None:
+            return layer.profile
+        sheet = self.panel.sheets[layer.index - 1]
+        return sheet.mirrored() if layer.is_mask else sheet
+
     def pins_holding(self, layer: Layer) -> tuple[Pin, ...]:
         """The pins on which the layer has a hole that fits; a wider opening does not hold it."""
         return self.pins_in(layer.profile)
 
     def pins_in(self, part: Region) -> tuple[Pin, ...]:
-        """The pins on which this part of a layer has a hole that fits."""
+        """The pins on which this part of a layer, or its registered sheet, has a hole that fits."""
+        if self.panel is not None:
+            return self.pins
         circles = [hole.circle for hole in part.holes if hole.circle is not None]
         return tuple(
             pin
             for pin in self.pins
             if any(
-                math.dist(centre, pin.centre) < LOOSE and abs(2 * radius - pin.diameter) < LOOSE
+                math.dist(centre, pin.centre) < LOOSE and abs(2 * radius - pin.hole) < LOOSE
                 for centre, radius in circles
             )
         )

@@ -131,9 +131,12 @@ def _mass(laminate: Laminate) -> Figure:
 def _tubes(one: Actuator) -> Iterator[Figure]:
     inlet = min(one.laminate.inlets, key=lambda inlet: inlet.width - inlet.tube_diameter)
     model = Model(
-        "half the perimeter", "a flat strip opened round", "films do not stretch; glue not counted"
+        "half the perimeter",
+        "a flat strip opened round, its PTFE beside the tube",
+        "cut at its narrowest; films do not stretch; glue not counted",
     )
-    most = largest_tube(inlet.width)
+    narrowest = inlet.width - one.design.strip_loss
+    most = largest_tube(narrowest, one.design.films.ptfe.thickness)
     yield Figure("inlet", "largest tube that the inlet opens to", most, "mm", model)
     spare = most - inlet.tube_diameter
     name = f"room round the tube of {inlet.tube_diameter:g} mm"

@@ -16,8 +16,11 @@ def parts_of(
 
     ``paths`` holds each pattern's path of the beam, kerf compensated; ``spares`` more of every
     mask are cut than the ``copies`` take. Pieces of one pattern that
-    differ only in their place are one part, named after the first of them.
+    differ only in their place are one part, named after the first of them. None where the
+    layers are registered sheets: these are not nested.
     """
+    if laminate.panel is not None:
+        return ()
     parts: list[NestPart] = []
     for pattern, layers in laminate.patterns.items():
         layers_cut = len(layers) * copies + (spares if layers[0].is_mask else 0)

@@ -24,6 +24,14 @@ MOST_STEPS = 128
 CHECK_SEED = SEED + 1
 
 
+OTHERWISE = {
+    "channel-pin": 'registration.method = "ears" pins every film',
+    "ears": "smaller registration.hand_turn and registration.hand_placement do",
+    "sheet": "a smaller panel.sheet_error does",
+}
+"""What reaches a yield that bond and overhang do not, by registration method."""
+
+
 @dataclass(frozen=True)
 class Advice:
     """The least ``bond`` and ``overhang`` (mm) that reach ``target``, and the share of good builds
@@ -39,11 +47,7 @@ class Advice:
     @property
     def sentence(self) -> str:
         if self.share is None:
-            other = (
-                'registration.method = "ears" pins every film'
-                if self.method == "channel-pin"
-                else "smaller registration.hand_turn and registration.hand_placement do"
-            )
+            other = OTHERWISE.get(self.method, OTHERWISE["ears"])
             return (
                 f"No bond and overhang up to {MOST_STEPS * STEP:g} mm above the rules' limits "
                 f"reach a yield of {self.target:.4g} with registration.method = "

@@ -50,6 +50,12 @@ class Batch:
 
 def refuse_other_film(designs: Sequence[Design]) -> None:
     """Raises DesignError where two designs are not cut from the same film by one machine."""
+    for one in designs:
+        if one.registration.method == "sheet":
+            raise DesignError(
+                f"{one.name} is made in registered sheets, which hold no parts of other designs; "
+                'make it by itself with sbafab generate, or use registration.method = "ears"'
+            )
     first, *others = designs
     for other in others:
         for section in SHARED:

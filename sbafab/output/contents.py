@@ -22,7 +22,8 @@ from sbafab.output.manifest import as_json, checks, file_hashes, manifest
 from sbafab.output.planned import Checked, Planned
 from sbafab.output.settings import GENERATOR, kerf_widths, limits
 from sbafab.output.shop import write_cut_files
-from sbafab.pressing.schedule import Schedule, press_csv, press_json
+from sbafab.pressing.schedule import Schedule
+from sbafab.pressing.tables import press_csv, press_json
 from sbafab.pressing.together import batch_json, design_runs
 from sbafab.progress import Progress
 from sbafab.rules.finding import Finding

@@ -87,6 +87,8 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
     if _are_files(layers, carried):
         index["layers"] = layers
         index["fixture"] = plate if plate in carried else None
+        if "panel" in old:
+            index["panel"] = old["panel"]
         if _are_files(old.get("sheets"), carried):
             index["sheets"], index["films"] = old["sheets"], old.get("films")
     if isinstance(meshes, list):

@@ -11,6 +11,7 @@ from typing import Any
 
 from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.properties import CutSettings, layer_path, said_of
+from sbafab.cutting.second_cut import PATH as SECOND_CUT
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.kits import citation
 from sbafab.design.records import Design
@@ -19,6 +20,7 @@ from sbafab.geometry.beam import Kerf
 from sbafab.laminate.films import Film
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.panel import SheetPanel
 from sbafab.meshing.files import MeshFile
 from sbafab.models.sizes import sizes
 from sbafab.output.manifest_records import (
@@ -26,6 +28,7 @@ from sbafab.output.manifest_records import (
     BatchSchema,
     BoreClaim,
     DesignClaim,
+    FiducialClaim,
     FilmClaim,
     FilmUseClaim,
     InletClaim,
@@ -36,6 +39,7 @@ from sbafab.output.manifest_records import (
     LayerClaim,
     Manifest,
     MeshClaim,
+    PanelClaim,
     PinClaim,
     PlaceClaim,
     RegistrationClaim,
@@ -80,6 +84,8 @@ def manifest(
     runs = design_runs(design, laminate)
     if runs.copies > 1:
         optional["batch"] = _batch(runs)
+    if is_cut and laminate.panel is not None:
+        optional["panel"] = _panel(laminate.panel)
     if planned.conforming is not None:
         optional["mesh_statistics"] = planned.conforming.statistics
     return Manifest(
@@ -177,6 +183,21 @@ def _batch(runs: Runs) -> BatchClaim:
     """How several copies are pressed, and where each lies on the pin plate."""
     places = tuple(PlaceClaim(**_place(place)) for place in runs.places)
     return BatchClaim(at_once=runs.together, cycles=runs.cycles, places=places)
+
+
+def _panel(panel: SheetPanel) -> PanelClaim:
+    width, length = (round(side, 6) for side in panel.size)
+    return PanelClaim(
+        size=(width, length),
+        places=tuple(PlaceClaim(**_place(place)) for place in panel.places),
+        batches=panel.batches,
+        second_cut=SECOND_CUT,
+        fiducials=tuple(
+            FiducialClaim(**_place(place), diameter=panel.fiducial_diameter)
+            for place in panel.fiducials
+        ),
+        turned_over="PTFE",
+    )
 
 
 def _place(point: tuple[float, float]) -> dict[str, float]:

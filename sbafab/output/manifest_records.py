@@ -181,6 +181,24 @@ class KitClaim(_Claim):
     departures: tuple[str, ...]
 
 
+class FiducialClaim(PlaceClaim):
+    diameter: float
+
+
+class PanelClaim(_Claim):
+    """Registered sheets, in the frame of the first copy; lengths in mm.
+
+    ``turned_over`` is the material whose sheets are drawn as seen from below.
+    """
+
+    size: tuple[float, float]
+    places: tuple[PlaceClaim, ...]
+    batches: int
+    second_cut: str
+    fiducials: tuple[FiducialClaim, ...]
+    turned_over: str
+
+
 class Manifest(_Claim):
     """``manifest.json`` of one design's folder."""
 
@@ -208,6 +226,7 @@ class Manifest(_Claim):
     inlets: tuple[InletClaim, ...]
     lumen: float | None
     fixture: str | None = None
+    panel: PanelClaim | None = None
     sheets: Annotated[tuple[SheetClaim, ...], Field(max_length=2000)] = ()
     meshes: tuple[MeshClaim, ...] = ()
     mesh_statistics: dict[str, Any] = Field(default_factory=dict)

@@ -11,12 +11,14 @@ from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.cutting.files import compensated_paths
 from sbafab.cutting.properties import CutSettings
 from sbafab.design.records import Design
+from sbafab.errors import DesignError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.parts import parts_of
 from sbafab.nesting.records import NestPart
 from sbafab.output.settings import cut_settings, limits, press_settings
 from sbafab.pressing.schedule import Schedule, schedule
+from sbafab.pressing.together import design_runs
 from sbafab.rules.deck import has_failed
 from sbafab.rules.finding import Finding
 from sbafab.rules.lowered import CHECKED_AGAINST, lowered
@@ -80,6 +82,11 @@ def plan(checked: Checked, wanted: Collection[RunPart], curves: Curves = TRUE_AR
     planned = Planned(checked, frozenset(wanted), settings, pressing)
     if "cut" not in wanted:
         return planned
+    if laminate.panel is not None and curves.in_chords:
+        raise DesignError(
+            'registered sheets (registration.method = "sheet") are not drawn in chords; write '
+            "bulges or arcs"
+        )
     paths = compensated_paths(laminate, settings)
     if curves.in_chords:
         refuse_coarse(laminate, paths, settings, limits(design))
@@ -89,7 +96,8 @@ def plan(checked: Checked, wanted: Collection[RunPart], curves: Curves = TRUE_AR
 
 def schedule_of(checked: Checked) -> Schedule:
     """The press schedule; its first step and its warnings name waived rules and lowered limits."""
-    made = schedule(checked.laminate, press_settings(checked.design))
+    cycles = design_runs(checked.design, checked.laminate).cycles
+    made = schedule(checked.laminate, press_settings(checked.design), cycles)
     said = []
     if checked.waived:
         rules = ", ".join(checked.waived)

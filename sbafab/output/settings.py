@@ -13,6 +13,7 @@ from sbafab.design.writing import design_sha256
 from sbafab.geometry.beam import Kerf
 from sbafab.laminate.films import Material
 from sbafab.nesting.records import TURNS, Stock
+from sbafab.pressing.build_up import Pad
 from sbafab.pressing.schedule import PressSettings
 from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.lowered import lowered
@@ -50,7 +51,11 @@ def limits(design: Design) -> Limits:
             pin=design.registration.pin_error,
             placement=design.registration.hand_placement,
             turn=design.registration.hand_turn,
+            sheet=design.panel.sheet_error,
+            second_cut=design.panel.second_cut_error,
         ),
+        unknown_kerf=design.laser.unknown_kerf,
+        pin_stretch=design.registration.pin_stretch,
         worst_bond_width=design.rules.worst_bond_width,
         worst_mask_overhang=design.rules.worst_mask_overhang,
         target_yield=design.rules.target_yield,
@@ -71,6 +76,7 @@ def cut_settings(
         curves=curves,
         generator=GENERATOR,
         warnings=warnings(design),
+        platen=(design.press.platen_width, design.press.platen_length),
     )
 
 
@@ -85,6 +91,14 @@ def press_settings(design: Design) -> PressSettings:
         flash_middle=press.flash_middle_minutes,
         bond_all=press.bond_all_minutes,
         validated_balloons=design.rules.validated_balloons,
+        pad=Pad(press.pad_material, press.pad_thickness, press.pad_hardness),
+        plate_material=press.plate_material,
+        plate_thickness=press.plate_thickness,
+        release_film=press.release_film,
+        release_thickness=press.release_thickness,
+        pin_standard=design.registration.pin_standard,
+        pin_lengths=design.registration.pin_lengths,
+        tack=design.panel.tack_minutes,
     )
 
 

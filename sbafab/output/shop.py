@@ -11,10 +11,12 @@ from typing import Any
 from sbafab.cutting.files import write_layer_files
 from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.properties import CutSettings
+from sbafab.cutting.second_cut import write_second_cut
 from sbafab.cutting.sheets import FOLDER, SheetFile, write_sheets
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
 from sbafab.laminate.films import Material
+from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import nest
 from sbafab.nesting.records import Nest, NestPart
@@ -37,6 +39,8 @@ def find_nests(
     Places that an earlier run found for the same parts and sheets are taken over, not searched
     for again. Raises DesignError where parts do not fit.
     """
+    if not parts:
+        return ()
     tell("nesting", 0, 1)
     saved = _saved(parts, design, old_folder / PLACES)
     return saved or nest(parts, stocks(design), design.sheets.engine, design.sheets.seconds)
@@ -48,12 +52,21 @@ def write_cut_files(planned: Planned, folder: Path, tell: Progress) -> None:
     told = partial(tell, "cut files")
     write_layer_files(laminate, planned.paths, folder, settings, told)
     write_fixture(laminate, folder, settings, design_runs(planned.checked.design, laminate).places)
+    write_second(laminate, folder, settings)
+
+
+def write_second(laminate: Laminate, folder: Path, settings: CutSettings) -> None:
+    """Writes the second cut of registered sheets, if the laminate is made in any."""
+    if laminate.panel is not None:
+        write_second_cut(laminate.panel, folder, settings)
 
 
 def write_nested_sheets(
     nests: Sequence[Nest], design: Design, folder: Path, settings: CutSettings, tell: Progress
 ) -> list[SheetFile]:
-    """Writes the film sheets, and beside them the places for a later run."""
+    """Writes the film sheets, and beside them the places for a later run; nothing for no nest."""
+    if not nests:
+        return []
     sheets = write_sheets(
         nests,
         folder,

@@ -5,12 +5,11 @@ Temperatures are C, pressures kPa, forces N, times minutes, lengths mm.
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from itertools import chain
+from typing import NamedTuple
 
 from sbafab.errors import DesignError
 from sbafab.laminate.assembly import (
@@ -23,16 +22,22 @@ from sbafab.laminate.assembly import (
 )
 from sbafab.laminate.films import FIRST
 from sbafab.laminate.laminate import Laminate
+from sbafab.pressing import build_up, sheets
+from sbafab.pressing.build_up import BuildUpPart, Footprint, Pad
+from sbafab.pressing.dowels import PinSetting, Standard, is_sold, plate_thickness, settings_by_step
 
 TITLES: dict[StepName, str] = {
     "flash_bottom": "Bottom balloon, upper two layers",
+    "tack_bottom": "Bottom balloon, its base tacked on",
     "bond_bottom": "Bottom balloon, with its base",
     "flash_middle": "Middle layers",
+    "tack_all": "Whole laminate, tacked",
     "bond_all": "Whole laminate",
 }
 TITLES_OF_SEVERAL = {
     **TITLES,
     "flash_bottom": "Bottom balloons, upper two layers of each",
+    "tack_bottom": "Bottom balloons, their bases tacked on",
     "bond_bottom": "Bottom balloons, each with its base",
 }
 """Where stacks are pressed beside each other."""
@@ -42,26 +47,22 @@ SNIP = (
     "masks stay in their pockets."
 )
 
+PINS_OUT = (
+    "untested: with ears each full bond comes after a flash bond on the pins, and is pressed "
+    "without them; that the flash bond keeps the layers in register was not tried on a bench"
+)
+PINS_IN = (
+    "untested: the ears' pins stay in through the full bonds, where molten TPE can grip them; put "
+    "a release sleeve on each or coat it with a release agent, and try it on a sample first"
+)
+
+BASE_PLATE, RELEASE, LAMINATE, PAD = "base plate", "release film", "laminate", "press pad"
+"""The parts of the build-up, between the platens."""
+
 HOTTEST_TRIED = 150.0
 PRESSURES_TRIED = (70.0, 200.0)
 HANDLING_MINUTES = 60.0
 """The paper's total build time of 1.75 h less its 45 minutes in the press."""
-
-COLUMNS = (
-    "step",
-    "title",
-    "bond",
-    "layers",
-    "adds",
-    "pins",
-    "temperature_c",
-    "pressure_kpa",
-    "force_n",
-    "platen_width_mm",
-    "platen_length_mm",
-    "minutes",
-    "instructions",
-)
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,14 @@ class PressSettings:
     flash_middle: float = 10.0
     bond_all: float = 20.0
     validated_balloons: int = 20
+    pad: Pad = field(default_factory=Pad)
+    plate_material: str = "steel"
+    plate_thickness: float | None = None
+    release_film: str = "PTFE film"
+    release_thickness: float = 0.05
+    pin_standard: Standard = "ISO 8734"
+    pin_lengths: tuple[float, ...] = ()
+    tack: float = 1.0
 
     @property
     def force_n(self) -> float:
@@ -83,11 +92,13 @@ class PressSettings:
         return self.pressure_kpa * self.platen[0] * self.platen[1] / 1000
 
     def minutes(self, step: StepName) -> float:
-        """How long the press stays closed in a step."""
+        """How long the press stays closed in a step; tacking is a flash bond."""
         return {
             "flash_bottom": self.flash_bottom,
+            "tack_bottom": self.flash_bottom,
             "bond_bottom": self.bond_bottom,
             "flash_middle": self.flash_middle,
+            "tack_all": self.flash_middle,
             "bond_all": self.bond_all,
         }[step]
 
@@ -97,7 +108,9 @@ class Step:
     """One closing of the press.
 
     ``layers`` are pressed together, ``adds`` those of them that join in this step, both by layer
-    index; ``pins`` names the dowel pins that are in.
+    index; ``pins`` names the dowel pins that are in, ``pin_settings`` how long they are and how
+    deep they sit. ``pressure_kpa`` is the force on the whole platen, ``film_kpa`` and the others
+    what the pad makes of it (``build_up.Pressures``). ``build_up`` goes from the lower platen up.
     """
 
     step: int
@@ -111,7 +124,19 @@ class Step:
     force_n: float
     platen_mm: tuple[float, float]
     minutes: float
+    film_kpa: float
+    edge_kpa: float
+    bond_kpa: float
+    plate_kpa: float
+    pressure_basis: str
+    build_up: tuple[BuildUpPart, ...]
+    pin_settings: tuple[PinSetting, ...]
     instructions: str
+
+    @property
+    def stack_mm(self) -> float:
+        """Height of the stack that is pressed."""
+        return next(item.thickness_mm for item in self.build_up if item.part == LAMINATE)
 
 
 @dataclass(frozen=True)
@@ -125,37 +150,77 @@ class Schedule:
     warnings: tuple[str, ...]
 
 
-def schedule(laminate: Laminate, press: PressSettings) -> Schedule:
+def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] = (1,)) -> Schedule:
     """The press steps of a laminate, bottom balloon first.
 
-    Flash bonds hold layers in place on their pins. Full bonds are pressed without any: base and
-    cap have no bore for a channel pin, and a lumen pin, though it would pass, stays out as in the
-    paper. Raises DesignError at a temperature that would not bond the films or that one of them
-    does not stand.
+    Flash bonds hold layers in place on their pins. Full bonds are pressed without any, as in the
+    paper; with ears a flash bond on the pins comes before each. Raises DesignError at a temperature
+    that would not bond the films or that one of them or the pad does not stand, and where pad, pins
+    or plate do not do for the laminate. ``together`` are the laminates that lie in the press at
+    once, one number for each size of cycle, the largest first: they share the force.
     """
     _refuse_temperature(laminate, press)
-    *parts, last = assembly(laminate)
-    after = f" {SNIP}" if laminate.registration == "ears" else ""
-    steps = (
-        *(_step(laminate, part, press) for part in parts),
-        _step(laminate, last, press, after),
+    parts = assembly(laminate)
+    under, *others = (
+        [build_up.footprint(laminate, part.layers, count) for part in parts]
+        for count in dict.fromkeys(together)
+    )
+    stacks = [*under, *chain.from_iterable(others)]
+    pad = build_up.pad_thickness(press.pressure_kpa, press.platen, press.pad, stacks)
+    pins = settings_by_step(
+        [(stack.height, part.pins) for stack, part in zip(under, parts, strict=True)],
+        press.pin_standard,
+        press.pin_lengths,
+    )
+    plate = plate_thickness(press.plate_thickness, pins)
+    steps = tuple(
+        _step(
+            laminate,
+            part,
+            press,
+            _Setting(pad, plate, stack, own),
+            f" {SNIP}" if laminate.registration == "ears" and part is parts[-1] else "",
+        )
+        for part, stack, own in zip(parts, under, pins, strict=True)
     )
     total = sum(step.minutes for step in steps)
+    tacking = press.tack * sheets.tackings(laminate)
     return Schedule(
         steps,
         total,
-        total + HANDLING_MINUTES,
-        f"{total:g} min in the press and {HANDLING_MINUTES:g} min to cut, lay up, pin and fit the "
-        "tubing; the latter is assumed the same for every design (paper: 1.75 h in all)",
+        total + tacking + HANDLING_MINUTES,
+        f"{total:g} min in the press{_tacked(tacking)} and {HANDLING_MINUTES:g} min to cut, lay "
+        "up, pin and fit the tubing; the latter is assumed the same for every design (paper: "
+        "1.75 h in all)",
         tuple(_warnings(laminate, press, steps)),
     )
 
 
-def _step(laminate: Laminate, part: AssemblyStep, press: PressSettings, after: str = "") -> Step:
+def _tacked(minutes: float) -> str:
+    return f", {minutes:g} min to tack masks to their films" if minutes else ""
+
+
+class _Setting(NamedTuple):
+    """Thickness of pad and plate, mm, and what one step's stack and pins are like."""
+
+    pad: float
+    plate: float
+    under: Footprint
+    pins: tuple[PinSetting, ...]
+
+
+def _step(
+    laminate: Laminate, part: AssemblyStep, press: PressSettings, own: _Setting, after: str
+) -> Step:
     count = stack_count(laminate, part.layers)
+    found = build_up.pressures(press.pressure_kpa, press.platen, press.pad, own.pad, own.under)
+    title = TITLES[part.name] if count == 1 else TITLES_OF_SEVERAL[part.name]
+    words = _instructions(part, count) + after
+    if laminate.panel is not None:
+        title, words = sheets.title(part), sheets.instructions(part)
     return Step(
         step=part.number,
-        title=TITLES[part.name] if count == 1 else TITLES_OF_SEVERAL[part.name],
+        title=title,
         bond=part.bond,
         layers=part.layers,
         adds=part.adds,
@@ -165,15 +230,44 @@ def _step(laminate: Laminate, part: AssemblyStep, press: PressSettings, after: s
         force_n=round(press.force_n, 1),
         platen_mm=press.platen,
         minutes=press.minutes(part.name),
-        instructions=_instructions(part, count) + after,
+        film_kpa=found.film,
+        edge_kpa=found.edge,
+        bond_kpa=found.bond,
+        plate_kpa=found.plate,
+        pressure_basis=build_up.said(press.pressure_kpa, press.pad, own.pad, own.under, found)
+        + _round_pins(press, own),
+        build_up=tuple(_items(press, own)),
+        pin_settings=own.pins,
+        instructions=words,
     )
+
+
+def _round_pins(press: PressSettings, own: _Setting) -> str:
+    out = max((pin.stands_mm - own.under.height for pin in own.pins), default=0.0)
+    if not out:
+        return ""
+    free = build_up.unpressed(press.pressure_kpa, press.pad, out)
+    return f"; up to {free:.1f} mm round a pin none"
+
+
+def _items(press: PressSettings, own: _Setting) -> Iterator[BuildUpPart]:
+    """From the lower platen up; the films take the size that they have."""
+    release = BuildUpPart(RELEASE, press.release_film, press.release_thickness, press.platen)
+    pad = f"{press.pad.material}, {press.pad.hardness:g} Shore A"
+    yield BuildUpPart(BASE_PLATE, press.plate_material, own.plate, press.platen)
+    yield release
+    yield BuildUpPart(LAMINATE, "films of this step", round(own.under.height, 6), (0.0, 0.0))
+    yield release
+    yield BuildUpPart(PAD, pad, own.pad, press.platen)
 
 
 def _instructions(part: AssemblyStep, count: int) -> str:
     """What to do in a step that makes ``count`` stacks beside each other."""
     pins = [pin.name for pin in part.pins]
-    stacks = ", then ".join(_named(stack) for stack in part.stacks if stack)
+    stacks = ", then ".join(named(stack) for stack in part.stacks if stack)
     on_pins = f"on the pin{'s' if len(pins) > 1 else ''} {_listed(pins)}"
+    if not part.adds:
+        return f"Lay {stacks} down again, with no pin. Press to the full bond and let it cool flat."
     if part.bond == "full":
         how = on_pins if pins else "by eye, with no pin"
         return (
@@ -190,7 +284,7 @@ def _listed(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
-def _named(layers: Sequence[int]) -> str:
+def named(layers: Sequence[int]) -> str:
     """Layer indices in words; never 2-3, which a spreadsheet takes for a date."""
     runs: list[list[int]] = []
     for index in layers:
@@ -198,6 +292,8 @@ def _named(layers: Sequence[int]) -> str:
             runs[-1][1] = index
         else:
             runs.append([index, index])
+    if not runs:
+        return "none"
     words = [
         word
         for first, last in runs
@@ -236,9 +332,16 @@ def _refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
                 f"{above.film.material}, which both stay solid in the press and do not bond; give "
                 f"the {roles} another film in [layup]"
             )
+    if press.temperature_c > build_up.PAD_LIMIT_C:
+        raise DesignError(
+            f"press.temperature_c = {press.temperature_c:g} is more than the press pad of "
+            f"{press.pad.material} stands, {build_up.PAD_LIMIT_C:g} C; lower it"
+        )
 
 
 def _warnings(laminate: Laminate, press: PressSettings, steps: Sequence[Step]) -> Iterator[str]:
+    if laminate.panel is not None:
+        yield sheets.UNTRIED
     if press.temperature_c > HOTTEST_TRIED:
         yield (
             f"{press.temperature_c:g} C is hotter than the {HOTTEST_TRIED:g} C of earlier work, "
@@ -255,6 +358,31 @@ def _warnings(laminate: Laminate, press: PressSettings, steps: Sequence[Step]) -
             f"{laminate.balloons} balloons are more than the {press.validated_balloons} validated; "
             "heat must pass the whole laminate, so try the bond on a sample first"
         )
+    uneven = [step for step in steps if not low <= step.film_kpa <= high]
+    if uneven and low <= press.pressure_kpa <= high:
+        worst = max(uneven, key=lambda step: abs(step.film_kpa - press.pressure_kpa))
+        yield (
+            f"step {worst.step}: the films get about {worst.film_kpa:.0f} kPa (estimate), outside "
+            f"{low:g} to {high:g} kPa; take a thicker or softer pad (press.pad_thickness, "
+            "press.pad_hardness)"
+        )
+    if laminate.registration == "ears" and laminate.pins:
+        yield PINS_IN if laminate.pins_in_full_bonds else PINS_OUT
+    pad = next(item.thickness_mm for item in steps[0].build_up if item.part == PAD)
+    if (pile := build_up.pieces(pad)) > 1:
+        yield (
+            f"the press pad is a pile of {pile} sheets, {pad:g} mm high together, which may "
+            "slide aside: hold it in a frame, and see whether the press opens so far"
+        )
+    unsold = {
+        pin.diameter for pin in laminate.pins if not is_sold(pin.diameter, press.pin_standard)
+    }
+    if unsold and not press.pin_lengths:
+        yield (
+            f"{press.pin_standard} has no dowel pin of diameter "
+            f"{_listed([f'{diameter:g}' for diameter in sorted(unsold)])}: change the diameter, or "
+            "make the pins and give their lengths in registration.pin_lengths"
+        )
     for step in steps:
         if step.bond == "flash":
             held = {pin for pin in laminate.pins if pin.name in step.pins}
@@ -265,52 +393,10 @@ def _warnings(laminate: Laminate, press: PressSettings, steps: Sequence[Step]) -
             ]
             layers = [i for i in step.layers if laminate.layer(i).pattern in loose]
             if layers:
-                which = _named(layers) if len(layers) < 4 else _by_role(laminate, layers)
+                which = named(layers) if len(layers) < 4 else _by_role(laminate, layers)
                 yield f"step {step.step}: no pin holds {which}; align by hand"
 
 
 def _by_role(laminate: Laminate, layers: Sequence[int]) -> str:
     counts = Counter(laminate.layer(index).role for index in layers)
     return _listed([f"the {count} {role}s" for role, count in counts.items()])
-
-
-def press_json(plan: Schedule) -> dict[str, Any]:
-    """The schedule as ``press.json`` holds it."""
-    return {
-        "steps": [
-            {
-                key: list(value) if isinstance(value, tuple) else value
-                for key, value in asdict(step).items()
-            }
-            for step in plan.steps
-        ],
-        "total_press_minutes": plan.total_press_minutes,
-        "estimated_build_minutes": plan.estimated_build_minutes,
-        "estimate_basis": plan.estimate_basis,
-        "warnings": list(plan.warnings),
-    }
-
-
-def press_csv(plan: Schedule) -> str:
-    """The steps as a table, one row each, with units in the column names."""
-    table = io.StringIO()
-    writer = csv.writer(table, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for step in plan.steps:
-        writer.writerow(
-            [
-                step.step,
-                step.title,
-                step.bond,
-                _named(step.layers),
-                _named(step.adds),
-                ", ".join(step.pins),
-                f"{step.temperature_c:g}",
-                f"{step.pressure_kpa:g}",
-                f"{step.force_n:.1f}",
-                *(f"{size:g}" for size in step.platen_mm),
-                f"{step.minutes:g}",
-                step.instructions,
-            ]
-        )
-    return table.getvalue()

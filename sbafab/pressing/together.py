@@ -51,7 +51,7 @@ def press_runs(
 ) -> Runs:
     """As many copies at once as the heated area (mm) takes; ``bounds`` are those of one.
 
-    ``margin`` mm of pin plate lie round all of them; the plate lies on the platen either way.
+    ``margin`` mm of base plate lie round all of them; the plate lies on the platen either way.
     Copies are equal layer by layer, so every place of the press holds the same films at every
     height: the paper (Sec. 2) splits pressing where stacks of unlike cuts would share the pressure
     unevenly. Unlike designs are therefore never pressed together.
@@ -71,7 +71,9 @@ def press_runs(
 
 
 def runs_of(laminate: Laminate, copies: int, platen: tuple[float, float]) -> Runs:
-    """The press runs of a laminate, on one pin plate if it has pins."""
+    """The press runs of a laminate, on one base plate; registered sheets are one piece to it."""
+    if laminate.panel is not None:
+        return Runs(1, ((0.0, 0.0),))
     margin = PLATE_MARGIN if laminate.pins else 0.0
     return press_runs(copies, laminate.bounds, platen, margin)
 

@@ -102,6 +102,9 @@ def pattern_card(
     widths = inlet_width(laminate, layers[0]), piece_width(profile)
     marks += [width for width in widths if width is not None]
     pins = tuple(pin for pin in laminate.pins if all(pin in held[x.index] for x in layers))
+    if laminate.panel is not None:
+        # Corner pins stand in the sheet round the part.
+        pins = ()
     return Card(layers, pins, tuple(marks), (low_x, low_y, high_x, high_y))
 
 

@@ -121,7 +121,7 @@ def _union(regions: tuple[Region, ...]) -> Region:
 def pin_openings(laminate: Laminate) -> Region:
     """Where bores, lumen and tooling holes are open, as wide as holes that are still a pin's."""
     places = [(bore.centre, bore.diameter) for bore in laminate.bores]
-    places += [(pin.centre, pin.diameter) for pin in laminate.pins]
+    places += [(pin.centre, pin.hole) for pin in laminate.pins]
     if laminate.lumen is not None:
         places.append(((0.0, 0.0), laminate.lumen))
     return union(disc(centre, (width + LOOSE) / 2) for centre, width in dict.fromkeys(places))

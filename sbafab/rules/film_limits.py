@@ -52,7 +52,7 @@ def _finest(laminate: Laminate) -> _Feature | None:
     for layers in laminate.patterns.values():
         for kind, least in (("web", least_width), ("slot or hole", least_gap)):
             below = finest.width.value if finest else math.inf
-            width = least(layers[0].profile, SHARP, below)
+            width = least(laminate.first_cut(layers[0]), SHARP, below)
             if width is not None and (finest is None or width.value < below):
                 finest = _Feature(layers[0], kind, width)
     return finest
@@ -67,10 +67,10 @@ def _lost_to_kerf(laminate: Laminate, limits: Limits) -> Finding | None:
             continue
         place, what = Place(None, (layer.index,)), "loses or joins a hole or piece"
         try:
-            lost = beam_path(layer.profile, kerf).lost
+            lost = beam_path(laminate.first_cut(layer), kerf).lost
             if lost is None:
                 continue
-            spot = place_of(layer.profile, lost, kerf)
+            spot = place_of(laminate.first_cut(layer), lost, kerf)
             place = Place(None, (layer.index,), *spot)
             kind = "hole" if lost.contour.is_hole else "outline"
             what = f"has a {kind} that {lost.fate} at {at(spot)}"

@@ -2,20 +2,22 @@
 
 Layers come together in the steps of the assembly. What is not yet bonded together is a body of its
 own: a piece of a layer, or all that an earlier step has joined. Two pins hold a body but for the
-pin error; on one pin it may also turn; a body on no pin is laid by hand on what lies below it.
+pin error and the play in its holes; on one pin it may also turn; a body on no pin is laid by hand
+on what lies below it.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import combinations
 from typing import NamedTuple
 
 from sbafab.geometry.centroid import centroid
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.assembly import AssemblyStep, assembly
-from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.laminate import LOOSE, Laminate
 from sbafab.rules.boundary import beside
 from sbafab.rules.limits import Tolerances
 
@@ -37,7 +39,8 @@ class Freedom(NamedTuple):
     ``centre`` is given, turned about it by up to ``most`` radians.
 
     The body reaches from layer ``lowest`` to ``highest``; ``body`` tells it from others in the
-    same ``step``. ``pins`` are those that hold it.
+    same ``step``. ``pins`` are those that hold it. ``in_sheet``: it is what a registered sheet
+    stretches, or what moves while it is transferred.
     """
 
     step: int
@@ -47,11 +50,12 @@ class Freedom(NamedTuple):
     pins: int
     most: float
     centre: Point | None = None
+    in_sheet: bool = False
 
     @property
     def by_hand(self) -> bool:
         """Whether the hand decides it: every turn, and the place of what no pin holds."""
-        return self.centre is not None or self.pins == 0
+        return self.centre is not None or self.pins == 0 or self.in_sheet
 
     def lever(self, p: Point, normal: Point) -> float:
         """How many mm the body moves along ``normal`` at ``p`` per radian of its turn."""
@@ -62,7 +66,7 @@ class Freedom(NamedTuple):
     def like(self) -> tuple[object, ...]:
         """Equal for freedoms that differ in step and body only."""
         centre = self.centre and (round(self.centre[0], 6), round(self.centre[1], 6))
-        return self.most, centre, self.pins
+        return self.most, centre, self.pins, self.in_sheet
 
 
 Freedoms = Mapping[Part, tuple[Freedom, ...]]
@@ -73,6 +77,8 @@ def freedoms(laminate: Laminate, tolerances: Tolerances) -> Freedoms:
 
     Two pieces lie off each other by what one of them does and the other does not.
     """
+    if laminate.panel is not None:
+        return _in_sheets(laminate, tolerances)
     shapes = _Shapes(laminate)
     bodies = [[part] for layer in laminate.layers for part in shapes.parts(layer.index)]
     found: dict[Part, tuple[Freedom, ...]] = {body[0]: () for body in bodies}
@@ -95,6 +101,28 @@ def freedoms(laminate: Laminate, tolerances: Tolerances) -> Freedoms:
     return found
 
 
+def _in_sheets(laminate: Laminate, tolerances: Tolerances) -> Freedoms:
+    """The same for registered sheets: all parts of a sheet move as one, masks with the film below.
+
+    A mask is tacked to that film before the sheets are stacked.
+    """
+    found: dict[Part, tuple[Freedom, ...]] = {}
+    under: tuple[Freedom, ...] = ()
+    added = {index: step.number for step in assembly(laminate) for index in step.adds}
+    for layer in laminate.layers:
+        number, step, pins = layer.index, added[layer.index], len(laminate.pins)
+        on_pins = Freedom(step, number, number, number, pins, tolerances.pin)
+        both = on_pins, on_pins._replace(body=-number, most=tolerances.sheet, in_sheet=True)
+        own = tuple(one for one in both if one.most > 0)
+        if layer.is_mask:
+            own = (*under, *own)
+        else:
+            under = own
+        for piece in range(len(layer.profile.pieces)):
+            found[Part(layer.index, piece)] = own
+    return found
+
+
 def _own(
     body: Sequence[Part], number: int, shapes: _Shapes, step: AssemblyStep, tolerances: Tolerances
 ) -> tuple[Freedom, ...]:
@@ -105,13 +133,29 @@ def _own(
     def freedom(most: float, centre: Point | None = None) -> Freedom:
         return Freedom(step.number, number, lowest, highest, len(pins), most, centre)
 
-    shift = freedom(tolerances.pin if pins else tolerances.placement)
+    loose = min(pins.values(), default=0.0)
+    shift = freedom(tolerances.pin + loose if pins else tolerances.placement)
     if len(pins) >= 2:
-        both = [shift]
+        both = [shift, freedom(*_turn_on(pins))]
     else:
-        centre = pins[0] if pins else shapes.centre(body)
+        centre = next(iter(pins), None) or shapes.centre(body)
         both = [shift, freedom(math.radians(tolerances.turn), centre)]
     return tuple(one for one in both if one.most > 0)
+
+
+def _turn_on(pins: Mapping[Point, float]) -> tuple[float, Point]:
+    """How far, in radians, play on two or more pins lets a body turn, and about which point.
+
+    Of all pairs the one that holds best decides; the body turns about the place between its pins
+    that their play divides.
+    """
+    found = []
+    for (a, loose_a), (b, loose_b) in combinations(pins.items(), 2):
+        both = loose_a + loose_b
+        share = loose_a / both if both else 0.0
+        centre = a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share
+        found.append((both / math.dist(a, b), centre))
+    return min(found)
 
 
 class _Shapes:
@@ -123,7 +167,7 @@ class _Shapes:
             pattern: layers[0].profile.pieces for pattern, layers in laminate.patterns.items()
         }
         self.centres: dict[tuple[str, int], Point] = {}
-        self.holders: dict[tuple[str, int], frozenset[str]] = {}
+        self.holders: dict[tuple[str, int], dict[str, float]] = {}
         self.overlaps: dict[tuple[str, int, str, int], bool] = {}
 
     def parts(self, layer: int) -> list[Part]:
@@ -135,18 +179,18 @@ class _Shapes:
     def _region(self, part: Part) -> Region:
         return self.pieces[self._pattern(part.layer)][part.piece]
 
-    def pins(self, body: Iterable[Part], step: AssemblyStep) -> list[Point]:
-        """Centres of the step's pins that hold a part of the body."""
+    def pins(self, body: Iterable[Part], step: AssemblyStep) -> dict[Point, float]:
+        """Centres of the step's pins that hold a part of the body, and its play on each, mm."""
         if not step.pins:
-            return []
-        names: set[str] = set()
+            return {}
+        found: dict[str, float] = {}
         for part in body:
             key = self._pattern(part.layer), part.piece
             if key not in self.holders:
-                held = self.laminate.pins_in(self._region(part))
-                self.holders[key] = frozenset(pin.name for pin in held)
-            names |= self.holders[key]
-        return [pin.centre for pin in step.pins if pin.name in names]
+                self.holders[key] = _held(self.laminate, self._region(part))
+            for name, loose in self.holders[key].items():
+                found[name] = min(loose, found.get(name, loose))
+        return {pin.centre: found[pin.name] for pin in step.pins if pin.name in found}
 
     def centre(self, body: Sequence[Part]) -> Point:
         """The body's centre of area, all its parts counted."""
@@ -204,6 +248,19 @@ class _Shapes:
         for part in sorted(home):
             merged.setdefault(first(home[part]), []).append(part)
         return list(merged.values())
+
+
+def _held(laminate: Laminate, part: Region) -> dict[str, float]:
+    """The pins that hold a part, and by how much it may lie off each as its hole is drawn."""
+    circles = [hole.circle for hole in part.holes if hole.circle is not None]
+    return {
+        pin.name: max(
+            0.0,
+            min(r for centre, r in circles if math.dist(centre, pin.centre) < LOOSE)
+            - pin.diameter / 2,
+        )
+        for pin in laminate.pins_in(part)
+    }
 
 
 def _plainly_meet(a: Region, b: Region) -> bool:

@@ -19,23 +19,27 @@ class Tolerances:
     ``cutting``: mm, any cut edge along its normal; ``pin``: mm, a layer on its pins; ``placement``
     mm and ``turn`` degrees: a layer laid by hand. The first two are the paper's (Sec. 2); the hand
     is calibrated on its success rate (``docs/hand.py``).
+    ``sheet``: mm, a part in its registered sheet; ``second_cut``: mm, the second cut of these.
     """
 
     cutting: float = 0.1
     pin: float = 0.004
     placement: float = 0.08
     turn: float = 0.4
+    sheet: float = 0.05
+    second_cut: float = 0.2
 
 
 @dataclass(frozen=True)
 class Limits:
     """A design's limits, mm; the defaults are the paper's (Sec. 2).
 
-    ``least_feature`` is the laser's, ``kerf`` the full kerf width by material, or that along x and
-    along y (none given: not calibrated), ``waive`` the rules whose failure the user accepts by
-    name. The ``worst_`` limits are for what is left of bond and overhang under the ``tolerances``;
-    ``target_yield`` is the share of ``yield_builds`` random builds that must keep them (None: none
-    asked for; for the builds: as many as are quick).
+    ``pin_stretch`` is the share by which a hole may be stretched over its pin, ``least_feature`` is
+    the laser's, ``kerf`` the full kerf width by material, or that along x and along y (none given:
+    not calibrated, and up to ``unknown_kerf``), ``waive`` the rules whose failure the user accepts
+    by name. The ``worst_`` limits are for what is left of bond and overhang under the
+    ``tolerances``; ``target_yield`` is the share of ``yield_builds`` random builds that must keep
+    them (None: none asked for; for the builds: as many as are quick).
     """
 
     bond_width: float = 0.75
@@ -47,6 +51,8 @@ class Limits:
     validated_balloons: int = 20
     registration_tolerance: float = 0.001
     tolerances: Tolerances = Tolerances()
+    unknown_kerf: float = 0.1
+    pin_stretch: float = 0.3
     worst_bond_width: float = 0.5
     worst_mask_overhang: float = 0.25
     target_yield: float | None = None

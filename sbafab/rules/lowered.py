@@ -33,10 +33,14 @@ KEYS = (
     _Key("worst_mask_overhang", WORST, lambda own: own.worst_mask_overhang, "default"),
     _Key("validated_balloons", ("press-fit",), lambda own: own.validated_balloons, "paper", True),
     _Key("least_feature", ("film-limits",), lambda own: own.least_feature, "default"),
-    _Key("cutting_error", WORST, lambda own: own.tolerances.cutting),
+    _Key("unknown_kerf", ("tube-fit",), lambda own: own.unknown_kerf, "default"),
+    _Key("pin_stretch", ("pin-fit",), lambda own: own.pin_stretch, "default", True),
+    _Key("cutting_error", (*WORST, "pin-fit", "tube-fit"), lambda own: own.tolerances.cutting),
     _Key("pin_error", WORST, lambda own: own.tolerances.pin),
     _Key("hand_placement", WORST, lambda own: own.tolerances.placement, "default"),
     _Key("hand_turn", WORST, lambda own: own.tolerances.turn, "default"),
+    _Key("sheet_error", WORST, lambda own: own.tolerances.sheet, "default"),
+    _Key("second_cut_error", ("bridges",), lambda own: own.tolerances.second_cut, "default"),
 )
 """Smaller tolerances assume a better shop than is usual, so they weaken the rules as well."""
 

@@ -251,7 +251,7 @@ def pin_at(edge: Edge, pins: tuple[Pin, ...]) -> Pin | None:
     for pin in pins:
         if (
             math.dist(edge.centre, pin.centre) <= TOLERANCE
-            and abs(edge.radius - pin.diameter / 2) <= TOLERANCE
+            and abs(edge.radius - pin.hole / 2) <= TOLERANCE
         ):
             return pin
     return None

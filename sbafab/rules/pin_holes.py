@@ -9,6 +9,7 @@ from typing import NamedTuple
 from sbafab.geometry.edges import Point
 from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
+from sbafab.rules.bridges import sheeted
 from sbafab.rules.channels import channels
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, at
@@ -17,6 +18,9 @@ NAME = "pin-holes"
 
 ALIKE = (("base", "wall", "cap"), ("separator-mask",), ("sheet",))
 """Roles whose layers hang on the same pins where ears register them."""
+
+LOCATING = 2
+"""Corner pins that a registered sheet fits on, one in a hole and one in a slot."""
 
 
 class _Miss(NamedTuple):
@@ -28,7 +32,10 @@ class _Miss(NamedTuple):
 def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     """How many pins miss a hole, meet film, or leave a layer that they should hold."""
     del limits
-    found = [*_unholed(laminate), *_loose(laminate), *_blocked(laminate), *_idle(laminate)]
+    if laminate.panel is not None:
+        found = [*_sheets_off(laminate)]
+    else:
+        found = [*_unholed(laminate), *_loose(laminate), *_blocked(laminate), *_idle(laminate)]
     if found:
         first = found[0]
         message = f"{first.what}; draw pins and holes from the same outline"
@@ -38,6 +45,21 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     if not laminate.pins:
         message = "no pin holds a layer"
     return [Finding(NAME, "pass", 0.0, 0.0, "misses", Place(), message)]
+
+
+def _sheets_off(laminate: Laminate) -> Iterator[_Miss]:
+    """Registered sheets that do not go on the corner pins, or hang loose on the first two."""
+    for layer in (*sheeted(laminate), *sheeted(laminate, masks=True)):
+        sheet = laminate.panel.sheets[layer.index - 1] if laminate.panel else layer.profile
+        for number, pin in enumerate(laminate.pins):
+            radius = pin.diameter / 2
+            free = 0.0 if sheet.contains(pin.centre) else sheet.distance_to_edge(pin.centre)
+            what = f"layer {layer.index} ({layer.name})"
+            where = f"the pin {pin.name} at {at(pin.centre)}"
+            if free < radius - TOLERANCE:
+                yield _Miss(f"{what} has no hole for {where}", pin.centre, (layer.index,))
+            elif number < LOCATING and free > radius + TOLERANCE:
+                yield _Miss(f"{what} hangs loose on {where}", pin.centre, (layer.index,))
 
 
 def _idle(laminate: Laminate) -> Iterator[_Miss]:

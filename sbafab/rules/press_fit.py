@@ -11,13 +11,15 @@ NAME = "press-fit"
 
 def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     """How far the laminate, laid either way round, fills the platen; a warning on many balloons."""
-    low_x, low_y, high_x, high_y = laminate.bounds
+    panel = laminate.panel
+    low_x, low_y, high_x, high_y = laminate.bounds if panel is None else panel.outline.bounds
     short, long = sorted((high_x - low_x, high_y - low_y))
     narrow, wide = sorted((limits.heated_width, limits.heated_length))
     # The side with less room to spare decides.
     measured, limit = min(((short, narrow), (long, wide)), key=lambda side: side[1] - side[0])
     good = measured <= limit + TOLERANCE
-    size = f"the laminate measures {high_x - low_x:.3f} x {high_y - low_y:.3f} mm"
+    what = "laminate" if panel is None else "registered sheet"
+    size = f"the {what} measures {high_x - low_x:.3f} x {high_y - low_y:.3f} mm"
     platen = f"{limits.heated_width:g} x {limits.heated_length:g} mm"
     message = f"{size} and lies within the heated area of {platen}"
     place = Place()

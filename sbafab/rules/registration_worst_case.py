@@ -155,6 +155,8 @@ def _source(freedom: Freedom) -> str:
     """What may move which layers, and in which press step."""
     one = freedom.lowest == freedom.highest
     what = f"layer {freedom.lowest}" if one else f"layers {freedom.lowest} to {freedom.highest}"
+    if freedom.in_sheet:
+        return f"stretch or transfer of {what} in its sheet"
     how = {0: "hand placement", 1: "turn about the only pin"}.get(freedom.pins, "play on the pins")
     return f"{how} of {what} in step {freedom.step}"
 

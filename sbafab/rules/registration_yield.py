@@ -80,8 +80,7 @@ def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) 
     message = (
         f"{found.whole.value:.2%} of {found.whole.builds} random builds keep every limit "
         f"(95 % interval {low:.2%} to {high:.2%}){_by_interface(found)}; errors are assumed spread "
-        f"evenly, up to {limits.tolerances.placement:g} mm and "
-        f"{limits.tolerances.turn:g} degree where a hand places{_calibrated(limits.tolerances)}"
+        f"evenly, up to {_by_hand(laminate, limits)}"
     )
     if verdict == "fail":
         message += (
@@ -92,6 +91,17 @@ def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) 
     if worst is not None and found.interfaces[worst].good < found.whole.builds:
         place = Place(worst, laminate.interfaces[worst - 1].layer_indices)
     return [Finding(NAME, verdict, target, found.whole.value, "", place, message)]
+
+
+def _by_hand(laminate: Laminate, limits: Limits) -> str:
+    """What the design assumes of the bench, in words."""
+    errors = limits.tolerances
+    if laminate.panel is not None:
+        return f"{errors.sheet:g} mm in a registered sheet"
+    return (
+        f"{errors.placement:g} mm and {errors.turn:g} degree where a hand places"
+        f"{_calibrated(errors)}"
+    )
 
 
 def _calibrated(tolerances: Tolerances) -> str:

@@ -1,4 +1,10 @@
-"""tube-fit: the flat inlet strip opens to the tube (half its perimeter), inside bonded film."""
+"""tube-fit: the flat inlet strip, as cut at worst, opens to the tube, inside bonded film.
+
+A channel w wide opens to a perimeter of 2 w. In it lie the tube and, along one side of it, the PTFE
+strip: the tube's half circle there is one strip's thickness farther out, so w must be pi / 2 times
+the sum of the tube's diameter and the strip's thickness. Both edges of the strip may be cut off by
+the cutting error, and a kerf that is not compensated makes it narrower by its width.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +23,9 @@ from sbafab.rules.limits import TOLERANCE, Limits, at, holds
 
 NAME = "tube-fit"
 BOND = "the bond beside the strip"
+REMEDY = "widen inlet.width"
+MASKS = "PTFE"
+"""Whose kerf makes the strips narrower."""
 
 
 class _Fit(NamedTuple):
@@ -29,6 +38,7 @@ class _Fit(NamedTuple):
     limit: float
     at: Point
     remedy: str
+    drawn: float = 0.0
 
 
 def check(laminate: Laminate, limits: Limits) -> list[Finding]:
@@ -40,13 +50,17 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     short = [fit for fit in fits if not holds(fit.value, fit.limit)]
     worst = min(short or [fit for fit in fits if fit.what != BOND], key=_margin)
     good = not short
-    message = (
-        f"{worst.what} of {worst.inlet.chamber} is {worst.value:.3f} mm wide, {at(worst.at)}; "
-    )
     if worst.what == BOND:
-        message += f"to hold the tube it needs {worst.limit:.3f}"
+        message = (
+            f"{worst.what} of {worst.inlet.chamber} is {worst.value:.3f} mm wide, {at(worst.at)}; "
+            f"to hold the tube it needs {worst.limit:.3f}"
+        )
     else:
-        message += f"a tube of {worst.inlet.tube_diameter:g} needs {worst.limit:.3f}"
+        message = (
+            f"{worst.what} of {worst.inlet.chamber} is drawn {worst.drawn:.3f} mm wide, "
+            f"{at(worst.at)}, and cut {worst.value:.3f} at worst ({_lost_to(limits)}); a tube of "
+            f"{worst.inlet.tube_diameter:g} beside its strip needs {worst.limit:.3f}"
+        )
     if not good:
         message += f": {worst.remedy}"
     place = Place(None, (), *worst.at)
@@ -58,11 +72,11 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
 
 
 def _fits(inlet: Inlet, laminate: Laminate, limits: Limits) -> list[_Fit]:
-    needed = math.pi * inlet.tube_diameter / 2
     for alike in distinct_interfaces(laminate):
         interface = alike.interface
         if interface.kind != "chamber":
             continue
+        needed = _needed(inlet, interface)
         mouth = [
             edge
             for edge in edges_along(interface.unbonded, interface.contact)
@@ -71,11 +85,11 @@ def _fits(inlet: Inlet, laminate: Laminate, limits: Limits) -> list[_Fit]:
         ]
         if mouth:
             width = sum(edge.length for edge in mouth)
-            opening = _Fit(
-                inlet, interface, "the mouth", width, needed, inlet.mouth, "widen inlet.width"
-            )
+            cut = max(0.0, width - _lost(limits))
+            opening = _Fit(inlet, interface, "the mouth", cut, needed, inlet.mouth, REMEDY, width)
             return [opening, *_along_run(inlet, interface, needed, limits)]
     message = "open a mask strip to the tab's end"
+    needed = math.pi * inlet.tube_diameter / 2
     return [_Fit(inlet, None, "the mouth", 0.0, needed, inlet.mouth, message)]
 
 
@@ -94,13 +108,31 @@ def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits
     bonds = [outward_reach(edge, interface.contact.index) for edge in sides]
     found = []
     for reaches, what, limit, remedy in (
-        (widths, "the strip", needed, "widen inlet.width"),
+        (widths, "the strip", needed, REMEDY),
         (bonds, BOND, limits.bond_width, "raise bond.width, which makes the tab wider"),
     ):
         least = min((r for r in reaches if r), key=lambda r: r.value, default=None)
         if least is not None:
-            found.append(_Fit(inlet, interface, what, least.value, limit, least.at, remedy))
+            cut = least.value if what == BOND else max(0.0, least.value - _lost(limits))
+            fit = _Fit(inlet, interface, what, cut, limit, least.at, remedy, least.value)
+            found.append(fit)
     return found
+
+
+def _needed(inlet: Inlet, interface: Interface) -> float:
+    """Width that opens to the tube with the strip beside it."""
+    strip = max((mask.film.thickness for mask in interface.masks), default=0.0)
+    return math.pi / 2 * (inlet.tube_diameter + strip)
+
+
+def _lost(limits: Limits) -> float:
+    """By how much a strip may be cut narrower than drawn: the kerf is known or it is not."""
+    return 2 * limits.tolerances.cutting + (0.0 if MASKS in limits.kerf else limits.unknown_kerf)
+
+
+def _lost_to(limits: Limits) -> str:
+    edges = f"{limits.tolerances.cutting:g} on each edge"
+    return edges if MASKS in limits.kerf else f"{edges}, kerf up to {limits.unknown_kerf:g}"
 
 
 def _margin(fit: _Fit) -> float:

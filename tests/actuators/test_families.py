@@ -52,10 +52,10 @@ def test_1dof_interfaces_by_closed_formulas() -> None:
     lam = laminate("1dof-5mm")
     chamber, separator = lam.interfaces[2], lam.interfaces[1]
     assert (chamber.kind, separator.kind) == ("chamber", "separator")
-    # Ring wall 2.5 to 3.25; pocket 2.5 less the bore 0.5; neck ring 0.5 to 1.25.
+    # Ring wall 2.5 to 3.25; pocket 2.5 less the bore 0.52; neck ring 0.52 to 1.27.
     assert chamber.bond.area == pytest.approx(math.pi * (3.25**2 - 2.5**2))
-    assert chamber.unbonded.area == pytest.approx(math.pi * (2.5**2 - 0.5**2))
-    assert separator.bond.area == pytest.approx(math.pi * (1.25**2 - 0.5**2))
+    assert chamber.unbonded.area == pytest.approx(math.pi * (2.5**2 - 0.52**2))
+    assert separator.bond.area == pytest.approx(math.pi * (1.27**2 - 0.52**2))
 
 
 def test_inlet_strip_reaches_one_overhang_past_the_tab() -> None:

@@ -24,6 +24,9 @@ def test_every_command_has_help(command: object, capsys: pytest.CaptureFixture[s
     assert "Usage: sbafab" in out
 
 
+CUT_ONE = ["cut", "1dof-5mm", "--set", "bore.diameter=1"]
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -44,7 +47,7 @@ def test_every_command_has_help(command: object, capsys: pytest.CaptureFixture[s
         ["cut", "1dof-5mm", "--set", "sheets.tpe.pins=[[1,2]]"],
         ["cut", "1dof-5mm", "--set", "laser.kerf_tpe=-0.1"],
         ["cut", "1dof-5mm", "--set", "laser.kerf_tpe=2"],
-        ["cut", "1dof-5mm", "--waive", "film-limits", "--set", "laser.kerf_tpe=1"],
+        [*CUT_ONE, "--waive", "film-limits", "--set", "laser.kerf_tpe=1"],
         ["mesh", "1dof-5mm", "--h", "5"],
         ["mesh", "1dof-5mm", "--fill", "30"],
         ["mesh", "1dof-5mm", "--fill", "nosuch=3"],

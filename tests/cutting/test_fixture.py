@@ -9,7 +9,7 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.fixture import PATH, fixture, write_fixture
+from sbafab.cutting.fixture import PATH, fixture, plate_corner, write_fixture
 from sbafab.cutting.properties import CutSettings
 
 SETTINGS = CutSettings("test", "0" * 64)
@@ -33,17 +33,22 @@ def test_every_pin_has_its_hole(name: str, method: str, tmp_path: Path) -> None:
         )
 
 
-def test_the_plate_holds_every_layer_and_lacks_one_corner() -> None:
+def test_the_plate_is_as_large_as_the_platen_and_lacks_one_corner() -> None:
     laminate = build(load_design("3dof-15mm"))
-    plate = fixture(laminate)
+    plate = fixture(laminate, (152.4, 120.0))
     assert plate is not None
     low_x, low_y, high_x, high_y = laminate.bounds
+    x0, y0, x1, y1 = plate.bounds
+    assert (x1 - x0, y1 - y0) == pytest.approx((152.4, 120.0))
+    # The laminate lies in the middle, to the tenth that the holes are measured from.
+    assert (x0 + x1) / 2 == pytest.approx((low_x + high_x) / 2, abs=0.051)
+    assert (y0 + y1) / 2 == pytest.approx((low_y + high_y) / 2, abs=0.051)
+    assert (x0, y0) == plate_corner(laminate, (152.4, 120.0))
     (outline,) = plate.outers
-    width, height = high_x - low_x + 12, high_y - low_y + 12
-    holes = math.pi * (3 * 0.5**2 + 1.0**2)
-    assert plate.area == pytest.approx(width * height - 5 * 5 / 2 - holes)
-    assert outline.winding((high_x + 5.9, high_y + 5.9)) == 0
-    assert outline.winding((low_x - 5.9, low_y - 5.9)) == 1
+    holes = math.pi * sum((pin.diameter / 2) ** 2 for pin in laminate.pins)
+    assert plate.area == pytest.approx(152.4 * 120 - 5 * 5 / 2 - holes)
+    assert outline.winding((x1 - 0.1, y1 - 0.1)) == 0
+    assert outline.winding((x0 + 0.1, y0 + 0.1)) == 1
 
 
 def test_no_pins_no_plate(tmp_path: Path) -> None:

@@ -12,9 +12,10 @@ from filelock import FileLock
 from sbafab.actuators import load_design
 from sbafab.as_built.check import read_folder
 from sbafab.design.writing import design_sha256
+from sbafab.errors import DesignError
 from sbafab.output.run import generate
 from tests.as_built.doctoring import Doctor
-from tests.faults import beside, chords, claims, files, holes, layers, masks, sheets
+from tests.faults import beside, chords, claims, files, holes, layers, masks, panels, sheets
 from tests.faults.record import Fault, Kind
 from tests.faults.specimen import Specimen, failing, unabridged
 
@@ -29,6 +30,7 @@ KINDS: tuple[Kind, ...] = (
     files.KIND,
     claims.KIND,
     sheets.KIND,
+    panels.KIND,
     beside.KIND,
 )
 FAULTS = tuple(fault for kind in KINDS for fault in kind.faults)
@@ -65,7 +67,10 @@ def good_folders(root: Path) -> Goods:
 
 def caught_by(fault: Fault, template: str, goods: Goods, folder: Path) -> tuple[str, ...] | str:
     """The rules that fail once the fault is in a copy at ``folder``, or why it does not apply."""
-    good = goods(template, fault.settings, fault.beside)
+    try:
+        good = goods(template, fault.settings, fault.beside)
+    except DesignError:
+        return "cannot be made so"
     reason = fault.why_not(good.clean)
     if reason:
         return reason

@@ -97,7 +97,7 @@ def _common(rng: Random, name: str, family: str, most_balloons: int) -> dict[str
         "registration": {"method": rng.choice(["channel-pin", "ears"])},
     }
     if tables["registration"]["method"] == "ears" and rng.random() < 0.3:
-        tables["registration"]["pin_diameter"] = _mm(rng, 0.8, 2.0)
+        tables["registration"]["pin_diameter"] = _mm(rng, 0.95, 2.0)
     if rng.random() < 0.4:
         tables["bond"] = {"width": _mm(rng, 0.75, 1.6)}
     if rng.random() < 0.4:
@@ -107,7 +107,7 @@ def _common(rng: Random, name: str, family: str, most_balloons: int) -> dict[str
         tables["bond"] = {"width": _mm(rng, 0.4, 0.75)}
         tables["mask"] = {"overhang": _mm(rng, 0.3, 0.5)}
     if rng.random() < 0.5:
-        tables["bore"] = {"diameter": _mm(rng, 0.3, 1.6)}
+        tables["bore"] = {"diameter": _mm(rng, 0.8, 1.6)}
     if rng.random() < 0.6:
         tables["fillet"] = {"radius": rng.choice([0.0, 0.3, 1.0, 2.0, 4.0, _mm(rng, 0.05, 5.0)])}
     tables["inlet"] = _inlet(rng)
@@ -117,13 +117,18 @@ def _common(rng: Random, name: str, family: str, most_balloons: int) -> dict[str
     return tables
 
 
+OPENED, MASK, LOST = math.pi / 2, 0.025, 0.3
+"""Half a perimeter over its diameter; the strip beside the tube; cutting errors and a kerf."""
+
+
 def _inlet(rng: Random) -> dict[str, Any]:
     inlet: dict[str, Any] = {}
     if rng.random() < 0.5:
         inlet["tube_outer_diameter"] = _mm(rng, 0.4, 1.6)
     tube = inlet.get("tube_outer_diameter", 1.016)
     if rng.random() < 0.3:
-        inlet["width"] = round(math.pi * tube / 2 + rng.choice([0.001, _mm(rng, 0.0, 1.0)]), 4)
+        spare = rng.choice([0.001, _mm(rng, 0.0, 1.0)])
+        inlet["width"] = round(OPENED * (tube + MASK) + LOST + spare, 4)
     if rng.random() < 0.6:
         inlet["tab_length"] = rng.choice([0.001, 0.1, 1.0, _mm(rng, 0.5, 12.0)])
     return inlet
@@ -171,9 +176,10 @@ def _neck(tables: dict[str, Any]) -> float:
     back = 0.0
     if tables["registration"]["method"] == "ears":
         back = tables.get("mask", {}).get("overhang", 0.5)
-    bore = tables.get("bore", {}).get("diameter", 1.0) / 2
+    bore = tables.get("bore", {}).get("diameter", 1.04) / 2
     inlet = tables["inlet"]
-    strip = inlet.get("width", math.pi * inlet.get("tube_outer_diameter", 1.016) / 2 + 0.05)
+    tube = inlet.get("tube_outer_diameter", 1.016)
+    strip = inlet.get("width", OPENED * (tube + MASK) + LOST + 0.05)
     neck = bore + back + bond + 0.15 if tables["stack"]["balloons"] > 1 else 0.0
     return float(max(neck, strip / 2 + 0.05, 0.8))
 
@@ -187,7 +193,7 @@ def _pockets(rng: Random, tables: dict[str, Any]) -> tuple[Drawing | None, tuple
     if family == "lobed":
         chamber["count"] = rng.choice([2, 3, 3, 4, 5, 6, 7, 8])
         if rng.random() < 0.4:
-            tables["lumen"] = {"diameter": _mm(rng, 0.5, 5.0)}
+            tables["lumen"] = {"diameter": _mm(rng, 0.95, 5.0)}
     if family == "radial":
         _tube(rng, tables, chamber)
     most = least + rng.choice([1.0, 3.0, 6.0])

@@ -9,6 +9,7 @@ from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
 from tests.judge.folder import Disagreement, Folder, Layer, pieces, place
+from tests.judge.pins import play
 
 THINNEST = 0.004
 """mm: narrower overlaps are what flattened arcs make of edges that coincide."""
@@ -17,7 +18,7 @@ THINNEST = 0.004
 def judge_facing(folder: Folder) -> Iterator[Disagreement]:
     """No two films but consecutive ones see each other, other than down a pinned bore."""
     bores = shapely.union_all(
-        [Point(hole.x, hole.y).buffer(hole.radius + 0.003) for hole in folder.holes]
+        [Point(hole.x, hole.y).buffer(hole.radius + play(folder) + 0.003) for hole in folder.holes]
     )
     for below, above, seen in _sights(folder):
         for part in pieces(seen.difference(bores), THINNEST):

@@ -21,6 +21,8 @@ BESIDE = 0.01
 whose kerf was taken back may lean by a thousandth, an arc that ends at it by its last chord."""
 FITS = 0.004
 """mm by which a hole may differ from the pin in it."""
+PLAY = 0.02
+"""mm by which a bore's radius exceeds its pin's, the default."""
 LOOKS = 8
 """Places along the overhang that are looked at."""
 Array = NDArray[np.float64]
@@ -110,7 +112,7 @@ def _is_pinned(ring: shapely.LinearRing, exempt: tuple[Hole, ...], slack: float)
     """Whether a pin fills the hole."""
     hole = Polygon(ring)
     return any(
-        abs(math.sqrt(hole.area / math.pi) - pin.radius) <= slack
+        -slack <= math.sqrt(hole.area / math.pi) - pin.radius <= slack + PLAY
         and math.dist(hole.centroid.coords[0], (pin.x, pin.y)) <= slack
         for pin in exempt
     )

@@ -95,9 +95,15 @@ def _meets(folder: Folder, pin: Pin, layer: Layer) -> str:
             centre = hole.centroid
             if math.hypot(centre.x - x, centre.y - y) > slack:
                 continue
-            if abs(math.sqrt(hole.area / math.pi) - radius) <= slack:
+            wider = math.sqrt(hole.area / math.pi) - radius
+            if -slack <= wider <= slack + play(folder):
                 return "held"
     return "free"
+
+
+def play(folder: Folder) -> float:
+    """By how much a bore's radius may exceed its pin's, as asked for."""
+    return float(folder.wish("bore", "clearance", 0.04)) / 2
 
 
 def _unheld(folder: Folder, holding: dict[int, list[Pin]]) -> Iterator[Disagreement]:

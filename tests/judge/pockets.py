@@ -46,7 +46,7 @@ def _axis(folder: Folder, part: Polygon) -> tuple[float, float] | None:
     """The axis of a pocket: the middle of its bore; without one known only for 1-DoF."""
     if folder.asked["family"] == "1dof":
         return 0.0, 0.0
-    bore = float(folder.wish("bore", "diameter", 1.0))
+    bore = float(folder.wish("bore", "diameter", 1.04))
     inlet_side = [
         ring.centroid
         for ring in map(Polygon, part.interiors)

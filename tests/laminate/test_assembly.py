@@ -90,14 +90,36 @@ def test_a_pin_that_holds_nothing_stays_out(laminate: Laminate) -> None:
     assert [len(step.pins) for step in assembly(beside)] == [1, 0, 1, 0]
 
 
-def test_pins_of_ears_are_in_every_time(laminate: Laminate) -> None:
+def on_ears(laminate: Laminate, pins_in: bool) -> Laminate:
     holed = [
         replace(layer, profile=layer.profile - disc((2.0, 1.0), 0.5), pattern=f"e{layer.index}")
         for layer in laminate.layers
     ]
     ear = Pin("ear", (2.0, 1.0), 1.0)
-    eared = replace(laminate, layers=tuple(holed), pins=(ear,), registration="ears")
-    assert [step.pins for step in assembly(eared)] == [(ear,)] * 4
+    return replace(
+        laminate,
+        layers=tuple(holed),
+        pins=(ear,),
+        registration="ears",
+        pins_in_full_bonds=pins_in,
+    )
+
+
+def test_pins_of_ears_are_in_every_time_where_asked_for(laminate: Laminate) -> None:
+    eared = on_ears(laminate, pins_in=True)
+    assert [step.pins for step in assembly(eared)] == [eared.pins] * 4
+
+
+def test_ears_are_tacked_on_their_pins_and_fully_bonded_without(laminate: Laminate) -> None:
+    eared = on_ears(laminate, pins_in=False)
+    steps = assembly(eared)
+    assert [step.bond for step in steps] == ["flash", "flash", "full", "flash", "flash", "full"]
+    assert [bool(step.pins) for step in steps] == [True, True, False, True, True, False]
+    # Every layer joins once, in the step that has the pins; a full bond presses what was tacked.
+    added = [index for step in steps for index in step.adds]
+    assert sorted(added) == [layer.index for layer in eared.layers]
+    for tack, full in ((steps[1], steps[2]), (steps[4], steps[5])):
+        assert (full.adds, full.stacks) == ((), (tack.layers,))
 
 
 def test_one_layer_of_each_pattern(laminate: Laminate) -> None:

@@ -103,10 +103,13 @@ def test_notebooks_get_the_same_pictures(laminate: Laminate) -> None:
 
 
 def test_notebooks_get_a_scale_and_a_legend(laminate: Laminate) -> None:
-    # The longer side of 23.317 mm and its margins, 1.06 times that, are shown 80 mm wide.
+    # The longer side of 23.493 mm and its margins, 1.06 times that, are shown 80 mm wide.
+    low_x, low_y, high_x, high_y = laminate.bounds
+    longer = max(high_x - low_x, high_y - low_y)
+    assert longer == pytest.approx(23.49, abs=0.01)
     page = laminate._repr_html_()
     [width] = re.findall(r"width:([\d.]+)mm;border-top", page)
-    assert float(width) == pytest.approx(5 * 80 / (1.06 * 23.317), rel=1e-4)
+    assert float(width) == pytest.approx(5 * 80 / (1.06 * longer), rel=1e-4)
     assert "5 mm</span>" in page
     assert "TPE, Stretchlon 200, 0.038 mm" in page
 

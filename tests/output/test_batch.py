@@ -105,7 +105,7 @@ def test_places_that_are_too_near_fail_though_the_plate_agrees(doctor: Doctor) -
     def put() -> None:
         said = [(p["x"], p["y"]) for p in doctor.manifest["batch"]["places"]]
         near = [(x - 0.01 if n % 2 else x, y) for n, (x, y) in enumerate(said)]
-        plate = fixture(laminate, near)
+        plate = fixture(laminate, (152.4, 152.4), near)
         assert plate is not None
         properties = read_profile(path).properties
         path.write_text(dxf_text(cutting_order(plate), properties), newline="\n")

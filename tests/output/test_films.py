@@ -152,7 +152,9 @@ def test_meshes_hold_area_times_thickness_of_each_film(design: Design) -> None:
     from sbafab.meshing.conforming.meshes import conforming_meshes
     from sbafab.meshing.conforming.settings import MeshSettings
 
-    flat = build(design.with_("stack.balloons=1", "fillet.radius=0", "layup.base=tpu50"))
+    flat = build(
+        design.with_("stack.balloons=1", "fillet.radius=0", "inlet.width=1.6", "layup.base=tpu50")
+    )
     volume = conforming_meshes(flat, MeshSettings(h=0.7)).volume
     # A disc of 6.5 and a tab 3.1 wide that ends 5 mm past it, less what lies under the disc.
     side = math.sqrt(3.25**2 - 1.55**2)

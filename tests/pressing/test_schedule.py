@@ -12,7 +12,8 @@ import pytest
 
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.schedule import PressSettings, press_csv, press_json, schedule
+from sbafab.pressing.schedule import PressSettings, schedule
+from sbafab.pressing.tables import press_csv, press_json
 
 Stack = Callable[..., Laminate]
 PAPER = PressSettings()
@@ -220,6 +221,10 @@ def test_instructions_name_the_stacks_in_their_order(stack: Stack) -> None:
 
 def test_ears_and_tails_are_snipped_off_at_the_end(stack: Stack) -> None:
     on_ears = schedule(replace(stack(2), registration="ears"), PAPER)
+    assert [step.minutes for step in on_ears.steps] == [3, 3, 12, 10, 10, 20]
+    assert any("untested: with ears each full bond" in words for words in on_ears.warnings)
+    kept = replace(stack(2), registration="ears", pins_in_full_bonds=True)
+    assert any("release sleeve" in words for words in schedule(kept, PAPER).warnings)
     *before, last = [step.instructions for step in on_ears.steps]
     assert last.endswith("the masks stay in their pockets.")
     assert "Snip off the ears along the outline, and the tails of the inlet strips" in last

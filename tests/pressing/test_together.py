@@ -7,6 +7,7 @@ import pytest
 from sbafab.actuators import build, load_design
 from sbafab.cutting.fixture import fixture
 from sbafab.laminate.laminate import Laminate
+from sbafab.pressing.build_up import footprint
 from sbafab.pressing.schedule import PressSettings, schedule
 from sbafab.pressing.together import (
     Runs,
@@ -74,14 +75,52 @@ def test_times_of_a_batch_are_those_of_the_paper_a_copy_and_a_cycle() -> None:
 
 def test_one_plate_has_every_hole_of_every_place() -> None:
     column = laminate("stack.balloons=2")
-    runs = runs_of(column, 7, (152.4, 152.4))
-    plate = fixture(column, runs.places)
+    platen = (152.4, 152.4)
+    runs = runs_of(column, 7, platen)
+    plate = fixture(column, platen, runs.places)
     assert plate is not None
     holes = {(round(h.circle[0][0], 6), round(h.circle[0][1], 6)) for h in plate.holes if h.circle}
     assert holes == set(runs.places)
-    low_x, low_y, high_x, high_y = plate.bounds
-    assert max(high_x - low_x, high_y - low_y) <= 152.4
-    assert fixture(column, ((0.0, 0.0),)) == fixture(column)
+    # As large as the platen, and all that lies on it is in its middle, to the 0.1 mm it is cut to.
+    x0, y0, x1, y1 = plate.bounds
+    assert (x1 - x0, y1 - y0) == pytest.approx(platen)
+    low_x, low_y, high_x, high_y = column.bounds
+    taken = [low_x, low_y, high_x + max(x for x, _ in runs.places)]
+    taken.append(high_y + max(y for _, y in runs.places))
+    assert taken[0] - x0 == pytest.approx(x1 - taken[2], abs=0.11)
+    assert taken[1] - y0 == pytest.approx(y1 - taken[3], abs=0.11)
+    assert min(taken[0] - x0, taken[1] - y0) > 5
+    assert fixture(column, platen, ((0.0, 0.0),)) == fixture(column, platen)
+
+
+def test_the_plate_lies_turned_where_the_places_do() -> None:
+    column = laminate("stack.balloons=2")
+    low_x, _, high_x, _ = column.bounds
+    row = tuple((n * (high_x - low_x + 5), 0.0) for n in range(4))
+    plate = fixture(column, (60.0, 200.0), row)
+    assert plate is not None
+    x0, y0, x1, y1 = plate.bounds
+    assert (x1 - x0, y1 - y0) == pytest.approx((200.0, 60.0))
+
+
+def test_all_laminates_of_a_cycle_share_the_force() -> None:
+    column = laminate("stack.balloons=6")
+    one, twelve = schedule(column, PressSettings()), schedule(column, PressSettings(), (12, 1))
+    for single, shared in zip(one.steps, twelve.steps, strict=True):
+        assert shared.force_n == single.force_n
+        pad = {item.part: item for item in shared.build_up}["press pad"]
+        assert pad == {item.part: item for item in single.build_up}["press pad"]
+        area = 12 * footprint(column, single.layers).area
+        # What the films take and what the plate takes is the whole force.
+        total = shared.film_kpa * area + shared.plate_kpa * (152.4**2 - area)
+        assert total == pytest.approx(1000 * shared.force_n, rel=1e-3)
+        assert shared.film_kpa <= single.film_kpa
+    assert twelve.steps[-1].film_kpa < one.steps[-1].film_kpa
+
+
+def test_registered_sheets_are_one_piece_to_the_press() -> None:
+    sheets = laminate("registration.method=sheet", "order.copies=4", "stack.balloons=2")
+    assert runs_of(sheets, 4, (152.4, 152.4)) == Runs(1, ((0.0, 0.0),))
 
 
 def test_patterns_are_counted_a_cycle() -> None:

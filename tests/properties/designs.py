@@ -102,8 +102,9 @@ def common(
 ) -> Common:
     bond, overhang = draw(mm(0.75, 2.5)), draw(mm(0.5, 1.5))
     balloons = draw(st.integers(1, most_balloons))
-    tube = draw(mm(0.4, 3.0))
-    least = math.pi * tube / 2
+    tube, mask = draw(mm(0.4, 3.0)), draw(mm(0.01, 0.1))
+    # Tube and strip opened round, and 0.1 of cutting error on each edge and 0.1 of kerf.
+    least = math.pi / 2 * (tube + mask) + 0.3
     inlet: dict[str, Any] = {
         "tube_outer_diameter": tube,
         "tab_length": draw(mm(1.0, longest_tab)),
@@ -117,12 +118,13 @@ def common(
         "registration": {"method": method},
         "bond": {"width": bond},
         "mask": {"overhang": overhang},
-        "bore": {"diameter": draw(mm(LEAST_FEATURE, 2.5))},
+        # Less would tear over a pin (rule pin-fit).
+        "bore": {"diameter": draw(mm(0.8, 2.5))},
         "fillet": {"radius": draw(st.just(0.0) | mm(0.1, 3.0))},
         "inlet": inlet,
         "films": {
             "tpe": {"thickness": draw(mm(0.02, 0.2))},
-            "ptfe": {"thickness": draw(mm(0.01, 0.1))},
+            "ptfe": {"thickness": mask},
         },
         "rules": {
             "bond_width": draw(st.sampled_from([0.75, bond])),
@@ -267,7 +269,7 @@ def lobed(draw: st.DrawFn, ears: bool = False) -> Draft:
     """Lobes round a lumen; whether ears find room between lobes and tabs has no closed formula."""
     shared = draw(common(longest_tab=12.0, ears=ears))
     stack = draw(pockets(shared, 6.0))
-    count, lumen = draw(st.integers(2, 8)), draw(mm(0.5, 6.0))
+    count, lumen = draw(st.integers(2, 8)), draw(mm(0.95, 6.0))
     hole = lumen / 2 + shared.setback
     half = math.pi / count
     bond, reach = shared.bond, stack.reach

@@ -65,12 +65,12 @@ def test_every_pattern_is_named_and_counted(name: str) -> None:
     [
         ("1dof-5mm", "cap", {"⌀6.50"}),
         ("1dof-10mm", "cap", {"⌀11.50"}),
-        ("1dof-5mm", "base", {"6.50", "11.50", "R3.25", "2x R1.00", "tab 3.10 wide"}),
-        ("1dof-5mm", "separator-mask", {"⌀7.50", "neck ring ⌀2.50"}),
+        ("1dof-5mm", "base", {"6.50", "11.50", "R3.25", "2x R1.00", "tab 3.45 wide"}),
+        ("1dof-5mm", "separator-mask", {"⌀7.50", "neck ring ⌀2.54"}),
         ("3dof-15mm", "cap", {"fits ⌀15.00", "lumen ⌀2.00", "3x R3.25", "3x R1.00"}),
-        ("3dof-15mm", "base", {"fits ⌀15.00", "3x tab 3.10 wide"}),
-        ("3dof-15mm", "separator-mask", {"fits ⌀16.00", "3x neck ring ⌀2.50", "3x R3.75"}),
-        ("3dof-15mm", "chamber-mask", {"3x strip 1.60 wide", "3x bore ⌀1.00", "3x R2.50"}),
+        ("3dof-15mm", "base", {"fits ⌀15.00", "3x tab 3.45 wide"}),
+        ("3dof-15mm", "separator-mask", {"fits ⌀16.00", "3x neck ring ⌀2.54", "3x R3.75"}),
+        ("3dof-15mm", "chamber-mask", {"3x strip 1.95 wide", "3x bore ⌀1.04", "3x R2.50"}),
         ("radial-15mm", "sheet", {f"{15 * math.pi:.2f}"}),
         ("radial-15mm", "cap", {"3x 11.50 wide", f"{10 * math.pi + 11.5:.2f}", "6x R5.75"}),
         ("radial, three balloons", "cap", {"3x 11.50 wide", "20.00"}),
@@ -85,7 +85,7 @@ def test_dimensions_are_those_of_the_paper(name: str, role: str, words: set[str]
 def test_three_separate_masks_are_dimensioned_as_discs() -> None:
     laminate = laminate_of("3dof-15mm")
     pattern = next(x.pattern for x in laminate.layers[4:] if x.role == "chamber-mask")
-    assert {"3x ⌀5.00", "3x bore ⌀1.00"} <= set(cards(layers_svg(laminate))[pattern])
+    assert {"3x ⌀5.00", "3x bore ⌀1.04"} <= set(cards(layers_svg(laminate))[pattern])
 
 
 def box_of(text: ElementTree.Element) -> Box:

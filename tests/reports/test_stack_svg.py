@@ -31,12 +31,12 @@ def test_the_section_of_one_dof_cuts_where_the_formulas_say() -> None:
     spans = {slab.layer.index: slab.spans for slab in section.slabs}
     near = {"abs": 1e-9}
     assert spans[1] == (pytest.approx((-3.25, 8.25), **near),)
-    assert spans[2] == (pytest.approx((-2.5, -0.5), **near), pytest.approx((0.5, 8.75), **near))
-    assert spans[4] == (pytest.approx((-3.75, -1.25), **near), pytest.approx((1.25, 3.75), **near))
+    assert spans[2] == (pytest.approx((-2.5, -0.52), **near), pytest.approx((0.52, 8.75), **near))
+    assert spans[4] == (pytest.approx((-3.75, -1.27), **near), pytest.approx((1.27, 3.75), **near))
     assert spans[23] == (pytest.approx((-3.25, 3.25), **near),)
     bonds = {joint.interface.index: joint.spans for joint in section.joints}
     assert bonds[1] == (pytest.approx((-3.25, -2.5), **near),)
-    assert bonds[2] == (pytest.approx((-1.25, -0.5), **near), pytest.approx((0.5, 1.25), **near))
+    assert bonds[2] == (pytest.approx((-1.27, -0.52), **near), pytest.approx((0.52, 1.27), **near))
 
 
 def test_the_lumen_lies_where_the_chamber_axis_radius_says() -> None:
@@ -61,7 +61,7 @@ def test_many_balloons_are_broken_short(balloons: int, hidden: int) -> None:
 @pytest.mark.parametrize(
     ("template", "labels"),
     [
-        ("1dof-5mm", {"bore ⌀1.00", "bond 0.75", "overhang 0.50", "23 cap", "6.50", "5.00"}),
+        ("1dof-5mm", {"bore ⌀1.04", "bond 0.75", "overhang 0.50", "23 cap", "6.50", "5.00"}),
         (
             "3dof-15mm",
             {"lumen ⌀2.00", "neck ring, bond 0.75", "chamber pocket 5.00", "59 cap", "tab 5.00"},
@@ -102,7 +102,7 @@ def test_widths_and_heights_are_to_their_two_scales() -> None:
 def test_eight_lobes_are_cropped_beyond_the_lumen_and_keep_all_labels() -> None:
     laminate = laminate_of("3dof-15mm", "chamber.count=8")
     assert chamber_section(laminate).cropped
-    assert {"overhang 0.50", "bore ⌀1.00", "lumen ⌀2.00"} <= set(words_of(stack_svg(laminate)))
+    assert {"overhang 0.50", "bore ⌀1.04", "lumen ⌀2.00"} <= set(words_of(stack_svg(laminate)))
 
 
 def box_of(text: ElementTree.Element) -> tuple[float, float, float, float]:
@@ -162,5 +162,5 @@ def test_tails_run_on_to_their_pins() -> None:
     strip = next(slab.spans for slab in section.slabs if slab.layer.index == 2)
     assert strip[-1] == pytest.approx((centre + half, centre + 1.5))
     words = words_of(stack_svg(laminate))
-    assert {"pin strip1, steps 1, 2, 4", "pin chamber1, steps 1, 3", "tail 3.50"} <= set(words)
+    assert {"pin strip1, steps 1, 2, 5", "pin chamber1, steps 1, 4", "tail 3.50"} <= set(words)
     assert "dowel pin" in words

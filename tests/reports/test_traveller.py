@@ -125,8 +125,10 @@ def test_each_step_shows_its_dials(sheet_files: Any) -> None:
     ]
     assert [row[0] for row in dials] == ["135 °C (275 °F)"] * 4
     assert {row[1] for row in dials} == {"2555 N = 2.555 kN = 574 lbf"}
-    assert [row[3] for row in dials] == ["3 min", "12 min", "10 min", "20 min"]
-    assert [row[4] for row in dials] == ["4 in", "none", "4 in", "none"]
+    films = [step.film_kpa for step in work_of(sheet_files, "3dof-15mm").schedule.steps]
+    assert [row[3] for row in dials] == [f"about {kpa:.0f} kPa" for kpa in films]
+    assert [row[4] for row in dials] == ["3 min", "12 min", "10 min", "20 min"]
+    assert [row[5] for row in dials] == ["4 in", "none", "4 in", "none"]
 
 
 def test_pins_are_drawn_filled_where_they_are_in(sheet_files: Any) -> None:
@@ -221,9 +223,11 @@ def test_the_bill_counts_what_is_needed(sheet_files: Any) -> None:
     rows = parsed(work).get_element_by_id("materials").getparent().findall(".//tbody/tr")
     bill = [[words_of(cell) for cell in row][1:] for row in rows]
     found = {(name, what): quantity for name, what, quantity in bill}
-    lengths = "plate + 0.063 mm in step 1 and plate + 1.726 mm in step 3"
-    assert found["Dowel pins", f"⌀1 mm; {lengths}"] == "6"
-    assert found["Dowel pins", f"⌀2 mm; {lengths}"] == "2"
+    # The highest stack on pins, 1.726 mm, the chamfers, 0.2 and 0.35, and 2 and 3 mm of seat.
+    assert found["Dowel pins", "ISO 8734, ⌀1 mm m6, 4 mm long"] == "3"
+    assert found["Dowel pins", "ISO 8734, ⌀2 mm m6, 6 mm long"] == "1"
+    names = [name for name, _ in found]
+    assert {"Base plate", "Release film", "Press pad"} <= set(names)
     assert found["Tube", "Braintree RPT040, outer diameter 1.016 mm"] == "6 pieces"
     assert found["Magnet", ""] == "1"
     area = 2 * sum(
@@ -335,17 +339,10 @@ def test_import_notes_stand_where_is_cut_and_name_every_file(sheet_files: Any) -
     words = words_of(notes)
     for sheet in work.sheets:
         assert f"{sheet.path}152.4 {TIMES} 152.4 mm" in words
-    # Outline of the bottom balloon with tabs and masks, and 6 mm of plate all round.
-    low_x, low_y, high_x, high_y = bounds_by_shapely(work.laminate)
-    plate = f"{round(high_x - low_x + 12, 2):g} {TIMES} {round(high_y - low_y + 12, 2):g} mm"
-    assert f"sheets/fixture.dxf{plate}" in words
+    # The base plate is as large as the platen.
+    assert f"sheets/fixture.dxf152.4 {TIMES} 152.4 mm" in words
     for layer in ("ENGRAVE", "CUT_INNER", "CUT_OUTER", "CUT_SHEET", "REFERENCE"):
         assert layer in words
-
-
-def bounds_by_shapely(laminate: Laminate) -> tuple[float, float, float, float]:
-    rings = [rings[0] for layer in laminate.layers[:3] for rings in layer.profile.polygons(1e-6)]
-    return shapely.GeometryCollection([shapely.Polygon(ring) for ring in rings]).bounds
 
 
 def test_without_sheets_the_layer_files_are_named(sheet_files: Any) -> None:

@@ -21,6 +21,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.records import Nest
 from sbafab.output.settings import press_settings
 from sbafab.pressing.schedule import schedule
+from sbafab.reports.drawing import TIMES
 from sbafab.reports.traveller.bill import cut_list
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import traveller_html
@@ -87,24 +88,52 @@ def test_what_the_force_means_is_said(sheet_files: Any, template: str) -> None:
         for rings in laminate.layers[-1].profile.polygons(1e-4)
     )
     assert "2555 N is 110 kPa on the whole platen of 152.4" in words
-    assert "the paper does not say what it used" in words
-    found = re.search(r"\((\d+) mm² at the top\) would be ([\d.]+) MPa", words)
+    assert "What the paper laid between platen and films is not known" in words
+    found = re.search(r"laminate alone \((\d+) mm²\) would be ([\d.]+) MPa", words)
     assert found is not None
     assert float(found[1]) == pytest.approx(top, abs=0.51)
     assert float(found[2]) == pytest.approx(110e-3 * 152.4**2 / top, abs=0.051)
 
 
-def test_pins_are_no_longer_than_plate_and_stack(sheet_files: Any) -> None:
+def test_pins_stand_over_the_stack_by_their_chamfer(sheet_files: Any) -> None:
     first, second, third, fourth = steps(page(sheet_files, "3dof-15mm"))
-    middle = 27 * TPE + 28 * PTFE
-    assert f"here the plate + {TPE + PTFE:g} mm" in first
-    assert "cut sheets/fixture.dxf twice" in first
-    assert f"stands higher than the stack, {TPE + PTFE:g} mm over the plate" in first
-    assert f"stands higher than the stack, {round(middle, 3):g} mm over the plate" in third
-    assert "pushed from below through the plate" in first
+    for step, stack in ((first, TPE + PTFE), (third, 27 * TPE + 28 * PTFE)):
+        # Chamfers of ISO 8734: 0.2 at a diameter of 1, 0.35 at 2; lengths 4 and 6.
+        for size, length, chamfer in (("⌀1", 4, 0.2), ("⌀2", 6, 0.35)):
+            stands = stack + chamfer
+            said = f"{length - stands:.2f} mm in the plate, {stands:.2f} mm over it"
+            assert f"{size} {TIMES} {length} mm, {said}, {chamfer:.2f} mm over the stack" in step
+        assert "pushed from below through the plate" in step
     for without in (second, fourth):
-        assert "plate +" not in without
-        assert "higher than the stack" not in without
+        assert "over the stack" not in without
+    for step in (first, second, third, fourth):
+        assert "press pad, flush with the platen all round. No second plate on top." in step
+
+
+def test_the_hole_table_has_every_pin_from_the_plates_corner(sheet_files: Any) -> None:
+    html = page(sheet_files, "3dof-15mm")
+    [table] = [t for t in html.iter("table") if t.get("class") == "holes"]
+    rows = [[words_of(cell) for cell in row] for row in table.findall(".//tbody/tr")]
+    _, laminate = built("3dof-15mm")
+    assert [row[0] for row in rows] == [pin.name for pin in laminate.pins]
+    for row, pin in zip(rows, laminate.pins, strict=True):
+        assert float(row[4]) == pytest.approx(pin.centre[0], abs=6e-4)
+        assert float(row[5]) == pytest.approx(pin.centre[1], abs=6e-4)
+    # Both frames differ by one shift, and the plate's own lies in its front left corner.
+    shifts = {
+        (round(float(r[2]) - float(r[4]), 2), round(float(r[3]) - float(r[5]), 2)) for r in rows
+    }
+    assert len(shifts) == 1
+    assert all(60 < value < 95 for value in shifts.pop())
+
+
+def test_each_step_draws_its_build_up(sheet_files: Any) -> None:
+    for number, step in enumerate(page(sheet_files, "3dof-15mm").iter("article"), 1):
+        drawn = step.findall(".//svg")[1]
+        assert drawn.get("aria-label").startswith(f"build-up of step {number}: press pad 15 mm")
+        words = words_of(drawn)
+        for part in ("upper platen", "press pad", "release film", "laminate", "base plate"):
+            assert part in words
 
 
 def test_without_pins_each_edge_is_laid_along_another(sheet_files: Any) -> None:

@@ -19,7 +19,8 @@ AXIS = (0.0, 0.0)
 LIMITS = Limits()
 ONE = ("1dof-5mm", "stack.balloons=3")
 LOBED = ("3dof-15mm", "stack.balloons=3")
-TUBE = math.pi * 1.016 / 2
+TUBE = math.pi / 2 * (0.8 + 0.025)
+"""A tube of 0.8 and the strip of 0.025 beside it, opened flat."""
 NOWHERE = Place()
 Good = Callable[..., Laminate]
 Spoil = Callable[..., Laminate]
@@ -143,10 +144,11 @@ def test_tube_fit_at_the_mouth(good: Good) -> None:
             "tube-fit",
             "pass",
             TUBE,
-            1.6,
+            1.3,
             "mm",
             Place(1, (1, 2, 3), 8.25, 0.0),
-            "the mouth of chamber1 is 1.600 mm wide, x 8.250, y 0.000; a tube of 1.016 needs 1.596",
+            "the mouth of chamber1 is drawn 1.600 mm wide, x 8.250, y 0.000, and cut 1.300 at "
+            "worst (0.1 on each edge, kerf up to 0.1); a tube of 0.8 beside its strip needs 1.296",
         ),
     )
 
@@ -155,8 +157,8 @@ def test_tube_fit_of_a_strip_with_a_narrow_place(good: Good, spoil: Spoil) -> No
     mask = good(*ONE).layer(2).profile - rectangle((5.0, 0.65), (6.0, 1.0))
     found = only(tube_fit.check(spoil(good(*ONE), 2, mask), LIMITS))
     assert (found.verdict, found.where.interface) == ("fail", 1)
-    assert found.message.startswith("the strip of chamber1 is 1.450 mm wide, x ")
-    assert found.message.endswith("; a tube of 1.016 needs 1.596: widen inlet.width")
+    assert found.message.startswith("the strip of chamber1 is drawn 1.450 mm wide, x ")
+    assert found.message.endswith("; a tube of 0.8 beside its strip needs 1.296: widen inlet.width")
 
 
 def test_tube_fit_of_a_narrow_mouth(good: Good, spoil: Spoil) -> None:
@@ -167,11 +169,12 @@ def test_tube_fit_of_a_narrow_mouth(good: Good, spoil: Spoil) -> None:
             "tube-fit",
             "fail",
             TUBE,
-            1.4,
+            1.1,
             "mm",
             Place(1, (1, 2, 3), 8.25, 0.0),
-            "the mouth of chamber1 is 1.400 mm wide, x 8.250, y 0.000; a tube of 1.016 needs "
-            "1.596: widen inlet.width",
+            "the mouth of chamber1 is drawn 1.400 mm wide, x 8.250, y 0.000, and cut 1.100 at "
+            "worst (0.1 on each edge, kerf up to 0.1); a tube of 0.8 beside its strip needs 1.296: "
+            "widen inlet.width",
         ),
     )
 
@@ -183,12 +186,13 @@ def test_tube_fit_of_a_closed_mouth(good: Good, spoil: Spoil) -> None:
         Finding(
             "tube-fit",
             "fail",
-            TUBE,
+            math.pi / 2 * 0.8,
             0.0,
             "mm",
             Place(None, (), 8.25, 0.0),
-            "the mouth of chamber1 is 0.000 mm wide, x 8.250, y 0.000; a tube of 1.016 needs "
-            "1.596: open a mask strip to the tab's end",
+            "the mouth of chamber1 is drawn 0.000 mm wide, x 8.250, y 0.000, and cut 0.000 at "
+            "worst (0.1 on each edge, kerf up to 0.1); a tube of 0.8 beside its strip needs 1.257: "
+            "open a mask strip to the tab's end",
         ),
     )
 
@@ -203,11 +207,18 @@ def test_tube_fit_of_a_narrow_bond(good: Good, spoil: Spoil) -> None:
 
 
 def test_tube_fit_of_two_faults_tells_the_worse(good: Good, spoil: Spoil) -> None:
-    # A strip 1.3 wide is 0.296 too narrow; 0.25 off the tab's middle it leaves 0.1 too little bond.
+    # A strip cut 1.0 wide is 0.296 too narrow;
+    # 0.25 off the tab's middle it leaves 0.1 too little bond.
     mask = (disc(AXIS, 2.5) | strip((0.0, 0.25), (8.75, 0.25), 1.3)) - disc(AXIS, 0.5)
     found = only(tube_fit.check(spoil(good(*ONE), 2, mask), LIMITS))
     assert found.limit == pytest.approx(TUBE)
-    assert found.measured == pytest.approx(1.3)
+    assert found.measured == pytest.approx(1.0)
+
+
+def test_tube_fit_counts_no_kerf_that_is_known(good: Good) -> None:
+    found = only(tube_fit.check(good(*ONE), Limits(kerf={"PTFE": 0.12})))
+    assert found.measured == pytest.approx(1.4)
+    assert "cut 1.400 at worst (0.1 on each edge); " in found.message
 
 
 def test_tube_fit_of_a_mouth_off_its_place(good: Good, spoil: Spoil) -> None:

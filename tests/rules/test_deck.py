@@ -121,11 +121,11 @@ FAULTS = {
         "tube-fit",
         ONE,
         2,
-        lambda mask: (disc(AXIS, 2.5) | strip(AXIS, (8.75, 0.0), 1.4)) - disc(AXIS, 0.5),
-        1.4,
+        lambda mask: (disc(AXIS, 2.5) | strip(AXIS, (8.75, 0.0), 1.3)) - disc(AXIS, 0.5),
+        1.2,
     ),
     "strip with a narrow place": Fault(
-        "tube-fit", ONE, 2, lambda mask: mask - rectangle((5.0, 0.65), (6.0, 1.0)), 1.45
+        "tube-fit", ONE, 2, lambda mask: mask - rectangle((5.0, 0.5), (6.0, 1.0)), 1.2
     ),
     "mask island in the waste": Fault(
         "piece-count", ONE, 6, lambda mask: mask | disc((6.0, 0.0), 0.5), 1.0
@@ -218,8 +218,21 @@ def test_kerf_that_closes_a_bore_fails_film_limits_alone(good: Callable[..., Lam
     assert failing(laminate, replace(EXACT, kerf={"PTFE": 1.01})) == {"film-limits"}
 
 
+def test_a_pin_too_thick_for_its_holes_fails_pin_fit_alone(good: Callable[..., Laminate]) -> None:
+    # A hole of 1.0 with the cutting error of 0.1 on each side, and a pin of 1.19 to m6.
+    cut = replace(EXACT, tolerances=Tolerances(0.1, 0, 0, 0), worst_bond_width=0.0)
+    cut = replace(cut, worst_mask_overhang=0.0)
+    thick = good(*ONE, "bore.pin_diameter=1.19")
+    assert failing(good(*ONE), cut) == set()
+    assert failing(thick, cut) == {"pin-fit"}
+    (found,) = (f for f in run_deck(thick, cut) if f.rule == "pin-fit")
+    assert found.measured == pytest.approx(1.198 / 0.8 - 1)
+    assert found.where.layers == (2,)
+
+
 def test_every_rule_has_a_fault_of_its_own() -> None:
-    tested_apart = {"press-fit", "registration-worst-case", "registration-yield"}
+    tested_apart = {"press-fit", "pin-fit", "registration-worst-case", "registration-yield"}
+    tested_apart |= {"bridges", "scrap"}
     assert {fault.rule for fault in FAULTS.values()} | tested_apart == set(rule_names())
 
 

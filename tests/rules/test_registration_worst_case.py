@@ -149,8 +149,8 @@ def by_rule(findings: tuple[Finding, ...], verdict: str) -> set[str]:
 
 
 def test_a_coarse_laser_is_caught_by_this_rule_alone(good: Good) -> None:
-    coarse = Limits(tolerances=Tolerances(cutting=0.2))
-    findings = run_deck(good(*ONE), coarse)
+    coarse = Limits(tolerances=Tolerances(cutting=0.2), pin_stretch=1.0)
+    findings = run_deck(good(*ONE, "inlet.tube_outer_diameter=0.6"), coarse)
     assert by_rule(findings, "fail") == {"registration-worst-case"}
     # 0.75 - 2 x 0.2 - 2 x 0.004 is short of 0.5 even where pins hold everything.
     assert any("0.342 mm is left" in finding.message for finding in findings)

@@ -15,7 +15,7 @@ from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
 from sbafab.pressing.together import Runs
 from sbafab.reports.drawing import TIMES
-from sbafab.reports.traveller import bench, bill, joining, notes, process, times
+from sbafab.reports.traveller import bench, bill, joining, notes, times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.cautions import cautions, for_the_designer
 from sbafab.reports.traveller.code import code_svg, code_text
@@ -117,7 +117,6 @@ def _chapter(one: DesignWork, number: int, mark: str) -> str:
     said["shapes"] = definitions(pattern_regions(one.work.laminate))
     # The sheet goes round its tube when the assembly is put together.
     said["wrapping"] = []
-    said["force_notes"] = process.force_notes(one.work, one.runs.together)
     html = (
         environment()
         .get_template(CHAPTER)

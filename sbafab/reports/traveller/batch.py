@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sbafab.cutting.fixture import fixture
+from sbafab.cutting.fixture import whole_plate
 from sbafab.geometry.svg import number, path_data
-from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.together import Runs, batch_times
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller import quantities as say
@@ -56,13 +55,18 @@ def batch_page(work: Work) -> BatchPage | None:
     runs = work.runs
     if runs.copies == 1:
         return None
+    lesser = (
+        " A smaller last cycle shares the same force: its films get somewhat more pressure."
+        if len(set(runs.cycles)) > 1
+        else ""
+    )
     sizes = tuple(dict.fromkeys(runs.cycles))
     return BatchPage(
         runs.together,
         runs.count,
         _said(work, runs),
         "Copies are alike layer by layer and share the pressure evenly (ours: the paper does not "
-        "say how many it pressed at once).",
+        f"say how many it pressed at once).{lesser}",
         _picture(work, runs),
         tuple(_name(runs, size) for size in sizes),
         tuple(
@@ -99,28 +103,22 @@ def _name(runs: Runs, size: int) -> str:
 
 
 def _picture(work: Work, runs: Runs) -> str:
-    """The places on the heated area, numbered as they are laid."""
+    """The places on the base plate, numbered as they are laid."""
     laminate = work.laminate
-    low_x, low_y, high_x, high_y = _taken(laminate, runs)
-    wide, high = work.schedule.steps[0].platen_mm
-    if (high_x - low_x > wide) != (high_y - low_y > high):
-        wide, high = high, wide
+    plate = whole_plate(laminate, work.schedule.steps[0].platen_mm, runs.places)
+    low_x, low_y, high_x, high_y = plate.bounds
+    wide, high = high_x - low_x, high_y - low_y
     scale = WIDEST / max(wide, high)
-    middle = (low_x + high_x) / 2, (low_y + high_y) / 2
-    at = scale * (wide / 2 - middle[0]) + 1, scale * (high / 2 + middle[1]) + 1
-    words = f"{runs.together} places on the heated area, from above"
+    at = 1 - scale * low_x, 1 + scale * high_y
+    words = f"{runs.together} places on the base plate, from above"
     picture = Picture("batch-plan", scale * wide + 2, scale * high + 8, words)
-    corner = 1 + scale * wide, 1 + scale * high
-    picture.add(draw.box((1.0, 1.0), corner, fill="none", stroke=draw.GREY))
-    plate = fixture(laminate, runs.places)
-    if plate is not None:
-        shape = path_data(
-            plate.mapped(lambda p: (at[0] + scale * p[0], at[1] - scale * p[1]), scale, mirror=True)
-        )
-        picture.add(
-            f'<path d="{shape}" fill="{PLATE}" fill-rule="evenodd" stroke="{draw.GREY}" '
-            'stroke-width="0.25"/>'
-        )
+    shape = path_data(
+        plate.mapped(lambda p: (at[0] + scale * p[0], at[1] - scale * p[1]), scale, mirror=True)
+    )
+    picture.add(
+        f'<path d="{shape}" fill="{PLATE}" fill-rule="evenodd" stroke="{draw.GREY}" '
+        'stroke-width="0.25"/>'
+    )
     widest = max(laminate.layers, key=lambda layer: layer.profile.area)
     box = laminate.bounds
     for place, (x, y) in enumerate(runs.places, 1):
@@ -130,13 +128,7 @@ def _picture(work: Work, runs: Runs) -> str:
         middle = (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
         spot = moved[0] + scale * middle[0], moved[1] - scale * middle[1] + size / 3
         picture.add(label(spot, str(place), size))
-    cut = "; the plate's cut corner lies at the back right" if plate is not None else ""
-    said = f"heated area {number(wide)} x {number(high)} mm from above{cut}"
+    size_said = f"{number(round(wide, 6))} x {number(round(high, 6))} mm"
+    said = f"base plate and heated area, {size_said}, from above; the cut corner at the back right"
     picture.add(draw.text((1.0, scale * high + 6), said, size=2.2))
     return picture.svg()
-
-
-def _taken(laminate: Laminate, runs: Runs) -> tuple[float, float, float, float]:
-    low_x, low_y, high_x, high_y = laminate.bounds
-    xs, ys = [x for x, _ in runs.places], [y for _, y in runs.places]
-    return min(xs) + low_x, min(ys) + low_y, max(xs) + high_x, max(ys) + high_y

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from sbafab.laminate.laminate import Layer
 from sbafab.reports.features import layer_numbers
+from sbafab.reports.traveller import base_plate
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.job import Job, Work
-from sbafab.reports.traveller.process import pin_lengths
 from sbafab.reports.traveller.shapes import thumbnail
 
 
@@ -41,26 +41,10 @@ def bill(work: Work) -> list[Item]:
         items.append(Item("Tube to wrap", what, str(job.copies)))
         what = f"{wrap.glue}, between sheet and tube (ours: the paper does not say what holds it)"
         items.append(Item("Adhesive of the wrap", what, "as needed"))
-    together = work.runs.together
-    pins = Counter(pin.diameter for pin in laminate.pins for _ in range(together))
-    items += [
-        Item("Dowel pins", f"⌀{say.millimetres(diameter)}; {pin_lengths(work)}", str(number))
-        for diameter, number in sorted(pins.items())
-    ]
-    if job.fixture is not None:
-        what = f"cut from {job.fixture}, holes reamed to the pins; a second one lies on top"
-        items.append(Item("Pin plate", f"{what} of longer pins", "1 or 2"))
+    items += [Item(*row) for row in base_plate.items(work)]
     if job.underlay is not None:
         what = f"{job.underlay} printed at 100 % on plain paper; its bars must measure 100 mm"
         items.append(Item("Underlay", what, "1 page"))
-    items.append(
-        Item(
-            "Release film",
-            "two pieces, larger than the laminate, that TPE does not stick to at press temperature "
-            "(our advice; the paper names none)",
-            "2",
-        )
-    )
     items += [Item(name, "", quantity) for name, quantity in job.extras]
     return items
 

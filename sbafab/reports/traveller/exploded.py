@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from sbafab.cutting.fixture import fixture
+from sbafab.cutting.fixture import shown
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.svg import number, path_data
@@ -24,7 +24,7 @@ WIDE = 58.0
 TILT = 0.34
 """How much of its depth a layer keeps, seen from the front and above."""
 LABELS = 46.0
-TALLEST = 96.0
+TALLEST = 80.0
 NEAREST, FARTHEST, TWO_LINES = 4.0, 12.0, 6.0
 PAGE = 1.1
 """mm on the page between the layers of a finished stack."""
@@ -72,7 +72,7 @@ class _View:
 def exploded(laminate: Laminate, step: AssemblyStep, lying: Sequence[Bed], name: str) -> str:
     """The step's layers one over another, lowest first, with numbers and patterns beside them."""
     levels = _shortened([level for bed in lying for level in _levels(laminate, bed)])
-    plate = fixture(laminate) if step.pins else None
+    plate = shown(laminate) if step.pins else None
     view = _view(plate.bounds if plate is not None else laminate.bounds, len(levels), bool(plate))
     words = "; ".join(f"{level.words} {level.detail}" for level in levels)
     picture = Picture(name, WIDE + LABELS, view.height, f"step {step.number} taken apart: {words}")
@@ -113,7 +113,7 @@ def _plate(plate: Region, view: _View) -> list[str]:
         f'stroke-width="{number(0.25 / view.scale)}" transform="matrix({moved})"/>'
     )
     edge = view.middle + plate.bounds[2] * view.scale, view.ground
-    return [shape, *_beside(edge, "pin plate", "cut corner: back right", view.gap)]
+    return [shape, *_beside(edge, "base plate", "cut corner: back right", view.gap)]
 
 
 def _levels(laminate: Laminate, bed: Bed) -> Iterator[Level]:

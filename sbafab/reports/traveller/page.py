@@ -26,7 +26,7 @@ from sbafab.pressing.schedule import Schedule
 from sbafab.reports.canvas import COLOURS, KEY
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.features import balloons, layer_numbers
-from sbafab.reports.traveller import bench, bill, notes, process, times
+from sbafab.reports.traveller import base_plate, bench, bill, notes, panel, process, times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.batch import batch_page
 from sbafab.reports.traveller.cautions import cautions, for_the_designer
@@ -105,7 +105,9 @@ def context(work: Work) -> dict[str, Any]:
         "laser_minutes": times.laser_minutes(work),
         "laser_basis": times.laser_basis(work),
         "lay_up": _lay_up(work),
-        "force_notes": process.force_notes(work, work.runs.together),
+        "force_notes": base_plate.build_up_notes(work),
+        "plate_holes": base_plate.holes(work),
+        "plate_places": base_plate.places(work),
         "batch": batch_page(work),
         "step_pages": process.step_pages(work),
         "finishing": process.finishing(work),
@@ -117,6 +119,7 @@ def context(work: Work) -> dict[str, Any]:
         "times": times.times(work),
         "kerf_notes": notes.kerf_notes(work),
         "expected_sizes": notes.expected_sizes(work),
+        **panel.chapter(work),
     }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sbafab.cutting.fixture import CHAMFER, fixture
+from sbafab.cutting.fixture import shown
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.section import section
@@ -16,7 +16,9 @@ from sbafab.reports import drawing as draw
 from sbafab.reports.traveller.layup import Bed, inlets_in
 from sbafab.reports.traveller.shapes import Picture, flat, label, pattern_id
 
-WIDEST, TALLEST = 64.0, 66.0
+WIDEST, TALLEST = 64.0, 46.0
+NARROWEST = 66.0
+"""mm: room for the words under the picture."""
 EDGE, HEAD, FOOT = 5.0, 5.0, 9.0
 FREE = 6.0
 """mm of air round a laminate that has no pin plate."""
@@ -34,7 +36,7 @@ class _View(NamedTuple):
 
     @property
     def width(self) -> float:
-        return (self.bounds[2] - self.bounds[0]) * self.scale + 2 * EDGE
+        return max((self.bounds[2] - self.bounds[0]) * self.scale + 2 * EDGE, NARROWEST)
 
     @property
     def height(self) -> float:
@@ -54,14 +56,9 @@ def _view(bounds: Bounds) -> _View:
     return _View(bounds, min(WIDEST / (high_x - low_x), TALLEST / (high_y - low_y)))
 
 
-def plan(
-    laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: str, alone: bool = True
-) -> str:
-    """The step from above; earlier stacks grey, what joins in its own colour.
-
-    A laminate that is not ``alone`` on the pin plate is drawn without it: one place of many.
-    """
-    plate = fixture(laminate) if alone else None
+def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: str) -> str:
+    """The step from above; earlier stacks grey, what joins in its own colour."""
+    plate = shown(laminate)
     view = _view(plate.bounds if plate is not None else _widened(laminate.bounds))
     state = "pins in" if step.pins else "no pins"
     words = f"step {step.number} from above, {state}; the text beside it says the same"
@@ -162,7 +159,7 @@ def _captions(view: _View, plate: bool, pinned: bool, datum: str) -> list[str]:
         draw.text((EDGE + 14.6, y), "no pin", size=2.2),
     ]
     _, _, high_x, high_y = view.bounds
-    corner = view.at((high_x - CHAMFER / 2, high_y))
-    words = "cut corner" if pinned else "pin plate not used"
+    corner = view.at((high_x, high_y))
+    words = "on the base plate, cut corner back right" if pinned else "no pins in"
     parts.append(draw.text((corner[0] + 2.0, HEAD - 1.2), words, size=2.2, anchor="end"))
     return parts

@@ -14,6 +14,7 @@ from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
 from sbafab.reports.traveller.bench import on_the_lumen, reseat, underlay, warm_plate
+from sbafab.reports.traveller.build_up_svg import build_up_svg, pin_lines
 from sbafab.reports.traveller.exploded import exploded
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.layup import Bed, Round, beds, inlets_in, rounds
@@ -41,6 +42,8 @@ class StepPage:
     step: Step
     bond: str
     dials: tuple[tuple[str, str], ...]
+    build_up: str
+    pins: str
     notes: tuple[str, ...]
     places: tuple[PiecePlace, ...]
     pitch: float | None
@@ -53,7 +56,6 @@ def step_pages(work: Work) -> list[StepPage]:
     """The press steps in order, each with its pictures, dial settings and actions."""
     parts = assembly(work.laminate)
     runs = work.runs
-    first_pinned = next((part.number for part in parts if part.pins), None)
     found = []
     for part, step in zip(parts, work.schedule.steps, strict=True):
         lying = beds(parts, part)
@@ -63,13 +65,12 @@ def step_pages(work: Work) -> list[StepPage]:
                 step,
                 BONDS[step.bond],
                 _dials(step),
-                (
-                    *_place_notes(runs),
-                    *(_pin_notes(work, part) if part.number == first_pinned else ()),
-                ),
+                build_up_svg(step, f"build-up-{step.step}"),
+                pin_lines(step),
+                _place_notes(runs),
                 placed,
                 pitch(placed),
-                plan(work.laminate, part, lying, f"plan-{step.step}", runs.copies == 1),
+                plan(work.laminate, part, lying, f"plan-{step.step}"),
                 exploded(work.laminate, part, lying, f"exploded-{step.step}"),
                 _bench_actions(work, part, step, lying, runs),
             )
@@ -83,37 +84,9 @@ def _dials(step: Step) -> tuple[tuple[str, str], ...]:
         ("Both platens", say.temperature(step.temperature_c)),
         ("Force on the whole platen", say.force(step.force_n)),
         (f"Pressure on {say.size(width, length)}", say.pressure(step.pressure_kpa)),
+        ("On the films (estimate)", f"about {step.film_kpa:.0f} kPa"),
         ("Timer", say.minutes(step.minutes)),
         ("Pins", f"{len(step.pins)} in" if step.pins else "none"),
-    )
-
-
-def force_notes(work: Work, together: int = 1) -> tuple[str, ...]:
-    """What the force means, with so many laminates in the press: the paper gives only a pressure
-    and an area.
-    """
-    step = work.schedule.steps[0]
-    newtons, kilopascals = f"{step.force_n:.0f} N", f"{step.pressure_kpa:g} kPa"
-    top = together * work.laminate.layers[-1].profile.area
-    alone = "the laminate alone" if together == 1 else f"the {together} laminates alone"
-    return (
-        f"The paper gives a pressure and a heated area, no force. {newtons} is {kilopascals} on "
-        f"the whole platen of {say.size(*step.platen_mm)}. It reaches the laminate as "
-        f"{kilopascals} only if something compliant that fills the platen, such as a silicone "
-        "sheet, spreads it (ours: the paper does not say what it used).",
-        f"Between bare platens the same force on {alone} ({top:.0f} mm² at the top) "
-        f"would be {step.force_n / top:.1f} MPa.",
-    )
-
-
-def _pin_notes(work: Work, part: AssemblyStep) -> tuple[str, ...]:
-    """How long pins may be and how they come out."""
-    twice = f"cut {work.job.fixture} twice" if work.job.fixture else "cut it twice"
-    return (
-        "Pins and plate (ours: the paper gives no sizes): a plate as the shop has, 3 mm or "
-        "thicker. Pins no longer than the plate and the stack of the step together, here the "
-        f"plate + {_height(work.laminate, part)}; or, with a second plate with the same holes on "
-        f"top ({twice}), no longer than both plates and the stack.",
     )
 
 
@@ -151,11 +124,14 @@ def _actions(
     )
     if part.pins:
         yield Action(
-            f"Lay the pin plate down, cut corner at the back right. Pins in: {_pins(part.pins)}. "
-            "Prick a release film over them."
+            "Lay the base plate down, cut corner at the back right. Drive in the pins to their "
+            "heights (above) and prick a release film over them."
         )
     else:
-        yield Action("Lay a release film on a flat plate. No pins: lay by eye, as each line says.")
+        yield Action(
+            "Lay the base plate down, cut corner at the back right, no pins in it, and a release "
+            "film on it. Lay by eye, as each line says."
+        )
     for bed in lying:
         yield from _lay(things, bed, part.pins)
     yield from reseat(laminate, part.adds, bool(part.pins))
@@ -166,12 +142,11 @@ def _actions(
         f"dust or hair between the films, the {lies} flat (about {_height(laminate, part)})."
     )
     if part.pins:
-        yield Action(
-            "Check: every pin reaches through the highest layer that has its hole, and none stands "
-            f"higher than the stack, {_height(laminate, part)} over the plate, or a second plate "
-            "with the same holes lies on top."
-        )
-    yield Action("Cover with a release film.")
+        yield Action("Check: every pin reaches through the highest layer that has its hole.")
+    yield Action(
+        "Cover with a release film and the press pad, flush with the platen all round. No second "
+        "plate on top."
+    )
     yield warm_plate(step)
     cycles = tuple(f"cycle {n}" for n in range(1, runs.count + 1))
     yield Action(
@@ -184,13 +159,6 @@ def _actions(
         names = say.listed([pin.name for pin in part.pins])
         yield Action(f"Pins out, pushed from below through the plate: {names}.")
     yield Action(f"Take off the release films. You now hold {_product(laminate, part)}.")
-
-
-def _pins(pins: Sequence[Pin]) -> str:
-    sizes: dict[float, list[str]] = {}
-    for pin in pins:
-        sizes.setdefault(pin.diameter, []).append(pin.name)
-    return "; ".join(f"⌀{say.millimetres(d)}: {say.listed(names)}" for d, names in sizes.items())
 
 
 def _lay(things: Things, bed: Bed, pins: Sequence[Pin]) -> Iterator[Action]:
@@ -306,17 +274,6 @@ def finishing(work: Work) -> list[Action]:
         Action("Cut the tails of the inlet strips flush with the tab's end."),
         Action("Leave the masks in their pockets."),
     ]
-
-
-def pin_lengths(work: Work) -> str:
-    """How long pins are in each step that has any; no one length suits a thin and a high stack."""
-    laminate = work.laminate
-    found = [
-        f"plate + {_height(laminate, part)} in step {part.number}"
-        for part in assembly(laminate)
-        if part.pins
-    ]
-    return say.listed(found)
 
 
 def tubing(work: Work) -> list[Action]:

@@ -1,0 +1,58 @@
+"""The second cut of registered sheets: slots that sever the bridges, laid by the fiducials."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sbafab.cutting.dxf_write import DATUM_ARM, Surroundings, dxf_text
+from sbafab.cutting.kerf import compensate
+from sbafab.cutting.order import cutting_order
+from sbafab.cutting.properties import CutSettings, second_cut_properties
+from sbafab.cutting.verify import check_surroundings, verify_file
+from sbafab.errors import OutputError
+from sbafab.geometry.beam import Kerf
+from sbafab.geometry.edges import Point
+from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import rectangle
+from sbafab.laminate.panel import SheetPanel
+
+PATH = "sheets/second_cut.dxf"
+ROOM = 10.0
+
+
+def second_path(panel: SheetPanel, kerf: Kerf) -> Region:
+    """The beam's path inside the slots, so that what stays keeps its size."""
+    x0, y0, x1, y1 = panel.second.bounds
+    around = rectangle((x0 - ROOM, y0 - ROOM), (x1 + ROOM, y1 + ROOM))
+    slots = [contour.reversed() for contour in panel.second.contours]
+    path = compensate(Region((*around.contours, *slots)), kerf)
+    return Region(tuple(hole.reversed() for hole in path.holes))
+
+
+def marks(panel: SheetPanel) -> Surroundings:
+    """What is drawn for reference: the sheet's edge, its datum and a cross in every fiducial."""
+    outline = [edge.start for edge in panel.outline.edges]
+    crosses = [run for p in ((0.0, 0.0), *panel.fiducials) for run in _cross(p)]
+    return Surroundings(marks=((*outline, outline[0]), *crosses))
+
+
+def write_second_cut(panel: SheetPanel, folder: Path, settings: CutSettings) -> str:
+    """Writes and reads back the file; its path in ``folder``. Raises OutputError, OSError."""
+    properties = second_cut_properties(settings)
+    path = second_path(panel, settings.kerf_width("TPE") or 0.0)
+    around = marks(panel)
+    text = dxf_text(cutting_order(path), properties, settings.curves.profile, around)
+    target = folder / PATH
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_bytes(text.encode())
+    found = verify_file(target, path, properties)
+    try:
+        check_surroundings(found, around)
+    except OutputError as error:
+        raise OutputError(f"{target.name}: {error}") from error
+    return PATH
+
+
+def _cross(p: Point) -> tuple[tuple[Point, Point], tuple[Point, Point]]:
+    (x, y), arm = p, DATUM_ARM
+    return ((x - arm, y), (x + arm, y)), ((x, y - arm), (x, y + arm))

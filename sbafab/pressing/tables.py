@@ -1,0 +1,92 @@
+"""The schedule as ``press.json`` and ``press.csv`` hold it."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import asdict
+from typing import Any
+
+from sbafab.pressing.dowels import PinSetting
+from sbafab.pressing.schedule import Schedule, named
+
+COLUMNS = (
+    "step",
+    "title",
+    "bond",
+    "layers",
+    "adds",
+    "pins",
+    "temperature_c",
+    "pressure_kpa",
+    "force_n",
+    "platen_width_mm",
+    "platen_length_mm",
+    "minutes",
+    "film_kpa",
+    "edge_kpa",
+    "bond_kpa",
+    "plate_kpa",
+    "pressure_basis",
+    "build_up",
+    "pin_settings",
+    "instructions",
+)
+
+
+def press_json(plan: Schedule) -> dict[str, Any]:
+    """The schedule as ``press.json`` holds it."""
+    return {
+        "steps": [_plain(asdict(step)) for step in plan.steps],
+        "total_press_minutes": plan.total_press_minutes,
+        "estimated_build_minutes": plan.estimated_build_minutes,
+        "estimate_basis": plan.estimate_basis,
+        "warnings": list(plan.warnings),
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Tuples as lists, as JSON has them, at every depth."""
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    return [_plain(one) for one in value] if isinstance(value, tuple | list) else value
+
+
+def press_csv(plan: Schedule) -> str:
+    """The steps as a table, one row each, with units in the column names."""
+    table = io.StringIO()
+    writer = csv.writer(table, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for step in plan.steps:
+        writer.writerow(
+            [
+                step.step,
+                step.title,
+                step.bond,
+                named(step.layers),
+                named(step.adds),
+                ", ".join(step.pins),
+                f"{step.temperature_c:g}",
+                f"{step.pressure_kpa:g}",
+                f"{step.force_n:.1f}",
+                *(f"{size:g}" for size in step.platen_mm),
+                f"{step.minutes:g}",
+                f"{step.film_kpa:g}",
+                f"{step.edge_kpa:g}",
+                f"{step.bond_kpa:g}",
+                f"{step.plate_kpa:g}",
+                step.pressure_basis,
+                "; ".join(f"{i.part} {i.thickness_mm:g} mm ({i.material})" for i in step.build_up),
+                "; ".join(map(pin_words, step.pin_settings)),
+                step.instructions,
+            ]
+        )
+    return table.getvalue()
+
+
+def pin_words(pin: PinSetting) -> str:
+    """One pin as the table and the page name it."""
+    return (
+        f"{pin.pin}: {pin.diameter_mm:g} x {pin.length_mm:g} mm, {pin.seat_mm:g} in the plate, "
+        f"stands {pin.stands_mm:g}"
+    )

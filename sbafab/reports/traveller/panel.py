@@ -1,0 +1,344 @@
+"""What the page says of registered sheets: cut, weed, tack, stack, press, cut free."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from sbafab.cutting.cut_layers import CUT_OUTER
+from sbafab.cutting.second_cut import PATH as SECOND_CUT
+from sbafab.geometry.edges import Point
+from sbafab.geometry.region import Region
+from sbafab.geometry.svg import number, path_data
+from sbafab.laminate.inks import ink
+from sbafab.laminate.laminate import Laminate, Layer, Pin
+from sbafab.laminate.panel import SheetPanel
+from sbafab.pressing.sheets import tackings
+from sbafab.reports import drawing as draw
+from sbafab.reports.traveller import process
+from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller.action import Action
+from sbafab.reports.traveller.bill import Cut, Item, bill, cut_list
+from sbafab.reports.traveller.job import Work
+from sbafab.reports.traveller.notes import expected_sizes
+from sbafab.reports.traveller.process import StepPage
+from sbafab.reports.traveller.shapes import Picture, label
+from sbafab.reports.traveller.times import PAPER_MINUTES, Time
+
+WIDEST, TALLEST = 62.0, 74.0
+EDGE, FOOT = 3.0, 5.0
+SECOND = "#c8008c"
+UNTRIED = (
+    "No bench has tried this way of building. It follows how laminates are made that pop up: try "
+    "one copy of two balloons first, and look at every step for what the page does not foresee."
+)
+
+
+def chapter(work: Work) -> dict[str, Any]:
+    """What ``panel.html.j2`` prints, and what stands instead of the pages for single parts."""
+    panel = work.laminate.panel
+    if panel is None:
+        return {"panel": None}
+    return {
+        "panel": panel,
+        "panel_size": say.size(*panel.size),
+        "panel_untried": UNTRIED,
+        "panel_pictures": _pictures(work.laminate, panel),
+        "panel_actions": _preparing(work, panel),
+        "step_pages": _step_pages(work, panel),
+        "finishing": _cut_free(panel),
+        "tubing": [*_each(panel, "Fit the tubes"), *process.tubing(work)],
+        "leak_test": [*_each(panel, "Test"), *process.leak_test(work)],
+        "force_notes": _force_notes(work, panel),
+        "bill": _bill(work, panel),
+        "cuts": _cuts(work, panel),
+        "times": _times(work, panel),
+        "expected_sizes": [
+            ("every file in layers/", say.size(*panel.size)),
+            (f"{SECOND_CUT}, with its frame", say.size(*panel.size)),
+            *expected_sizes(work),
+        ],
+    }
+
+
+def _force_notes(work: Work, panel: SheetPanel) -> tuple[str, ...]:
+    """What the force means on sheets that are smaller than the platen."""
+    step = work.schedule.steps[0]
+    area = panel.outline.area
+    return (
+        f"{step.force_n:.0f} N is {step.pressure_kpa:g} kPa on the whole platen of "
+        f"{say.size(*step.platen_mm)}, as the paper gives it. The sheets take "
+        f"{say.size(*panel.size)}: without something compliant round them that fills the platen "
+        f"the same force is {1000 * step.force_n / area:.0f} kPa on them, and "
+        f"{step.pressure_kpa * area / 1000:.0f} N would be {step.pressure_kpa:g} kPa.",
+        "Sheets of every film lie round the parts at every height, so that these share the "
+        "pressure; what each part gets of it nobody has measured.",
+    )
+
+
+def _pairs(laminate: Laminate) -> list[tuple[Layer, tuple[Layer, ...]]]:
+    """Every film with the masks that lie on it."""
+    found: list[tuple[Layer, tuple[Layer, ...]]] = []
+    for layer in laminate.layers:
+        if layer.is_mask and found:
+            film, masks = found[-1]
+            found[-1] = film, (*masks, layer)
+        elif not layer.is_mask:
+            found.append((layer, ()))
+    return found
+
+
+def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
+    """All that is done to the sheets before the first press step."""
+    design, laminate = work.design, work.laminate
+    pairs = [(film, masks) for film, masks in _pairs(laminate) if masks]
+    ticks = tuple(
+        f"{say.listed([str(mask.index) for mask in masks])} on {film.index}"
+        for film, masks in pairs
+    )
+    tack = say.minutes(design.panel.tack_minutes)
+    return [
+        Action(
+            f"Stick {design.panel.carrier} on the back of every PTFE sheet. It stops short of the "
+            "corners, so that it covers no pin hole."
+        ),
+        Action(
+            "Cut every file in layers/ once for each batch. Mask sheets lie PTFE side up and are "
+            "drawn turned over: cut through the PTFE, not through the transfer film. Film sheets "
+            "come off with their parts held by bridges: lift them by the edge."
+        ),
+        Action(
+            "Write its layer's number on the edge of every sheet. Equal patterns have equal files, "
+            "and the number tells where the sheet goes."
+        ),
+        Action(
+            "Weed the mask sheets: take off the rings round the masks, the discs out of their "
+            "bores and out of the pin holes. Masks and the sheet round them stay on the transfer "
+            "film."
+        ),
+        Action(
+            "Pins into the plate. Tack the masks, a film at a time: the film sheet on the pins, "
+            "cut corner over the plate's, its mask sheet face down on it, a release film on top; "
+            f"press for {tack} at {say.temperature(design.press.temperature_c)} (ours), let it "
+            "cool, peel off the transfer film flat and slowly. Masks and PTFE sheet stay on the "
+            "film.",
+            tuple(mask.index for _, masks in pairs for mask in masks),
+            ticks,
+        ),
+        Action(
+            "Check every sheet against its picture: each mask lies inside its film's window, none "
+            "is missing, none has folded."
+        ),
+    ]
+
+
+def _step_pages(work: Work, panel: SheetPanel) -> list[StepPage]:
+    """The press steps with what is done to sheets, and the panel in place of one copy."""
+    pages = process.step_pages(work)
+    found = []
+    for page in pages:
+        last = page is pages[-1]
+        plan = _picture(
+            work.laminate,
+            panel,
+            work.laminate.layers[-1 if last else 0],
+            f"plan-{page.step.step}",
+            "the sheets from above on their pins",
+        )
+        actions = tuple(_pressing(work.laminate, page, last))
+        found.append(replace(page, plan=plan, actions=actions))
+    return found
+
+
+def _pressing(laminate: Laminate, page: StepPage, last: bool) -> list[Action]:
+    step = page.step
+    films = [pair for pair in _pairs(laminate) if pair[0].index in step.adds]
+    ticks = tuple(
+        f"{film.index} with {say.listed([str(mask.index) for mask in masks])}"
+        if masks
+        else str(film.index)
+        for film, masks in films
+    )
+    lay = (
+        "Lay the film sheets on the pins, lowest first, each with its masks on its upper side, cut "
+        "corner over the plate's."
+    )
+    if last:
+        lay = f"Lay the sheet of layer {films[0][0].index}, the cap, on the pins over the stack."
+    start = [
+        Action(
+            "Lay the pin plate down, cut corner at the back right, all corner pins in. Prick a "
+            "release film over them."
+        )
+    ]
+    end = [
+        Action("The stack stays on the plate and its pins."),
+    ]
+    if last:
+        start = []
+        end = [
+            Action("Pins out, pushed from below through the plate, once the stack is cold."),
+            Action("Take off the release films. You now hold all sheets as one stack."),
+        ]
+    return [
+        Action(
+            f"Heat both platens to {say.temperature(step.temperature_c)}; set the force to "
+            f"{say.force(step.force_n)}."
+        ),
+        *start,
+        Action(lay, tuple(i for i in step.adds), ticks if len(ticks) > 1 else ()),
+        Action(
+            "Check: every sheet's cut corner lies over the next, no sheet is stretched between its "
+            "pins or folded, and the pins do not stand higher than the stack."
+        ),
+        Action("Cover with a release film."),
+        Action(f"Close the press and start the timer: {say.minutes(step.minutes)}."),
+        Action("Take it out on its plate and let it cool flat before you touch it."),
+        *end,
+    ]
+
+
+def _cut_free(panel: SheetPanel) -> list[Action]:
+    many = say.count(len(panel.places), "actuator")
+    return [
+        Action(
+            f"Fix the stack flat on the laser's bed, the cap up. Lay {SECOND_CUT} by the "
+            f"{len(panel.fiducials)} fiducials: a cross on REFERENCE stands in the middle of each "
+            "hole. Check all of them before you cut."
+        ),
+        Action(
+            f"Second cut: the slots on {CUT_OUTER} go through all films and the edges of the "
+            "masks. PTFE is among what is cut: see the warnings. A sharp blade along the inner "
+            "edge of every slot does the same."
+        ),
+        Action(f"Lift out {many}; the sheets round them come off one by one."),
+        Action(
+            "Part the balloons at the stubs with a blade's tip: a laser may have welded the films' "
+            "cut edges to each other there."
+        ),
+        Action("Look through every lumen and into every tab: no scrap may be left in either."),
+        Action("Leave the masks in their pockets."),
+    ]
+
+
+def _each(panel: SheetPanel, what: str) -> list[Action]:
+    """What is done once for every actuator of a batch says so, with a box for each."""
+    count = len(panel.places)
+    if count == 1:
+        return []
+    numbers = tuple(str(number) for number in range(1, count + 1))
+    text = f"{what} one actuator after the other, numbered by its place in the sheet, row by row:"
+    return [Action(text, (), numbers)]
+
+
+def _bill(work: Work, panel: SheetPanel) -> list[Item]:
+    """The bill with sheets in place of parts, and what carries the masks."""
+    items = []
+    for item in bill(work):
+        material = item.name.removesuffix(" film")
+        own = [layer for layer in work.laminate.layers if layer.film.material == material]
+        if own:
+            number_of = len(own) * panel.batches
+            needed = f"{say.count(number_of, 'sheet')} {say.size(*panel.size)}"
+            items.append(replace(item, quantity=needed))
+        else:
+            items.append(item)
+    masks = sum(layer.is_mask for layer in work.laminate.layers) * panel.batches
+    what = f"{work.design.panel.carrier}; carries the masks of one sheet each, off in the end"
+    return [*items, Item("Carrier", what, say.count(masks, "piece"))]
+
+
+def _cuts(work: Work, panel: SheetPanel) -> list[Cut]:
+    """The cut list: a sheet for every layer of a pattern and every batch."""
+    found = []
+    for row in cut_list(work):
+        layers = work.laminate.patterns[row.pattern]
+        sheet = work.laminate.first_cut(layers[0])
+        length = sum(contour.length for contour in sheet.contours)
+        found.append(
+            replace(row, count=len(layers) * panel.batches, pieces=1, spares=0, cut_length=length)
+        )
+    return found
+
+
+def _times(work: Work, panel: SheetPanel) -> list[Time]:
+    """How long a batch takes; the paper's handling is of one actuator, and is not known of many."""
+    plan, copies = work.schedule, len(panel.places)
+    steps = " + ".join(f"{step.minutes:g}" for step in plan.steps)
+    tacking = work.design.panel.tack_minutes * tackings(work.laminate)
+    pressing = plan.total_press_minutes + tacking
+    return [
+        Time(
+            "In the press",
+            say.minutes(pressing),
+            f"{steps} min, and {tacking:g} min to tack masks; one batch of "
+            f"{say.count(copies, 'actuator')}, {say.minutes(pressing / copies)} each",
+        ),
+        Time(
+            "Handling",
+            "not known",
+            "cutting, weeding, tacking and stacking sheets, tubes; no bench has tried it",
+        ),
+        Time("The paper", f"{PAPER_MINUTES:g} min", "one actuator of single parts, in all"),
+    ]
+
+
+def _pictures(laminate: Laminate, panel: SheetPanel) -> list[tuple[str, str]]:
+    """One film sheet and one mask sheet as they come from the laser, with what they are."""
+    film = laminate.layers[0]
+    mask = next(layer for layer in laminate.layers if layer.is_mask)
+    return [
+        (
+            _picture(laminate, panel, film, "panel-film", "a film sheet after the first cut"),
+            f"Layer {film.index}, a film sheet after the first cut. Pink: what the second cut "
+            "takes out of the bridges.",
+        ),
+        (
+            _picture(laminate, panel, mask, "panel-mask", "a mask sheet on its film"),
+            f"Layer {mask.index}, a mask sheet as it lies on its film; its file is drawn turned "
+            "over.",
+        ),
+    ]
+
+
+def _picture(laminate: Laminate, panel: SheetPanel, layer: Layer, name: str, words: str) -> str:
+    """A sheet from above, its pins filled, crosses in its fiducials, its slots pink."""
+    width, length = panel.size
+    scale = min(WIDEST / width, TALLEST / length)
+    x0, _, _, y1 = panel.outline.bounds
+    picture = Picture(name, width * scale + 2 * EDGE, length * scale + 2 * EDGE + FOOT, words)
+
+    def at(p: Point) -> Point:
+        return EDGE + (p[0] - x0) * scale, EDGE + (y1 - p[1]) * scale
+
+    def shape(region: Region, fill: str, line: str) -> str:
+        drawn = path_data(region.mapped(at, scale, mirror=True))
+        return (
+            f'<path d="{drawn}" fill="{fill}" fill-rule="evenodd" stroke="{line}" '
+            'stroke-width="0.18"/>'
+        )
+
+    fill, line = ink(layer.film)
+    picture.add(shape(panel.sheets[layer.index - 1], fill, line))
+    if not layer.is_mask:
+        picture.add(shape(panel.second, SECOND, SECOND))
+    for pin in laminate.pins:
+        picture.add(*_pin(pin, at(pin.centre), scale))
+    for p in panel.fiducials:
+        x, y = at(p)
+        picture.add(
+            draw.line([(x - 1.2, y), (x + 1.2, y)], width=0.2),
+            draw.line([(x, y - 1.2), (x, y + 1.2)], width=0.2),
+        )
+    foot = f"seen from above, 1 : {1 / scale:.2f}; filled: pins; crosses: fiducials"
+    picture.add(draw.text((EDGE, picture.height - 1.2), foot, size=2.2))
+    return picture.svg()
+
+
+def _pin(pin: Pin, at: Point, scale: float) -> tuple[str, str]:
+    x, y = at
+    r = pin.diameter * scale / 2
+    return (
+        f'<circle cx="{number(x)}" cy="{number(y)}" r="{number(r)}" fill="{draw.DARK}"/>',
+        label((x, y + r + 2.4), pin.name, 1.9),
+    )

@@ -1,0 +1,106 @@
+"""pin-fit: every film goes on its pins, with hole and pin at their worst.
+
+A cut edge lies off by up to the cutting error all round, so a hole may be two of them narrower than
+drawn, the place of its middle included. A film whose hole is then narrower than its pin must
+stretch over it. A kerf that is not compensated makes holes wider: they go on easier, and hold less.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from sbafab.laminate.assembly import assembly, distinct_layers
+from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
+from sbafab.rules.finding import Finding, Place
+from sbafab.rules.limits import TOLERANCE, Limits, at
+
+NAME = "pin-fit"
+
+M6 = ((3.0, 0.008), (6.0, 0.012), (10.0, 0.015), (18.0, 0.018))
+"""Upper deviation of a dowel pin up to each diameter, mm: m6 of ISO 286-2, ISO 8734 and 2338."""
+
+
+class _Fit(NamedTuple):
+    """A layer's hole on a pin: its drawn diameter and the least that it may come out."""
+
+    pin: Pin
+    layer: Layer
+    drawn: float
+    least: float
+
+    @property
+    def most(self) -> float:
+        """The pin's largest diameter."""
+        return self.pin.diameter + next((up for d, up in M6 if self.pin.diameter <= d), M6[-1][1])
+
+    @property
+    def stretch(self) -> float:
+        """By what share of itself the hole must widen; endless where nothing may be left of it."""
+        if self.least <= 0:
+            return math.inf
+        return max(0.0, self.most / self.least - 1)
+
+
+def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+    """The most by which a film must stretch over a pin, against the share that is allowed."""
+    fits = list(_fits(laminate, limits))
+    if not fits:
+        message = "no pin holds a layer"
+        return [Finding(NAME, "pass", limits.pin_stretch, None, "", Place(), message)]
+    worst = max(fits, key=lambda fit: round(fit.stretch, 9))
+    # What a hole may miss its drawing by counts for it.
+    good = worst.stretch <= limits.pin_stretch + 2 * TOLERANCE / max(worst.least, TOLERANCE)
+    pin = worst.pin
+    message = (
+        f"the {worst.drawn:.3f} mm hole of layer {worst.layer.index} ({worst.layer.name}) may come "
+        f"out {max(worst.least, 0.0):.3f} mm wide, and the pin {pin.name} up to {worst.most:.3f}: "
+    )
+    if worst.stretch > 0:
+        message += f"the film stretches by {worst.stretch:.1%} over it, at {at(pin.centre)}"
+    else:
+        message += f"it goes on with {worst.least - worst.most:.3f} mm to spare"
+    message += f"; {_threaded(laminate, pin)} films are threaded on this pin"
+    if worst.layer.film.material not in limits.kerf:
+        message += "; its kerf is not measured, so holes come out wider by it and hold less"
+    if not good:
+        message += (
+            f"; {limits.pin_stretch:.0%} is allowed: take a thinner pin or a wider hole "
+            "(bore.pin_diameter, bore.diameter, registration.pin_diameter)"
+        )
+    value = None if math.isinf(worst.stretch) else worst.stretch
+    place = Place(None, (worst.layer.index,), *pin.centre)
+    return [
+        Finding(NAME, "pass" if good else "fail", limits.pin_stretch, value, "", place, message)
+    ]
+
+
+def _fits(laminate: Laminate, limits: Limits) -> Iterator[_Fit]:
+    """Every pin in every pattern that hangs on it in a step."""
+    seen = set()
+    for step in assembly(laminate):
+        for layer in distinct_layers(laminate, step.adds):
+            for pin in step.pins:
+                if (layer.pattern, pin) in seen:
+                    continue
+                seen.add((layer.pattern, pin))
+                for hole in layer.profile.holes:
+                    circle = hole.circle
+                    if circle is None or math.dist(circle[0], pin.centre) >= LOOSE:
+                        continue
+                    if abs(2 * circle[1] - pin.hole) < LOOSE:
+                        # A hole off its place leaves the pin that much less room.
+                        drawn = 2 * (circle[1] - math.dist(circle[0], pin.centre))
+                        least = drawn - 2 * (limits.tolerances.cutting + limits.tolerances.pin)
+                        yield _Fit(pin, layer, 2 * circle[1], least)
+
+
+def _threaded(laminate: Laminate, pin: Pin) -> int:
+    """How many layers go on the pin in the step that lays most of them."""
+    counts = [
+        sum(pin in laminate.pins_holding(laminate.layer(index)) for index in step.adds)
+        for step in assembly(laminate)
+        if pin in step.pins
+    ]
+    return max(counts, default=0)

@@ -1,0 +1,112 @@
+"""The build-up between the platens: the estimate against balance of forces and Gent's paper."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from sbafab.errors import DesignError
+from sbafab.laminate.laminate import Laminate
+from sbafab.pressing.build_up import (
+    EVEN,
+    PADS,
+    Footprint,
+    Pad,
+    column_modulus,
+    gent_modulus,
+    pad_thickness,
+    pressures,
+)
+from sbafab.pressing.schedule import PressSettings, schedule
+from sbafab.pressing.tables import press_json
+
+Stack = Callable[..., Laminate]
+PAPER = PressSettings()
+PLATEN = (152.4, 152.4)
+LAMINATE = Footprint(height=1.865, area=150.0, rim=50.0, below=0.375)
+
+
+def test_gents_modulus_is_that_of_rubber() -> None:
+    # Gent's own scale: 0.69 MPa (100 psi) near 20 Shore A, 2.4 to 2.5 MPa at 50.
+    assert gent_modulus(50) == pytest.approx(2450, rel=0.02)
+    assert gent_modulus(20) == pytest.approx(720, rel=0.05)
+
+
+@pytest.mark.parametrize("pad", [Pad(), Pad("silicone rubber", 25.0, 40.0)])
+def test_what_films_and_plate_get_is_the_force(pad: Pad) -> None:
+    found = pressures(110.0, PLATEN, pad, 25.0, LAMINATE)
+    platen = PLATEN[0] * PLATEN[1]
+    carried = found.film * LAMINATE.area + found.plate * (platen - LAMINATE.area)
+    assert carried == pytest.approx(110.0 * platen, rel=1e-3)
+    # The pad is pressed together by the laminate's height more over it than beside it.
+    more = (found.film - found.plate) / column_modulus(pad, 25.0, LAMINATE) * 25.0
+    assert more == pytest.approx(LAMINATE.height, rel=5e-3)
+    assert found.bond < found.film < found.edge
+
+
+def test_solid_rubber_must_flow_aside_and_is_harder_than_a_sponge() -> None:
+    # A disc of radius a on a pad of height H has the shape factor a / 2 H.
+    a, thickness = 10.0, 5.0
+    disc = Footprint(1.0, math.pi * a * a, 2 * math.pi * a, 0.0)
+    solid = Pad("silicone rubber", thickness, 10.0)
+    assert column_modulus(solid, thickness, disc) == pytest.approx(solid.modulus * (1 + 2 * 1.0))
+    assert column_modulus(Pad(), thickness, disc) == Pad().modulus
+
+
+def test_the_pad_is_the_thinnest_that_is_even_enough(stack: Stack) -> None:
+    plan = schedule(stack(15), PAPER)
+    [pad] = {item.thickness_mm for step in plan.steps for item in step.build_up[-1:]}
+    assert max(step.film_kpa for step in plan.steps) <= EVEN * 110
+    thinner = PADS[PADS.index(pad) - 1]
+    with_thinner = schedule(stack(15), replace(PAPER, pad=Pad(thickness=thinner)))
+    assert max(step.film_kpa for step in with_thinner.steps) > EVEN * 110
+
+
+@pytest.mark.parametrize(
+    ("pad", "said"),
+    [
+        (Pad(thickness=3.0), r"pad_thickness = 3 of .* 1\.\d+ mm high the films would get \d+ kPa"),
+        (Pad("silicone rubber", 3.0, 60.0), "make it thicker or softer"),
+        (Pad(hardness=5.0, thickness=50.0), "harder or thicker"),
+        (Pad(hardness=50.0), "none of a silicone sponge"),
+        (Pad("silicone rubber", None, 90.0), "no press pad"),
+    ],
+)
+def test_a_set_up_that_cannot_give_the_pressure_is_refused(
+    stack: Stack, pad: Pad, said: str
+) -> None:
+    high = replace(PAPER, pad=pad, pressure_kpa=180.0 if pad.hardness == 5 else 110.0)
+    with pytest.raises(DesignError, match=said):
+        schedule(stack(15), high)
+
+
+def test_a_pad_that_does_not_reach_the_base_plate_is_refused() -> None:
+    # A quarter of the platen lies 2 mm high under 3 mm of hard rubber.
+    wide = Footprint(height=2.0, area=5800.0, rim=300.0, below=0.0)
+    hard = Pad("silicone rubber", 3.0, 60.0)
+    with pytest.raises(DesignError, match="the films take the whole force, 440 kPa"):
+        pad_thickness(110.0, PLATEN, hard, [wide])
+
+
+def test_a_pad_has_its_own_heat_limit(stack: Stack) -> None:
+    with pytest.raises(DesignError, match="more than the press pad of silicone sponge stands"):
+        schedule(stack(2), replace(PAPER, temperature_c=210))
+
+
+def test_every_step_lists_platen_to_platen(stack: Stack) -> None:
+    for step in press_json(schedule(stack(15), PAPER))["steps"]:
+        parts = [item["part"] for item in step["build_up"]]
+        assert parts == ["base plate", "release film", "laminate", "release film", "press pad"]
+        assert step["build_up"][0]["size_mm"] == step["build_up"][-1]["size_mm"] == [152.4, 152.4]
+        assert step["film_kpa"] > step["pressure_kpa"] >= step["plate_kpa"]
+        assert step["pressure_basis"].startswith("estimate: ")
+
+
+def test_a_pile_and_uneven_films_draw_warnings(stack: Stack) -> None:
+    uneven = schedule(stack(15), replace(PAPER, pad=Pad(thickness=8.0)))
+    assert any("outside 70 to 200 kPa; take a thicker" in words for words in uneven.warnings)
+    piled = schedule(stack(15), replace(PAPER, pad=Pad(thickness=50.0)))
+    assert any("a pile of 2 sheets" in words for words in piled.warnings)
