@@ -18,7 +18,7 @@ from sbafab.rules.finding import Finding
 
 
 @dataclass(frozen=True)
-class Run:
+class SupplyRun:
     """A supply tube along the outside of a tube, ``angle`` degrees round it from its marked line.
 
     ``over`` are the parts whose balloons it would lie on.
@@ -59,7 +59,7 @@ def reach(placed: PlacedPart) -> float:
     return 2 * max(edge.farthest_from((0.0, 0.0)) for edge in edges)
 
 
-def runs(placed: PlacedPart, assembled: Assembled) -> tuple[Run, ...]:
+def runs(placed: PlacedPart, assembled: Assembled) -> tuple[SupplyRun, ...]:
     """Where the supply tubes of an actuator on a tube's end or start run along that tube."""
     tube = assembled.on(placed)
     if placed.made is None or tube is None or not isinstance(tube.part, Tube):
@@ -73,7 +73,7 @@ def runs(placed: PlacedPart, assembled: Assembled) -> tuple[Run, ...]:
         angle = _angle(tube, placed.at((*inlet.mouth, 0.0)))
         half = math.degrees(inlet.tube_diameter / 2 / around)
         over = [name for name, middle, own in covered if _apart(angle, middle) < own + half]
-        found_runs.append(Run(inlet.chamber, angle, tuple(dict.fromkeys(over))))
+        found_runs.append(SupplyRun(inlet.chamber, angle, tuple(dict.fromkeys(over))))
     return tuple(found_runs)
 
 
@@ -132,7 +132,7 @@ def supply_tubes(assembled: Assembled) -> Iterator[Finding]:
         yield Finding("supply-tubes", "fail", 0, len(crossing), "tubes", WHOLE, message)
 
 
-def _remedy(placed: PlacedPart, assembled: Assembled, own: Sequence[Run]) -> str:
+def _remedy(placed: PlacedPart, assembled: Assembled, own: Sequence[SupplyRun]) -> str:
     """The turn, in whole degrees, that keeps every tube farthest from balloons."""
     tube = assembled.on(placed)
     assert tube is not None

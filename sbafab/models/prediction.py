@@ -13,7 +13,7 @@ from sbafab.errors import DesignError
 from sbafab.geometry.boolean import GeometryError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from sbafab.models import axial, lobes, paper
+from sbafab.models import axial, elastic, lobes, paper
 from sbafab.models.actuator import NO_OUTLINE, Actuator, actuator
 from sbafab.models.figures import (
     Asked,
@@ -74,6 +74,7 @@ def _all(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
             yield LeftOut(what, NO_OUTLINE)
         return
     yield from axial.strokes(one, asked)
+    yield from elastic.free_strokes(one, asked)
     yield from axial.forces(one, asked)
     yield from axial.power(one, asked, mass.value)
     if one.form.is_parallel:

@@ -18,18 +18,18 @@ POINTS = 72 / 25.4
 MOST_SWEEP = math.pi / 4
 ENCODING = "cp1252"
 """Of the fonts that every reader has."""
-Colour = tuple[float, float, float]
-BLACK: Colour = (0.0, 0.0, 0.0)
+Rgb = tuple[float, float, float]
+BLACK: Rgb = (0.0, 0.0, 0.0)
 
 
-class Page:
+class PdfPage:
     """One page, its lower left corner at (0, 0); what is drawn later covers what was earlier."""
 
     def __init__(self, width: float, height: float) -> None:
         self.width, self.height = width, height
         self._drawn: list[str] = [f"{POINTS:.10f} 0 0 {POINTS:.10f} 0 0 cm 1 J 1 j"]
 
-    def stroke(self, colour: Colour, width: float, dashes: Iterable[float] = ()) -> None:
+    def stroke(self, colour: Rgb, width: float, dashes: Iterable[float] = ()) -> None:
         """What the lines that follow look like; widths and dashes are mm."""
         shades = " ".join(map(number, colour))
         on = " ".join(map(number, dashes))

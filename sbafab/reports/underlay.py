@@ -14,7 +14,7 @@ from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import disc
 from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.reports.pdf import BLACK, Colour, Page
+from sbafab.reports.pdf import BLACK, PdfPage, Rgb
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.layup import Bed, beds
 
@@ -28,9 +28,9 @@ SIDE, HEAD = 25.0, 52.0
 """mm of the page that stay free of the drawing: left and right, and above."""
 BEYOND = 8.0
 """mm by which the cross reaches past the outermost line."""
-FILM: Colour = (0.05, 0.25, 0.55)
-MASK: Colour = (0.85, 0.4, 0.0)
-GREY: Colour = (0.55, 0.55, 0.55)
+FILM: Rgb = (0.05, 0.25, 0.55)
+MASK: Rgb = (0.85, 0.4, 0.0)
+GREY: Rgb = (0.55, 0.55, 0.55)
 THIN, WORDS, TITLE, ROW = 0.1, 3.0, 5.0, 4.5
 USE = (
     "Print at 100 % (“actual size”, not “fit to page”) on plain paper. Measure both bars:",
@@ -69,7 +69,7 @@ def underlay_pdf(laminate: Laminate, design_sha256: str) -> bytes | None:
     low_x, low_y, high_x, high_y = _bounds(found)
     foot = 20 + ROW * (len(found) + len(NOTES))
     wide, high = high_x - low_x + 2 * BEYOND, high_y - low_y + 2 * BEYOND
-    page = Page(max(A4[0], wide + 2 * SIDE), max(A4[1], high + HEAD + foot))
+    page = PdfPage(max(A4[0], wide + 2 * SIDE), max(A4[1], high + HEAD + foot))
     middle = page.width / 2, foot + (page.height - HEAD - foot) / 2
     shift = middle[0] - (low_x + high_x) / 2, middle[1] - (low_y + high_y) / 2
     _cross(page, (low_x, low_y, high_x, high_y), shift)
@@ -129,11 +129,11 @@ def _moved(region: Region, shift: Point) -> tuple[Contour, ...]:
     return tuple(region.moved(*shift).contours)
 
 
-def _stroke(page: Page, guide: Guide) -> None:
+def _stroke(page: PdfPage, guide: Guide) -> None:
     page.stroke(MASK if guide.is_mask else FILM, THIN, (1.0, 0.6) if guide.is_mask else ())
 
 
-def _cross(page: Page, bounds: Bounds, shift: Point) -> None:
+def _cross(page: PdfPage, bounds: Bounds, shift: Point) -> None:
     """Lines through the axis, seen past all that lies on the page."""
     low_x, low_y, high_x, high_y = bounds
     x, y = shift
@@ -142,7 +142,7 @@ def _cross(page: Page, bounds: Bounds, shift: Point) -> None:
     page.line((x, low_y - BEYOND + y), (x, high_y + BEYOND + y))
 
 
-def _bars(page: Page) -> None:
+def _bars(page: PdfPage) -> None:
     """A bar along each way of the page."""
     page.stroke(BLACK, THIN)
     y, x = page.height - HEAD + 8, 14.0
@@ -157,7 +157,7 @@ def _bars(page: Page) -> None:
 
 
 def _words(
-    page: Page, laminate: Laminate, sha256: str, found: tuple[Guide, ...], foot: float
+    page: PdfPage, laminate: Laminate, sha256: str, found: tuple[Guide, ...], foot: float
 ) -> None:
     """Title and use above the drawing, what its lines are below."""
     top = page.height - 16

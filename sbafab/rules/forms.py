@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Form:
+class LinearForm:
     """Margins with the same two owners of their edges, in the order they were found.
 
     ``numbers`` are their places among all margins of the interface, ``nominal`` (mm) and ``normal``
@@ -51,7 +51,7 @@ class Form:
 
 def linear_forms(
     margins: Sequence[Margin], interface: Interface, moves: Freedoms
-) -> tuple[Form, ...]:
+) -> tuple[LinearForm, ...]:
     """The margins of an interface by quantity and owners, in the order of their first."""
     groups: dict[tuple[Quantity, tuple[Owner, Owner]], list[int]] = {}
     for number, margin in enumerate(margins):
@@ -69,14 +69,14 @@ def _form(
     margins: Sequence[Margin],
     interface: Interface,
     moves: Freedoms,
-) -> Form:
+) -> LinearForm:
     import numpy as np
 
     own = [margins[number] for number in numbers]
     normal = np.array([margin.normal for margin in own]).T
     start = np.array([margin.start for margin in own]).T
     end = np.array([margin.end for margin in own]).T
-    return Form(
+    return LinearForm(
         quantity,
         owners,
         np.array(numbers),

@@ -11,7 +11,7 @@ from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.boundary import Reach, edges_along, outward_reach
 from sbafab.rules.facing import Facing, facing_films
-from sbafab.rules.forms import Form, linear_forms
+from sbafab.rules.forms import LinearForm, linear_forms
 from sbafab.rules.freedoms import Freedoms, freedoms
 from sbafab.rules.limits import Limits
 from sbafab.rules.margins import SHARP, InterfaceMargins, felt_alike, narrow_places
@@ -63,7 +63,7 @@ class Measures:
         ]
 
     @cached_property
-    def forms(self) -> list[tuple[Form, ...]]:
+    def forms(self) -> list[tuple[LinearForm, ...]]:
         """The same as linear forms."""
         return [linear_forms(own.margins, own.first, self.moves) for own in self.margins]
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
-from sbafab.rules.forms import Form
+from sbafab.rules.forms import LinearForm
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.margins import Quantity
@@ -35,17 +35,17 @@ UNITS = 1000
 """Factors that are equal to so many parts are one: rows that feel all errors alike."""
 
 
-class Contour(NamedTuple):
+class CutContour(NamedTuple):
     """A cut contour: by how far its film reaches beyond the nominal edge."""
 
     layer: int
     contour: int
 
 
-Error = Contour | Freedom
+Error = CutContour | Freedom
 
 
-class Bounds(NamedTuple):
+class DrawBounds(NamedTuple):
     """Least and largest of the room, the normal's x and y and the levers, in chunks of rows."""
 
     low: Floats
@@ -53,7 +53,7 @@ class Bounds(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Rows:
+class MarginRows:
     """What is left at margins of one form beyond their limit: ``room`` and a sum of errors.
 
     Contours count by their sign, shifts by the normal times theirs, turns by the levers times
@@ -64,7 +64,7 @@ class Rows:
     room: Floats
     normal: Floats
     angle: Floats
-    contours: tuple[tuple[Contour, float], ...]
+    contours: tuple[tuple[CutContour, float], ...]
     moves: tuple[tuple[Freedom, float, Floats | None], ...]
 
     @property
@@ -72,21 +72,21 @@ class Rows:
         return *(one for one, _ in self.contours), *(freedom for freedom, _, _ in self.moves)
 
     @cached_property
-    def bounds(self) -> Bounds:
+    def bounds(self) -> DrawBounds:
         import numpy as np
 
         levers = [levers for _, _, levers in self.moves if levers is not None]
         columns = np.array([self.room, *self.normal, *levers])
         starts = np.arange(0, len(self.room), CHUNK)
-        return Bounds(
+        return DrawBounds(
             np.minimum.reduceat(columns, starts, axis=1),
             np.maximum.reduceat(columns, starts, axis=1),
         )
 
 
 def rows_of(
-    form: Form, layers: Sequence[int], limit: float, cutting: float
-) -> tuple[int, Rows] | None:
+    form: LinearForm, layers: Sequence[int], limit: float, cutting: float
+) -> tuple[int, MarginRows] | None:
     """The margins that can come short at all; of those that feel all errors alike, the least.
 
     With the number of the first of them; None if there is none.
@@ -104,8 +104,8 @@ def rows_of(
     chosen = chosen[order]
     # More film widens a bond, more mask an overhang.
     signs = (1.0 if one.is_film == (form.quantity == "bond") else -1.0 for one in form.owners)
-    contours = (Contour(layers[one.seat], one.contour) for one in form.owners)
-    return int(form.numbers[short[0]]), Rows(
+    contours = (CutContour(layers[one.seat], one.contour) for one in form.owners)
+    return int(form.numbers[short[0]]), MarginRows(
         form.quantity,
         room[chosen],
         form.normal[:, chosen],
@@ -118,7 +118,7 @@ def rows_of(
     )
 
 
-def _least_alike(form: Form, room: Floats, short: Indices) -> list[int]:
+def _least_alike(form: LinearForm, room: Floats, short: Indices) -> list[int]:
     """Which of the short margins have the least room of all with the same factors, rounded."""
     import numpy as np
 
@@ -177,7 +177,7 @@ class Draws:
         return self.generator.uniform(-most, most, (1, self.builds))
 
 
-def kept(rows: Iterable[Rows], own: Mapping[Error, Error], draws: Draws) -> Bools:
+def kept(rows: Iterable[MarginRows], own: Mapping[Error, Error], draws: Draws) -> Bools:
     """In which builds an interface, with its own errors, keeps room at all of the rows."""
     import numpy as np
 
@@ -198,14 +198,14 @@ def kept(rows: Iterable[Rows], own: Mapping[Error, Error], draws: Draws) -> Bool
 class _Sums(NamedTuple):
     """Rows, what was drawn for builds, and that taken together: cuts, shifts and each turn."""
 
-    rows: Rows
+    rows: MarginRows
     drawn: list[Floats]
     cut: Floats
     shift: Floats
     turns: list[Floats]
 
     @staticmethod
-    def of(rows: Rows, drawn: list[Floats]) -> _Sums:
+    def of(rows: MarginRows, drawn: list[Floats]) -> _Sums:
         import numpy as np
 
         cut, shift = np.zeros(drawn[0].shape[1]), np.zeros((2, drawn[0].shape[1]))
@@ -289,7 +289,7 @@ def _picked(some: Bools) -> Indices:
     return numbers
 
 
-def _looking(rows: Rows, shift: Floats) -> Indices:
+def _looking(rows: MarginRows, shift: Floats) -> Indices:
     """For each build the row whose normal looks most against all shifts together."""
     import numpy as np
 

@@ -14,7 +14,7 @@ from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.alike import Alike, interface_name
 from sbafab.rules.finding import Finding, Place, Verdict
-from sbafab.rules.forms import Form
+from sbafab.rules.forms import LinearForm
 from sbafab.rules.freedoms import Freedom, Freedoms
 from sbafab.rules.limits import Limits, Tolerances, at, holds, least_held
 from sbafab.rules.margins import InterfaceMargins, Margin, Push, Quantity, pushes
@@ -70,7 +70,7 @@ def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) 
 
 
 def _least(
-    group: InterfaceMargins, forms: Sequence[Form], moves: Freedoms, limits: Limits
+    group: InterfaceMargins, forms: Sequence[LinearForm], moves: Freedoms, limits: Limits
 ) -> Remaining:
     """What is left at the worst of one quantity's margins; the first of those that are equal."""
     drawn = limits.bond_width if forms[0].quantity == "bond" else limits.mask_overhang

@@ -14,12 +14,12 @@ from typing import NamedTuple
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.finding import Finding, Place, Verdict
-from sbafab.rules.forms import Form
+from sbafab.rules.forms import LinearForm
 from sbafab.rules.freedoms import Freedom, Freedoms
 from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.margins import QUANTITIES, Quantity, own_freedoms, seated
 from sbafab.rules.measures import Measures
-from sbafab.rules.random_builds import Contour, Draws, Error, Rows, kept, rows_of
+from sbafab.rules.random_builds import CutContour, Draws, Error, MarginRows, kept, rows_of
 
 NAME = "registration-yield"
 
@@ -63,7 +63,7 @@ class Yield:
 class _Group:
     """Rows of the first of some alike interfaces; for each, its own errors by the first's."""
 
-    rows: dict[Quantity, tuple[Rows, ...]]
+    rows: dict[Quantity, tuple[MarginRows, ...]]
     own: dict[int, dict[Error, Error]]
 
 
@@ -130,8 +130,8 @@ def simulate(
 
 
 def _rows(
-    forms: Iterable[Form], layers: Sequence[int], limits: Limits
-) -> dict[Quantity, tuple[Rows, ...]]:
+    forms: Iterable[LinearForm], layers: Sequence[int], limits: Limits
+) -> dict[Quantity, tuple[MarginRows, ...]]:
     """The rows of an interface by quantity, those of the first margins first."""
     limit = {"bond": limits.worst_bond_width, "overhang": limits.worst_mask_overhang}
     found = [
@@ -144,7 +144,7 @@ def _rows(
     }
 
 
-def _in_order(rows: Mapping[Quantity, Iterable[Rows]]) -> list[Error]:
+def _in_order(rows: Mapping[Quantity, Iterable[MarginRows]]) -> list[Error]:
     """All errors, in the order in which they are drawn."""
     return list(
         dict.fromkeys(error for some in rows.values() for one in some for error in one.errors)
@@ -200,7 +200,7 @@ def _renamed(
     return {
         error: twins[error]
         if isinstance(error, Freedom)
-        else Contour(layers[error.layer], error.contour)
+        else CutContour(layers[error.layer], error.contour)
         for error in errors
     }
 

@@ -21,7 +21,7 @@ from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
 from sbafab.rules.margins import pushes
 from sbafab.rules.measures import Measures
-from sbafab.rules.random_builds import Contour, Draws, Error, Rows, kept
+from sbafab.rules.random_builds import CutContour, Draws, Error, MarginRows, kept
 from sbafab.rules.registration_worst_case import least_remaining
 from sbafab.rules.registration_yield import simulate
 from sbafab.rules.voids import _around
@@ -31,15 +31,15 @@ BUILDS = 400
 SHIFT = Freedom(1, 1, 1, 1, 0, 0.2)
 OTHER = Freedom(2, 2, 3, 3, 0, 0.1)
 TURN = Freedom(2, 2, 3, 3, 0, math.radians(1), (0.0, 0.0))
-CUT, AGAIN = Contour(1, 0), Contour(2, 0)
+CUT, AGAIN = CutContour(1, 0), CutContour(2, 0)
 DESIGNS = [("1dof-5mm", "stack.balloons=3"), ("3dof-15mm", "stack.balloons=2"), ("radial-15mm",)]
 
 
-def rows(number: int, least: float, seed: int) -> Rows:
+def rows(number: int, least: float, seed: int) -> MarginRows:
     """Rows of random normals, rooms and levers that feel two cuts, two shifts and a turn."""
     generator = np.random.default_rng(seed)
     angle = np.sort(generator.uniform(-math.pi, math.pi, number))
-    return Rows(
+    return MarginRows(
         "bond",
         generator.uniform(least, least + 0.1, number),
         np.vstack([np.cos(angle), np.sin(angle)]),

@@ -1,0 +1,279 @@
+"""One round balloon as an elastic membrane of revolution: inflated free, or between plates.
+
+Two equal films, bonded round the pocket and, where there are neighbours, at the neck. One film is
+computed; the other one mirrors it. A film stretches (Saint Venant-Kirchhoff, plane stress) and
+bends. Where its hoop is compressed it wrinkles, and carries what wrinkles of least energy do:
+
+    N = 2 pi / L sqrt(B T)      (after Cerda and Mahadevan, 2003)
+
+with the bending stiffness B, the tension T along the meridian and the length L of the compressed
+zone. The rim, two films thick, does not ripple. Shapes are those of least energy, found by Newton's
+method for many pressures and heights at once. Lengths mm, pressures kPa, volumes ul, forces mN.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from sbafab.errors import DesignError
+from sbafab.models.film_elements import Flat, Term, add, air, bending, membrane, strain
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from sbafab.models.film_elements import Array
+
+FILM_ELEMENTS = 40
+RIM_ELEMENTS = 8
+NECK_ELEMENTS = 2
+FARTHEST = 0.7
+"""Share of its length by which an element may change in one step."""
+MOST_STEPS = 400
+ROUNDING = 1e-13
+"""Share of the energy that is lost in its own digits."""
+HALVINGS = 12
+CLOSE = 1e-9
+"""Force out of balance, as a share of pressure times pocket area, that is none."""
+PLATE = 20_000.0
+"""What a plate gives way by: the pressure on the film presses it in by 1 / PLATE mm."""
+ROUNDS = 3
+"""How often the wrinkles' force is taken from the tension, and the shape from that."""
+
+
+@dataclass(frozen=True)
+class Balloon:
+    """A balloon and its film: radii, width of the ring and thickness in mm, modulus in kPa.
+
+    ``neck`` is the radius bonded to the next balloon, ``bore`` that of the hole in it; both 0 for a
+    lone balloon. Without ``wrinkles`` films stay as smooth as an axisymmetric mesh keeps them.
+    ``inextensible`` is the limit of a film that neither bends nor carries any compression, its rim
+    included: the modulus has then to be large.
+    """
+
+    pocket: float = 2.5
+    ring: float = 0.75
+    neck: float = 0.0
+    bore: float = 0.0
+    thickness: float = 0.038
+    modulus: float = 10_000.0
+    poisson: float = 0.2
+    wrinkles: bool = True
+    inextensible: bool = False
+
+    @cached_property
+    def nodes(self) -> Array:
+        """Radii of the flat film's nodes, closer where it bends sharply: at neck and rim."""
+        even = np.linspace(0, 1, FILM_ELEMENTS + 1)
+        close = (1 - np.cos(math.pi * even)) / 2 if self.neck else np.sin(math.pi / 2 * even)
+        film = self.neck + (self.pocket - self.neck) * (0.6 * close + 0.4 * even)
+        held = np.linspace(self.bore, self.neck, NECK_ELEMENTS + 1)[:-1]
+        neck = held if self.neck else held[:0]
+        rim = self.pocket + self.ring * np.linspace(0, 1, RIM_ELEMENTS + 1)[1:] ** 2
+        return np.concatenate([neck, film, rim])
+
+    @property
+    def held(self) -> int:
+        """Number of the node at the neck's edge; 0, the pole, without a neck."""
+        return NECK_ELEMENTS if self.neck else 0
+
+    @property
+    def edge(self) -> int:
+        """Number of the node at the pocket's edge."""
+        return self.held + FILM_ELEMENTS
+
+    @cached_property
+    def film(self) -> Flat:
+        return Flat(self.nodes, self.thickness, self.modulus, self.poisson)
+
+    @property
+    def rigidity(self) -> float:
+        """Bending stiffness B of one film in kPa mm3."""
+        if self.inextensible:
+            return 0.0
+        return self.modulus * self.thickness**3 / (12 * (1 - self.poisson**2))
+
+    @cached_property
+    def freedoms(self) -> Array:
+        """What moves: a row a coordinate (r, z of each node in turn), a column a freedom.
+
+        The neck stays level, the rim in the plane between the films, the pole on the axis.
+        """
+        nodes = range(len(self.nodes))
+        columns = [[2 * node] for node in nodes if node or self.bore]
+        columns.append([2 * node + 1 for node in nodes[: self.held + 1]])
+        columns += [[2 * node + 1] for node in nodes[self.held + 1 : self.edge]]
+        matrix = np.zeros((2 * len(self.nodes), len(columns)))
+        for column, rows in enumerate(columns):
+            matrix[rows, column] = 1.0
+        return matrix
+
+    @cached_property
+    def may_wrinkle(self) -> NDArray[np.bool_]:
+        """The elements that may: of the films, not of neck and rim."""
+        number = np.arange(len(self.nodes) - 1)
+        free = (number >= self.held) & (number < self.edge) & self.wrinkles
+        return free | ((number >= self.edge) & self.inextensible)
+
+
+class Shapes(NamedTuple):
+    """Balloons in balance, a row each.
+
+    ``pressure`` in kPa; ``height`` that the whole balloon has risen by, its stroke, in mm;
+    ``volume`` of its air in ul; ``force`` on the plate at either end in mN; ``energy`` stored in
+    its films in uJ; ``r`` and ``z`` of the nodes of one film, above those of a flat one, in mm.
+    """
+
+    pressure: Array
+    height: Array
+    volume: Array
+    force: Array
+    energy: Array
+    r: Array
+    z: Array
+
+
+class _Load(NamedTuple):
+    """Pressure, half the height between the plates, and the stress that wrinkles carry."""
+
+    pressure: Array
+    half: Array
+    cap: Array
+
+
+def inflate(balloon: Balloon, pressure: ArrayLike, height: ArrayLike | None = None) -> Shapes:
+    """The shapes at pressures (kPa), free or between plates at heights (mm).
+
+    A free balloon with a bore is pulled on by the air in it, as one in a stack is. Raises
+    DesignError for pressures or heights that are not above 0, or where no balance is found.
+    """
+    p = np.atleast_1d(np.asarray(pressure, dtype=float))
+    high = math.inf if height is None else np.asarray(height, dtype=float)
+    p, high = np.broadcast_arrays(p, high)
+    if not ((p > 0) & np.isfinite(p) & (high > 0)).all():
+        raise DesignError("pressure and height of a balloon must be above 0 kPa and 0 mm")
+    elements = len(balloon.nodes) - 1
+    smooth = np.where(balloon.may_wrinkle & balloon.inextensible, 0.0, math.inf)
+    load = _Load(p, high / 2, np.broadcast_to(smooth, (len(p), elements)))
+    r, z = _settled(balloon, load, *_start(balloon, load))
+    if balloon.wrinkles and not balloon.inextensible:
+        zone = _compressed(balloon, r, z)
+        for _ in range(ROUNDS):
+            load = load._replace(cap=_wrinkling(balloon, r, z, zone))
+            r, z = _settled(balloon, load, r, z)
+    term, force = _total(balloon, load, r, z)
+    held = air(balloon.film, balloon.edge, r, z).energy
+    return Shapes(p, 2 * z[:, 0], 2 * held, force, 2 * (term.energy + p * held), r, z)
+
+
+def _start(balloon: Balloon, load: _Load) -> tuple[Array, Array]:
+    """Bulged films to begin with, as high as their pressure may lift them."""
+    flat, free = balloon.nodes, balloon.pocket - balloon.neck
+    rise = 0.3 * free * np.cbrt(load.pressure * balloon.pocket / (balloon.modulus * 0.0025))
+    rise = np.minimum(np.clip(rise, 0.05 * free, 0.8 * free), load.half)
+    shape = np.clip(1 - ((flat - balloon.neck) / free) ** 2, 0.0, 1.0)
+    shape[: balloon.held + 1] = 1.0
+    return np.tile(flat, (len(rise), 1)), rise[:, None] * shape
+
+
+def _total(balloon: Balloon, load: _Load, r: Array, z: Array) -> tuple[Term, Array]:
+    """Energy of films and plates less the work of the air, by coordinate, and the plates' force."""
+    film, edge = balloon.film, balloon.edge
+    total = bending(film, balloon.rigidity, balloon.held, edge, r, z)
+    stretched = membrane(film, r, z, load.cap)
+    filled = air(film, edge, r, z)
+    p = load.pressure
+    add(
+        total,
+        stretched.gradient - p[:, None, None] * filled.gradient,
+        stretched.hessian - p[:, None, None, None] * filled.hessian,
+    )
+    width = math.tau * film.nodes * np.gradient(film.nodes)
+    stiff = PLATE * p[:, None] * np.where(np.arange(len(film.nodes)) < edge, width, 0.0)
+    over = np.maximum(z - load.half[:, None], 0.0)
+    pressed = stiff * over
+    heights = np.arange(1, 2 * len(film.nodes), 2)
+    total.gradient[:, heights] += pressed
+    total.hessian[:, heights, heights] += np.where(over > 0, stiff, 0.0)
+    energy = total.energy + stretched.energy - p * filled.energy + (pressed * over).sum(-1) / 2
+    return total._replace(energy=energy), pressed.sum(-1)
+
+
+def _settled(balloon: Balloon, load: _Load, r: Array, z: Array) -> tuple[Array, Array]:
+    """The shapes of least energy downhill of these: Newton's method, damped where it climbs.
+
+    Raises DesignError where it does not end.
+    """
+    freedoms = balloon.freedoms
+    damping = np.zeros(len(r))
+    small = CLOSE * load.pressure * math.pi * balloon.pocket**2
+    eye = np.eye(freedoms.shape[1])
+    term, _ = _total(balloon, load, r, z)
+    for _ in range(MOST_STEPS):
+        gradient = term.gradient @ freedoms
+        stiffness = freedoms.T @ term.hessian @ freedoms
+        size = np.abs(np.einsum("nii->ni", stiffness))
+        stiffness += (damping[:, None] * size)[..., None] * eye
+        move = -np.linalg.solve(stiffness, gradient[..., None])[..., 0]
+        slope = (move * gradient).sum(-1)
+        still = np.abs(gradient).max(-1) <= small
+        # Where rounding alone decides whether the energy falls, there is nothing left to gain.
+        still |= (np.abs(slope) <= ROUNDING * np.abs(term.energy)) & (damping == 0.0)
+        if still.all():
+            return r, z
+        ahead = np.where(still[:, None], 0.0, move) @ freedoms.T
+        share = _downhill(balloon, load, (r, z), ahead, term.energy, slope)
+        r, z = r + share[:, None] * ahead[:, ::2], z + share[:, None] * ahead[:, 1::2]
+        term, _ = _total(balloon, load, r, z)
+        damping = np.where(share > 0, damping / 10, np.clip(10 * damping, 1e-3, 1e9))
+        damping[damping < 1e-6] = 0.0
+    raise DesignError(
+        f"a balloon of radius {balloon.pocket:g} mm finds no balance; try another load"
+    )
+
+
+def _downhill(
+    balloon: Balloon,
+    load: _Load,
+    at: tuple[Array, Array],
+    ahead: Array,
+    energy: Array,
+    slope: Array,
+) -> Array:
+    """The share of each step that lowers the energy; 0 where none does or it leads uphill."""
+    # No element is stretched, turned or shortened by more than its own length: none collapses.
+    length = np.hypot(np.diff(at[0]), np.diff(at[1]))
+    change = np.hypot(np.diff(ahead[:, ::2]), np.diff(ahead[:, 1::2]))
+    share = np.minimum(1.0, FARTHEST / np.maximum((change / length).max(-1), 1e-300))
+    share = np.where(slope <= 0, share, 0.0)
+    room = 1e-12 * np.abs(energy)
+    for _ in range(HALVINGS):
+        step = share[:, None] * ahead
+        tried = _total(balloon, load, at[0] + step[:, ::2], at[1] + step[:, 1::2])[0].energy
+        good = tried <= energy + 1e-4 * share * slope + room
+        if good.all():
+            return share
+        share = np.where(good, share, share / 2)
+    return np.where(good, share, 0.0)
+
+
+def _compressed(balloon: Balloon, r: Array, z: Array) -> Array:
+    """Length in mm along the film, neck and rim apart, over which the smooth hoop is compressed."""
+    strains = strain(balloon.film, r, z)
+    is_film = balloon.may_wrinkle & ~balloon.inextensible
+    pressed = (strains.hoop + balloon.poisson * strains.meridian < 0) & is_film
+    shortest = balloon.film.lengths.min()
+    return np.asarray(np.maximum((pressed * balloon.film.lengths).sum(-1), shortest))
+
+
+def _wrinkling(balloon: Balloon, r: Array, z: Array, zone: Array) -> Array:
+    """The hoop stress in kPa that wrinkles over a zone carry, for each element's tension."""
+    tension = balloon.modulus * balloon.thickness * strain(balloon.film, r, z).meridian
+    force = math.tau / zone[:, None] * np.sqrt(balloon.rigidity * np.maximum(tension, 0.0))
+    carried: Array = np.full_like(force, math.inf)
+    carried[:, balloon.may_wrinkle] = force[:, balloon.may_wrinkle] / balloon.thickness
+    return carried
