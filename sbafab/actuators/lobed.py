@@ -21,7 +21,8 @@ from sbafab.actuators.pockets import (
 from sbafab.actuators.stacking import BalloonShape, BalloonStack, balloon_cuts, channel_pin, layers
 from sbafab.actuators.tails import tails
 from sbafab.design.form import Form, degrees_of_freedom
-from sbafab.design.records import Design, Section
+from sbafab.design.records import Design
+from sbafab.design.section import Section
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import union

@@ -33,7 +33,8 @@ from sbafab.actuators.stacking import (
 from sbafab.actuators.tails import head_reach, tails
 from sbafab.design.form import Drawn, Form, Slots, Wrap
 from sbafab.design.records import Chamber as ChamberSection
-from sbafab.design.records import Design, Inlet, Section, Stack
+from sbafab.design.records import Design, Inlet, Stack
+from sbafab.design.section import Section
 from sbafab.design.units import Length, LengthOrZero
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import union

@@ -14,15 +14,17 @@ from sbafab.actuators.ears import (
     with_mask_ears,
 )
 from sbafab.actuators.tails import Tail, with_tails
+from sbafab.design.reading import listed, shown
 from sbafab.design.records import Bore as BoreSection
 from sbafab.design.records import Design
+from sbafab.errors import DesignError
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc
-from sbafab.laminate.films import Film
-from sbafab.laminate.laminate import Layer, Pin, Role
+from sbafab.laminate.films import Film, in_order
+from sbafab.laminate.laminate import ROLES, Layer, Pin, Role
 
 
 @dataclass(frozen=True)
@@ -138,37 +140,43 @@ def channel_pin(name: str, centre: Point, bore: BoreSection) -> Pin:
     return Pin(name, centre, bore.pin, round(bore.diameter - bore.pin, 9))
 
 
-def films(design: Design) -> dict[str, Film]:
-    """The two films of a design by material."""
-    tpe, ptfe = design.films.tpe, design.films.ptfe
-    return {
-        "TPE": Film(
-            "TPE",
-            tpe.product,
-            tpe.thickness,
-            tpe.density,
-            tpe.melting_point,
-            ptfe.temperature_limit,
-        ),
-        "PTFE": Film(
-            "PTFE",
-            ptfe.product,
-            ptfe.thickness,
-            ptfe.density,
-            ptfe.temperature_limit,
-            ptfe.temperature_limit,
-        ),
-    }
+def film_of(design: Design, role: Role) -> Film:
+    """The film that a design's layup gives to the layers of a role.
+
+    Raises DesignError where it names none, or one that cannot do the role's work.
+    """
+    key = role.replace("-", "_")
+    name: str = getattr(design.layup, key)
+    stock = design.films.stock
+    wanted = "mask" if role.endswith("-mask") else "structural"
+    fit = [known for known, film in stock.items() if film.kind == wanted]
+    if name not in stock:
+        raise DesignError(
+            f"layup.{key} = {shown(name)} names no film; there are {listed(fit)} for it, and "
+            "[films.NAME] adds one"
+        )
+    if name not in fit:
+        raise DesignError(
+            f"layup.{key} = {shown(name)} is a {stock[name].kind} film, and a {role} is cut from a "
+            f"{wanted} one: {listed(fit)}"
+        )
+    return stock[name]
+
+
+def used_films(design: Design) -> dict[str, Film]:
+    """The films that a design's layup names, by material, TPE first. Raises DesignError."""
+    named = {film.material: film for role in ROLES for film in [film_of(design, role)]}
+    return {material: named[material] for material in in_order(named)}
 
 
 def layers(cuts: Iterable[CutFilm], design: Design) -> tuple[Layer, ...]:
     """The films in their order, with heights and pattern names."""
-    stock = films(design)
+    used_films(design)
     patterns: dict[tuple[str, Region], str] = {}
     placed: list[Layer] = []
     z = 0.0
     for index, cut in enumerate(cuts, start=1):
-        film = stock["PTFE" if cut.role.endswith("-mask") else "TPE"]
+        film = film_of(design, cut.role)
         shape = (film.material, cut.profile)
         pattern = patterns.setdefault(shape, f"P{len(patterns) + 1:02d}")
         placed.append(

@@ -22,6 +22,7 @@ from sbafab.as_built.derived import derived_job_problems, derived_problems
 from sbafab.as_built.joined import joined_findings, lowered_between
 from sbafab.as_built.meant import Meant, RunWork, departure, meant_by
 from sbafab.as_built.measures import (
+    batch_problems,
     fixture_problems,
     interface_problems,
     layer_problems,
@@ -212,7 +213,7 @@ def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None)
         meant: Meant | None = work.meant
     else:
         meant = meant_by(design, claims.curves) if is_own else None
-    problems += order_problems(claims)
+    problems += order_problems(claims, design)
     try:
         problems += file_problems(folder, claims)
     except OSError as error:
@@ -225,7 +226,7 @@ def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None)
     problems += unread
     layers = stacked_layers(files, design)
     problems += height_problems(claims, layers, design)
-    problems += property_problems(files, claims)
+    problems += property_problems(files, claims, design)
     problems += layer_problems(files, claims)
     problems += pattern_problems(layers, claims)
     if not of_job and panel is None:
@@ -236,7 +237,7 @@ def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None)
     if len(parts) == len(files):
         try:
             laminate = _laminate(files, claims, design, meant, panel)
-            problems += _laminate_problems(folder, laminate, claims, parts)
+            problems += _laminate_problems(folder, laminate, claims, parts, design)
             room = 2 * (TOLERANCE + chord_error)
             outline = meant.laminate.outline if meant is not None else Region()
             outlined = replace(laminate, outline=outline)
@@ -329,11 +330,13 @@ def _laminate_problems(
     laminate: Laminate,
     claims: Manifest,
     parts: Sequence[CutPart],
+    design: Design,
 ) -> list[Problem]:
     return [
         *interface_problems(laminate, claims, parts),
         *place_problems(laminate, claims),
         *fixture_problems(folder, laminate, claims),
+        *batch_problems(laminate, claims, design),
     ]
 
 

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from sbafab.actuators.stacking import film_of
 from sbafab.as_built.cut_files import LayerFile
 from sbafab.as_built.records import CLAIMS, Problem
 from sbafab.cutting.lightburn import ENDING
 from sbafab.cutting.properties import (
     LIMITS,
-    PTFE_WARNING,
     curves_property,
     kerf_properties,
     layer_path,
     limit_properties,
+    warning_property,
 )
 from sbafab.design.records import Design
 from sbafab.laminate.laminate import Layer
 from sbafab.output.manifest import file_hashes, kerf_claim
 from sbafab.output.manifest_records import JobManifest, KerfClaim, LayerClaim, Manifest
-from sbafab.output.settings import kerf_widths, limits
+from sbafab.output.settings import kerf_widths, limits, warnings
 from sbafab.rules.lowered import lowered
 
 HEIGHT = 1e-6
@@ -58,8 +60,8 @@ def file_problems(folder: Path, claims: Manifest | JobManifest) -> list[Problem]
     return problems
 
 
-def order_problems(claims: Manifest) -> list[Problem]:
-    """Indices, names and roles that do not fit their place in the stack."""
+def order_problems(claims: Manifest, design: Design) -> list[Problem]:
+    """Indices, names, roles and films that do not fit their place in the stack."""
     problems = []
     expected = _roles([layer.role for layer in claims.layers])
     for position, (layer, role) in enumerate(zip(claims.layers, expected, strict=True), start=1):
@@ -80,7 +82,7 @@ def order_problems(claims: Manifest) -> list[Problem]:
         if layer.role != role:
             message = f"layer {position} has the role {layer.role}, where the order asks for {role}"
             problems.append(claim(message, position))
-        if (layer.material == "PTFE") != layer.role.endswith("-mask"):
+        if layer.material != film_of(design, layer.role).material:
             message = f"layer {position} is {layer.material}, which no {layer.role} is made of"
             problems.append(claim(message, position))
     return problems
@@ -100,11 +102,11 @@ def _roles(roles: Sequence[str]) -> list[str]:
 def height_problems(claims: Manifest, layers: Sequence[Layer], design: Design) -> list[Problem]:
     """Thicknesses against the design's films, heights against their sums, balloon numbers."""
     problems = []
-    stock = {"TPE": design.films.tpe.thickness, "PTFE": design.films.ptfe.thickness}
+    stock = {film.material: film.thickness for film in design.films.stock.values()}
     placed = {layer.index: layer for layer in layers}
     z = 0.0
     for position, layer in enumerate(claims.layers, start=1):
-        nominal = stock[layer.material]
+        nominal = film_of(design, layer.role).thickness
         if abs(layer.thickness - nominal) > HEIGHT:
             problems.append(
                 claim(
@@ -142,9 +144,10 @@ def _film_problems(claims: Manifest, stock: Mapping[str, float]) -> list[Problem
         if abs(film.area - area) > 1e-4 * area:
             message = f"films: {film.area:g} mm2 of {material}, and its layers sum to {area:g}"
             problems.append(claim(message))
-        if abs(film.thickness - stock[material]) > HEIGHT:
-            message = f"films: {material} of {film.thickness:g} mm, and {stock[material]:g} in the "
-            problems.append(claim(f"{message}design"))
+        nominal = stock.get(material, math.nan)
+        if not abs(film.thickness - nominal) <= HEIGHT:
+            message = f"films: {material} of {film.thickness:g} mm, and {nominal:g} in the design"
+            problems.append(claim(message))
     return problems
 
 
@@ -195,15 +198,18 @@ def _kerf(said: KerfClaim | None) -> str:
     return "missing" if said is None else f"{said.state} ({said.width})"
 
 
-def property_problems(files: Iterable[LayerFile], claims: Manifest) -> list[Problem]:
+def property_problems(
+    files: Iterable[LayerFile], claims: Manifest, design: Design
+) -> list[Problem]:
     """Custom properties of the cut files that are not what the manifest says, alike ones as one."""
     where: dict[str, list[int]] = {}
     bare = [file for file in files if file.part is not None and not file.part.properties]
+    dangers = warnings(design)
     for file in files:
         if file.part is None or file in bare:
             continue
         found = file.part.properties
-        for name, said in _properties(file.claim, claims).items():
+        for name, said in _properties(file.claim, claims, dangers).items():
             if found.get(name) != said:
                 message = f"custom property {name} is {found.get(name)!r}, not {said!r}"
                 where.setdefault(message, []).append(file.position)
@@ -230,7 +236,9 @@ def bare_problem(files: str, has_units: bool, *layers: int) -> Problem:
     return Problem(CLAIMS, message, layers, verdict="warn")
 
 
-def _properties(layer: LayerClaim, claims: Manifest) -> dict[str, str | None]:
+def _properties(
+    layer: LayerClaim, claims: Manifest, dangers: Mapping[str, str]
+) -> dict[str, str | None]:
     kerf = claims.kerf.get(layer.material)
     width = kerf.width if kerf is not None else None
     return {
@@ -243,7 +251,7 @@ def _properties(layer: LayerClaim, claims: Manifest) -> dict[str, str | None]:
         **curves_property(claims.curves),
         **waiver_properties(claims),
         "GENERATOR": claims.generator,
-        **({"WARNING": PTFE_WARNING} if layer.material == "PTFE" else {}),
+        **warning_property(dangers.get(layer.material)),
     }
 
 

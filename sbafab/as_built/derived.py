@@ -36,6 +36,7 @@ from sbafab.output.manifest_records import JobManifest, Manifest
 from sbafab.output.planned import EVERYTHING, Checked, Planned, RunPart, plan, schedule_of
 from sbafab.output.settings import GENERATOR
 from sbafab.output.shop import find_nests, write_nested_sheets, write_second
+from sbafab.pressing.together import design_runs
 from sbafab.progress import unheard
 
 INDEX = "manifest.json"
@@ -118,7 +119,7 @@ def _write_anew(
     if parts is not None:
         nests = find_nests(parts, design, folder, unheard)
         sheets = write_nested_sheets(nests, design, fresh, settings, unheard)
-    write_fixture(laminate, fresh, settings)
+    write_fixture(laminate, fresh, settings, design_runs(design, laminate).places)
     write_second(laminate, fresh, settings)
     pressing = schedule_of(checked) if "press" in wanted else None
     planned = Planned(checked, frozenset(wanted), settings, pressing)

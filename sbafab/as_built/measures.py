@@ -10,11 +10,14 @@ from pathlib import Path
 from sbafab.as_built.claims import claim, waiver_properties
 from sbafab.as_built.cut_files import CutPart, LayerFile, read_part, told_of
 from sbafab.as_built.records import CLAIMS, INTEGRITY, Problem
+from sbafab.design.records import Design
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
+from sbafab.laminate.assembly import PLATE_MARGIN
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
 from sbafab.output.manifest_records import Manifest
+from sbafab.pressing.together import APART, are_apart
 from sbafab.rules.limits import TOLERANCE, at
 
 SHARE = 1e-4
@@ -226,7 +229,11 @@ def fixture_problems(folder: Path, laminate: Laminate, claims: Manifest) -> list
         return [Problem(INTEGRITY, f"{claims.fixture}: {said}")]
     circles = [hole.circle for hole in part.region.holes]
     holes = [("hole", c[0], 2 * c[1]) for c in circles if c is not None]
-    pins = [("hole", pin.centre, pin.diameter) for pin in laminate.pins]
+    pins = [
+        ("hole", (pin.centre[0] + x, pin.centre[1] + y), pin.diameter)
+        for x, y in _places(claims)
+        for pin in laminate.pins
+    ]
     room = TOLERANCE
     for name, stated in waiver_properties(claims).items() if part.properties else ():
         found = part.properties.get(name)
@@ -234,8 +241,48 @@ def fixture_problems(folder: Path, laminate: Laminate, claims: Manifest) -> list
             return [claim(f"{claims.fixture}: custom property {name} is {found!r}, not {stated!r}")]
     problems = _unmatched("pin's hole of the plate", pins, holes, room)
     if problems or len(circles) != len(pins):
-        return [claim(f"{claims.fixture} has other holes than the laminate has pins")]
+        of = "laminate has" if len(_places(claims)) == 1 else "laminates at its places have"
+        return [claim(f"{claims.fixture} has other holes than the {of} pins")]
     return []
+
+
+def batch_problems(laminate: Laminate, claims: Manifest, design: Design) -> list[Problem]:
+    """Cycles that do not make all copies, places that are too near or off the platen."""
+    if claims.copies == 1:
+        return []
+    batch = claims.batch
+    if batch is None:
+        return [claim("the manifest does not say how copies are pressed; write the folder anew")]
+    problems = []
+    if sum(batch.cycles) != claims.copies or max(batch.cycles) > len(batch.places):
+        problems.append(
+            claim(
+                f"the cycles press {sum(batch.cycles)} copies at {len(batch.places)} places, and "
+                f"{claims.copies} are ordered"
+            )
+        )
+    places, bounds = _places(claims), laminate.bounds
+    if not are_apart(places, bounds, 2 * TOLERANCE):
+        problems.append(claim(f"places in the press are less than {APART:g} mm apart"))
+    room = sorted((design.press.platen_width, design.press.platen_length))
+    margin = 2 * PLATE_MARGIN if laminate.pins else 0.0
+    taken = sorted(
+        max(p[i] for p in places) - min(p[i] for p in places) + bounds[i + 2] - bounds[i] + margin
+        for i in (0, 1)
+    )
+    if len(places) > 1 and any(a > b + 2 * TOLERANCE for a, b in zip(taken, room, strict=True)):
+        width, length = taken
+        problems.append(
+            claim(f"the places take {width:.1f} x {length:.1f} mm, more than the heated area has")
+        )
+    return problems
+
+
+def _places(claims: Manifest) -> tuple[Point, ...]:
+    """Where the laminates of a press cycle lie on their plate."""
+    if claims.batch is None:
+        return ((0.0, 0.0),)
+    return tuple((place.x, place.y) for place in claims.batch.places)
 
 
 def with_plate_pins(folder: Path, laminate: Laminate, claims: Manifest) -> Laminate:
@@ -248,7 +295,12 @@ def with_plate_pins(folder: Path, laminate: Laminate, claims: Manifest) -> Lamin
         return laminate
     names = {(pin.x, pin.y): pin.name for pin in claims.registration.pins}
     pins = list(laminate.pins)
-    for number, (centre, radius) in enumerate((h.circle for h in holes if h.circle), start=1):
+    low_x, low_y, high_x, high_y = laminate.bounds
+    middle = (low_x + high_x) / 2, (low_y + high_y) / 2
+    for number, (spot, radius) in enumerate((h.circle for h in holes if h.circle), start=1):
+        # As it lies in the laminate whose place is nearest.
+        found = [(spot[0] - x, spot[1] - y) for x, y in _places(claims)]
+        centre = min(found, key=lambda place: math.dist(place, middle))
         if not any(
             math.dist(pin.centre, centre) < LOOSE and abs(pin.diameter - 2 * radius) < LOOSE
             for pin in pins

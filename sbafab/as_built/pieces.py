@@ -14,8 +14,8 @@ from sbafab.as_built.records import CLAIMS, Problem
 from sbafab.cutting.verify import check_contours
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Mark, Region
-from sbafab.laminate.films import Material
-from sbafab.nesting.records import MATERIALS, Turn
+from sbafab.laminate.films import Material, in_order
+from sbafab.nesting.records import TURNS, Turn
 from sbafab.output.manifest_records import SheetClaim
 
 
@@ -99,9 +99,11 @@ def piece_problems(
 ) -> list[Problem]:
     """Pieces on the sheets that no layer has, or not as often as layers and copies ask for."""
     problems = []
-    for material in MATERIALS:
+    told = {sheet.told.material for sheet in sheets}
+    drawn = {file.claim.material for lot in lots for file in lot.files}
+    for material in in_order(told | drawn):
         own = [sheet for sheet in sheets if sheet.told.material == material]
-        kinds = _kinds_of(lots, material, turns[material], AGREED)
+        kinds = _kinds_of(lots, material, turns.get(material, TURNS), AGREED)
         cut: Counter[int] = Counter()
         for sheet in own:
             found, strangers = _sorted_out(sheet, kinds)
@@ -125,15 +127,19 @@ def _kinds_of(
     kinds = _Kinds(turns, room)
     for lot in lots:
         drawn = Counter(
-            (file.part.path, file.claim.pattern)
+            (file.part.path, file.claim.pattern, file.claim.role.endswith("-mask"))
             for file in lot.files
             if file.part is not None and file.claim.material == material
         )
-        spares = lot.spares if material == "PTFE" else 0
-        for (path, pattern), count in drawn.items():
+        # Spares are cut of masks alone, whatever film they are of.
+        counts: dict[tuple[Region, str], int] = {}
+        for (path, pattern, is_mask), count in drawn.items():
+            more = counts.get((path, pattern), lot.spares if is_mask else 0)
+            counts[path, pattern] = more + count * lot.copies
+        for (path, pattern), total in counts.items():
             for piece in path.pieces:
                 kind = kinds.find(piece) or kinds.add(piece)
-                kind.wanted[lot.design, pattern] += count * lot.copies + spares
+                kind.wanted[lot.design, pattern] += total
     return kinds
 
 

@@ -71,6 +71,9 @@ def sheet_problems(folder: Path, order: SheetOrder) -> list[Problem]:
     sheets: list[CutSheet] = []
     bare: list[ReadBack] = []
     for told in order.claims.sheets:
+        if told.material not in stock_of:
+            problems.append(claim(f"{told.file} is of {told.material}, no film of design.toml"))
+            continue
         try:
             found = _read(folder, told)
         except OutputError as error:

@@ -6,15 +6,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from sbafab.actuators.stacking import channel_pin, films
+from sbafab.actuators.stacking import channel_pin, film_of
 from sbafab.as_built.cut_files import LayerFile
 from sbafab.as_built.inlets import Tab, feeding, inner_point, tabs
 from sbafab.as_built.openings import ORIGIN, bores, tooling
 from sbafab.design.records import Design
 from sbafab.geometry.edges import Point
+from sbafab.laminate.films import Film
 from sbafab.laminate.interfaces import Interface, interface_regions
 from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Layer, Pin
-from sbafab.output.manifest_records import Manifest
+from sbafab.output.manifest_records import LayerClaim, Manifest
 
 
 def laminate_of(files: Sequence[LayerFile], claims: Manifest, design: Design) -> Laminate:
@@ -72,7 +73,6 @@ def laminate_of(files: Sequence[LayerFile], claims: Manifest, design: Design) ->
 
 def stacked_layers(files: Sequence[LayerFile], design: Design) -> tuple[Layer, ...]:
     """The layers whose files could be read, in the manifest's order; equal profiles one pattern."""
-    stock = films(design)
     patterns: dict[tuple[str, str], str] = {}
     layers = []
     z, balloon = 0.0, 0
@@ -80,7 +80,7 @@ def stacked_layers(files: Sequence[LayerFile], design: Design) -> tuple[Layer, .
         claim = file.claim
         following = files[number + 1].claim.role if number + 1 < len(files) else None
         balloon += claim.role == "chamber-mask"
-        is_below = claim.material == "TPE" and following == "chamber-mask"
+        is_below = not claim.role.endswith("-mask") and following == "chamber-mask"
         own = balloon + 1 if is_below else balloon
         if file.part is not None:
             shape = (claim.material, file.part.region.key)
@@ -88,7 +88,7 @@ def stacked_layers(files: Sequence[LayerFile], design: Design) -> tuple[Layer, .
                 Layer(
                     index=file.position,
                     role=claim.role,
-                    film=replace(stock[claim.material], thickness=claim.thickness),
+                    film=_film(claim, design),
                     profile=file.part.region,
                     balloon=None if claim.role == "sheet" or own == 0 else own,
                     z=round(z, 9),
@@ -98,6 +98,12 @@ def stacked_layers(files: Sequence[LayerFile], design: Design) -> tuple[Layer, .
             )
         z += claim.thickness
     return tuple(layers)
+
+
+def _film(claim: LayerClaim, design: Design) -> Film:
+    """The film of a layer's role, as thick and of the name that the manifest claims."""
+    film = film_of(design, claim.role)
+    return replace(film, material=claim.material, thickness=claim.thickness)
 
 
 def _pieces(layer: Layer, has_lumen: bool, chambers: int, places: int) -> int:

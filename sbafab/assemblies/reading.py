@@ -15,6 +15,7 @@ from sbafab.design.reading import (
     changed_keys,
     checked,
     design_path,
+    kit_names,
     listed,
     override,
     read_toml,
@@ -93,6 +94,7 @@ def part_design(assembly: Assembly, name: str, part: Sba) -> Design:
         data = override(table, [part.set, assembly.shared])
         data.setdefault("name", path.stem)
         _keep_outline(data, part, assembly.folder)
+        _keep_kit(data, part, assembly)
         own = _waivers(data)
         rules = [r for r in assembly.rules.waive if r in _deck_names() and r not in own]
         return validated(add_waivers(data, rules), records(), path.parent)
@@ -123,6 +125,14 @@ def _keep_outline(data: dict[str, Any], part: Sba, folder: Path) -> None:
     chamber = part.set.get("chamber")
     if isinstance(chamber, dict) and isinstance(chamber.get("outline"), str):
         data["chamber"]["outline"] = str((folder / chamber["outline"]).absolute())
+
+
+def _keep_kit(data: dict[str, Any], part: Sba, assembly: Assembly) -> None:
+    """Likewise a kit's file."""
+    kit = data.get("kit")
+    is_named_here = assembly.kit is not None or "kit" in part.set
+    if is_named_here and isinstance(kit, str) and kit not in kit_names():
+        data["kit"] = str((assembly.folder / kit).absolute())
 
 
 def _start_where_the_user_stands(data: dict[str, Any], changes: Sequence[Change]) -> None:

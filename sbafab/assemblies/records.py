@@ -11,7 +11,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from sbafab.design.records import NAME_PATTERN, Laser, Order, Press, RuleName, Section, Sheets
+from sbafab.design.records import NAME_PATTERN, Laser, Order, Press, RuleName, Sheets
+from sbafab.design.section import Section
 from sbafab.design.units import Length, LengthOrZero, Millimetres
 
 FAMILY = "assembly"
@@ -201,7 +202,7 @@ class AssemblyRules(Section):
 class Assembly(Section):
     """An assembly: a tree of parts with one root.
 
-    ``sheets``, ``laser`` and ``press``, where given, count for every part's design.
+    ``kit``, ``sheets``, ``laser`` and ``press``, where given, count for every part's design.
     """
 
     name: str = Field(pattern=NAME_PATTERN)
@@ -218,6 +219,8 @@ class Assembly(Section):
     deploy: Deploy = Deploy()
     rules: AssemblyRules = AssemblyRules()
     order: Order = Order()
+    kit: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
+    """The kit of all parts' designs, in place of their own: a kit's name, or a file beside this."""
     sheets: Sheets | None = None
     """Sheets for all parts' designs, in place of their own."""
     laser: Laser | None = None
@@ -242,7 +245,8 @@ class Assembly(Section):
     def shared(self) -> dict[str, Any]:
         """The keys that are set here for every part's design."""
         sections = {"sheets": self.sheets, "laser": self.laser, "press": self.press}
-        return {
+        kit = {} if self.kit is None else {"kit": self.kit}
+        return kit | {
             name: section.model_dump(exclude_unset=True)
             for name, section in sections.items()
             if section is not None

@@ -15,7 +15,7 @@ DESIGN_FILE = "design.toml"
 def resolved(assembled: Assembled) -> dict[str, Any]:
     """The assembly with every default written out; designs are those of the parts' folders."""
     assembly = assembled.assembly
-    table = assembly.model_dump(mode="json", exclude={"sheets", "laser", "press"})
+    table = assembly.model_dump(mode="json", exclude={"kit", "sheets", "laser", "press"})
     for name, part in table["parts"].items():
         made = assembled[name].made
         if made is not None:

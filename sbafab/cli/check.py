@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from sbafab.progress import Progress
     from sbafab.rules.finding import Finding
 
-    Told = tuple[str, tuple[Finding, ...], list[str]]
-    """What was checked ("design" or "as-built"), what was found, and notes on the designs."""
+    Told = tuple[str, tuple[Finding, ...], list[str], list[Design]]
+    """What was checked ("design" or "as-built"), what was found, notes, and the designs."""
 
 
 @click.command()
@@ -45,18 +45,21 @@ def check(
     FOLDER is one that sbafab generate has written: its files are read back as they lie on disk.
     """
     from sbafab.cli.printing import console, findings_table, print_json
+    from sbafab.design.kits import cited
     from sbafab.output.manifest import checks
     from sbafab.rules.deck import has_failed
 
-    kind, findings, notes = _findings(source, assignments, waivers, target_yield, as_json)
+    kind, findings, notes, designs = _findings(source, assignments, waivers, target_yield, as_json)
     advice = None if target_yield is None else _advice(source, assignments, target_yield)
     if as_json:
-        said = {"advice": advice.as_dict()} if advice else {}
-        print_json({**checks(findings, kind), "notes": notes, **said})
+        advised = {"advice": advice.as_dict()} if advice else {}
+        print_json({**checks(findings, kind, designs), "notes": notes, **advised})
     else:
         out = console()
         if kind == "as-built":
             out.print(f"as built: {source}", markup=False, soft_wrap=True)
+        for said in dict.fromkeys(map(cited, designs)):
+            out.print(said, markup=False, soft_wrap=True)
         for note in notes:
             out.print(f"note: {note}", markup=False, soft_wrap=True)
         out.print(findings_table(findings))
@@ -76,7 +79,7 @@ def _of_design(design: Design, progress: Progress) -> Told:
     checked = Checked(design, *run_check(design, progress))
     if not checked.failed:
         refuse_undoable([checked])
-    return "design", checked.findings, notes_of([checked])
+    return "design", checked.findings, notes_of([checked]), [design]
 
 
 def _of_assembly(assembly: Assembly, progress: Progress) -> Told:
@@ -88,7 +91,8 @@ def _of_assembly(assembly: Assembly, progress: Progress) -> Told:
     checked = check_assembly(assembly, progress)
     if not checked.failed:
         refuse_undoable(checked.designs)
-    return "design", checked.findings, notes_of(checked.designs)
+    designs = [one.design for one in checked.designs]
+    return "design", checked.findings, notes_of(checked.designs), designs
 
 
 def _advice(source: str, assignments: tuple[str, ...], target: float) -> Advice:
@@ -141,4 +145,4 @@ def _findings(
 
     # A broken file is told of in a finding; what ezdxf logs of it would stand in between.
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())
-    return "as-built", check_folder(Path(source)), []
+    return "as-built", check_folder(Path(source)), [], []

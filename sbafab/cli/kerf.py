@@ -17,10 +17,11 @@ if TYPE_CHECKING:
 @click.argument("measurements", type=click.Path(path_type=Path))
 @click.option(
     "--material",
-    type=click.Choice(["tpe", "ptfe"]),
+    callback=lambda context, option, name: _film(name),
     default="tpe",
     show_default=True,
-    help="The film that the coupon was cut from.",
+    metavar="FILM",
+    help="The film that the coupon was cut from: tpe, ptfe or a further one of a kit.",
 )
 @click.option(
     "--resolution",
@@ -51,7 +52,7 @@ def kerf(
         raise DesignError("--split-xy needs two sizes along x and two along y; fill in more rows")
     widths = _widths(found, split_xy)
     warnings = _warnings(found, widths)
-    block = _to_paste(f"kerf_{material}", widths, warnings)
+    block = _to_paste(*_place_in_design(material), widths, warnings)
     if as_json:
         print_json(
             {
@@ -77,6 +78,19 @@ def kerf(
     click.echo(f"\n{block.rstrip()}")
 
 
+def _film(name: str) -> str:
+    from sbafab.design.films import FILM_NAME
+
+    if not FILM_NAME.fullmatch(name):
+        raise click.BadParameter(f"{name!r} names no film; give tpe, ptfe or another's table")
+    return name
+
+
+def _place_in_design(film: str) -> tuple[str, str]:
+    """Table and key of a film's kerf."""
+    return ("[laser]", f"kerf_{film}") if film in ("tpe", "ptfe") else (f"[films.{film}]", "kerf")
+
+
 def _as_dict(estimate: Estimate | None) -> dict[str, object] | None:
     if estimate is None:
         return None
@@ -100,12 +114,12 @@ def _widths(found: Calibration, split_xy: bool | None) -> Widths:
     return (found.overall,)
 
 
-def _to_paste(key: str, widths: Widths, warnings: list[str]) -> str:
+def _to_paste(table: str, key: str, widths: Widths, warnings: list[str]) -> str:
     """The lines for the design file; doubt goes with them, so that no bare value is pasted."""
     values = [f"{estimate.kerf.value:.3f}" for estimate in widths]
     value = values[0] if len(values) == 1 else f"[{', '.join(values)}]"
     doubts = "".join(f"# warning: {warning}\n" for warning in warnings)
-    return f"[laser]\n{doubts}{key} = {value}\n"
+    return f"{table}\n{doubts}{key} = {value}\n"
 
 
 def _told(value: Value, unit: str = " mm") -> str:
@@ -127,7 +141,7 @@ def _remark(found: Calibration, widths: Widths) -> str:
 
 def _warnings(found: Calibration, widths: Widths) -> list[str]:
     """What speaks against cutting with these widths, a sentence each."""
-    from sbafab.design.records import is_kerf
+    from sbafab.design.films import is_kerf
 
     places = ("",) if len(widths) == 1 else (" along x", " along y")
     told = [

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 COUPON = "coupon"
+KIT = "kit"
 
 
 @click.command()
@@ -17,16 +18,27 @@ def new(template: str, file: Path | None) -> None:
     """Write a commented design file to start from (FILE: by default TEMPLATE.toml here).
 
     TEMPLATE "coupon" writes the kerf's calibration piece, its picture and its table to fill in
-    (FILE is then a folder: by default coupon).
+    (FILE is then a folder: by default coupon). TEMPLATE "kit" writes the paper's films, tubes,
+    press, laser and limits with their sources, to be made your lab's (by default kit.toml).
     """
     if template == COUPON:
         _coupon(file or Path(COUPON))
+        return
+    if template == KIT:
+        _kit(file or Path("kit.toml"))
         return
     from sbafab.design.reading import write_new
 
     written = write_new(template, file)
     path = shlex.quote(str(written))
     click.echo(f"{written} is yours to edit; then: sbafab generate {path}")
+
+
+def _kit(file: Path) -> None:
+    from sbafab.design.kits import write_kit
+
+    path = shlex.quote(str(write_kit(file)))
+    click.echo(f'{path} is yours to edit; then: sbafab generate DESIGN --set kit="{path}"')
 
 
 def _coupon(folder: Path) -> None:

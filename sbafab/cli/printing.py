@@ -204,7 +204,7 @@ def job_json(job: Run) -> dict[str, object]:
 
 
 def _made(run: Run) -> Iterator[tuple[str, str]]:
-    from sbafab.cutting.properties import PTFE_WARNING
+    from sbafab.pressing.together import batch_times, design_runs
 
     index = run.manifest
     lam = run.laminate
@@ -218,6 +218,7 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
         "design",
         f"{lam.name} ({lam.family}, {balloons}), {index['design_sha256'][:12]}",
     )
+    yield "kit", f"{index['kit']['name']}, version {index['kit']['version']}"
     yield "sizes", ", ".join(f"{k.replace('_', ' ')} {v:.3f}" for k, v in sizes.items()) + " mm"
     yield (
         "layers",
@@ -251,9 +252,19 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
             f"{len(run.schedule.steps)} steps, {run.schedule.total_press_minutes:g} min at "
             f"{run.schedule.steps[0].temperature_c:g} C, {force:.3f} kN; press.json, press.csv",
         )
+        runs = design_runs(run.design, lam)
+        if runs.copies > 1:
+            took = batch_times(runs, run.schedule)
+            sizes = ", ".join(map(str, dict.fromkeys(runs.cycles)))
+            yield (
+                "batch",
+                f"{runs.copies} copies in {runs.count} press cycle{'s' if runs.count > 1 else ''} "
+                f"of {sizes}: {took.press:g} min in the press, {took.total:g} min in all",
+            )
     yield from _for_simulation(run)
     if cut:
-        yield "warning", PTFE_WARNING
+        for said in index["warnings"]:
+            yield "warning", said
     for note in lam.notes:
         yield "note", note
     for warning in run.schedule.warnings if run.schedule is not None else ():

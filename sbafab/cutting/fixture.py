@@ -1,7 +1,8 @@
-"""The fixture: the base plate of the press, with a hole for every dowel pin of one laminate."""
+"""The fixture: the base plate of the press, with a hole for every dowel pin of a press cycle."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from sbafab.cutting.chords import in_chords
@@ -13,60 +14,90 @@ from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, polygon, rectangle
+from sbafab.laminate.assembly import PLATE_MARGIN
 from sbafab.laminate.laminate import Laminate
 
 PATH = "sheets/fixture.dxf"
-MARGIN = 6.0
-"""mm of plate that pictures show round everything that lies on it."""
 CHAMFER = 5.0
+ONE: tuple[Point, ...] = ((0.0, 0.0),)
+"""The place of a laminate that is pressed by itself."""
 
 
-def fixture(laminate: Laminate, platen: tuple[float, float]) -> Region | None:
+def fixture(
+    laminate: Laminate, platen: tuple[float, float], places: Sequence[Point] = ONE
+) -> Region | None:
     """The base plate in the layers' own frame; None for a laminate without pins.
 
-    As large as the platen (mm), so that the pad rests on it all round; the laminate lies in its
-    middle. One corner is cut off, at the largest x and y: it tells which way round layers and plate
-    go.
+    As large as the platen (mm), so that the pad rests on it all round; in its middle lie the
+    ``places``, and at each it has all holes of a laminate that is moved there. One corner is cut
+    off, at the largest x and y: it tells which way round layers and plate go.
     """
-    if not laminate.pins:
-        return None
-    x0, y0 = plate_corner(laminate, platen)
-    x1, y1 = x0 + platen[0], y0 + platen[1]
+    return whole_plate(laminate, platen, places) if laminate.pins else None
+
+
+def whole_plate(
+    laminate: Laminate, platen: tuple[float, float], places: Sequence[Point] = ONE
+) -> Region:
+    """The base plate in the layers' own frame, plain where the laminate has no pins."""
+    x0, y0 = plate_corner(laminate, platen, places)
+    width, length = _as_it_lies(platen, _lying(laminate, places))
+    x1, y1 = x0 + width, y0 + length
     plate = polygon([(x0, y0), (x1, y0), (x1, y1 - CHAMFER), (x1 - CHAMFER, y1), (x0, y1)])
-    return _drilled(plate, laminate)
+    return _drilled(plate, laminate, places)
 
 
-def plate_corner(laminate: Laminate, platen: tuple[float, float]) -> Point:
+def plate_corner(
+    laminate: Laminate, platen: tuple[float, float], places: Sequence[Point] = ONE
+) -> Point:
     """The plate's corner of least x and y, to 0.1 mm: where its holes are measured from."""
-    low_x, low_y, high_x, high_y = _lying(laminate)
-    middle = (low_x + high_x) / 2, (low_y + high_y) / 2
-    return round(middle[0] - platen[0] / 2, 1), round(middle[1] - platen[1] / 2, 1)
+    box = low_x, low_y, high_x, high_y = _lying(laminate, places)
+    width, length = _as_it_lies(platen, box)
+    return round((low_x + high_x - width) / 2, 1), round((low_y + high_y - length) / 2, 1)
 
 
 def shown(laminate: Laminate) -> Region | None:
-    """The part of the base plate round the laminate, as pictures show it; None without pins."""
+    """The part of the base plate round one laminate, as pictures show it; None without pins."""
     if not laminate.pins:
         return None
     low_x, low_y, high_x, high_y = _lying(laminate)
-    low, high = (low_x - MARGIN, low_y - MARGIN), (high_x + MARGIN, high_y + MARGIN)
+    low, high = (
+        (low_x - PLATE_MARGIN, low_y - PLATE_MARGIN),
+        (high_x + PLATE_MARGIN, high_y + PLATE_MARGIN),
+    )
     return _drilled(rectangle(low, high), laminate)
 
 
-def _lying(laminate: Laminate) -> Bounds:
-    """The box round what lies on the plate: the laminate, or its registered sheets."""
-    return laminate.bounds if laminate.panel is None else laminate.panel.outline.bounds
+def _as_it_lies(platen: tuple[float, float], box: Bounds) -> tuple[float, float]:
+    """Width and length of the plate, turned where what lies on it fits in that way only."""
+    wide, high = box[2] - box[0], box[3] - box[1]
+    width, length = platen
+    turn = (wide > width or high > length) and wide <= length and high <= width
+    return (length, width) if turn else platen
 
 
-def _drilled(plate: Region, laminate: Laminate) -> Region:
-    return plate - union(disc(pin.centre, pin.diameter / 2) for pin in laminate.pins)
+def _lying(laminate: Laminate, places: Sequence[Point] = ONE) -> Bounds:
+    """The box round what lies on the plate: the laminates, or their registered sheets."""
+    box = laminate.bounds if laminate.panel is None else laminate.panel.outline.bounds
+    xs, ys = [x for x, _ in places], [y for _, y in places]
+    return min(xs) + box[0], min(ys) + box[1], max(xs) + box[2], max(ys) + box[3]
 
 
-def write_fixture(laminate: Laminate, folder: Path, settings: CutSettings) -> str | None:
+def _drilled(plate: Region, laminate: Laminate, places: Sequence[Point] = ONE) -> Region:
+    return plate - union(
+        disc((pin.centre[0] + x, pin.centre[1] + y), pin.diameter / 2)
+        for x, y in places
+        for pin in laminate.pins
+    )
+
+
+def write_fixture(
+    laminate: Laminate, folder: Path, settings: CutSettings, places: Sequence[Point] = ONE
+) -> str | None:
     """Writes and reads back the plate's cut file; its path in ``folder``, None without pins.
 
     Nominal edges: the holes are to be reamed to the pins.
     """
-    plate = fixture(laminate, settings.platen)
+    plate = fixture(laminate, settings.platen, places)
     if plate is None:
         return None
     properties = fixture_properties(settings)

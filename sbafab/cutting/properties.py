@@ -7,20 +7,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
-from sbafab.design.records import is_kerf
+from sbafab.design.films import is_kerf
 from sbafab.errors import OutputError
 from sbafab.geometry.beam import Kerf, widths
-from sbafab.laminate.films import Material
+from sbafab.laminate.films import PTFE_WARNING, Material
 
 UNCALIBRATED = "uncalibrated: nominal edges"
 COMPENSATED = "compensated"
 LIMITS = "LIMITS"
 CHORDS = "chords within"
 FOLDER = "layers"
-PTFE_WARNING = (
-    "Hot PTFE gives off toxic fumes (COF2, HF): cut it with a laser only on a machine whose owner "
-    "permits PTFE, or use a drag knife."
-)
 
 
 @dataclass(frozen=True)
@@ -31,8 +27,8 @@ class CutSettings:
     it was not measured.
     ``waived``: names of the waived rules; ``lowered``: limits below the usual ones, as
     ``rules.lowered`` says them.
-    ``generator``: program and version, for example ``sbafab 1.0.0``. ``platen``: size of the base
-    plate in mm.
+    ``generator``: program and version, for example ``sbafab 1.0.0``. ``warnings``: what the files
+    of a material must say. ``platen``: size of the base plate in mm.
     """
 
     design: str
@@ -42,6 +38,7 @@ class CutSettings:
     lowered: tuple[str, ...] = ()
     curves: Curves = TRUE_ARCS
     generator: str = "sbafab"
+    warnings: Mapping[str, str] = field(default_factory=lambda: {"PTFE": PTFE_WARNING})
     platen: tuple[float, float] = (152.4, 152.4)
 
     def kerf_width(self, material: Material) -> Kerf | None:
@@ -51,9 +48,7 @@ class CutSettings:
 def file_properties(settings: CutSettings, material: Material, pattern: str) -> dict[str, str]:
     """Custom properties of the cut file of one pattern, equal for all layers that share it."""
     properties = _properties(settings, material, pattern, settings.kerf_width(material))
-    if material == "PTFE":
-        properties["WARNING"] = PTFE_WARNING
-    return properties
+    return {**properties, **warning_property(settings.warnings.get(material))}
 
 
 def sheet_properties(
@@ -64,9 +59,7 @@ def sheet_properties(
         **_properties(settings, material, f"sheet {sheet}", settings.kerf_width(material)),
         "PARTS": parts,
     }
-    if material == "PTFE":
-        properties["WARNING"] = PTFE_WARNING
-    return properties
+    return {**properties, **warning_property(settings.warnings.get(material))}
 
 
 def fixture_properties(settings: CutSettings) -> dict[str, str]:
@@ -107,6 +100,11 @@ def _properties(
         "GENERATOR": settings.generator,
         **curves_property(said_of(settings.curves)),
     }
+
+
+def warning_property(said: str | None) -> dict[str, str]:
+    """What a cut file says of the dangers of its film."""
+    return {"WARNING": said} if said else {}
 
 
 def limit_properties(lowered: Sequence[str]) -> dict[str, str]:

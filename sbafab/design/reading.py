@@ -19,6 +19,9 @@ from sbafab.errors import DesignError
 Change = str | Mapping[str, Any]
 """A key to set: "key.path=value", or a table of keys, which may be dotted, with their values."""
 OUTLINE = "chamber.outline"
+KIT = "kit"
+KITS = "kits"
+"""The folder of the kits that ship, among the templates."""
 AnyRecord = TypeVar("AnyRecord", bound=BaseModel)
 AnyDesign = TypeVar("AnyDesign", bound=Design)
 MOST_BYTES = 1_000_000
@@ -39,6 +42,11 @@ def templates_folder() -> Path:
 
 def template_names() -> list[str]:
     return sorted(path.stem for path in templates_folder().glob("*.toml"))
+
+
+def kit_names() -> list[str]:
+    """The kits that ship."""
+    return sorted(path.stem for path in (templates_folder() / KITS).glob("*.toml"))
 
 
 def design_path(source: str | Path) -> Path:
@@ -149,17 +157,26 @@ def _set(table: dict[str, Any], key: str, value: Any) -> None:
 
 
 def start_where_the_user_stands(data: dict[str, Any], changes: Iterable[Change]) -> None:
-    """A drawing's path that a change names starts there, not at the design file."""
-    if OUTLINE in changed_keys(changes):
+    """The path of a drawing or a kit that a change names starts there, not at the design file."""
+    keys = set(changed_keys(changes))
+    if OUTLINE in keys:
         chamber = data["chamber"]
         chamber["outline"] = str(Path(str(chamber["outline"])).absolute())
+    if KIT in keys and isinstance(data[KIT], str) and data[KIT] not in kit_names():
+        data[KIT] = str(Path(data[KIT]).absolute())
 
 
 def changed(design: AnyDesign, changes: Iterable[Change]) -> AnyDesign:
     """The same design with changes made to its keys. Raises DesignError with one sentence."""
+    from sbafab.design.kits import under_kit, without_kit
+
     changes = list(changes)
-    data = override(plain_tables(design), changes)
+    data = plain_tables(design)
+    if KIT in changed_keys(changes):
+        data = without_kit(data, design)
+    data = override(data, changes)
     start_where_the_user_stands(data, changes)
+    data = under_kit(data, design.folder)
     family = type(design)
     return checked(family, data, {design.family: family}).placed(design.folder)
 
@@ -204,7 +221,9 @@ def validated(
         near = difflib.get_close_matches(shown(family).strip("'"), families, 1)
         hint = f"; did you mean {near[0]}?" if near else ""
         raise DesignError(f"family = {shown(family)} must be one of {listed(families)}{hint}")
-    return checked(families[family], data, families).placed(folder)
+    from sbafab.design.kits import under_kit
+
+    return checked(families[family], under_kit(data, folder), families).placed(folder)
 
 
 def checked(
@@ -364,10 +383,14 @@ def write_new(template: str, file: Path | None) -> Path:
         near = difflib.get_close_matches(template, names, 1)
         hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
         raise DesignError(f"{shown(template)} is not a template; {hint}")
-    target = file or Path(f"{template}.toml")
-    text = (templates_folder() / f"{template}.toml").read_text(encoding="utf-8")
-    name = re.sub(r"[^A-Za-z0-9._-]+", "-", target.stem).strip("-._") or template
-    text = text.replace(f'name = "{template}"', f'name = "{name}"', 1)
+    return write_copy(templates_folder() / f"{template}.toml", file or Path(f"{template}.toml"))
+
+
+def write_copy(source: Path, target: Path) -> Path:
+    """Copies a commented file, named after the new one; never over an old one."""
+    text = source.read_text(encoding="utf-8")
+    name = re.sub(r"[^A-Za-z0-9._-]+", "-", target.stem).strip("-._") or source.stem
+    text = text.replace(f'name = "{source.stem}"', f'name = "{name}"', 1)
     try:
         with target.open("x", encoding="utf-8", newline="\n") as opened:
             opened.write(text)

@@ -7,21 +7,20 @@ and says so. Lengths are mm.
 from __future__ import annotations
 
 import math
-import re
 from abc import abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator
+from pydantic import Field, PrivateAttr
 
+from sbafab.design.films import UNCALIBRATED, Films, KerfWidth, LayerFilms, Sheet
 from sbafab.design.form import Form
-from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
-from sbafab.geometry.beam import Kerf
+from sbafab.design.section import Section
+from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres
 from sbafab.notebook import table_html
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
-UNCALIBRATED: Literal["uncalibrated"] = "uncalibrated"
 RuleName = Literal[
     "bond-width",
     "mask-overhang",
@@ -40,66 +39,6 @@ RuleName = Literal[
     "registration-worst-case",
     "registration-yield",
 ]
-
-
-_UNWRITABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
-"""Control characters but tab and line end, and what XML 1.0 does not allow at all."""
-
-
-class Section(BaseModel):
-    """A frozen table of a design file that knows all its keys.
-
-    Texts stand in pictures, pages and tables, so they hold no character that cannot be written
-    there.
-    """
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, use_attribute_docstrings=True
-    )
-
-    @field_validator("*")
-    @classmethod
-    def _can_be_written(cls, value: object) -> object:
-        found = _UNWRITABLE.search(value) if isinstance(value, str) else None
-        if found is not None:
-            raise ValueError(
-                f"must be plain text; remove the character U+{ord(found[0]):04X} "
-                f"at place {found.start() + 1}"
-            )
-        return value
-
-
-class TpeFilm(Section):
-    """The structural film that is bonded."""
-
-    product: str = Field(default="Stretchlon 200", max_length=80)
-    """What to order."""
-    thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.038
-    """Thickness of the structural film."""
-    density: float = Field(default=1122.0, gt=0, le=20000)
-    """kg/m3, measured (paper Sec. 3.2.1)."""
-    melting_point: float = Field(default=120.0, gt=0, le=400)
-    """C; the press must be hotter."""
-
-
-class PtfeFilm(Section):
-    """The film of the masks, which nothing bonds to."""
-
-    product: str = Field(default="PTFE film", max_length=80)
-    """What to order."""
-    thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.025
-    """Thickness of the mask film."""
-    density: float = Field(default=2200.0, gt=0, le=20000)
-    """kg/m3, handbook value."""
-    temperature_limit: float = Field(default=260.0, gt=0, le=400)
-    """C; the usual limit for PTFE in lasting use."""
-
-
-class Films(Section):
-    """What the layers are cut from."""
-
-    tpe: TpeFilm = TpeFilm()
-    ptfe: PtfeFilm = PtfeFilm()
 
 
 class Bond(Section):
@@ -150,6 +89,10 @@ class Inlet(Section):
     """The tubing to order."""
     tube_outer_diameter: Length = 1.016
     """Outer diameter of the tubing."""
+    adhesive: str = Field(
+        default="Loctite Vinyl, Fabric & Plastic Flexible Adhesive", min_length=1, max_length=120
+    )
+    """What seals tube and mouth (paper Sec. 2)."""
     width: Length | None = None
     """Width of the inlet strip; by default what tube and strip need together, with cutting error
     and an unknown kerf taken off, rounded up to 0.05."""
@@ -254,14 +197,6 @@ class Press(Section):
     """Step 4: the whole laminate, full bond."""
 
 
-KerfWidth = LengthOrZero | tuple[LengthOrZero, LengthOrZero] | Literal["uncalibrated"]
-
-
-def is_kerf(x: float, y: float) -> bool:
-    """Whether a beam may be so wide: up to a millimetre, and nowhere ten times as wide."""
-    return min(x, y) >= 0 and max(x, y) <= min(1.0, 10 * min(x, y)) and math.isfinite(x + y)
-
-
 class Laser(Section):
     """The laser: what it can cut, its kerf, speeds for estimates."""
 
@@ -282,45 +217,6 @@ class Laser(Section):
     """Full kerf width in PTFE, measured, likewise."""
     unknown_kerf: Annotated[float, Millimetres(0, 1)] = 0.1
     """What a kerf that was not measured may take off the width of a part: ours."""
-
-    @field_validator("kerf_tpe", "kerf_ptfe", mode="before")
-    @classmethod
-    def _kerf(cls, value: object) -> Kerf | str:
-        if value == UNCALIBRATED:
-            return UNCALIBRATED
-        pair = list(value) if isinstance(value, list | tuple) else [value, value]
-        try:
-            x, y = map(millimetres, pair)
-        except ValueError:
-            x = y = -1.0
-        if not is_kerf(x, y):
-            raise ValueError(
-                "must be a length from 0 to 1 mm, or two of them, [along x, along y], neither over "
-                'ten times the other, or "uncalibrated"'
-            )
-        return x if x == y else (x, y)
-
-
-SheetPin = Annotated[tuple[LengthOrZero, LengthOrZero, Length], Field(strict=False)]
-
-
-class Sheet(Section):
-    """Film to cut from, as it lies on the machine."""
-
-    width: Annotated[float, Millimetres(SHORTEST, 10000)] = 152.4
-    """Size along x; the heated area of the paper's press."""
-    length: Annotated[float, Millimetres(SHORTEST, 10000)] = 152.4
-    """Size along y; of a roll, the most that is unrolled for one sheet."""
-    roll: bool = False
-    """Whether it comes off a roll: a sheet then ends where its parts do."""
-    border: LengthOrZero = 10.0
-    """What is left free along every edge of the sheet."""
-    spacing: Annotated[float, Millimetres(SHORTEST, 100)] = 1.0
-    """Least distance between two parts' cuts, and to pins."""
-    pins: tuple[SheetPin, ...] = Field(default=(), max_length=100, strict=False)
-    """What holds the sheet down: x, y from its lower left corner, and diameter."""
-    most: int = Field(default=20, ge=1, le=1000)
-    """Sheets that may be used."""
 
 
 class Sheets(Section):
@@ -393,6 +289,9 @@ class Design(Section):
     """Names the output folder: letters, digits, dot, dash, underscore."""
     family: str
     """Which kind of actuator this is."""
+    kit: str = Field(default="paper", min_length=1, max_length=1000)
+    """The lab's films, tubes, press, laser and limits: "paper", or a file beside the design. It
+    gives every key of its sections that the design leaves out."""
     stack: Stack = Stack()
     bond: Bond = Bond()
     mask: Mask = Mask()
@@ -400,6 +299,7 @@ class Design(Section):
     fillet: Fillet = Fillet()
     inlet: Inlet = Inlet()
     films: Films = Films()
+    layup: LayerFilms = LayerFilms()
     registration: Registration = Registration()
     panel: PanelSection = PanelSection()
     press: Press = Press()

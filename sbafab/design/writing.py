@@ -7,7 +7,8 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from sbafab.design.records import Design
+from sbafab.design.films import LayerFilms
+from sbafab.design.records import Design, Inlet
 
 
 def resolved(design: Design) -> dict[str, Any]:
@@ -53,9 +54,24 @@ def design_toml(design: Design) -> str:
     return tomli_w.dumps(resolved(design))
 
 
+def _as_first_hashed(table: dict[str, Any], design: Design) -> dict[str, Any]:
+    """The table with the kit's hash for its path, and without what came later and is not used.
+
+    A design that says nothing of kit and layup keeps the hash that it had before there were any.
+    """
+    from sbafab.design.kits import DEFAULT, kit_of
+
+    table["kit"] = kit_of(design).sha256 if design.kit != DEFAULT else None
+    if design.layup == LayerFilms():
+        table["layup"] = None
+    if design.inlet.adhesive == Inlet().adhesive:
+        table["inlet"]["adhesive"] = None
+    return _without_none(table)
+
+
 def design_sha256(design: Design) -> str:
     """Hash of all that decides the output; a drawn outline counts by its content, not its path."""
-    table = resolved(design)
+    table = _as_first_hashed(resolved(design), design)
     if design.drawing is not None:
         table["chamber"]["outline"] = hashlib.sha256(design.drawing.read_bytes()).hexdigest()
     text = json.dumps(table, sort_keys=True, separators=(",", ":"), ensure_ascii=False)

@@ -16,6 +16,8 @@ BondState = Literal["flash", "full"]
 StepName = Literal[
     "flash_bottom", "tack_bottom", "bond_bottom", "flash_middle", "tack_all", "bond_all"
 ]
+PLATE_MARGIN = 6.0
+"""mm of base plate round everything that lies on it."""
 
 
 @dataclass(frozen=True)

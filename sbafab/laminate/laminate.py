@@ -9,15 +9,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, get_args
 
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
-from sbafab.laminate.films import Film
+from sbafab.laminate.films import Film, in_order
 from sbafab.laminate.interfaces import Interface, InterfaceKind, interface_regions
 from sbafab.laminate.panel import SheetPanel
 
 Role = Literal["base", "wall", "cap", "sheet", "chamber-mask", "separator-mask"]
+ROLES: tuple[Role, ...] = get_args(Role)
 
 NOTHING = Region()
 LOOSE = 0.2
@@ -53,7 +54,7 @@ class Layer:
 
     @property
     def is_mask(self) -> bool:
-        return self.film.material == "PTFE"
+        return self.film.is_mask
 
     def _repr_html_(self) -> str:
         from sbafab.laminate.picture import layer_html
@@ -167,7 +168,13 @@ class Laminate:
 
     @cached_property
     def tpe_layers(self) -> tuple[Layer, ...]:
+        """The layers that bond: all of structural films, TPE or further ones."""
         return tuple(layer for layer in self.layers if not layer.is_mask)
+
+    @property
+    def bonded_materials(self) -> str:
+        """The materials of the films that bond, in words."""
+        return ", ".join(in_order(layer.film.material for layer in self.tpe_layers))
 
     @cached_property
     def patterns(self) -> dict[str, tuple[Layer, ...]]:
@@ -239,6 +246,7 @@ __all__ = [
     "InterfaceKind",
     "Laminate",
     "Layer",
+    "ROLES",
     "Pin",
     "Role",
 ]

@@ -8,7 +8,7 @@ from xml.sax.saxutils import escape
 
 from sbafab.geometry.edges import Bounds
 from sbafab.geometry.svg import number, path_data
-from sbafab.laminate.inks import INK
+from sbafab.laminate.inks import ink
 from sbafab.notebook import table_html
 
 if TYPE_CHECKING:
@@ -47,8 +47,8 @@ def _legend(bounds: Bounds, layers: Iterable[Layer]) -> str:
     bar = max((step for step in BARS if step < longer / 3), default=BARS[0])
     films = dict.fromkeys(layer.film for layer in layers)
     swatches = "".join(
-        f'<span style="background:{INK[film.material].fill};border:1px solid '
-        f'{INK[film.material].line}">&emsp;</span> {film.material}, {escape(film.product)}, '
+        f'<span style="background:{ink(film).fill};border:1px solid '
+        f'{ink(film).line}">&emsp;</span> {film.material}, {escape(film.product)}, '
         f"{number(film.thickness)} mm &ensp; "
         for film in films
     )
@@ -73,9 +73,9 @@ def laminate_svg(laminate: Laminate) -> str:
 
 
 def _profile(layer: Layer, opacity: float) -> str:
-    ink = INK[layer.film.material]
+    own = ink(layer.film)
     return (
-        f'<path d="{path_data(layer.profile)}" fill="{ink.fill}" stroke="{ink.line}" '
+        f'<path d="{path_data(layer.profile)}" fill="{own.fill}" stroke="{own.line}" '
         f'fill-opacity="{number(opacity)}"/>'
     )
 

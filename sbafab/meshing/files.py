@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -68,7 +69,12 @@ def write_meshes(
 
 def _meshes(laminate: Laminate, sagitta: float) -> Iterator[tuple[MeshFile, Surface, Writer]]:
     surface = solid(laminate, sagitta)
-    for suffix, write in SOLID_WRITERS.items():
+    films = laminate.bonded_materials
+    named: dict[str, Writer] = {
+        "3mf": partial(write_3mf, material=films),
+        "glb": partial(write_glb, material=films),
+    }
+    for suffix, write in {**SOLID_WRITERS, **named}.items():
         yield _described(f"mesh/solid.{suffix}", "solid", None, surface), surface, write
     for chamber in laminate.chambers:
         file = f"mesh/cavity_{chamber.name}.stl"

@@ -24,7 +24,7 @@ MODEL = """<?xml version="1.0" encoding="UTF-8"?>
 <model unit="millimeter" xml:lang="en-US" \
 xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
 <resources>
-<basematerials id="1"><base name="TPE" displaycolor="#E4DFD2"/></basematerials>
+<basematerials id="1"><base name="{material}" displaycolor="#E4DFD2"/></basematerials>
 <object id="2" type="model" pid="1" pindex="0"><mesh>
 <vertices>
 {vertices}</vertices>
@@ -37,14 +37,14 @@ xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
 """
 
 
-def write_3mf(surface: Surface, path: Path) -> None:
+def write_3mf(surface: Surface, path: Path, material: str = "TPE") -> None:
     """Write the surface in mm, as one object of one material."""
     # One format for the whole table is several times faster than one a row.
     vertex = '<vertex x="%.6f" y="%.6f" z="%.6f"/>\n'
     triangle = '<triangle v1="%d" v2="%d" v3="%d"/>\n'
     vertices = vertex * len(surface.points) % tuple(surface.points.ravel().tolist())
     triangles = triangle * len(surface.faces) % tuple(surface.faces.ravel().tolist())
-    model = MODEL.format(vertices=vertices, triangles=triangles)
+    model = MODEL.format(material=material, vertices=vertices, triangles=triangles)
     _write_zip(
         path,
         {

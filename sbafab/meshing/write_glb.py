@@ -27,9 +27,9 @@ class Node(NamedTuple):
     colour: LinearRGB
 
 
-def write_glb(surface: Surface, path: Path) -> None:
+def write_glb(surface: Surface, path: Path, material: str = "TPE") -> None:
     """Write the surface at true size, as a scene of one node."""
-    write_scene([Node("solid", surface, "TPE", FILM)], path)
+    write_scene([Node("solid", surface, material, FILM)], path)
 
 
 def write_scene(nodes: Sequence[Node], path: Path) -> None:

@@ -158,6 +158,9 @@ def _stiffness(one: Actuator) -> Iterator[Figure | LeftOut]:
     if not one.radii:
         yield LeftOut(name, "the paper measured no modulus of oblong balloons")
         return
+    if any(layer.film.material != "TPE" for layer in one.laminate.tpe_layers):
+        yield LeftOut(name, "the paper measured the modulus of actuators of TPE alone")
+        return
     if plate is None:
         yield LeftOut(name, "the topmost film is not the plain outline: it has tabs or ears")
         return

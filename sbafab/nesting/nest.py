@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from sbafab.laminate.films import Material
-from sbafab.nesting.records import MATERIALS, EngineName, Nest, NestPart, Stock
+from sbafab.laminate.films import Material, in_order
+from sbafab.nesting.records import EngineName, Nest, NestPart, Stock
 from sbafab.nesting.refusals import no_usable_area, too_large, too_many
 
 ROUNDING = 5e-7
@@ -24,19 +24,21 @@ def nest(
     fit a sheet or more sheets are needed than may be used.
     """
     nests = []
-    for material in MATERIALS:
+    for material in materials_of(parts):
         chosen = of_material(parts, material)
-        if chosen:
-            nests.append(_nest(material, chosen, stocks[material], engine, seconds))
+        nests.append(_nest(material, chosen, stocks[material], engine, seconds))
     return tuple(nests)
 
 
 def refuse_unfit(parts: Sequence[NestPart], stocks: Mapping[Material, Stock]) -> None:
     """Raises DesignError where no search is needed to see that the sheets are too small or few."""
-    for material in MATERIALS:
-        chosen = of_material(parts, material)
-        if chosen:
-            _check_fit(material, chosen, stocks[material])
+    for material in materials_of(parts):
+        _check_fit(material, of_material(parts, material), stocks[material])
+
+
+def materials_of(parts: Sequence[NestPart]) -> list[Material]:
+    """The materials that have parts, TPE first."""
+    return in_order(part.material for part in parts if part.count > 0)
 
 
 def of_material(parts: Sequence[NestPart], material: Material) -> tuple[NestPart, ...]:

@@ -17,7 +17,6 @@ EngineName = Literal["bottom-left", "spyrrow"]
 Turn = Literal[0, 1, 2, 3]
 """Quarter turns, counterclockwise. Never mirrored: a film's faces differ by their cut."""
 TURNS: tuple[Turn, ...] = (0, 1, 2, 3)
-MATERIALS: tuple[Material, ...] = ("TPE", "PTFE")
 
 
 @dataclass(frozen=True)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from sbafab.errors import DesignError
-from sbafab.laminate.films import Material
+from sbafab.laminate.films import FIRST, Material
 from sbafab.nesting.records import NestPart, Stock
 
 
 def field(material: Material) -> str:
     """The section of a design file that describes this material's sheets."""
-    return f"sheets.{material.lower()}"
+    name = material.lower()
+    return f"sheets.{name}" if material in FIRST else f"films.{name}.sheet"
 
 
 def no_usable_area(material: Material, stock: Stock) -> DesignError:

@@ -10,8 +10,8 @@ from dataclasses import astuple
 from typing import Any
 
 from sbafab.laminate.films import Material
-from sbafab.nesting.nest import of_material
-from sbafab.nesting.records import MATERIALS, TURNS, EngineName, Nest, NestPart, Placement, Stock
+from sbafab.nesting.nest import materials_of, of_material
+from sbafab.nesting.records import TURNS, EngineName, Nest, NestPart, Placement, Stock
 
 
 def as_dict(nests: Sequence[Nest]) -> dict[str, Any]:
@@ -33,9 +33,8 @@ def from_dict(
     Whether the parts lie as they must is left to ``check_nest``.
     """
     wanted = [
-        (material, stocks[material], chosen)
-        for material in MATERIALS
-        if (chosen := of_material(parts, material))
+        (material, stocks[material], of_material(parts, material))
+        for material in materials_of(parts)
     ]
     key = _key((engine, stock, chosen) for _, stock, chosen in wanted)
     if not isinstance(data, dict) or data.get("key") != key:

@@ -144,7 +144,8 @@ def write_assembly(
         write_text(folder / TRAVELLER, _traveller(checked, batch, sheets, bare))
     sha256 = assembly_sha256(assembled)
     write_findings(assembled.assembly.name, sha256, checked.designs, checked.between, folder)
-    write_text(folder / "checks.json", as_json(checks(checked.findings, "design")))
+    designs = [one.design for one in checked.designs]
+    write_text(folder / "checks.json", as_json(checks(checked.findings, "design", designs)))
     write_text(folder / DESIGN_FILE, assembly_toml(assembled))
     index |= {**_claims(assembled), "meshes": meshes, "files": {}}
     return AssemblyManifest.model_validate_json(as_json(index)).as_dict()
@@ -181,7 +182,7 @@ def _write_solid(assembled: Assembled, folder: Path) -> dict[str, Any]:
 
 def _material(placed: PlacedPart) -> str:
     if placed.made is not None:
-        return "TPE"
+        return placed.made.laminate.bonded_materials
     return str(getattr(placed.part, "material", placed.part.kind))
 
 

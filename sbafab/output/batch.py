@@ -26,7 +26,7 @@ from sbafab.output.shop import (
 from sbafab.output.swap import ASSEMBLY_SCHEMA, SCHEMA
 from sbafab.progress import Progress
 
-SHARED = ("sheets", "laser")
+SHARED = ("films", "sheets", "laser")
 """Sections that must be alike in all designs that are cut from the same film."""
 
 
@@ -106,6 +106,7 @@ def _settings(
         design_sha256=hashlib.sha256(hashes.encode()).hexdigest(),
         waived=tuple(dict.fromkeys([*(said for one in own for said in one.waived), *waived])),
         lowered=tuple(dict.fromkeys([*(said for one in own for said in one.lowered), *lowered])),
+        warnings={name: said for one in own for name, said in one.warnings.items()},
     )
 
 

@@ -11,6 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.sheets import SheetFile
+from sbafab.design.kits import FILE as KIT_FILE
+from sbafab.design.kits import kit_of
+from sbafab.design.reading import kit_names
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256, design_toml
 from sbafab.laminate.laminate import Laminate
@@ -19,7 +22,9 @@ from sbafab.output.manifest import as_json, checks, file_hashes, manifest
 from sbafab.output.planned import Checked, Planned
 from sbafab.output.settings import GENERATOR, kerf_widths, limits
 from sbafab.output.shop import write_cut_files
+from sbafab.pressing.schedule import Schedule
 from sbafab.pressing.tables import press_csv, press_json
+from sbafab.pressing.together import batch_json, design_runs
 from sbafab.progress import Progress
 from sbafab.rules.finding import Finding
 
@@ -51,7 +56,7 @@ def write_contents(
     if planned.paths:
         write_cut_files(planned, folder, tell)
     if planned.pressing is not None:
-        write_text(folder / "press.json", as_json(press_json(planned.pressing)))
+        write_text(folder / "press.json", as_json(_press(checked, planned.pressing)))
         write_text(folder / "press.csv", press_csv(planned.pressing))
         underlay = underlay_pdf(checked.laminate, design_sha256(checked.design))
         if underlay is not None:
@@ -69,9 +74,16 @@ def write_contents(
         write_text(folder / TRAVELLER, _traveller(planned, sheets, solid))
     if has_page and "preview" in wanted:
         write_findings(checked.design.name, design_sha256(checked.design), [checked], (), folder)
-    write_text(folder / "checks.json", as_json(checks(checked.findings, "design")))
+    found = checks(checked.findings, "design", [checked.design])
+    write_text(folder / "checks.json", as_json(found))
     _write_design(checked.design, folder)
     return manifest(planned, sheets, meshes)
+
+
+def _press(checked: Checked, plan: Schedule) -> dict[str, Any]:
+    runs = design_runs(checked.design, checked.laminate)
+    batch = {"batch": batch_json(checked.laminate, runs, plan)} if runs.copies > 1 else {}
+    return {**press_json(plan), **batch}
 
 
 def write_findings(
@@ -168,4 +180,7 @@ def _write_design(design: Design, folder: Path) -> None:
         shutil.copyfile(design.drawing, folder / name)
         chamber = design.chamber.model_copy(update={"outline": name})
         design = design.model_copy(update={"chamber": chamber})
+    if design.kit not in kit_names():
+        (folder / KIT_FILE).write_bytes(kit_of(design).text)
+        design = design.model_copy(update={"kit": KIT_FILE})
     write_text(folder / "design.toml", design_toml(design))

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from sbafab.cutting.fixture import PATH as FIXTURE
-from sbafab.cutting.properties import PTFE_WARNING, CutSettings, layer_path, said_of
+from sbafab.cutting.properties import CutSettings, layer_path, said_of
 from sbafab.cutting.second_cut import PATH as SECOND_CUT
 from sbafab.cutting.sheets import SheetFile
+from sbafab.design.kits import citation
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
 from sbafab.geometry.beam import Kerf
@@ -23,6 +24,7 @@ from sbafab.laminate.panel import SheetPanel
 from sbafab.meshing.files import MeshFile
 from sbafab.models.sizes import sizes
 from sbafab.output.manifest_records import (
+    BatchClaim,
     BatchSchema,
     BoreClaim,
     DesignClaim,
@@ -33,6 +35,7 @@ from sbafab.output.manifest_records import (
     InterfaceClaim,
     JobManifest,
     KerfClaim,
+    KitClaim,
     LayerClaim,
     Manifest,
     MeshClaim,
@@ -45,9 +48,10 @@ from sbafab.output.manifest_records import (
     SheetPinClaim,
 )
 from sbafab.output.planned import Planned
-from sbafab.output.settings import GENERATOR, kerf_widths
+from sbafab.output.settings import GENERATOR, kerf_widths, warnings
 from sbafab.output.shop import film_use
 from sbafab.output.swap import SCHEMA
+from sbafab.pressing.together import Runs, design_runs
 from sbafab.rules.finding import Finding
 
 
@@ -56,9 +60,15 @@ def as_json(value: object) -> str:
     return json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def checks(findings: Sequence[Finding], source: str) -> dict[str, Any]:
-    """``checks.json``; ``source`` is "design" or "as-built"."""
-    return {"source": source, "findings": [finding.as_dict() for finding in findings]}
+def checks(
+    findings: Sequence[Finding], source: str, designs: Sequence[Design] = ()
+) -> dict[str, Any]:
+    """``checks.json``; ``source`` is "design" or "as-built", ``designs`` are what was checked."""
+    return {
+        "source": source,
+        "kits": [{"design": design.name, **citation(design)} for design in designs],
+        "findings": [finding.as_dict() for finding in findings],
+    }
 
 
 def manifest(
@@ -71,6 +81,9 @@ def manifest(
     optional: dict[str, Any] = {}
     if curves is not None:
         optional["curves"] = curves
+    runs = design_runs(design, laminate)
+    if runs.copies > 1:
+        optional["batch"] = _batch(runs)
     if is_cut and laminate.panel is not None:
         optional["panel"] = _panel(laminate.panel)
     if planned.conforming is not None:
@@ -82,6 +95,7 @@ def manifest(
         units="mm",
         design_sha256=design_sha256(design),
         generator=GENERATOR,
+        kit=KitClaim.model_validate_json(as_json(citation(design))),
         registration=RegistrationClaim(
             method=laminate.registration,
             pins=tuple(
@@ -96,7 +110,7 @@ def manifest(
         notes=laminate.notes,
         copies=design.order.copies,
         films=_films(laminate, sheets),
-        warnings=(PTFE_WARNING,),
+        warnings=tuple(dict.fromkeys(warnings(design).values())),
         layers=tuple(_layer(planned, layer) for layer in laminate.layers),
         interfaces=tuple(_interface(interface) for interface in laminate.interfaces),
         bores=tuple(
@@ -149,6 +163,7 @@ def job_manifest(
                 folder=design.name,
                 copies=design.order.copies,
                 design_sha256=design_sha256(design),
+                kit=KitClaim.model_validate_json(as_json(citation(design))),
             )
             for design in designs
         ),
@@ -162,6 +177,12 @@ def job_manifest(
 
 def kerf_claim(width: Kerf | None) -> KerfClaim:
     return KerfClaim(state="uncalibrated" if width is None else "compensated", width=width)
+
+
+def _batch(runs: Runs) -> BatchClaim:
+    """How several copies are pressed, and where each lies on the pin plate."""
+    places = tuple(PlaceClaim(**_place(place)) for place in runs.places)
+    return BatchClaim(at_once=runs.together, cycles=runs.cycles, places=places)
 
 
 def _panel(panel: SheetPanel) -> PanelClaim:

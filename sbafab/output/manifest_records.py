@@ -166,6 +166,21 @@ class PlaceClaim(_Claim):
     y: float
 
 
+class BatchClaim(_Claim):
+    """How several copies are pressed: where each of a cycle lies, and how many cycles take."""
+
+    at_once: Count
+    cycles: Annotated[tuple[Count, ...], Field(max_length=1000)]
+    places: Annotated[tuple[PlaceClaim, ...], Field(min_length=1, max_length=1000)]
+
+
+class KitClaim(_Claim):
+    name: str
+    version: str
+    sha256: str
+    departures: tuple[str, ...]
+
+
 class FiducialClaim(PlaceClaim):
     diameter: float
 
@@ -193,6 +208,7 @@ class Manifest(_Claim):
     units: Literal["mm"]
     design_sha256: str
     generator: str
+    kit: KitClaim | None = None
     registration: RegistrationClaim
     kerf: dict[Material, KerfClaim]
     curves: str | None = None
@@ -201,6 +217,7 @@ class Manifest(_Claim):
     sizes: dict[str, float]
     notes: tuple[str, ...] = ()
     copies: Annotated[int, Field(ge=1, le=1000)] = 1
+    batch: BatchClaim | None = None
     films: tuple[FilmClaim, ...]
     warnings: tuple[str, ...] = ()
     layers: Annotated[tuple[LayerClaim, ...], Field(min_length=1, max_length=10_000)]
@@ -221,6 +238,7 @@ class DesignClaim(_Claim):
     folder: str
     copies: Annotated[int, Field(ge=1, le=1000)]
     design_sha256: str
+    kit: KitClaim | None = None
 
 
 class JobManifest(_Claim):

@@ -18,6 +18,7 @@ from sbafab.nesting.parts import parts_of
 from sbafab.nesting.records import NestPart
 from sbafab.output.settings import cut_settings, limits, press_settings
 from sbafab.pressing.schedule import Schedule, schedule
+from sbafab.pressing.together import design_runs
 from sbafab.rules.deck import has_failed
 from sbafab.rules.finding import Finding
 from sbafab.rules.lowered import CHECKED_AGAINST, lowered
@@ -95,7 +96,8 @@ def plan(checked: Checked, wanted: Collection[RunPart], curves: Curves = TRUE_AR
 
 def schedule_of(checked: Checked) -> Schedule:
     """The press schedule; its first step and its warnings name waived rules and lowered limits."""
-    made = schedule(checked.laminate, press_settings(checked.design))
+    cycles = design_runs(checked.design, checked.laminate).cycles
+    made = schedule(checked.laminate, press_settings(checked.design), cycles)
     said = []
     if checked.waived:
         rules = ", ".join(checked.waived)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from sbafab import __version__
+from sbafab.actuators.stacking import used_films
 from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import Machine
-from sbafab.design.records import Design, Sheet
+from sbafab.design.films import KerfWidth, Sheet, material
+from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
 from sbafab.geometry.beam import Kerf
 from sbafab.laminate.films import Material
@@ -21,11 +23,18 @@ GENERATOR = f"sbafab {__version__}"
 
 def kerf_widths(design: Design) -> dict[Material, Kerf | None]:
     """Full kerf width (or that along x and y) by material, None where it was not measured."""
-    tpe, ptfe = design.laser.kerf_tpe, design.laser.kerf_ptfe
-    return {
-        "TPE": None if isinstance(tpe, str) else tpe,
-        "PTFE": None if isinstance(ptfe, str) else ptfe,
-    }
+    widths = _kerfs(design).items()
+    return {name: None if isinstance(kerf, str) else kerf for name, kerf in widths}
+
+
+def _kerfs(design: Design) -> dict[Material, KerfWidth]:
+    others = {material(name): film.kerf for name, film in design.films.others.items()}
+    return {"TPE": design.laser.kerf_tpe, "PTFE": design.laser.kerf_ptfe, **others}
+
+
+def warnings(design: Design) -> dict[Material, str]:
+    """What cut files of a film must say, by material."""
+    return {name: film.warning for name, film in used_films(design).items() if film.warning}
 
 
 def limits(design: Design) -> Limits:
@@ -66,6 +75,7 @@ def cut_settings(
         lowered=lowered(limits(design)),
         curves=curves,
         generator=GENERATOR,
+        warnings=warnings(design),
         platen=(design.press.platen_width, design.press.platen_length),
     )
 
@@ -104,10 +114,9 @@ def machine(design: Design) -> Machine:
 
 def stocks(design: Design) -> dict[Material, Stock]:
     """The film sheets by material."""
-    return {
-        "TPE": _stock(design.sheets.tpe, design.laser.kerf_tpe),
-        "PTFE": _stock(design.sheets.ptfe, design.laser.kerf_ptfe),
-    }
+    sheets = {"TPE": design.sheets.tpe, "PTFE": design.sheets.ptfe}
+    sheets |= {material(name): film.sheet for name, film in design.films.others.items()}
+    return {name: _stock(sheets[name], kerf) for name, kerf in _kerfs(design).items()}
 
 
 def _stock(sheet: Sheet, kerf: object) -> Stock:

@@ -23,6 +23,7 @@ from sbafab.nesting.records import Nest, NestPart
 from sbafab.nesting.saved import as_dict, from_dict
 from sbafab.output.planned import Planned
 from sbafab.output.settings import machine, stocks
+from sbafab.pressing.together import design_runs
 from sbafab.progress import Progress
 
 PLACES = f"{FOLDER}/nest.json"
@@ -50,7 +51,7 @@ def write_cut_files(planned: Planned, folder: Path, tell: Progress) -> None:
     laminate, settings = planned.checked.laminate, planned.settings
     told = partial(tell, "cut files")
     write_layer_files(laminate, planned.paths, folder, settings, told)
-    write_fixture(laminate, folder, settings)
+    write_fixture(laminate, folder, settings, design_runs(planned.checked.design, laminate).places)
     write_second(laminate, folder, settings)
 
 

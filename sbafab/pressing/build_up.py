@@ -63,7 +63,7 @@ class BuildUpPart:
 
 @dataclass(frozen=True)
 class Footprint:
-    """What a stack shows the pad: its height, area and rim, and the masks that bonds lie below.
+    """What the stacks show the pad: their height, area and rim, and the masks that bonds lie below.
 
     ``below`` is how much lower the lowest bonded place is than the highest.
     """
@@ -96,8 +96,11 @@ def gent_modulus(shore_a: float) -> float:
     return 1000 * 0.0981 * (56 + 7.62336 * shore_a) / (0.137505 * (254 - 2.54 * shore_a))
 
 
-def footprint(laminate: Laminate, layers: Sequence[int]) -> Footprint:
-    """Of a stack of layers, given by index, or of the registered sheets that they are part of."""
+def footprint(laminate: Laminate, layers: Sequence[int], together: int = 1) -> Footprint:
+    """Of a stack of layers, given by index, or of the registered sheets that they are part of.
+
+    ``together`` such stacks lie below the pad side by side, far enough apart to be pressed alike.
+    """
     films = [laminate.layer(index) for index in layers]
     widest = max(
         (layer.profile for layer in distinct_layers(laminate, layers)), key=lambda part: part.area
@@ -110,8 +113,8 @@ def footprint(laminate: Laminate, layers: Sequence[int]) -> Footprint:
     }
     return Footprint(
         sum(layer.film.thickness for layer in films),
-        widest.area,
-        sum(contour.length for contour in widest.outers),
+        together * widest.area,
+        together * sum(contour.length for contour in widest.outers),
         max(masks.values()),
     )
 

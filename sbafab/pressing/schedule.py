@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import NamedTuple
 
 from sbafab.errors import DesignError
@@ -19,6 +20,7 @@ from sbafab.laminate.assembly import (
     distinct_layers,
     stack_count,
 )
+from sbafab.laminate.films import FIRST
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing import build_up, sheets
 from sbafab.pressing.build_up import BuildUpPart, Footprint, Pad
@@ -148,18 +150,23 @@ class Schedule:
     warnings: tuple[str, ...]
 
 
-def schedule(laminate: Laminate, press: PressSettings) -> Schedule:
+def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] = (1,)) -> Schedule:
     """The press steps of a laminate, bottom balloon first.
 
     Flash bonds hold layers in place on their pins. Full bonds are pressed without any, as in the
     paper; with ears a flash bond on the pins comes before each. Raises DesignError at a temperature
-    that would not bond TPE or that PTFE or the pad does not stand, and where pad, pins or plate do
-    not do for the laminate.
+    that would not bond the films or that one of them or the pad does not stand, and where pad, pins
+    or plate do not do for the laminate. ``together`` are the laminates that lie in the press at
+    once, one number for each size of cycle, the largest first: they share the force.
     """
     _refuse_temperature(laminate, press)
     parts = assembly(laminate)
-    under = [build_up.footprint(laminate, part.layers) for part in parts]
-    pad = build_up.pad_thickness(press.pressure_kpa, press.platen, press.pad, under)
+    under, *others = (
+        [build_up.footprint(laminate, part.layers, count) for part in parts]
+        for count in dict.fromkeys(together)
+    )
+    stacks = [*under, *chain.from_iterable(others)]
+    pad = build_up.pad_thickness(press.pressure_kpa, press.platen, press.pad, stacks)
     pins = settings_by_step(
         [(stack.height, part.pins) for stack, part in zip(under, parts, strict=True)],
         press.pin_standard,
@@ -299,7 +306,8 @@ def named(layers: Sequence[int]) -> str:
 
 def _refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
     for film in dict.fromkeys(layer.film for layer in laminate.layers):
-        if film.material == "TPE" and press.temperature_c <= film.softens_above:
+        melts = not film.is_mask and film.softens_above is not None
+        if melts and press.temperature_c <= (film.softens_above or 0.0):
             raise DesignError(
                 f"press.temperature_c = {press.temperature_c:g} does not bond {film.product}, "
                 f"which melts at {film.softens_above:g} C; raise it (the paper presses at 135 C)"
@@ -309,6 +317,20 @@ def _refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
                 f"press.temperature_c = {press.temperature_c:g} reaches the limit of the masks, "
                 f"{film.limit:g} C for {film.product}; lower it, for hotter PTFE gives off toxic "
                 "fumes"
+            )
+        if film.material not in FIRST and press.temperature_c >= film.limit:
+            raise DesignError(
+                f"press.temperature_c = {press.temperature_c:g} reaches the limit of "
+                f"{film.material}, {film.limit:g} C for {film.product}; lower it"
+            )
+    for interface in laminate.interfaces:
+        below, above = interface.below, interface.above
+        if below.film.softens_above is None and above.film.softens_above is None:
+            roles = " or the ".join(dict.fromkeys((below.role, above.role)))
+            raise DesignError(
+                f"layers {below.index} and {above.index} are of {below.film.material} and "
+                f"{above.film.material}, which both stay solid in the press and do not bond; give "
+                f"the {roles} another film in [layup]"
             )
     if press.temperature_c > build_up.PAD_LIMIT_C:
         raise DesignError(

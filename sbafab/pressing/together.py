@@ -1,42 +1,167 @@
-"""How often the press runs for several copies of one laminate."""
+"""Several copies of one laminate: how many the press takes at once, where they lie, how long."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
-from sbafab.geometry.edges import Bounds
+from sbafab.design.records import Design
+from sbafab.geometry.edges import Bounds, Point
+from sbafab.laminate.assembly import PLATE_MARGIN
+from sbafab.laminate.laminate import Laminate
+from sbafab.pressing.schedule import Schedule
 
 APART = 5.0
 """mm between two copies in the press, ours: so far do films flow and hands need."""
+WORKING_DAY = 480.0
+"""Minutes of one person."""
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Runs:
-    """``together`` copies lie side by side in the press, in ``columns`` columns."""
+    """How ``copies`` are pressed: side by side at these ``places``, cycle after cycle.
+
+    A place is how far a laminate's frame is moved from that of the first one, which lies at the
+    lower left; rows fill from there. The last cycle may be smaller than the others.
+    """
 
     copies: int
-    together: int
-    columns: int
+    places: tuple[Point, ...]
+
+    @property
+    def together(self) -> int:
+        """Copies in a full cycle."""
+        return len(self.places)
+
+    @property
+    def cycles(self) -> tuple[int, ...]:
+        """How many copies each cycle presses."""
+        full, rest = divmod(self.copies, self.together)
+        return (self.together,) * full + ((rest,) if rest else ())
 
     @property
     def count(self) -> int:
-        return math.ceil(self.copies / self.together)
+        return len(self.cycles)
 
 
-def press_runs(copies: int, bounds: Bounds, platen: tuple[float, float]) -> Runs:
+def press_runs(
+    copies: int, bounds: Bounds, platen: tuple[float, float], margin: float = 0.0
+) -> Runs:
     """As many copies at once as the heated area (mm) takes; ``bounds`` are those of one.
 
+    ``margin`` mm of base plate lie round all of them; the plate lies on the platen either way.
     Copies are equal layer by layer, so every place of the press holds the same films at every
     height: the paper (Sec. 2) splits pressing where stacks of unlike cuts would share the pressure
     unevenly. Unlike designs are therefore never pressed together.
     """
     low_x, low_y, high_x, high_y = bounds
-    columns = _in_a_row(platen[0], high_x - low_x)
-    rows = _in_a_row(platen[1], high_y - low_y)
+    size = high_x - low_x, high_y - low_y
+    room = platen[0] - 2 * margin, platen[1] - 2 * margin
+    grids = [_grid(room, size), _grid((room[1], room[0]), size)]
+    # What is larger than the heated area breaks the rule press-fit, or is waived: one by one.
+    columns, rows = max((*grids, (1, 1)), key=lambda grid: grid[0] * grid[1])
     together = min(copies, columns * rows)
-    return Runs(copies, together, min(together, columns))
+    # A few copies lie in a block, not in one long row.
+    columns = min(columns, max(math.ceil(together / rows), math.ceil(math.sqrt(together))))
+    pitch = size[0] + APART, size[1] + APART
+    places = [((n % columns) * pitch[0], (n // columns) * pitch[1]) for n in range(together)]
+    return Runs(copies, tuple((round(x, 6), round(y, 6)) for x, y in places))
 
 
-def _in_a_row(room: float, size: float) -> int:
-    return max(1, math.floor((room + APART + 1e-9) / (size + APART)))
+def runs_of(laminate: Laminate, copies: int, platen: tuple[float, float]) -> Runs:
+    """The press runs of a laminate, on one base plate; registered sheets are one piece to it."""
+    if laminate.panel is not None:
+        return Runs(1, ((0.0, 0.0),))
+    margin = PLATE_MARGIN if laminate.pins else 0.0
+    return press_runs(copies, laminate.bounds, platen, margin)
+
+
+def design_runs(design: Design, laminate: Laminate) -> Runs:
+    """The press runs of all copies that a design orders."""
+    press = design.press
+    return runs_of(laminate, design.order.copies, (press.platen_width, press.platen_length))
+
+
+def _grid(room: tuple[float, float], size: tuple[float, float]) -> tuple[int, int]:
+    """Columns and rows."""
+    columns, rows = (
+        max(0, math.floor((most + APART + ROUNDING) / (own + APART)))
+        for most, own in zip(room, size, strict=True)
+    )
+    return columns, rows
+
+
+def are_apart(places: tuple[Point, ...], bounds: Bounds, room: float) -> bool:
+    """Whether copies at these places keep APART, but for ``room`` mm."""
+    wide = bounds[2] - bounds[0] + APART - room
+    high = bounds[3] - bounds[1] + APART - room
+    return all(
+        abs(x - u) >= wide or abs(y - v) >= high
+        for n, (x, y) in enumerate(places)
+        for u, v in places[:n]
+    )
+
+
+@dataclass(frozen=True)
+class BatchTimes:
+    """Minutes that a batch takes: in the press, by hand, and both after each other."""
+
+    press: float
+    hands: float
+
+    @property
+    def total(self) -> float:
+        return self.press + self.hands
+
+
+def batch_times(runs: Runs, plan: Schedule) -> BatchTimes:
+    """The press closes once a cycle; every copy takes the same hands as one by itself.
+
+    Nothing is taken off for hands that work while the press is closed.
+    """
+    by_hand = plan.estimated_build_minutes - plan.total_press_minutes
+    return BatchTimes(runs.count * plan.total_press_minutes, runs.copies * by_hand)
+
+
+def a_day(plan: Schedule, together: int, minutes: float = WORKING_DAY) -> int:
+    """Actuators that one person finishes in a working day with one press, ``together`` at once."""
+    by_hand = plan.estimated_build_minutes - plan.total_press_minutes
+    made = 0
+    while True:
+        cycles = math.ceil((made + 1) / together)
+        if (made + 1) * by_hand + cycles * plan.total_press_minutes > minutes:
+            return made
+        made += 1
+
+
+def most_together(laminate: Laminate, platen: tuple[float, float]) -> int:
+    """As many copies as one cycle could press."""
+    return runs_of(laminate, 10_000, platen).together
+
+
+def batch_json(laminate: Laminate, runs: Runs, plan: Schedule) -> dict[str, Any]:
+    """What ``press.json`` says of a batch of several copies."""
+    times = batch_times(runs, plan)
+    most = most_together(laminate, plan.steps[0].platen_mm)
+    return {
+        "copies": runs.copies,
+        "at_once": runs.together,
+        "at_once_at_most": most,
+        "cycles": list(runs.cycles),
+        "places_mm": [list(place) for place in runs.places],
+        "press_minutes": times.press,
+        "hands_minutes": times.hands,
+        "total_minutes": times.total,
+        "a_day_one_by_one": a_day(plan, 1),
+        "a_day_in_batches": a_day(plan, most),
+        "patterns": [
+            {
+                "pattern": pattern,
+                "each": len(layers),
+                "cycles": [len(layers) * count for count in runs.cycles],
+            }
+            for pattern, layers in laminate.patterns.items()
+        ],
+    }

@@ -62,8 +62,8 @@ class Canvas:
         colour = min(255, round(r * step)), min(255, round(g * step)), min(255, round(b * step))
         return self._index.setdefault(colour, len(self._index))
 
-    def png(self, footprint: Sequence[Sequence[Point]], caption: str) -> bytes:
-        """The picture over the soft shadow of ``footprint``, with caption and key."""
+    def png(self, footprint: Sequence[Sequence[Point]], caption: str, films: str) -> bytes:
+        """The picture over the soft shadow of ``footprint``, with caption and key of ``films``."""
         from PIL import ImageChops
 
         self._image.putpalette([part for colour in self._index for part in colour])
@@ -74,7 +74,7 @@ class Canvas:
         # in proportion, leaves no bright rim round the solid.
         lack = ImageChops.multiply(ImageChops.invert(backdrop).convert("RGB"), empty.convert("RGB"))
         picture = ImageChops.subtract(painted, lack)
-        self._write(picture, caption)
+        self._write(picture, caption, films)
         out = BytesIO()
         picture.save(out, "PNG", compress_level=6)
         return out.getvalue()
@@ -91,7 +91,7 @@ class Canvas:
             draw.polygon([(x / shrink + 2, y / shrink + 4) for x, y in ring], fill=255 - SHADOW)
         return small.filter(ImageFilter.GaussianBlur(BLUR)).resize(self._size)
 
-    def _write(self, picture: Image, caption: str) -> None:
+    def _write(self, picture: Image, caption: str, films: str) -> None:
         """Caption and colour key along the foot, in Pillow's own font."""
         from PIL import ImageDraw, ImageFont
 
@@ -101,7 +101,8 @@ class Canvas:
         draw = ImageDraw.Draw(picture)
         x, y = round(0.03 * width), height - 2 * size
         draw.text((x, y - 1.7 * size), caption, fill=INK, font=font)
-        for tone, words in KEY:
+        for tone, said in KEY:
+            words = films if tone == "film" else said
             draw.rectangle((x, y, x + 1.6 * size, y + size), fill=COLOURS[tone], outline=INK)
             draw.text((x + 2.1 * size, y - 0.1 * size), words, fill=INK, font=font)
             x += round(3.6 * size + draw.textlength(words, font=font))

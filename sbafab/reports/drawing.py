@@ -12,7 +12,8 @@ from xml.sax.saxutils import escape
 
 from sbafab.geometry.edges import Point
 from sbafab.geometry.svg import number
-from sbafab.laminate.inks import INK
+from sbafab.laminate.films import Film
+from sbafab.laminate.inks import MASKS, Ink, ink
 
 Anchor = Literal["start", "middle", "end"]
 
@@ -29,28 +30,43 @@ FONT = "Helvetica, Arial, 'Liberation Sans', sans-serif"
 def document(width: float, height: float, title: str, elements: Iterable[str]) -> str:
     """A whole SVG file, ``width`` x ``height`` mm, on white."""
     w, h = number(width), number(height)
+    drawn = "\n".join(elements)
     return "\n".join(
         [
             '<?xml version="1.0" encoding="UTF-8"?>',
             f'<svg xmlns="http://www.w3.org/2000/svg" width="{w}mm" height="{h}mm" '
             f'viewBox="0 0 {w} {h}" font-family="{FONT}" font-size="{TEXT}" fill="{DARK}">',
             f"<title>{escape(title)}</title>",
-            _definitions(),
+            _definitions(drawn),
             f'<rect width="{w}" height="{h}" fill="#ffffff"/>',
-            *elements,
+            drawn,
             "</svg>",
             "",
         ]
     )
 
 
-def _definitions() -> str:
-    """PTFE is hatched as well as orange, so that a grey print still tells it from TPE."""
-    ink = INK["PTFE"]
+def film_fill(film: Film) -> str:
+    """What a film is filled with: masks are hatched, so that a grey print still tells them."""
+    return f"url(#{_hatch_id(film.shade % len(MASKS))})" if film.is_mask else ink(film).fill
+
+
+def _hatch_id(shade: int) -> str:
+    return f"mask{shade + 1}" if shade else "PTFE"
+
+
+def _definitions(drawn: str) -> str:
+    """The hatch of PTFE, and those of the further masks that are drawn."""
+    hatches = {_hatch_id(shade): own for shade, own in enumerate(MASKS)}
+    used = [_hatch(n, own) for n, own in hatches.items() if n == "PTFE" or f"url(#{n})" in drawn]
+    return f"<defs>{''.join(used)}</defs>"
+
+
+def _hatch(name: str, own: Ink) -> str:
     return (
-        '<defs><pattern id="PTFE" patternUnits="userSpaceOnUse" width="1.2" height="1.2" '
-        f'patternTransform="rotate(45)"><rect width="1.2" height="1.2" fill="{ink.fill}"/>'
-        f'<rect width="0.16" height="1.2" fill="{ink.line}" fill-opacity="0.55"/></pattern></defs>'
+        f'<pattern id="{name}" patternUnits="userSpaceOnUse" width="1.2" height="1.2" '
+        f'patternTransform="rotate(45)"><rect width="1.2" height="1.2" fill="{own.fill}"/>'
+        f'<rect width="0.16" height="1.2" fill="{own.line}" fill-opacity="0.55"/></pattern>'
     )
 
 

@@ -6,11 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sbafab.cutting.properties import PTFE_WARNING
 from sbafab.geometry.edges import Point
 from sbafab.geometry.svg import number
 from sbafab.laminate.assembly import pins_when_added
-from sbafab.laminate.inks import INK
+from sbafab.laminate.inks import ink
 from sbafab.laminate.laminate import Laminate
 from sbafab.reports import drawing as draw
 from sbafab.reports.features import balloons
@@ -20,6 +19,7 @@ PAGE = (420.0, 297.0)  # A3: the most a drawing may fill
 MARGIN = 10.0
 BLOCK, NOTE_ROW = 22.5, 4.2
 """Height of the title block with up to one note, and of every further one."""
+FILM_ROW = 5.4
 SCALES = (20.0, 15.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.0, 0.5, 0.2, 0.1)
 LEAST_DRAWN = 30.0
 
@@ -38,7 +38,9 @@ def layers_svg(laminate: Laminate) -> str:
     """Every distinct pattern in plan at one scale, as a drawing for A3 (longer if need be)."""
     held = pins_when_added(laminate)
     cards = [pattern_card(laminate, layers, held) for layers in laminate.patterns.values()]
-    block = BLOCK + NOTE_ROW * max(0, len(laminate.notes) - 1)
+    films = dict.fromkeys(layer.film for layer in laminate.layers)
+    rows = max(0, len(laminate.notes) - 1) + max(0, len(_warnings(laminate)) - 1)
+    block = BLOCK + max(NOTE_ROW * rows, FILM_ROW * max(0, len(films) - 2))
     grid = _grid(cards, block)
     elements: list[str] = []
     for place, card in enumerate(cards):
@@ -78,7 +80,6 @@ def _title_block(laminate: Laminate, grid: PageGrid, block: float, pinned: bool)
     low = (MARGIN, height - MARGIN - block)
     x, y = low
     needed = len(laminate.layers)
-    masked = any(layer.is_mask for layer in laminate.layers)
     facts = (
         f"{laminate.family}: {balloons(laminate)}, "
         f"{_count(len(laminate.chambers), 'chamber')}, {needed} layers of "
@@ -92,10 +93,18 @@ def _title_block(laminate: Laminate, grid: PageGrid, block: float, pinned: bool)
             draw.text((x + 3.0, y + 16.2 + NOTE_ROW * row), note, bold=True)
             for row, note in enumerate(laminate.notes or ("",))
         ),
-        draw.text((x + 3.0, y + block - 2.1), PTFE_WARNING if masked else ""),
+        *(
+            draw.text((x + 3.0, y + block - 2.1 - NOTE_ROW * row), said)
+            for row, said in enumerate(reversed(_warnings(laminate) or ("",)))
+        ),
         *_films(laminate, pinned, (width / 2 + 18.0, y)),
         *_scale_bar(grid.scale, (width - MARGIN - 4.0, y)),
     ]
+
+
+def _warnings(laminate: Laminate) -> tuple[str, ...]:
+    said = dict.fromkeys(layer.film.warning for layer in laminate.layers)
+    return tuple(filter(None, said))
 
 
 def _count(count: int, noun: str) -> str:
@@ -107,16 +116,15 @@ def _films(laminate: Laminate, pinned: bool, at: Point) -> list[str]:
     parts: list[str] = []
     films = dict.fromkeys(layer.film for layer in laminate.layers)
     for row, film in enumerate(films):
-        x, y = at[0], at[1] + 3.4 + 5.4 * row
-        ink = INK[film.material]
-        fill = ink.fill if film.material == "TPE" else "url(#PTFE)"
-        parts.append(draw.box((x, y), (x + 6.0, y + 3.6), fill=fill, stroke=ink.line))
+        x, y = at[0], at[1] + 3.4 + FILM_ROW * row
+        fill = draw.film_fill(film)
+        parts.append(draw.box((x, y), (x + 6.0, y + 3.6), fill=fill, stroke=ink(film).line))
         known = film.product.startswith(film.material)
         name = film.product if known else f"{film.material}, {film.product}"
         words = f"{name}, {number(film.thickness)} thick"
         parts.append(draw.text((x + 8.0, y + 2.8), words))
     if pinned:
-        x, y = at[0] + 3.0, at[1] + 3.4 + 5.4 * len(films) + 1.4
+        x, y = at[0] + 3.0, at[1] + 3.4 + FILM_ROW * len(films) + 1.4
         parts.append(pin_mark((x, y), 2.0))
         parts.append(draw.text((x + 5.0, y + 1.0), "dowel pin that holds the layer"))
     return parts

@@ -9,7 +9,7 @@ from functools import cached_property
 
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.svg import number, path_data
-from sbafab.laminate.inks import INK
+from sbafab.laminate.inks import ink
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.reports import drawing as draw
 from sbafab.reports.features import (
@@ -132,20 +132,20 @@ def drawn(card: Card, scale: float, corner: Point, cell: Point) -> list[str]:
 
 
 def fill_of(layer: Layer) -> str:
-    """Plain for TPE, hatched for PTFE."""
-    return "url(#PTFE)" if layer.is_mask else INK[layer.film.material].fill
+    """Plain for structural films, hatched for masks."""
+    return draw.film_fill(layer.film)
 
 
 def _heading(card: Card, corner: Point, cell: Point) -> list[str]:
     x, y = corner
     layer = card.layers[0]
-    ink = INK[layer.film.material]
+    line = ink(layer.film).line
     name, film, numbers = card.caption
     return [
         draw.box(corner, (x + cell[0], y + cell[1]), fill="none", stroke="#c8c8c8"),
-        draw.box((x + 2.5, y + 2.7), (x + 5.0, y + 5.2), fill=fill_of(layer), stroke=ink.line),
+        draw.box((x + 2.5, y + 2.7), (x + 5.0, y + 5.2), fill=fill_of(layer), stroke=line),
         draw.text((x + 6.5, y + 5.0), name, bold=True),
-        draw.text((x + 6.5, y + 9.4), film, colour=ink.line),
+        draw.text((x + 6.5, y + 9.4), film, colour=line),
         draw.text((x + 6.5, y + 13.6), numbers),
     ]
 
@@ -155,7 +155,7 @@ def _outline(card: Card, frame: CardFrame) -> list[str]:
     shape = layer.profile.mapped(frame.at, frame.scale, mirror=True)
     parts = [
         f'<path d="{path_data(shape)}" fill="{fill_of(layer)}" fill-rule="evenodd" '
-        f'stroke="{INK[layer.film.material].line}" stroke-width="0.25"/>'
+        f'stroke="{ink(layer.film).line}" stroke-width="0.25"/>'
     ]
     for mark in card.marks:
         if isinstance(mark, Circle) and mark.phantom:

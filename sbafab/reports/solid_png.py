@@ -92,10 +92,11 @@ def solid_png(laminate: Laminate, width: int = 1600, height: int = 1200) -> byte
     base = next(iter(shapes.values()))
     what = f"{laminate.balloons} balloons" if laminate.balloons > 1 else "one balloon"
     caption = (
-        f"{laminate.name}: TPE solid of {what} before inflation, cut open at {cut.chamber}; "
-        f"height exaggerated {factor} times" + "".join(f"; {note}" for note in laminate.notes)
+        f"{laminate.name}: {laminate.bonded_materials} solid of {what} before inflation, cut open "
+        f"at {cut.chamber}; height exaggerated {factor} times"
+        + "".join(f"; {note}" for note in laminate.notes)
     )
-    return canvas.png([rings[0] for rings in base.faces], caption)
+    return canvas.png([rings[0] for rings in base.faces], caption, laminate.bonded_materials)
 
 
 def _factor(laminate: Laminate) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import NamedTuple
 
-from sbafab.laminate.films import Material
+from sbafab.laminate.films import Film
 from sbafab.reports.features import length
 from sbafab.reports.stack_section import Joint, SectionSlab, StackSection, opening
 
@@ -17,7 +17,7 @@ class StackLabel(NamedTuple):
     s: float
     z: float
     layer: int
-    material: Material | None = None
+    film: Film | None = None
 
 
 def layer_labels(section: StackSection) -> list[StackLabel]:
@@ -32,7 +32,7 @@ def layer_labels(section: StackSection) -> list[StackLabel]:
         if slab.layer.role == "chamber-mask" and end > base_end:
             words += ", inlet strip"
         found = _in_slab(words, end - min(0.2, 0.25 * (end - slab.spans[-1][0])), slab)
-        labels.append(found._replace(material=slab.layer.film.material))
+        labels.append(found._replace(film=slab.layer.film))
     return labels
 
 

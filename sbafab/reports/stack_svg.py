@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from sbafab.geometry.edges import Point
 from sbafab.geometry.section import Interval
 from sbafab.geometry.svg import number
-from sbafab.laminate.inks import INK
+from sbafab.laminate.films import Film
+from sbafab.laminate.inks import ink
 from sbafab.laminate.laminate import Laminate
 from sbafab.reports import drawing as draw
 from sbafab.reports.features import length
@@ -102,13 +103,13 @@ def _view(section: StackSection) -> StackView:
 
 def _slab(slab: SectionSlab, view: StackView) -> list[str]:
     layer = slab.layer
-    ink = INK[layer.film.material]
+    line = ink(layer.film).line
     inset = SLIT * layer.film.thickness if layer.is_mask else 0.0
     bottom = view.y(layer.z + inset, layer.index)
     top = view.y(layer.z + layer.film.thickness - inset, layer.index)
-    fill = "url(#PTFE)" if layer.is_mask else ink.fill
+    fill = draw.film_fill(layer.film)
     return [
-        draw.box((view.x(start), top), (view.x(end), bottom), fill=fill, stroke=ink.line)
+        draw.box((view.x(start), top), (view.x(end), bottom), fill=fill, stroke=line)
         for start, end in slab.spans
     ]
 
@@ -289,7 +290,7 @@ def _label(label: StackLabel, feature: Point, at: Point, side: int) -> list[str]
     x, row = at
     elbow = (x - 2.2 * side, row)
     anchor: draw.Anchor = "start" if side > 0 else "end"
-    colour = INK[label.material].line if label.material else draw.DARK
+    colour = ink(label.film).line if label.film else draw.DARK
     return [
         *draw.leader(feature, elbow, (x - 0.6 * side, row)),
         draw.text((x + 0.4 * side, row + 1.05), label.words, anchor=anchor, colour=colour),
@@ -300,21 +301,25 @@ def _legend(view: StackView, page: float) -> list[str]:
     y = page - 10.0
     films = dict.fromkeys(slab.layer.film for slab in view.section.slabs)
     entries = [
-        (f"{film.material} film, {number(film.thickness)}", _swatch(film.material))
-        for film in films
+        (f"{film.material} film, {number(film.thickness)}", draw.film_fill(film)) for film in films
     ]
-    entries.append(("bond: the gap filled with TPE", BOND))
+    entries.append((f"bond: the gap filled with {_bonding(films)}", BOND))
     entries.append(("unbonded: drawn as a slit beside the mask", "#ffffff"))
     if view.section.rods:
         entries.append(("dowel pin", STEEL))
     parts: list[str] = []
     x = 10.0
     for words, fill in entries:
+        width = 7.6 + draw.text_width(words) + 7.0
+        if x + width - 7.0 > PAGE_WIDTH - 5.0:
+            x, y = 10.0, y + 5.0
         parts.append(draw.box((x, y - 2.6), (x + 6.0, y + 0.6), fill=fill, stroke=draw.GREY))
         parts.append(draw.text((x + 7.6, y), words))
-        x += 7.6 + draw.text_width(words) + 7.0
+        x += width
     return parts
 
 
-def _swatch(material: str) -> str:
-    return "url(#PTFE)" if material == "PTFE" else INK["TPE"].fill
+def _bonding(films: Iterable[Film]) -> str:
+    """What flows into a gap: the structural film, if there is one alone."""
+    found = [film.material for film in films if not film.is_mask]
+    return found[0] if len(found) == 1 else "the film that melts"

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import PurePath
-
 from sbafab.actuators import build as laminate_of
+from sbafab.design.kits import kit_of
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256, design_toml
 from sbafab.models.figures import Asked, Prediction
@@ -49,8 +48,8 @@ def promised(design: Design) -> Build:
 
 
 def kit_name(design: Design) -> str:
-    """The kit that the design names, without folder and ending; "" where it names none."""
-    return PurePath(str(getattr(design, "kit", None) or "")).stem
+    """The name of the design's kit, as the kit's file says it. Raises DesignError."""
+    return kit_of(design).name
 
 
 def _predicted(prediction: Prediction) -> dict[str, tuple[float, str]]:

@@ -46,7 +46,7 @@ def test_from_the_first_record_to_the_report(
     told = ["--leak", "pass", "--burst", "3.5 bar", "--height", "500 um", "--operator", "Ada"]
     code, out, err = run(["record", "1dof-5mm", "--serial", "A1", *told], capsys)
     assert (code, err) == (0, "")
-    assert "serial A1: leak pass, operator Ada, burst_kpa 350.0, height_mm 0.5" in out
+    assert "serial A1: leak pass, operator Ada, kit paper, burst_kpa 350.0, height_mm 0.5" in out
     Path("batch.csv").write_text(
         "serial,leak,height_mm,operator\nA2,fail,0.48,Bo\nA3,pass,0.52,Bo\n"
     )
@@ -76,7 +76,7 @@ def test_from_the_first_record_to_the_report(
     shares = {(s["by"], s["name"]): (s["passed"], s["tested"]) for s in said["success"]}
     assert shares["design", "1dof-5mm"] == (3, 3)
     assert shares["operator", "Bo"] == (2, 2)
-    assert shares["method", "channel-pin"] == shares["kit", "not said"] == (3, 3)
+    assert shares["method", "channel-pin"] == shares["kit", "paper"] == (3, 3)
     [height] = (c for c in said["measured"] if c["quantity"] == "height_mm")
     assert height["mean"] == pytest.approx(0.5)
     assert height["predicted"] == pytest.approx(FLAT)

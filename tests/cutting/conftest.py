@@ -18,7 +18,7 @@ from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate, Layer, Role
 
 TPE = Film("TPE", "film", 0.038, 1122.0, 120.0, 200.0)
-PTFE = Film("PTFE", "film", 0.025, 2200.0, 327.0, 260.0)
+PTFE = Film("PTFE", "film", 0.025, 2200.0, 327.0, 260.0, kind="mask")
 
 
 @pytest.fixture(scope="session")

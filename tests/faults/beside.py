@@ -202,6 +202,7 @@ KIND = Kind(
             "manifest.json",
             lambda d: d["sheets"][0].update(estimated_minutes=0.01),
         ),
+        told("another kit", "manifest.json", lambda d: d["kit"].update(version="0")),
         told("note", "manifest.json", lambda d: d.update(notes=["safe to cut"])),
     ),
 )

@@ -16,7 +16,7 @@ Profiles = list[tuple[Role, Region]]
 Stack = Callable[[Profiles], Laminate]
 
 TPE = Film("TPE", "sheet", 0.038, 900.0, 125.0, 200.0)
-PTFE = Film("PTFE", "sheet", 0.025, 2200.0, 327.0, 260.0)
+PTFE = Film("PTFE", "sheet", 0.025, 2200.0, 327.0, 260.0, kind="mask")
 
 
 def stacked(profiles: Profiles) -> Laminate:

@@ -13,7 +13,7 @@ from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate, Layer, Pin, Role
 
 TPE = Film("TPE", "Stretchlon 200", 0.038, 1122, softens_above=120, limit=200)
-PTFE = Film("PTFE", "PTFE film", 0.025, 2200, softens_above=327, limit=260)
+PTFE = Film("PTFE", "PTFE film", 0.025, 2200, softens_above=327, limit=260, kind="mask")
 
 Stack = Callable[..., Laminate]
 

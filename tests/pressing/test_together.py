@@ -4,7 +4,20 @@ from __future__ import annotations
 
 import pytest
 
-from sbafab.pressing.together import press_runs
+from sbafab.actuators import build, load_design
+from sbafab.cutting.fixture import fixture
+from sbafab.laminate.laminate import Laminate
+from sbafab.pressing.build_up import footprint
+from sbafab.pressing.schedule import PressSettings, schedule
+from sbafab.pressing.together import (
+    Runs,
+    a_day,
+    are_apart,
+    batch_json,
+    batch_times,
+    press_runs,
+    runs_of,
+)
 
 INCH = 25.4
 
@@ -26,3 +39,95 @@ def test_as_many_as_the_heated_area_takes(
 ) -> None:
     runs = press_runs(copies, (-3.0, 2.0, size[0] - 3.0, size[1] + 2.0), (6 * INCH, 6 * INCH))
     assert (runs.together, runs.count) == expected
+
+
+def laminate(*changes: str) -> Laminate:
+    return build(load_design("1dof-5mm", changes))
+
+
+def test_a_batch_fills_the_plate_in_rows_and_ends_in_a_smaller_cycle() -> None:
+    # A plate of 6 mm round 4 columns of 20 and 3 rows of 30, 5 apart: 107 x 112.
+    runs = press_runs(30, (-10.0, -5.0, 10.0, 25.0), (107.0, 112.0), 6.0)
+    assert runs.cycles == (12, 12, 6)
+    assert runs.places[:5] == ((0, 0), (25, 0), (50, 0), (75, 0), (0, 35))
+    assert press_runs(30, (-10.0, -5.0, 10.0, 25.0), (106.99, 112.0), 6.0).together == 9
+    assert are_apart(runs.places, (-10.0, -5.0, 10.0, 25.0), 1e-9)
+    assert not are_apart(runs.places, (-10.0, -5.0, 10.01, 25.0), 1e-9)
+
+
+def test_the_plate_is_turned_where_more_lie_on_it() -> None:
+    # 50 x 10 in 100 x 60: a column of four; turned, in 60 x 100, one of seven.
+    assert press_runs(99, (0.0, 0.0, 50.0, 10.0), (100.0, 60.0)).together == 7
+    assert press_runs(99, (0.0, 0.0, 10.0, 50.0), (100.0, 60.0)).together == 7
+    assert press_runs(99, (0.0, 0.0, 90.0, 10.0), (60.0, 100.0)).together == 4
+
+
+def test_times_of_a_batch_are_those_of_the_paper_a_copy_and_a_cycle() -> None:
+    plan = schedule(laminate(), PressSettings())
+    assert plan.total_press_minutes == 45
+    times = batch_times(Runs(30, ((0.0, 0.0),) * 12), plan)
+    assert (times.press, times.hands, times.total) == (3 * 45, 30 * 60, 135 + 1800)
+    # 480 min: 4 x 105 fit and 5 x 105 do not; 45 + 7 x 60 = 465 fits and 45 + 8 x 60 does not.
+    assert (a_day(plan, 1), a_day(plan, 12)) == (4, 7)
+    # Two cycles of 4: 90 + 60 n.
+    assert a_day(plan, 4) == 6
+
+
+def test_one_plate_has_every_hole_of_every_place() -> None:
+    column = laminate("stack.balloons=2")
+    platen = (152.4, 152.4)
+    runs = runs_of(column, 7, platen)
+    plate = fixture(column, platen, runs.places)
+    assert plate is not None
+    holes = {(round(h.circle[0][0], 6), round(h.circle[0][1], 6)) for h in plate.holes if h.circle}
+    assert holes == set(runs.places)
+    # As large as the platen, and all that lies on it is in its middle, to the 0.1 mm it is cut to.
+    x0, y0, x1, y1 = plate.bounds
+    assert (x1 - x0, y1 - y0) == pytest.approx(platen)
+    low_x, low_y, high_x, high_y = column.bounds
+    taken = [low_x, low_y, high_x + max(x for x, _ in runs.places)]
+    taken.append(high_y + max(y for _, y in runs.places))
+    assert taken[0] - x0 == pytest.approx(x1 - taken[2], abs=0.11)
+    assert taken[1] - y0 == pytest.approx(y1 - taken[3], abs=0.11)
+    assert min(taken[0] - x0, taken[1] - y0) > 5
+    assert fixture(column, platen, ((0.0, 0.0),)) == fixture(column, platen)
+
+
+def test_the_plate_lies_turned_where_the_places_do() -> None:
+    column = laminate("stack.balloons=2")
+    low_x, _, high_x, _ = column.bounds
+    row = tuple((n * (high_x - low_x + 5), 0.0) for n in range(4))
+    plate = fixture(column, (60.0, 200.0), row)
+    assert plate is not None
+    x0, y0, x1, y1 = plate.bounds
+    assert (x1 - x0, y1 - y0) == pytest.approx((200.0, 60.0))
+
+
+def test_all_laminates_of_a_cycle_share_the_force() -> None:
+    column = laminate("stack.balloons=6")
+    one, twelve = schedule(column, PressSettings()), schedule(column, PressSettings(), (12, 1))
+    for single, shared in zip(one.steps, twelve.steps, strict=True):
+        assert shared.force_n == single.force_n
+        pad = {item.part: item for item in shared.build_up}["press pad"]
+        assert pad == {item.part: item for item in single.build_up}["press pad"]
+        area = 12 * footprint(column, single.layers).area
+        # What the films take and what the plate takes is the whole force.
+        total = shared.film_kpa * area + shared.plate_kpa * (152.4**2 - area)
+        assert total == pytest.approx(1000 * shared.force_n, rel=1e-3)
+        assert shared.film_kpa <= single.film_kpa
+    assert twelve.steps[-1].film_kpa < one.steps[-1].film_kpa
+
+
+def test_registered_sheets_are_one_piece_to_the_press() -> None:
+    sheets = laminate("registration.method=sheet", "order.copies=4", "stack.balloons=2")
+    assert runs_of(sheets, 4, (152.4, 152.4)) == Runs(1, ((0.0, 0.0),))
+
+
+def test_patterns_are_counted_a_cycle() -> None:
+    column = laminate("stack.balloons=2")
+    runs = Runs(5, ((0.0, 0.0),) * 3)
+    said = batch_json(column, runs, schedule(column, PressSettings()))
+    assert said["cycles"] == [3, 2]
+    for row in said["patterns"]:
+        assert row["each"] == len(column.patterns[row["pattern"]])
+        assert row["cycles"] == [3 * row["each"], 2 * row["each"]]

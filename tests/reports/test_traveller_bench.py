@@ -14,7 +14,9 @@ import shapely
 from lxml import html as lxml_html
 
 from sbafab.actuators import build, load_design
+from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
+from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.records import Nest
 from sbafab.output.settings import press_settings
@@ -27,6 +29,11 @@ from sbafab.reports.traveller.sheet_map import sheet_map
 
 SHA = hashlib.sha256(b"design").hexdigest()
 TPE, PTFE, BOND, OVERHANG = 0.038, 0.025, 0.75, 0.5
+
+
+def film_of(sheet: SheetFile) -> Film:
+    films = built("1dof-5mm")[0].films.stock
+    return films[sheet.material.lower()]
 
 
 @cache
@@ -276,14 +283,14 @@ def test_labels_do_not_lie_over_each_other_or_windows(sheet_files: Any) -> None:
         for sheet in sheet_files(built(template)[1]):
             # Two designs on a sheet: every label begins with the design's name.
             for marks in ({template: ""}, {template: "B"}):
-                svg = lxml_html.fromstring(sheet_map(sheet, marks, "sheet-1"))
+                svg = lxml_html.fromstring(sheet_map(sheet, film_of(sheet), marks, "sheet-1"))
                 covered = boxes(svg)
                 assert len(covered) > 4
                 for i, box in enumerate(covered):
                     assert all(box.intersection(other).area < 0.05 for other in covered[:i])
     masks = [sheet for sheet in sheet_files(laminate) if sheet.material == "PTFE"]
     for sheet in masks:
-        svg = lxml_html.fromstring(sheet_map(sheet, {"radial-15mm": ""}, "sheet-1"))
+        svg = lxml_html.fromstring(sheet_map(sheet, film_of(sheet), {"radial-15mm": ""}, "sheet-1"))
         frame = max(svg.iter("rect"), key=lambda rect: float(rect.get("width")))
         scale = float(frame.get("width")) / sheet.width
         foot = float(frame.get("y")) + float(frame.get("height"))
@@ -310,7 +317,7 @@ def test_a_long_sheet_is_drawn_in_rows_across_the_page(sheet_files: Any) -> None
     long = replace(
         sheet, width=60.0, length=581.0, nest=Nest("bottom-left", "TPE", stock, nest.parts, places)
     )
-    svg = lxml_html.fromstring(sheet_map(long, {"1dof-5mm": ""}, "sheet-1"))
+    svg = lxml_html.fromstring(sheet_map(long, film_of(long), {"1dof-5mm": ""}, "sheet-1"))
     rows = svg.findall(".//svg")
     sizes = [(float(row.get("width")), float(row.get("height"))) for row in rows]
     across, high = sizes[0]

@@ -26,6 +26,7 @@ class Mesh:
     ``cavities`` are closed surfaces (k, 3) of flat triangles in this mesh's nodes, counter-
     clockwise seen from outside of the air; inlets are closed by a patch. ``thickness`` is a
     shell's, in mm, a value a cell set. ``notes`` are sentences for whoever reads a file of it.
+    ``materials`` names the film that each part of a volume mesh is of; a bond is of what melts.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Mesh:
     cavities: Mapping[str, NDArray[np.int64]]
     thickness: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    materials: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def parts(self) -> dict[str, NDArray[np.int64]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -62,10 +63,21 @@ def volume_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
         cell_sets,
         face_sets,
         cavities,
+        materials={name: of for name, of in _materials(stack).items() if name in cell_sets},
     )
     check_mesh(mesh, expected)
     check_cavities(mesh)
     return mesh
+
+
+def _materials(stack: Layup) -> dict[str, str]:
+    """The material of every film and bond; a bond is of the lower film if that melts."""
+    found = {ply.name: ply.layer.film.material for ply in stack.plies}
+    for k, (below, above) in enumerate(pairwise(stack.plies), start=1):
+        films = [ply.layer.film for ply in (below, above)]
+        molten = [film for film in films if film.softens_above is not None]
+        found[bond_name(k)] = (molten or films)[0].material
+    return found
 
 
 def _corners_under(stack: Layup, swept: Sweep) -> NDArray[np.int64]:

@@ -11,10 +11,9 @@ from typing import Any
 
 from sbafab.assemblies.build import Assembled
 from sbafab.assemblies.colours import colours
-from sbafab.cutting.fixture import shown
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
-from sbafab.pressing.together import Runs, press_runs
+from sbafab.pressing.together import Runs
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.traveller import bench, bill, joining, notes, times
 from sbafab.reports.traveller import quantities as say
@@ -45,7 +44,7 @@ class DesignWork:
 
     @property
     def runs(self) -> Runs:
-        return runs_of(self.work)
+        return self.work.runs
 
 
 @dataclass(frozen=True)
@@ -67,14 +66,6 @@ class AssemblyJob:
     copies: int = 1
     made_for: str = ""
     note: str = ""
-
-
-def runs_of(work: Work) -> Runs:
-    """Press runs for all copies of a design, each with its own holes in the base plate."""
-    plate = shown(work.laminate)
-    press = work.design.press
-    bounds = work.laminate.bounds if plate is None else plate.bounds
-    return press_runs(work.job.copies, bounds, (press.platen_width, press.platen_length))
 
 
 def assembly_html(job: AssemblyJob) -> str:
@@ -101,7 +92,7 @@ def assembly_html(job: AssemblyJob) -> str:
             before_cutting=bench.before_cutting(f for w in works for f in page_films(w.laminate)),
             after_cutting=bench.after_cutting(works),
             kerf=bill.kerf_states(works[0].job, films),
-            sheet_rows=sheet_rows(job.sheets, _marks(job)),
+            sheet_rows=sheet_rows(works[0].design, job.sheets, _marks(job)),
             laser_minutes=times.laser_minutes(works[0]),
             laser_basis=times.laser_basis(works[0]),
             press_plan=[_press_words(one) for one in job.works],
@@ -178,14 +169,16 @@ def _bill(job: AssemblyJob) -> list[bill.Item]:
 
 def _is_elsewhere(item: bill.Item) -> bool:
     """Films are summed over the designs, and the tube to wrap is a part of the assembly."""
-    return item.name in ("TPE film", "PTFE film", "Tube to wrap", "Adhesive of the wrap")
+    name, _, rest = item.name.partition(" ")
+    is_film = name.isupper() and rest == "film"
+    return is_film or item.name in ("Tube to wrap", "Adhesive of the wrap")
 
 
 def _named(item: bill.Item, one: DesignWork) -> bill.Item:
-    """A design's item with its name; pins, plate and underlay for all copies pressed at once."""
+    """A design's item with its name; an underlay for each copy that is pressed at once."""
     if item.name == "Release film":
         return item
-    often = one.runs.together if item.name in ("Dowel pins", "Pin plate", "Underlay") else 1
+    often = one.runs.together if item.name == "Underlay" else 1
     quantity = f"{often} {TIMES} {item.quantity}" if often > 1 else item.quantity
     return bill.Item(f"{item.name} ({one.name})", item.what, quantity)
 

@@ -25,10 +25,24 @@ class PlateHole(NamedTuple):
     length: str
 
 
+class PlatePlace(NamedTuple):
+    """Where a further place has its holes, mm from those of the first."""
+
+    place: int
+    x: float
+    y: float
+
+
+def places(work: Work) -> list[PlatePlace]:
+    """All places of the plate but the first."""
+    return [PlatePlace(n, x, y) for n, (x, y) in enumerate(work.runs.places[1:], 2)]
+
+
 def holes(work: Work) -> list[PlateHole]:
-    """Every hole of the plate; films have the diameter ``films`` there."""
+    """Every hole of the plate's first place; films have the diameter ``films`` there."""
     laminate, press = work.laminate, work.design.press
-    corner_x, corner_y = plate_corner(laminate, (press.platen_width, press.platen_length))
+    platen = press.platen_width, press.platen_length
+    corner_x, corner_y = plate_corner(laminate, platen, work.runs.places)
     lengths = _lengths(work.schedule)
     return [
         PlateHole(
@@ -55,7 +69,9 @@ def build_up_notes(work: Work) -> tuple[str, ...]:
     newtons, kilopascals = f"{step.force_n:.0f} N", f"{step.pressure_kpa:g} kPa"
     size = say.size(*step.platen_mm)
     plate, pad, release = thick[BASE_PLATE], thick[PAD], thick[RELEASE]
-    alone = work.laminate.layers[-1].profile.area
+    together = work.runs.together
+    alone = together * work.laminate.layers[-1].profile.area
+    what = "laminate" if together == 1 else f"{together} laminates"
     return (
         "Every step has the same build-up, from the lower platen up: base plate "
         f"({plate.material}, {say.millimetres(plate.thickness_mm)}, {size}, as large as the "
@@ -64,7 +80,7 @@ def build_up_notes(work: Work) -> tuple[str, ...]:
         "platen. Nothing rigid lies on the films: no second plate.",
         f"The paper gives a pressure and a heated area, no force: {newtons} is {kilopascals} on "
         f"the whole platen of {size}. The pad brings it to the films; without it {newtons} on the "
-        f"laminate alone ({alone:.0f} mm²) would be {step.force_n / alone:.1f} MPa. What the paper "
+        f"{what} alone ({alone:.0f} mm²) would be {step.force_n / alone:.1f} MPa. What the paper "
         "laid between platen and films is not known. Over the films the pad is pressed together by "
         "their height more than beside them and pushes back the more. The pressures at each step "
         "are estimates that no press has confirmed: check them once, cold, with "
@@ -90,7 +106,9 @@ def items(work: Work) -> list[tuple[str, str, str]]:
         else "; no holes"
     )
     return [
-        *_pin_items(laminate.pins, plan, work.design.registration.pin_standard),
+        *_pin_items(
+            laminate.pins * work.runs.together, plan, work.design.registration.pin_standard
+        ),
         (
             "Base plate",
             f"{plate.material}, {say.millimetres(plate.thickness_mm)}, {size}{holes}",

@@ -13,8 +13,6 @@ from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.shapes import thumbnail
 
-ADHESIVE = "Loctite Vinyl, Fabric & Plastic Flexible Adhesive"
-
 
 @dataclass(frozen=True)
 class Item:
@@ -35,7 +33,7 @@ def bill(work: Work) -> list[Item]:
         tube = work.design.inlet.tube
         items.append(Item("Tube", f"{tube}, outer diameter {diameter}", say.count(number, "piece")))
         drops = say.count(number, "small drop")
-        items.append(Item("Adhesive", ADHESIVE, drops))
+        items.append(Item("Adhesive", work.design.inlet.adhesive, drops))
     wrap = work.design.form.wrap
     if wrap is not None:
         diameter = say.millimetres(wrap.tube_diameter)
@@ -102,7 +100,7 @@ def _cut(work: Work, layers: tuple[Layer, ...]) -> Cut:
     ]
     return Cut(
         first.pattern,
-        thumbnail(f"thumb-{first.pattern}", first.pattern, first.film.material, profile.bounds),
+        thumbnail(f"thumb-{first.pattern}", first.pattern, first.film, profile.bounds),
         first.film.material,
         ", ".join(dict.fromkeys(layer.role.replace("-", " ") for layer in layers)),
         layer_numbers([layer.index for layer in layers]),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from sbafab.cutting.properties import PTFE_WARNING
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.bill import kerf_states
 from sbafab.reports.traveller.job import Work
@@ -31,9 +30,12 @@ def for_the_designer(findings: Iterable[Finding]) -> list[tuple[str, str]]:
 
 def _all(work: Work) -> Iterator[tuple[str, str]]:
     job, schedule = work.job, work.schedule
-    materials = list(dict.fromkeys(layer.film.material for layer in work.laminate.layers))
-    if "PTFE" in materials:
-        yield "PTFE fumes", PTFE_WARNING
+    films = list(dict.fromkeys(layer.film for layer in work.laminate.layers))
+    materials = [film.material for film in films]
+    for film in films:
+        if film.warning:
+            title = "PTFE fumes" if film.material == "PTFE" else f"Cutting {film.material}"
+            yield title, film.warning
     if job.waived:
         yield (
             "Waived rules",

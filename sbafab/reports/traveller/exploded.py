@@ -85,7 +85,7 @@ def exploded(laminate: Laminate, step: AssemblyStep, lying: Sequence[Bed], name:
         look = "made" if level.made else "fresh"
         for lift, layer in enumerate(level.layers):
             matrix = view.matrix(here - PAGE * lift)
-            picture.part(pattern_id(layer.pattern), layer.film.material, matrix, look)
+            picture.part(pattern_id(layer.pattern), layer.film, matrix, look)
         reach = max(layer.profile.bounds[2] for layer in level.layers)
         edge = view.middle + reach * view.scale, here
         picture.add(*_beside(edge, level.words, level.detail, view.gap))

@@ -10,6 +10,7 @@ from sbafab.design.records import Design
 from sbafab.geometry.beam import Kerf
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.schedule import Schedule
+from sbafab.pressing.together import Runs, runs_of
 from sbafab.rules.finding import Finding
 
 
@@ -47,3 +48,10 @@ class Work:
     schedule: Schedule
     sheets: Sequence[SheetFile]
     job: Job
+
+    @property
+    def runs(self) -> Runs:
+        """How all copies are pressed."""
+        press = self.design.press
+        platen = press.platen_width, press.platen_length
+        return runs_of(self.laminate, self.job.copies, platen)

@@ -108,7 +108,8 @@ def expected_sizes(work: Work) -> list[tuple[str, str]]:
     """For every sheet and the pin plate: file, and how large it must be after opening."""
     found = [(sheet.path, say.size(sheet.width, sheet.length)) for sheet in work.sheets]
     press = work.design.press
-    plate = fixture(work.laminate, (press.platen_width, press.platen_length))
+    platen = press.platen_width, press.platen_length
+    plate = fixture(work.laminate, platen, work.runs.places)
     if work.job.fixture is not None and plate is not None:
         low_x, low_y, high_x, high_y = plate.bounds
         found.append((work.job.fixture, say.size(high_x - low_x, high_y - low_y)))

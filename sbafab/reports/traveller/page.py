@@ -15,6 +15,7 @@ from string import ascii_uppercase
 from typing import TYPE_CHECKING, Any
 
 from sbafab.cutting.sheets import SheetFile
+from sbafab.design.kits import cited, departures
 from sbafab.design.records import Design
 from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.films import Film, Material
@@ -27,6 +28,7 @@ from sbafab.reports.drawing import TIMES
 from sbafab.reports.features import balloons, layer_numbers
 from sbafab.reports.traveller import base_plate, bench, bill, notes, panel, process, times
 from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller.batch import batch_page
 from sbafab.reports.traveller.cautions import cautions, for_the_designer
 from sbafab.reports.traveller.code import code_svg, record_text
 from sbafab.reports.traveller.job import Job, Work
@@ -86,6 +88,8 @@ def context(work: Work) -> dict[str, Any]:
         "shapes": definitions(chain(pattern_regions(laminate), part_regions(work.sheets))),
         "family": work.design.form.words,
         "facts": _facts(work),
+        "kit": cited(work.design),
+        "departures": departures(work.design),
         "code": code_svg(text),
         "code_text": text,
         "legend": [(words, f"#{bytes(COLOURS[tone]).hex()}") for tone, words in KEY],
@@ -95,7 +99,7 @@ def context(work: Work) -> dict[str, Any]:
         "after_cutting": bench.after_cutting([work]),
         "bill": bill.bill(work),
         "others": others,
-        "sheet_rows": sheet_rows(work.sheets, {work.design.name: "", **others}),
+        "sheet_rows": sheet_rows(work.design, work.sheets, {work.design.name: "", **others}),
         "cuts": bill.cut_list(work),
         "kerf": bill.kerf_states(job, materials(laminate)),
         "laser_minutes": times.laser_minutes(work),
@@ -103,6 +107,8 @@ def context(work: Work) -> dict[str, Any]:
         "lay_up": _lay_up(work),
         "force_notes": base_plate.build_up_notes(work),
         "plate_holes": base_plate.holes(work),
+        "plate_places": base_plate.places(work),
+        "batch": batch_page(work),
         "step_pages": process.step_pages(work),
         "finishing": process.finishing(work),
         "tubing": process.tubing(work),
@@ -185,8 +191,11 @@ class SheetRow:
     said: str
 
 
-def sheet_rows(sheets: Sequence[SheetFile], marks: Mapping[str, str]) -> list[SheetRow]:
-    """The film sheets; patterns go with the mark of their design, or with the design's name."""
+def sheet_rows(
+    design: Design, sheets: Sequence[SheetFile], marks: Mapping[str, str]
+) -> list[SheetRow]:
+    """The film sheets of a design; patterns go with the mark or the name of theirs."""
+    films = {film.material: film for film in design.films.stock.values()}
     rows = []
     for number, sheet in enumerate(sheets, 1):
         counts = [
@@ -196,7 +205,7 @@ def sheet_rows(sheets: Sequence[SheetFile], marks: Mapping[str, str]) -> list[Sh
         rows.append(
             SheetRow(
                 sheet,
-                sheet_map(sheet, marks, f"sheet-{number}"),
+                sheet_map(sheet, films[sheet.material], marks, f"sheet-{number}"),
                 ", ".join(counts),
                 say.size(sheet.width, sheet.length),
                 say.minutes(sheet.minutes),

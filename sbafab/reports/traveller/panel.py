@@ -10,7 +10,7 @@ from sbafab.cutting.second_cut import PATH as SECOND_CUT
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.svg import number, path_data
-from sbafab.laminate.inks import INK
+from sbafab.laminate.inks import ink
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.laminate.panel import SheetPanel
 from sbafab.pressing.sheets import tackings
@@ -318,8 +318,8 @@ def _picture(laminate: Laminate, panel: SheetPanel, layer: Layer, name: str, wor
             'stroke-width="0.18"/>'
         )
 
-    ink = INK[layer.film.material]
-    picture.add(shape(panel.sheets[layer.index - 1], ink.fill, ink.line))
+    fill, line = ink(layer.film)
+    picture.add(shape(panel.sheets[layer.index - 1], fill, line))
     if not layer.is_mask:
         picture.add(shape(panel.second, SECOND, SECOND))
     for pin in laminate.pins:

@@ -70,7 +70,7 @@ def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: s
             look = "made" if bed.made_in else "clear"
             picture.part(
                 pattern_id(layer.pattern),
-                layer.film.material,
+                layer.film,
                 flat(view.scale, view.origin),
                 look,
             )

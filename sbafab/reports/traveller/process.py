@@ -9,6 +9,7 @@ from itertools import groupby
 from sbafab.laminate.assembly import AssemblyStep, assembly, stack_count
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.pressing.schedule import Step
+from sbafab.pressing.together import Runs
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
@@ -43,6 +44,7 @@ class StepPage:
     dials: tuple[tuple[str, str], ...]
     build_up: str
     pins: str
+    notes: tuple[str, ...]
     places: tuple[PiecePlace, ...]
     pitch: float | None
     plan: str
@@ -53,6 +55,7 @@ class StepPage:
 def step_pages(work: Work) -> list[StepPage]:
     """The press steps in order, each with its pictures, dial settings and actions."""
     parts = assembly(work.laminate)
+    runs = work.runs
     found = []
     for part, step in zip(parts, work.schedule.steps, strict=True):
         lying = beds(parts, part)
@@ -64,11 +67,12 @@ def step_pages(work: Work) -> list[StepPage]:
                 _dials(step),
                 build_up_svg(step, f"build-up-{step.step}"),
                 pin_lines(step),
+                _place_notes(runs),
                 placed,
                 pitch(placed),
                 plan(work.laminate, part, lying, f"plan-{step.step}"),
                 exploded(work.laminate, part, lying, f"exploded-{step.step}"),
-                _bench_actions(work, part, step, lying),
+                _bench_actions(work, part, step, lying, runs),
             )
         )
     return found
@@ -90,17 +94,28 @@ def _height(laminate: Laminate, part: AssemblyStep) -> str:
     return say.millimetres(sum(laminate.layer(index).film.thickness for index in part.layers))
 
 
+def _place_notes(runs: Runs) -> tuple[str, ...]:
+    """What is done for every laminate of a cycle, and how often the step comes round."""
+    if runs.copies == 1:
+        return ()
+    again = "" if runs.count == 1 else f" The step comes round {runs.count} times, once a cycle."
+    return (
+        f"Lay every layer at each of the {runs.together} places of the plate before the next one, "
+        f"then close the press once for all; the pictures show one place.{again}",
+    )
+
+
 def _bench_actions(
-    work: Work, part: AssemblyStep, step: Step, lying: Sequence[Bed]
+    work: Work, part: AssemblyStep, step: Step, lying: Sequence[Bed], runs: Runs
 ) -> tuple[Action, ...]:
     """A step's actions; what it is laid up on comes right after the press is set."""
-    first, *others = _actions(work.laminate, part, step, lying)
+    first, *others = _actions(work.laminate, part, step, lying, runs)
     own = (*underlay(work, part), *on_the_lumen(work.laminate, part))
     return (first, *own, *others)
 
 
 def _actions(
-    laminate: Laminate, part: AssemblyStep, step: Step, lying: Sequence[Bed]
+    laminate: Laminate, part: AssemblyStep, step: Step, lying: Sequence[Bed], runs: Runs
 ) -> Iterator[Action]:
     things = Things(laminate, lying)
     yield Action(
@@ -133,7 +148,12 @@ def _actions(
         "plate on top."
     )
     yield warm_plate(step)
-    yield Action(f"Close the press and start the timer: {say.minutes(step.minutes)}.")
+    cycles = tuple(f"cycle {n}" for n in range(1, runs.count + 1))
+    yield Action(
+        f"Close the press and start the timer: {say.minutes(step.minutes)}.",
+        (),
+        cycles if 1 < len(cycles) <= MOST_LINES else (),
+    )
     yield Action("Take it out: it is as hot as the platens. Let it cool flat before you touch it.")
     if part.pins:
         names = say.listed([pin.name for pin in part.pins])
@@ -214,7 +234,10 @@ def _turned(laminate: Laminate, layers: Sequence[int]) -> str:
     mask = over_tab(laminate, layers)
     if mask is None:
         return ""
-    return f" Turn it so that layer {mask.index}, the PTFE mask that reaches out, covers the tab."
+    return (
+        f" Turn it so that layer {mask.index}, the {mask.film.material} mask that reaches out, "
+        "covers the tab."
+    )
 
 
 def _named(layer: Layer) -> str:
@@ -261,6 +284,7 @@ def tubing(work: Work) -> list[Action]:
     names = _apart([inlet.chamber for inlet in inlets])
     diameter = say.millimetres(inlets[0].tube_diameter)
     straight = say.millimetres(min(inlet.length for inlet in inlets))
+    strip = work.laminate.interfaces[-1].masks[0].film.material
     first = f"the tab of {inlets[0].chamber}" if len(inlets) > 1 else "the tab"
     return [
         Action(
@@ -270,7 +294,9 @@ def tubing(work: Work) -> list[Action]:
             f"Cut {say.count(len(inlets), 'piece')} of {work.design.inlet.tube}, outer diameter "
             f"{diameter}, square and without burr, as long as your rig needs."
         ),
-        Action("Part the two films at the tab's end; the PTFE strip lies between them.", (), names),
+        Action(
+            f"Part the two films at the tab's end; the {strip} strip lies between them.", (), names
+        ),
         Action(
             f"Push the tube in beside the strip, up to {straight} deep: so long is the straight "
             "run of the tab.",
@@ -279,8 +305,8 @@ def tubing(work: Work) -> list[Action]:
         ),
         Action("Snip off what of the strip stands out of the tab, flush with its end.", (), names),
         Action(
-            "Seal the mouth all round with a small drop of Loctite Vinyl, Fabric & Plastic; keep "
-            "it out of the tube.",
+            f"Seal the mouth all round with a small drop of {work.design.inlet.adhesive}; keep it "
+            "out of the tube.",
             (),
             names,
         ),

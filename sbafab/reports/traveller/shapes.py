@@ -1,7 +1,7 @@
 """What all pictures of the page share: the outline of every pattern, drawn once and used often.
 
-Pictures are inline SVG with millimetres as units. PTFE is hatched as well as orange, so that a
-grey print still tells it from TPE.
+Pictures are inline SVG with millimetres as units. Masks are hatched as well as coloured, so that a
+grey print still tells them from structural films.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from xml.sax.saxutils import escape, quoteattr
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.svg import number, path_data
-from sbafab.laminate.films import Material
-from sbafab.laminate.inks import INK
+from sbafab.laminate.films import Film
+from sbafab.laminate.inks import Ink, ink
 from sbafab.laminate.laminate import Laminate
 from sbafab.reports import drawing as draw
 
@@ -53,34 +53,34 @@ class Picture:
     def __init__(self, name: str, width: float, height: float, words: str) -> None:
         self.name, self.width, self.height, self.words = name, width, height, words
         self._elements: list[str] = []
-        self._hatches: dict[float, str] = {}
+        self._hatches: dict[tuple[float, Ink], str] = {}
 
     def add(self, *elements: str) -> None:
         self._elements += elements
 
-    def part(self, shape: str, material: Material, matrix: tuple[float, ...], look: str) -> None:
+    def part(self, shape: str, film: Film, matrix: tuple[float, ...], look: str) -> None:
         """A shape drawn by its id; ``matrix`` takes its frame to the page, ``look`` is fresh,
         made (both opaque) or clear.
         """
         scale = abs(matrix[0]) or abs(matrix[1])
-        ink = INK[material]
-        fill = "#e4e7ea" if look == "made" else self._fill(material, scale)
+        fill = "#e4e7ea" if look == "made" else self._fill(film, scale)
         opacity = ' fill-opacity="0.6"' if look == "clear" else ""
         moved = " ".join(map(number, matrix))
         self.add(
             f'<use href="#{shape}" transform="matrix({moved})" fill="{fill}"{opacity} '
-            f'stroke="{ink.line}" stroke-width="{number(LINE / scale)}"/>'
+            f'stroke="{ink(film).line}" stroke-width="{number(LINE / scale)}"/>'
         )
 
-    def _fill(self, material: Material, scale: float) -> str:
-        if material == "TPE":
-            return INK[material].fill
-        self._hatches.setdefault(scale, f"hatch-{self.name}-{len(self._hatches) + 1}")
-        return f"url(#{self._hatches[scale]})"
+    def _fill(self, film: Film, scale: float) -> str:
+        own = ink(film)
+        if not film.is_mask:
+            return own.fill
+        self._hatches.setdefault((scale, own), f"hatch-{self.name}-{len(self._hatches) + 1}")
+        return f"url(#{self._hatches[scale, own]})"
 
     def svg(self) -> str:
         w, h = number(self.width), number(self.height)
-        hatches = "".join(_hatch(name, scale) for scale, name in self._hatches.items())
+        hatches = "".join(_hatch(name, scale, own) for (scale, own), name in self._hatches.items())
         return (
             f'<svg class="picture" role="img" aria-label={quoteattr(self.words)} '
             f'width="{w}mm" height="{h}mm" viewBox="0 0 {w} {h}" font-family="{draw.FONT}" '
@@ -89,15 +89,14 @@ class Picture:
         )
 
 
-def _hatch(name: str, scale: float) -> str:
+def _hatch(name: str, scale: float, own: Ink) -> str:
     """Oblique lines, as dense on the page whatever the scale of what they fill."""
-    ink = INK["PTFE"]
     turned = f"rotate(45) scale({number(1 / scale)})"
     step = number(HATCH_STEP)
     return (
         f'<pattern id="{name}" patternUnits="userSpaceOnUse" width="{step}" height="{step}" '
-        f'patternTransform="{turned}"><rect width="{step}" height="{step}" fill="{ink.fill}"/>'
-        f'<rect width="0.18" height="{step}" fill="{ink.line}" fill-opacity="0.6"/></pattern>'
+        f'patternTransform="{turned}"><rect width="{step}" height="{step}" fill="{own.fill}"/>'
+        f'<rect width="0.18" height="{step}" fill="{own.line}" fill-opacity="0.6"/></pattern>'
     )
 
 
@@ -116,12 +115,12 @@ def label(at: Point, words: str, size: float = draw.SMALL, anchor: str = "middle
     )
 
 
-def thumbnail(name: str, pattern: str, material: Material, bounds: Bounds) -> str:
+def thumbnail(name: str, pattern: str, film: Film, bounds: Bounds) -> str:
     """A pattern by itself, small."""
     low_x, low_y, high_x, high_y = bounds
     scale = min((THUMB[0] - 1) / (high_x - low_x), (THUMB[1] - 1) / (high_y - low_y))
     picture = Picture(name, *THUMB, f"outline of pattern {pattern}")
     middle = (low_x + high_x) / 2, (low_y + high_y) / 2
     at = THUMB[0] / 2 - scale * middle[0], THUMB[1] / 2 + scale * middle[1]
-    picture.part(pattern_id(pattern), material, flat(scale, at), "fresh")
+    picture.part(pattern_id(pattern), film, flat(scale, at), "fresh")
     return picture.svg()

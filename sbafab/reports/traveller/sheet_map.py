@@ -10,6 +10,7 @@ from sbafab.cutting.sheets import SheetFile
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.svg import number
+from sbafab.laminate.films import Film
 from sbafab.nesting.records import Placement
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller.part_labels import PlacedLabel, first_free, labels
@@ -100,7 +101,7 @@ def rows_said(sheet: SheetFile) -> str:
     return f"{turn}; {said}" if said else turn
 
 
-def sheet_map(sheet: SheetFile, marks: Mapping[str, str], name: str) -> str:
+def sheet_map(sheet: SheetFile, film: Film, marks: Mapping[str, str], name: str) -> str:
     """The sheet in plan, its lower left corner at the lower left; a long one in rows.
 
     A part is labelled with its pattern after the mark of its design, or the design's name.
@@ -112,7 +113,7 @@ def sheet_map(sheet: SheetFile, marks: Mapping[str, str], name: str) -> str:
     picture = Picture(name, width + 2 * EDGE, low + EDGE, words)
     for strip in strips:
         picture.add(*_window(strip))
-        _draw(picture, sheet, strip, marks)
+        _draw(picture, sheet, film, strip, marks)
         picture.add("</svg>")
         (x, y), (wide, high) = strip.corner, strip.size
         frame = (x, y), (x + wide, y + high)
@@ -163,7 +164,9 @@ def _window(strip: _Strip) -> list[str]:
     ]
 
 
-def _draw(picture: Picture, sheet: SheetFile, strip: _Strip, marks: Mapping[str, str]) -> None:
+def _draw(
+    picture: Picture, sheet: SheetFile, film: Film, strip: _Strip, marks: Mapping[str, str]
+) -> None:
     """Parts, pins and labels of a strip."""
     seen = [
         (placement, sheet.nest.region(placement))
@@ -172,7 +175,7 @@ def _draw(picture: Picture, sheet: SheetFile, strip: _Strip, marks: Mapping[str,
     seen = [(placement, region) for placement, region in seen if _meets(region.bounds, strip)]
     for placement, _ in seen:
         name = _part_id(sheet, placement.part)
-        picture.part(name, sheet.material, strip.matrix(placement), "fresh")
+        picture.part(name, film, strip.matrix(placement), "fresh")
     for x, y, diameter in sheet.nest.stock.pins:
         at = strip.at((x, y))
         radius = number(diameter * strip.scale / 2)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from sbafab.pressing.together import batch_times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.job import Work
 
@@ -34,6 +35,21 @@ def laser_basis(work: Work) -> str:
     )
 
 
+def _batch(work: Work) -> list[Time]:
+    """The whole batch, for a design of several copies."""
+    runs, plan = work.runs, work.schedule
+    if runs.copies == 1:
+        return []
+    took = batch_times(runs, plan)
+    made_of = (
+        f"{say.count(runs.count, 'press cycle')} of {plan.total_press_minutes:g} min, "
+        f"{runs.copies} times the handling below, one after the other; one by one "
+        f"{runs.copies * plan.estimated_build_minutes:.0f} min"
+    )
+    row = f"All {runs.copies} copies"
+    return [Time(row, f"{took.total:.0f} min = {say.hours(took.total)}", made_of)]
+
+
 def times(work: Work) -> list[Time]:
     """Rows of the time table, the total last but for the paper's."""
     plan = work.schedule
@@ -53,6 +69,7 @@ def times(work: Work) -> list[Time]:
         )
     return [
         *rows,
+        *_batch(work),
         Time(
             "Handling",
             say.minutes(handling),

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sbafab.laminate.films import in_order
 from sbafab.meshing.conforming.model import Mesh
 from sbafab.meshing.conforming.write_inp import write_inp
 from sbafab.simulators.calculix.imperfection import uneven
@@ -60,21 +61,33 @@ def started(mesh: Mesh, settings: DeckSettings) -> Mesh:
 
 
 def _lines(mesh: Mesh, settings: DeckSettings) -> Iterator[str]:
-    film = settings.film
     asked = ", ".join(f"{name} {value:g} kPa" for name, value in settings.pressures.items())
     yield "*HEADING\n"
     yield "Stacked balloon actuator; units mm, N, MPa, t, s\n"
     yield f"** Pressures at the end: {asked}\n"
     yield f"*INCLUDE, INPUT={MESH_FILE}\n"
     yield from _cavity_faces(mesh)
-    yield "*MATERIAL, NAME=TPE\n"
-    yield f"*ELASTIC\n{film.modulus:g}, {film.poisson:g}\n*DENSITY\n{film.density:g}\n"
-    yield "*SOLID SECTION, ELSET=all_elements, MATERIAL=TPE\n"
+    yield from _sections(mesh, settings)
     yield from supports(mesh)
     for name in settings.pressures:
         yield f"*AMPLITUDE, NAME=ramp_{name}\n"
         yield "".join(f"{time:.9g}, {settings.share(time):.9g}\n" for time in settings.times())
     yield from _step(mesh, settings)
+
+
+def _sections(mesh: Mesh, settings: DeckSettings) -> Iterator[str]:
+    """The films' materials, and which elements are of each."""
+    films = {"TPE": settings.film, **settings.others}
+    used = in_order(mesh.materials.values()) or ["TPE"]
+    for name in used:
+        film, elements = films[name], "all_elements"
+        if len(used) > 1:
+            elements = f"material_{name}"
+            yield f"*ELSET, ELSET={elements}\n"
+            yield from (f"{part}\n" for part, of in mesh.materials.items() if of == name)
+        yield f"*MATERIAL, NAME={name}\n"
+        yield f"*ELASTIC\n{film.modulus:g}, {film.poisson:g}\n*DENSITY\n{film.density:g}\n"
+        yield f"*SOLID SECTION, ELSET={elements}, MATERIAL={name}\n"
 
 
 def _step(mesh: Mesh, settings: DeckSettings) -> Iterator[str]:

@@ -6,9 +6,11 @@ Units are mm, N, MPa, t and s; pressures are given in kPa.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
+from sbafab.errors import DesignError
+from sbafab.laminate.films import PAPER_TPE, Film
 from sbafab.laminate.laminate import Laminate
 from sbafab.simulators.simulator import Wish, chamber_pressures
 
@@ -26,7 +28,7 @@ class Elastic(NamedTuple):
     density: float
 
 
-TPE = Elastic(10.0, 0.2, 1.122e-9)
+TPE = Elastic(*PAPER_TPE, 1.122e-9)
 """As in the paper's model. The density is the film's own where there is a laminate."""
 
 
@@ -38,7 +40,8 @@ class DeckSettings:
     times on the way. They rise with the square of time, because a flat film gives way at once and
     then ever less. Films start ``imperfection`` mm off flat, or wrinkles would be a bifurcation
     that no Newton iteration gets past; "static" leaves out the inertia that carries a film from
-    one pattern of wrinkles to the next, and mostly stops there.
+    one pattern of wrinkles to the next, and mostly stops there. ``film`` is TPE, ``others`` are
+    further films by material.
     """
 
     pressures: Mapping[str, float]
@@ -47,6 +50,7 @@ class DeckSettings:
     outputs: int = 24
     imperfection: float = 0.010
     film: Elastic = TPE
+    others: Mapping[str, Elastic] = field(default_factory=dict)
 
     def times(self) -> list[float]:
         """When results are written, in s, and the start."""
@@ -70,5 +74,16 @@ def deck_settings(
     """Settings for a laminate; pressures as in ``chamber_pressures``, by default the paper's."""
     names = [chamber.name for chamber in laminate.chambers]
     pressures = chamber_pressures(names, wish or Wish(), PAPER_PRESSURE)
-    kilograms = laminate.tpe_layers[0].film.density
-    return DeckSettings(pressures, procedure, film=TPE._replace(density=1e-12 * kilograms))
+    films = {layer.film.material: _elastic(layer.film) for layer in laminate.tpe_layers}
+    film = films.pop("TPE", TPE)
+    return DeckSettings(pressures, procedure, film=film, others=films)
+
+
+def _elastic(film: Film) -> Elastic:
+    """What a film is like. Raises DesignError where its modulus is not known."""
+    if film.elastic is None:
+        raise DesignError(
+            f"CalculiX needs Young's modulus of {film.material}; add "
+            f"films.{film.material.lower()}.modulus, in MPa, and poisson, its ratio"
+        )
+    return Elastic(*film.elastic, 1e-12 * film.density)

@@ -57,6 +57,12 @@ def round_stack(laminate: Laminate) -> RoundStack:
             f"{SUPPORTED}; the pockets of {laminate.name} lie on a sheet and need the conforming "
             "shell mesh"
         )
+    others = sorted({layer.film.material for layer in laminate.tpe_layers} - {"TPE"})
+    if others:
+        raise DesignError(
+            f"{SUPPORTED} of TPE alone; {laminate.name} has films of {', '.join(others)}, which "
+            "CalculiX takes"
+        )
     axes = tuple(chamber.centres[0] for chamber in laminate.chambers)
     rooms = [gap for gap in laminate.interfaces if gap.kind == "chamber"]
     necks = [gap for gap in laminate.interfaces if gap.kind == "separator"]

@@ -1,0 +1,226 @@
+"""The films that a design is cut from, the sheets they come on, and which film a layer is of.
+
+Lengths are mm.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from typing import Annotated, Literal, Self
+
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
+
+from sbafab.design.section import Section
+from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
+from sbafab.geometry.beam import Kerf
+from sbafab.laminate.films import PAPER_TPE, PTFE_WARNING, Film, FilmKind, Material
+
+UNCALIBRATED: Literal["uncalibrated"] = "uncalibrated"
+FILM_NAME = re.compile(r"[a-z][a-z0-9]{0,15}")
+MOST_FILMS = 20
+"""Beside TPE and PTFE."""
+HOTTEST = 400.0
+"""C, of any film."""
+
+
+def is_kerf(x: float, y: float) -> bool:
+    """Whether a beam may be so wide: up to a millimetre, and nowhere ten times as wide."""
+    return min(x, y) >= 0 and max(x, y) <= min(1.0, 10 * min(x, y)) and math.isfinite(x + y)
+
+
+def _kerf(value: object) -> Kerf | str:
+    if value == UNCALIBRATED:
+        return UNCALIBRATED
+    pair = list(value) if isinstance(value, list | tuple) else [value, value]
+    try:
+        x, y = map(millimetres, pair)
+    except ValueError:
+        x = y = -1.0
+    if not is_kerf(x, y):
+        raise ValueError(
+            "must be a length from 0 to 1 mm, or two of them, [along x, along y], neither over "
+            'ten times the other, or "uncalibrated"'
+        )
+    return x if x == y else (x, y)
+
+
+KerfWidth = Annotated[
+    LengthOrZero | tuple[LengthOrZero, LengthOrZero] | Literal["uncalibrated"],
+    BeforeValidator(_kerf),
+]
+"""Full width of the cut, or [along x, along y]."""
+
+SheetPin = Annotated[tuple[LengthOrZero, LengthOrZero, Length], Field(strict=False)]
+
+
+class Sheet(Section):
+    """Film to cut from, as it lies on the machine."""
+
+    width: Annotated[float, Millimetres(SHORTEST, 10000)] = 152.4
+    """Size along x; the heated area of the paper's press."""
+    length: Annotated[float, Millimetres(SHORTEST, 10000)] = 152.4
+    """Size along y; of a roll, the most that is unrolled for one sheet."""
+    roll: bool = False
+    """Whether it comes off a roll: a sheet then ends where its parts do."""
+    border: LengthOrZero = 10.0
+    """What is left free along every edge of the sheet."""
+    spacing: Annotated[float, Millimetres(SHORTEST, 100)] = 1.0
+    """Least distance between two parts' cuts, and to pins."""
+    pins: tuple[SheetPin, ...] = Field(default=(), max_length=100, strict=False)
+    """What holds the sheet down: x, y from its lower left corner, and diameter."""
+    most: int = Field(default=20, ge=1, le=1000)
+    """Sheets that may be used."""
+
+
+class TpeFilm(Section):
+    """The structural film that is bonded."""
+
+    product: str = Field(default="Stretchlon 200", max_length=80)
+    """What to order."""
+    thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.038
+    """Thickness of the structural film."""
+    density: float = Field(default=1122.0, gt=0, le=20000)
+    """kg/m3, measured (paper Sec. 3.2.1)."""
+    melting_point: float = Field(default=120.0, gt=0, le=HOTTEST)
+    """C; the press must be hotter."""
+
+
+class PtfeFilm(Section):
+    """The film of the masks, which nothing bonds to."""
+
+    product: str = Field(default="PTFE film", max_length=80)
+    """What to order."""
+    thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.025
+    """Thickness of the mask film."""
+    density: float = Field(default=2200.0, gt=0, le=20000)
+    """kg/m3, handbook value."""
+    temperature_limit: float = Field(default=260.0, gt=0, le=HOTTEST)
+    """C; the usual limit for PTFE in lasting use."""
+
+
+class OtherFilm(Section):
+    """A further film: another thickness or polymer, one that does not stretch, another mask."""
+
+    kind: FilmKind
+    """"structural": bonds where it touches another structural film. "mask": nothing bonds to it."""
+    product: str = Field(max_length=80)
+    """What to order."""
+    thickness: Annotated[float, Millimetres(SHORTEST, 1)]
+    """Its thickness."""
+    density: float = Field(gt=0, le=20000)
+    """kg/m3."""
+    melting_point: float | None = Field(default=None, gt=0, le=HOTTEST)
+    """C; the press must be hotter. A structural film without one stays solid in the press and
+    bonds only to films that melt on it."""
+    temperature_limit: float | None = Field(default=None, gt=0, le=HOTTEST)
+    """C; the press must stay below. A mask has one."""
+    modulus: float | None = Field(default=None, gt=0, le=1e6)
+    """MPa, Young's; CalculiX needs it. TPE has the paper's 10."""
+    poisson: float = Field(default=0.3, ge=0, lt=0.5)
+    """Poisson's ratio, for CalculiX too; TPE has the paper's 0.2."""
+    warning: str = Field(default="", max_length=200)
+    """What every cut file of it says, for instance of its fumes."""
+    kerf: KerfWidth = UNCALIBRATED
+    """Full kerf width in this film, as laser.kerf_tpe."""
+    sheet: Sheet = Sheet()
+    """What it is cut from, as sheets.tpe."""
+
+    @model_validator(mode="after")
+    def _mask_has_a_limit(self) -> Self:
+        if self.kind == "mask" and self.temperature_limit is None:
+            raise ValueError("is a mask without temperature_limit; add it, in C")
+        if self.kind == "mask" and self.melting_point is not None:
+            raise ValueError("is a mask, to which nothing bonds; remove melting_point")
+        return self
+
+
+class Films(Section):
+    """What the layers are cut from: TPE, PTFE, and further films, a table each."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, OtherFilm] = Field(init=False)
+
+    tpe: TpeFilm = TpeFilm()
+    ptfe: PtfeFilm = PtfeFilm()
+
+    @model_validator(mode="after")
+    def _names_can_be_written(self) -> Self:
+        for name in self.others:
+            if not FILM_NAME.fullmatch(name):
+                raise ValueError(
+                    f"has a film named {name[:40]!r}; a name is a small letter and up to 15 small "
+                    'letters or digits, such as "tpu50"'
+                )
+        if len(self.others) > MOST_FILMS:
+            raise ValueError(f"has {len(self.others)} further films; at most {MOST_FILMS} may be")
+        return self
+
+    @property
+    def others(self) -> Mapping[str, OtherFilm]:
+        """The films beside TPE and PTFE, by the names of their tables."""
+        return self.__pydantic_extra__ or {}
+
+    @property
+    def stock(self) -> dict[str, Film]:
+        """Every film by the name of its table: TPE, PTFE, then the others."""
+        tpe, ptfe = self.tpe, self.ptfe
+        limit = ptfe.temperature_limit
+        found = {
+            "tpe": Film(
+                "TPE",
+                tpe.product,
+                tpe.thickness,
+                tpe.density,
+                tpe.melting_point,
+                limit,
+                elastic=PAPER_TPE,
+            ),
+            "ptfe": Film(
+                "PTFE",
+                ptfe.product,
+                ptfe.thickness,
+                ptfe.density,
+                limit,
+                limit,
+                "mask",
+                warning=PTFE_WARNING,
+            ),
+        }
+        for name, film in self.others.items():
+            found[name] = Film(
+                material=material(name),
+                product=film.product,
+                thickness=film.thickness,
+                density=film.density,
+                softens_above=film.melting_point,
+                limit=HOTTEST if film.temperature_limit is None else film.temperature_limit,
+                kind=film.kind,
+                warning=film.warning,
+                elastic=None if film.modulus is None else (film.modulus, film.poisson),
+                shade=sum(known.kind == film.kind for known in found.values()),
+            )
+        return found
+
+
+def material(name: str) -> Material:
+    """What files and lists call the film of this table."""
+    return name.upper()
+
+
+class LayerFilms(Section):
+    """Which film each layer is cut from, by the names of the tables in ``films``."""
+
+    base: str = "tpe"
+    """The lowest film of the bottom balloons."""
+    wall: str = "tpe"
+    """All films between base and cap."""
+    cap: str = "tpe"
+    """The topmost film."""
+    sheet: str = "tpe"
+    """The sheet of a radial design."""
+    chamber_mask: str = "ptfe"
+    """The masks in the pockets, inlet strips included."""
+    separator_mask: str = "ptfe"
+    """The masks between balloons."""

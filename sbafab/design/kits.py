@@ -1,0 +1,334 @@
+"""Kits: what a lab works with, in one file with a source for every number.
+
+A kit gives a design every key of films, registration, press, laser, sheets and rules that the
+design itself leaves out, and the tube and adhesive of its inlets.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from sbafab.design.films import Films
+from sbafab.design.reading import (
+    KITS,
+    checked,
+    kit_names,
+    listed,
+    read_toml,
+    shown,
+    templates_folder,
+    write_copy,
+)
+from sbafab.design.records import NAME_PATTERN, Design, Laser, Press, Registration, Rules, Sheets
+from sbafab.design.section import Section, writable
+from sbafab.design.units import Length, millimetres
+from sbafab.design.writing import plain_tables, resolved
+from sbafab.errors import DesignError
+
+DEFAULT = "paper"
+SCHEMA = "sbafab/kit@1"
+FILE = "kit.toml"
+"""A kit's copy in the output folder of a design."""
+VALUE, SOURCE = "value", "source"
+SECTIONS = ("films", "registration", "press", "laser", "sheets", "rules")
+"""Sections of a design that a kit fills in."""
+OF_A_DESIGN = ("registration.method", "rules.waive", "rules.target_yield", "rules.yield_builds")
+"""Keys in them that are no lab's to say."""
+TEXTS = ("product", "use", "warning", "plate_material", "release_film")
+"""Keys that are no numbers, whatever they say."""
+Product = Annotated[str, Field(min_length=1, max_length=120)]
+
+
+class Tube(Section):
+    """Supply tubing."""
+
+    outer_diameter: Length
+    """Outer diameter."""
+    inner_diameter: Length | None = None
+    """Inner diameter."""
+
+
+class Adhesive(Section):
+    """What seals an inlet."""
+
+    use: str = Field(default="", max_length=400)
+    """How it is used."""
+    cure_hours: float | None = Field(default=None, gt=0, le=1000)
+    """Hours until it holds."""
+
+
+class _File(Section):
+    """All tables of a kit's file, sources taken out."""
+
+    schema_name: Literal["sbafab/kit@1"] = Field(alias="schema")
+    name: str = Field(pattern=NAME_PATTERN)
+    version: str = Field(min_length=1, max_length=40)
+    about: str = Field(default="", max_length=400)
+    films: Films = Films()
+    registration: Registration = Registration()
+    press: Press = Press()
+    laser: Laser = Laser()
+    sheets: Sheets = Sheets()
+    rules: Rules = Rules()
+    tubes: dict[Product, Tube] = Field(default_factory=dict)
+    adhesives: dict[Product, Adhesive] = Field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Kit:
+    """A lab's kit. ``tables`` hold the keys that it gives a design, ``sources`` say by dotted key
+    where its numbers are from; ``sha256`` is that of all it says.
+    """
+
+    name: str
+    version: str
+    about: str
+    sha256: str
+    tables: Mapping[str, Any]
+    sources: Mapping[str, str]
+    tubes: Mapping[str, Tube]
+    adhesives: Mapping[str, Adhesive]
+    text: bytes
+    """The file as it lies on disk."""
+
+
+def kit_path(kit: object, folder: Path) -> Path:
+    """The file of the kit that a design in ``folder`` names. Raises DesignError."""
+    if not isinstance(kit, str):
+        raise DesignError(f"kit = {shown(kit)} must be a text in quotes: a kit's name or its file")
+    try:
+        writable(kit)
+    except ValueError as error:
+        raise DesignError(f"kit = {shown(kit)} {error}") from None
+    if kit in kit_names():
+        return templates_folder() / KITS / f"{kit}.toml"
+    path = folder / kit
+    try:
+        is_there = path.is_file()
+    except (OSError, ValueError):
+        is_there = False
+    if not is_there:
+        raise DesignError(
+            f"kit = {shown(kit)} is neither a kit that ships ({', '.join(kit_names())}) nor a file "
+            "beside the design; sbafab new kit writes one to start from"
+        )
+    return path
+
+
+def read_kit(path: Path) -> Kit:
+    """A kit's file. Raises DesignError with one sentence for what is wrong in it."""
+    tables = read_toml(path)
+    sources: dict[str, str] = {}
+    plain = _without_sources(tables, "", sources, path)
+    for key in OF_A_DESIGN:
+        section, _, name = key.partition(".")
+        if name in _table(plain, section):
+            raise DesignError(f"{path}: {key} is a design's to say, not a kit's; remove it")
+    try:
+        found = checked(_File, plain, {})
+    except DesignError as error:
+        said = str(error).replace("a design file", "a kit").replace("the design file", "the kit")
+        raise DesignError(f"{path}: {said}") from None
+    text = json.dumps(tables, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return Kit(
+        name=found.name,
+        version=found.version,
+        about=found.about,
+        sha256=hashlib.sha256(text.encode()).hexdigest(),
+        tables={section: plain[section] for section in SECTIONS if section in plain},
+        sources=sources,
+        tubes=found.tubes,
+        adhesives=found.adhesives,
+        text=path.read_bytes(),
+    )
+
+
+@cache
+def _shipped(path: Path) -> Kit:
+    return read_kit(path)
+
+
+def _kit(kit: object, folder: Path) -> Kit:
+    path = kit_path(kit, folder)
+    return _shipped(path) if kit in kit_names() else read_kit(path)
+
+
+def kit_of(design: Design) -> Kit:
+    """The kit that a design names. Raises DesignError."""
+    return _kit(design.kit, design.folder)
+
+
+def _without_sources(
+    table: Mapping[str, Any], prefix: str, sources: dict[str, str], path: Path
+) -> dict[str, Any]:
+    """The tables with plain values. Raises DesignError for a number whose source is not given."""
+    plain: dict[str, Any] = {}
+    for key, value in table.items():
+        where = f"{prefix}{key}"
+        if isinstance(value, dict) and VALUE in value:
+            source = value.get(SOURCE)
+            if set(value) != {VALUE, SOURCE} or not isinstance(source, str) or not source.strip():
+                raise DesignError(
+                    f'{path}: {where} must be {{ value = ..., source = "where the number is '
+                    'from" } and nothing else'
+                )
+            plain[key], sources[where] = value[VALUE], source
+        elif isinstance(value, dict):
+            plain[key] = _without_sources(value, f"{where}.", sources, path)
+        elif prefix and key not in TEXTS and _is_number(value):
+            raise DesignError(
+                f"{path}: {where} = {shown(value)} has no source; write {where} = {{ value = "
+                f'{shown(value)}, source = "where the number is from" }}'
+            )
+        else:
+            plain[key] = value
+    return plain
+
+
+def _is_number(value: object) -> bool:
+    """Whether a value is a number, a length with its unit, or a list with one in it."""
+    if isinstance(value, list):
+        return any(map(_is_number, value))
+    if isinstance(value, str):
+        try:
+            millimetres(value)
+        except ValueError:
+            return False
+        return True
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def under_kit(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """A design's tables with every key filled in that its kit gives and the design leaves out.
+
+    Raises DesignError where there is no such kit, it is not sound, or it lacks the tube.
+    """
+    kit = _kit(data.get("kit", DEFAULT), folder)
+    filled = {**data}
+    for section, table in kit.tables.items():
+        own = data.get(section, {})
+        # What is no table is refused later, in the words for it.
+        filled[section] = _merged(table, own) if isinstance(own, dict) else own
+    inlet = data.get("inlet", {})
+    if isinstance(inlet, dict):
+        filled["inlet"] = {**_inlet(kit, inlet, "kit" in data), **inlet}
+    return filled
+
+
+def _merged(table: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+    """The table with all that ``own`` says in its place, table by table."""
+    merged = {**table, **own}
+    for key, value in own.items():
+        if isinstance(value, dict) and isinstance(table.get(key), dict):
+            merged[key] = _merged(table[key], value)
+    return merged
+
+
+def _inlet(kit: Kit, own: Mapping[str, Any], is_named: bool) -> dict[str, Any]:
+    """The kit's tube and adhesive: the first of each, or the size of the one that is asked for."""
+    given: dict[str, Any] = {}
+    if kit.adhesives:
+        given["adhesive"] = next(iter(kit.adhesives))
+    if not kit.tubes:
+        return given
+    name = own.get("tube", next(iter(kit.tubes)))
+    if isinstance(name, str) and name in kit.tubes:
+        return {**given, "tube": name, "tube_outer_diameter": kit.tubes[name].outer_diameter}
+    if is_named and "tube_outer_diameter" not in own:
+        raise DesignError(
+            f"inlet.tube = {shown(name)} is not in kit {kit.name} ({listed(kit.tubes)}); name one "
+            "of those, add it to the kit, or give inlet.tube_outer_diameter"
+        )
+    return given
+
+
+def without_kit(data: Mapping[str, Any], design: Design) -> dict[str, Any]:
+    """A design's tables without values that its kit or a default gives: another kit may."""
+    kit = kit_of(design)
+    given = {**kit.tables, "inlet": _inlet(kit, {}, False)}
+    usual = type(design).model_validate({"name": "x", "family": design.family, **given})
+    tables = {key: table for key, table in data.items() if isinstance(table, dict)}
+    return {**data, **{key: {} for key in tables}, **_less(tables, plain_tables(usual))}
+
+
+def _less(data: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
+    """What differs from the usual values, tables that are left with nothing taken out."""
+    left: dict[str, Any] = {}
+    for key, value in data.items():
+        inner = usual.get(key)
+        own = _less(value, inner) if isinstance(value, dict) and isinstance(inner, dict) else value
+        if own not in (inner, {}):
+            left[key] = own
+    return left
+
+
+def departures(design: Design) -> list[str]:
+    """The dotted keys that a design sets otherwise than its kit."""
+    kit = kit_of(design)
+    own, given = resolved(design), dict(_values(kit))
+    found = [key for key, value in given.items() if _at(own, key) != value]
+    tube = kit.tubes.get(design.inlet.tube)
+    if kit.tubes and tube is None:
+        found.append("inlet.tube")
+    elif tube is not None and tube.outer_diameter != design.inlet.tube_outer_diameter:
+        found.append("inlet.tube_outer_diameter")
+    if kit.adhesives and design.inlet.adhesive not in kit.adhesives:
+        found.append("inlet.adhesive")
+    return found
+
+
+def _values(kit: Kit) -> Iterator[tuple[str, object]]:
+    """Every key that a kit gives, and its value as a design would have it."""
+    found = checked(_File, {"schema": SCHEMA, "name": "x", "version": "x", **kit.tables}, {})
+    usual = found.model_dump(mode="json")
+    for key in _dotted(kit.tables):
+        yield key, _at(usual, key)
+
+
+def _dotted(table: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _dotted(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}"
+
+
+def _at(table: Any, key: str) -> object:
+    for part in key.split("."):
+        table = table.get(part) if isinstance(table, dict) else None
+    return table
+
+
+def _table(tables: Mapping[str, Any], section: str) -> Mapping[str, Any]:
+    found = tables.get(section)
+    return found if isinstance(found, dict) else {}
+
+
+def citation(design: Design) -> dict[str, Any]:
+    """What manifest and checks say of a design's kit: name, version, hash, what departs from it."""
+    kit = kit_of(design)
+    return {
+        "name": kit.name,
+        "version": kit.version,
+        "sha256": kit.sha256,
+        "departures": departures(design),
+    }
+
+
+def cited(design: Design) -> str:
+    """The same in words."""
+    kit = kit_of(design)
+    return f"kit {kit.name}, version {kit.version} (sha256 {kit.sha256[:12]})"
+
+
+def write_kit(file: Path) -> Path:
+    """Copies the paper's kit, named after the new file. Raises DesignError if it exists."""
+    return write_copy(templates_folder() / KITS / f"{DEFAULT}.toml", file)

@@ -1,0 +1,211 @@
+"""Kits: a lab's numbers with their sources, and what a design takes from them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sbafab.actuators import load_design
+from sbafab.design.films import Films
+from sbafab.design.kits import citation, read_kit, write_kit
+from sbafab.design.reading import kit_names, templates_folder
+from sbafab.design.records import Design, Laser, Press, Registration, Rules, Sheets
+from sbafab.design.writing import design_sha256, resolved
+from sbafab.errors import DesignError
+
+SECTIONS = {
+    "films": Films(),
+    "registration": Registration(),
+    "press": Press(),
+    "laser": Laser(),
+    "sheets": Sheets(),
+    "rules": Rules(),
+}
+NO_LABS = {"sheets.seconds"}
+"""Numbers of a search, which no lab measures."""
+
+
+def numbers(table: dict[str, Any], prefix: str) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for key, value in table.items():
+        if isinstance(value, dict):
+            found |= numbers(value, f"{prefix}{key}.")
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            found[f"{prefix}{key}"] = value
+    return found
+
+
+def at(table: Any, key: str) -> Any:
+    for part in key.split("."):
+        table = table[part]
+    return table
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Path:
+    """Another lab's kit: a cooler press, a larger platen, a film, a mask and a tube of its own."""
+    path = write_kit(tmp_path / "lab.toml")
+    text = path.read_text()
+    for old, new in (
+        ("value = 135.0", "value = 128.0"),
+        ("platen_width = { value = 152.4", 'platen_width = { value = "12 in"'),
+        (
+            '[tubes."Braintree',
+            '[films.tpu50]\nkind = "structural"\nproduct = "TPU 85A"\n'
+            'thickness = { value = "50 um", source = "data sheet" }\n'
+            'density = { value = 1200, source = "data sheet" }\n'
+            'melting_point = { value = 115, source = "data sheet" }\n\n'
+            '[tubes."Fine tube"]\nouter_diameter = { value = 0.8, source = "measured" }\n\n'
+            '[tubes."Braintree',
+        ),
+    ):
+        assert old in text
+        text = text.replace(old, new, 1)
+    path.write_text(text)
+    return path
+
+
+def test_the_papers_kit_says_every_number_that_a_design_has_by_default() -> None:
+    kit = read_kit(templates_folder() / "kits" / "paper.toml")
+    usual = {}
+    for section, record in SECTIONS.items():
+        usual |= numbers(record.model_dump(mode="json"), f"{section}.")
+    for key, value in usual.items():
+        if key not in NO_LABS:
+            assert at(kit.tables, key) == value, key
+            assert kit.sources[key].strip()
+    tube = Design.model_fields["inlet"].default
+    assert kit.tubes[tube.tube].outer_diameter == tube.tube_outer_diameter
+    assert tube.adhesive in kit.adhesives
+
+
+def test_a_design_that_names_no_kit_keeps_its_values_and_its_hash() -> None:
+    plain = load_design("3dof-15mm")
+    named = load_design("3dof-15mm", ["kit=paper"])
+    assert resolved(named) == resolved(plain)
+    # All keys but those that came with kits.
+    table = resolved(plain)
+    del table["kit"], table["layup"], table["inlet"]["adhesive"]
+    text = json.dumps(table, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    before = hashlib.sha256(text.encode()).hexdigest()
+    assert design_sha256(plain) == design_sha256(named) == before
+
+
+def test_a_kit_gives_what_the_design_leaves_out(lab: Path, tmp_path: Path) -> None:
+    design = tmp_path / "one.toml"
+    design.write_text('family = "1dof"\nkit = "lab.toml"\n[press]\nplaten_width = 200\n')
+    found = load_design(design)
+    assert (found.press.temperature_c, found.press.platen_width) == (128.0, 200.0)
+    assert found.films.stock["tpu50"].thickness == pytest.approx(0.05)
+    assert (found.inlet.tube, found.inlet.tube_outer_diameter) == ("Fine tube", 0.8)
+    said = citation(found)
+    assert (said["name"], said["version"]) == ("lab", "1")
+    assert said["departures"] == ["press.platen_width"]
+
+
+def test_a_tube_of_the_kit_is_known_by_its_name(lab: Path) -> None:
+    name = "inlet.tube=Braintree RPT040"
+    bare = {"name": "x", "family": "1dof", "kit": str(lab)}
+    from sbafab.actuators import records
+    from sbafab.design.reading import validated
+
+    found = validated({**bare, "inlet": {"tube": name.partition("=")[2]}}, records(), Path())
+    assert found.inlet.tube_outer_diameter == 1.016
+    with pytest.raises(DesignError, match=r"inlet.tube = 'hose' is not in kit lab \(\"Fine tube\""):
+        validated({**bare, "inlet": {"tube": "hose"}}, records(), Path())
+
+
+def test_another_kit_takes_the_place_of_the_first_one(lab: Path) -> None:
+    changed = load_design("1dof-5mm", ["press.flash_bottom_minutes=4"]).with_(f"kit={lab}")
+    assert changed.press.temperature_c == 128.0
+    assert changed.press.flash_bottom_minutes == 4
+    assert changed.with_("kit=paper").press.temperature_c == 135.0
+
+
+def test_the_kits_sources_count_in_the_hash(lab: Path) -> None:
+    first = design_sha256(load_design("1dof-5mm", [f"kit={lab}"]))
+    lab.write_text("# a remark\n" + lab.read_text())
+    assert design_sha256(load_design("1dof-5mm", [f"kit={lab}"])) == first
+    lab.write_text(lab.read_text().replace('"measured"', '"guessed"'))
+    assert design_sha256(load_design("1dof-5mm", [f"kit={lab}"])) != first
+
+
+BAD = {
+    "number without a source": (
+        'thickness = { value = 0.038, source = "paper, Sec. 2" }',
+        "thickness = 0.038",
+        r"films.tpe.thickness = 0.038 has no source; write films.tpe.thickness = \{ value",
+    ),
+    "length without a source": (
+        'thickness = { value = 0.038, source = "paper, Sec. 2" }',
+        'thickness = "38 um"',
+        r"films.tpe.thickness = '38 um' has no source",
+    ),
+    "empty source": (
+        'source = "paper, Sec. 3.2.1, measured"',
+        'source = " "',
+        r"films.tpe.density must be \{ value = ..., source = ",
+    ),
+    "value out of range": (
+        "value = 0.038",
+        "value = 38",
+        r"films.tpe.thickness = 38 must be at most 1 mm",
+    ),
+    "unknown key": (
+        "pin_error =",
+        "pin_eror =",
+        r"registration.pin_eror is not a key of a kit; did you mean registration.pin_error\?",
+    ),
+    "waiver": ("[rules]", '[rules]\nwaive = ["sealing"]', r"rules.waive is a design's to say"),
+    "no version": ('version = "1"\n', "", r"version is missing; add it to the kit"),
+    "another schema": ("kit@1", "kit@9", r"schema = 'sbafab/kit@9' must be 'sbafab/kit@1'"),
+    "film of no kind": (
+        "[press]",
+        '[films.foil]\nproduct = "foil"\n[press]',
+        r"films.foil.kind is missing; add it to the kit",
+    ),
+    "mask that may melt": (
+        "[press]",
+        '[films.foil]\nkind = "mask"\nproduct = "foil"\n'
+        'thickness = { value = 0.1, source = "x" }\ndensity = { value = 1, source = "x" }\n[press]',
+        r"films.foil = .* is a mask without temperature_limit",
+    ),
+    "film that no file can be named after": (
+        "[press]",
+        '[films."a b"]\nkind = "structural"\nproduct = "foil"\n'
+        'thickness = { value = 0.1, source = "x" }\ndensity = { value = 1, source = "x" }\n[press]',
+        r"has a film named 'a b'; a name is a small letter",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_a_bad_kit_is_refused_in_one_sentence(case: str, tmp_path: Path) -> None:
+    old, new, said = BAD[case]
+    path = write_kit(tmp_path / "lab.toml")
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(DesignError, match=said) as raised:
+        load_design("1dof-5mm", [f"kit={path}"])
+    assert str(path) in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_kit_that_is_not_there_is_named() -> None:
+    assert kit_names() == ["paper"]
+    with pytest.raises(DesignError, match=r"kit = .*none.toml.* is neither a kit that ships"):
+        load_design("1dof-5mm", ["kit=none.toml"])
+    with pytest.raises(DesignError, match="kit = 3 must be a text in quotes"):
+        load_design("1dof-5mm", [{"kit": 3}])
+
+
+def test_a_kit_is_never_written_over(tmp_path: Path) -> None:
+    path = write_kit(tmp_path / "our-lab.toml")
+    assert read_kit(path).name == "our-lab"
+    with pytest.raises(DesignError, match="exists"):
+        write_kit(path)

@@ -1,0 +1,122 @@
+"""Several copies pressed at once: the plate, the records and the page, written and checked."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from lxml import html as lxml_html
+
+from sbafab.actuators import load_design
+from sbafab.as_built.check import check_folder
+from sbafab.output.run import Run, generate
+from sbafab.rules.deck import has_failed
+from tests.as_built.doctoring import Doctor
+
+COPIES = 5
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    # The platen takes a block of two by two of 12.5 x 7.5 with 5 between and 6 round: 42 x 32.
+    small = ("press.platen_width=42", "press.platen_length=32")
+    few = ("stack.balloons=2", f"order.copies={COPIES}", "rules.yield_builds=100")
+    design = load_design("1dof-5mm", [*small, *few])
+    return generate(design, tmp_path_factory.mktemp("batch"), ("cut", "press", "preview"))
+
+
+def test_two_cycles_make_five_copies_on_one_plate(run: Run) -> None:
+    batch = run.manifest["batch"]
+    assert (batch["at_once"], batch["cycles"]) == (4, [4, 1])
+    press = json.loads((run.folder / "press.json").read_text())
+    said = press["batch"]
+    assert (said["press_minutes"], said["hands_minutes"]) == (90, 300)
+    assert said["total_minutes"] == 390
+    assert press["total_press_minutes"] == 45
+    assert not has_failed(check_folder(run.folder))
+
+
+def test_the_traveller_has_a_serial_number_for_each_copy(run: Run) -> None:
+    page = lxml_html.fromstring((run.folder / "traveller.html").read_text())
+    serials = page.xpath("//input[starts-with(@id, 'serial')]/@id")
+    assert serials == [f"serial-{n}" for n in range(1, COPIES + 1)]
+    rows = page.xpath("//table[@class='serials']/tbody/tr")
+    assert [[cell.text_content() for cell in row[:3]] for row in rows] == [
+        ["1", "1", "1"],
+        ["2", "1", "2"],
+        ["3", "1", "3"],
+        ["4", "1", "4"],
+        ["5", "2", "1"],
+    ]
+    words = " ".join(page.text_content().split())
+    assert "5 copies in 2 press cycles of 4, 1 at once: 90 min in the press instead of 225" in words
+    assert "390 min" in words
+    closings = page.xpath("//label[contains(., 'cycle 2')]")
+    assert len(closings) == 4
+
+
+@pytest.fixture
+def doctor(run: Run) -> Doctor:
+    return Doctor(run.folder)
+
+
+def doctored(doctor: Doctor, file: str, change: object) -> set[str]:
+    """The rules that fail once a file of the folder is changed; it is put back."""
+    paths = [doctor.folder / "manifest.json", doctor.folder / file]
+    before = [path.read_bytes() for path in paths]
+    try:
+        change()  # type: ignore[operator]
+        doctor.rehash()
+        return {f.rule for f in check_folder(doctor.folder) if f.verdict == "fail"}
+    finally:
+        for path, data in zip(paths, before, strict=True):
+            path.write_bytes(data)
+
+
+def test_a_plate_without_a_hole_of_one_place_fails(doctor: Doctor) -> None:
+    from sbafab.cutting.dxf_read import read_profile
+    from sbafab.cutting.dxf_write import dxf_text
+    from sbafab.cutting.order import cutting_order
+    from sbafab.geometry.region import Region
+
+    file = doctor.manifest["fixture"]
+    path = doctor.folder / file
+
+    def put() -> None:
+        found = read_profile(path)
+        holes = found.region.holes
+        left = Region(tuple(c for c in found.region.contours if c is not holes[-1]))
+        path.write_text(dxf_text(cutting_order(left), found.properties), newline="\n")
+
+    assert doctored(doctor, file, put) == {"manifest-claims", "as-designed"}
+
+
+def test_places_that_are_too_near_fail_though_the_plate_agrees(doctor: Doctor) -> None:
+    from sbafab.actuators import build
+    from sbafab.cutting.dxf_read import read_profile
+    from sbafab.cutting.dxf_write import dxf_text
+    from sbafab.cutting.fixture import fixture
+    from sbafab.cutting.order import cutting_order
+
+    file = doctor.manifest["fixture"]
+    path = doctor.folder / file
+    laminate = build(load_design(doctor.folder / "design.toml"))
+
+    def put() -> None:
+        said = [(p["x"], p["y"]) for p in doctor.manifest["batch"]["places"]]
+        near = [(x - 0.01 if n % 2 else x, y) for n, (x, y) in enumerate(said)]
+        plate = fixture(laminate, (152.4, 152.4), near)
+        assert plate is not None
+        properties = read_profile(path).properties
+        path.write_text(dxf_text(cutting_order(plate), properties), newline="\n")
+        places = [{"x": x, "y": y} for x, y in near]
+        doctor.set_manifest(lambda m: m["batch"].update(places=places))
+
+    assert doctored(doctor, file, put) == {"manifest-claims", "as-designed"}
+
+
+def test_cycles_that_leave_a_copy_out_fail(doctor: Doctor) -> None:
+    def put() -> None:
+        doctor.set_manifest(lambda m: m["batch"].update(cycles=[4]))
+
+    assert "manifest-claims" in doctored(doctor, "press.json", put)
