@@ -216,7 +216,7 @@ def _unmatched(
 
 
 def fixture_problems(folder: Path, laminate: Laminate, claims: Manifest) -> list[Problem]:
-    """The pin plate: sound, and a hole for every pin and for nothing else."""
+    """The base plate: sound, and a hole for every pin and for nothing else."""
     if claims.fixture is None:
         return [claim("the manifest names no fixture for the pins")] if laminate.pins else []
     if claims.fixture not in claims.files:
@@ -247,8 +247,11 @@ def fixture_problems(folder: Path, laminate: Laminate, claims: Manifest) -> list
 
 
 def batch_problems(laminate: Laminate, claims: Manifest, design: Design) -> list[Problem]:
-    """Cycles that do not make all copies, places that are too near or off the platen."""
-    if claims.copies == 1:
+    """Cycles that do not make all copies, places that are too near or off the platen.
+
+    Registered sheets are pressed as one piece; what they hold is claimed of their panel.
+    """
+    if claims.copies == 1 or laminate.panel is not None:
         return []
     batch = claims.batch
     if batch is None:

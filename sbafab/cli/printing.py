@@ -228,7 +228,7 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
     yield from replaced(run.dropped)
     cut = [layer["file"] for layer in index["layers"] if layer["file"]]
     if cut:
-        plate = f", and the pin plate {index['fixture']}" if index["fixture"] else ""
+        plate = f", and the base plate {index['fixture']}" if index["fixture"] else ""
         yield (
             "cut files",
             f"{len(cut)} in layers/{plate}, each read back and compared with its profile",

@@ -63,7 +63,7 @@ def sheet_properties(
 
 
 def fixture_properties(settings: CutSettings) -> dict[str, str]:
-    """Custom properties of the pin plate's cut file; its edges are nominal."""
+    """Custom properties of the base plate's cut file; its edges are nominal."""
     return _properties(settings, "plate", "fixture", None)
 
 

@@ -58,7 +58,8 @@ def write_contents(
     if planned.pressing is not None:
         write_text(folder / "press.json", as_json(_press(checked, planned.pressing)))
         write_text(folder / "press.csv", press_csv(planned.pressing))
-        underlay = underlay_pdf(checked.laminate, design_sha256(checked.design))
+        places = design_runs(checked.design, checked.laminate).places
+        underlay = underlay_pdf(checked.laminate, design_sha256(checked.design), places)
         if underlay is not None:
             (folder / UNDERLAY).write_bytes(underlay)
     if "mesh" in wanted:

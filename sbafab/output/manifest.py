@@ -180,7 +180,7 @@ def kerf_claim(width: Kerf | None) -> KerfClaim:
 
 
 def _batch(runs: Runs) -> BatchClaim:
-    """How several copies are pressed, and where each lies on the pin plate."""
+    """How several copies are pressed, and where each lies on the base plate."""
     places = tuple(PlaceClaim(**_place(place)) for place in runs.places)
     return BatchClaim(at_once=runs.together, cycles=runs.cycles, places=places)
 

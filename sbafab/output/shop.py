@@ -1,4 +1,4 @@
-"""What the cutting shop gets of one or several designs: layer files, pin plates, film sheets."""
+"""What the cutting shop gets of one or several designs: layer files, base plates, film sheets."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def find_nests(
 
 
 def write_cut_files(planned: Planned, folder: Path, tell: Progress) -> None:
-    """Writes the layer files and the pin plate of a design."""
+    """Writes the layer files and the base plate of a design."""
     laminate, settings = planned.checked.laminate, planned.settings
     told = partial(tell, "cut files")
     write_layer_files(laminate, planned.paths, folder, settings, told)

@@ -17,7 +17,7 @@ from sbafab.laminate.laminate import Pin
 Standard = Literal["ISO 8734", "ISO 2338"]
 
 SERIES = (2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30, 32, 35, 40, 45, 50, 55, 60)
-"""Lengths of both standards, mm, as far as a pin plate needs them."""
+"""Lengths of both standards, mm, as far as a base plate needs them."""
 RANGES: Mapping[Standard, Mapping[float, tuple[int, int]]] = {
     "ISO 8734": {
         1.0: (3, 10),

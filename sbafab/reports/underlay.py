@@ -6,7 +6,7 @@ the actuator where the cross is. Ours; how much steadier it makes a hand was not
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from sbafab.geometry.edges import Bounds, Point
@@ -61,18 +61,39 @@ class Guide:
         )
 
 
-def underlay_pdf(laminate: Laminate, design_sha256: str) -> bytes | None:
-    """The page; None for a laminate of which pins hold every part in every step."""
+def underlay_pdf(
+    laminate: Laminate, design_sha256: str, places: Sequence[Point] = ((0.0, 0.0),)
+) -> bytes | None:
+    """The page; None for a laminate of which pins hold every part in every step.
+
+    It shows the laminate at each of the ``places`` that it has in the press.
+    """
     found = guides(laminate)
     if not found:
         return None
-    low_x, low_y, high_x, high_y = _bounds(found)
+    own = _bounds(found)
+    xs, ys = [x for x, _ in places], [y for _, y in places]
+    low_x, low_y, high_x, high_y = (
+        min(xs) + own[0],
+        min(ys) + own[1],
+        max(xs) + own[2],
+        max(ys) + own[3],
+    )
     foot = 20 + ROW * (len(found) + len(NOTES))
     wide, high = high_x - low_x + 2 * BEYOND, high_y - low_y + 2 * BEYOND
     page = PdfPage(max(A4[0], wide + 2 * SIDE), max(A4[1], high + HEAD + foot))
     middle = page.width / 2, foot + (page.height - HEAD - foot) / 2
-    shift = middle[0] - (low_x + high_x) / 2, middle[1] - (low_y + high_y) / 2
-    _cross(page, (low_x, low_y, high_x, high_y), shift)
+    x, y = middle[0] - (low_x + high_x) / 2, middle[1] - (low_y + high_y) / 2
+    for place in places:
+        _laminate(page, laminate, found, (x + place[0], y + place[1]))
+    _bars(page)
+    _words(page, laminate, design_sha256, found, foot)
+    return page.pdf(f"{laminate.name}: alignment underlay")
+
+
+def _laminate(page: PdfPage, laminate: Laminate, found: tuple[Guide, ...], shift: Point) -> None:
+    """The cross, the pins and the lines of one laminate."""
+    _cross(page, _bounds(found), shift)
     for pin in laminate.pins:
         page.stroke(GREY, THIN)
         for contour in disc(pin.centre, pin.diameter / 2).moved(*shift).contours:
@@ -81,9 +102,6 @@ def underlay_pdf(laminate: Laminate, design_sha256: str) -> bytes | None:
         _stroke(page, guide)
         for contour in _moved(guide.region, shift):
             page.contour(contour)
-    _bars(page)
-    _words(page, laminate, design_sha256, found, foot)
-    return page.pdf(f"{laminate.name}: alignment underlay")
 
 
 def guides(laminate: Laminate) -> tuple[Guide, ...]:

@@ -98,6 +98,24 @@ def test_every_line_is_the_edge_of_what_is_laid_there(template: str) -> None:
     assert len(drawn) == len(rings)
 
 
+def test_it_has_every_place_of_a_cycle() -> None:
+    laminate, one = printed("1dof-5mm")
+    places = ((0.0, 0.0), (30.0, 0.0), (0.0, 40.0))
+    data = underlay_pdf(laminate, SHA, places)
+    assert data is not None
+
+    def middles(document: pypdfium2.PdfDocument) -> list[tuple[float, float]]:
+        lines = [line for line in paths(document, FILM) if len(line) > 2]
+        boxes = [shapely.Polygon(line).bounds for line in lines]
+        return [((a + c) / 2, (b + d) / 2) for a, b, c, d in boxes]
+
+    own, found = middles(one), middles(pypdfium2.PdfDocument(data))
+    assert len(found) == 3 * len(own)
+    for n, (x, y) in enumerate(places):
+        first, moved = found[0], found[n * len(own)]
+        assert (moved[0] - first[0], moved[1] - first[1]) == pytest.approx((x, y), abs=2e-3)
+
+
 def test_it_shows_what_a_hand_lays() -> None:
     # Base and cap; a 1-DoF separator, whose hole is wider than the pin, in step 3 as well.
     one = {guide.patterns[0]: guide.steps for guide in guides(printed("1dof-5mm")[0])}

@@ -14,7 +14,6 @@ from sbafab.assemblies.colours import colours
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
 from sbafab.pressing.together import Runs
-from sbafab.reports.drawing import TIMES
 from sbafab.reports.traveller import bench, bill, joining, notes, times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.cautions import cautions, for_the_designer
@@ -175,12 +174,10 @@ def _is_elsewhere(item: bill.Item) -> bool:
 
 
 def _named(item: bill.Item, one: DesignWork) -> bill.Item:
-    """A design's item with its name; an underlay for each copy that is pressed at once."""
+    """A design's item with its name."""
     if item.name == "Release film":
         return item
-    often = one.runs.together if item.name == "Underlay" else 1
-    quantity = f"{often} {TIMES} {item.quantity}" if often > 1 else item.quantity
-    return bill.Item(f"{item.name} ({one.name})", item.what, quantity)
+    return bill.Item(f"{item.name} ({one.name})", item.what, item.quantity)
 
 
 def _films(job: AssemblyJob) -> list[bill.Item]:

@@ -18,7 +18,7 @@ from sbafab.rules.finding import Finding
 class Job:
     """The order behind a traveller.
 
-    ``kerf`` by material, None where it was not measured; ``fixture`` the path of the pin plate's
+    ``kerf`` by material, None where it was not measured; ``fixture`` the path of the base plate's
     cut file, ``underlay`` that of the page to lay up on, ``solid_png`` the bytes of the picture of
     the solid. ``lowered`` are limits below the usual ones. ``extras`` are further rows of the bill
     of materials: item and quantity. Empty ``made_for`` leaves a blank to fill in by hand.

@@ -105,7 +105,7 @@ def cut_layers() -> list[CutLayer]:
 
 
 def expected_sizes(work: Work) -> list[tuple[str, str]]:
-    """For every sheet and the pin plate: file, and how large it must be after opening."""
+    """For every sheet and the base plate: file, and how large it must be after opening."""
     found = [(sheet.path, say.size(sheet.width, sheet.length)) for sheet in work.sheets]
     press = work.design.press
     platen = press.platen_width, press.platen_length

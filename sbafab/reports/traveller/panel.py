@@ -167,7 +167,7 @@ def _pressing(laminate: Laminate, page: StepPage, last: bool) -> list[Action]:
         lay = f"Lay the sheet of layer {films[0][0].index}, the cap, on the pins over the stack."
     start = [
         Action(
-            "Lay the pin plate down, cut corner at the back right, all corner pins in. Prick a "
+            "Lay the base plate down, cut corner at the back right, all corner pins in. Prick a "
             "release film over them."
         )
     ]

@@ -21,7 +21,7 @@ NARROWEST = 66.0
 """mm: room for the words under the picture."""
 EDGE, HEAD, FOOT = 5.0, 5.0, 9.0
 FREE = 6.0
-"""mm of air round a laminate that has no pin plate."""
+"""mm of air round a laminate that has no base plate."""
 PLATE = "#f1f1ef"
 BESIDE = 2.2
 AT_DATUM = 1e-3
@@ -87,7 +87,7 @@ def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: s
 
 
 def _plate(plate: Region, used: bool, view: _View) -> str:
-    """The pin plate, dashed where it is not used: it still tells which way round things go."""
+    """The base plate, dashed where it is not used: it still tells which way round things go."""
     shape = path_data(plate.mapped(view.at, view.scale, mirror=True))
     dash = "" if used else ' stroke-dasharray="1.6 1.2"'
     return (

@@ -95,14 +95,11 @@ def _height(laminate: Laminate, part: AssemblyStep) -> str:
 
 
 def _place_notes(runs: Runs) -> tuple[str, ...]:
-    """What is done for every laminate of a cycle, and how often the step comes round."""
+    """What is done for every laminate of a cycle; the pictures show one place."""
     if runs.copies == 1:
         return ()
-    again = "" if runs.count == 1 else f" The step comes round {runs.count} times, once a cycle."
-    return (
-        f"Lay every layer at each of the {runs.together} places of the plate before the next one, "
-        f"then close the press once for all; the pictures show one place.{again}",
-    )
+    at = f"all {runs.together} places" if runs.together > 1 else "its place"
+    return (f"Lay each layer at {at} before the next one; press once a cycle, for all.",)
 
 
 def _bench_actions(
