@@ -109,7 +109,10 @@ def guides(laminate: Laminate) -> tuple[Guide, ...]:
     shapes: dict[tuple[object, bool], tuple[Region, list[str], list[int]]] = {}
     parts = assembly(laminate)
     for step in parts:
-        for bed in beds(parts, step):
+        lying = beds(parts, step)
+        if len(lying) == 1 and lying[0].made_in is not None:
+            continue  # one stack by itself has nothing to lie over
+        for bed in lying:
             for layer in _loose(laminate, step, bed):
                 outline = Region(tuple(layer.profile.outers))
                 key = outline.key, layer.is_mask

@@ -89,8 +89,8 @@ def on_the_lumen(laminate: Laminate, part: AssemblyStep) -> list[Action]:
     names = say.listed([f"{pin.name} (⌀{say.millimetres(pin.diameter)})" for pin in pins])
     return [
         Action(
-            f"Better than by eye: lay up on the base plate with the pin of the {names} alone, which "
-            "passes every film here; then only the turn is yours. Draw it before the press closes."
+            f"Better than by eye: lay up on the base plate with the pin of the {names} alone, "
+            "which passes every film here; then only the turn is yours. Draw it before the press closes."
         )
     ]
 
