@@ -91,7 +91,8 @@ def on_the_lumen(laminate: Laminate, part: AssemblyStep) -> list[Action]:
     return [
         Action(
             f"Better than by eye: lay up on the base plate with the pin of the {names} alone, "
-            "which passes every film here; then only the turn is yours. Draw it before the press closes."
+            "which passes every film here; then only the turn is yours. Draw it before the press "
+            "closes."
         )
     ]
 
