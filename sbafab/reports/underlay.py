@@ -108,7 +108,8 @@ def guides(laminate: Laminate) -> tuple[Guide, ...]:
     """What is laid by hand in any step, equal outlines once, in the order of the steps."""
     shapes: dict[tuple[object, bool], tuple[Region, list[str], list[int]]] = {}
     parts = assembly(laminate)
-    for step in parts:
+    # What is laid down again as one whole stack has no edge to lie by.
+    for step in (part for part in parts if part.adds):
         for bed in beds(parts, step):
             for layer in _loose(laminate, step, bed):
                 outline = Region(tuple(layer.profile.outers))
