@@ -108,11 +108,9 @@ def guides(laminate: Laminate) -> tuple[Guide, ...]:
     """What is laid by hand in any step, equal outlines once, in the order of the steps."""
     shapes: dict[tuple[object, bool], tuple[Region, list[str], list[int]]] = {}
     parts = assembly(laminate)
-    for step in parts:
-        lying = beds(parts, step)
-        if len(lying) == 1 and lying[0].made_in is not None:
-            continue  # one stack by itself has nothing to lie over
-        for bed in lying:
+    # What is laid down again as one whole stack has no edge to lie by.
+    for step in (part for part in parts if part.adds):
+        for bed in beds(parts, step):
             for layer in _loose(laminate, step, bed):
                 outline = Region(tuple(layer.profile.outers))
                 key = outline.key, layer.is_mask

@@ -24,8 +24,6 @@ from sbafab.rules.limits import TOLERANCE, Limits, at, holds
 NAME = "tube-fit"
 BOND = "the bond beside the strip"
 REMEDY = "widen inlet.width"
-MASKS = "PTFE"
-"""Whose kerf makes the strips narrower."""
 
 
 class _Fit(NamedTuple):
@@ -58,7 +56,8 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     else:
         message = (
             f"{worst.what} of {worst.inlet.chamber} is drawn {worst.drawn:.3f} mm wide, "
-            f"{at(worst.at)}, and cut {worst.value:.3f} at worst ({_lost_to(limits)}); a tube of "
+            f"{at(worst.at)}, and cut {worst.value:.3f} at worst "
+            f"({_lost_to(worst.interface, limits)}); a tube of "
             f"{worst.inlet.tube_diameter:g} beside its strip needs {worst.limit:.3f}"
         )
     if not good:
@@ -85,7 +84,7 @@ def _fits(inlet: Inlet, laminate: Laminate, limits: Limits) -> list[_Fit]:
         ]
         if mouth:
             width = sum(edge.length for edge in mouth)
-            cut = max(0.0, width - _lost(limits))
+            cut = max(0.0, width - _lost(interface, limits))
             opening = _Fit(inlet, interface, "the mouth", cut, needed, inlet.mouth, REMEDY, width)
             return [opening, *_along_run(inlet, interface, needed, limits)]
     message = "open a mask strip to the tab's end"
@@ -113,7 +112,7 @@ def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits
     ):
         least = min((r for r in reaches if r), key=lambda r: r.value, default=None)
         if least is not None:
-            cut = least.value if what == BOND else max(0.0, least.value - _lost(limits))
+            cut = least.value if what == BOND else max(0.0, least.value - _lost(interface, limits))
             fit = _Fit(inlet, interface, what, cut, limit, least.at, remedy, least.value)
             found.append(fit)
     return found
@@ -125,14 +124,23 @@ def _needed(inlet: Inlet, interface: Interface) -> float:
     return math.pi / 2 * (inlet.tube_diameter + strip)
 
 
-def _lost(limits: Limits) -> float:
+def _lost(interface: Interface, limits: Limits) -> float:
     """By how much a strip may be cut narrower than drawn: the kerf is known or it is not."""
-    return 2 * limits.tolerances.cutting + (0.0 if MASKS in limits.kerf else limits.unknown_kerf)
+    unknown = 0.0 if _is_measured(interface, limits) else limits.unknown_kerf
+    return 2 * limits.tolerances.cutting + unknown
 
 
-def _lost_to(limits: Limits) -> str:
+def _lost_to(interface: Interface | None, limits: Limits) -> str:
     edges = f"{limits.tolerances.cutting:g} on each edge"
-    return edges if MASKS in limits.kerf else f"{edges}, kerf up to {limits.unknown_kerf:g}"
+    if _is_measured(interface, limits):
+        return edges
+    return f"{edges}, kerf up to {limits.unknown_kerf:g}"
+
+
+def _is_measured(interface: Interface | None, limits: Limits) -> bool:
+    """Whether the kerf in the masks, which makes strips narrower, is known."""
+    masks = interface.masks if interface is not None else ()
+    return bool(masks) and all(mask.film.material in limits.kerf for mask in masks)
 
 
 def _margin(fit: _Fit) -> float:

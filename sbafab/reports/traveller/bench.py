@@ -25,12 +25,13 @@ def before_cutting(films: Iterable[Film]) -> list[Action]:
             "hold film by its border: grease and dust keep TPE from bonding."
         )
     ]
-    masks = [film for film in films if film.material == "PTFE"]
+    masks = [film for film in films if film.is_mask]
     if masks:
         thin = say.millimetres(min(film.thickness for film in masks))
+        names = say.listed(list(dict.fromkeys(film.material for film in masks)))
         actions.append(
             Action(
-                f"Lay PTFE on a backing of card, smooth it flat, and hold it down all along its "
+                f"Lay {names} on a backing of card, smooth it flat, and hold it down all along its "
                 f"border (tape, magnets or vacuum): {thin} of it lifts in the exhaust's draught."
             )
         )
@@ -90,7 +91,8 @@ def on_the_lumen(laminate: Laminate, part: AssemblyStep) -> list[Action]:
     return [
         Action(
             f"Better than by eye: lay up on the base plate with the pin of the {names} alone, "
-            "which passes every film here; then only the turn is yours. Draw it before the press closes."
+            "which passes every film here; then only the turn is yours. Draw it before the press "
+            "closes."
         )
     ]
 
