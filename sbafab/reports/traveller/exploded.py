@@ -24,7 +24,7 @@ WIDE = 58.0
 TILT = 0.34
 """How much of its depth a layer keeps, seen from the front and above."""
 LABELS = 46.0
-TALLEST = 72.0
+TALLEST = 64.0
 NEAREST, FARTHEST, TWO_LINES = 4.0, 12.0, 6.0
 PAGE = 1.1
 """mm on the page between the layers of a finished stack."""

@@ -16,7 +16,7 @@ from sbafab.reports import drawing as draw
 from sbafab.reports.traveller.layup import Bed, inlets_in
 from sbafab.reports.traveller.shapes import Picture, flat, label, pattern_id
 
-WIDEST, TALLEST = 64.0, 38.0
+WIDEST, TALLEST = 64.0, 34.0
 NARROWEST = 66.0
 """mm: room for the words under the picture."""
 EDGE, HEAD, FOOT = 5.0, 5.0, 9.0
