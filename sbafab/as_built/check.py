@@ -295,7 +295,7 @@ def _layer_problems(built: AsBuilt) -> list[Problem]:
             continue
         off = departure(file.part.path, own.path)
         if off:
-            message = f"{file.label} is not what design.toml makes: {off}; write the folder anew"
+            message = f"{file.label} is not what design.toml makes: {off}; regenerate the folder"
             problems.append(Problem(DESIGNED, message, (file.position,)))
     if built.files and expected[0] is None:
         count = len(built.meant.laminate.layers)
@@ -372,7 +372,7 @@ def _measured(rule: Rule, measures: Measures) -> list[Finding]:
     try:
         return run_rule(rule, measures.laminate, measures.limits, measures)
     except UNMEASURED as error:
-        message = f"cannot be measured on these files ({error}); write them anew"
+        message = f"cannot be measured on these files ({error}); regenerate them"
         return [Finding(rule.name, "fail", None, None, "", Place(), message)]
 
 

@@ -123,10 +123,10 @@ def _in_agreement(files: Sequence[LayerFile]) -> list[LayerFile]:
 def inside(folder: Path, file: str | None) -> Path:
     """Where a file of the manifest lies. Raises OutputError where that is not in the folder."""
     if file is None:
-        raise OutputError("the manifest names no cut file for it; write the folder anew")
+        raise OutputError("the manifest names no cut file for it; regenerate the folder")
     pure = PurePosixPath(file)
     if pure.is_absolute() or ".." in pure.parts or "\\" in file or "\0" in file:
-        raise OutputError("its path leads out of the folder; write the folder anew")
+        raise OutputError("its path leads out of the folder; regenerate the folder")
     return folder / pure
 
 
@@ -135,9 +135,9 @@ def sound_digest(path: Path) -> str:
     try:
         # A pipe or a device would be read for ever.
         if path.exists() and not path.is_file():
-            raise OutputError("no plain file; write it anew")
+            raise OutputError("no plain file; regenerate it")
         if path.stat().st_size > MOST_BYTES:
-            raise OutputError(f"larger than {MOST_BYTES:,} bytes; write it anew")
+            raise OutputError(f"larger than {MOST_BYTES:,} bytes; regenerate it")
         data = path.read_bytes()
         marks = sum(1 for _ in MARK.finditer(data))
         if marks > MOST_MARKS:
@@ -146,11 +146,11 @@ def sound_digest(path: Path) -> str:
             )
         return hashlib.sha256(data).hexdigest()
     except (FileNotFoundError, NotADirectoryError):
-        raise OutputError("missing; write it anew") from None
+        raise OutputError("missing; regenerate it") from None
     except OSError as error:
         if isinstance(error, OutputError):
             raise
-        raise OutputError(f"cannot be read ({error.strerror or error}); write it anew") from None
+        raise OutputError(f"cannot be read ({error.strerror or error}); regenerate it") from None
 
 
 def read_part(
@@ -170,7 +170,7 @@ def read_part(
     except OutputError:
         raise
     except (ArithmeticError, ValueError, LookupError) as error:
-        raise OutputError(f"holds no sound contours ({error}); write it anew") from error
+        raise OutputError(f"holds no sound contours ({error}); regenerate it") from error
 
 
 def _part(
@@ -183,13 +183,13 @@ def _part(
     kerf = kerf_of(properties) or 0.0
     chord_error = chord_error_of(properties)
     if chord_error and isinstance(kerf, tuple):
-        raise OutputError("its chords do not tell how its kerf was compensated; write it anew")
+        raise OutputError("its chords do not tell how its kerf was compensated; regenerate it")
     if not chord_error and not chords_drawn:
         place = chorded_place(found.region)
         if place is not None:
             raise OutputError(
                 f"an arc is drawn as chords at x {place[0]:.3f}, y {place[1]:.3f}, and the file "
-                "does not say so; write it anew with arcs"
+                "does not say so; regenerate it with arcs"
             )
     if expected is not None and not departure(found.region, expected.path):
         # What is cut within its tolerance needs no guess at what the beam may have left.
@@ -204,7 +204,7 @@ def _part(
         )
     region, corner_room = uncut(with_circles(found.region), kerf)
     if region.is_empty:
-        raise OutputError(f"nothing is left inside a kerf of {kerf_text(kerf)} mm; write it anew")
+        raise OutputError(f"nothing is left inside a kerf of {kerf_text(kerf)} mm; regenerate it")
     return CutPart(
         with_circles(without_specks(region)),
         found.region,
@@ -217,7 +217,7 @@ def _part(
 
 def _check_drawn(found: ReadBack) -> None:
     if found.region.is_empty:
-        raise OutputError(f"no contour on {CUT_INNER} or {CUT_OUTER}; write it anew")
+        raise OutputError(f"no contour on {CUT_INNER} or {CUT_OUTER}; regenerate it")
     for kind in found.other:
         if kind != DATUM:
             raise OutputError(
@@ -234,5 +234,5 @@ def check_sequence(found: ReadBack) -> None:
     for before, after in pairwise(ranks):
         if before > after:
             raise OutputError(
-                f"{CUT_SEQUENCE[before]} is cut before {CUT_SEQUENCE[after]}; write it anew"
+                f"{CUT_SEQUENCE[before]} is cut before {CUT_SEQUENCE[after]}; regenerate it"
             )

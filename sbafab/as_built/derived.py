@@ -1,4 +1,4 @@
-"""What lies in a folder beside its layers, made anew from its design and compared with it.
+"""What lies in a folder beside its layers, made again from its design and compared with it.
 
 The design is that of the folder's ``design.toml``, whose layers the cut files have been held
 against; the places of the parts on their film sheets are those of the folder's ``nest.json``.
@@ -94,7 +94,7 @@ def _made_anew(folder: Path) -> Iterator[tuple[Path, list[Problem]]]:
         try:
             yield Path(name), problems
         except UNMADE as error:
-            message = f"{folder.name} could not be made anew to be compared: {error}"
+            message = f"{folder.name} could not be made again to be compared: {error}"
             problems.append(Problem(DESIGNED, message))
 
 
@@ -141,7 +141,7 @@ def _parts(files: Collection[str]) -> set[RunPart]:
 def _differences(
     folder: Path, fresh: Path, listed: Collection[str], generator: str
 ) -> list[Problem]:
-    """Files that are not as they are made anew.
+    """Files that are not as they are made again.
 
     What another version of this program has written may read otherwise and be right: then it is a
     warning, but for what is cut and pressed.
@@ -166,8 +166,8 @@ def _differences(
 
 def _other(said: str, generator: str, is_done: bool) -> Problem:
     if generator == GENERATOR or is_done:
-        return Problem(DESIGNED, f"{said}; write the folder anew")
-    said = f"{said}, but it was made by {generator}, and this is {GENERATOR}; write the folder anew"
+        return Problem(DESIGNED, f"{said}; regenerate the folder")
+    said = f"{said}, but it was made by {generator}, and this is {GENERATOR}; regenerate the folder"
     return Problem(DESIGNED, said, verdict="warn")
 
 
@@ -181,7 +181,7 @@ def _index_problems(folder: Path, index: dict[str, Any], of_job: bool) -> list[P
     left_out = (*NOT_COMPARED, "sheets", "films") if of_job else NOT_COMPARED
     found, wanted = _index(folder / INDEX), json.loads(as_json(index))
     said = index_difference(found, wanted, left_out) or _mesh_difference(folder, found, wanted)
-    return [Problem(DESIGNED, f"manifest.json: {said}; write the folder anew")] if said else []
+    return [Problem(DESIGNED, f"manifest.json: {said}; regenerate the folder")] if said else []
 
 
 def _mesh_difference(folder: Path, found: dict[str, Any], wanted: dict[str, Any]) -> str:

@@ -255,7 +255,7 @@ def batch_problems(laminate: Laminate, claims: Manifest, design: Design) -> list
         return []
     batch = claims.batch
     if batch is None:
-        return [claim("the manifest does not say how copies are pressed; write the folder anew")]
+        return [claim("the manifest does not say how copies are pressed; regenerate the folder")]
     problems = []
     if sum(batch.cycles) != claims.copies or max(batch.cycles) > len(batch.places):
         problems.append(

@@ -63,9 +63,9 @@ def _read(folder: Path, kind: type[Read], schema: str) -> Read:
     try:
         # A pipe or a device would be read for ever.
         if path.exists() and not path.is_file():
-            raise OutputError(f"{path} is no plain file; write the folder anew")
+            raise OutputError(f"{path} is no plain file; regenerate the folder")
         if path.stat().st_size > MOST_BYTES:
-            raise OutputError(f"{path} is larger than {MOST_BYTES:,} bytes; write the folder anew")
+            raise OutputError(f"{path} is larger than {MOST_BYTES:,} bytes; regenerate the folder")
         data = path.read_bytes()
     except (FileNotFoundError, NotADirectoryError):
         raise OutputError(
@@ -83,7 +83,7 @@ def _read(folder: Path, kind: type[Read], schema: str) -> Read:
         reason = first["msg"][:1].lower() + first["msg"][1:]
         said = f"{where}: {reason}" if where else reason
         raise OutputError(
-            f"{path} is not a sound {schema}: {said}; write the folder anew with sbafab generate"
+            f"{path} is not a sound {schema}: {said}; regenerate the folder with sbafab generate"
         ) from None
 
 

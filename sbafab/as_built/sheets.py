@@ -103,12 +103,12 @@ def _read(folder: Path, told: SheetClaim) -> ReadBack:
         found = read_profile(path)
         check_sequence(found)
         if found.region.is_empty:
-            raise OutputError("it cuts nothing; write it anew")
+            raise OutputError("it cuts nothing; regenerate it")
         return found
     except OutputError:
         raise
     except (ArithmeticError, ValueError, LookupError) as error:
-        raise OutputError(f"holds no sound contours ({error}); write it anew") from error
+        raise OutputError(f"holds no sound contours ({error}); regenerate it") from error
 
 
 def _unsound(told: SheetClaim, error: OutputError, place: Point | None = None) -> Problem:
@@ -245,7 +245,7 @@ def _layout_problems(told: SheetClaim, found: ReadBack, stock: Stock) -> list[Pr
     bad = _badly_engraved(found, told)
     if bad is not None:
         x, y = bad
-        message = f"engraving at x {x:.3f}, y {y:.3f} is not in the waste; write it anew"
+        message = f"engraving at x {x:.3f}, y {y:.3f} is not in the waste; regenerate it"
         problems.append(_unsound(told, OutputError(message), bad))
     return problems
 

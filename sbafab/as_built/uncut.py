@@ -123,7 +123,7 @@ def _spots(before: Edge, after: Edge, a: float, b: float) -> Iterator[_Spot]:
     if turn > KINK:
         raise OutputError(
             f"the corner at x {q[0]:.3f}, y {q[1]:.3f} is sharp, where the path round a part is "
-            "rounded by its kerf; write it anew"
+            "rounded by its kerf; regenerate it"
         )
     ux, uy = before.direction(q)
     first = math.atan2(-ux, uy)

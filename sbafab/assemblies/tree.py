@@ -38,17 +38,17 @@ def building_order(parts: Mapping[str, AnyPart]) -> tuple[str, ...]:
             )
     if len(roots) > 1:
         raise DesignError(
-            f"{listed(roots)} hang on nothing; give all but one of them on = the part that each is "
-            "fixed on"
+            f"{listed(roots)} are fixed on nothing; give all but one of them on = the part that "
+            "each is fixed on"
         )
     order = list(roots)
     for name in order:
         order += [other for other, part in parts.items() if part.on == name]
     if len(order) < len(parts):
         circle = _circle(parts, order)
-        how = "hang on each other in a circle" if circle[1:] else "hangs on itself"
+        how = "are fixed on each other in a circle" if circle[1:] else "hangs on itself"
         raise DesignError(
-            f"{listed(circle)} {how}; leave out on and at in the part that all others hang on"
+            f"{listed(circle)} {how}; leave out on and at in the part that all others are fixed on"
         )
     return tuple(order)
 

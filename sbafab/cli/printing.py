@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 DECKS = ("calculix/actuator.inp", "sofa/actuator.scn", "mujoco/actuator.xml")
 """What a simulator opens."""
 LEFT_AS_IT_WAS = (
-    "is left as it was: what lies there is of an earlier design or version, not of this one; with "
+    "is unchanged: it holds an earlier design or version; with "
     "--set name=NAME this one gets its findings and pictures into a folder of its own"
 )
 COLOURS = {"pass": "green", "fail": "bold red", "waived": "yellow", "warn": "yellow"}
@@ -182,7 +182,7 @@ def print_job(job: Run) -> None:
             out.print(findings_table(one.findings))
     if job.failed:
         every = (finding for one in job.checked for finding in one.findings)
-        print_failed(every, f"Nothing was written, {job.folder} is as it was", "designs")
+        print_failed(every, f"Nothing was written; {job.folder} is as it was", "designs")
 
 
 def job_json(job: Run) -> dict[str, object]:
@@ -279,7 +279,7 @@ def replaced(dropped: Sequence[str]) -> Iterator[tuple[str, str]]:
         names = ", ".join(dict.fromkeys(path.partition("/")[0] for path in dropped))
         yield (
             "replaced",
-            f"removed {count} of an earlier run with other settings ({names}); "
+            f"removed {count} stale files ({names}); "
             "--set name=NAME gives a design a folder of its own",
         )
 

@@ -33,7 +33,7 @@ def check_appearance(document: Drawing) -> None:
     for name in dict.fromkeys(entity.dxf.layer for entity in entities):
         if name in COLOURS:
             if name not in document.layers:
-                raise OutputError(f"layer {name} is not in the layer table; write it anew.")
+                raise OutputError(f"layer {name} is not in the layer table; regenerate it.")
             _check_layer(document.layers.get(name), name)
     for entity in entities:
         if entity.dxf.layer in COLOURS:
@@ -66,11 +66,11 @@ def _check_layer(layer: Layer, name: str) -> None:
     )
     for state, holds in states:
         if holds:
-            raise OutputError(f"layer {name} is {state}, so it would not be cut; write it anew.")
+            raise OutputError(f"layer {name} is {state}, so it would not be cut; regenerate it.")
     colour, linetype = abs(layer.dxf.color), layer.dxf.get("linetype", "Continuous")
     if colour != COLOURS[name] or not _is_true(layer.dxf.get("true_color"), name):
         raise OutputError(
-            f"layer {name} has the colour {_shown(layer)}, not {COLOURS[name]}; write it anew."
+            f"layer {name} has the colour {_shown(layer)}, not {COLOURS[name]}; regenerate it."
         )
     if linetype.lower() not in SOLID:
         raise OutputError(f"layer {name} has the linetype {linetype}; make it Continuous.")
@@ -87,7 +87,7 @@ def _check_entity(entity: DXFGraphic) -> None:
         dxf.get("true_color"), layer
     ):
         raise OutputError(
-            f"{place} has the colour {_shown(entity)}, not its layer's; write it anew."
+            f"{place} has the colour {_shown(entity)}, not its layer's; regenerate it."
         )
     linetype = dxf.get("linetype", "ByLayer")
     if linetype.lower() not in SOLID:

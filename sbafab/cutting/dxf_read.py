@@ -78,20 +78,20 @@ def _parsed(text: str) -> Drawing:
 
     words = text.split()
     if words[:2] != ["0", "SECTION"]:
-        raise OutputError("not an ASCII DXF document; write it anew.")
+        raise OutputError("not an ASCII DXF document; regenerate it.")
     if words[-2:] != ["0", "EOF"]:
-        raise OutputError("the document ends early; write it anew.")
+        raise OutputError("the document ends early; regenerate it.")
     try:
         return read(StringIO(text))
     except (DXFError, ValueError, LookupError, TypeError, AttributeError) as error:
-        raise OutputError(f"not a sound DXF document ({error}); write it anew.") from error
+        raise OutputError(f"not a sound DXF document ({error}); regenerate it.") from error
 
 
 def _text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8", errors="surrogateescape")
     except OSError as error:
-        raise OutputError(f"cannot be read ({error.strerror}); write it anew.") from error
+        raise OutputError(f"cannot be read ({error.strerror}); regenerate it.") from error
 
 
 def _read(document: Drawing) -> ReadBack:

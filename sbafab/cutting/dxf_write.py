@@ -241,7 +241,7 @@ def _skeleton() -> _Skeleton:
         r"\nBLOCK_RECORD\n  5\n(\w+)\n(?:(?!  0\n).*\n)*?\*Model_Space\n", before_entities
     )
     if record is None:
-        raise ValueError("skeleton.dxf has no model space: write it anew.")
+        raise ValueError("skeleton.dxf has no model space: regenerate it.")
     return _Skeleton(
         before_properties,
         base + before_extents,

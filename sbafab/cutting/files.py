@@ -104,6 +104,6 @@ def _write_pattern(
         if layer is not first:
             shutil.copyfile(original, target)
         if hashlib.sha256(target.read_bytes()).hexdigest() != digest:
-            raise OutputError(f"{target.name}: differs from what was written; write it anew.")
+            raise OutputError(f"{target.name}: differs from what was written; regenerate it.")
         files.append(CutFile(layer.index, path_of_layer, digest, len(contours), length))
     return files

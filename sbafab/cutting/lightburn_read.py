@@ -170,7 +170,7 @@ def verify_project(path: Path, contours: Sequence[Contour], sheet: Surroundings)
                 raise OutputError(f"the shape at x {x:.3f}, y {y:.3f} is not one of {layer}")
             _check_shape(shape, edges)
     except OutputError as error:
-        raise OutputError(f"{path.name}: {error}; write it anew") from error
+        raise OutputError(f"{path.name}: {error}; regenerate it") from error
 
 
 def _check_settings(found: Project, layers: set[str]) -> None:

@@ -135,7 +135,7 @@ def kerf_of(properties: Mapping[str, str]) -> Kerf | None:
     if state != COMPENSATED or not is_kerf(*kerf):
         raise OutputError(
             f"its properties say KERF_STATE {state!r} and KERF_WIDTH {width!r}, which leaves open "
-            "how it was compensated; write it anew"
+            "how it was compensated; regenerate it"
         )
     return kerf[0] if kerf[0] == kerf[1] else kerf
 
@@ -187,6 +187,6 @@ def chord_error_of(properties: Mapping[str, str]) -> float:
         error = 0.0
     if not 0 < error <= 0.1:
         raise OutputError(
-            f"custom property CURVES is {said!r}, not {CHORDS} up to 0.1 mm; write it anew."
+            f"custom property CURVES is {said!r}, not {CHORDS} up to 0.1 mm; regenerate it."
         )
     return error

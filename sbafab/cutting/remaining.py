@@ -12,7 +12,7 @@ SLACK = 1e-5
 
 
 class PointsLeft:
-    """Points filed by the cells of a square grid, which is made anew as they grow few."""
+    """Points filed by the cells of a square grid, which is made again as they grow few."""
 
     def __init__(self, points: Sequence[Point]) -> None:
         self._points = points

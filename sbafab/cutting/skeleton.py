@@ -1,6 +1,6 @@
 """The empty DXF document that every cut file is filled into.
 
-``python -m sbafab.cutting.skeleton`` writes it anew with ezdxf. Keeping it as a file means that
+``python -m sbafab.cutting.skeleton`` regenerates it with ezdxf. Keeping it as a file means that
 writing a cut file costs no import of ezdxf, and that reading one back is an independent check.
 """
 

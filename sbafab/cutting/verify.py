@@ -41,7 +41,7 @@ def verify_file(
         check_contours(found.region, expected, TOLERANCE)
         _check_area(found.region, expected)
     except OutputError as error:
-        raise OutputError(f"{path.name}: {error} Write it anew.") from error
+        raise OutputError(f"{path.name}: {error} Regenerate it.") from error
     return found
 
 
@@ -71,7 +71,9 @@ def check_surroundings(found: ReadBack, expected: Surroundings) -> None:
                 math.dist(p, q) > TOLERANCE for p, q in zip(points, run, strict=True)
             ):
                 x, y = run[0]
-                raise OutputError(f"the stroke on {layer} at x {x:.3f}, y {y:.3f} is another.")
+                raise OutputError(
+                    f"the stroke on {layer} at x {x:.3f}, y {y:.3f} differs from what was written."
+                )
     engraved = [edge for name, edges in found.strokes if name == ENGRAVE for edge in edges]
     near = _near(found.region, engraved)
     for edge in engraved:
@@ -117,7 +119,7 @@ def check_datum(found: ReadBack) -> None:
             )
         wanted.remove(own)
     if wanted:
-        raise OutputError("the datum cross at x 0, y 0 is not whole; write it anew.")
+        raise OutputError("the datum cross at x 0, y 0 is not whole; regenerate it.")
 
 
 def _apart(line: Sequence[Point], other: Sequence[Point]) -> float:

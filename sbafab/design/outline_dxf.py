@@ -120,7 +120,7 @@ def _drawing(path: Path) -> tuple[Drawing, Modelspace]:
         # A damaged file fails anywhere in the parser, with any of the built-in errors.
         kind = type(error).__name__
         raise DesignError(
-            f"is not a DXF file that can be read ({kind}); save it anew as DXF R2010"
+            f"is not a DXF file that can be read ({kind}); save it again as DXF R2010"
         ) from None
 
 
@@ -141,7 +141,7 @@ def _read(entity: Any, factor: float) -> Strand:
         raise
     except Exception:
         # As above: what a damaged entity lacks shows itself anywhere.
-        raise DesignError(f"holds a damaged {entity.dxftype()}; draw it anew") from None
+        raise DesignError(f"holds a damaged {entity.dxftype()}; draw it again") from None
 
 
 def _heights(entity: Any) -> list[float]:
@@ -149,7 +149,7 @@ def _heights(entity: Any) -> list[float]:
     try:
         return [float(z) for z in HEIGHTS[entity.dxftype()](entity)]
     except Exception:
-        raise DesignError(f"holds a damaged {entity.dxftype()}; draw it anew") from None
+        raise DesignError(f"holds a damaged {entity.dxftype()}; draw it again") from None
 
 
 def _facing(entity: Any) -> float:

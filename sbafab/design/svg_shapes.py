@@ -127,10 +127,10 @@ def _corners(text: str, name: str) -> str:
         found = list(numbers(text))
     except ValueError as error:
         raise DesignError(
-            f'has <{name}> with points that stop at "{error}"; draw it anew'
+            f'has <{name}> with points that stop at "{error}"; draw it again'
         ) from None
     if len(found) % 2:
-        raise DesignError(f"has <{name}> with an odd count of numbers in points; draw it anew")
+        raise DesignError(f"has <{name}> with an odd count of numbers in points; draw it again")
     if not found:
         return ""
     pairs = [f"{x} {y}" for x, y in zip(found[::2], found[1::2], strict=True)]
@@ -144,13 +144,13 @@ def _commands(text: str) -> Iterator[str]:
     start, *rest = _COMMANDS.split(text)
     letters, bodies = rest[::2], rest[1::2]
     if start.strip(WHITE) or not letters or letters[0] not in "Mm":
-        raise DesignError("has <path> with d that does not begin with a move; draw it anew")
+        raise DesignError("has <path> with d that does not begin with a move; draw it again")
     for before, letter, body in zip(["", *letters], letters, bodies, strict=False):
         takes = TAKES[letter.upper()]
         found = list(_numbers(body, takes == 7))
         if (takes == 0 and found) or (takes and (not found or len(found) % takes)):
             raise DesignError(
-                f'has <path> with d that is damaged at "{letter}{body.strip()[:20]}"; draw it anew'
+                f'has <path> with d that is damaged at "{letter}{body.strip()[:20]}"; draw it again'
             )
         if before.upper() + letter.upper() in UNLIKE:
             yield from ("l", "0", "0")
@@ -179,7 +179,7 @@ def _numbers(text: str, arcs: bool) -> Iterator[str]:
         match = (_FLAGS_OF_ARC if is_flag else _NUMBER).match(text, place)
         if match is None:
             raise DesignError(
-                f'has <path> with d that is damaged at "{text[place : place + 20]}"; draw it anew'
+                f'has <path> with d that is damaged at "{text[place : place + 20]}"; draw it again'
             )
         yield match[0] if is_flag else repr(float(match[0]))
         count += 1

@@ -154,7 +154,7 @@ def write_assembly(
 def _note(checked: CheckedAssembly) -> str:
     failed = dict.fromkeys(f.rule for f in checked.findings if f.verdict == "fail")
     waived = dict.fromkeys(f.rule for f in checked.findings if f.by_user)
-    note = f"; not to be built, failed: {', '.join(failed)}" if failed else ""
+    note = f"; must not be built; failed: {', '.join(failed)}" if failed else ""
     return note + (f"; waived: {', '.join(waived)}" if waived else "")
 
 

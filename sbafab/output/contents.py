@@ -149,7 +149,7 @@ def order_of(checked: Checked, folder: str = "") -> Job:
 def _marked(checked: Checked) -> Laminate:
     """The laminate with notes for its pictures: failed and waived rules, lowered limits."""
     failed = dict.fromkeys(f.rule for f in checked.findings if f.verdict == "fail")
-    notes = [f"not to be built, failed: {', '.join(failed)}"] if failed else []
+    notes = [f"must not be built; failed: {', '.join(failed)}"] if failed else []
     notes += [f"waived: {', '.join(checked.waived)}"] if checked.waived else []
     notes += [f"limits lowered: {', '.join(checked.lowered)}"] if checked.lowered else []
     laminate = checked.laminate

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 ExtraFiles = Callable[[Laminate, Path], None]
 """Writes something of its own for a laminate into the folder of a run."""
 OWN: dict[RunPart, tuple[str, ...]] = {"cut": CUT, "press": PRESS, "mesh": MESH, "preview": ()}
-"""What of an earlier run is made anew with a part."""
+"""What of an earlier run is made again with a part."""
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from sbafab.progress import Progress
 
 PLACES = f"{FOLDER}/nest.json"
 MOST_BYTES = 50_000_000
-"""Of saved places; more are not read but searched anew."""
+"""Of saved places; more are not read but searched for again."""
 
 
 def find_nests(

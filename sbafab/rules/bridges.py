@@ -109,7 +109,7 @@ def _misfreed(panel: SheetPanel, layer: Layer) -> Iterator[_Wrong]:
         if part != layer.profile and apart(part, layer.profile) > room:
             what = "is still held after the second cut" if part.is_empty else "is cut otherwise"
             said = f"layer {layer.index} ({layer.name}) {what} in the copy at {at(place)}"
-            yield _Wrong(layer, place, f"{said}; write the sheets anew")
+            yield _Wrong(layer, place, f"{said}; regenerate the sheets")
 
 
 def apart(one: Region, other: Region) -> float:

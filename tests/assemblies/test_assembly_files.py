@@ -52,7 +52,7 @@ FAULTS: list[tuple[str, dict[str, Any], str]] = [
     ("brace", {"parts.arm.at": "lumen"}, "is fixed on a tube at one of"),
     ("brace", {"parts.cup.on": "vacuum"}, "no cup can be fixed on a line"),
     ("brace", {"parts.tube.at": "end"}, "needs parts.tube.on"),
-    ("brace", {"parts.arm.on": None, "parts.arm.at": None}, '"tube", "arm" hang on nothing'),
+    ("brace", {"parts.arm.on": None, "parts.arm.at": None}, '"tube", "arm" are fixed on nothing'),
     ("brace", {"parts.tube.on": "arm", "parts.tube.at": "top"}, '"tube", "arm" hang on each other'),
     ("brace", {"parts.arm.on": "arm", "parts.arm.at": "top"}, '"arm" hangs on itself'),
     ("brace", {"rules": {"waive": ["bond"]}}, "must be 'tube-match', .*'bond-width'"),

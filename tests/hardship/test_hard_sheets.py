@@ -1,4 +1,4 @@
-"""Film sheets and saved places that were tampered with: searched anew, or told, and never hung."""
+"""Film sheets and saved places that were tampered with: searched for again, or told, and never hung."""
 
 from __future__ import annotations
 

@@ -118,7 +118,7 @@ def test_the_page_makes_every_design_and_joins_every_part(brace: Run) -> None:
     joined = [words(a.find("h3")) for a in tree.iterfind(".//article") if "join" in a.get("class")]
     assert [title.split()[1] for title in joined] == ["tube", "grip", "vacuum", "arm", "cup"]
     assert "laminated at once, as in the paper" in page
-    assert "Not together: radial-15mm and 3dof-15mm" in page
+    assert "Not pressed together: radial-15mm and 3dof-15mm" in page
     assert "3M 1587" in page
 
 

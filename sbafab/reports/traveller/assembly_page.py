@@ -131,7 +131,7 @@ def _parts(job: AssemblyJob) -> list[tuple[str, str, str, str]]:
     for placed in job.assembled.parts:
         what = placed.part.kind if placed.made is None else f"SBA {placed.made.design.name}"
         on = placed.part.on
-        where = "all else hangs on it" if on is None else f"{on}, {placed.part.at}"
+        where = "everything else is fixed on it" if on is None else f"{on}, {placed.part.at}"
         rows.append((placed.name, what, where, f"#{bytes(paints[placed.name]).hex()}"))
     return rows
 
@@ -235,7 +235,7 @@ def _not_together(job: AssemblyJob) -> str:
         return ""
     sizes = [f"{one.name} {say.millimetres(one.work.laminate.thickness)}" for one in job.works]
     return (
-        f"Not together: {say.listed([one.name for one in job.works])}. Their stacks differ in "
+        f"Not pressed together: {say.listed([one.name for one in job.works])}. Their stacks differ in "
         f"height ({say.listed(sizes)}) and steps; the paper presses only like patterns at once, "
         "and glues these parts to each other."
     )

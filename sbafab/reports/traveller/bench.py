@@ -105,7 +105,7 @@ def reseat(laminate: Laminate, adds: Sequence[int], pinned: bool) -> list[Action
     return [
         Action(
             f"Has a mask slipped? Lift what lies over it with tweezers, push it {home}, lay the "
-            "rest back and stroke it flat. After the flash bond it cannot be moved: cut anew."
+            "rest back and stroke it flat. After the flash bond it cannot be moved: cut a new one."
         )
     ]
 
