@@ -275,12 +275,11 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
 def replaced(dropped: Sequence[str]) -> Iterator[tuple[str, str]]:
     """The row on the files of an earlier run that were removed, if there were any."""
     if dropped:
-        count = "1 file" if len(dropped) == 1 else f"{len(dropped)} files"
+        count = "1 stale file" if len(dropped) == 1 else f"{len(dropped)} stale files"
         names = ", ".join(dict.fromkeys(path.partition("/")[0] for path in dropped))
         yield (
             "replaced",
-            f"removed {count} stale files ({names}); "
-            "--set name=NAME gives a design a folder of its own",
+            f"removed {count} ({names}); --set name=NAME gives a design a folder of its own",
         )
 
 

@@ -98,7 +98,8 @@ def _strands(drawn: list[DrawnShape], page: Page) -> Iterator[Strand]:
         except Exception as error:
             # Numbers out of all bounds fail anywhere in the library, with any built-in error.
             raise DesignError(
-                f"holds a <{shape.name}> that cannot be read ({type(error).__name__}); draw it again"
+                f"holds a <{shape.name}> that cannot be read ({type(error).__name__}); "
+                "draw it again"
             ) from None
         yield from _subpaths(segments, _placement(matrix, page.across, -page.down))
 

@@ -1,7 +1,7 @@
 """The spyrrow engine: strip packing that imitates sheets.
 
 The strip runs along a sheet's length and is as high as the sheet is wide. What reaches past the
-sheet's end goes to the next sheet, which is searched for again. The search ends by the clock, so its
+sheet's end goes to the next sheet, for which a new search begins. It ends by the clock, so its
 result is no function of the design: it is worth saving.
 """
 

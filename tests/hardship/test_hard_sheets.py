@@ -1,4 +1,4 @@
-"""Film sheets and saved places that were tampered with: searched for again, or told, and never hung."""
+"""Film sheets and saved places that were tampered with: searched again, or told, never hung."""
 
 from __future__ import annotations
 

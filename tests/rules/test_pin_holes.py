@@ -83,7 +83,7 @@ def test_ears_that_vanished_from_all_films(good: Good) -> None:
     laminate = replace(laminate, layers=layers)
     assert failing(laminate) == {"pin-holes", "facing-films"}
     assert "hangs on no pin in step 1" in found(laminate).message
-    # Three patterns of film (tabbed base, tabbed wall, wall, cap) are fixed on nothing, two pins idle.
+    # Three patterns of film (tabbed base, tabbed wall, wall, cap) hang on nothing, two pins idle.
     assert found(laminate).measured >= 5
 
 

@@ -235,8 +235,8 @@ def _not_together(job: AssemblyJob) -> str:
         return ""
     sizes = [f"{one.name} {say.millimetres(one.work.laminate.thickness)}" for one in job.works]
     return (
-        f"Not pressed together: {say.listed([one.name for one in job.works])}. Their stacks differ in "
-        f"height ({say.listed(sizes)}) and steps; the paper presses only like patterns at once, "
+        f"Not pressed together: {say.listed([one.name for one in job.works])}. Their stacks differ "
+        f"in height ({say.listed(sizes)}) and steps; the paper presses only like patterns at once, "
         "and glues these parts to each other."
     )
 
