@@ -49,7 +49,7 @@ def test_a_drawing_that_a_change_names_lies_where_the_user_stands(
     design = sbafab.load("1dof-5mm").with_(chamber={"outline": "o.svg"})
     assert design.drawing == tmp_path / "o.svg"
     mask = sbafab.build(design).layer(6).profile
-    assert mask.area == pytest.approx(math.pi * (3**2 - 0.5**2), rel=1e-6)
+    assert mask.area == pytest.approx(math.pi * (3**2 - 0.52**2), rel=1e-6)
 
 
 def test_regions_are_shapely_geometries_within_the_chord_error() -> None:
@@ -65,7 +65,7 @@ def test_regions_are_shapely_geometries_within_the_chord_error() -> None:
 def test_layers_are_ezdxf_documents_of_the_same_area() -> None:
     layer = sbafab.build("1dof-5mm", SMALL).layer(5)
     circles = sbafab.drawing(layer).modelspace().query("CIRCLE")
-    assert sorted(circle.dxf.radius for circle in circles) == pytest.approx([0.5, 3.25])
+    assert sorted(circle.dxf.radius for circle in circles) == pytest.approx([0.52, 3.25])
 
 
 def test_solid_and_meshes_are_objects_of_other_libraries(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ INLET = {
     "on": "arm",
     "at": "inlet",
     "chamber": "chamber2",
-    "outer_diameter": 1.2,
+    "outer_diameter": 1.4,
     "length": 20,
 }
 FAULTS: dict[CheckName, tuple[str, dict[str, Any]]] = {

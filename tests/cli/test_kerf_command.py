@@ -172,7 +172,9 @@ def test_a_calibrated_folder_checks_as_built(
 def test_a_kerf_that_takes_a_bore_is_told_with_its_place(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["cut", "1dof-5mm", "--set", "laser.kerf_ptfe=[0.5,1.0]", "-o", str(tmp_path)]
+    narrow = ["--set", "bore.diameter=1", "--set", "bore.pin_diameter=0.96"]
+    kerf = ["--set", "laser.kerf_ptfe=[0.5,1.0]"]
+    arguments = ["cut", "1dof-5mm", *narrow, *kerf, "-o", str(tmp_path)]
     code, out, _ = run(arguments, capsys)
     assert code == 1
     said = " ".join(out.split())

@@ -16,7 +16,7 @@ from sbafab.cutting.order import cutting_order
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width, least_gap, least_width
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules import bond_width, film_limits, mask_overhang
+from sbafab.rules import film_limits, margins, mask_overhang
 from sbafab.rules.alike import distinct_interfaces
 from sbafab.rules.limits import Limits
 
@@ -74,7 +74,7 @@ def widths(laminate: Laminate) -> Iterator[Compared]:
     for alike in distinct_interfaces(laminate):
         bond = alike.interface.bond
         layer = alike.interface.below.index
-        found = compared("bond", bond, layer, least_width(bond, bond_width.SHARP))
+        found = compared("bond", bond, layer, least_width(bond, margins.SHARP))
         if found is not None:
             yield found
     for layers in laminate.patterns.values():
@@ -91,7 +91,7 @@ def compared(what: str, region: Region, layer: int, ours: Width | None) -> Compa
         return None
     shape = as_klayout(region)
     check = shape.space_check if what == "slot" else shape.width_check
-    sharp = bond_width.SHARP if what == "bond" else film_limits.SHARP
+    sharp = margins.SHARP if what == "bond" else film_limits.SHARP
     limit = round(min(ours.value + 2 * TOLERANCE, WIDEST) / UNIT)
     square = min(
         _distances(check(limit, False, kdb.Region.Projection, sharp, GRAZING, None)), default=None

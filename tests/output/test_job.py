@@ -25,7 +25,8 @@ def designs(*assignments: str) -> list[Design]:
 
 @pytest.fixture(scope="module")
 def job(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return generate_job(designs("order.copies=2"), "batch", tmp_path_factory.mktemp("job"))
+    made = designs("order.copies=2", "order.spares=0")
+    return generate_job(made, "batch", tmp_path_factory.mktemp("job"))
 
 
 def test_every_design_has_its_folder_and_the_sheets_are_shared(job: Run) -> None:
@@ -75,7 +76,7 @@ def test_travellers_name_the_shared_sheets(job: Run) -> None:
 
 
 def test_the_same_job_gives_the_same_bytes(job: Run, tmp_path: Path) -> None:
-    again = generate_job(designs("order.copies=2"), "batch", tmp_path)
+    again = generate_job(designs("order.copies=2", "order.spares=0"), "batch", tmp_path)
     assert file_hashes(again.folder) == file_hashes(job.folder)
 
 

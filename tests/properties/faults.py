@@ -63,7 +63,8 @@ def thick_tube(draw: st.DrawFn) -> Draft:
 @st.composite
 def coarse_laser(draw: st.DrawFn) -> Draft:
     draft = draw(one_dof() | lobed())
-    return draft.having("laser.least_feature", strip(draft) + draw(mm(0.06, 2.0)))
+    # The strip is wider by what cutting takes.
+    return draft.having("laser.least_feature", strip(draft) + draw(mm(0.5, 2.0)))
 
 
 @st.composite
