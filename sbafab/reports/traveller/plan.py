@@ -158,8 +158,6 @@ def _captions(view: _View, plate: bool, pinned: bool, datum: str) -> list[str]:
         mark.format(number(EDGE + 13.0), number(y - 0.8), "#ffffff"),
         draw.text((EDGE + 14.6, y), "no pin", size=2.2),
     ]
-    _, _, high_x, high_y = view.bounds
-    corner = view.at((high_x, high_y))
     words = "on the base plate, cut corner back right" if pinned else "no pins in"
-    parts.append(draw.text((corner[0] + 2.0, HEAD - 1.2), words, size=2.2, anchor="end"))
+    parts.append(draw.text((EDGE, HEAD - 1.2), words, size=2.2))
     return parts
