@@ -115,6 +115,7 @@ KIND = Kind(
         redrawn("bore moved in a separator", NOMINAL, separator, drilled(1.25, 0.15)),
         redrawn("bore too small in a wall", CLEAR, wall, drilled(0.4)),
         redrawn("bore too small in a chamber mask", CLEAR, mask, drilled(0.4)),
+        redrawn("bore too small for its pin in a wall", "pin-fit", wall, drilled(0.45)),
         redrawn("bore too large in a wall", "bond-width", wall, drilled(0.6)),
         redrawn("bore too large in a chamber mask", "bond-width", mask, drilled(0.6)),
         redrawn("hole in the base", "sealing", base, holed(0.3, 1.7)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
 import shapely
@@ -76,11 +76,34 @@ def _pins(folder: Folder) -> tuple[dict[str, Pin], list[Disagreement]]:
             continue
         left.remove(hole)
         pins[entry["name"]] = Pin(entry["name"], hole)
+    said += _at_other_places(folder, pins.values(), left)
     said += [
         Disagreement("pins", f"the plate has a hole for no pin at x {h.x:.3f}, y {h.y:.3f}")
         for h in left
     ]
     return pins, said
+
+
+def _at_other_places(
+    folder: Folder, pins: Iterable[Pin], left: list[Hole]
+) -> Iterator[Disagreement]:
+    """Takes the same holes at the further places of a press cycle from those that are left."""
+    batch = folder.manifest.get("batch")
+    if batch is None:
+        return
+    if (
+        len(batch["places"]) != batch["at_once"]
+        or sum(batch["cycles"]) != folder.manifest["copies"]
+    ):
+        yield Disagreement("pins", f"places and cycles do not make all copies: {batch}")
+    for spot in batch["places"][1:]:
+        for pin in pins:
+            at = pin.hole.x + spot["x"], pin.hole.y + spot["y"]
+            found = next((hole for hole in left if math.dist(at, hole[:2]) < FITS), None)
+            if found is None or abs(found.radius - pin.hole.radius) > FITS:
+                yield Disagreement("pins", f"place {spot} has no hole for pin {pin.name}")
+            else:
+                left.remove(found)
 
 
 def _meets(folder: Folder, pin: Pin, layer: Layer) -> str:
