@@ -42,7 +42,7 @@ CLEAN: list[tuple[str, tuple[str, ...], DxfProfile]] = [
     *(("3dof-15mm", (f"chamber.count={n}", "stack.balloons=2"), "bulges") for n in (2, 4)),
     ("radial-15mm", (), "bulges"),
     ("radial-15mm", ("chamber.count=2", *KERF), "arcs"),
-    ("radial-15mm", ("inlet.manifold=true",), "chords"),
+    ("radial-15mm", ("inlet.manifold=true",), "arcs"),
     ("1dof-5mm", ("rules.bond_width=0.8", 'rules.waive=["bond-width", "tube-fit"]'), "bulges"),
     *(
         (name, ("stack.balloons=2", "registration.method=ears"), "bulges")

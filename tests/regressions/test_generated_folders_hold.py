@@ -15,7 +15,7 @@ from sbafab.output.run import generate
 FEW = ("rules.yield_builds=100", "registration.method=ears")
 UNEVEN = ("laser.kerf_tpe=[0.12, 0.1]", "laser.kerf_ptfe=[0.08, 0.12]")
 BONE = (
-    "stack.balloons=2",
+    "stack.balloons=1",
     "fillet.radius=1",
     "inlet.tab_length=0.001",
     "chamber.outline=bone.dxf",
