@@ -53,7 +53,11 @@ FAULTS: list[tuple[str, dict[str, Any], str]] = [
     ("brace", {"parts.cup.on": "vacuum"}, "no cup can be fixed on a line"),
     ("brace", {"parts.tube.at": "end"}, "needs parts.tube.on"),
     ("brace", {"parts.arm.on": None, "parts.arm.at": None}, '"tube", "arm" are fixed on nothing'),
-    ("brace", {"parts.tube.on": "arm", "parts.tube.at": "top"}, '"tube", "arm" hang on each other'),
+    (
+        "brace",
+        {"parts.tube.on": "arm", "parts.tube.at": "top"},
+        '"tube", "arm" are fixed on each other',
+    ),
     ("brace", {"parts.arm.on": "arm", "parts.arm.at": "top"}, '"arm" hangs on itself'),
     ("brace", {"rules": {"waive": ["bond"]}}, "must be 'tube-match', .*'bond-width'"),
     ("brace", {"parts.tube.inner_diameter": 15}, "parts.tube must have an inner_diameter smaller"),

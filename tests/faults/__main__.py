@@ -1,7 +1,11 @@
-"""Writes ``docs/faults.md`` from what the checks find: ``python -m tests.faults``."""
+"""Writes ``docs/faults.md`` from what the checks find: ``python -m tests.faults``.
+
+With ``--check`` the page is compared, not written.
+"""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -12,7 +16,7 @@ from tests.faults.table import PAGE, text
 
 
 def main() -> int:
-    """Puts every fault into every template; 1 if a rule missed one."""
+    """Puts every fault into every template; 1 if a rule missed one, or the page is another."""
     cells: dict[tuple[str, str], str] = {}
     with TemporaryDirectory() as folder, quick({}), remembering(Path(folder) / "anew")():
         root = Path(folder)
@@ -22,7 +26,12 @@ def main() -> int:
             for template in TEMPLATES:
                 found = caught_by(fault, template, goods, root / "faulty")
                 cells[fault.name, template] = cell(fault, found)
-    PAGE.write_text(text(cells), newline="\n")
+    written = text(cells)
+    if "--check" not in sys.argv[1:]:
+        PAGE.write_text(written, newline="\n")
+    elif PAGE.read_text() != written:
+        print(f"{PAGE.name} does not say what was found; run python -m tests.faults")
+        return 1
     missed = [key for key, said in cells.items() if said.startswith("MISSED")]
     for name, template in missed:
         print(f"{name}, {template}: {cells[name, template]}")

@@ -72,7 +72,7 @@ def test_a_failing_design_writes_no_cut_files(tmp_path: Path) -> None:
     assert run.failed
     written = hashes(run.folder)
     assert not [path for path in written if path.startswith(("layers/", "mesh/", "press"))]
-    assert "not to be built" in (run.folder / "preview" / "layers.svg").read_text()
+    assert "must not be built" in (run.folder / "preview" / "layers.svg").read_text()
     findings = json.loads((run.folder / "checks.json").read_text())["findings"]
     assert "fail" in {finding["verdict"] for finding in findings}
 
