@@ -31,7 +31,6 @@ CLEAN: list[tuple[str, tuple[str, ...], DxfProfile]] = [
     ("1dof-5mm", ("stack.balloons=1",), "arcs"),
     ("1dof-5mm", ("chamber.diameter=[6, 5, 4.5]", "stack.balloons=3"), "chords"),
     ("1dof-5mm", ("stack.balloons=21",), "bulges"),
-    ("1dof-10mm", ("stack.balloons=2",), "chords"),
     ("1dof-10mm", ("chamber.outline=drop.svg", "stack.balloons=2"), "bulges"),
     ("1dof-10mm", ("chamber.outline=drop.svg", "stack.balloons=1"), "chords"),
     ("3dof-15mm", ("stack.balloons=6",), "bulges"),
@@ -48,7 +47,7 @@ CLEAN: list[tuple[str, tuple[str, ...], DxfProfile]] = [
         (name, ("stack.balloons=2", "registration.method=ears"), "bulges")
         for name in ("1dof-5mm", "3dof-15mm", "radial-15mm")
     ),
-    ("3dof-15mm", ("stack.balloons=1", "order.copies=3", *KERF), "chords"),
+    ("3dof-15mm", ("stack.balloons=1", "order.copies=3", *KERF), "bulges"),
     ("3dof-15mm", ("stack.balloons=1", PINS, UNEVEN, "order.copies=2"), "bulges"),
     ("1dof-10mm", ("stack.balloons=2", UNEVEN, "registration.method=ears"), "arcs"),
     ("1dof-5mm", ("stack.balloons=2", *ROLLS, "order.copies=3", *KERF), "arcs"),

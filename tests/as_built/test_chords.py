@@ -25,7 +25,6 @@ BOND, OVERHANG, TOLERANCE = 0.75, 0.5, 1e-3
 CASES = [
     ("1dof-5mm", (), 0.005),
     ("1dof-5mm", (), 0.1),
-    ("1dof-10mm", (), 0.05),
     ("3dof-15mm", (), 0.02),
     ("radial-15mm", (), 0.1),
 ]

@@ -1,6 +1,6 @@
 """Every fault is caught by the rule named for it, and ``docs/faults.md`` says what was found.
 
-All faults are put into ``1dof-5mm``, and every fourth one into the other templates.
+Every second fault is put into ``1dof-5mm``, and every fourth into each other template.
 ``python -m tests.faults`` runs all of them and writes the page; with ``--check`` it compares.
 """
 
@@ -21,12 +21,12 @@ from tests.faults.record import Fault
 from tests.faults.specimen import LEFT_OUT, failing, quick, unabridged
 from tests.faults.table import PAGE, cells_of, text
 
-WHOLE, WIDER = "1dof-5mm", "1dof-10mm"
+MOST, WIDER = "1dof-5mm", "1dof-10mm"
 CASES = [
     pytest.param(fault, template, id=f"{template}-{fault.name}")
     for place, template in enumerate(TEMPLATES)
     for number, fault in enumerate(FAULTS)
-    if template == WHOLE or number % 4 == place
+    if number % 4 == place or (template == MOST and number % 4 == 2)
 ]
 
 

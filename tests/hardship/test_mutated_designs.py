@@ -26,7 +26,7 @@ from sbafab.errors import SbafabError
 from sbafab.output.assembly import check_assembly
 from sbafab.output.run import check
 
-COUNT = int(os.environ.get("SBAFAB_MUTATIONS", "160"))
+COUNT = int(os.environ.get("SBAFAB_MUTATIONS", "120"))
 BATCHES = 8
 LONGEST_SECONDS = 30
 VALUES = [

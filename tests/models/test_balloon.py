@@ -35,7 +35,7 @@ def pressed_ideal(disc: float, length: float) -> tuple[float, float]:
 
 
 def test_a_film_that_cannot_stretch_between_plates_is_the_closed_limit() -> None:
-    discs = np.array([0.5, 1.5, 2.0, 2.4])
+    discs = np.array([0.5, 2.0])
     limits = np.array([pressed_ideal(disc, 2.5) for disc in discs])
     found = inflate(IDEAL, 100.0, limits[:, 0])
     assert found.volume == pytest.approx(limits[:, 1], rel=1e-3)

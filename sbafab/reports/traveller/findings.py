@@ -91,6 +91,10 @@ def _helps(one: Inspected, hands: Sequence[Hand]) -> Iterator[str]:
             'registration.method = "ears" pins every film and separator in every step; the ears '
             "are snipped off afterwards."
         )
+        yield (
+            'registration.method = "sheet", for round and lobed actuators, keeps films and masks '
+            "whole on corner pins until all copies are pressed; no bench has tried it."
+        )
     yield (
         "Count your own builds and set registration.hand_placement and registration.hand_turn to "
         "what they say."

@@ -63,14 +63,13 @@ def chapter(work: Work) -> dict[str, Any]:
 
 def _force_notes(work: Work, panel: SheetPanel) -> tuple[str, ...]:
     """What the force means on sheets that are smaller than the platen."""
+    highest = max(step.film_kpa for step in work.schedule.steps)
     step = work.schedule.steps[0]
-    area = panel.outline.area
     return (
         f"{step.force_n:.0f} N is {step.pressure_kpa:g} kPa on the whole platen of "
         f"{say.size(*step.platen_mm)}, as the paper gives it. The sheets take "
-        f"{say.size(*panel.size)}: without something compliant round them that fills the platen "
-        f"the same force is {1000 * step.force_n / area:.0f} kPa on them, and "
-        f"{step.pressure_kpa * area / 1000:.0f} N would be {step.pressure_kpa:g} kPa.",
+        f"{say.size(*panel.size)}; through the press pad, which fills the platen, up to about "
+        f"{highest:.0f} kPa reach them. That is an estimate, which no press has confirmed.",
         "Sheets of every film lie round the parts at every height, so that these share the "
         "pressure; what each part gets of it nobody has measured.",
     )
