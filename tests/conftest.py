@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile(
@@ -17,18 +18,11 @@ settings.register_profile(
 settings.load_profile("sbafab")
 
 LONG = "SBAFAB_LONG" in os.environ
-"""Whether tests that start other programs for long run too, as ``.ci/run`` has them."""
-collect_ignore = (
-    []
-    if LONG
-    else [
-        f"interop/test_{name}.py"
-        for name in (
-            "klayout",
-            "sheets_chromium",
-            "sheets_inkscape",
-            "sheets_librecad",
-            "sheets_openscad",
-        )
-    ]
-)
+"""Whether only the tests marked ``long`` run, as ``.ci/run`` has them beside the suite."""
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """The suite leaves out what is marked ``long``; with ``SBAFAB_LONG=1`` only that runs."""
+    left_out = [item for item in items if (item.get_closest_marker("long") is not None) != LONG]
+    config.hook.pytest_deselected(items=left_out)
+    items[:] = [item for item in items if item not in set(left_out)]

@@ -18,6 +18,8 @@ from sbafab.laminate.laminate import Laminate
 from tests.interop.judging import TOLERANCE, compared, overhang, widths
 from tests.properties.designs import Draft, valid
 
+pytestmark = pytest.mark.long
+
 RING = disc((0.0, 0.0), 3.25) - disc((0.0, 0.0), 2.5)
 
 

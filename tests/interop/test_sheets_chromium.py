@@ -35,7 +35,10 @@ body { margin: 0 } svg { display: block } g { display: none }
 #CUT_OUTER { fill: #f00 } #CUT_INNER { fill: #00f }
 </style>"""
 
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here")
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here"),
+]
 
 
 def shown(page: Path, finer: int, folder: Path) -> Image.Image:

@@ -22,7 +22,10 @@ A4_HEIGHT = 297.0
 PIXELS_PER_MM = 96 / 25.4
 """Inkscape's own, whatever it exports."""
 
-pytestmark = pytest.mark.skipif(INKSCAPE is None, reason="no Inkscape here")
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(INKSCAPE is None, reason="no Inkscape here"),
+]
 
 
 def inkscape(*arguments: str) -> str:

@@ -18,7 +18,10 @@ LIBRECAD = shutil.which("librecad")
 DOTS = 600
 """Dots an inch."""
 
-pytestmark = pytest.mark.skipif(LIBRECAD is None, reason="no LibreCAD here")
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(LIBRECAD is None, reason="no LibreCAD here"),
+]
 
 
 def printed(sheet: Sheet, folder: Path) -> Image.Image:

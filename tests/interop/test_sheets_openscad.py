@@ -16,7 +16,10 @@ OPENSCAD = shutil.which("openscad")
 SIDES = 360
 """Chords of a full circle: 5e-5 of its area."""
 
-pytestmark = pytest.mark.skipif(OPENSCAD is None, reason="no OpenSCAD here")
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(OPENSCAD is None, reason="no OpenSCAD here"),
+]
 
 
 def imported(sheet: Sheet, profile: DxfProfile, layer: str, folder: Path) -> list[float]:

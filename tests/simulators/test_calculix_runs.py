@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
 import sys
@@ -23,9 +22,6 @@ from sbafab.simulators.calculix.run import run_ccx
 from sbafab.simulators.calculix.settings import DeckSettings
 
 pytest.importorskip("netgen")
-at_length = pytest.mark.skipif(
-    "SBAFAB_LONG" not in os.environ, reason="long: SBAFAB_LONG=1 runs it"
-)
 needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="ccx is not installed")
 
 # CAX8R, 133 nodes, of the paper's balloon: pocket 5, ring 0.75, films 0.038, E 10 MPa, nu 0.2.
@@ -69,7 +65,7 @@ def summed(values: np.ndarray, over: np.ndarray) -> np.ndarray:
 
 
 @needs_ccx
-@at_length
+@pytest.mark.long
 @pytest.mark.parametrize("procedure", ["static", "dynamic"])
 def test_the_balloon_in_3d_before_it_wrinkles(tmp_path: Path, procedure: str) -> None:
     settings = DeckSettings({"chamber1": 0.95}, procedure, outputs=8)  # type: ignore[arg-type]
