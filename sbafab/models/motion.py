@@ -94,7 +94,7 @@ class Motion:
         """
         most = np.cbrt(self.stack.most_pressure)
         x = np.cbrt(np.asarray(self.pose.pressures))
-        pose = self.pose
+        pose = self._at(x)
         wrong = missed(pose)
         close = CLOSE * np.maximum(np.abs(scale), 1.0)
         for _ in range(MOST_ROUNDS):
