@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sbafab.models.balloon_map import HEIGHT_SPANS, along
-
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
@@ -35,7 +33,5 @@ def blocked(stack: Stack, pressure: float, stroke: ArrayLike) -> Array:
 
 def _curve(one: BalloonMap, pressure: float) -> tuple[Array, Array]:
     """Heights in mm and the force in mN there, made to fall."""
-    rows = one.pressed(np.array([pressure]))[0]
-    y = np.linspace(0.0, HEIGHT_SPANS, SAMPLES)
-    push = -along(np.broadcast_to(rows, (SAMPLES, rows.shape[1])), y).first * one.spans
-    return y / one.spans, np.minimum.accumulate(push)
+    heights = np.linspace(0.0, one.most_height, SAMPLES)
+    return heights, np.minimum.accumulate(one.force(pressure, heights))
