@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         schema,
         simulate,
         solid,
+        sweep,
         templates,
     )
 
@@ -50,6 +51,7 @@ __all__ = [
     "schema",
     "simulate",
     "solid",
+    "sweep",
     "templates",
 ]
 

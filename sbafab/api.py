@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from sbafab.output.run import Run
     from sbafab.output.simulating import Simulated
     from sbafab.rules.finding import Findings
+    from sbafab.search.sweep import Sweep
     from sbafab.simulators.simulator import Name
 
 Source = Design | str | Path
@@ -208,6 +209,29 @@ def predict(
     factors = Factors(press_factor, contact_factor)
     asked = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), factors)
     return model_predict(load(source, *changes, **tables), asked)
+
+
+def sweep(
+    source: Source,
+    *changes: Change,
+    vary: Sequence[str],
+    out: str | Path = "out",
+    **asked: Any,
+) -> Sweep:
+    """Checks and predicts a design with keys varied into ``out/<name>-sweep/``; a row a design.
+
+    ``vary`` holds texts such as ``"chamber.diameter=4:8:0.5"`` and ``"stack.balloons=3,6,9"``.
+    ``asked`` holds fields of ``search.sweep.SweepRequest``, such as ``samples``, ``pressures_kpa``,
+    ``workers`` and ``dask``, beside tables of the design.
+    """
+    from sbafab.search.sweep import SweepRequest
+    from sbafab.search.sweep import sweep as run_sweep
+    from sbafab.search.vary import read_varied
+
+    settings, tables = _parted(asked, SweepRequest)
+    design = load(source, *changes, **tables)
+    varied = tuple(read_varied(text) for text in vary)
+    return run_sweep(SweepRequest(design, varied, **settings), Path(out))
 
 
 def kerf(measurements: str | Path, resolution: float = 0.01) -> Calibration:

@@ -50,7 +50,7 @@ def check(
     from sbafab.rules.deck import has_failed
 
     kind, findings, notes, designs = _findings(source, assignments, waivers, target_yield, as_json)
-    advice = None if target_yield is None else _advice(source, assignments, target_yield)
+    advice = None if target_yield is None else _advice(source, assignments, target_yield, as_json)
     if as_json:
         advised = {"advice": advice.as_dict()} if advice else {}
         print_json({**checks(findings, kind, designs), "notes": notes, **advised})
@@ -95,11 +95,13 @@ def _of_assembly(assembly: Assembly, progress: Progress) -> Told:
     return "design", checked.findings, notes_of(checked.designs), designs
 
 
-def _advice(source: str, assignments: tuple[str, ...], target: float) -> Advice:
+def _advice(source: str, assignments: tuple[str, ...], target: float, quiet: bool) -> Advice:
     from sbafab.actuators import load_design
+    from sbafab.cli.printing import shown_progress
     from sbafab.output.advice import advise
 
-    return advise(load_design(source, _asking(assignments, target)), target)
+    with shown_progress(quiet) as tell:
+        return advise(load_design(source, _asking(assignments, target)), target, tell)
 
 
 def _asking(assignments: tuple[str, ...], target: float) -> tuple[str, ...]:
