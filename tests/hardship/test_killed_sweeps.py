@@ -18,19 +18,6 @@ ARGUMENTS = [
     *("--vary", "chamber.diameter=2,3,4,5", "--vary", "bond.width=0.7,0.75"),
     *("--set", "rules.yield_builds=100"),
 ]
-    "sweep",
-    "1dof-5mm",
-    "--vary",
-    "chamber.diameter=2,3,4,5",
-    "--vary",
-    "bond.width=0.7,0.75",
-    "--workers",
-    "1",
-    "--pressure",
-    "10",
-    "--set",
-    "rules.yield_builds=100",
-]
 FILES = ("sweep.csv", "sweep.parquet", "sweep.html")
 
 
