@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         simulate,
         solid,
         stack,
+        sweep,
         templates,
     )
 
@@ -52,6 +53,7 @@ __all__ = [
     "simulate",
     "solid",
     "stack",
+    "sweep",
     "templates",
 ]
 

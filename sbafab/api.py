@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from sbafab.output.run import Run
     from sbafab.output.simulating import Simulated
     from sbafab.rules.finding import Findings
+    from sbafab.search.sweep import Sweep
     from sbafab.simulators.simulator import Name
 
 Source = Design | str | Path
@@ -211,9 +212,7 @@ def predict(
     return model_predict(load(source, *changes, **tables), asked)
 
 
-def stack(
-    source: Source, *changes: Change, most_pressure: float = 110.0, **tables: Any
-) -> Stack:
+def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **tables: Any) -> Stack:
     """The actuator as plates joined by balloons, for poses in real time: ``stack.pose((5, 5, 0))``.
 
     ``most_pressure`` kPa is the most that it may be asked for. Raises DesignError for pockets that
@@ -222,6 +221,29 @@ def stack(
     from sbafab.models.stack import stack as stack_of
 
     return stack_of(load(source, *changes, **tables), most_pressure=most_pressure)
+
+
+def sweep(
+    source: Source,
+    *changes: Change,
+    vary: Sequence[str],
+    out: str | Path = "out",
+    **asked: Any,
+) -> Sweep:
+    """Checks and predicts a design with keys varied into ``out/<name>-sweep/``; a row a design.
+
+    ``vary`` holds texts such as ``"chamber.diameter=4:8:0.5"`` and ``"stack.balloons=3,6,9"``.
+    ``asked`` holds fields of ``search.sweep.SweepRequest``, such as ``samples``, ``pressures_kpa``,
+    ``workers`` and ``dask``, beside tables of the design.
+    """
+    from sbafab.search.sweep import SweepRequest
+    from sbafab.search.sweep import sweep as run_sweep
+    from sbafab.search.vary import read_varied
+
+    settings, tables = _parted(asked, SweepRequest)
+    design = load(source, *changes, **tables)
+    varied = tuple(read_varied(text) for text in vary)
+    return run_sweep(SweepRequest(design, varied, **settings), Path(out))
 
 
 def kerf(measurements: str | Path, resolution: float = 0.01) -> Calibration:
