@@ -17,7 +17,7 @@ from sbafab.pressing.together import Runs
 from sbafab.reports.traveller import bench, bill, joining, notes, times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.cautions import cautions, for_the_designer
-from sbafab.reports.traveller.code import code_svg, code_text
+from sbafab.reports.traveller.code import code_svg, record_text
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.page import context, environment, frame, sheet_rows
 from sbafab.reports.traveller.page import films as page_films
@@ -70,7 +70,7 @@ class AssemblyJob:
 def assembly_html(job: AssemblyJob) -> str:
     """The whole page."""
     name = job.assembled.assembly.name
-    text = code_text(name, job.sha256, job.generator)
+    text = record_text(name, job.sha256, job.generator)
     works = [one.work for one in job.works]
     return (
         environment()
