@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from sbafab.models.stack import Stack
     from sbafab.output.run import Run
     from sbafab.output.simulating import Simulated
+    from sbafab.results.records import Record
+    from sbafab.results.report import Report
     from sbafab.rules.finding import Findings
     from sbafab.search.sweep import Sweep
     from sbafab.simulators.simulator import Name
@@ -252,6 +254,38 @@ def kerf(measurements: str | Path, resolution: float = 0.01) -> Calibration:
     from sbafab.cutting.measured_table import read_measurements
 
     return calibrated(read_measurements(Path(measurements)), resolution)
+
+
+def record(
+    source: Source,
+    *changes: Change,
+    lab: str | Path = "lab.sqlite",
+    table: str | Path | None = None,
+    **said: Any,
+) -> list[Record]:
+    """Records what came out of a design or an assembly in the lab's file; the records added.
+
+    ``said`` holds ``serial``, ``leak`` ("pass" or "fail"), ``operator``, ``kit``, ``note``, and
+    what was measured: ``burst_kpa``, ``stroke_mm``, ``force_n``, ``height_mm``, ``mass_g``, one
+    or several of ``offset_mm``, ``turn_deg``, ``cut_mm``; beside tables of the design. A
+    ``table`` (CSV) says it of a batch instead. Raises DesignError, OutputError.
+    """
+    from sbafab.results import recording
+    from sbafab.results.store import Lab
+
+    told = {name: value for name, value in said.items() if name in recording.SAID}
+    tables = {name: value for name, value in said.items() if name not in recording.SAID}
+    results = recording.results_of(told, table)
+    built = recording.built_from(source, [*changes, tables] if tables else changes)
+    return recording.record(Lab(Path(lab)), built, results)
+
+
+def report(lab: str | Path = "lab.sqlite") -> Report:
+    """What all records of a lab's file say together: success, figures, tolerances."""
+    from sbafab.results.report import report as report_of
+    from sbafab.results.store import Lab
+
+    return report_of(*Lab(Path(lab)).contents())
 
 
 def solid(source: Source | Laminate, *changes: Change, **tables: Any) -> Surface:
