@@ -22,6 +22,7 @@ from sbafab.cli.press import press
 from sbafab.cli.record import record
 from sbafab.cli.schema import schema
 from sbafab.cli.simulate import simulate
+from sbafab.cli.studio import studio
 from sbafab.cli.templates import templates
 
 COMMANDS = (
@@ -37,6 +38,7 @@ COMMANDS = (
     predict,
     simulate,
     record,
+    studio,
     schema,
 )
 
