@@ -19,7 +19,7 @@ export class PanZoom {
     for (const end of ["pointerup", "pointercancel"]) element.addEventListener(end, (event) => this.pointers.delete(event.pointerId));
     element.addEventListener("dblclick", () => { this.touched = false; this.fit(); });
     element.addEventListener("keydown", (event) => this.key(event));
-    new ResizeObserver(() => { if (!this.touched) this.fit(); else this.changed(); }).observe(element);
+    new ResizeObserver(() => { if (this.later) this.goto(...this.later); else if (!this.touched) this.fit(); else this.changed(); }).observe(element);
   }
   get width() { return this.element.clientWidth; }
   get height() { return this.element.clientHeight; }
@@ -66,6 +66,9 @@ export class PanZoom {
     this.changed();
   }
   goto(x, y, across) {
+    // A view that is not shown has no size yet.
+    this.later = this.width && this.height ? null : [x, y, across];
+    if (this.later) return;
     this.scale = Math.min(this.width, this.height) / across;
     Object.assign(this, { x, y, touched: true });
     this.changed();

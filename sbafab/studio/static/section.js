@@ -144,9 +144,7 @@ export class Section {
     if (!own.length) return;
     const z0 = Math.min(...own.map((layer) => layer.z)), z1 = Math.max(...own.map((layer) => layer.z + layer.thickness));
     this.mark = [0, (z0 + z1) / 2];
-    this.eye.scale = Math.min((this.surface.clientHeight * 0.5) / ((z1 - z0) * this.stretch), this.surface.clientWidth / 3);
-    Object.assign(this.eye, { x: 0, y: (z0 + z1) / 2, touched: true });
-    this.draw();
+    this.eye.goto(0, (z0 + z1) / 2, Math.max(1.5, (z1 - z0) * this.stretch * 2));
   }
   async picture() { return { name: "section.png", blob: await new Promise((done) => this.canvas.toBlob(done)) }; }
 }
