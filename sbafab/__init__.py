@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         schema,
         simulate,
         solid,
+        stack,
         template,
         templates,
     )
@@ -59,6 +60,7 @@ __all__ = [
     "schema",
     "simulate",
     "solid",
+    "stack",
     "template",
     "templates",
 ]
