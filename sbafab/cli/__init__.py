@@ -25,6 +25,7 @@ from sbafab.cli.progress_line import add_verbosity
 from sbafab.cli.record import record
 from sbafab.cli.schema import schema
 from sbafab.cli.simulate import simulate
+from sbafab.cli.studio import studio
 from sbafab.cli.sweep import sweep
 from sbafab.cli.templates import templates
 
@@ -43,6 +44,7 @@ COMMANDS = (
     simulate,
     sweep,
     record,
+    studio,
     schema,
 )
 for _command in COMMANDS:
