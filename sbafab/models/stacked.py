@@ -198,10 +198,12 @@ def _stiffness(asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
         name = f"lateral tip stiffness at {pressure:g} kPa"
         try:
             start = found.pose((pressure,) * found.chambers)
-            load = {"tip_load": (SLIGHT, 0.0, 0.0)}
-            held = found.pose(start.pressures, near=start, **load)
-            yield _per_mm(f"{name}, pressure held", held, replace(SHUT, name="elastic stack"), asked)
-            shut = Motion(found, Line(AIR, length=1e-3), load, start)
+            aside = (SLIGHT, 0.0, 0.0)
+            held = found.pose(start.pressures, aside, near=start)
+            yield _per_mm(
+                f"{name}, pressure held", held, replace(SHUT, name="elastic stack"), asked
+            )
+            shut = Motion(found, Line(AIR, length=1e-3), {"tip_load": aside}, start)
             shut.step(1.0, flows=(0.0,) * found.chambers)
             yield _per_mm(f"{name}, chambers shut", shut.pose, SHUT, asked)
         except DesignError as error:
