@@ -16,6 +16,7 @@ from sbafab.cli.ending import BAD_INPUT, ended_plainly, prepared_streams, say
 from sbafab.cli.explain import explain
 from sbafab.cli.generate import generate
 from sbafab.cli.kerf import kerf
+from sbafab.cli.map import map_
 from sbafab.cli.mesh import mesh
 from sbafab.cli.nest import nest
 from sbafab.cli.new import new
@@ -41,6 +42,7 @@ COMMANDS = (
     nest,
     kerf,
     predict,
+    map_,
     simulate,
     sweep,
     record,
