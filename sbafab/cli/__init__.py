@@ -24,6 +24,7 @@ from sbafab.cli.predict import predict
 from sbafab.cli.press import press
 from sbafab.cli.progress_line import add_verbosity
 from sbafab.cli.record import record
+from sbafab.cli.reproduce import reproduce
 from sbafab.cli.schema import schema
 from sbafab.cli.simulate import simulate
 from sbafab.cli.studio import studio
@@ -46,6 +47,7 @@ COMMANDS = (
     simulate,
     sweep,
     record,
+    reproduce,
     studio,
     schema,
 )
