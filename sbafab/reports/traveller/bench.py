@@ -102,8 +102,8 @@ def underlay(work: Work, part: AssemblyStep) -> list[Action]:
     prick = ", the pins pricked through" if part.pins else ""
     return [
         Action(
-            f"Tape {work.job.underlay}, printed at 100 % and its bars measured, to the plate, "
-            f"below the release film{prick}. It has the edges of {say.listed(patterns)}."
+            f"Tape {work.job.underlay}, printed at 100 % and its bars measured, to the plate{prick}"
+            f". It has the edges of {say.listed(patterns)}."
         )
     ]
 
@@ -117,7 +117,7 @@ def on_the_lumen(laminate: Laminate, part: AssemblyStep) -> list[Action]:
     return [
         Action(
             f"Better than by eye alone: the pin of the {names} passes every film here. Lay up on "
-            "this one pin, so that only the turn is yours; push it out before the press closes."
+            "it, so that only the turn is yours, and push it out before the press closes."
         )
     ]
 

@@ -109,10 +109,19 @@ def _place_notes(runs: Runs) -> tuple[str, ...]:
 def _bench_actions(
     work: Work, part: AssemblyStep, step: Step, lying: Sequence[Bed], runs: Runs
 ) -> tuple[Action, ...]:
-    """A step's actions; what it is laid up on comes right after the base plate."""
-    heat, plate, *others = _actions(work.laminate, part, step, lying, runs)
-    own = (*underlay(work, part), *on_the_lumen(work.laminate, part))
-    return (heat, plate, *own, *others)
+    """A step's actions; what it is laid up on comes between base plate and release film."""
+    heat, plate, film, *others = _actions(work.laminate, part, step, lying, runs)
+    laid = underlay(work, part)
+    # One whole stack that is laid down again has nothing to be aligned with.
+    by_eye = [] if part.pins or not part.adds else [_by_lines(bool(laid))]
+    on_pin = on_the_lumen(work.laminate, part) if part.adds else []
+    return (heat, plate, *laid, film, *by_eye, *on_pin, *others)
+
+
+def _by_lines(has_underlay: bool) -> Action:
+    """How a step without pins is laid up."""
+    lines = ", on the lines that show through the release film" if has_underlay else ""
+    return Action(f"No pin holds these layers: lay them by eye{lines}, as each line below says.")
 
 
 def _actions(
@@ -126,13 +135,12 @@ def _actions(
     if part.pins:
         yield Action(
             "Lay the base plate down, cold, cut corner at the back right. Drive in the pins to "
-            "their heights (above) and prick a release film over them."
+            "their heights (above)."
         )
+        yield Action("Prick a release film over the pins.")
     else:
-        yield Action(
-            "Lay the base plate down, cold, cut corner at the back right, no pins in it, and a "
-            "release film on it. Lay by eye, as each line says."
-        )
+        yield Action("Lay the base plate down, cold, cut corner at the back right, no pins in it.")
+        yield Action("Lay a release film on it.")
     for bed in lying:
         yield from _lay(things, bed, part.pins)
     yield from reseat(laminate, part.adds, bool(part.pins))
