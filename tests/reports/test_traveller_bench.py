@@ -370,3 +370,18 @@ def test_narrow_holes_are_tried_on_their_pins_before_the_press(sheet_files: Any)
     assert "a film must stretch by 21% over its pin (30% is allowed; nobody has tried it)" in cut
     assert "up to 41 films go on one pin" in cut
     assert cut.index("Wipe the soot") < cut.index("Try one part of every pattern on its pins")
+
+
+def test_tubes_and_leaks_are_those_of_every_copy() -> None:
+    design, laminate = built("1dof-5mm", "stack.balloons=1", "order.copies=3")
+    plan = schedule(laminate, press_settings(design))
+    tree = lxml_html.fromstring(
+        traveller_html(design, laminate, plan, [], Job(SHA, "sbafab 1.0.0", copies=3))
+    )
+    for part in ("tubes", "leak"):
+        section = tree.get_element_by_id(part).getparent()
+        assert "of all 3 copies, one after the other" in words_of(section)
+        first = section.xpath(".//ul[@class='ticks']/li")[0]
+        assert len(first.xpath(".//input[@type='checkbox']")) == 3
+    alone = traveller_html(design, laminate, plan, [], Job(SHA, "sbafab 1.0.0"))
+    assert "one after the other" not in alone

@@ -30,6 +30,8 @@ COVER = (
 )
 MOST_LINES = 12
 """Single layers up to which each has a line of its own."""
+MOST_COPIES = 36
+"""Copies up to which each has a box."""
 BONDS = {
     "flash": "Flash bond: the layers just barely stick together.",
     "full": "Full bond: all TPE that touches melts into one.",
@@ -288,6 +290,7 @@ def tubing(work: Work) -> list[Action]:
     strip = work.laminate.interfaces[-1].masks[0].film.material
     first = f"the tab of {inlets[0].chamber}" if len(inlets) > 1 else "the tab"
     return [
+        *_each_copy(work, "Fit the tubes"),
         Action(
             f"Mark {first} with a pen, on the side that lay up in the press: the base is below."
         ),
@@ -315,6 +318,15 @@ def tubing(work: Work) -> list[Action]:
     ]
 
 
+def _each_copy(work: Work, what: str) -> list[Action]:
+    """That what follows is done for every copy of a batch, with a box for each."""
+    count = work.job.copies
+    if count == 1 or work.laminate.panel is not None:
+        return []
+    numbers = tuple(str(copy) for copy in range(1, count + 1)) if count <= MOST_COPIES else ()
+    return [Action(f"{what} of all {count} copies, one after the other, as follows.", (), numbers)]
+
+
 def _apart(names: Sequence[str]) -> tuple[str, ...]:
     """A box for each of several; a single one needs no name."""
     return tuple(names) if len(names) > 1 else ()
@@ -336,6 +348,7 @@ def leak_test(work: Work) -> list[Action]:
         else []
     )
     return [
+        *_each_copy(work, "Test the chambers"),
         Action("Connect a regulator or a syringe with a gauge. Wear eye protection."),
         Action(
             f"Under water, or brushed with soapy water, raise each chamber slowly to "
