@@ -99,11 +99,13 @@ def underlay(work: Work, part: AssemblyStep) -> list[Action]:
     ]
     if work.job.underlay is None or not patterns:
         return []
-    prick = ", the pins pricked through" if part.pins else ""
+    film, eye = ("a release film over it", ": lay by eye along them, as each line says")
+    if part.pins:
+        film, eye = "a release film over it, the pins pricked through both", ""
     return [
         Action(
-            f"Tape {work.job.underlay}, printed at 100 % and its bars measured, to the plate{prick}"
-            f". It has the edges of {say.listed(patterns)}."
+            f"Tape {work.job.underlay}, printed at 100 % and its bars measured, to the plate, "
+            f"{film}. It has the edges of {say.listed(patterns)}{eye}."
         )
     ]
 

@@ -28,7 +28,7 @@ TALLEST = 64.0
 NEAREST, FARTHEST, TWO_LINES = 4.0, 12.0, 6.0
 COLUMN, BRACKET = 4.0, 13.0
 """mm from the layers to their labels, and for a bracket with its count."""
-BOLD = 1.12
+BOLD = 1.25
 """How much wider bold letters are, at most."""
 PAGE = 1.1
 """mm on the page between the layers of a finished stack."""

@@ -112,18 +112,23 @@ def _bench_actions(
     work: Work, part: AssemblyStep, step: Step, lying: Sequence[Bed], runs: Runs
 ) -> tuple[Action, ...]:
     """A step's actions; what it is laid up on comes between base plate and release film."""
-    heat, plate, film, *others = _actions(work.laminate, part, step, lying, runs)
+    heat, *others = _actions(work.laminate, part, step, lying, runs)
     laid = underlay(work, part)
+    plate = _plate(part, bool(laid))
     # One whole stack that is laid down again has nothing to be aligned with.
-    by_eye = [] if part.pins or not part.adds else [_by_lines(bool(laid))]
     on_pin = on_the_lumen(work.laminate, part) if part.adds else []
-    return (heat, plate, *laid, film, *by_eye, *on_pin, *others)
+    return (heat, plate, *laid, *on_pin, *others)
 
 
-def _by_lines(has_underlay: bool) -> Action:
-    """How a step without pins is laid up."""
-    lines = ", on the lines that show through the release film" if has_underlay else ""
-    return Action(f"No pin holds these layers: lay them by eye{lines}, as each line below says.")
+def _plate(part: AssemblyStep, has_underlay: bool) -> Action:
+    """Base plate and pins, and the release film unless an underlay comes first."""
+    text = "Lay the base plate down, cold, cut corner at the back right"
+    if part.pins:
+        film = "." if has_underlay else " and prick a release film over them."
+        return Action(f"{text}. Drive in the pins to their heights (above){film}")
+    film = "" if has_underlay else ", and a release film on it"
+    by_eye = " Lay by eye, as each line says." if part.adds and not has_underlay else ""
+    return Action(f"{text}, no pins in it{film}.{by_eye}")
 
 
 def _actions(
@@ -134,15 +139,6 @@ def _actions(
         f"Heat both platens to {say.temperature(step.temperature_c)}; set the force to "
         f"{say.force(step.force_n)}."
     )
-    if part.pins:
-        yield Action(
-            "Lay the base plate down, cold, cut corner at the back right. Drive in the pins to "
-            "their heights (above)."
-        )
-        yield Action("Prick a release film over the pins.")
-    else:
-        yield Action("Lay the base plate down, cold, cut corner at the back right, no pins in it.")
-        yield Action("Lay a release film on it.")
     for bed in lying:
         yield from _lay(things, bed, part.pins)
     yield from reseat(laminate, part.adds, bool(part.pins))
