@@ -36,10 +36,9 @@ def test_csv_holds_force_and_volume(
     assert len(rows) == 16
     for row in rows:
         p, h = float(row["pressure_kpa"]), float(row["height_mm"])
-        assert float(row["force_mn"]) == pytest.approx(
-            float(balloon.force(p, h)), rel=1e-5, abs=1e-6
-        )
-        assert float(row["volume_ul"]) == pytest.approx(float(balloon.volume(p, h)), rel=1e-5)
+        force = float(balloon.force(p, h))
+        assert float(row["force_mn"]) == pytest.approx(force, rel=1e-4, abs=1e-4)
+        assert float(row["volume_ul"]) == pytest.approx(float(balloon.volume(p, h)), rel=1e-4)
 
 
 def test_json_says_where_each_balloon_is(
