@@ -90,8 +90,8 @@ def _forces(one: Actuator, asked: Asked, found: Stack) -> Iterator[Figure]:
             yield Figure("force", name, value, "N", model)
 
 
-def _some(found: Stack, chambers: int, pressure: float) -> tuple[float, ...]:
-    return (pressure,) * chambers + (0.0,) * (found.chambers - chambers)
+def _some(found: Stack, chambers: int, pressure: float, rest: float = 0.0) -> tuple[float, ...]:
+    return (pressure,) * chambers + (rest,) * (found.chambers - chambers)
 
 
 def _chambers(number: int) -> str:
@@ -109,16 +109,18 @@ def _bends(asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
                 yield LeftOut(name, str(error))
                 continue
             yield Figure("bending", name, pose.bend, "deg", model)
+            aside = float(np.hypot(*pose.tip[:2]))
+            yield Figure("bending", name.replace("bend", "tip aside", 1), aside, "mm", model)
 
 
 def bent(found: Stack, chambers: int, angle: float) -> Pose | None:
     """The pose in which some chambers, the others empty, bend it by so many degrees."""
-    low, high = 1e-4, found.most_pressure
+    low, high = 0.01, found.most_pressure
     pose = None
     for _ in range(40):
         middle = math.sqrt(low * high)
         try:
-            pose = found.pose(_some(found, chambers, middle))
+            pose = found.pose(_some(found, chambers, middle), near=pose)
         except DesignError:
             high = middle
             continue
@@ -233,11 +235,28 @@ def bend_relation(asked: Asked, found: Stack) -> Relation:
     )
 
 
-def _poses(found: Stack, chambers: int, pressures: Sequence[float] | Array) -> list[Pose]:
+def workspace_traces(asked: Asked, found: Stack) -> list[Trace]:
+    """Paths of the tip with 1, 2 ... chambers from no pressure to 10 kPa, the others empty or full."""
+    model = calibrated(BEND, asked.calibration)
+    pressures = np.linspace(0.1, paper.FULL_KPA**0.5, SAMPLES) ** 2
+    lines = []
+    for rest, words in ((0.0, "empty"), (paper.FULL_KPA, f"at {paper.FULL_KPA:g} kPa")):
+        for chambers in range(1, found.chambers):
+            poses = _poses(found, chambers, pressures, rest)
+            label = f"elastic stack, {_chambers(chambers)} to 10 kPa, the others {words}"
+            aside = [float(np.hypot(*pose.tip[:2])) for pose in poses]
+            lines.append(Trace(label, aside, [pose.height for pose in poses], model))
+    return lines
+
+
+def _poses(
+    found: Stack, chambers: int, pressures: Sequence[float] | Array, rest: float = 0.0
+) -> list[Pose]:
     poses: list[Pose] = []
     for pressure in pressures:
         try:
-            poses.append(found.pose(_some(found, chambers, float(pressure))))
+            near = poses[-1] if poses else None
+            poses.append(found.pose(_some(found, chambers, float(pressure), rest), near=near))
         except DesignError:
             break
     return poses
