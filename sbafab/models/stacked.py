@@ -236,7 +236,7 @@ def bend_relation(asked: Asked, found: Stack) -> Relation:
 
 
 def workspace_traces(asked: Asked, found: Stack) -> list[Trace]:
-    """Paths of the tip with 1, 2 ... chambers from no pressure to 10 kPa, the others empty or full."""
+    """Paths of the tip with 1, 2 ... chambers up to 10 kPa, the others empty or full."""
     model = calibrated(BEND, asked.calibration)
     pressures = np.linspace(0.1, paper.FULL_KPA**0.5, SAMPLES) ** 2
     lines = []

@@ -192,7 +192,7 @@ def _bends(three: Prediction, whole: Stack) -> Iterator[Row]:
     ):
         pose = whole.pose((full,) * count + (0.0,) * (3 - count))
         what = "one chamber" if count == 1 else "2 chambers"
-        model = f"{STACK}, {what} at the {full:.2g} kPa of the full height"
+        model = f"{STACK}, {what} at the {full:.2g} kPa that the pump's 10 leave"
         yield Row("largest bend", paper.LARGEST_BEND, pose.bend, model, why)
     empty = whole.pose((0.0, 0.0, 0.0)).volumes[0]
     for time, angle in paper.BENDING:
