@@ -180,12 +180,14 @@ def inflate(
     elements = len(balloon.nodes) - 1
     smooth = np.where(balloon.may_wrinkle & balloon.inextensible, 0.0, math.inf)
     load = _Load(p, high / 2, np.broadcast_to(smooth, (len(p), elements)), tied)
-    r, z = _settled(balloon, load, *_start(balloon, load))
-    if balloon.wrinkles and not balloon.inextensible:
-        zone = _compressed(balloon, r, z)
-        for _ in range(ROUNDS):
-            load = load._replace(cap=_wrinkling(balloon, r, z, zone))
-            r, z = _settled(balloon, load, r, z)
+    # Where no balance is found, elements may shrink to nothing on the way; that is said in the end.
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        r, z = _settled(balloon, load, *_start(balloon, load))
+        if balloon.wrinkles and not balloon.inextensible:
+            zone = _compressed(balloon, r, z)
+            for _ in range(ROUNDS):
+                load = load._replace(cap=_wrinkling(balloon, r, z, zone))
+                r, z = _settled(balloon, load, r, z)
     term, force = _total(balloon, load, r, z)
     held = air(balloon.film, balloon.edge, r, z).energy
     return Shapes(p, 2 * z[:, 0], 2 * held, force, 2 * (term.energy + p * held), r, z)

@@ -80,14 +80,18 @@ def stroke_at(one: Actuator, share: float) -> float:
     return max(share * (one.full_height - one.thickness), 0.0)
 
 
-def _forces(one: Actuator, asked: Asked, found: Stack) -> Iterator[Figure]:
+def _forces(one: Actuator, asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
     model = calibrated(FORCE, asked.calibration)
     for pressure in asked.pressures_kpa:
         for share in SHARES:
             at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
-            value = one.form.pushing * float(blocked(found, pressure, stroke_at(one, share)))
             name = f"blocked force at {pressure:g} kPa, {at}"
-            yield Figure("force", name, value, "N", model)
+            try:
+                value = float(blocked(found, pressure, stroke_at(one, share)))
+            except DesignError as error:
+                yield LeftOut(f"{name}, elastic stack", str(error))
+                continue
+            yield Figure("force", name, one.form.pushing * value, "N", model)
 
 
 def _some(found: Stack, chambers: int, pressure: float, rest: float = 0.0) -> tuple[float, ...]:
@@ -215,6 +219,8 @@ def force_traces(one: Actuator, asked: Asked, found: Stack) -> list[Trace]:
     model = calibrated(FORCE, asked.calibration)
     lines = []
     for pressure in asked.pressures_kpa:
+        if pressure > found.most_pressure:
+            continue
         values = (one.form.pushing * blocked(found, pressure, strokes)).tolist()
         lines.append(Trace(f"elastic stack, {pressure:g} kPa", strokes.tolist(), values, model))
     return lines
