@@ -141,7 +141,7 @@ def test_calculix_takes_each_film_and_the_coarse_shell_says_that_it_does_not(
     design: Design,
 ) -> None:
     laminate = build(design)
-    assert "films of PET, TPU50" in (why_not_round(laminate) or "")
+    assert "films of PET, TPE, TPU50" in (why_not_round(laminate) or "")
     with pytest.raises(DesignError, match=r"add films.pet.modulus, in MPa"):
         deck_settings(laminate)
     stiff = build(design.with_("films.pet.modulus=3000"))
