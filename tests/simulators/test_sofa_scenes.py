@@ -167,7 +167,7 @@ def test_the_shell_has_the_numbers_that_ran(folder: Path) -> None:
 
 @pytest.mark.parametrize("design", ["3dof-15mm", "1dof-10mm"])
 def test_nodal_mass_follows_the_rule_that_held(design: str) -> None:
-    """3 mN/mm a kPa for pockets of 5 mm: a tenth of it was seen to shake at 10 kPa."""
+    """3 mN/mm a kPa for pockets of 5 mm, 8 at least."""
     for pressure, expected in ((10.0, 30.0), (1.0, 8.0)):
         made = round_actuator(sbafab.build(design), {"chamber1": pressure})
         size = made.stack.pockets[0] / 2.5

@@ -18,7 +18,7 @@ from sbafab.simulators.sofa.parts import add_films, add_pressure, add_tip
 from sbafab.simulators.sofa.shell import film_groups, nearly_flat
 
 FRAMES = 9
-"""Reference frames on the backbone (paper, Sec. 3.2.2)."""
+"""Reference frames on the backbone (paper, Sec. 3.2.2), where there are balloons enough."""
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 ALONG_Z = (0.0, -math.sqrt(0.5), 0.0, math.sqrt(0.5))
 """Turns local x, a beam's own axis, upward."""
@@ -65,7 +65,8 @@ def frames_scene(actuator: CoarseActuator) -> str:
     mesh = actuator.mesh
     root = root_node(FRAMES_DT)
     add(root, "DefaultAnimationLoop")
-    node = _frames(root, mesh.height, UPRIGHT, actuator.mass)
+    frames = frame_count(actuator.balloons)
+    node = _frames(root, mesh.height, frames, UPRIGHT, actuator.mass)
     film = child(node, "film")
     add(
         film,
@@ -75,7 +76,7 @@ def frames_scene(actuator: CoarseActuator) -> str:
         position=mesh.position,
         rest_position=mesh.rest,
     )
-    _add_skin(film, mesh)
+    _add_skin(film, mesh, frames)
     add_films(film, *film_groups(actuator, mesh), SOFTENING)
     cavities = dict(mesh.cavities)
     for name, pressure in actuator.pressures:
@@ -90,8 +91,9 @@ def beam_scene(actuator: CoarseActuator) -> str:
     mesh = actuator.mesh_from(standing(beam.height / actuator.balloons))
     root = root_node(BEAM_DT)
     add(root, "DefaultAnimationLoop")
-    node = _frames(root, mesh.height, ALONG_Z, actuator.mass * BEAM_MASS)
-    links = [index for i in range(FRAMES - 1) for index in (i, i + 1)]
+    frames = frame_count(actuator.balloons)
+    node = _frames(root, mesh.height, frames, ALONG_Z, actuator.mass * BEAM_MASS)
+    links = [index for i in range(frames - 1) for index in (i, i + 1)]
     add(node, "MeshTopology", name="beams", edges=links)
     add(
         node,
@@ -103,7 +105,7 @@ def beam_scene(actuator: CoarseActuator) -> str:
         poissonRatio=actuator.poisson,
     )
     for axis, (name, pressure) in zip(actuator.stack.axes, actuator.pressures, strict=True):
-        _add_prism(node, name, axis, beam.area, mesh.height, pressure)
+        _add_prism(node, name, prism(axis, beam.area, mesh.height, frames), pressure)
     film = child(node, "film")
     add(
         film,
@@ -113,7 +115,7 @@ def beam_scene(actuator: CoarseActuator) -> str:
         position=mesh.position,
         showObject="1",
     )
-    _add_skin(film, mesh, mapForces="0", mapConstraints="0", mapMasses="0")
+    _add_skin(film, mesh, frames, mapForces="0", mapConstraints="0", mapMasses="0")
     # The surface on which to hang a visual model.
     shown = child(film, "surface")
     add(shown, "TriangleSetTopologyContainer", name="t", triangles=mesh.single + mesh.double)
@@ -121,19 +123,26 @@ def beam_scene(actuator: CoarseActuator) -> str:
     return document(root, beam_note(actuator, beam.height, beam.area, beam.spring, BEAM_DT))
 
 
-def _frames(root: ET.Element, height: float, turn: tuple[float, ...], mass: float) -> ET.Element:
+def frame_count(balloons: int) -> int:
+    """Frames on the backbone: no more than there are levels, or a balloon would wave."""
+    return min(FRAMES, balloons + 1)
+
+
+def _frames(
+    root: ET.Element, height: float, frames: int, turn: tuple[float, ...], mass: float
+) -> ET.Element:
     node = child(root, "frames")
     add(node, "EulerImplicitSolver", rayleighStiffness=0.05, rayleighMass=2)
     add(node, "CGLinearSolver", iterations=100, tolerance="1e-8", threshold="1e-14")
-    places = [(0.0, 0.0, height * i / (FRAMES - 1), *turn) for i in range(FRAMES)]
+    places = [(0.0, 0.0, height * i / (frames - 1), *turn) for i in range(frames)]
     add(node, "MechanicalObject", name="dofs", template="Rigid3d", position=places)
     add(node, "UniformMass", totalMass=float(f"{mass:.4g}"))
     add(node, "FixedProjectiveConstraint", indices=0)
     return node
 
 
-def _add_skin(film: ET.Element, mesh: CoarseMesh, **off: str) -> None:
-    between = [pair_of_frames(z, mesh.height) for _, _, z in mesh.position]
+def _add_skin(film: ET.Element, mesh: CoarseMesh, frames: int, **off: str) -> None:
+    between = [pair_of_frames(z, mesh.height, frames) for _, _, z in mesh.position]
     add(
         film,
         "SkinningMapping",
@@ -146,13 +155,15 @@ def _add_skin(film: ET.Element, mesh: CoarseMesh, **off: str) -> None:
     )
 
 
-def pair_of_frames(z: float, height: float) -> tuple[tuple[int, int], tuple[float, float]]:
+def pair_of_frames(
+    z: float, height: float, frames: int = FRAMES
+) -> tuple[tuple[int, int], tuple[float, float]]:
     """The two frames next to a height and their weights, the nearer one first.
 
     SkinningMapping reads a node's weights up to the first that is 0: that one must be the last.
     """
-    place = z / height * (FRAMES - 1)
-    below = min(FRAMES - 2, max(0, math.floor(place)))
+    place = z / height * (frames - 1)
+    below = min(frames - 2, max(0, math.floor(place)))
     above = round(place - below, 6)
     if above > 0.5:
         return (below + 1, below), (above, round(1 - above, 6))
@@ -160,9 +171,12 @@ def pair_of_frames(z: float, height: float) -> tuple[tuple[int, int], tuple[floa
 
 
 def _add_prism(
-    node: ET.Element, name: str, axis: Point, area: float, height: float, pressure: float
+    node: ET.Element,
+    name: str,
+    surface: tuple[list[Vector], list[Triangle]],
+    pressure: float,
 ) -> None:
-    points, triangles = prism(axis, area, height)
+    points, triangles = surface
     chamber = child(node, f"air_{name}")
     add(chamber, "MechanicalObject", name="dofs", template="Vec3", position=points)
     add(
@@ -170,23 +184,25 @@ def _add_prism(
         "RigidMapping",
         input="@../dofs",
         output="@dofs",
-        rigidIndexPerPoint=[i for i in range(FRAMES) for _ in range(4)],
+        rigidIndexPerPoint=[place // 4 for place in range(len(points))],
         globalToLocalCoords="1",
     )
     add_pressure(chamber, name, triangles, pressure)
 
 
-def prism(axis: Point, area: float, height: float) -> tuple[list[Vector], list[Triangle]]:
+def prism(
+    axis: Point, area: float, height: float, frames: int = FRAMES
+) -> tuple[list[Vector], list[Triangle]]:
     """A closed square prism on a chamber's axis, four points a frame, normals outward."""
     half = math.sqrt(area) / 2
     corners = ((half, half), (-half, half), (-half, -half), (half, -half))
     points = [
-        (axis[0] + x, axis[1] + y, height * i / (FRAMES - 1))
-        for i in range(FRAMES)
+        (axis[0] + x, axis[1] + y, height * i / (frames - 1))
+        for i in range(frames)
         for x, y in corners
     ]
     triangles: list[Triangle] = [(0, 2, 1), (0, 3, 2)]
-    for start in range(0, 4 * (FRAMES - 1), 4):
+    for start in range(0, 4 * (frames - 1), 4):
         for i in range(4):
             a, b = start + i, start + (i + 1) % 4
             # Diagonals in turn: with all of one hand air would twist the prism.
@@ -194,5 +210,5 @@ def prism(axis: Point, area: float, height: float) -> tuple[list[Vector], list[T
                 triangles += [(a, b, b + 4), (a, b + 4, a + 4)]
             else:
                 triangles += [(a, b, a + 4), (b, b + 4, a + 4)]
-    top = 4 * (FRAMES - 1)
+    top = 4 * (frames - 1)
     return points, [*triangles, (top, top + 1, top + 2), (top, top + 2, top + 3)]

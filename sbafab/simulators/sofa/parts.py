@@ -10,8 +10,8 @@ from sbafab.simulators.sofa.markup import add, child, number
 from sbafab.simulators.sofa.shell import FilmGroup, Shell
 
 NODAL_BY_PRESSURE = 3.0
-"""mN/mm a kPa: nodal mass / dt^2 in pockets of 5 mm. A quarter of it jitters, at any pressure:
-the stiffness that air pressure lends a film is not in the matrix of a step."""
+"""mN/mm a kPa: nodal mass / dt^2 in pockets of 5 mm. The stiffness that air pressure lends a film
+is not in a step's matrix; a tenth of this holds too, but a long stack then swings for longer."""
 LEAST_NODAL = 8.0
 """mN/mm, for low pressures."""
 TIP_FILE = "tip.state"
