@@ -23,11 +23,12 @@ PATH = Path(__file__).parents[1] / "validation.md"
 HEAD = """# The paper's figures beside the predictions
 
 Written by `python -m docs.scripts.validate` from the templates; a test holds that this file is
-what the command writes. No constant of a model is fitted. Where a number is itself a measurement of the
-paper (handling time, full height, moduli), the row says so. The residual is prediction minus paper;
-in parentheses, how many of the paper's own errors that is, where it gives one. A reason that we
-have not tested says "likely". Models and their ranges are in [prediction.md](prediction.md), the
-paper's inputs (films, widths, temperatures, errors of cutting and pins) in [paper.md](paper.md).
+what the command writes. No constant of a model is fitted. Where a number is itself a measurement
+of the paper (handling time, full height, moduli), the row says so. The residual is prediction
+minus paper; in parentheses, how many of the paper's own errors that is, where it gives one. A
+reason that we have not tested says "likely". Models and their ranges are in
+[prediction.md](prediction.md), the paper's inputs (films, widths, temperatures, errors of cutting
+and pins) in [paper.md](paper.md).
 """
 
 CALIBRATION = """## What a calibration would take
