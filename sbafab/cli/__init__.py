@@ -21,9 +21,12 @@ from sbafab.cli.nest import nest
 from sbafab.cli.new import new
 from sbafab.cli.predict import predict
 from sbafab.cli.press import press
+from sbafab.cli.progress_line import add_verbosity
 from sbafab.cli.record import record
 from sbafab.cli.schema import schema
 from sbafab.cli.simulate import simulate
+from sbafab.cli.studio import studio
+from sbafab.cli.sweep import sweep
 from sbafab.cli.templates import templates
 
 COMMANDS = (
@@ -39,9 +42,13 @@ COMMANDS = (
     kerf,
     predict,
     simulate,
+    sweep,
     record,
+    studio,
     schema,
 )
+for _command in COMMANDS:
+    add_verbosity(_command)
 
 
 EXTRAS = {

@@ -191,9 +191,11 @@ def _of_checked(
 
 def _advice(asked: CheckRequest, target: float) -> Advice:
     from sbafab.actuators import load_design
+    from sbafab.cli.printing import shown_progress
     from sbafab.output.advice import advise
 
-    return advise(load_design(asked.source, _asking(asked, target)), target)
+    with shown_progress(asked.as_json) as tell:
+        return advise(load_design(asked.source, _asking(asked, target)), target, tell)
 
 
 def _asking(asked: CheckRequest, target: float) -> tuple[str, ...]:

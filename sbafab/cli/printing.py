@@ -48,15 +48,19 @@ def console() -> Console:
 
 @contextmanager
 def shown_progress(quiet: bool) -> Iterator[Progress]:
-    """A progress line on standard error, where that is a terminal."""
-    if quiet or not sys.stderr.isatty():
-        yield unheard
-        return
-    from rich.console import Console
-    from rich.status import Status
+    """Tells on standard error how far the work in the block is, as -q and -v ask for.
 
-    with Status("starting", console=Console(stderr=True)) as status:
-        yield lambda what, done, total: status.update(f"{what}: {done} of {total}")
+    A line that stays fresh on a terminal; elsewhere plain lines, the first after some seconds.
+    """
+    from sbafab.cli.progress_line import QUIET, VERBOSE, asked_for, live_line, plain_lines
+
+    if quiet or asked_for(QUIET):
+        yield unheard
+    elif sys.stderr.isatty() and not asked_for(VERBOSE):
+        with live_line() as tell:
+            yield tell
+    else:
+        yield plain_lines(asked_for(VERBOSE))
 
 
 def findings_table(findings: Sequence[Finding]) -> Table:

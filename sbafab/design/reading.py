@@ -78,6 +78,15 @@ def _hint(missing: Path) -> str:
     return f"did you mean {near[0]}?" if near else f"the templates are {', '.join(names)}"
 
 
+def template_text(name: str) -> str:
+    """The commented text of a design that ships. Raises DesignError if there is none."""
+    if name not in template_names():
+        raise DesignError(
+            f"{shown(name)} is not a template; there are {', '.join(template_names())}"
+        )
+    return design_path(name).read_text(encoding="utf-8")
+
+
 def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a design file. Raises DesignError where it cannot be read."""
     try:
@@ -93,6 +102,11 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise DesignError(f"{path} is not a text file in UTF-8; save it as UTF-8") from None
     except OSError as error:
         raise DesignError(f"{path} cannot be read: {error.strerror or error}") from None
+    return toml_tables(text, path)
+
+
+def toml_tables(text: str, path: str | Path) -> dict[str, Any]:
+    """The tables of a design file's text; ``path`` names it in messages. Raises DesignError."""
     # The parser's time grows with the square of the parts of a key.
     deep = _TOO_DEEP.search(text)
     if deep is not None:
