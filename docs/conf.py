@@ -22,6 +22,7 @@ extensions = ["myst_nb", "sphinx.ext.autodoc"]
 exclude_patterns = ["scripts", "__main__.py", "conf.py"]
 myst_enable_extensions = ["attrs_block", "attrs_inline", "colon_fence", "deflist"]
 myst_heading_anchors = 3
+smartquotes = False  # an option is --set, not one dash
 
 # Notebooks are run by the build; one that fails stops it.
 nb_execution_mode = "auto"
