@@ -56,10 +56,13 @@ for _command in COMMANDS:
 
 
 EXTRAS = {
+    "dask": ("distributed", "sweep --dask"),
     "mesh": ("netgen", "sbafab mesh, simulate --with calculix"),
     "mujoco": ("mujoco", "simulate --with mujoco"),
     "nest": ("spyrrow", "--nest spyrrow"),
+    "parquet": ("pyarrow", "tables of sweeps as Parquet"),
     "python": ("trimesh", "meshes for trimesh, meshio and PyVista"),
+    "studio": ("starlette", "sbafab studio"),
 }
 """What each extra brings: a module to look for, and what needs it."""
 
