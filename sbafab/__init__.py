@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         schema,
         simulate,
         solid,
+        stack,
         sweep,
         templates,
     )
@@ -51,6 +52,7 @@ __all__ = [
     "schema",
     "simulate",
     "solid",
+    "stack",
     "sweep",
     "templates",
 ]

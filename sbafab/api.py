@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from sbafab.laminate.laminate import Laminate, Layer
     from sbafab.meshing.surface import Surface
     from sbafab.models.figures import Prediction
+    from sbafab.models.stack import Stack
     from sbafab.output.run import Run
     from sbafab.output.simulating import Simulated
     from sbafab.rules.finding import Findings
@@ -209,6 +210,17 @@ def predict(
     factors = Factors(press_factor, contact_factor)
     asked = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), factors)
     return model_predict(load(source, *changes, **tables), asked)
+
+
+def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **tables: Any) -> Stack:
+    """The actuator as plates joined by balloons, for poses in real time: ``stack.pose((5, 5, 0))``.
+
+    ``most_pressure`` kPa is the most that it may be asked for. Raises DesignError for pockets that
+    are not round.
+    """
+    from sbafab.models.stack import stack as stack_of
+
+    return stack_of(load(source, *changes, **tables), most_pressure=most_pressure)
 
 
 def sweep(

@@ -22,16 +22,20 @@ ROOT = 0.645
 """Thicknesses by which a film bends on past the edge of its bond: end correction of Williams (1989)
 for a double cantilever beam, isotropic, nu = 0.2.
 """
-WIDEN = np.array([[1, 0, 1, 0], [0, 0, 0, 0], [1, 0, 1, 0], [0, 0, 0, 0]], dtype=float) / 4
 
 
 class Flat(NamedTuple):
-    """The flat film: radii of its nodes and thickness in mm, modulus in kPa, Poisson's ratio."""
+    """The flat film: radii of its nodes and thickness in mm, modulus in kPa, Poisson's ratio.
+
+    ``order`` m says which strain the energy is quadratic in: (stretch^m - 1) / m, of the family of
+    Seth (1964) and Hill (1968). 0 is Hencky's logarithmic strain, 2 Green's.
+    """
 
     nodes: Array
     thickness: float
     modulus: float
     poisson: float
+    order: int = 2
 
     @property
     def lengths(self) -> Array:
@@ -51,10 +55,13 @@ class Term(NamedTuple):
 
 
 class Strain(NamedTuple):
-    """Green's strains of the elements along the meridian and round the hoop."""
+    """Strains of the elements along the meridian and round the hoop."""
 
     meridian: Array
     hoop: Array
+
+
+WIDEN = np.array([[1, 0, 1, 0], [0, 0, 0, 0], [1, 0, 1, 0], [0, 0, 0, 0]], dtype=float) / 4
 
 
 def outer(a: Array, b: Array) -> Array:
@@ -63,17 +70,28 @@ def outer(a: Array, b: Array) -> Array:
 
 
 def strain(flat: Flat, r: Array, z: Array) -> Strain:
-    """Green's strains of each element."""
-    dr, dz, middle = np.diff(r), np.diff(z), (r[:, 1:] + r[:, :-1]) / 2
-    return Strain(
-        ((dr**2 + dz**2) / flat.lengths**2 - 1) / 2, ((middle / flat.middles) ** 2 - 1) / 2
-    )
+    """Strains of each element."""
+    along, around = _squares(flat, r, z)
+    return Strain(_measure(flat, along), _measure(flat, around))
+
+
+def _squares(flat: Flat, r: Array, z: Array) -> tuple[Array, Array]:
+    """Squared stretches of each element."""
+    length = np.diff(r) ** 2 + np.diff(z) ** 2
+    return length / flat.lengths**2, ((r[:, 1:] + r[:, :-1]) / (2 * flat.middles)) ** 2
+
+
+def _measure(flat: Flat, square: Array) -> Array:
+    if flat.order == 0:
+        return np.asarray(np.log(square) / 2)
+    return np.asarray((square ** (flat.order / 2) - 1) / flat.order)
 
 
 def membrane(flat: Flat, r: Array, z: Array, cap: Array) -> Term:
     """Stretching, by element; where the hoop stress falls to ``-cap`` (kPa) the film wrinkles.
 
-    From there on the hoop follows at no more than that stress: the relaxed energy of a tension
+    Plane stress. With logarithmic strains it is Hencky's (1928) law, good for stretches of 0.7 to
+    1.3 (Anand, 1979); with Green's it is Saint Venant's and Kirchhoff's. From there on the hoop follows at no more than that stress: the relaxed energy of a tension
     field (Pipkin, 1986), with what the wrinkles themselves carry.
     """
     nu, plane = flat.poisson, flat.modulus / (1 - flat.poisson**2)
@@ -86,19 +104,22 @@ def membrane(flat: Flat, r: Array, z: Array, cap: Array) -> Term:
     density = (s1 * e1 + s2 * own) / 2 + held * (own - e2)
     c11 = np.where(wrinkled, flat.modulus, plane)
     c12, c22 = np.where(wrinkled, 0.0, plane * nu), np.where(wrinkled, 0.0, plane)
+    half = flat.order / 2 - 1
+    sq1, sq2 = _squares(flat, r, z)
+    f1, f2 = sq1**half / 2, sq2**half / 2
     dr, dz, middle = np.diff(r), np.diff(z), (r[:, 1:] + r[:, :-1]) / 2
     none = np.zeros_like(dr)
-    g1 = np.stack([-dr, -dz, dr, dz], -1) / (flat.lengths**2)[:, None]
-    g2 = np.stack([middle, none, middle, none], -1) / (2 * flat.middles**2)[:, None]
+    d1 = np.stack([-dr, -dz, dr, dz], -1) * (2 / flat.lengths**2)[:, None]
+    d2 = np.stack([middle, none, middle, none], -1) / (flat.middles**2)[:, None]
     volume = math.tau * flat.middles * flat.lengths * flat.thickness
-    gradient = volume[:, None] * (s1[..., None] * g1 + s2[..., None] * g2)
-    both = outer(g1, g2)
+    gradient = volume[:, None] * ((s1 * f1)[..., None] * d1 + (s2 * f2)[..., None] * d2)
+    both = outer(d1, d2)
     hessian = volume[:, None, None] * (
-        (s1 / flat.lengths**2)[..., None, None] * STRETCH
-        + (s2 / flat.middles**2)[..., None, None] * WIDEN
-        + c11[..., None, None] * outer(g1, g1)
-        + c12[..., None, None] * (both + np.swapaxes(both, -1, -2))
-        + c22[..., None, None] * outer(g2, g2)
+        (2 * s1 * f1 / flat.lengths**2)[..., None, None] * STRETCH
+        + (2 * s2 * f2 / flat.middles**2)[..., None, None] * WIDEN
+        + (c11 * f1 * f1 + s1 * half * f1 / sq1)[..., None, None] * outer(d1, d1)
+        + (c12 * f1 * f2)[..., None, None] * (both + np.swapaxes(both, -1, -2))
+        + (c22 * f2 * f2 + s2 * half * f2 / sq2)[..., None, None] * outer(d2, d2)
     )
     return Term((volume * density).sum(-1), gradient, hessian)
 
