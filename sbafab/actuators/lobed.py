@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import Field
 
 from sbafab.actuators.ears import NOTE, Ear, Holder, Ray, film_setback, placed
+from sbafab.actuators.fits import Fits, fitted
 from sbafab.actuators.panel import on_panel, roots, with_stubs
 from sbafab.actuators.pockets import (
     RoundChamber,
@@ -64,6 +65,7 @@ class LobedDesign(Design):
     family: Literal["lobed"]
     """Which kind of actuator this is."""
     chamber: LobedChamber = LobedChamber()
+    fits: Fits = Fits()
     lumen: Lumen = Lumen()
 
     @property
@@ -72,6 +74,9 @@ class LobedDesign(Design):
         lumen = self.lumen
         words = degrees_of_freedom(count)
         return Form(words, count, pockets, lumen=lumen.diameter, lumen_pin=lumen.pin)
+
+    def fitted(self) -> Self:
+        return fitted(self, self.fits, build)
 
 
 def axis_radius(design: LobedDesign, pockets: list[Region]) -> tuple[float, str | None]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Self
 
 from sbafab.actuators.ears import NOTE, Ear, Ray, placed
+from sbafab.actuators.fits import Fits, fitted
 from sbafab.actuators.panel import on_panel, roots, with_stubs
 from sbafab.actuators.pockets import (
     RoundChamber,
@@ -33,10 +34,14 @@ class OneDofDesign(Design):
     family: Literal["1dof"]
     """Which kind of actuator this is."""
     chamber: RoundChamber = RoundChamber()
+    fits: Fits = Fits()
 
     @property
     def form(self) -> Form:
         return Form(degrees_of_freedom(1), 1, round_pockets(self, self.chamber))
+
+    def fitted(self) -> Self:
+        return fitted(self, self.fits, build)
 
 
 def build(design: OneDofDesign) -> Laminate:

@@ -310,11 +310,17 @@ class Design(Section):
     chamber: Chamber = Chamber()
 
     _folder: Path = PrivateAttr(default=Path())
+    _is_solved: bool = PrivateAttr(default=False)
 
     @property
     def folder(self) -> Path:
         """Where relative paths of the design start: the folder of its file."""
         return self._folder
+
+    @property
+    def is_solved(self) -> bool:
+        """Whether ``chamber.diameter`` was solved from what the design must fit."""
+        return self._is_solved
 
     @property
     def drawing(self) -> Path | None:
@@ -367,6 +373,19 @@ class Design(Section):
         """The same design with every default that depends on another value filled in."""
         inlet = self.inlet.model_copy(update={"width": self.strip_width})
         return self.model_copy(update={"inlet": inlet})
+
+    def fitted(self) -> Self:
+        """The same design with what it must fit solved for. Raises DesignError where nothing does.
+
+        A family that knows ``fits`` does so.
+        """
+        return self
+
+    def solved(self) -> Self:
+        """The same design, of which ``chamber.diameter`` is known to be solved, not given."""
+        copy = self.model_copy()
+        copy._is_solved = True
+        return copy
 
     def placed(self, folder: Path) -> Self:
         """The same design with relative paths starting at ``folder``."""

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.errors import DesignError
+from sbafab.laminate.films import PAPER_TPE
 from sbafab.models.film_elements import Flat, Term, add, air, bending, membrane, strain
 
 if TYPE_CHECKING:
@@ -62,8 +63,8 @@ class Balloon:
     neck: float = 0.0
     bore: float = 0.0
     thickness: float = 0.038
-    modulus: float = 10_000.0
-    poisson: float = 0.2
+    modulus: float = 1000 * PAPER_TPE[0]
+    poisson: float = PAPER_TPE[1]
     wrinkles: bool = True
     inextensible: bool = False
     order: int = 2
@@ -93,6 +94,11 @@ class Balloon:
     def film(self) -> Flat:
         return Flat(self.nodes, self.thickness, self.modulus, self.poisson, self.order)
 
+    @cached_property
+    def widths(self) -> Array:
+        """Area in mm2 that belongs to each node."""
+        return np.asarray(math.tau * self.nodes * np.gradient(self.nodes))
+
     @property
     def rigidity(self) -> float:
         """Bending stiffness B of one film in kPa mm3."""
@@ -101,19 +107,21 @@ class Balloon:
         return self.modulus * self.thickness**3 / (12 * (1 - self.poisson**2))
 
     @cached_property
-    def freedoms(self) -> Array:
-        """What moves: a row a coordinate (r, z of each node in turn), a column a freedom.
+    def freedoms(self) -> NDArray[np.int_]:
+        """Numbers of the coordinates (r, z of each node in turn) that move on their own.
 
-        The neck stays level, the rim in the plane between the films, the pole on the axis.
+        The neck stays level: its heights follow ``level``. The rim stays in the plane between the
+        films, the pole on the axis.
         """
         nodes = range(len(self.nodes))
-        columns = [[2 * node] for node in nodes if node or self.bore]
-        columns.append([2 * node + 1 for node in nodes[: self.held + 1]])
-        columns += [[2 * node + 1] for node in nodes[self.held + 1 : self.edge]]
-        matrix = np.zeros((2 * len(self.nodes), len(columns)))
-        for column, rows in enumerate(columns):
-            matrix[rows, column] = 1.0
-        return matrix
+        found = [2 * node for node in nodes if node or self.bore]
+        found += [2 * node + 1 for node in nodes[self.held : self.edge]]
+        return np.array(sorted(found))
+
+    @property
+    def level(self) -> int:
+        """Number of the height that the neck's others are equal to."""
+        return 2 * self.held + 1
 
     @cached_property
     def may_wrinkle(self) -> NDArray[np.bool_]:
@@ -192,31 +200,35 @@ def _start(balloon: Balloon, load: _Load) -> tuple[Array, Array]:
     return np.tile(flat, (len(rise), 1)), rise[:, None] * shape
 
 
-def _total(balloon: Balloon, load: _Load, r: Array, z: Array) -> tuple[Term, Array]:
+def _total(
+    balloon: Balloon, load: _Load, r: Array, z: Array, slopes: bool = True
+) -> tuple[Term, Array]:
     """Energy of films and plates less the work of the air, by coordinate, and the plates' force."""
     film, edge = balloon.film, balloon.edge
-    total = bending(film, balloon.rigidity, balloon.held, edge, r, z)
-    stretched = membrane(film, r, z, load.cap)
-    filled = air(film, edge, r, z)
+    bent = slice(balloon.held, edge)
+    total = bending(film, balloon.rigidity, bent, r, z, slopes)
+    stretched = membrane(film, r, z, load.cap, slopes)
+    filled = air(film, edge, r, z, slopes)
     p = load.pressure
+    number = np.arange(len(film.nodes))
+    stiff = PLATE * p[:, None] * np.where(number < edge, balloon.widths, 0.0)
+    over = np.maximum(z - load.half[:, None], 0.0)
+    if load.tied:
+        holds = number <= balloon.held
+        stiff = np.where(holds, PLATE * np.maximum(p, 1.0)[:, None] * balloon.widths, stiff)
+        over = np.where(holds, z - load.half[:, None], over)
+    pressed = stiff * over
+    energy = total.energy + stretched.energy - p * filled.energy + (pressed * over).sum(-1) / 2
+    if not slopes:
+        return total._replace(energy=energy), pressed.sum(-1)
     add(
         total,
         stretched.gradient - p[:, None, None] * filled.gradient,
         stretched.hessian - p[:, None, None, None] * filled.hessian,
     )
-    width = math.tau * film.nodes * np.gradient(film.nodes)
-    number = np.arange(len(film.nodes))
-    stiff = PLATE * p[:, None] * np.where(number < edge, width, 0.0)
-    over = np.maximum(z - load.half[:, None], 0.0)
-    if load.tied:
-        holds = number <= balloon.held
-        stiff = np.where(holds, PLATE * np.maximum(p, 1.0)[:, None] * width, stiff)
-        over = np.where(holds, z - load.half[:, None], over)
-    pressed = stiff * over
     heights = np.arange(1, 2 * len(film.nodes), 2)
     total.gradient[:, heights] += pressed
     total.hessian[:, heights, heights] += np.where(over != 0, stiff, 0.0)
-    energy = total.energy + stretched.energy - p * filled.energy + (pressed * over).sum(-1) / 2
     return total._replace(energy=energy), pressed.sum(-1)
 
 
@@ -228,14 +240,21 @@ def _settled(balloon: Balloon, load: _Load, r: Array, z: Array) -> tuple[Array, 
     freedoms = balloon.freedoms
     r, z, damping = r.copy(), z.copy(), np.zeros(len(r))
     live = np.arange(len(r))
-    eye = np.eye(freedoms.shape[1])
+    own = np.ix_(freedoms, freedoms)
+    diagonal = np.arange(len(freedoms))
     for _ in range(MOST_STEPS):
         part, at = load.rows(live), (r[live], z[live])
         term, _ = _total(balloon, part, *at)
-        gradient = term.gradient @ freedoms
-        stiffness = freedoms.T @ term.hessian @ freedoms
-        size = np.abs(np.einsum("nii->ni", stiffness))
-        stiffness += (damping[live, None] * size)[..., None] * eye
+        for height in range(1, balloon.level, 2):
+            term.gradient[:, balloon.level] += term.gradient[:, height]
+            term.hessian[:, balloon.level] += term.hessian[:, height]
+        for height in range(1, balloon.level, 2):
+            term.hessian[:, :, balloon.level] += term.hessian[:, :, height]
+        gradient = term.gradient[:, freedoms]
+        stiffness = term.hessian[:, own[0], own[1]]
+        stiffness[:, diagonal, diagonal] += damping[live, None] * np.abs(
+            stiffness[:, diagonal, diagonal]
+        )
         move = -np.linalg.solve(stiffness, gradient[..., None])[..., 0]
         slope = (move * gradient).sum(-1)
         small = CLOSE * np.maximum(part.pressure, LEAST) * math.pi * balloon.pocket**2
@@ -245,11 +264,15 @@ def _settled(balloon: Balloon, load: _Load, r: Array, z: Array) -> tuple[Array, 
         still |= (np.abs(slope) <= digits) & (damping[live] == 0.0)
         if still.all():
             return r, z
-        ahead = np.where(still[:, None], 0.0, move) @ freedoms.T
+        ahead = np.zeros_like(term.gradient)
+        ahead[:, freedoms] = np.where(still[:, None], 0.0, move)
+        ahead[:, 1 : balloon.level : 2] = ahead[:, balloon.level, None]
         share = _downhill(balloon, part, at, ahead, term.energy, slope)
         r[live] += share[:, None] * ahead[:, ::2]
         z[live] += share[:, None] * ahead[:, 1::2]
-        damped = np.where(share > 0, damping[live] / 10, np.clip(10 * damping[live], 1e-3, 1e9))
+        damped = np.where(
+            share > 0, damping[live] / 10, np.clip(10 * damping[live], 1e-3, 1e9)
+        )
         damping[live] = np.where(damped < 1e-6, 0.0, damped)
         live = live[~still]
     raise DesignError(
@@ -274,7 +297,8 @@ def _downhill(
     room = 1e-12 * (np.abs(energy) + load.pressure * balloon.pocket**3)
     for _ in range(HALVINGS):
         step = share[:, None] * ahead
-        tried = _total(balloon, load, at[0] + step[:, ::2], at[1] + step[:, 1::2])[0].energy
+        to = at[0] + step[:, ::2], at[1] + step[:, 1::2]
+        tried = _total(balloon, load, *to, slopes=False)[0].energy
         good = tried <= energy + 1e-4 * share * slope + room
         if good.all():
             return share

@@ -54,6 +54,9 @@ class Term(NamedTuple):
     hessian: Array
 
 
+NOTHING = np.zeros(0)
+
+
 class Strain(NamedTuple):
     """Strains of the elements along the meridian and round the hoop."""
 
@@ -87,7 +90,7 @@ def _measure(flat: Flat, square: Array) -> Array:
     return np.asarray((square ** (flat.order / 2) - 1) / flat.order)
 
 
-def membrane(flat: Flat, r: Array, z: Array, cap: Array) -> Term:
+def membrane(flat: Flat, r: Array, z: Array, cap: Array, slopes: bool = True) -> Term:
     """Stretching, by element; where the hoop stress falls to ``-cap`` (kPa) the film wrinkles.
 
     Plane stress. With logarithmic strains it is Hencky's (1928) law, good for stretches of 0.7 to
@@ -102,6 +105,9 @@ def membrane(flat: Flat, r: Array, z: Array, cap: Array) -> Term:
     own = np.where(wrinkled, -held / plane - nu * e1, e2)
     s1, s2 = plane * (e1 + nu * own), plane * (own + nu * e1)
     density = (s1 * e1 + s2 * own) / 2 + held * (own - e2)
+    volume = math.tau * flat.middles * flat.lengths * flat.thickness
+    if not slopes:
+        return Term((volume * density).sum(-1), NOTHING, NOTHING)
     c11 = np.where(wrinkled, flat.modulus, plane)
     c12, c22 = np.where(wrinkled, 0.0, plane * nu), np.where(wrinkled, 0.0, plane)
     half = flat.order / 2 - 1
@@ -111,7 +117,6 @@ def membrane(flat: Flat, r: Array, z: Array, cap: Array) -> Term:
     none = np.zeros_like(dr)
     d1 = np.stack([-dr, -dz, dr, dz], -1) * (2 / flat.lengths**2)[:, None]
     d2 = np.stack([middle, none, middle, none], -1) / (flat.middles**2)[:, None]
-    volume = math.tau * flat.middles * flat.lengths * flat.thickness
     gradient = volume[:, None] * ((s1 * f1)[..., None] * d1 + (s2 * f2)[..., None] * d2)
     both = outer(d1, d2)
     hessian = volume[:, None, None] * (
@@ -124,30 +129,36 @@ def membrane(flat: Flat, r: Array, z: Array, cap: Array) -> Term:
     return Term((volume * density).sum(-1), gradient, hessian)
 
 
-def bending(flat: Flat, rigidity: float, held: int, edge: int, r: Array, z: Array) -> Term:
+def bending(
+    flat: Flat, rigidity: float, bent: slice, r: Array, z: Array, slopes: bool = True
+) -> Term:
     """Bending along the meridian and round the hoop, by coordinate, between clamped edges.
 
-    What lies inside node ``held`` and outside ``edge`` is bonded face to face with its mirror. It
+    What lies outside the nodes ``bent`` is bonded face to face with its mirror. It
     does not bend, but gives way at its root as the arms of a double cantilever beam do. The
     second derivatives leave out those of the slopes themselves: enough to descend by.
     """
     dr, dz = np.diff(r), np.diff(z)
     slope = np.arctan2(-dz, dr)
-    turn = np.stack([-dz, dr, dz, -dr], -1) / (dr**2 + dz**2)[..., None]
+    held, edge = bent.start, bent.stop
     inner, beyond = slice(0, edge), slice(1, edge + 1)
     kink = slope[:, beyond] - slope[:, inner]
     number = np.arange(len(flat.lengths))
-    bent = np.where((number >= held) & (number < edge), flat.lengths, 2 * ROOT * flat.thickness)
-    between = (bent[inner] + bent[beyond]) / 2
+    along = np.where((number >= held) & (number < edge), flat.lengths, 2 * ROOT * flat.thickness)
+    between = (along[inner] + along[beyond]) / 2
     stiff = math.tau * rigidity * flat.nodes[beyond] / between
+    ring = math.tau * rigidity * flat.lengths / flat.middles
+    sine, cosine = np.sin(slope), np.cos(slope)
+    energy = ((stiff * kink**2).sum(-1) + (ring * sine**2).sum(-1)) / 2
+    if not slopes:
+        return Term(energy, NOTHING, NOTHING)
+    turn = np.stack([-dz, dr, dz, -dr], -1) / (dr**2 + dz**2)[..., None]
     change = np.zeros((*kink.shape, 6))
     change[..., 2:] += turn[:, beyond]
     change[..., :4] -= turn[:, inner]
-    ring = math.tau * rigidity * flat.lengths / flat.middles
-    sine, cosine = np.sin(slope), np.cos(slope)
     count = r.shape[1]
     total = Term(
-        ((stiff * kink**2).sum(-1) + (ring * sine**2).sum(-1)) / 2,
+        energy,
         np.zeros((len(r), 2 * count)),
         np.zeros((len(r), 2 * count, 2 * count)),
     )
@@ -166,7 +177,7 @@ def add(total: Term, gradient: Array, hessian: Array) -> None:
         total.hessian[:, at, at] += hessian[:, number]
 
 
-def air(flat: Flat, edge: int, r: Array, z: Array) -> Term:
+def air(flat: Flat, edge: int, r: Array, z: Array, slopes: bool = True) -> Term:
     """Air (ul) between the inner face of a film and the plane of its edge, by element.
 
     The film's middle starts half a thickness above that plane, and its inner face is smaller: what
@@ -175,6 +186,12 @@ def air(flat: Flat, edge: int, r: Array, z: Array) -> Term:
     r1, r2, drop = r[:, :-1], r[:, 1:], z[:, :-1] - z[:, 1:]
     dr, mean = r2 - r1, (r1 + r2) / 2
     area = math.pi / 3 * (r1 * r1 + r1 * r2 + r2 * r2)
+    half = np.where(np.arange(drop.shape[1]) < edge, math.pi * flat.thickness, 0.0)
+    length = np.sqrt(dr**2 + drop**2)
+    volume = (area * drop - half * mean * length).sum(-1)
+    volume = volume + math.pi / 2 * flat.thickness * r[:, edge] ** 2
+    if not slopes:
+        return Term(volume, NOTHING, NOTHING)
     a, b = math.pi / 3 * (2 * r1 + r2), math.pi / 3 * (2 * r2 + r1)
     gradient = np.stack([a * drop, area, b * drop, -area], -1)
     hessian = np.zeros((*drop.shape, 4, 4))
@@ -182,11 +199,9 @@ def air(flat: Flat, edge: int, r: Array, z: Array) -> Term:
     hessian[..., 0, 2] = hessian[..., 2, 0] = math.pi / 3 * drop
     for i, j, value in ((0, 1, a), (0, 3, -a), (2, 1, b), (2, 3, -b)):
         hessian[..., i, j] = hessian[..., j, i] = value
-    length = np.sqrt(dr**2 + drop**2)
     along = np.stack([-dr, drop, dr, -drop], -1) / length[..., None]
     across = np.stack([-drop, -dr, drop, dr], -1) / length[..., None]
     halves = np.broadcast_to(np.array([0.5, 0.0, 0.5, 0.0]), along.shape)
-    half = np.where(np.arange(drop.shape[1]) < edge, math.pi * flat.thickness, 0.0)
     both = outer(along, halves)
     gradient -= half[:, None] * (mean[..., None] * along + length[..., None] * halves)
     hessian -= half[:, None, None] * (
@@ -194,5 +209,4 @@ def air(flat: Flat, edge: int, r: Array, z: Array) -> Term:
     )
     gradient[:, edge - 1, 2] += math.pi * flat.thickness * r[:, edge]
     hessian[:, edge - 1, 2, 2] += math.pi * flat.thickness
-    volume = (area * drop - half * mean * length).sum(-1)
-    return Term(volume + math.pi / 2 * flat.thickness * r[:, edge] ** 2, gradient, hessian)
+    return Term(volume, gradient, hessian)

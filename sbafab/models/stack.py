@@ -15,7 +15,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,7 +29,10 @@ if TYPE_CHECKING:
 
     from sbafab.design.records import Design
     from sbafab.laminate.laminate import Laminate
+    from sbafab.models.figures import Factors
     from sbafab.models.film_elements import Array
+    from sbafab.models.motion import Motion
+    from sbafab.models.pneumatics import Line
 
 RING = 6
 """Points of each balloon at which its gap is looked at."""
@@ -182,6 +185,23 @@ class Stack:
         found, push, stable = held(springs, self.levels, self.pitch, load, start)
         return self._pose(pressures, springs, found, push / 1000, stable)
 
+    def motion(
+        self, pressures: Sequence[float] | None = None, line: Line | None = None, **load: Any
+    ) -> Motion:
+        """A motion that starts at pressures (kPa, by default 0); ``line`` feeds each chamber, and
+        ``load`` is what ``pose`` takes beside pressures.
+        """
+        from sbafab.models.motion import Motion
+        from sbafab.models.pneumatics import Line
+
+        start = self.pose(pressures or (0.0,) * self.chambers, **load)
+        return Motion(self, line or Line(), load, start)
+
+    @cached_property
+    def most_pressure(self) -> float:
+        """kPa to which its maps go."""
+        return min(one.most_pressure for one in self.maps)
+
     @cached_property
     def _first(self) -> NDArray[np.int_]:
         """The first level with each of the unlike balloons."""
@@ -224,9 +244,7 @@ class Stack:
         stable: bool = True,
     ) -> Pose:
         kinds = springs.of(self.levels)
-        gaps = (
-            found @ np.concatenate([np.ones((self.chambers, 1)), self.axes[:, ::-1] * [1, -1]], 1).T
-        )
+        gaps = found @ np.concatenate([np.ones((self.chambers, 1)), self.axes[:, ::-1] * [1, -1]], 1).T
         highest = (gaps - kinds.top[:, None]).max()
         if highest > 0:
             raise DesignError(
@@ -248,18 +266,22 @@ class Stack:
 
 
 def stack(
-    design: Design, laminate: Laminate | None = None, most_pressure: float = MOST_PRESSURE
+    design: Design,
+    laminate: Laminate | None = None,
+    most_pressure: float = MOST_PRESSURE,
+    factors: Factors | None = None,
 ) -> Stack:
     """The stack of a design with round pockets on one axis or side by side.
 
-    ``most_pressure`` in kPa is what maps are made to. Raises DesignError for pockets of another
+    ``most_pressure`` in kPa is what maps are made to. ``factors`` are measured ones. Raises DesignError for pockets of another
     shape, for actuators round a tube and for films of unknown modulus.
     """
     from sbafab.actuators import build
     from sbafab.models.balloons import balloons_of
 
     flat = laminate or build(design)
-    row = balloons_of(design, flat)
+    row = balloons_of(design, flat, factors)
+    press = 1.0 if factors is None else factors.press_factor
     kinds = list(dict.fromkeys(row))
     axes = np.array([chamber.centres[0] for chamber in flat.chambers])
     if len(axes) == 1:
@@ -273,7 +295,7 @@ def stack(
         tuple(balloon_map(kind, most_pressure) for kind in kinds),
         np.array([kinds.index(one) for one in row]),
         axes,
-        flat.thickness / len(row),
+        flat.thickness * press / len(row),
         reach,
         grams * GRAVITY / len(row),
     )
