@@ -11,13 +11,14 @@ from sbafab.actuators.pockets import (
     RoundChamber,
     bonded,
     check_neck,
+    free_diameter,
     pocket_shapes,
     round_pockets,
     tab_and_strip,
 )
 from sbafab.actuators.stacking import BalloonShape, BalloonStack, balloon_cuts, channel_pin, layers
 from sbafab.actuators.tails import tails
-from sbafab.design.form import Form, degrees_of_freedom
+from sbafab.design.form import Form, Free, degrees_of_freedom
 from sbafab.design.records import Design
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import unit
@@ -39,6 +40,10 @@ class OneDofDesign(Design):
     @property
     def form(self) -> Form:
         return Form(degrees_of_freedom(1), 1, round_pockets(self, self.chamber))
+
+    @property
+    def free(self) -> tuple[Free, ...]:
+        return (*free_diameter(self.chamber), *super().free)
 
     def fitted(self) -> Self:
         return fitted(self, self.fits, build)

@@ -12,6 +12,7 @@ from sbafab import __version__
 from sbafab.cli.check import check
 from sbafab.cli.cut import cut
 from sbafab.cli.ending import BAD_INPUT, ended_plainly, prepared_streams, say
+from sbafab.cli.find import find
 from sbafab.cli.generate import generate
 from sbafab.cli.kerf import kerf
 from sbafab.cli.mesh import mesh
@@ -39,6 +40,7 @@ COMMANDS = (
     predict,
     simulate,
     sweep,
+    find,
     record,
     schema,
 )

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, PrivateAttr
 
 from sbafab.design.films import UNCALIBRATED, Films, KerfWidth, LayerFilms, Sheet
-from sbafab.design.form import Form
+from sbafab.design.form import Form, Free
 from sbafab.design.section import Section
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres
 from sbafab.notebook import table_html
@@ -350,6 +350,16 @@ class Design(Section):
     @abstractmethod
     def form(self) -> Form:
         """What the actuator is like, for models, checks and pages. Raises DesignError."""
+
+    @property
+    def free(self) -> tuple[Free, ...]:
+        """The keys that a search may change unless it is told otherwise; a family adds its own."""
+        most, bond, reach = self.rules.validated_balloons, self.rules.bond_width, self.mask.overhang
+        return (
+            Free("stack.balloons", 2, most, 1),
+            Free("bond.width", bond, bond + 0.5, 0.05, asked="yield"),
+            Free("mask.overhang", reach, reach + 0.5, 0.05, asked="yield"),
+        )
 
     def with_(self, *changes: str | Mapping[str, Any], **tables: Any) -> Self:
         """The same design with keys changed, checked like a design file.

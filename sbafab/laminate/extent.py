@@ -30,6 +30,14 @@ def beyond_the_outline(laminate: Laminate) -> str:
     return f"{tabs} and the ears" if laminate.registration == "ears" else tabs
 
 
+def film_mass(laminate: Laminate) -> float:
+    """Mass in g of all films, tabs and ears included; without tubing, glue and fluid."""
+    return sum(
+        layer.profile.area * layer.film.thickness * layer.film.density * 1e-6
+        for layer in laminate.layers
+    )
+
+
 def _round_axis(regions: Iterable[Region]) -> float:
     return 2 * max(
         (edge.farthest_from((0.0, 0.0)) for region in regions for edge in region.edges), default=0.0
