@@ -12,7 +12,7 @@ RING = 1.0
 
 
 def place_said(laminate: Laminate, where: Place) -> str:
-    """For example "at the lumen" or "at the inlet tab of chamber2"; empty where nothing is known."""
+    """For example "at the lumen", "at the inlet tab of chamber2"; empty where nothing is known."""
     if where.x is None or where.y is None:
         return ""
     x, y = where.x, where.y
