@@ -37,7 +37,7 @@ class Motion:
 
     @property
     def pressures(self) -> tuple[float, ...]:
-        """kPa in the chambers."""
+        """KPa in the chambers."""
         return self.pose.pressures
 
     def step(
@@ -55,9 +55,7 @@ class Motion:
             raise DesignError("a step takes either pressures or flows, one a chamber")
         given = np.asarray(pressures if flows is None else flows, dtype=float)
         if given.shape != (self.stack.chambers,) or not np.isfinite(given).all():
-            raise DesignError(
-                f"a step takes {self.stack.chambers} finite numbers, one a chamber"
-            )
+            raise DesignError(f"a step takes {self.stack.chambers} finite numbers, one a chamber")
         before = self._contents(self.pose)
         acts = max(0.0, min(dt, self.time + dt - self.line.delay))
         if flows is None:

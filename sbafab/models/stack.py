@@ -199,7 +199,7 @@ class Stack:
 
     @cached_property
     def most_pressure(self) -> float:
-        """kPa to which its maps go."""
+        """KPa to which its maps go."""
         return min(one.most_pressure for one in self.maps)
 
     @cached_property
@@ -244,7 +244,9 @@ class Stack:
         stable: bool = True,
     ) -> Pose:
         kinds = springs.of(self.levels)
-        gaps = found @ np.concatenate([np.ones((self.chambers, 1)), self.axes[:, ::-1] * [1, -1]], 1).T
+        gaps = (
+            found @ np.concatenate([np.ones((self.chambers, 1)), self.axes[:, ::-1] * [1, -1]], 1).T
+        )
         highest = (gaps - kinds.top[:, None]).max()
         if highest > 0:
             raise DesignError(
