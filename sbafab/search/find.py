@@ -7,12 +7,14 @@ none helps; rules are asked of what would become the best. With Optuna in place 
 from __future__ import annotations
 
 import itertools
+import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from sbafab.design.form import Free
 from sbafab.design.records import Design
+from sbafab.design.writing import keys_of
 from sbafab.errors import DesignError
 from sbafab.progress import Progress, unheard
 from sbafab.search.pareto import front
@@ -32,7 +34,8 @@ TIGHT = ("bond-width", "mask-overhang", "tube-fit", "film-limits", "press-fit", 
 """Rules whose margins a design can be changed to widen."""
 LITTLE = 0.005
 """Share of a limit that is nothing to spare."""
-STARTS = 2
+STARTS = 4
+SEED = 20_240
 """Designs of the grid from which to go on."""
 
 
@@ -155,6 +158,16 @@ class Search:
             found[free.key] = int(value) if is_whole else value
         return found
 
+    def nearest(self) -> Place:
+        """Where the design itself stands, or as near as the free keys come to it."""
+        keys = {key: value for key, value, _ in keys_of(self.request.design)}
+        found = []
+        for free, count in zip(self.free, self.counts, strict=True):
+            own: Any = keys.get(free.key)
+            at = own if isinstance(own, int | float) else (free.low + free.high) / 2
+            found.append(min(max(round((at - free.low) / free.step), 0), count))
+        return tuple(found)
+
     def trial(self, place: Place) -> Trial:
         """What is found there; a design that would be the best so far is asked for its rules."""
         if place not in self.trials:
@@ -214,19 +227,47 @@ def _grid(search: Search) -> None:
 
 
 def _steps(search: Search) -> None:
-    """From the best of the grid by coarse steps, then from the best of all by the finest.
+    """From some starts by coarse steps, then from the best of all by the finest.
 
-    The finest go on past the number of tries: what is found has no better neighbour.
+    While nothing holds it starts anew from random places, as long as there are tries. The finest
+    steps go on past these: what is found has no better neighbour.
     """
-    order = sorted(search.trials, key=lambda place: search.trials[place].rank)
-    for start in order[:STARTS]:
-        place, share = start, 4
-        while share <= max(search.counts) and not search.is_over:
-            place = _walked(search, place, [max(1, count // share) for count in search.counts])
-            share *= 2
+    dice = random.Random(SEED)
+    starts = _starts(search)
+    while not search.is_over:
+        if starts:
+            start = starts.pop(0)
+        elif search.best()[1].holds:
+            break
+        else:
+            start = tuple(dice.randint(0, count) for count in search.counts)
+        _descended(search, start)
     last, _ = search.best()
-    most = len(search.trials) + FINEST
-    _walked(search, last, [1] * len(search.free), most)
+    _walked(search, last, [1] * len(search.free), len(search.trials) + FINEST)
+
+
+def _starts(search: Search) -> list[Place]:
+    """Where the design itself stands, and the best of the grid that are far from each other."""
+    found = [search.nearest()]
+    for place in sorted(search.trials, key=lambda place: search.trials[place].rank):
+        is_far = all(
+            any(
+                abs(a - b) * 3 > count
+                for a, b, count in zip(place, other, search.counts, strict=True)
+            )
+            for other in found
+        )
+        if is_far and len(found) < STARTS:
+            found.append(place)
+    return found
+
+
+def _descended(search: Search, start: Place) -> None:
+    """Walks with steps that are halved where none is better."""
+    place, share = start, 4
+    while share <= 2 * max(search.counts) and not search.is_over:
+        place = _walked(search, place, [max(1, count // share) for count in search.counts])
+        share *= 2
 
 
 def _walked(search: Search, place: Place, stride: Sequence[int], most: int = 0) -> Place:
