@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from sbafab.results.records import Record
     from sbafab.results.report import Report
     from sbafab.rules.finding import Findings
+    from sbafab.search.find import Found
     from sbafab.search.sweep import Sweep
     from sbafab.simulators.simulator import Name
 
@@ -279,6 +280,31 @@ def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **tabl
     from sbafab.models.stack import stack as stack_of
 
     return stack_of(load(source, *changes, **tables), most_pressure=most_pressure)
+
+
+def find(
+    source: Source,
+    *changes: Change,
+    least: Mapping[str, float] | None = None,
+    most: Mapping[str, float] | None = None,
+    best: str = "mass",
+    **asked: Any,
+) -> Found:
+    """The design that meets requirements and is best in one thing, or the nearest miss.
+
+    ``find("3dof-15mm", least={"lumen": 3, "force@12.5mm@50kPa": 3}, most={"outline_diameter":
+    20})``; quantities in mm, N, g and kPa. ``asked`` holds fields of ``search.find.FindRequest``,
+    such as ``tries``, beside tables of the design; ``found.best.values`` are the found keys.
+    """
+    from sbafab.search.find import FindRequest
+    from sbafab.search.find import find as run_find
+    from sbafab.search.requirements import read_all
+
+    settings, tables = _parted(asked, FindRequest)
+    at_least = [f"{name}={value!r}" for name, value in (least or {}).items()]
+    at_most = [f"{name}={value!r}" for name, value in (most or {}).items()]
+    requirements, goal = read_all(at_least, at_most, best)
+    return run_find(FindRequest(load(source, *changes, **tables), requirements, goal, **settings))
 
 
 def sweep(

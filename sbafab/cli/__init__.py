@@ -14,6 +14,7 @@ from sbafab.cli.check import check
 from sbafab.cli.cut import cut
 from sbafab.cli.ending import BAD_INPUT, ended_plainly, prepared_streams, say
 from sbafab.cli.explain import explain
+from sbafab.cli.find import find
 from sbafab.cli.generate import generate
 from sbafab.cli.kerf import kerf
 from sbafab.cli.map import map_
@@ -46,6 +47,7 @@ COMMANDS = (
     map_,
     simulate,
     sweep,
+    find,
     record,
     reproduce,
     studio,
