@@ -265,9 +265,7 @@ def predict(
     return model_predict(load(source, *changes, **tables), asked)
 
 
-def stack(
-    source: Source, *changes: Change, most_pressure: float = 110.0, **tables: Any
-) -> Stack:
+def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **tables: Any) -> Stack:
     """The actuator as plates joined by balloons, for poses in real time: ``stack.pose((5, 5, 0))``.
 
     ``most_pressure`` kPa is the most that it may be asked for. Raises DesignError for pockets that

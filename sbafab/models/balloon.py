@@ -269,9 +269,7 @@ def _settled(balloon: Balloon, load: _Load, r: Array, z: Array) -> tuple[Array, 
         share = _downhill(balloon, part, at, ahead, term.energy, slope)
         r[live] += share[:, None] * ahead[:, ::2]
         z[live] += share[:, None] * ahead[:, 1::2]
-        damped = np.where(
-            share > 0, damping[live] / 10, np.clip(10 * damping[live], 1e-3, 1e9)
-        )
+        damped = np.where(share > 0, damping[live] / 10, np.clip(10 * damping[live], 1e-3, 1e9))
         damping[live] = np.where(damped < 1e-6, 0.0, damped)
         live = live[~still]
     raise DesignError(

@@ -113,12 +113,12 @@ class BalloonMap:
         return x, each / np.hypot(p, P0)
 
     def force(self, pressure: ArrayLike, height: ArrayLike) -> Array:
-        """mN on the plate at either end; below 0 where the balloon is pulled on."""
+        """MN on the plate at either end; below 0 where the balloon is pulled on."""
         p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
         return -along(self.pressed(p)[0], h * self.spans).first * self.spans
 
     def volume(self, pressure: ArrayLike, height: ArrayLike) -> Array:
-        """ul in the balloon."""
+        """Ul in the balloon."""
         p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
         return along(self.pressed(p)[1], h * self.spans).value
 
@@ -128,7 +128,7 @@ class BalloonMap:
         return along(self.pressed(p)[0], h * self.spans).value
 
     def free_height(self, pressure: ArrayLike) -> Array:
-        """mm to which it rises where nothing holds it."""
+        """Mm to which it rises where nothing holds it."""
         p = np.asarray(pressure, float)
         low, high = np.zeros(p.shape), np.full(p.shape, self.most_height)
         for _ in range(50):

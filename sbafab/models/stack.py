@@ -224,7 +224,9 @@ class Stack:
         stable: bool = True,
     ) -> Pose:
         kinds = springs.of(self.levels)
-        gaps = found @ np.concatenate([np.ones((self.chambers, 1)), self.axes[:, ::-1] * [1, -1]], 1).T
+        gaps = (
+            found @ np.concatenate([np.ones((self.chambers, 1)), self.axes[:, ::-1] * [1, -1]], 1).T
+        )
         highest = (gaps - kinds.top[:, None]).max()
         if highest > 0:
             raise DesignError(

@@ -191,6 +191,8 @@ export class Form {
     const found = answer?.field && this.rows.get(answer.field);
     if (!found) return;
     const { row, control } = found;
+    const written = valueIn(this.studio.text, answer.field);
+    if (written !== null && control.tagName === "INPUT" && document.activeElement !== control) control.value = written;
     const id = control.id + "-why";
     row.classList.add("bad");
     row.append(el("div", { class: "why", id, role: "alert" }, answer.message));
@@ -249,5 +251,16 @@ export function keysIn(text) {
     if (key) found.add((table + key[1]).replace(/["'\s]/g, ""));
   }
   return found;
+}
+// The value that a text gives a key, as it is written there.
+function valueIn(text, key) {
+  let table = "";
+  for (const line of text.split("\n")) {
+    const head = /^\s*\[+\s*([^\]#]+?)\s*\]+/.exec(line);
+    if (head) { table = head[1].trim() + "."; continue; }
+    const own = /^\s*([A-Za-z0-9_.-]+)\s*=\s*("[^"]*"|'[^']*'|\[[^\]]*\]|[^#\s]+)/.exec(line);
+    if (own && table + own[1] === key) return own[2].replace(/^["']|["']$/g, "");
+  }
+  return null;
 }
 export { at, pathOf };

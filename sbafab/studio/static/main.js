@@ -27,9 +27,11 @@ async function start() {
   }
   studio = new Studio(started);
   window.studio = studio;
+
   new Form(studio);
   new Editor(studio);
   views = { solid: new Solid(studio), layers: new Layers(studio), motion: new Motion(studio), make: new Make(studio), compare: new Compare(studio) };
+  studio.motion = views.motion;
   const section = new Section(studio);
   $("#lower-stage").append(section.element);
   new Findings(studio, (finding) => goto(finding, section));
@@ -119,6 +121,8 @@ function show(name) {
     tab.tabIndex = own === name ? 0 : -1;
     if (own !== name) view.hide?.();
   }
+  // What needs the room takes the section's as well.
+  $("#views").classList.toggle("whole", ["motion", "make", "compare"].includes(name));
   views[name].show?.();
   if (name !== "compare") remember("sbafab-view", name);
 }
