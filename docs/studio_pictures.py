@@ -44,7 +44,9 @@ def _gallery(seen: Watched, folder: Path) -> None:
     for name in api.templates():
         if 'family = "assembly"' in api.template(name):
             run = api.generate(name, out=folder / "out")
-            _thumb(Image.open(next((run.folder / "preview").glob("*.png"))), name)
+            picture = Image.open(next((run.folder / "preview").glob("*.png")))
+            # Without the legend below.
+            _thumb(picture.crop((0, 0, picture.width, int(0.82 * picture.height))), name)
             continue
         seen.page.evaluate("text => studio.open(text)", api.template(name))
         seen.until(f"studio.laminate?.name === '{name}'")
@@ -108,7 +110,9 @@ def _phone(seen: Watched) -> None:
 
 def _keep(seen: Watched, name: str) -> None:
     image = Image.open(io.BytesIO(seen.page.screenshot()))
-    image.quantize(128).save(IMAGES / f"studio-{name}.png", optimize=True)
+    image.quantize(256, Image.Quantize.FASTOCTREE).save(
+        IMAGES / f"studio-{name}.png", optimize=True
+    )
 
 
 if __name__ == "__main__":

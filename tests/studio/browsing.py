@@ -28,7 +28,7 @@ FLAGS = (
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 )
-PATIENCE = 90.0
+PATIENCE = 60.0
 """Seconds: other work may share the machine."""
 
 
@@ -94,7 +94,9 @@ class Watched:
 
     def _console(self, message: Any) -> None:
         # Reading pixels back makes the driver of the software's graphics grumble.
-        if message.type == "error" or (message.type == "warning" and "GL Driver" not in message.text):
+        if message.type == "error" or (
+            message.type == "warning" and "GL Driver" not in message.text
+        ):
             self.complaints.append(message.text)
 
     def until(self, condition: str, seconds: float = PATIENCE) -> Any:

@@ -63,9 +63,11 @@ export class Form {
   // Another family keeps what both know.
   become(name) {
     if (name === this.family) return;
-    const known = new Set(this.studio.families[name].map((field) => field.key));
-    const drop = this.studio.families[this.family].map((field) => field.key).filter((key) => !known.has(key) && this.own(key));
-    this.studio.edit([["family", `"${name}"`], ...drop.map((key) => [key, null])]);
+    const known = this.studio.families[name].map((field) => field.key);
+    const other = [...this.present].filter((key) => key !== "family" && !known.includes(key));
+    // A table that the other family lacks goes whole.
+    const drop = new Set(other.map((key) => { const table = key.split(".")[0]; return known.some((own) => own.startsWith(`${table}.`)) ? key : table; }));
+    this.studio.edit([["family", `"${name}"`], ...[...drop].map((key) => [key, null])]);
   }
 
   row(field) {

@@ -17,6 +17,7 @@ export class Motion {
     this.frames = [];
     this.times = [];
     this.trace = [];
+    this.costs = [];
     this.build();
     try { this.stage = new Stage3D(this.surface, { up: 10 }); } catch {
       this.surface.append(el("p", { class: "fallback" }, "This view takes WebGL, which the browser does not offer here. The figures beside it are the same."));
@@ -121,9 +122,12 @@ export class Motion {
     this.trace.push([performance.now() / 1000, pose.height, pose.bend, pose.volumes.reduce((sum, one) => sum + one, 0)]);
     while (this.trace.length > 2 && this.trace.at(-1)[0] - this.trace[0][0] > 8) this.trace.shift();
     if (this.times.length > 240) this.times.shift();
+    const before = performance.now();
     if (this.stage) this.draw();
     this.read();
     this.plots();
+    this.costs.push(performance.now() - before);
+    if (this.costs.length > 240) this.costs.shift();
   }
   read() {
     const { pose, stack } = this;
@@ -220,7 +224,10 @@ export class Motion {
       const a = pose.origins[level], b = pose.origins[level + 1], u = pose.axes[level], v = pose.axes[level + 1];
       const x = new THREE.Vector3(u[0] + v[0], u[3] + v[3], u[6] + v[6]).normalize(), z = new THREE.Vector3(u[2] + v[2], u[5] + v[5], u[8] + v[8]).normalize();
       const y = new THREE.Vector3().crossVectors(z, x).normalize();
-      m.makeBasis(x, y, z).setPosition((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2);
+      // The rims draw the bonded films in as the balloons rise.
+      const { pocket, neck } = stack.balloons[stack.levels[level]], rise = Math.max(...pose.gaps[level]) + stack.pitch;
+      const k = 1 - (pocket - meridian(rise, pocket - neck, neck)[RINGS][0]) / stack.outline;
+      m.makeBasis(x.multiplyScalar(k), y.multiplyScalar(k), z).setPosition((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2);
       this.web.setMatrixAt(level, m);
     });
     this.web.instanceMatrix.needsUpdate = true;
