@@ -36,7 +36,10 @@ if TYPE_CHECKING:
     from sbafab.output.simulating import Simulated
     from sbafab.progress import Progress
     from sbafab.reports.features import Dimension
+    from sbafab.results.records import Record
+    from sbafab.results.report import Report
     from sbafab.rules.finding import Findings
+    from sbafab.search.sweep import Sweep
     from sbafab.simulators.simulator import Name
 
 Source = Design | str | Path
@@ -251,6 +254,8 @@ def predict(
     volumes_ul: Sequence[float] = (),
     press_factor: float = 1.0,
     contact_factor: float = 1.0,
+    pocket_loss: float = 0.0,
+    modulus_mpa: float | None = None,
     **tables: Any,
 ) -> Prediction:
     """What a design will do, by closed formulas; each figure names its model and its trust.
@@ -260,7 +265,7 @@ def predict(
     from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict as model_predict
 
-    factors = Factors(press_factor, contact_factor)
+    factors = Factors(press_factor, contact_factor, pocket_loss, modulus_mpa)
     asked = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), factors)
     return model_predict(load(source, *changes, **tables), asked)
 
@@ -276,12 +281,67 @@ def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **tabl
     return stack_of(load(source, *changes, **tables), most_pressure=most_pressure)
 
 
+def sweep(
+    source: Source,
+    *changes: Change,
+    vary: Sequence[str],
+    out: str | Path = "out",
+    **asked: Any,
+) -> Sweep:
+    """Checks and predicts a design with keys varied into ``out/<name>-sweep/``; a row a design.
+
+    ``vary`` holds texts such as ``"chamber.diameter=4:8:0.5"`` and ``"stack.balloons=3,6,9"``.
+    ``asked`` holds fields of ``search.sweep.SweepRequest``, such as ``samples``, ``pressures_kpa``,
+    ``workers`` and ``dask``, beside tables of the design.
+    """
+    from sbafab.search.sweep import SweepRequest
+    from sbafab.search.sweep import sweep as run_sweep
+    from sbafab.search.vary import read_varied
+
+    settings, tables = _parted(asked, SweepRequest)
+    design = load(source, *changes, **tables)
+    varied = tuple(read_varied(text) for text in vary)
+    return run_sweep(SweepRequest(design, varied, **settings), Path(out))
+
+
 def kerf(measurements: str | Path, resolution: float = 0.01) -> Calibration:
     """The kerf from a filled ``coupon.csv``; ``resolution`` mm is the least step measured."""
     from sbafab.cutting.calibration import calibrated
     from sbafab.cutting.measured_table import read_measurements
 
     return calibrated(read_measurements(Path(measurements)), resolution)
+
+
+def record(
+    source: Source,
+    *changes: Change,
+    lab: str | Path = "lab.sqlite",
+    table: str | Path | None = None,
+    **said: Any,
+) -> list[Record]:
+    """Records what came out of a design or an assembly in the lab's file; the records added.
+
+    ``said`` holds ``serial``, ``leak`` ("pass" or "fail"), ``operator``, ``kit``, ``note``, and
+    what was measured: ``burst_kpa``, ``stroke_mm``, ``force_n``, ``height_mm``, ``mass_g``, one
+    or several of ``offset_mm``, ``turn_deg``, ``cut_mm``; beside tables of the design. A
+    ``table`` (CSV) says it of a batch instead. Raises DesignError, OutputError.
+    """
+    from sbafab.results import recording
+    from sbafab.results.store import Lab
+
+    told = {name: value for name, value in said.items() if name in recording.SAID}
+    tables = {name: value for name, value in said.items() if name not in recording.SAID}
+    results = recording.results_of(told, table)
+    built = recording.built_from(source, [*changes, tables] if tables else changes)
+    return recording.record(Lab(Path(lab)), built, results)
+
+
+def report(lab: str | Path = "lab.sqlite") -> Report:
+    """What all records of a lab's file say together: success, figures, tolerances."""
+    from sbafab.results.report import report as report_of
+    from sbafab.results.store import Lab
+
+    return report_of(*Lab(Path(lab)).contents())
 
 
 def solid(source: Source | Laminate, *changes: Change, **tables: Any) -> Surface:

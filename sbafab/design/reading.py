@@ -6,6 +6,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
@@ -63,9 +64,18 @@ def design_path(source: str | Path) -> Path:
         is_folder = False
     if is_folder:
         raise DesignError(f"{shown(source)} is a folder; give a design file (.toml) or a template")
-    near = difflib.get_close_matches(str(source), names, 1)
-    hint = f"did you mean {near[0]}?" if near else f"the templates are {', '.join(names)}"
-    raise DesignError(f"{shown(source)} is neither a template nor a design file; {hint}")
+    raise DesignError(f"{shown(source)} is neither a template nor a design file; {_hint(path)}")
+
+
+def _hint(missing: Path) -> str:
+    """What may have been meant by a design that is not there."""
+    with suppress(OSError, ValueError):
+        beside = missing.with_name(f"{missing.name}.toml")
+        if beside.is_file():
+            return f"did you mean {beside}?"
+    names = template_names()
+    near = difflib.get_close_matches(str(missing), names, 1)
+    return f"did you mean {near[0]}?" if near else f"the templates are {', '.join(names)}"
 
 
 def template_text(name: str) -> str:
