@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from sbafab.laminate.laminate import Laminate, Layer
     from sbafab.meshing.surface import Surface
     from sbafab.models.figures import Prediction
+    from sbafab.models.motion import Motion
     from sbafab.models.stack import Stack
     from sbafab.output.run import Run
     from sbafab.output.simulating import Simulated
@@ -279,6 +280,16 @@ def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **tabl
     from sbafab.models.stack import stack as stack_of
 
     return stack_of(load(source, *changes, **tables), most_pressure=most_pressure)
+
+
+def motion(stack: Stack, length: float = 150.0, diameter: float = 0.635, **load: Any) -> Motion:
+    """A stack that is fed with air through tubes, to call ``motion.step(dt, pressures=...)``.
+
+    ``length`` and inner ``diameter`` of each chamber's tube are mm; ``load`` is what ``stack.pose`` takes beside pressures. Raises DesignError.
+    """
+    from sbafab.models.pneumatics import AIR, Line
+
+    return stack.motion(line=Line(AIR, length, diameter), **load)
 
 
 def sweep(

@@ -16,7 +16,7 @@ from sbafab.errors import DesignError
 from sbafab.studio import places
 from sbafab.studio.editing import MOST_EDITS, edited
 from sbafab.studio.model import Beat, finding_model, laminate_model
-from sbafab.studio.moving import poses, stack_model
+from sbafab.studio.moving import Filling, poses, stack_model
 
 if TYPE_CHECKING:
     from sbafab.design.records import Design
@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 
 Job = dict[str, Any]
 Answer = dict[str, Any]
-LAST_RULE = "registration-yield"
+_FILLINGS: dict[str, Filling] = {}
+MOST_FILLINGS = 8
+"""Tabs whose actuators fill at the same time."""
 
 
 def live(job: Job, beat: Beat) -> Iterator[Answer]:
@@ -103,6 +105,12 @@ def motion(job: Job, beat: Beat) -> Iterator[Answer]:
     beat()
     if "pressures" not in asked:
         yield stack_model(design.name, stack)
+        return
+    if asked.get("tube"):
+        filling = _FILLINGS.setdefault(job["tab"], Filling())
+        while len(_FILLINGS) > MOST_FILLINGS:
+            del _FILLINGS[next(iter(_FILLINGS))]
+        yield filling.step(stack, asked)
         return
     for pose in poses(stack, asked):
         yield pose

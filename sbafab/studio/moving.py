@@ -6,13 +6,17 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
+from sbafab import api
 from sbafab.errors import DesignError
 
 if TYPE_CHECKING:
+    from sbafab.models.motion import Motion
     from sbafab.models.stack import Pose, Stack
 
 CURVE = 25
 """Points of the curves beside the view."""
+LONGEST_STEP = 0.2
+"""Seconds that one step of a motion spans at most."""
 MOST_LOAD = 0.5
 """N that a hand may put on the tip."""
 
@@ -46,14 +50,7 @@ def poses(stack: Stack, asked: dict[str, Any]) -> Iterator[dict[str, Any]]:
     Raises DesignError for what is out of the model's range.
     """
     pressures = _asked(asked.get("pressures"), stack.chambers, "pressures")
-    load = _asked(asked.get("load") or [0, 0, 0], 3, "load")
-    size = math.hypot(*load)
-    if size > MOST_LOAD:
-        load = [part * MOST_LOAD / size for part in load]
-    plate = asked.get("plate")
-    height = float(plate) if isinstance(plate, int | float) else None
-    pose = stack.pose(pressures, tip_load=load, gravity=bool(asked.get("gravity")), plate=height)
-    yield _pose_model(pose)
+    yield _pose_model(stack.pose(pressures, **_loads(asked)))
     if not asked.get("curves"):
         return
     most = max(pressures) or 1.0
@@ -68,6 +65,43 @@ def poses(stack: Stack, asked: dict[str, Any]) -> Iterator[dict[str, Any]]:
     names = ("pressure", "height", "bend", "volume")
     columns = zip(*rows, strict=True)
     yield {"kind": "curves", **{name: _numbers(c) for name, c in zip(names, columns, strict=False)}}
+
+
+class Filling:
+    """A motion through the tubes of one tab: the state from which its next step starts."""
+
+    def __init__(self) -> None:
+        self.known: tuple[object, ...] = ()
+        self.motion: Motion | None = None
+
+    def step(self, stack: Stack, asked: dict[str, Any]) -> dict[str, Any]:
+        """The pose ``dt`` s on, with pressures in kPa at the valves. Raises DesignError.
+
+        It starts anew, vented, with another stack, tube or load, and where ``restart`` is asked.
+        """
+        tube = asked["tube"] if isinstance(asked.get("tube"), dict) else {}
+        pressures = _asked(asked.get("pressures"), stack.chambers, "pressures")
+        length, diameter, dt = _asked(
+            [tube.get("length"), tube.get("diameter"), tube.get("dt")], 3, "tube"
+        )
+        load = _loads(asked)
+        known = (id(stack), length, diameter, repr(load))
+        if self.motion is None or known != self.known or tube.get("restart"):
+            self.known = known
+            self.motion = api.motion(stack, length=length, diameter=diameter, **load)
+        pose = self.motion.step(min(max(dt, 1e-4), LONGEST_STEP), pressures=pressures)
+        return {**_pose_model(pose), "valves": pressures, "time": round(self.motion.time, 4)}
+
+
+def _loads(asked: dict[str, Any]) -> dict[str, Any]:
+    """What acts on the tip: a pull, weight, an outer plate."""
+    load = _asked(asked.get("load") or [0, 0, 0], 3, "load")
+    size = math.hypot(*load)
+    if size > MOST_LOAD:
+        load = [part * MOST_LOAD / size for part in load]
+    plate = asked.get("plate")
+    height = float(plate) if isinstance(plate, int | float) else None
+    return {"tip_load": load, "gravity": bool(asked.get("gravity")), "plate": height}
 
 
 def _pose_model(pose: Pose) -> dict[str, Any]:

@@ -34,16 +34,23 @@ export class Motion {
     this.knobs = el("div", { role: "group", "aria-label": "Pressures" });
     this.playing = el("button", { "aria-pressed": "false", onclick: () => (this.timer ? this.stop() : this.play()) }, "Play");
     const gravity = el("input", { type: "checkbox", onchange: (event) => { this.gravity = event.target.checked; this.want(); } });
-    const plate = el("input", { type: "checkbox", onchange: (event) => { this.plated = event.target.checked; this.plateHeight.disabled = !this.plated; this.want(); } });
+    const plate = el("input", { type: "checkbox", "aria-label": "Plate", onchange: (event) => { this.plated = event.target.checked; this.plateHeight.disabled = !this.plated; this.want(); } });
     this.plateHeight = el("input", { type: "range", min: 0, max: 40, step: 0.1, value: 12, disabled: true, "aria-label": "Height of the plate, mm", oninput: () => { this.plateOut.textContent = `${plain(Number(this.plateHeight.value), 1)} mm`; this.want(); } });
     this.plateOut = el("output", {}, "12 mm");
-    this.flow = el("input", { type: "text", inputmode: "decimal", value: "35", "aria-label": "Flow into each chamber, ml/min", style: null, oninput: () => this.read() });
+    const number = (label, value, changed) => el("input", { type: "text", inputmode: "decimal", value, "aria-label": label, oninput: changed });
+    this.flow = number("Flow into each chamber, ml/min", "35", () => this.read());
+    this.tubeLength = number("Length of the tube, mm", "150", () => this.fill(true));
+    this.tubeDiameter = number("Inner diameter of the tube, mm", "0.635", () => this.fill(true));
+    const tube = el("input", { type: "checkbox", onchange: (event) => { this.tubed = event.target.checked; this.fill(true); } });
+    this.tubeRows = el("div", {}, el("label", { class: "knob" }, el("span", {}, "Length"), this.tubeLength, el("output", {}, "mm")), el("label", { class: "knob" }, el("span", {}, "Inside"), this.tubeDiameter, el("output", {}, "mm")));
     this.values = el("dl", { class: "reading", "aria-live": "off" });
     this.trust = el("div", { class: "trust", role: "status" });
     this.plot = el("div");
     this.side.append(el("h3", {}, "Pressure, kPa"), this.knobs, el("div", { class: "group" }, this.playing, el("button", { onclick: () => this.set(() => 0) }, "Vent")),
       el("h3", {}, "Acting on it"), el("label", { class: "knob" }, el("span", {}, plate, " Plate"), this.plateHeight, this.plateOut), el("label", {}, gravity, " Gravity, base level"), el("p", { class: "trust" }, "Drag the top of the actuator to pull it aside."),
+      el("h3", {}, "Supply"), el("label", {}, tube, " Air through a tube, in real time"), this.tubeRows,
       el("h3", {}, "Reading"), this.values, el("label", { class: "knob" }, el("span", {}, "Flow"), this.flow, el("output", {}, "ml/min")), this.trust, this.plot);
+    this.tubeRows.hidden = true;
   }
   pressures() { return this.sliders?.map(({ input }) => Number(input.value)) ?? []; }
   set(of) { this.sliders.forEach(({ input, out }, i) => { input.value = of(i); out.textContent = `${plain(Number(input.value), 1)}`; }); this.want(); }
@@ -94,6 +101,7 @@ export class Motion {
   // The newest wish goes out as soon as the last one is answered.
   want() {
     this.wanted = true;
+    if (this.tubed) this.settled = false;
     clearTimeout(this.rest);
     this.rest = setTimeout(() => { this.curves = true; this.want(); }, 260);
     if (!this.asking) this.ask();
@@ -102,7 +110,11 @@ export class Motion {
     if (!this.stack) return;
     this.wanted = false;
     this.asking = true;
-    const pose = { pressures: this.pressures(), load: this.pull ?? [0, 0, 0], gravity: Boolean(this.gravity), plate: this.plated ? Number(this.plateHeight.value) : null, curves: this.curves };
+    const now = performance.now(), dt = Math.min(0.1, (now - (this.stepped ?? now)) / 1000) || 0.01;
+    this.stepped = now;
+    const tube = this.tubed ? { length: Number(this.tubeLength.value), diameter: Number(this.tubeDiameter.value), dt, restart: this.restart } : null;
+    this.restart = false;
+    const pose = { tube, pressures: this.pressures(), load: this.pull ?? [0, 0, 0], gravity: Boolean(this.gravity), plate: this.plated ? Number(this.plateHeight.value) : null, curves: this.curves };
     if (this.curves) clearTimeout(this.rest);
     this.curves = false;
     try {
@@ -114,10 +126,15 @@ export class Motion {
       });
     } catch (error) { this.say(error.message, true); }
     this.asking = false;
-    if (this.wanted) this.ask();
+    // Through a tube the chambers follow their valves until they are as full.
+    if (this.tubed && !this.settled && !this.element.hidden) this.wanted = true;
+    if (this.wanted) this.ask(); else this.stepped = null;
   }
+  fill(restart) { this.restart = restart; this.tubeRows.hidden = !this.tubed; this.stepped = null; this.want(); }
   take(pose) {
     this.pose = pose;
+    if (pose.valves) this.settled = pose.valves.every((p, i) => Math.abs(p - pose.pressures[i]) < 0.01 + 0.002 * p);
+    if (pose.valves?.join() !== this.valves) { this.valves = pose.valves?.join(); this.valvesAt = pose.time; }
     this.times.push(performance.now());
     this.trace.push([performance.now() / 1000, pose.height, pose.bend, pose.volumes.reduce((sum, one) => sum + one, 0)]);
     while (this.trace.length > 2 && this.trace.at(-1)[0] - this.trace[0][0] > 8) this.trace.shift();
@@ -135,15 +152,16 @@ export class Motion {
     const volume = pose.volumes.reduce((sum, one) => sum + one, 0), flow = Number(this.flow.value);
     const most = Math.max(...pose.volumes);
     const rows = [["Height", `${pose.height.toFixed(2)} mm`], ["Stroke", `${(pose.height - stack.flat_height).toFixed(2)} mm`], ["Bend", `${pose.bend.toFixed(1)}°`], ["Towards", pose.bend > 0.05 ? `${pose.direction.toFixed(0)}°` : "–"], ["Volume", `${volume.toFixed(1)} µl`], ["Force on plate", this.plated ? `${pose.force.toFixed(3)} N` : "–"], ["Fill time", flow > 0 ? `${((most / 1000 / flow) * 60).toFixed(2)} s` : "–"]];
+    if (pose.valves) rows.push(["In the chambers", `${pose.pressures.map((p) => p.toFixed(1)).join(" · ")} kPa`], ["Since the valves", `${(pose.time - this.valvesAt).toFixed(2)} s${this.settled ? ", filled" : ""}`]);
     if (this.pull) rows.push(["Pull", `${(1000 * Math.hypot(...this.pull)).toFixed(1)} mN`]);
     this.values.replaceChildren(...rows.flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)]));
     if (!pose.stable) this.say("Stands as a straight column that would rather buckle", true);
-    else this.say("Elastic films, still air, no calibration on a built actuator; fill time is the fullest chamber at this flow, without the tube's resistance. Walls are drawn as arcs of the film's length.", false);
+    else this.say("Elastic films, still air, no calibration on a built actuator; fill time is the fullest chamber at this flow, without the tube's resistance, which Supply has. Walls are drawn as arcs of the film's length.", false);
   }
 
   plots() {
     if (!this.pose) return;
-    if (this.timer) {
+    if (this.timer || this.tubed) {
       const t = this.trace.map((row) => row[0] - this.trace[0][0]), of = (i) => this.trace.map((row) => row[i]);
       this.plot.replaceChildren(el("h3", {}, "The last seconds"), ...[["Height, mm", 1], ["Bend, °", 2], ["Volume, µl", 3]].map(([words, i]) => chart(t, of(i), t.at(-1), of(i).at(-1), words, "s")));
       return;
