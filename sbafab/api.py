@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from sbafab.laminate.laminate import Laminate, Layer
     from sbafab.meshing.surface import Surface
     from sbafab.models.figures import Prediction
+    from sbafab.models.motion import Motion
     from sbafab.models.stack import Stack
     from sbafab.output.run import Run
     from sbafab.output.simulating import Simulated
@@ -305,6 +306,16 @@ def find(
     at_most = [f"{name}={value!r}" for name, value in (most or {}).items()]
     requirements, goal = read_all(at_least, at_most, best)
     return run_find(FindRequest(load(source, *changes, **tables), requirements, goal, **settings))
+
+
+def motion(stack: Stack, length: float = 150.0, diameter: float = 0.635, **load: Any) -> Motion:
+    """A stack that is fed with air through tubes, to call ``motion.step(dt, pressures=...)``.
+
+    ``length`` and inner ``diameter`` of each chamber's tube are mm; ``load`` is what ``stack.pose`` takes beside pressures. Raises DesignError.
+    """
+    from sbafab.models.pneumatics import AIR, Line
+
+    return stack.motion(line=Line(AIR, length, diameter), **load)
 
 
 def sweep(
