@@ -117,9 +117,10 @@ class Registration(Section):
     """By how much the holes of the ears are wider than their pins; up to three steps add it up."""
     pin_stretch: float = Field(default=0.3, ge=0, le=2)
     """The most by which a hole may be stretched over its pin, as a share of itself. Ours, untested:
-    a tenth of the 300 % that PTFE film must stand before it tears (ASTM D3308); TPE stands more."""
+    less than a tenth of the 400 % that cast PTFE film of 0.025 mm must stand before it tears (ASTM
+    D3369, Table 1); skived film stands less, TPE more."""
     pin_standard: Literal["ISO 8734", "ISO 2338"] = "ISO 8734"
-    """Whose diameters and lengths the dowel pins have; both are ground to m6."""
+    """Whose diameters and lengths the dowel pins have; order them ground to m6."""
     pin_lengths: tuple[Length, ...] = Field(default=(), max_length=30, strict=False)
     """Lengths of pins that you have, in place of the standard's."""
     cutting_error: Annotated[float, Millimetres(0, 1)] = 0.1
@@ -185,8 +186,8 @@ class Press(Section):
     pad_thickness: Length | None = None
     """Of the press pad; by default the thinnest sold that gives films 1.5 times the pressure."""
     pad_hardness: float = Field(default=10.0, ge=5, le=90)
-    """Shore A; 10 is a soft closed-cell silicone sponge, grade 4 of ASTM D1056 by Gent's formula;
-    sheets of solid silicone rubber have 40 to 70."""
+    """Shore A; 10 is a soft closed-cell silicone sponge, between grades 3 and 4 of ASTM D1056 class
+    D; sheets of solid silicone rubber have 40 to 70."""
     flash_bottom_minutes: float = Field(default=3.0, gt=0, le=600)
     """Step 1: the bottom balloon's upper two layers."""
     bond_bottom_minutes: float = Field(default=12.0, gt=0, le=600)
@@ -278,8 +279,8 @@ class Chamber(Section):
     """The pockets of one chamber; a family adds their sizes."""
 
     outline: str | None = Field(default=None, max_length=1000)
-    """DXF or SVG file with one closed path, drawn round (0, 0): the pocket, in place of the shape
-    that the family gives it."""
+    """DXF or SVG file with one closed path: the pocket, in place of the shape that the family gives
+    it. Drawn round (0, 0) it stays as it lies, else its centroid comes to the chamber's axis."""
 
 
 class Design(Section):

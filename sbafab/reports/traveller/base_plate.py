@@ -86,8 +86,9 @@ def build_up_notes(work: Work) -> tuple[str, ...]:
         "are estimates that no press has confirmed: check them once, cold, with "
         "pressure-indicating film.",
         "The pad has no holes: pins press their chamfers into it.",
-        "The pad keeps heat back: the films are heated from below, through the base plate. Let the "
-        "plate lie in the closed press until it has the platens' temperature, then lay up.",
+        "The pad keeps heat back: the films are heated from below, through the base plate. Lay up "
+        "on the plate while it is cold, out of the press; it warms with the films on it, and each "
+        "step counts from when it is hot.",
     )
 
 

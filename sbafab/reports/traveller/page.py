@@ -101,7 +101,6 @@ def context(work: Work) -> dict[str, Any]:
         "others": others,
         "sheet_rows": sheet_rows(work.design, work.sheets, {work.design.name: "", **others}),
         "cuts": bill.cut_list(work),
-        "kerf": bill.kerf_states(job, materials(laminate)),
         "laser_minutes": times.laser_minutes(work),
         "laser_basis": times.laser_basis(work),
         "lay_up": _lay_up(work),

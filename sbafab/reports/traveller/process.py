@@ -13,7 +13,7 @@ from sbafab.pressing.together import Runs
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
-from sbafab.reports.traveller.bench import on_the_lumen, reseat, underlay, warm_plate
+from sbafab.reports.traveller.bench import closing, on_the_lumen, reseat, underlay
 from sbafab.reports.traveller.build_up_svg import build_up_svg, pin_lines
 from sbafab.reports.traveller.exploded import exploded
 from sbafab.reports.traveller.job import Work
@@ -24,6 +24,10 @@ from sbafab.reports.traveller.plan import plan
 LEAK_KILOPASCALS = 5.0
 """Our choice, far below the paper's burst pressure and enough to open every balloon."""
 LEAK_SECONDS = 60
+COVER = (
+    "Cover with a release film and the press pad, flush with the platen all round. No second plate "
+    "on top."
+)
 MOST_LINES = 12
 """Single layers up to which each has a line of its own."""
 BONDS = {
@@ -105,10 +109,10 @@ def _place_notes(runs: Runs) -> tuple[str, ...]:
 def _bench_actions(
     work: Work, part: AssemblyStep, step: Step, lying: Sequence[Bed], runs: Runs
 ) -> tuple[Action, ...]:
-    """A step's actions; what it is laid up on comes right after the press is set."""
-    first, *others = _actions(work.laminate, part, step, lying, runs)
+    """A step's actions; what it is laid up on comes right after the base plate."""
+    heat, plate, *others = _actions(work.laminate, part, step, lying, runs)
     own = (*underlay(work, part), *on_the_lumen(work.laminate, part))
-    return (first, *own, *others)
+    return (heat, plate, *own, *others)
 
 
 def _actions(
@@ -121,13 +125,13 @@ def _actions(
     )
     if part.pins:
         yield Action(
-            "Lay the base plate down, cut corner at the back right. Drive in the pins to their "
-            "heights (above) and prick a release film over them."
+            "Lay the base plate down, cold, cut corner at the back right. Drive in the pins to "
+            "their heights (above) and prick a release film over them."
         )
     else:
         yield Action(
-            "Lay the base plate down, cut corner at the back right, no pins in it, and a release "
-            "film on it. Lay by eye, as each line says."
+            "Lay the base plate down, cold, cut corner at the back right, no pins in it, and a "
+            "release film on it. Lay by eye, as each line says."
         )
     for bed in lying:
         yield from _lay(things, bed, part.pins)
@@ -140,17 +144,9 @@ def _actions(
     )
     if part.pins:
         yield Action("Check: every pin reaches through the highest layer that has its hole.")
-    yield Action(
-        "Cover with a release film and the press pad, flush with the platen all round. No second "
-        "plate on top."
-    )
-    yield warm_plate(step)
+    yield Action(COVER)
     cycles = tuple(f"cycle {n}" for n in range(1, runs.count + 1))
-    yield Action(
-        f"Close the press and start the timer: {say.minutes(step.minutes)}.",
-        (),
-        cycles if 1 < len(cycles) <= MOST_LINES else (),
-    )
+    yield closing(step, cycles if 1 < len(cycles) <= MOST_LINES else ())
     yield Action("Take it out: it is as hot as the platens. Let it cool flat before you touch it.")
     if part.pins:
         names = say.listed([pin.name for pin in part.pins])

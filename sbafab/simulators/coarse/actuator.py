@@ -35,13 +35,26 @@ class CoarseActuator:
         return coarse_mesh(self.stack, sectors=self.sectors)
 
     @property
+    def young(self) -> float:
+        """Young's modulus of the film, kPa; the paper's TPE unless the film says its own."""
+        elastic = self.stack.film.elastic
+        return YOUNG if elastic is None else 1000 * elastic[0]
+
+    @property
+    def poisson(self) -> float:
+        """Poisson's ratio of the film."""
+        elastic = self.stack.film.elastic
+        return POISSON if elastic is None else elastic[1]
+
+    @property
     def membrane(self) -> float:
         """E t of one film in kPa mm = mN/mm."""
-        return YOUNG * self.stack.film.thickness
+        return self.young * self.stack.film.thickness
 
     def bending(self, films: int) -> float:
         """Bending stiffness of so many films bonded, in mN mm."""
-        return YOUNG * (films * self.stack.film.thickness) ** 3 / (12 * (1 - POISSON**2))
+        thick = films * self.stack.film.thickness
+        return self.young * thick**3 / (12 * (1 - self.poisson**2))
 
     @cached_property
     def mass(self) -> float:

@@ -57,12 +57,7 @@ def round_stack(laminate: Laminate) -> RoundStack:
             f"{SUPPORTED}; the pockets of {laminate.name} lie on a sheet and need the conforming "
             "shell mesh"
         )
-    others = sorted({layer.film.material for layer in laminate.tpe_layers} - {"TPE"})
-    if others:
-        raise DesignError(
-            f"{SUPPORTED} of TPE alone; {laminate.name} has films of {', '.join(others)}, which "
-            "CalculiX takes"
-        )
+    film = _film(laminate)
     axes = tuple(chamber.centres[0] for chamber in laminate.chambers)
     rooms = [gap for gap in laminate.interfaces if gap.kind == "chamber"]
     necks = [gap for gap in laminate.interfaces if gap.kind == "separator"]
@@ -95,8 +90,25 @@ def round_stack(laminate: Laminate) -> RoundStack:
         bore=bore,
         hub=hub,
         lumen=lumen,
-        film=laminate.tpe_layers[0].film,
+        film=film,
     )
+
+
+def _film(laminate: Laminate) -> Film:
+    """The one film that all balloons are of, its modulus known."""
+    films = {layer.film.material: layer.film for layer in laminate.tpe_layers}
+    if len(films) > 1:
+        raise DesignError(
+            f"{SUPPORTED} of one film; {laminate.name} has films of {', '.join(sorted(films))}, "
+            "which CalculiX takes"
+        )
+    [film] = films.values()
+    if film.elastic is None:
+        raise DesignError(
+            f"{SUPPORTED} of a film whose modulus is known; add "
+            f"films.{film.material.lower()}.modulus, in MPa, and poisson, its ratio"
+        )
+    return film
 
 
 def why_not_round(laminate: Laminate) -> str | None:

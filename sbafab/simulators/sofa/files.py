@@ -27,6 +27,12 @@ LEAST_LOBES = 3
 
 def why_no_scene(laminate: Laminate) -> str | None:
     """The reason why no scene can be written for a laminate, or None."""
+    others = sorted({layer.film.material for layer in laminate.tpe_layers} - {"TPE"})
+    if others:
+        return (
+            f"the SOFA scenes are of TPE alone; {laminate.name} has films of {', '.join(others)}, "
+            "which CalculiX takes, and MuJoCo where all are alike"
+        )
     return why_not_round(laminate)
 
 

@@ -1,4 +1,7 @@
-"""Writes docs/validation.md, the paper's figures beside the predictions: python -m docs.validate"""
+"""Writes docs/validation.md, the paper's figures beside the predictions.
+
+python -m docs.scripts.validate
+"""
 
 from __future__ import annotations
 
@@ -8,19 +11,19 @@ from pathlib import Path
 import numpy as np
 
 import sbafab
-from docs.validation_table import NONE, Row, exact, table
+from docs.scripts.validation_table import NONE, Row, exact, table
 from sbafab.models import paper, parabola, printed
 from sbafab.models.figures import Prediction
 from sbafab.models.flow import seconds
 from sbafab.output.settings import press_settings
 from sbafab.pressing.schedule import schedule
 
-PATH = Path(__file__).parent / "validation.md"
+PATH = Path(__file__).parents[1] / "validation.md"
 
 HEAD = """# The paper's figures beside the predictions
 
-Written by `python -m docs.validate` from the templates; a test holds that this file is what the
-command writes. No constant of a model is fitted. Where a number is itself a measurement of the
+Written by `python -m docs.scripts.validate` from the templates; a test holds that this file is
+what the command writes. No constant of a model is fitted. Where a number is itself a measurement of the
 paper (handling time, full height, moduli), the row says so. The residual is prediction minus paper;
 in parentheses, how many of the paper's own errors that is, where it gives one. A reason that we
 have not tested says "likely". Models and their ranges are in [prediction.md](prediction.md), the
