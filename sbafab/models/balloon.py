@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.errors import DesignError
+from sbafab.laminate.films import PAPER_TPE
 from sbafab.models.film_elements import Flat, Term, add, air, bending, membrane, strain
 
 if TYPE_CHECKING:
@@ -62,8 +63,8 @@ class Balloon:
     neck: float = 0.0
     bore: float = 0.0
     thickness: float = 0.038
-    modulus: float = 10_000.0
-    poisson: float = 0.2
+    modulus: float = 1000 * PAPER_TPE[0]
+    poisson: float = PAPER_TPE[1]
     wrinkles: bool = True
     inextensible: bool = False
     order: int = 2
