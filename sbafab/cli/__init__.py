@@ -19,6 +19,7 @@ from sbafab.cli.kerf import kerf
 from sbafab.cli.mesh import mesh
 from sbafab.cli.nest import nest
 from sbafab.cli.new import new
+from sbafab.cli.picture import picture
 from sbafab.cli.predict import predict
 from sbafab.cli.press import press
 from sbafab.cli.progress_line import add_verbosity
@@ -41,6 +42,7 @@ COMMANDS = (
     nest,
     kerf,
     predict,
+    picture,
     simulate,
     sweep,
     record,
