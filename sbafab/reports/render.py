@@ -43,7 +43,8 @@ def rendered(bodies: Sequence[Body], view: View, width: int, height: int, ground
     import numpy as np
     from PIL import Image
 
-    large = View(view.axes, view.scale * ENLARGED, tuple(ENLARGED * c for c in view.centre))
+    x, y = view.centre
+    large = View(view.axes, view.scale * ENLARGED, (ENLARGED * x, ENLARGED * y))
     size = width * ENLARGED, height * ENLARGED
     lamp = np.array(LAMP) / np.linalg.norm(LAMP)
     surfaces = [body.surface for body in bodies]
