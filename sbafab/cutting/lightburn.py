@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
-from xml.sax.saxutils import quoteattr
 
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER, CUT_SHEET, ENGRAVE, REFERENCE
 from sbafab.cutting.dxf_write import Surroundings
 from sbafab.geometry.copies import Copies
 from sbafab.geometry.edges import Arc, Edge, Line, Point
 from sbafab.geometry.region import Contour
+from sbafab.markup import quoteattr
 
 ENDING = ".lbrn2"
 INDICES = {ENGRAVE: 0, CUT_INNER: 1, CUT_OUTER: 2, CUT_SHEET: 7, REFERENCE: 8}
