@@ -313,7 +313,8 @@ def find(
 def motion(stack: Stack, length: float = 150.0, diameter: float = 0.635, **load: Any) -> Motion:
     """A stack that is fed with air through tubes, to call ``motion.step(dt, pressures=...)``.
 
-    ``length`` and inner ``diameter`` of each chamber's tube are mm; ``load`` is what ``stack.pose`` takes beside pressures. Raises DesignError.
+    ``length`` and inner ``diameter`` of each chamber's tube are mm; ``load`` is what ``stack.pose``
+    takes beside pressures. Raises DesignError.
     """
     from sbafab.models.pneumatics import AIR, Line
 
