@@ -15,6 +15,10 @@ class DesignError(SbafabError, ValueError):
     """A design that cannot be built: field, value, what is allowed, what would fix it."""
 
 
+class TooLargeError(DesignError):
+    """A part that does not fit the film it is cut from: it ends as a failed rule does."""
+
+
 class OutputError(SbafabError, OSError):
     """Files that could not be written or read back as they should be."""
 

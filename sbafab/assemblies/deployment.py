@@ -43,10 +43,12 @@ def aperture(assembled: Assembled) -> Iterator[Finding]:
     if holds(hole, worst.nominal):
         yield found("aperture", True, hole, worst.nominal, message)
     elif holds(hole, worst.pressed):
-        message += (
-            f", or {worst.pressed:.2f} if pressed as thin as the paper's, which passed 9.25: try it"
+        remedy = "try it in the aperture first"
+        message = (
+            f"{remedy}: {message}, or {worst.pressed:.2f} if pressed as thin as the paper's, which "
+            "passed 9.25"
         )
-        yield Finding("aperture", "warn", hole, worst.nominal, "mm", WHOLE, message)
+        yield Finding("aperture", "warn", hole, worst.nominal, "mm", WHOLE, message, remedy=remedy)
     else:
         message += "; use fewer balloons, smaller chambers or a smaller part"
         yield found("aperture", False, hole, worst.pressed, message)

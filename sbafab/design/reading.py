@@ -6,6 +6,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
@@ -63,9 +64,27 @@ def design_path(source: str | Path) -> Path:
         is_folder = False
     if is_folder:
         raise DesignError(f"{shown(source)} is a folder; give a design file (.toml) or a template")
-    near = difflib.get_close_matches(str(source), names, 1)
-    hint = f"did you mean {near[0]}?" if near else f"the templates are {', '.join(names)}"
-    raise DesignError(f"{shown(source)} is neither a template nor a design file; {hint}")
+    raise DesignError(f"{shown(source)} is neither a template nor a design file; {_hint(path)}")
+
+
+def _hint(missing: Path) -> str:
+    """What may have been meant by a design that is not there."""
+    with suppress(OSError, ValueError):
+        beside = missing.with_name(f"{missing.name}.toml")
+        if beside.is_file():
+            return f"did you mean {beside}?"
+    names = template_names()
+    near = difflib.get_close_matches(str(missing), names, 1)
+    return f"did you mean {near[0]}?" if near else f"the templates are {', '.join(names)}"
+
+
+def template_text(name: str) -> str:
+    """The commented text of a design that ships. Raises DesignError if there is none."""
+    if name not in template_names():
+        raise DesignError(
+            f"{shown(name)} is not a template; there are {', '.join(template_names())}"
+        )
+    return design_path(name).read_text(encoding="utf-8")
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -83,6 +102,11 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise DesignError(f"{path} is not a text file in UTF-8; save it as UTF-8") from None
     except OSError as error:
         raise DesignError(f"{path} cannot be read: {error.strerror or error}") from None
+    return toml_tables(text, path)
+
+
+def toml_tables(text: str, path: str | Path) -> dict[str, Any]:
+    """The tables of a design file's text; ``path`` names it in messages. Raises DesignError."""
     # The parser's time grows with the square of the parts of a key.
     deep = _TOO_DEEP.search(text)
     if deep is not None:

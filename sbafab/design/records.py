@@ -279,8 +279,8 @@ class Chamber(Section):
     """The pockets of one chamber; a family adds their sizes."""
 
     outline: str | None = Field(default=None, max_length=1000)
-    """DXF or SVG file with one closed path, drawn round (0, 0): the pocket, in place of the shape
-    that the family gives it."""
+    """DXF or SVG file with one closed path: the pocket, in place of the shape that the family gives
+    it. Drawn round (0, 0) it stays as it lies, else its centroid comes to the chamber's axis."""
 
 
 class Design(Section):

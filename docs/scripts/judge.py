@@ -1,4 +1,4 @@
-"""Lets KLayout and GDAL judge random designs: ``python -m docs.judge [NUMBER]``."""
+"""Lets KLayout and GDAL judge random designs: ``python -m docs.scripts.judge [NUMBER]``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Makes the pictures that README and docs show, from the templates: python docs/pictures.py"""
+"""Makes the pictures that README and docs show, from the templates.
+
+python -m docs.scripts.pictures
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from sbafab.reports.relation_svg import relation_svg
 from sbafab.reports.solid_png import solid_png
 from sbafab.reports.stack_svg import stack_svg
 
-IMAGES = Path(__file__).parent / "images"
+IMAGES = Path(__file__).parents[1] / "images"
 
 
 def main() -> None:

@@ -1,6 +1,6 @@
 """Runs the examples of docs/simulation.md in CalculiX and draws what they find.
 
-python docs/calculix_runs.py takes about ten minutes; it needs ccx and the extra "mesh".
+python -m docs.scripts.calculix_runs takes about ten minutes; it needs ccx and the extra "mesh".
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from sbafab.simulators.calculix.history import State
 from sbafab.simulators.calculix.job import simulate
 from sbafab.simulators.calculix.settings import deck_settings
 
-PICTURE = Path(__file__).parent / "images" / "calculix.svg"
+PICTURE = Path(__file__).parents[1] / "images" / "calculix.svg"
 SECTION = [0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 0.95, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0]
 """kPa."""
 STROKE, HEIGHT, REGIME = 1.2, 17.5, 0.95
