@@ -177,7 +177,9 @@ def _python(name: str, stack: Stack) -> str:
             **_drawn(one),
             "most_pressure": one.most_pressure,
             "most_height": one.most_height,
-            "coefficients": [[float(f"{c:.10g}") for c in row] for row in one.coefficients.tolist()],
+            "coefficients": [
+                [float(f"{c:.10g}") for c in row] for row in one.coefficients.tolist()
+            ],
         }
         for one in stack.maps
     ]

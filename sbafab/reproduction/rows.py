@@ -171,5 +171,3 @@ def simulators() -> Iterator[Row]:
         ("SOFA: speed", 10, "Hz", "depends on machine and mesh; docs/sofa.md"),
     ):
         yield Row(what, exact(value, unit, "Sec. 4.2, 3.2"), None, NONE, why)
-
-

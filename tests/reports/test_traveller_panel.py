@@ -73,3 +73,18 @@ def test_labels_of_the_picture_do_not_run_into_each_other() -> None:
             spans.sort()
             assert all(b <= c for (_, b), (c, _) in pairwise(spans))
             assert spans[-1][1] <= width
+
+
+def test_every_actuator_of_a_batch_has_its_serial_number() -> None:
+    design = load_design(
+        "1dof-5mm", ('registration.method="sheet"', "stack.balloons=2", "order.copies=3")
+    )
+    laminate = build(design)
+    plan = schedule(laminate, press_settings(design))
+    job = Job(SHA, "sbafab 1", copies=3)
+    page = lxml_html.fromstring(traveller_html(design, laminate, plan, [], job))
+    rows = page.find_class("serials")[0].findall("tbody/tr")
+    assert [words_of(row.find("th")) for row in rows] == ["1", "2", "3"]
+    assert all(len(row.findall("td/input")) == 3 for row in rows)
+    leak = words_of(page.get_element_by_id("leak").getparent())
+    assert "write the result beside its serial number" in leak
