@@ -64,7 +64,7 @@ def nearly_flat(pocket: float, neck: float) -> Meridian:
 
 
 def half_full(pocket: float, neck: float) -> Meridian:
-    """7.5 ul in a pocket of 5 mm: with 80 ul more 15 balloons hold what 5 kPa hold."""
+    """7.5 ul in a pocket of 5 mm: with 80 ul more 15 balloons come near what 5 kPa hold."""
     return holding(neck, pocket - neck, 7.5 * (pocket / 2.5) ** 3)
 
 
