@@ -14,6 +14,7 @@ from pathlib import Path
 
 import ezdxf
 import pytest
+from _pytest.mark import ParameterSet
 from ezdxf.addons import r12export
 from ezdxf.document import Drawing
 
@@ -33,7 +34,12 @@ FOLDERS: list[tuple[str, tuple[str, ...], DxfProfile]] = [
 ]
 
 
-@pytest.fixture(scope="module", params=FOLDERS, ids=[f"{t}-{p}" for t, _, p in FOLDERS])
+def _param(template: str, settings: tuple[str, ...], profile: DxfProfile) -> ParameterSet:
+    marks = [pytest.mark.long] if profile == "chords" else []
+    return pytest.param((template, settings, profile), marks=marks, id=f"{template}-{profile}")
+
+
+@pytest.fixture(scope="module", params=[_param(*one) for one in FOLDERS])
 def good(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     template, settings, profile = request.param
     design = load_design(template, [*settings, "rules.yield_builds=100"])

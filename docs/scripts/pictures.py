@@ -1,0 +1,34 @@
+"""Makes the pictures that README and docs show, from the templates.
+
+python -m docs.scripts.pictures
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import sbafab
+from sbafab.reports.assembly_png import assembly_png
+from sbafab.reports.layers_svg import layers_svg
+from sbafab.reports.relation_svg import relation_svg
+from sbafab.reports.solid_png import solid_png
+from sbafab.reports.stack_svg import stack_svg
+
+IMAGES = Path(__file__).parents[1] / "images"
+
+
+def main() -> None:
+    for name in ("1dof-5mm", "3dof-15mm", "radial-15mm"):
+        (IMAGES / f"{name}-solid.png").write_bytes(solid_png(sbafab.build(name), 1200, 900))
+    (IMAGES / "brace-assembled.png").write_bytes(assembly_png(sbafab.assemble("brace")))
+    laminate = sbafab.build("3dof-15mm")
+    (IMAGES / "3dof-15mm-layers.svg").write_text(layers_svg(laminate), encoding="utf-8")
+    (IMAGES / "3dof-15mm-stack.svg").write_text(stack_svg(laminate), encoding="utf-8")
+    for relation in sbafab.predict("3dof-15mm").relations:
+        if relation.name == "force":
+            plot = relation_svg("3dof-15mm", relation)
+            (IMAGES / "3dof-15mm-force.svg").write_text(plot, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
