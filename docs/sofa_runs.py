@@ -6,6 +6,7 @@ A further model beside them is a further entry of ``OTHERS``.
 
 from __future__ import annotations
 
+import math
 import resource
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -49,7 +50,10 @@ def fast_stack() -> Posed | None:
 
     def pose(pressures: Sequence[float]) -> tuple[float, float]:
         found = stack.pose(tuple(pressures))
-        return float(found.tip[2]) - FILMS, float(found.bend)
+        turn = math.radians(found.bend)
+        # Bent into an arc, the films stand on each other the less upright the higher they are.
+        upright = math.sin(turn) / turn if turn > 1e-6 else 1.0
+        return float(found.tip[2]) - FILMS * upright, float(found.bend)
 
     return pose
 
