@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from sbafab.laminate.laminate import Laminate, Layer
     from sbafab.meshing.surface import Surface
     from sbafab.models.figures import Prediction
+    from sbafab.models.motion import Motion
     from sbafab.models.stack import Stack
     from sbafab.output.run import Run
     from sbafab.output.simulating import Simulated
@@ -255,6 +256,8 @@ def predict(
     volumes_ul: Sequence[float] = (),
     press_factor: float = 1.0,
     contact_factor: float = 1.0,
+    pocket_loss: float = 0.0,
+    modulus_mpa: float | None = None,
     **tables: Any,
 ) -> Prediction:
     """What a design will do, by closed formulas; each figure names its model and its trust.
@@ -264,7 +267,7 @@ def predict(
     from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict as model_predict
 
-    factors = Factors(press_factor, contact_factor)
+    factors = Factors(press_factor, contact_factor, pocket_loss, modulus_mpa)
     asked = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), factors)
     return model_predict(load(source, *changes, **tables), asked)
 
@@ -303,6 +306,16 @@ def find(
     at_most = [f"{name}={value!r}" for name, value in (most or {}).items()]
     requirements, goal = read_all(at_least, at_most, best)
     return run_find(FindRequest(load(source, *changes, **tables), requirements, goal, **settings))
+
+
+def motion(stack: Stack, length: float = 150.0, diameter: float = 0.635, **load: Any) -> Motion:
+    """A stack that is fed with air through tubes, to call ``motion.step(dt, pressures=...)``.
+
+    ``length`` and inner ``diameter`` of each chamber's tube are mm; ``load`` is what ``stack.pose`` takes beside pressures. Raises DesignError.
+    """
+    from sbafab.models.pneumatics import AIR, Line
+
+    return stack.motion(line=Line(AIR, length, diameter), **load)
 
 
 def sweep(

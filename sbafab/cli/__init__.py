@@ -17,6 +17,7 @@ from sbafab.cli.explain import explain
 from sbafab.cli.find import find
 from sbafab.cli.generate import generate
 from sbafab.cli.kerf import kerf
+from sbafab.cli.map import map_
 from sbafab.cli.mesh import mesh
 from sbafab.cli.nest import nest
 from sbafab.cli.new import new
@@ -24,6 +25,7 @@ from sbafab.cli.predict import predict
 from sbafab.cli.press import press
 from sbafab.cli.progress_line import add_verbosity
 from sbafab.cli.record import record
+from sbafab.cli.reproduce import reproduce
 from sbafab.cli.schema import schema
 from sbafab.cli.simulate import simulate
 from sbafab.cli.studio import studio
@@ -42,10 +44,12 @@ COMMANDS = (
     nest,
     kerf,
     predict,
+    map_,
     simulate,
     sweep,
     find,
     record,
+    reproduce,
     studio,
     schema,
 )
@@ -54,10 +58,13 @@ for _command in COMMANDS:
 
 
 EXTRAS = {
+    "dask": ("distributed", "sweep --dask"),
     "mesh": ("netgen", "sbafab mesh, simulate --with calculix"),
     "mujoco": ("mujoco", "simulate --with mujoco"),
     "nest": ("spyrrow", "--nest spyrrow"),
+    "parquet": ("pyarrow", "tables of sweeps as Parquet"),
     "python": ("trimesh", "meshes for trimesh, meshio and PyVista"),
+    "studio": ("starlette", "sbafab studio"),
 }
 """What each extra brings: a module to look for, and what needs it."""
 
