@@ -254,6 +254,8 @@ def predict(
     volumes_ul: Sequence[float] = (),
     press_factor: float = 1.0,
     contact_factor: float = 1.0,
+    pocket_loss: float = 0.0,
+    modulus_mpa: float | None = None,
     **tables: Any,
 ) -> Prediction:
     """What a design will do, by closed formulas; each figure names its model and its trust.
@@ -263,7 +265,7 @@ def predict(
     from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict as model_predict
 
-    factors = Factors(press_factor, contact_factor)
+    factors = Factors(press_factor, contact_factor, pocket_loss, modulus_mpa)
     asked = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), factors)
     return model_predict(load(source, *changes, **tables), asked)
 

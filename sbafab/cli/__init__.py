@@ -16,6 +16,7 @@ from sbafab.cli.ending import BAD_INPUT, ended_plainly, prepared_streams, say
 from sbafab.cli.explain import explain
 from sbafab.cli.generate import generate
 from sbafab.cli.kerf import kerf
+from sbafab.cli.map import map_
 from sbafab.cli.mesh import mesh
 from sbafab.cli.nest import nest
 from sbafab.cli.new import new
@@ -23,6 +24,7 @@ from sbafab.cli.predict import predict
 from sbafab.cli.press import press
 from sbafab.cli.progress_line import add_verbosity
 from sbafab.cli.record import record
+from sbafab.cli.reproduce import reproduce
 from sbafab.cli.schema import schema
 from sbafab.cli.simulate import simulate
 from sbafab.cli.studio import studio
@@ -41,9 +43,11 @@ COMMANDS = (
     nest,
     kerf,
     predict,
+    map_,
     simulate,
     sweep,
     record,
+    reproduce,
     studio,
     schema,
 )

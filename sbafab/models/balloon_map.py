@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -81,7 +81,7 @@ class BalloonMap:
     most_height: float
     coefficients: Array
 
-    @property
+    @cached_property
     def spans(self) -> float:
         """Pieces of the spline a mm of height."""
         return HEIGHT_SPANS / self.most_height
@@ -113,29 +113,31 @@ class BalloonMap:
         return x, each / np.hypot(p, P0)
 
     def force(self, pressure: ArrayLike, height: ArrayLike) -> Array:
-        """mN on the plate at either end; below 0 where the balloon is pulled on."""
-        p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
-        return -along(self.pressed(p)[0], h * self.spans).first * self.spans
+        """MN on the plate at either end; below 0 where the balloon is pulled on."""
+        return -self._along(0, pressure, height).first * self.spans
 
     def volume(self, pressure: ArrayLike, height: ArrayLike) -> Array:
-        """ul in the balloon."""
-        p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
-        return along(self.pressed(p)[1], h * self.spans).value
+        """Ul in the balloon."""
+        return self._along(1, pressure, height).value
 
     def potential(self, pressure: ArrayLike, height: ArrayLike) -> Array:
         """uJ: energy of the films less pressure times volume."""
+        return self._along(0, pressure, height).value
+
+    def _along(self, which: int, pressure: ArrayLike, height: ArrayLike) -> Along:
         p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
-        return along(self.pressed(p)[0], h * self.spans).value
+        found = pieces(self.pressed(p)[which]).reshape(-1, DEGREE + 1)
+        return along(found, HEIGHT_SPANS * np.arange(p.size).reshape(p.shape), h * self.spans)
 
     def free_height(self, pressure: ArrayLike) -> Array:
-        """mm to which it rises where nothing holds it."""
+        """Mm to which it rises where nothing holds it."""
         p = np.asarray(pressure, float)
         low, high = np.zeros(p.shape), np.full(p.shape, self.most_height)
         for _ in range(50):
             middle = (low + high) / 2
             pushes = self.force(p, middle) > 0
             low, high = np.where(pushes, middle, low), np.where(pushes, high, middle)
-        return (low + high) / 2
+        return np.asarray((low + high) / 2)
 
 
 class Along(NamedTuple):
@@ -146,30 +148,29 @@ class Along(NamedTuple):
     second: Array
 
 
-def along(coefficients: Array, y: Array) -> Along:
-    """A spline (a row of coefficients each, last axis) at places ``y``, in pieces.
+def pieces(coefficients: Array) -> Array:
+    """Polynomials of splines: (..., coefficients) become (..., pieces, powers)."""
+    windows = np.lib.stride_tricks.sliding_window_view(coefficients, DEGREE + 1, axis=-1)
+    return np.asarray(windows @ PIECES)
 
-    Outside its ends it goes on with the second derivative that it has there.
+
+def along(polynomials: Array, which: NDArray[np.int_], y: Array) -> Along:
+    """Splines at places ``y``, in pieces.
+
+    ``polynomials`` (rows, powers) holds the pieces of all splines; ``which`` says at which row each
+    one begins. Outside its ends it goes on with the second derivative that it has there.
     """
-    inside = np.clip(y, 0.0, coefficients.shape[-1] - DEGREE - 1e-9)
+    inside = np.minimum(np.maximum(y, 0.0), HEIGHT_SPANS - 1e-9)
     first = inside.astype(np.int_)
     u = inside - first
-    c = np.take_along_axis(coefficients, first[..., None] + np.arange(DEGREE + 1), -1) @ PIECES
-    value, slope, curve = c[..., 5], 5 * c[..., 5], 20 * c[..., 5]
-    value = c[..., 4] + u * value
-    slope = 4 * c[..., 4] + u * slope
-    curve = 12 * c[..., 4] + u * curve
-    value = c[..., 3] + u * value
-    slope = 3 * c[..., 3] + u * slope
-    curve = 6 * c[..., 3] + u * curve
-    value = c[..., 2] + u * value
-    slope = 2 * c[..., 2] + u * slope
-    curve = 2 * c[..., 2] + u * curve
-    value = c[..., 1] + u * value
-    slope = c[..., 1] + u * slope
-    value = c[..., 0] + u * value
+    c0, c1, c2, c3, c4, c5 = polynomials[which + first].T
+    value = c0.T + u * (c1.T + u * (c2.T + u * (c3.T + u * (c4.T + u * c5.T))))
+    slope = c1.T + u * (2 * c2.T + u * (3 * c3.T + u * (4 * c4.T + u * 5 * c5.T)))
+    curve = 2 * c2.T + u * (6 * c3.T + u * (12 * c4.T + u * 20 * c5.T))
     beyond = y - inside
-    return Along(value + beyond * (slope + beyond * curve / 2), slope + beyond * curve, curve)
+    if beyond.any():
+        value, slope = value + beyond * (slope + beyond * curve / 2), slope + beyond * curve
+    return Along(value, slope, curve)
 
 
 @lru_cache(maxsize=64)
@@ -223,7 +224,8 @@ def _fitted(p: Array, h: Array, found: Shapes, most: float, top: float) -> Array
         ]
     )
     wanted = np.concatenate([potential * scale, found.force * push, found.volume * room])
-    return np.linalg.lstsq(matrix, wanted, rcond=None)[0].reshape(blank.shape)
+    best = np.linalg.lstsq(matrix, wanted, rcond=None)[0]
+    return np.asarray(best.reshape(blank.shape))
 
 
 def _rows(x: Array, order: int, count: int) -> Array:

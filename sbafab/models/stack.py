@@ -15,12 +15,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.balloon_map import BalloonMap, balloon_map
+from sbafab.models.balloon_map import (
+    DEGREE,
+    HEIGHT_SPANS,
+    BalloonMap,
+    balloon_map,
+    pieces,
+)
 from sbafab.models.chain import Chain, chain
 from sbafab.models.stack_balance import Load, Springs, free, held
 
@@ -29,7 +35,10 @@ if TYPE_CHECKING:
 
     from sbafab.design.records import Design
     from sbafab.laminate.laminate import Laminate
+    from sbafab.models.figures import Factors
     from sbafab.models.film_elements import Array
+    from sbafab.models.motion import Motion
+    from sbafab.models.pneumatics import Line
 
 RING = 6
 """Points of each balloon at which its gap is looked at."""
@@ -89,7 +98,7 @@ class Pose:
     @property
     def tip(self) -> Array:
         """Middle of the top plate (3,) in mm."""
-        return self._chain.places[-1]
+        return np.asarray(self._chain.places[-1])
 
     @property
     def height(self) -> float:
@@ -135,6 +144,12 @@ class Stack:
         return self.pitch * len(self.levels)
 
     @cached_property
+    def _centres(self) -> Array:
+        """Gap at each chamber's middle, by rise and tilt: (3, chambers)."""
+        x, y = self.axes.T
+        return np.stack([np.ones_like(x), y, -x])
+
+    @cached_property
     def _gap_of(self) -> Array:
         """Gap at each point of each balloon's ring, by rise and tilt: (chambers x points, 3)."""
         turn = np.arange(RING) * math.tau / RING
@@ -153,10 +168,18 @@ class Stack:
             raise DesignError(
                 f"{len(asked)} pressures are given for {self.chambers} chambers; give one a chamber"
             )
-        forces, volumes = zip(*(one.pressed(np.array(asked)) for one in self.maps), strict=True)
-        spans = np.array([one.spans for one in self.maps])
+        rows = [one.pressed(np.array(asked)) for one in self.maps]
+        found = pieces(np.array(rows).transpose(1, 0, 2, 3)).reshape(2, -1, DEGREE + 1)
+        return Springs(found[0], found[1], *self._rows)
+
+    @cached_property
+    def _rows(self) -> tuple[NDArray[np.int_], Array, Array, Array, int]:
+        """What springs hold beside their polynomials."""
+        count = len(self.maps) * self.chambers
+        begins = np.arange(count).reshape(len(self.maps), -1) * HEIGHT_SPANS
+        spans = np.array([[one.spans] for one in self.maps])
         top = np.array([one.most_height for one in self.maps])
-        return Springs(np.stack(forces), np.stack(volumes), self._gap_of, spans, top, RING)
+        return np.repeat(begins, RING, axis=1), self._gap_of, spans, top, RING
 
     def pose(
         self,
@@ -177,10 +200,28 @@ class Stack:
         load = self._load(tip_load, gravity, plate)
         if load is None:
             start = None if near is None else near.freedoms[self._first]
-            return self._pose(pressures, springs, free(springs, start)[self.levels])
+            kinds = free(springs, start)
+            return self._pose(pressures, springs, kinds[self.levels], kinds)
         start = near.freedoms if near is not None else free(springs, None)[self.levels]
         found, push, stable = held(springs, self.levels, self.pitch, load, start)
-        return self._pose(pressures, springs, found, push / 1000, stable)
+        return self._pose(pressures, springs, found, None, push / 1000, stable)
+
+    def motion(
+        self, pressures: Sequence[float] | None = None, line: Line | None = None, **load: Any
+    ) -> Motion:
+        """A motion that starts at pressures (kPa, by default 0); ``line`` feeds each chamber, and
+        ``load`` is what ``pose`` takes beside pressures.
+        """
+        from sbafab.models.motion import Motion
+        from sbafab.models.pneumatics import Line
+
+        start = self.pose(pressures or (0.0,) * self.chambers, **load)
+        return Motion(self, line or Line(), load, start)
+
+    @cached_property
+    def most_pressure(self) -> float:
+        """How far its maps go, in kPa."""
+        return min(one.most_pressure for one in self.maps)
 
     @cached_property
     def _first(self) -> NDArray[np.int_]:
@@ -220,20 +261,27 @@ class Stack:
         pressures: Sequence[float],
         springs: Springs,
         found: Array,
+        kinds: Array | None = None,
         force: float = 0.0,
         stable: bool = True,
     ) -> Pose:
-        kinds = springs.of(self.levels)
-        gaps = (
-            found @ np.concatenate([np.ones((self.chambers, 1)), self.axes[:, ::-1] * [1, -1]], 1).T
-        )
-        highest = (gaps - kinds.top[:, None]).max()
+        """The record of a pose; ``kinds`` are its freedoms by kind of balloon where levels of one
+        kind are alike.
+        """
+        gaps = found @ self._centres
+        top = springs.top[self.levels]
+        highest = float((gaps - top[:, None]).max())
         if highest > 0:
             raise DesignError(
                 "a balloon would rise higher than its films can be stretched "
-                f"({highest:.2g} mm above {float(kinds.top.min()):.3g} mm); give less pressure or load"
+                f"({highest:.2g} mm above {float(top.min()):.3g} mm); give less pressure or load"
             )
-        volumes, energy = kinds.contents(found)
+        if kinds is None:
+            volumes, energies = springs.of(self.levels).contents(found)
+        else:
+            each, stored = springs.contents(kinds)
+            volumes, energies = each[self.levels], stored[self.levels]
+        volumes, energy = volumes.sum(0), float(energies.sum())
         p = np.asarray(pressures, dtype=float)
         return Pose(
             tuple(p.tolist()),
@@ -248,18 +296,23 @@ class Stack:
 
 
 def stack(
-    design: Design, laminate: Laminate | None = None, most_pressure: float = MOST_PRESSURE
+    design: Design,
+    laminate: Laminate | None = None,
+    most_pressure: float = MOST_PRESSURE,
+    factors: Factors | None = None,
 ) -> Stack:
     """The stack of a design with round pockets on one axis or side by side.
 
-    ``most_pressure`` in kPa is what maps are made to. Raises DesignError for pockets of another
-    shape, for actuators round a tube and for films of unknown modulus.
+    ``most_pressure`` in kPa is what maps are made to. ``factors`` are measured ones. Raises
+    DesignError for pockets of another shape, for actuators round a tube and for films of unknown
+    modulus.
     """
     from sbafab.actuators import build
     from sbafab.models.balloons import balloons_of
 
     flat = laminate or build(design)
-    row = balloons_of(design, flat)
+    row = balloons_of(design, flat, factors)
+    press = 1.0 if factors is None else factors.press_factor
     kinds = list(dict.fromkeys(row))
     axes = np.array([chamber.centres[0] for chamber in flat.chambers])
     if len(axes) == 1:
@@ -273,7 +326,7 @@ def stack(
         tuple(balloon_map(kind, most_pressure) for kind in kinds),
         np.array([kinds.index(one) for one in row]),
         axes,
-        flat.thickness / len(row),
+        flat.thickness * press / len(row),
         reach,
         grams * GRAVITY / len(row),
     )

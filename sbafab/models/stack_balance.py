@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,7 +15,6 @@ from sbafab.models.chain import chain, moves, stiffening
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sbafab.models.balloon_map import Along
     from sbafab.models.chain import Chain
     from sbafab.models.film_elements import Array
 
@@ -50,13 +49,15 @@ class Load(NamedTuple):
 class Springs:
     """What levels do at given pressures: a row a level or a kind of balloon.
 
-    ``forces`` and ``volumes`` (rows, chambers, coefficients) are splines of the potential and the
-    volume by height, ``gap_of`` (rows, chambers x points, 3) the gaps by rise and tilt, ``spans``
-    pieces of the spline a mm and ``top`` its end in mm.
+    ``potentials`` and ``volumes`` (pieces of all splines, powers) are polynomials by height, and
+    ``begins`` (rows, chambers x points) where those of each point begin; ``gap_of`` (rows,
+    chambers x points, 3) are the gaps by rise and tilt, ``spans`` (rows, 1) pieces of the spline a
+    mm and ``top`` (rows) its end in mm; ``ring`` is the number of points a balloon.
     """
 
-    forces: Array
+    potentials: Array
     volumes: Array
+    begins: NDArray[np.int_]
     gap_of: Array
     spans: Array
     top: Array
@@ -64,39 +65,37 @@ class Springs:
 
     def of(self, levels: NDArray[np.int_]) -> Springs:
         """A row for each of these."""
-        return Springs(
-            self.forces[levels],
-            self.volumes[levels],
-            self.gap_of[levels],
-            self.spans[levels],
-            self.top[levels],
-            self.ring,
+        return replace(
+            self,
+            begins=self.begins[levels],
+            gap_of=self.gap_of[levels],
+            spans=self.spans[levels],
+            top=self.top[levels],
         )
 
     def energy(self, freedoms: Array) -> tuple[Array, Array, Array]:
         """Energy (rows) in uJ with its gradient (rows, 3) and second derivatives (rows, 3, 3)."""
-        gaps, found = self._along(self.forces, freedoms)
-        spans = self.spans[:, None]
+        gaps = (self.gap_of @ freedoms[..., None])[..., 0]
+        found = along(self.potentials, self.begins, gaps * self.spans)
+        value, slope = found.value, found.first * self.spans
+        curve = found.second * self.spans**2
         shut = np.minimum(gaps, 0.0)
-        value = found.value + SHUT * shut**2 / 2
-        slope = found.first * spans + SHUT * shut
-        curve = found.second * spans**2 + np.where(gaps < 0, SHUT, 0.0)
-        by_gap = self.gap_of.transpose(0, 2, 1)
+        if shut.any():
+            value = value + SHUT * shut**2 / 2
+            slope = slope + SHUT * shut
+            curve = curve + np.where(gaps < 0, SHUT, 0.0)
+        by_gap = self.gap_of.transpose(0, 2, 1) / self.ring
         gradient = (by_gap @ slope[..., None])[..., 0]
         matrix = (by_gap * curve[:, None]) @ self.gap_of
-        return value.sum(-1) / self.ring, gradient / self.ring, matrix / self.ring
+        return value.sum(-1) / self.ring, gradient, matrix
 
-    def contents(self, freedoms: Array) -> tuple[Array, float]:
-        """Volume in ul of each chamber, and the potential of all."""
-        _, found = self._along(self.volumes, freedoms)
-        rows, chambers = self.volumes.shape[:2]
-        each = found.value.reshape(rows, chambers, self.ring).mean(-1)
-        return each.sum(0), float(self._along(self.forces, freedoms)[1].value.sum()) / self.ring
-
-    def _along(self, coefficients: Array, freedoms: Array) -> tuple[Array, Along]:
-        gaps = (self.gap_of @ freedoms[..., None])[..., 0]
-        rows = np.repeat(coefficients, self.ring, axis=1)
-        return gaps, along(rows, gaps * self.spans[:, None])
+    def contents(self, freedoms: Array) -> tuple[Array, Array]:
+        """Volume in ul of each balloon (rows, chambers), and the potential of each row."""
+        gaps = (self.gap_of @ freedoms[..., None])[..., 0] * self.spans
+        held = along(self.volumes, self.begins, gaps).value
+        stored = along(self.potentials, self.begins, gaps).value
+        volumes = held.reshape(len(held), -1, self.ring).mean(-1)
+        return volumes, stored.sum(-1) / self.ring
 
 
 def free(springs: Springs, start: Array | None) -> Array:
@@ -126,11 +125,15 @@ def free(springs: Springs, start: Array | None) -> Array:
 
 def _towards(gradient: Array, matrix: Array) -> Array:
     """Newton's step of each row, kept downhill where the energy curves the wrong way."""
-    values, vectors = np.linalg.eigh(matrix)
-    least = 1e-6 * np.abs(values).max(-1, keepdims=True) + 1e-9
-    values = np.maximum(np.abs(values), least)
-    within = (vectors.transpose(0, 2, 1) @ gradient[..., None])[..., 0]
-    return np.asarray(-(vectors @ (within / values)[..., None])[..., 0])
+    try:
+        np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(matrix)
+        least = 1e-6 * np.abs(values).max(-1, keepdims=True) + 1e-9
+        values = np.maximum(np.abs(values), least)
+        within = (vectors.transpose(0, 2, 1) @ gradient[..., None])[..., 0]
+        return np.asarray(-(vectors @ (within / values)[..., None])[..., 0])
+    return np.asarray(-np.linalg.solve(matrix, gradient[..., None])[..., 0])
 
 
 def _limited(move: Array) -> Array:
@@ -157,7 +160,7 @@ def held(
     for _ in range(MOST_STEPS):
         if np.abs(gradient).max() < CLOSE * (1 + 1e-3 * push):
             return at, push, _is_firm(matrix)
-        move = _descent(gradient, matrix).reshape(-1, 3)
+        move = _towards(gradient[None], matrix[None]).reshape(-1, 3)
         share = float(_limited(move).min())
         slope = float((move.ravel() * gradient).sum())
         for _ in range(14):
@@ -179,14 +182,6 @@ def _is_firm(matrix: Array) -> bool:
     except np.linalg.LinAlgError:
         return False
     return True
-
-
-def _descent(gradient: Array, matrix: Array) -> Array:
-    try:
-        low = np.linalg.cholesky(matrix)
-    except np.linalg.LinAlgError:
-        return _towards(gradient[None], matrix[None])[0]
-    return np.asarray(-np.linalg.solve(low.T, np.linalg.solve(low, gradient)))
 
 
 class _Acting(NamedTuple):
@@ -251,10 +246,10 @@ def _loaded(
     value, gradient, blocks = springs.energy(at)
     plates = chain(at, pitch)
     acting = _acting(plates, load)
-    matrix = np.zeros((count, 3, count, 3))
+    sparse = np.zeros((count, 3, count, 3))
     level = np.arange(count)
-    matrix[level, :, level] = blocks
-    matrix = matrix.reshape(3 * count, 3 * count)
+    sparse[level, :, level] = blocks
+    matrix = sparse.reshape(3 * count, 3 * count)
     does = (np.abs(acting.forces).max(-1) > 0) | acting.stiffness.any((1, 2))
     total = float(value.sum()) + acting.energy
     if not does.any():
