@@ -83,7 +83,7 @@ def mesh(
     gaps: bool,
     formats: tuple[str, ...],
 ) -> None:
-    """Write the meshes: solid and cavities, and conforming volume and shell meshes.
+    """Write meshes: solid, cavities, volume and shell.
 
     The conforming ones take the extra "mesh": pip install "sbafab[mesh]".
     """
