@@ -14,12 +14,14 @@ from sbafab.cli.check import check
 from sbafab.cli.cut import cut
 from sbafab.cli.ending import BAD_INPUT, ended_plainly, prepared_streams, say
 from sbafab.cli.explain import explain
+from sbafab.cli.find import find
 from sbafab.cli.generate import generate
 from sbafab.cli.kerf import kerf
 from sbafab.cli.map import map_
 from sbafab.cli.mesh import mesh
 from sbafab.cli.nest import nest
 from sbafab.cli.new import new
+from sbafab.cli.picture import picture
 from sbafab.cli.predict import predict
 from sbafab.cli.press import press
 from sbafab.cli.progress_line import add_verbosity
@@ -44,8 +46,10 @@ COMMANDS = (
     kerf,
     predict,
     map_,
+    picture,
     simulate,
     sweep,
+    find,
     record,
     reproduce,
     studio,

@@ -90,6 +90,7 @@ def predict(
     from sbafab.errors import OutputError
     from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict as predicted
+    from sbafab.models.sizes import size_said
     from sbafab.output.earlier import PREDICTION
     from sbafab.output.predicting import prediction_json, with_prediction
     from sbafab.output.run import Extras, generate
@@ -110,6 +111,7 @@ def predict(
     if request.as_json:
         print_json({**prediction_json(design, found), "failed": failed, "folder": str(run.folder)})
     else:
+        click.echo(size_said(design, run.laminate))
         _print(found)
         if not run.failed:
             click.echo(f"written to {run.folder}: predict.json, predict/")
