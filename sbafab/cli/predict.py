@@ -80,10 +80,10 @@ def predict(
     volumes: tuple[float, ...],
     **factors: Any,
 ) -> None:
-    """Predict sizes, stroke, force, time, bending: predict.json and plots.
+    """Predict sizes, stroke, force, time and bending.
 
-    Every figure names its model and how far that is trusted. A design that fails a rule is
-    predicted on the screen only (exit code 1).
+    Writes predict.json and plots. Every figure names its model and how far that is trusted. A
+    design that fails a rule is predicted on the screen only (exit code 1).
     """
     from sbafab.actuators import load_design
     from sbafab.cli.printing import print_json, shown_progress

@@ -1,4 +1,4 @@
-"""How fast the studio answers, measured in the browser: ``python -m docs.studio_latency``.
+"""How fast the studio answers, measured in the browser: ``python -m docs.scripts.studio_latency``.
 
 Turns the chamber's diameter of 3dof-15mm again and again and prints, from the change to what is
 painted, the median and the 95th percentile; then poses drawn a second. Run it on an idle machine.
