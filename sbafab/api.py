@@ -254,11 +254,12 @@ def predict(
     pressures_kpa: Sequence[float] = (10.0, 100.0),
     flow_ml_min: float = 35.0,
     volumes_ul: Sequence[float] = (),
+    quick: bool = False,
     **asked: Any,
 ) -> Prediction:
     """What a design will do; each figure names its model and its trust.
 
-    ``asked`` holds fields of ``models.figures.Factors``, which are ``press_factor``,
+    ``quick`` leaves out the figures of the elastic stack, which take seconds. ``asked`` holds fields of ``models.figures.Factors``, which are ``press_factor``,
     ``contact_factor``, ``pocket_loss`` mm and ``modulus_mpa``, beside tables of the design. Raises
     DesignError for what is out of every model's range.
     """
@@ -267,7 +268,7 @@ def predict(
 
     factors, tables = _parted(asked, Factors)
     wish = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), Factors(**factors))
-    return model_predict(load(source, *changes, **tables), wish)
+    return model_predict(load(source, *changes, **tables), wish, quick=quick)
 
 
 def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **asked: Any) -> Stack:
@@ -313,7 +314,8 @@ def find(
 def motion(stack: Stack, length: float = 150.0, diameter: float = 0.635, **load: Any) -> Motion:
     """A stack that is fed with air through tubes, to call ``motion.step(dt, pressures=...)``.
 
-    ``length`` and inner ``diameter`` of each chamber's tube are mm; ``load`` is what ``stack.pose`` takes beside pressures. Raises DesignError.
+    ``length`` and inner ``diameter`` of each chamber's tube are mm; ``load`` is what ``stack.pose``
+    takes beside pressures. Raises DesignError.
     """
     from sbafab.models.pneumatics import AIR, Line
 
