@@ -259,9 +259,10 @@ def predict(
 ) -> Prediction:
     """What a design will do; each figure names its model and its trust.
 
-    ``quick`` leaves out the figures of the elastic stack, which take seconds. ``asked`` holds fields of ``models.figures.Factors``, which are ``press_factor``,
-    ``contact_factor``, ``pocket_loss`` mm and ``modulus_mpa``, beside tables of the design. Raises
-    DesignError for what is out of every model's range.
+    ``quick`` leaves out the figures of the elastic stack, which take seconds. ``asked`` holds
+    fields of ``models.figures.Factors``, which are ``press_factor``, ``contact_factor``,
+    ``pocket_loss`` mm and ``modulus_mpa``, beside tables of the design. Raises DesignError for what
+    is out of every model's range.
     """
     from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict as model_predict
