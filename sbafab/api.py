@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from sbafab.laminate.laminate import Laminate, Layer
     from sbafab.meshing.surface import Surface
     from sbafab.models.figures import Prediction
+    from sbafab.models.motion import Motion
     from sbafab.models.stack import Stack
     from sbafab.output.run import Run
     from sbafab.output.simulating import Simulated
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from sbafab.results.records import Record
     from sbafab.results.report import Report
     from sbafab.rules.finding import Findings
+    from sbafab.search.find import Found
     from sbafab.search.sweep import Sweep
     from sbafab.simulators.simulator import Name
 
@@ -254,6 +256,8 @@ def predict(
     volumes_ul: Sequence[float] = (),
     press_factor: float = 1.0,
     contact_factor: float = 1.0,
+    pocket_loss: float = 0.0,
+    modulus_mpa: float | None = None,
     **tables: Any,
 ) -> Prediction:
     """What a design will do, by closed formulas; each figure names its model and its trust.
@@ -263,7 +267,7 @@ def predict(
     from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict as model_predict
 
-    factors = Factors(press_factor, contact_factor)
+    factors = Factors(press_factor, contact_factor, pocket_loss, modulus_mpa)
     asked = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), factors)
     return model_predict(load(source, *changes, **tables), asked)
 
@@ -277,6 +281,41 @@ def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **tabl
     from sbafab.models.stack import stack as stack_of
 
     return stack_of(load(source, *changes, **tables), most_pressure=most_pressure)
+
+
+def find(
+    source: Source,
+    *changes: Change,
+    least: Mapping[str, float] | None = None,
+    most: Mapping[str, float] | None = None,
+    best: str = "mass",
+    **asked: Any,
+) -> Found:
+    """The design that meets requirements and is best in one thing, or the nearest miss.
+
+    ``find("3dof-15mm", least={"lumen": 3, "force@12.5mm@50kPa": 3}, most={"outline_diameter":
+    20})``; quantities in mm, N, g and kPa. ``asked`` holds fields of ``search.find.FindRequest``,
+    such as ``tries``, beside tables of the design; ``found.best.values`` are the found keys.
+    """
+    from sbafab.search.find import FindRequest
+    from sbafab.search.find import find as run_find
+    from sbafab.search.requirements import read_all
+
+    settings, tables = _parted(asked, FindRequest)
+    at_least = [f"{name}={value!r}" for name, value in (least or {}).items()]
+    at_most = [f"{name}={value!r}" for name, value in (most or {}).items()]
+    requirements, goal = read_all(at_least, at_most, best)
+    return run_find(FindRequest(load(source, *changes, **tables), requirements, goal, **settings))
+
+
+def motion(stack: Stack, length: float = 150.0, diameter: float = 0.635, **load: Any) -> Motion:
+    """A stack that is fed with air through tubes, to call ``motion.step(dt, pressures=...)``.
+
+    ``length`` and inner ``diameter`` of each chamber's tube are mm; ``load`` is what ``stack.pose`` takes beside pressures. Raises DesignError.
+    """
+    from sbafab.models.pneumatics import AIR, Line
+
+    return stack.motion(line=Line(AIR, length, diameter), **load)
 
 
 def sweep(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 BY_SIGNAL = 128
 """Added to a signal's number, as shells do: the exit code of a command that it stopped."""
+ERROR_SCHEMA = "sbafab/error@1"
+"""Id of what a command prints of an error for programs."""
 STOPPED = "stopped; the output folder is whole, as it was before or as the run made it"
 
 

@@ -10,8 +10,9 @@ from sbafab.assemblies.fits import WHOLE, found
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Tube
 from sbafab.assemblies.supply import folded_diameter_with_tubes, reach
 from sbafab.design.form import Discs
+from sbafab.laminate.extent import outline_diameter
 from sbafab.models.folded import LOBES, folded_diameter
-from sbafab.models.sizes import deflated_diameter, inflated_diameter, outline_diameter
+from sbafab.models.sizes import deflated_diameter, inflated_diameter
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import holds
 

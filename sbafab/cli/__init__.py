@@ -14,8 +14,10 @@ from sbafab.cli.check import check
 from sbafab.cli.cut import cut
 from sbafab.cli.ending import BAD_INPUT, ended_plainly, prepared_streams, say
 from sbafab.cli.explain import explain
+from sbafab.cli.find import find
 from sbafab.cli.generate import generate
 from sbafab.cli.kerf import kerf
+from sbafab.cli.map import map_
 from sbafab.cli.mesh import mesh
 from sbafab.cli.nest import nest
 from sbafab.cli.new import new
@@ -24,6 +26,7 @@ from sbafab.cli.predict import predict
 from sbafab.cli.press import press
 from sbafab.cli.progress_line import add_verbosity
 from sbafab.cli.record import record
+from sbafab.cli.reproduce import reproduce
 from sbafab.cli.schema import schema
 from sbafab.cli.simulate import simulate
 from sbafab.cli.studio import studio
@@ -42,10 +45,13 @@ COMMANDS = (
     nest,
     kerf,
     predict,
+    map_,
     picture,
     simulate,
     sweep,
+    find,
     record,
+    reproduce,
     studio,
     schema,
 )
@@ -54,10 +60,13 @@ for _command in COMMANDS:
 
 
 EXTRAS = {
+    "dask": ("distributed", "sweep --dask"),
     "mesh": ("netgen", "sbafab mesh, simulate --with calculix"),
     "mujoco": ("mujoco", "simulate --with mujoco"),
     "nest": ("spyrrow", "--nest spyrrow"),
+    "parquet": ("pyarrow", "tables of sweeps as Parquet"),
     "python": ("trimesh", "meshes for trimesh, meshio and PyVista"),
+    "studio": ("starlette", "sbafab studio"),
 }
 """What each extra brings: a module to look for, and what needs it."""
 

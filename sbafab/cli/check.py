@@ -12,7 +12,7 @@ from sbafab.cli.options import json_option, set_option, waive_option
 from sbafab.cli.working import RULE_FAILED
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from sbafab.assemblies.records import Assembly
     from sbafab.cli.verdicts import Group
@@ -41,7 +41,10 @@ class CheckRequest(NamedTuple):
 
 
 class Told(NamedTuple):
-    """What was checked ("design" or "as-built"), its name, findings, notes, and the designs."""
+    """What was checked ("design" or "as-built"), its name, findings, notes, and the designs.
+
+    ``sizes``: those of each design by name, and in words.
+    """
 
     kind: str
     name: str
@@ -49,6 +52,8 @@ class Told(NamedTuple):
     groups: Sequence[Group]
     notes: Sequence[str] = ()
     designs: Sequence[Design] = ()
+    sizes: Mapping[str, Mapping[str, float]] = {}
+    sizes_said: Sequence[str] = ()
 
 
 @click.command()
@@ -100,7 +105,8 @@ def _checked(asked: CheckRequest) -> bool:
     if asked.as_json:
         advised = {"advice": advice.as_dict()} if advice else {}
         found = checks(told.findings, told.kind, told.name, told.designs)
-        print_json({**found, "notes": list(told.notes), **advised})
+        sized = {"sizes": told.sizes} if told.sizes else {}
+        print_json({**found, **sized, "notes": list(told.notes), **advised})
     else:
         _print(told, advice, asked.verbose)
     return has_failed(told.findings)
@@ -117,6 +123,8 @@ def _print(told: Told, advice: Advice | None, verbose: bool) -> None:
     out = console()
     if told.kind == "as-built":
         out.print(f"as built: {told.name}", markup=False, soft_wrap=True)
+    for said in told.sizes_said:
+        out.print(said, markup=False, soft_wrap=True)
     for said in dict.fromkeys(map(cited, told.designs)):
         out.print(said, markup=False, soft_wrap=True)
     for note in told.notes:
@@ -179,6 +187,7 @@ def _of_checked(
 ) -> Told:
     from sbafab.cli.printing import notes_of
     from sbafab.cli.verdicts import groups_of
+    from sbafab.models.sizes import size_said, sizes
     from sbafab.output.batch import refuse_undoable
     from sbafab.rules.deck import has_failed
 
@@ -186,7 +195,12 @@ def _of_checked(
         refuse_undoable(checked)
     designs = [one.design for one in checked]
     groups = groups_of(checked, between)
-    return Told("design", name, findings, groups, notes_of(checked), designs)
+    measured = {one.design.name: sizes(one.design, one.laminate) for one in checked}
+    said = [
+        f"{f'{one.design.name}, ' if len(checked) > 1 else ''}{size_said(one.design, one.laminate)}"
+        for one in checked
+    ]
+    return Told("design", name, findings, groups, notes_of(checked), designs, measured, said)
 
 
 def _advice(asked: CheckRequest, target: float) -> Advice:

@@ -17,14 +17,11 @@ from typing import NamedTuple, NoReturn
 import click
 
 from sbafab.cli.working import RULE_FAILED
-from sbafab.errors import BY_SIGNAL, STOPPED, DefectError, SbafabError, TooLargeError
+from sbafab.errors import BY_SIGNAL, ERROR_SCHEMA, STOPPED, DefectError, SbafabError, TooLargeError
 
 BAD_INPUT = 2
 LATER = 0.01
 """Seconds after which an interrupt that got lost is raised once more."""
-
-
-ERROR_SCHEMA = "sbafab/error@1"
 
 
 class Exit(NamedTuple):

@@ -10,7 +10,7 @@ from sbafab.cli.printing import COLOURS, console, findings_table
 
 if TYPE_CHECKING:
     from sbafab.output.planned import Checked
-    from sbafab.rules.finding import Finding
+    from sbafab.rules.finding import Finding, Verdict
 
 
 class Group(NamedTuple):
@@ -57,7 +57,8 @@ def print_lines(findings: Sequence[Finding]) -> None:
         line = Text(f"{rule:{wide}}  ")
         line.append(f"{one.verdict:7}", style=COLOURS[one.verdict])
         measured, limit = short_figure(one.measured, one.unit), short_figure(one.limit, one.unit)
-        line.append(f"  {measured:>13}  {limit:>11}".rstrip())
+        line.append(f"  {measured:>13}  {limit:>11}")
+        line.rstrip()
         out.print(line, soft_wrap=True)
 
 
@@ -66,18 +67,17 @@ def print_open(findings: Sequence[Finding], width: int = 80) -> None:
     from rich.text import Text
 
     out = console()
+    # Bond and overhang may ask for the same.
+    for said, verdict in dict.fromkeys(_told(findings)):
+        lines = textwrap.wrap(said, width, subsequent_indent="  ", break_on_hyphens=False)
+        for line in lines:
+            out.print(Text(line, style=COLOURS[verdict]), soft_wrap=True)
+
+
+def _told(findings: Sequence[Finding]) -> Iterator[tuple[str, Verdict]]:
     for one in findings:
-        for line in _told(one, width):
-            out.print(Text(line, style=COLOURS[one.verdict]), soft_wrap=True)
-
-
-def _told(finding: Finding, width: int) -> Iterator[str]:
-    if finding.verdict not in ("fail", "warn") and not finding.by_user:
-        return
-    said = finding.remedy or finding.message
-    yield from textwrap.wrap(
-        f"{finding.rule}: {said}", width, subsequent_indent="  ", break_on_hyphens=False
-    )
+        if one.verdict in ("fail", "warn") or one.by_user:
+            yield f"{one.rule}: {one.remedy or one.message}", one.verdict
 
 
 def counted(findings: Iterable[Finding]) -> str:

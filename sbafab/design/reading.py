@@ -14,12 +14,13 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from sbafab.design.records import Design
-from sbafab.design.writing import plain_tables
+from sbafab.design.writing import FITS, plain_tables
 from sbafab.errors import DesignError
 
 Change = str | Mapping[str, Any]
 """A key to set: "key.path=value", or a table of keys, which may be dotted, with their values."""
 OUTLINE = "chamber.outline"
+DIAMETER = "chamber.diameter"
 KIT = "kit"
 KITS = "kits"
 """The folder of the kits that ship, among the templates."""
@@ -190,6 +191,15 @@ def start_where_the_user_stands(data: dict[str, Any], changes: Iterable[Change])
         data[KIT] = str(Path(data[KIT]).absolute())
 
 
+def open_what_fits(data: dict[str, Any], changes: Iterable[Change]) -> None:
+    """A change to what the design must fit opens its chamber, unless a change names that too."""
+    keys = set(changed_keys(changes))
+    chamber = data.get("chamber")
+    fits = DIAMETER not in keys and any(key.startswith(f"{FITS}.") for key in keys)
+    if fits and isinstance(chamber, dict):
+        chamber.pop("diameter", None)
+
+
 def changed(design: AnyDesign, changes: Iterable[Change]) -> AnyDesign:
     """The same design with changes made to its keys. Raises DesignError with one sentence."""
     from sbafab.design.kits import under_kit, without_kit
@@ -200,9 +210,10 @@ def changed(design: AnyDesign, changes: Iterable[Change]) -> AnyDesign:
         data = without_kit(data, design)
     data = override(data, changes)
     start_where_the_user_stands(data, changes)
+    open_what_fits(data, changes)
     data = under_kit(data, design.folder)
     family = type(design)
-    return checked(family, data, {design.family: family}).placed(design.folder)
+    return checked(family, data, {design.family: family}).placed(design.folder).fitted()
 
 
 def add_waivers(data: dict[str, Any], waivers: Sequence[str]) -> dict[str, Any]:
@@ -247,7 +258,7 @@ def validated(
         raise DesignError(f"family = {shown(family)} must be one of {listed(families)}{hint}")
     from sbafab.design.kits import under_kit
 
-    return checked(families[family], under_kit(data, folder), families).placed(folder)
+    return checked(families[family], under_kit(data, folder), families).placed(folder).fitted()
 
 
 def checked(

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, PrivateAttr
 
 from sbafab.design.films import UNCALIBRATED, Films, KerfWidth, LayerFilms, Sheet
-from sbafab.design.form import Form
+from sbafab.design.form import Form, Free
 from sbafab.design.section import Section
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres
 from sbafab.notebook import table_html
@@ -311,11 +311,17 @@ class Design(Section):
     chamber: Chamber = Chamber()
 
     _folder: Path = PrivateAttr(default=Path())
+    _is_solved: bool = PrivateAttr(default=False)
 
     @property
     def folder(self) -> Path:
         """Where relative paths of the design start: the folder of its file."""
         return self._folder
+
+    @property
+    def is_solved(self) -> bool:
+        """Whether ``chamber.diameter`` was solved from what the design must fit."""
+        return self._is_solved
 
     @property
     def drawing(self) -> Path | None:
@@ -346,6 +352,16 @@ class Design(Section):
     def form(self) -> Form:
         """What the actuator is like, for models, checks and pages. Raises DesignError."""
 
+    @property
+    def free(self) -> tuple[Free, ...]:
+        """The keys that a search may change unless it is told otherwise; a family adds its own."""
+        most, bond, reach = self.rules.validated_balloons, self.rules.bond_width, self.mask.overhang
+        return (
+            Free("stack.balloons", 2, most, 1),
+            Free("bond.width", bond, bond + 0.5, 0.05, asked="yield"),
+            Free("mask.overhang", reach, reach + 0.5, 0.05, asked="yield"),
+        )
+
     def with_(self, *changes: str | Mapping[str, Any], **tables: Any) -> Self:
         """The same design with keys changed, checked like a design file.
 
@@ -368,6 +384,19 @@ class Design(Section):
         """The same design with every default that depends on another value filled in."""
         inlet = self.inlet.model_copy(update={"width": self.strip_width})
         return self.model_copy(update={"inlet": inlet})
+
+    def fitted(self) -> Self:
+        """The same design with what it must fit solved for. Raises DesignError where nothing does.
+
+        A family that knows ``fits`` does so.
+        """
+        return self
+
+    def solved(self) -> Self:
+        """The same design, of which ``chamber.diameter`` is known to be solved, not given."""
+        copy = self.model_copy()
+        copy._is_solved = True
+        return copy
 
     def placed(self, folder: Path) -> Self:
         """The same design with relative paths starting at ``folder``."""

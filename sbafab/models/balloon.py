@@ -1,8 +1,9 @@
 """One round balloon as an elastic membrane of revolution: inflated free, or between plates.
 
 Two equal films, bonded round the pocket and, where there are neighbours, at the neck. One film is
-computed; the other one mirrors it. A film stretches (plane stress; Saint Venant and
-Kirchhoff's law, or Hencky's) and bends. Where its hoop is compressed it wrinkles, and carries what wrinkles of least energy do:
+computed; the other one mirrors it. A film stretches (plane stress; Saint Venant and Kirchhoff's law,
+or Hencky's) and bends. Where its hoop is compressed it wrinkles, and carries what wrinkles of least
+energy do:
 
     N = 2 pi / L sqrt(B T)      (after Cerda and Mahadevan, 2003)
 
@@ -55,7 +56,8 @@ class Balloon:
     ``neck`` is the radius bonded to the next balloon, ``bore`` that of the hole in it; both 0 for a
     lone balloon. Without ``wrinkles`` films stay as smooth as an axisymmetric mesh keeps them.
     ``inextensible`` is the limit of a film that neither bends nor carries any compression, its rim
-    included: the modulus has then to be large.
+    included: the modulus has then to be large. ``order`` is that of the film's law (``Flat``): 2 for
+    Saint Venant's and Kirchhoff's, which programs for linear films take; 0 for Hencky's.
     """
 
     pocket: float = 2.5

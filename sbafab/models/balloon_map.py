@@ -113,11 +113,11 @@ class BalloonMap:
         return x, each / np.hypot(p, P0)
 
     def force(self, pressure: ArrayLike, height: ArrayLike) -> Array:
-        """mN on the plate at either end; below 0 where the balloon is pulled on."""
+        """MN on the plate at either end; below 0 where the balloon is pulled on."""
         return -self._along(0, pressure, height).first * self.spans
 
     def volume(self, pressure: ArrayLike, height: ArrayLike) -> Array:
-        """ul in the balloon."""
+        """Ul in the balloon."""
         return self._along(1, pressure, height).value
 
     def potential(self, pressure: ArrayLike, height: ArrayLike) -> Array:
@@ -130,14 +130,14 @@ class BalloonMap:
         return along(found, HEIGHT_SPANS * np.arange(p.size).reshape(p.shape), h * self.spans)
 
     def free_height(self, pressure: ArrayLike) -> Array:
-        """mm to which it rises where nothing holds it."""
+        """Mm to which it rises where nothing holds it."""
         p = np.asarray(pressure, float)
         low, high = np.zeros(p.shape), np.full(p.shape, self.most_height)
         for _ in range(50):
             middle = (low + high) / 2
             pushes = self.force(p, middle) > 0
             low, high = np.where(pushes, middle, low), np.where(pushes, high, middle)
-        return (low + high) / 2
+        return np.asarray((low + high) / 2)
 
 
 class Along(NamedTuple):
@@ -224,7 +224,8 @@ def _fitted(p: Array, h: Array, found: Shapes, most: float, top: float) -> Array
         ]
     )
     wanted = np.concatenate([potential * scale, found.force * push, found.volume * room])
-    return np.linalg.lstsq(matrix, wanted, rcond=None)[0].reshape(blank.shape)
+    best = np.linalg.lstsq(matrix, wanted, rcond=None)[0]
+    return np.asarray(best.reshape(blank.shape))
 
 
 def _rows(x: Array, order: int, count: int) -> Array:

@@ -24,6 +24,8 @@ ELASTIC = Model(
 def calibrated(model: Model, factors: Factors) -> Model:
     """The same model with the factors it took, named unless they are the defaults."""
     said = []
+    if factors.press_factor != 1:
+        said.append(f"press factor {factors.press_factor:g}")
     if factors.pocket_loss:
         said.append(f"pocket loss {factors.pocket_loss:g} mm")
     if factors.modulus_mpa is not None:

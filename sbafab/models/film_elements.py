@@ -94,8 +94,9 @@ def membrane(flat: Flat, r: Array, z: Array, cap: Array, slopes: bool = True) ->
     """Stretching, by element; where the hoop stress falls to ``-cap`` (kPa) the film wrinkles.
 
     Plane stress. With logarithmic strains it is Hencky's (1928) law, good for stretches of 0.7 to
-    1.3 (Anand, 1979); with Green's it is Saint Venant's and Kirchhoff's. From there on the hoop follows at no more than that stress: the relaxed energy of a tension
-    field (Pipkin, 1986), with what the wrinkles themselves carry.
+    1.3 (Anand, 1979); with Green's it is Saint Venant's and Kirchhoff's. From there on the hoop
+    follows at no more than that stress: the relaxed energy of a tension field (Pipkin, 1986), with
+    what the wrinkles themselves carry.
     """
     nu, plane = flat.poisson, flat.modulus / (1 - flat.poisson**2)
     e1, e2 = strain(flat, r, z)

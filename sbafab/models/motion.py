@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,10 @@ if TYPE_CHECKING:
     from sbafab.models.stack import Pose, Stack
 
 MOST_ROUNDS = 40
+HALVINGS = 8
+SOFTEST = 0.01
+"""Pressure in kPa below which volumes are nearly straight in pressure, above in its logarithm."""
+FARTHEST = 1.0
 CLOSE = 1e-5
 """Share of a chamber's content by which it may be missed."""
 
@@ -37,7 +42,7 @@ class Motion:
 
     @property
     def pressures(self) -> tuple[float, ...]:
-        """kPa in the chambers."""
+        """KPa in the chambers."""
         return self.pose.pressures
 
     def step(
@@ -46,8 +51,8 @@ class Motion:
         pressures: Sequence[float] | None = None,
         flows: Sequence[float] | None = None,
     ) -> Pose:
-        """The pose ``dt`` s later, with pressures (kPa) at the valves, or flows (ul/s) of the pumps,
-        one a chamber; of a gas at the atmosphere. Raises DesignError.
+        """The pose ``dt`` s later, with pressures (kPa) at the valves or flows (ul/s, of a gas at
+        the atmosphere) of the pumps, one a chamber. Raises DesignError.
         """
         if not (np.isfinite(dt) and dt > 0):
             raise DesignError(f"dt = {dt:g} s must be above 0 s")
@@ -55,9 +60,7 @@ class Motion:
             raise DesignError("a step takes either pressures or flows, one a chamber")
         given = np.asarray(pressures if flows is None else flows, dtype=float)
         if given.shape != (self.stack.chambers,) or not np.isfinite(given).all():
-            raise DesignError(
-                f"a step takes {self.stack.chambers} finite numbers, one a chamber"
-            )
+            raise DesignError(f"a step takes {self.stack.chambers} finite numbers, one a chamber")
         before = self._contents(self.pose)
         acts = max(0.0, min(dt, self.time + dt - self.line.delay))
         if flows is None:
@@ -88,45 +91,48 @@ class Motion:
     def _filled(self, wanted: Array) -> Pose:
         return self._solved(lambda pose: np.asarray(self._contents(pose) - wanted), wanted)
 
-    def _solved(self, missed: Any, scale: Array) -> Pose:
-        """The pose at which nothing is missed: Newton's method in the cube root of the pressure,
-        in which volumes are nearly straight.
+    def _solved(self, missed: Callable[[Pose], Array], scale: Array) -> Pose:
+        """The pose at which nothing is missed: Newton's method in asinh(p / SOFTEST), in which
+        volumes are nearly straight. A chamber that would need less than no pressure draws in what
+        it lacks.
         """
-        most = np.cbrt(self.stack.most_pressure)
-        x = np.cbrt(np.asarray(self.pose.pressures))
+        most = math.asinh(self.stack.most_pressure / SOFTEST)
+        x = np.arcsinh(np.asarray(self.pose.pressures) / SOFTEST)
         pose = self._at(x)
         wrong = missed(pose)
         close = CLOSE * np.maximum(np.abs(scale), 1.0)
         for _ in range(MOST_ROUNDS):
-            if (np.abs(wrong) <= close).all():
+            counts = ~((x <= 0) & (wrong >= 0))
+            if (np.abs(wrong) <= close)[counts].all():
                 return pose
-            slopes = self._slopes(missed, x, wrong)
-            move = np.clip(-np.linalg.solve(slopes, wrong), -0.5, 0.5)
-            for _ in range(8):
+            if (counts & (x >= most) & (wrong < 0)).any():
+                break
+            slopes = self._slopes(missed, x, wrong)[np.ix_(counts, counts)]
+            move = np.zeros_like(x)
+            move[counts] = np.clip(-np.linalg.solve(slopes, wrong[counts]), -FARTHEST, FARTHEST)
+            for _ in range(HALVINGS):
                 tried_x = np.clip(x + move, 0.0, most)
                 tried = self._at(tried_x)
                 left = missed(tried)
-                if np.abs(left / close).max() < np.abs(wrong / close).max():
+                still = ~((tried_x <= 0) & (left >= 0))
+                if np.abs(left / close)[still].max(initial=0) < np.abs(wrong / close)[counts].max():
                     break
                 move = move / 2
-            if (tried_x == x).all():
-                break
             x, pose, wrong = tried_x, tried, left
-        if (np.abs(wrong) <= 100 * close).all() or (x <= 0).any():
-            return pose
         raise DesignError(
             f"the chambers would need more than {self.stack.most_pressure:g} kPa; ask for less, or "
             "make the stack with a larger most_pressure"
         )
 
-    def _slopes(self, missed: Any, x: Array, wrong: Array) -> Array:
+    def _slopes(self, missed: Callable[[Pose], Array], x: Array, wrong: Array) -> Array:
         found = np.empty((len(x), len(x)))
         for chamber in range(len(x)):
-            step = 1e-4 if x[chamber] < 1 else -1e-4
+            step = 1e-3 if x[chamber] < 1 else -1e-3
             moved = x.copy()
             moved[chamber] += step
             found[:, chamber] = (missed(self._at(moved)) - wrong) / step
         return found
 
     def _at(self, x: Array) -> Pose:
-        return self.stack.pose(tuple((x**3).tolist()), near=self.pose, **self.load)
+        pressures = np.minimum(SOFTEST * np.sinh(x), self.stack.most_pressure)
+        return self.stack.pose(tuple(pressures.tolist()), near=self.pose, **self.load)

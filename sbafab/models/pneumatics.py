@@ -60,7 +60,7 @@ class Line:
 
     @property
     def tube_volume(self) -> float:
-        """ul in the tube."""
+        """Ul in the tube."""
         return math.pi * self.diameter**2 / 4 * self.length
 
     def flow(self, source: float, chamber: float) -> float:

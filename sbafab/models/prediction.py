@@ -13,6 +13,7 @@ from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import GeometryError
 from sbafab.geometry.region import Region
+from sbafab.laminate.extent import film_mass
 from sbafab.laminate.laminate import Laminate
 from sbafab.models import axial, elastic, lobes, paper, stacked
 from sbafab.models.actuator import NO_OUTLINE, Actuator, actuator
@@ -144,10 +145,7 @@ def _round_tube(name: str, factor: float) -> Model:
 
 
 def _mass(laminate: Laminate) -> Figure:
-    grams = sum(
-        layer.profile.area * layer.film.thickness * layer.film.density * 1e-6
-        for layer in laminate.layers
-    )
+    grams = film_mass(laminate)
     trust = "exact for the films, masks, tabs and ears included; without tubing, glue and fluid"
     return Figure("size", "mass", grams, "g", Model("area x thickness x density", "", trust))
 

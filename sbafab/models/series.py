@@ -28,7 +28,9 @@ def blocked(stack: Stack, pressure: float, stroke: ArrayLike) -> Array:
     total = np.zeros(SAMPLES)
     for count, (heights, push) in zip(counts, curves, strict=True):
         total += count * np.interp(force, push[::-1], heights[::-1])
-    return np.asarray(np.interp(stroke, total[::-1], force[::-1], right=0.0) / 1000)
+    return np.asarray(
+        np.interp(np.asarray(stroke, dtype=float), total[::-1], force[::-1], right=0.0) / 1000
+    )
 
 
 def _curve(one: BalloonMap, pressure: float) -> tuple[Array, Array]:

@@ -98,7 +98,7 @@ class Pose:
     @property
     def tip(self) -> Array:
         """Middle of the top plate (3,) in mm."""
-        return self._chain.places[-1]
+        return np.asarray(self._chain.places[-1])
 
     @property
     def height(self) -> float:
@@ -220,7 +220,7 @@ class Stack:
 
     @cached_property
     def most_pressure(self) -> float:
-        """kPa to which its maps go."""
+        """How far its maps go, in kPa."""
         return min(one.most_pressure for one in self.maps)
 
     @cached_property
@@ -303,8 +303,9 @@ def stack(
 ) -> Stack:
     """The stack of a design with round pockets on one axis or side by side.
 
-    ``most_pressure`` in kPa is what maps are made to. ``factors`` are measured ones. Raises DesignError for pockets of another
-    shape, for actuators round a tube and for films of unknown modulus.
+    ``most_pressure`` in kPa is what maps are made to. ``factors`` are measured ones. Raises
+    DesignError for pockets of another shape, for actuators round a tube and for films of unknown
+    modulus.
     """
     from sbafab.actuators import build
     from sbafab.models.balloons import balloons_of

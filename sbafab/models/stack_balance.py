@@ -246,10 +246,10 @@ def _loaded(
     value, gradient, blocks = springs.energy(at)
     plates = chain(at, pitch)
     acting = _acting(plates, load)
-    matrix = np.zeros((count, 3, count, 3))
+    sparse = np.zeros((count, 3, count, 3))
     level = np.arange(count)
-    matrix[level, :, level] = blocks
-    matrix = matrix.reshape(3 * count, 3 * count)
+    sparse[level, :, level] = blocks
+    matrix = sparse.reshape(3 * count, 3 * count)
     does = (np.abs(acting.forces).max(-1) > 0) | acting.stiffness.any((1, 2))
     total = float(value.sum()) + acting.energy
     if not does.any():

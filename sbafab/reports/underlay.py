@@ -70,12 +70,13 @@ class Guide:
 
     region: Region
     is_mask: bool
+    films: tuple[str, ...]
     patterns: tuple[str, ...]
     steps: tuple[int, ...]
 
     @property
     def words(self) -> str:
-        what = "PTFE, dashed" if self.is_mask else "TPE"
+        what = say.listed(self.films) + (", dashed" if self.is_mask else "")
         return (
             f"{say.listed(self.patterns)} ({what}): outer edge, press step"
             f"{'s' if len(self.steps) > 1 else ''} {say.listed([str(n) for n in self.steps])}"
@@ -205,7 +206,7 @@ def _laminate(page: PdfPage, laminate: Laminate, found: tuple[Guide, ...], shift
 
 def guides(laminate: Laminate) -> tuple[Guide, ...]:
     """What is laid by hand in any step, equal outlines once, in the order of the steps."""
-    shapes: dict[tuple[object, bool], tuple[Region, list[str], list[int]]] = {}
+    shapes: dict[tuple[object, bool], tuple[Region, list[Layer], list[int]]] = {}
     parts = assembly(laminate)
     # What is laid down again as one whole stack has no edge to lie by.
     for step in (part for part in parts if part.adds):
@@ -213,12 +214,18 @@ def guides(laminate: Laminate) -> tuple[Guide, ...]:
             for layer in _loose(laminate, step, bed):
                 outline = Region(tuple(layer.profile.outers))
                 key = outline.key, layer.is_mask
-                _, patterns, steps = shapes.setdefault(key, (outline, [], []))
-                patterns.append(layer.pattern)
+                _, laid, steps = shapes.setdefault(key, (outline, [], []))
+                laid.append(layer)
                 steps.append(step.number)
     return tuple(
-        Guide(region, is_mask, tuple(dict.fromkeys(patterns)), tuple(dict.fromkeys(steps)))
-        for (_, is_mask), (region, patterns, steps) in shapes.items()
+        Guide(
+            region,
+            is_mask,
+            tuple(dict.fromkeys(layer.film.material for layer in laid)),
+            tuple(dict.fromkeys(layer.pattern for layer in laid)),
+            tuple(dict.fromkeys(steps)),
+        )
+        for (_, is_mask), (region, laid, steps) in shapes.items()
     )
 
 

@@ -59,8 +59,13 @@ def results_of(said: Mapping[str, Any], table: str | Path | None = None) -> list
     if not said.get("serial"):
         raise DesignError("an actuator needs its serial; give serial, as on its traveller")
     errors = {q.name: said[q.name] for q in ERRORS if q.name in said}
+    serial, operator, kit, note, leak = (str(said.get(name, "")) for name in (*TEXTS, "leak"))
     result = LabResult(
-        **{name: str(said[name]) for name in (*TEXTS, "leak") if name in said},
+        serial=serial,
+        leak=leak,
+        operator=operator,
+        kit=kit,
+        note=note,
         numbers={q.name: float(said[q.name]) for q in NUMBERS if q.name in said},
         errors={
             name: tuple(map(float, (value,) if isinstance(value, int | float) else value))

@@ -46,6 +46,7 @@ class Studio:
     """A design from a link, in place of a file."""
     live: Worker = field(default_factory=lambda: Worker(LIVE_SECONDS))
     side: Worker = field(default_factory=lambda: Worker(LIVE_SECONDS))
+    mover: Worker = field(default_factory=lambda: Worker(LIVE_SECONDS, warm=False))
     maker: Worker = field(default_factory=lambda: Worker(MAKE_SECONDS, warm=False))
     made: dict[str, Made] = field(default_factory=dict)
     scratch: Path = field(default_factory=lambda: Path(tempfile.mkdtemp(prefix="sbafab-studio-")))
@@ -57,7 +58,7 @@ class Studio:
         try:
             yield
         finally:
-            for worker in (self.live, self.side, self.maker):
+            for worker in (self.live, self.side, self.mover, self.maker):
                 worker.stop()
             shutil.rmtree(self.scratch, ignore_errors=True)
 
@@ -71,7 +72,8 @@ def app(studio: Studio) -> Starlette:
         Route("/api/save", save, methods=["POST"]),
         Route("/api/watch/{name}", watch),
         Route("/api/live", live, methods=["POST"]),
-        Route("/api/predict", side, methods=["POST"]),
+        Route("/api/predict", predict, methods=["POST"]),
+        Route("/api/motion", motion, methods=["POST"]),
         Route("/api/generate", generate, methods=["POST"]),
         Route("/made/{key}.zip", made_zip),
         Route("/made/{key}/{path:path}", made_file),
@@ -156,8 +158,12 @@ async def live(request: Request) -> Response:
     return await _worked(request, _studio(request).live, "live")
 
 
-async def side(request: Request) -> Response:
-    return await _worked(request, _studio(request).side, request.url.path.rpartition("/")[2])
+async def predict(request: Request) -> Response:
+    return await _worked(request, _studio(request).side, "predict")
+
+
+async def motion(request: Request) -> Response:
+    return await _worked(request, _studio(request).mover, "motion")
 
 
 async def generate(request: Request) -> Response:

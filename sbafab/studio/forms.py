@@ -28,7 +28,7 @@ SLIDERS: dict[str, tuple[float, float, float]] = {
 FIRST = ("stack", "chamber", "lumen", "bore", "bond", "mask", "fillet", "inlet", "tube", "sheet")
 """Sections that shape the actuator; the form begins with them."""
 UNITS = (
-    (re.compile(r"(^|_)temperature_c$|melting_point$|temperature_limit$"), "\u00b0C"),
+    (re.compile(r"temperature_c$|melting_point$|temperature_limit$"), "\u00b0C"),
     (re.compile(r"_kpa$"), "kPa"),
     (re.compile(r"minutes$"), "min"),
     (re.compile(r"seconds$"), "s"),

@@ -22,10 +22,11 @@ PAGE_POLICY = (
     "frame-ancestors 'none'"
 )
 MADE_POLICY = (
-    "default-src 'none'; style-src 'unsafe-inline'; img-src 'self' data:; sandbox allow-modals "
-    "allow-popups; frame-ancestors 'self'; base-uri 'none'; form-action 'none'"
+    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src 'self' "
+    "data:; sandbox allow-scripts allow-modals; frame-ancestors 'self'; base-uri 'none'; "
+    "form-action 'none'"
 )
-"""For pages that a run wrote: pictures and styles, no script."""
+"""For pages that a run wrote: alone in a box, with no way to the studio or to any host."""
 
 
 class Guard:

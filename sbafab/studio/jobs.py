@@ -16,14 +16,18 @@ from sbafab.errors import DesignError
 from sbafab.studio import places
 from sbafab.studio.editing import MOST_EDITS, edited
 from sbafab.studio.model import Beat, finding_model, laminate_model
+from sbafab.studio.moving import Filling, poses, stack_model
 
 if TYPE_CHECKING:
     from sbafab.design.records import Design
     from sbafab.laminate.laminate import Laminate
+    from sbafab.models.stack import Stack
 
 Job = dict[str, Any]
 Answer = dict[str, Any]
-LAST_RULE = "registration-yield"
+_FILLINGS: dict[str, Filling] = {}
+MOST_FILLINGS = 8
+"""Tabs whose actuators fill at the same time."""
 
 
 def live(job: Job, beat: Beat) -> Iterator[Answer]:
@@ -90,6 +94,29 @@ def generate(job: Job, beat: Beat) -> Iterator[Answer]:
     }
 
 
+def motion(job: Job, beat: Beat) -> Iterator[Answer]:
+    """The actuator as the fast stack has it, and how it moves as its pressures grow together.
+
+    The pose asks for ``pressures``, or gives none for what the page has to know beforehand.
+    """
+    text, asked = _text(job), job.get("pose") or {}
+    design = _loaded(text, job)
+    stack = _stack(text, job["folder"], job["path"])
+    beat()
+    if "pressures" not in asked:
+        yield stack_model(design.name, stack)
+        return
+    if asked.get("tube"):
+        filling = _FILLINGS.setdefault(job["tab"], Filling())
+        while len(_FILLINGS) > MOST_FILLINGS:
+            del _FILLINGS[next(iter(_FILLINGS))]
+        yield filling.step(stack, asked)
+        return
+    for pose in poses(stack, asked):
+        yield pose
+        beat()
+
+
 def _text(job: Job) -> str:
     """The design's text with the edits made. Raises DesignError."""
     edits = job.get("edits", ())
@@ -99,13 +126,20 @@ def _text(job: Job) -> str:
 
 
 def _loaded(text: str, job: Job) -> Any:
-    places.refuse_outside(text, Path(job["folder"]))
     return _design(text, job["folder"], job["path"])
 
 
 @lru_cache(maxsize=4)
-def _design(text: str, folder: str, path: str) -> Any:
+def _read(text: str, folder: str, path: str) -> Any:
     return api.loads(text, Path(folder) / path)
+
+
+def _design(text: str, folder: str, path: str) -> Any:
+    """A design, read again each time where it names a file, which may have changed."""
+    if places.refuse_outside(text, Path(folder)):
+        _laminate.cache_clear()
+        return api.loads(text, Path(folder) / path)
+    return _read(text, folder, path)
 
 
 @lru_cache(maxsize=2)
@@ -113,8 +147,14 @@ def _laminate(text: str, folder: str, path: str) -> Laminate:
     return api.build(_design(text, folder, path))
 
 
+@lru_cache(maxsize=2)
+def _stack(text: str, folder: str, path: str) -> Stack:
+    return api.stack(_design(text, folder, path))
+
+
 JOBS: dict[str, Callable[[Job, Beat], Iterator[Answer]]] = {
     "live": live,
     "predict": predict,
     "generate": generate,
+    "motion": motion,
 }

@@ -16,10 +16,10 @@ def design_in(link: str) -> str:
     """The design's text in a link. Raises DesignError where there is none."""
     packed = parse_qs(urlsplit(link).fragment).get("design", [""])[0]
     try:
-        raw = base64.urlsafe_b64decode(packed + "=" * (-len(packed) % 4))
+        raw = base64.b64decode(packed + "=" * (-len(packed) % 4), b"-_", validate=True)
         reader = zlib.decompressobj(-zlib.MAX_WBITS)
         text = reader.decompress(raw, MOST)
-        if not packed or reader.unconsumed_tail or not reader.eof:
+        if not packed or reader.unconsumed_tail or reader.unused_data or not reader.eof:
             raise ValueError("cut off")
         return text.decode("utf-8")
     except (ValueError, binascii.Error, zlib.error):

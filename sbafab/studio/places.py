@@ -77,23 +77,26 @@ def save(path: Path, text: str, seen: str | None) -> str:
     return _hash(content)
 
 
-def refuse_outside(text: str, folder: Path) -> None:
-    """Raises DesignError where a design's text names a file outside the folder.
+def refuse_outside(text: str, folder: Path) -> bool:
+    """Whether a design's text names files; raises DesignError for one outside the folder.
 
     What is no TOML, or holds a value of another type there, is left to who reads it.
     """
     try:
         tables = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError):
-        return
+        return False
+    named = False
     for key, value in _references(tables):
         if value in (*api.templates(), "paper"):
             continue
+        named = True
         path = folder / value
         if "\0" in value or not _lies_in(path, folder):
             raise DesignError(f"{key} = {value[:60]!r} lies outside {folder}; copy it into there")
         if key.endswith("design") and path.is_file():
             refuse_outside(path.read_text("utf-8", "replace"), path.parent)
+    return named
 
 
 def _references(tables: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:

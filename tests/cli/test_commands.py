@@ -206,4 +206,5 @@ def test_check_refuses_what_generate_would_refuse(
     assert says in said_by_check
     code, _, said_by_generate = run(["generate", *arguments, "-o", str(tmp_path)], capsys)
     assert code == exit_code
-    assert said_by_generate == said_by_check
+    # A slow machine may say how far it was before.
+    assert said_by_generate.splitlines()[-1] == said_by_check.splitlines()[-1]

@@ -159,7 +159,7 @@ def test_calculix_takes_each_film_and_the_coarse_shell_one_that_is_known(
     ratio = actuator(tpu).mass / actuator(tpe).mass
     assert ratio == pytest.approx(0.05 * 1200 / (0.038 * 1122))
     assert "add films.pet.modulus, in MPa" in (why_not_round(pet) or "")
-    assert "of TPE alone" in (why_no_scene(tpu) or "")
+    assert why_no_scene(tpu) is None
     with pytest.raises(DesignError, match=r"add films.pet.modulus, in MPa"):
         deck_settings(laminate)
     stiff = build(design.with_("films.pet.modulus=3000"))

@@ -28,6 +28,7 @@ from sbafab.reports.traveller.page import traveller_html
 from sbafab.reports.traveller.sheet_map import sheet_map
 from sbafab.rules.deck import run_deck
 
+EARS = 'registration.method="ears"'
 SHA = hashlib.sha256(b"design").hexdigest()
 TPE, PTFE, BOND, OVERHANG = 0.038, 0.025, 0.75, 0.5
 
@@ -197,7 +198,7 @@ def test_the_legend_names_the_cross_only_where_it_is_seen(sheet_files: Any) -> N
         said = [words_of(plan) for plan in plans]
         assert [f"middle of pin {pin}" in words for words in said] == [True, False] * 2
         assert ["+ datum" in words for words in said] == [False, True] * 2
-    eared = page(sheet_files, "1dof-5mm", "stack.balloons=1", 'registration.method="ears"')
+    eared = page(sheet_files, "1dof-5mm", "stack.balloons=1", EARS)
     assert all("+ datum" in step for step in steps(eared))
 
 
@@ -226,6 +227,11 @@ def test_what_good_hands_know_stands_where_it_happens(sheet_files: Any) -> None:
     for step, says in ((first, False), (second, True), (third, False), (fourth, True)):
         assert ("the pin of the lumen (⌀2 mm) passes every film here" in step) == says
     assert "the pin of the lumen" not in " ".join(steps(page(sheet_files, "1dof-5mm")))
+    # A tacked stack that is laid down again by itself is aligned with nothing.
+    for step in steps(page(sheet_files, "1dof-5mm", "stack.balloons=1", EARS)):
+        if "no pins in it" in step:
+            assert "lay them by eye" not in step
+            assert "Better than by eye" not in step
 
 
 def test_the_underlay_is_laid_where_it_has_a_line(sheet_files: Any) -> None:
@@ -364,3 +370,18 @@ def test_narrow_holes_are_tried_on_their_pins_before_the_press(sheet_files: Any)
     assert "a film must stretch by 21% over its pin (30% is allowed; nobody has tried it)" in cut
     assert "up to 41 films go on one pin" in cut
     assert cut.index("Wipe the soot") < cut.index("Try one part of every pattern on its pins")
+
+
+def test_tubes_and_leaks_are_those_of_every_copy() -> None:
+    design, laminate = built("1dof-5mm", "stack.balloons=1", "order.copies=3")
+    plan = schedule(laminate, press_settings(design))
+    tree = lxml_html.fromstring(
+        traveller_html(design, laminate, plan, [], Job(SHA, "sbafab 1.0.0", copies=3))
+    )
+    for part in ("tubes", "leak"):
+        section = tree.get_element_by_id(part).getparent()
+        assert "of all 3 copies, one after the other" in words_of(section)
+        first = section.xpath(".//ul[@class='ticks']/li")[0]
+        assert len(first.xpath(".//input[@type='checkbox']")) == 3
+    alone = traveller_html(design, laminate, plan, [], Job(SHA, "sbafab 1.0.0"))
+    assert "one after the other" not in alone

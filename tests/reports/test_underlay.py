@@ -176,3 +176,18 @@ def test_words_stand_as_they_were_given() -> None:
     assert "a.b_c-d: alignment underlay" in words
     assert "“actual size”" in words
     assert "(TPE): outer edge" in words
+
+
+def test_films_other_than_the_papers_go_by_their_names() -> None:
+    tpu = (
+        'films.tpu50={kind="structural", product="TPU", thickness=0.05, density=1200, '
+        "melting_point=115}"
+    )
+    mask = (
+        'films.ptfe50={kind="mask", product="PTFE", thickness=0.05, density=2200, '
+        "temperature_limit=250}"
+    )
+    layup = ("layup.cap=tpu50", "layup.separator_mask=ptfe50")
+    found = guides(build(load_design("1dof-5mm", (tpu, mask, *layup))))
+    assert [guide.films for guide in found] == [("TPE",), ("PTFE50",), ("TPU50",)]
+    assert "(PTFE50, dashed): outer edge" in found[1].words

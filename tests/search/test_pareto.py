@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sbafab.search.pareto import front
@@ -10,6 +10,7 @@ from sbafab.search.pareto import front
 FEW = st.integers(0, 4)
 
 
+@settings(max_examples=25)
 @given(st.lists(st.tuples(FEW, FEW, FEW), max_size=25))
 def test_nothing_on_the_front_is_bettered_and_all_else_is(rows: list[tuple[int, int, int]]) -> None:
     kept = front(rows, (True, False, True))

@@ -14,7 +14,7 @@ from sbafab.assemblies.colours import colours
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
 from sbafab.pressing.together import Runs
-from sbafab.reports.traveller import bench, bill, joining, notes, times
+from sbafab.reports.traveller import base_plate, bench, bill, joining, notes, times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.cautions import cautions, for_the_designer
 from sbafab.reports.traveller.code import code_svg, record_text
@@ -117,9 +117,20 @@ def _chapter(one: DesignWork, number: int, mark: str) -> str:
     html = (
         environment()
         .get_template(CHAPTER)
-        .render(**said, runs=one.runs, press_words=_press_words(one), number=number, mark=mark)
+        .render(
+            **said | _again(one, number),
+            runs=one.runs,
+            press_words=_press_words(one),
+            number=number,
+            mark=mark,
+        )
     )
     return _NAMES.sub(rf"\g<1>d{number}-", html)
+
+
+def _again(one: DesignWork, number: int) -> dict[str, tuple[str, ...]]:
+    """What the first chapter has said of the build-up, in short in those that follow."""
+    return {} if number == 1 else {"force_notes": base_plate.build_up_again(one.work)}
 
 
 def _parts(job: AssemblyJob) -> list[tuple[str, str, str, str]]:

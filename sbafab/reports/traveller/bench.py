@@ -99,11 +99,13 @@ def underlay(work: Work, part: AssemblyStep) -> list[Action]:
     ]
     if work.job.underlay is None or not patterns:
         return []
-    prick = ", the pins pricked through" if part.pins else ""
+    film, eye = ("a release film over it", ": lay by eye along them, as each line says")
+    if part.pins:
+        film, eye = "a release film over it, the pins pricked through both", ""
     return [
         Action(
             f"Tape {work.job.underlay}, printed at 100 % and its bars measured, to the plate, "
-            f"below the release film{prick}. It has the edges of {say.listed(patterns)}."
+            f"{film}. It has the edges of {say.listed(patterns)}{eye}."
         )
     ]
 
@@ -117,7 +119,7 @@ def on_the_lumen(laminate: Laminate, part: AssemblyStep) -> list[Action]:
     return [
         Action(
             f"Better than by eye alone: the pin of the {names} passes every film here. Lay up on "
-            "this one pin, so that only the turn is yours; push it out before the press closes."
+            "it, so that only the turn is yours, and push it out before the press closes."
         )
     ]
 

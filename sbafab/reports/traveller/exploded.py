@@ -23,12 +23,12 @@ from sbafab.reports.traveller.shapes import Picture, pattern_id
 WIDE = 58.0
 TILT = 0.34
 """How much of its depth a layer keeps, seen from the front and above."""
-LABELS = 46.0
+LABELS = 50.0
 TALLEST = 64.0
 NEAREST, FARTHEST, TWO_LINES = 4.0, 12.0, 6.0
-COLUMN, BRACKET = 4.0, 9.0
+COLUMN, BRACKET = 4.0, 13.0
 """mm from the layers to their labels, and for a bracket with its count."""
-BOLD = 1.12
+BOLD = 1.25
 """How much wider bold letters are, at most."""
 PAGE = 1.1
 """mm on the page between the layers of a finished stack."""

@@ -63,9 +63,11 @@ export class Form {
   // Another family keeps what both know.
   become(name) {
     if (name === this.family) return;
-    const known = new Set(this.studio.families[name].map((field) => field.key));
-    const drop = this.studio.families[this.family].map((field) => field.key).filter((key) => !known.has(key) && this.own(key));
-    this.studio.edit([["family", `"${name}"`], ...drop.map((key) => [key, null])]);
+    const known = this.studio.families[name].map((field) => field.key);
+    const other = [...this.present].filter((key) => key !== "family" && !known.includes(key));
+    // A table that the other family lacks goes whole.
+    const drop = new Set(other.map((key) => { const table = key.split(".")[0]; return known.some((own) => own.startsWith(`${table}.`)) ? key : table; }));
+    this.studio.edit([["family", `"${name}"`], ...[...drop].map((key) => [key, null])]);
   }
 
   row(field) {
@@ -191,6 +193,8 @@ export class Form {
     const found = answer?.field && this.rows.get(answer.field);
     if (!found) return;
     const { row, control } = found;
+    const written = valueIn(this.studio.text, answer.field);
+    if (written !== null && control.tagName === "INPUT" && document.activeElement !== control) control.value = written;
     const id = control.id + "-why";
     row.classList.add("bad");
     row.append(el("div", { class: "why", id, role: "alert" }, answer.message));
@@ -249,5 +253,16 @@ export function keysIn(text) {
     if (key) found.add((table + key[1]).replace(/["'\s]/g, ""));
   }
   return found;
+}
+// The value that a text gives a key, as it is written there.
+function valueIn(text, key) {
+  let table = "";
+  for (const line of text.split("\n")) {
+    const head = /^\s*\[+\s*([^\]#]+?)\s*\]+/.exec(line);
+    if (head) { table = head[1].trim() + "."; continue; }
+    const own = /^\s*([A-Za-z0-9_.-]+)\s*=\s*("[^"]*"|'[^']*'|\[[^\]]*\]|[^#\s]+)/.exec(line);
+    if (own && table + own[1] === key) return own[2].replace(/^["']|["']$/g, "");
+  }
+  return null;
 }
 export { at, pathOf };

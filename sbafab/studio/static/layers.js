@@ -164,6 +164,7 @@ export class Layers {
   }
   goto(layer, x, y) {
     this.mark = [x, y];
+    this.around.box.checked = true;
     this.studio.pick(layer);
     this.eye.goto(x, y, Math.max(4, (this.studio.laminate.bounds[2] - this.studio.laminate.bounds[0]) / 4));
   }

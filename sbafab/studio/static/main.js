@@ -27,9 +27,11 @@ async function start() {
   }
   studio = new Studio(started);
   window.studio = studio;
+
   new Form(studio);
   new Editor(studio);
   views = { solid: new Solid(studio), layers: new Layers(studio), motion: new Motion(studio), make: new Make(studio), compare: new Compare(studio) };
+  studio.motion = views.motion;
   const section = new Section(studio);
   $("#lower-stage").append(section.element);
   new Findings(studio, (finding) => goto(finding, section));
@@ -81,7 +83,7 @@ function tabs() {
     view.element.setAttribute("aria-labelledby", `tab-${name}`);
     $("#upper-stage").append(view.element);
   }
-  const low = el("button", { class: "quiet", "aria-pressed": "true", title: "Section below", onclick: () => { const on = $("#views").classList.toggle("single"); low.setAttribute("aria-pressed", String(!on)); remember("sbafab-single", on); } }, "Section");
+  const low = el("button", { id: "low", class: "quiet", "aria-pressed": "true", title: "Section below", onclick: () => { const on = $("#views").classList.toggle("single"); low.setAttribute("aria-pressed", String(!on)); remember("sbafab-single", on); } }, "Section");
   if (recall("sbafab-single", innerWidth < 860)) { $("#views").classList.add("single"); low.setAttribute("aria-pressed", "false"); }
   bar.append(el("span", { class: "grow" }), low);
   for (const list of document.querySelectorAll("[role=tablist]")) list.addEventListener("keydown", (event) => {
@@ -119,6 +121,9 @@ function show(name) {
     tab.tabIndex = own === name ? 0 : -1;
     if (own !== name) view.hide?.();
   }
+  // What needs the room takes the section's as well.
+  $("#views").classList.toggle("whole", ["motion", "make", "compare"].includes(name));
+  $("#low").hidden = $("#views").classList.contains("whole");
   views[name].show?.();
   if (name !== "compare") remember("sbafab-view", name);
 }
@@ -242,7 +247,7 @@ export function notice(words, bad = false, choices = []) {
   const bar = $("#notice"), close = () => { bar.hidden = true; };
   bar.dataset.kind = bad ? "bad" : "";
   bar.classList.toggle("bad", bad);
-  bar.replaceChildren(el("span", {}, words), ...choices.map(([label, does]) => el("button", { onclick: () => { close(); does(); } }, label)), el("button", { class: "quiet", "aria-label": "Close", onclick: close }, "×"));
+  bar.replaceChildren(el("span", {}, words), ...choices.map(([label, does]) => el("button", { onclick: () => { close(); does(); } }, label)), el("button", { id: "low", class: "quiet", "aria-label": "Close", onclick: close }, "×"));
   bar.hidden = false;
 }
 export { css, download, svgBlob };

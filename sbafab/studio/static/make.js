@@ -11,7 +11,7 @@ export class Make {
     this.keep = el("input", { type: "checkbox" });
     this.bar = el("progress", { max: 1, value: 0, hidden: true, "aria-label": "Progress" });
     this.said = el("p", { role: "status" });
-    this.zip = el("a", { hidden: true, download: true }, el("button", { type: "button", tabindex: -1 }, "Download zip"));
+    this.zip = el("a", { hidden: true, download: "", class: "button" }, "Download zip");
     this.list = el("div", { class: "list", role: "group", "aria-label": "Files" });
     this.stage = el("div", { class: "show" }, el("p", { class: "empty" }, "Generate runs the rules, then writes cut files, film sheets, press schedule, traveller, meshes and pictures: the same bytes as sbafab generate. A design that breaks a rule gets its findings and no cut file."));
     this.element = el("div", { class: "view" }, el("div", { class: "make" },
@@ -61,7 +61,7 @@ export class Make {
     for (const button of this.list.querySelectorAll("button")) button.setAttribute("aria-pressed", String(button.dataset.file === file));
     const url = `/made/${this.made.key}/${file}`;
     if (/^sheets\/.*\.svg$/.test(file)) return this.sheet(await (await fetch(url)).text());
-    if (file.endsWith(".html")) { this.stage.replaceChildren(el("iframe", { src: url, title: file, sandbox: "allow-modals" }), el("div", { class: "tools right-top" }, el("a", { href: url, target: "_blank", rel: "noopener" }, "Open to print"))); return; }
+    if (file.endsWith(".html")) { this.stage.replaceChildren(el("iframe", { src: url, title: file, sandbox: "allow-scripts allow-modals" }), el("div", { class: "tools right-top" }, el("a", { href: url, target: "_blank", rel: "noopener" }, "Open to print"))); return; }
     if (/\.(svg|png)$/.test(file)) { this.stage.replaceChildren(el("img", { src: url, alt: file })); return; }
     if (/\.(json|csv|toml|dxf|lbrn2)$/.test(file)) { const words = await (await fetch(url)).text(); this.stage.replaceChildren(el("pre", { tabindex: 0 }, words.slice(0, 200000))); return; }
     this.stage.replaceChildren(el("p", { class: "empty" }, el("a", { href: url, download: "" }, `Download ${file}`)));

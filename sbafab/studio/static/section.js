@@ -16,7 +16,7 @@ export class Section {
     this.true = el("button", { "aria-pressed": "false", onclick: () => { this.auto = false; this.height.value = 0; this.refit(); } }, "True");
     this.fitted = el("button", { "aria-pressed": "true", onclick: () => { this.auto = true; this.refit(); } }, "Exaggerated");
     this.element = el("div", { class: "view" }, this.surface,
-      el("div", { class: "tools" }, this.true, this.fitted, el("label", {}, "Height", this.height, this.shown), el("button", { onclick: () => { studio.cut = null; studio.emit("laminate"); this.refit(); }, title: "Back through the first chamber and its inlet", hidden: true }, "Reset")),
+      el("div", { class: "tools" }, this.true, this.fitted, el("label", {}, "Height", this.height, this.shown), el("button", { onclick: () => { this.mark = null; this.eye.touched = false; studio.cut = null; studio.recut(); }, title: "Through the first chamber and its inlet, whole" }, "Reset")),
       el("div", { class: "stale-mark" }, "Updating"));
     this.stretch = 1;
     this.eye = new PanZoom(this.surface, () => this.draw(), { stretch: () => this.stretch });
@@ -48,7 +48,9 @@ export class Section {
   refit(quiet = false) {
     const { laminate } = this.studio;
     if (!laminate || !this.surface.clientWidth || this.low === undefined) return;
-    const across = (this.surface.clientWidth - 220) / (this.high - this.low);
+    // As wide as the whole actuator, so that a section beside its middle is drawn as high.
+    const [x0, y0, x1, y1] = laminate.bounds;
+    const across = (this.surface.clientWidth - 220) / Math.max(this.high - this.low, x1 - x0, y1 - y0);
     const most = Math.max(1, (this.surface.clientHeight - 96) / laminate.thickness / across);
     if (this.auto) this.height.value = 100;
     const before = this.stretch;

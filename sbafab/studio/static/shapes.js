@@ -70,21 +70,19 @@ export function spans(shape, x, y, u, v) {
         if ((t0 < 0) !== (t1 < 0)) stops.push(s0 + (s1 - s0) * (t0 / (t0 - t1)));
         continue;
       }
-      const a = arc(s0, t0, s1, t1, b);
-      if (Math.abs(a.cy) >= a.r) continue;
-      const half = Math.sqrt(a.r * a.r - a.cy * a.cy);
-      const hits = [];
-      for (const s of [a.cx - half, a.cx + half]) {
-        let turn = Math.atan2(-a.cy, s - a.cx) - a.start;
-        if (a.sweep > 0) while (turn < -1e-12) turn += 2 * Math.PI; else while (turn > 1e-12) turn -= 2 * Math.PI;
-        if (Math.abs(turn) <= Math.abs(a.sweep)) hits.push(s);
+      // Between its highest and lowest points an arc crosses the line once or not at all, and which of
+      // the two the ends alone decide: rounding cannot, nor an end on the line itself.
+      const a = arc(s0, t0, s1, t1, b), way = Math.sign(a.sweep), end = a.start + a.sweep;
+      const turns = [a.start];
+      const quarter = way > 0 ? Math.ceil((a.start - Math.PI / 2) / Math.PI) : Math.floor((a.start - Math.PI / 2) / Math.PI);
+      for (let k = quarter; way * (Math.PI / 2 + k * Math.PI) < way * end; k += way) turns.push(Math.PI / 2 + k * Math.PI);
+      turns.push(end);
+      for (let k = 0; k + 1 < turns.length; k++) {
+        const from = k ? a.cy + a.r * Math.sin(turns[k]) : t0, to = k + 2 < turns.length ? a.cy + a.r * Math.sin(turns[k + 1]) : t1;
+        if ((from < 0) === (to < 0)) continue;
+        const half = Math.sqrt(Math.max(0, a.r * a.r - a.cy * a.cy));
+        stops.push(a.cx + Math.sign(Math.cos((turns[k] + turns[k + 1]) / 2)) * half);
       }
-      // An arc whose ends lie on one side is met twice or not at all, else once: rounding must not decide.
-      const odd = (t0 < 0) !== (t1 < 0);
-      if (odd && hits.length === 2) hits.length = 1;
-      if (!odd && hits.length === 1) hits.length = 0;
-      if (odd && hits.length === 0) hits.push(Math.abs(t0) < Math.abs(t1) ? s0 : s1);
-      stops.push(...hits);
     }
   }
   stops.sort((p, q) => p - q);

@@ -296,6 +296,7 @@ export class Studio {
     this.hoverWords = words;
     this.emit("hover", words);
   }
+  recut() { this.cut = firstCut(this.laminate); this.emit("cut"); }
   moveCut(cut) { this.cut = { ...cut, moved: true }; this.emit("cut"); }
   shape(key) { return this.shapes.get(key) ?? []; }
 }

@@ -1,11 +1,14 @@
-"""Rows of docs/validation.md, and how they are written."""
+"""Rows of the paper's figures beside ours, and how they are written."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from sbafab.actuators import load_design
 from sbafab.models import paper
+from sbafab.models.figures import Asked, Factors, Prediction
+from sbafab.models.prediction import predict
 
 NONE = "none"
 """The model of what none predicts."""
@@ -49,3 +52,10 @@ def _residual(row: Row) -> str:
     share = f"{apart:+.3g}, {apart / row.measured.value:+.1%}"
     errors = f" ({abs(apart) / row.measured.error:.1f} errors)" if row.measured.error else ""
     return f"{share}{errors}"
+
+
+def predicted(
+    template: str, factors: Factors | None = None, pressures: tuple[float, ...] = (10.0, 100.0)
+) -> Prediction:
+    """What is predicted of a template."""
+    return predict(load_design(template), Asked(pressures, calibration=factors or Factors()))
