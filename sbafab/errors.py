@@ -4,6 +4,8 @@ from __future__ import annotations
 
 BY_SIGNAL = 128
 """Added to a signal's number, as shells do: the exit code of a command that it stopped."""
+ERROR_SCHEMA = "sbafab/error@1"
+"""Id of what a command prints of an error for programs."""
 STOPPED = "stopped; the output folder is whole, as it was before or as the run made it"
 
 
@@ -13,6 +15,10 @@ class SbafabError(Exception):
 
 class DesignError(SbafabError, ValueError):
     """A design that cannot be built: field, value, what is allowed, what would fix it."""
+
+
+class TooLargeError(DesignError):
+    """A part that does not fit the film it is cut from: it ends as a failed rule does."""
 
 
 class OutputError(SbafabError, OSError):

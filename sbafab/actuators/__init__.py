@@ -11,16 +11,19 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from sbafab.actuators import lobed, one_dof, radial
+from sbafab.actuators.fits import Fits, refuse_unfit
 from sbafab.design.reading import (
     Change,
     add_waivers,
     design_path,
+    open_what_fits,
     override,
     read_toml,
     start_where_the_user_stands,
     validated,
 )
 from sbafab.design.records import Design
+from sbafab.design.writing import FITS
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 
@@ -84,15 +87,20 @@ def load_design(
     data = add_waivers(override(read_toml(path), changes), waivers)
     data.setdefault("name", path.stem)
     start_where_the_user_stands(data, changes)
+    open_what_fits(data, changes)
     return validated(data, records(), path.parent)
 
 
 def build(design: Design) -> Laminate:
     """The laminate of a design of any family. Raises DesignError where parts do not fit.
 
-    Its notes say what size a drawn outline was understood to have.
+    Its notes say what size a drawn outline was understood to have, and that it fits what it must.
     """
     laminate = families()[design.family].build(design)
+    fits = getattr(design, FITS, None)
+    room = refuse_unfit(design, fits, laminate) if isinstance(fits, Fits) else None
+    if room is not None:
+        laminate = replace(laminate, notes=(room, *laminate.notes))
     if design.drawing is None:
         return laminate
     from sbafab.design.outline import understood

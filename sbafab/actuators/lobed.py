@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import Field
 
 from sbafab.actuators.ears import NOTE, Ear, Holder, Ray, film_setback, placed
+from sbafab.actuators.fits import Fits, fitted
 from sbafab.actuators.panel import on_panel, roots, with_stubs
 from sbafab.actuators.pockets import (
     RoundChamber,
     bonded,
     check_neck,
+    free_diameter,
     pocket_shapes,
     reach,
     round_pockets,
@@ -20,7 +22,7 @@ from sbafab.actuators.pockets import (
 )
 from sbafab.actuators.stacking import BalloonShape, BalloonStack, balloon_cuts, channel_pin, layers
 from sbafab.actuators.tails import tails
-from sbafab.design.form import Form, degrees_of_freedom
+from sbafab.design.form import Form, Free, degrees_of_freedom
 from sbafab.design.records import Design
 from sbafab.design.section import Section
 from sbafab.design.units import Length
@@ -64,6 +66,7 @@ class LobedDesign(Design):
     family: Literal["lobed"]
     """Which kind of actuator this is."""
     chamber: LobedChamber = LobedChamber()
+    fits: Fits = Fits()
     lumen: Lumen = Lumen()
 
     @property
@@ -72,6 +75,14 @@ class LobedDesign(Design):
         lumen = self.lumen
         words = degrees_of_freedom(count)
         return Form(words, count, pockets, lumen=lumen.diameter, lumen_pin=lumen.pin)
+
+    @property
+    def free(self) -> tuple[Free, ...]:
+        lumen = Free("lumen.diameter", 1.0, 10.0, 0.1, asked="lumen")
+        return (*free_diameter(self.chamber), lumen, *super().free)
+
+    def fitted(self) -> Self:
+        return fitted(self, self.fits, build)
 
 
 def axis_radius(design: LobedDesign, pockets: list[Region]) -> tuple[float, str | None]:

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Self
 
 from sbafab.actuators.ears import NOTE, Ear, Ray, placed
+from sbafab.actuators.fits import Fits, fitted
 from sbafab.actuators.panel import on_panel, roots, with_stubs
 from sbafab.actuators.pockets import (
     RoundChamber,
     bonded,
     check_neck,
+    free_diameter,
     pocket_shapes,
     round_pockets,
     tab_and_strip,
 )
 from sbafab.actuators.stacking import BalloonShape, BalloonStack, balloon_cuts, channel_pin, layers
 from sbafab.actuators.tails import tails
-from sbafab.design.form import Form, degrees_of_freedom
+from sbafab.design.form import Form, Free, degrees_of_freedom
 from sbafab.design.records import Design
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import unit
@@ -33,10 +35,18 @@ class OneDofDesign(Design):
     family: Literal["1dof"]
     """Which kind of actuator this is."""
     chamber: RoundChamber = RoundChamber()
+    fits: Fits = Fits()
 
     @property
     def form(self) -> Form:
         return Form(degrees_of_freedom(1), 1, round_pockets(self, self.chamber))
+
+    @property
+    def free(self) -> tuple[Free, ...]:
+        return (*free_diameter(self.chamber), *super().free)
+
+    def fitted(self) -> Self:
+        return fitted(self, self.fits, build)
 
 
 def build(design: OneDofDesign) -> Laminate:

@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import Field
 
 from sbafab.actuators.ears import film_setback
-from sbafab.design.form import Discs, Drawn
+from sbafab.design.form import Discs, Drawn, Free
 from sbafab.design.records import Chamber, Design
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
@@ -27,6 +27,12 @@ class RoundChamber(Chamber):
 
     diameter: Length | Annotated[tuple[Length, ...], Field(strict=False, min_length=1)] = 5.0
     """Pocket diameter; a list gives one a balloon, bottom to top (a tapered stack)."""
+
+
+def free_diameter(chamber: RoundChamber) -> tuple[Free, ...]:
+    """A search may change one diameter that all balloons share."""
+    is_one = chamber.outline is None and isinstance(chamber.diameter, float)
+    return (Free("chamber.diameter", 2.6, 16.0, 0.1),) if is_one else ()
 
 
 def diameters(design: Design, chamber: RoundChamber) -> tuple[float, ...]:

@@ -31,7 +31,7 @@ from sbafab.actuators.stacking import (
     layers,
 )
 from sbafab.actuators.tails import head_reach, tails
-from sbafab.design.form import Drawn, Form, Slots, Wrap
+from sbafab.design.form import Drawn, Form, Free, Slots, Wrap
 from sbafab.design.records import Chamber as ChamberSection
 from sbafab.design.records import Design, Inlet, Stack
 from sbafab.design.section import Section
@@ -125,6 +125,13 @@ class RadialDesign(Design):
         words = "radial expansion stacked balloon actuator"
         return Form(words, self.chamber.count, pockets, wrap=wrap)
 
+    @property
+    def free(self) -> tuple[Free, ...]:
+        if self.chamber.outline is not None:
+            return ()
+        sides = Free("chamber.width", 5.0, 20.0, 0.5), Free("chamber.length", 8.0, 60.0, 0.5)
+        return (*sides, Free("stack.balloons", 1, 3, 1), *super().free[1:])
+
     def completed(self) -> Self:
         """The same design with inlet and window sizes filled in."""
         completed = super().completed()
@@ -196,6 +203,7 @@ def build(design: RadialDesign) -> Laminate:
         registration=design.registration.method,
         pins_in_full_bonds=design.registration.full_bond_pins == "in",
         notes=(NOTE,) if ears else (),
+        tube=design.tube.outer_diameter,
     )
 
 

@@ -35,7 +35,7 @@ from sbafab.output.manifest import as_json
 from sbafab.output.manifest_records import JobManifest, Manifest
 from sbafab.output.planned import EVERYTHING, Checked, Planned, RunPart, plan, schedule_of
 from sbafab.output.settings import GENERATOR
-from sbafab.output.shop import find_nests, write_nested_sheets, write_second
+from sbafab.output.shop import find_nests, write_nested_sheets, write_panel
 from sbafab.pressing.together import design_runs
 from sbafab.progress import unheard
 
@@ -56,7 +56,7 @@ def derived_problems(
     with _made_anew(folder) as (fresh, problems):
         order = checked.design.order
         parts = parts_of(checked.laminate, paths, order.copies, order.spares)
-        index = _write_anew(folder, fresh, claims, checked, None if of_job else parts)
+        index = _write_anew(folder, fresh, claims, checked, paths, None if of_job else parts)
         problems.extend(_differences(folder, fresh, claims.files, claims.generator))
         problems.extend(_index_problems(folder, index, of_job))
         problems.extend(_prediction_problems(folder, fresh, claims, checked))
@@ -103,6 +103,7 @@ def _write_anew(
     fresh: Path,
     claims: Manifest,
     checked: Checked,
+    paths: Mapping[str, Region],
     parts: Sequence[NestPart] | None,
 ) -> dict[str, Any]:
     """Writes what a run would have put beside the layers' files; its manifest, without hashes.
@@ -120,7 +121,7 @@ def _write_anew(
         nests = find_nests(parts, design, folder, unheard)
         sheets = write_nested_sheets(nests, design, fresh, settings, unheard)
     write_fixture(laminate, fresh, settings, design_runs(design, laminate).places)
-    write_second(laminate, fresh, settings)
+    write_panel(laminate, paths, fresh, settings)
     pressing = schedule_of(checked) if "press" in wanted else None
     planned = Planned(checked, frozenset(wanted), settings, pressing)
     return write_contents(planned, sheets, fresh, unheard, parts is not None)

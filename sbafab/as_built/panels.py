@@ -11,7 +11,7 @@ from sbafab.as_built.meant import Meant, departure
 from sbafab.as_built.records import INTEGRITY, Problem
 from sbafab.as_built.uncut import uncut
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.second_cut import PATH, ROOM, marks, second_path
+from sbafab.cutting.second_cut import PATH, ROOM, marks, second_path, severed, stack_kerf
 from sbafab.cutting.verify import check_surroundings
 from sbafab.errors import OutputError
 from sbafab.geometry.beam import Kerf
@@ -35,7 +35,9 @@ def read_panel(
     panel = meant.laminate.panel if meant is not None else None
     if meant is None or panel is None or len(files) != len(panel.sheets):
         return panel, list(files), []
-    second, problems = _second(folder, claims, panel)
+    kerfs = {material: kerf.width for material, kerf in claims.kerf.items()}
+    kerf = stack_kerf(kerfs, severed(meant.laminate))
+    second, problems = _second(folder, kerf or 0.0, panel)
     parts = [file.part for file in files]
     if second is panel.second and all(part is None or part.is_meant for part in parts):
         return panel, list(files), problems
@@ -66,10 +68,8 @@ def _with_part(file: LayerFile, panel: SheetPanel, layer: Layer) -> LayerFile:
     return replace(file, part=replace(file.part, region=region))
 
 
-def _second(folder: Path, claims: Manifest, panel: SheetPanel) -> tuple[Region, list[Problem]]:
+def _second(folder: Path, width: Kerf, panel: SheetPanel) -> tuple[Region, list[Problem]]:
     """The slots of the second cut's file, the panel's own where they agree."""
-    kerf = claims.kerf.get("TPE")
-    width = kerf.width if kerf is not None and kerf.width is not None else 0.0
     try:
         sound_digest(folder / PATH)
         found = read_profile(folder / PATH)

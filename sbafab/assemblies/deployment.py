@@ -10,8 +10,9 @@ from sbafab.assemblies.fits import WHOLE, found
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Tube
 from sbafab.assemblies.supply import folded_diameter_with_tubes, reach
 from sbafab.design.form import Discs
+from sbafab.laminate.extent import outline_diameter
 from sbafab.models.folded import LOBES, folded_diameter
-from sbafab.models.sizes import deflated_diameter, inflated_diameter, outline_diameter
+from sbafab.models.sizes import deflated_diameter, inflated_diameter
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import holds
 
@@ -43,10 +44,12 @@ def aperture(assembled: Assembled) -> Iterator[Finding]:
     if holds(hole, worst.nominal):
         yield found("aperture", True, hole, worst.nominal, message)
     elif holds(hole, worst.pressed):
-        message += (
-            f", or {worst.pressed:.2f} if pressed as thin as the paper's, which passed 9.25: try it"
+        remedy = "try it in the aperture first"
+        message = (
+            f"{remedy}: {message}, or {worst.pressed:.2f} if pressed as thin as the paper's, which "
+            "passed 9.25"
         )
-        yield Finding("aperture", "warn", hole, worst.nominal, "mm", WHOLE, message)
+        yield Finding("aperture", "warn", hole, worst.nominal, "mm", WHOLE, message, remedy=remedy)
     else:
         message += "; use fewer balloons, smaller chambers or a smaller part"
         yield found("aperture", False, hole, worst.pressed, message)

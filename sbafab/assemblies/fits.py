@@ -171,17 +171,18 @@ def _around(placed: PlacedPart, other: PlacedPart, limit: float) -> Finding:
         )
         return found("seat", False, limit, share, message, "")
     if placed.radius is None:
-        message = (
-            f"{placed.name} is stiff and touches the round {other.name} in a line only; build "
-            "the joint up with adhesive"
-        )
-        return Finding("seat", "warn", limit, 0.0, "", WHOLE, message)
+        remedy = f"build the joint of {placed.name} up with adhesive"
+        message = f"{remedy}: it is stiff and touches the round {other.name} in a line only"
+        return Finding("seat", "warn", limit, 0.0, "", WHOLE, message, remedy=remedy)
     message = f"{share:.0%} of {placed.name} lies on {other.name}"
     if holds(share, 1.0):
         return found("seat", True, limit, share, message, "")
-    message += f", the rest hangs past its end; along = {along:g} puts it from "
-    message += f"{along + y0:.2f} to {along + y1:.2f} of {length:g}"
-    return Finding("seat", "warn", limit, share, "", WHOLE, message)
+    remedy = f"move {placed.name} along {other.name}, or glue well what lies on it"
+    message = (
+        f"{remedy}: {message}, the rest hangs past its end; along = {along:g} puts it from "
+        f"{along + y0:.2f} to {along + y1:.2f} of {length:g}"
+    )
+    return Finding("seat", "warn", limit, share, "", WHOLE, message, remedy=remedy)
 
 
 def _lower_face(placed: PlacedPart) -> Region:

@@ -20,6 +20,7 @@ from sbafab.design.reading import (
     override,
     read_toml,
     shown,
+    toml_tables,
     validated,
 )
 from sbafab.design.records import Design
@@ -37,6 +38,15 @@ def load(
         return load_design(source, changes, waivers)
     _start_where_the_user_stands(data, changes)
     return assembly_of(add_waivers(data, waivers), path)
+
+
+def load_text(text: str, path: Path) -> Design | Assembly:
+    """The same from the text of a file that would lie at ``path``. Raises DesignError."""
+    data = toml_tables(text, path.name)
+    if data.get("family") == FAMILY:
+        return assembly_of(data, path)
+    data.setdefault("name", path.stem)
+    return validated(data, records(), path.parent)
 
 
 def load_assembly(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import sys
+from importlib.util import find_spec
 from typing import Any
 
 import click
@@ -12,16 +13,24 @@ from sbafab import __version__
 from sbafab.cli.check import check
 from sbafab.cli.cut import cut
 from sbafab.cli.ending import BAD_INPUT, ended_plainly, prepared_streams, say
+from sbafab.cli.explain import explain
+from sbafab.cli.find import find
 from sbafab.cli.generate import generate
 from sbafab.cli.kerf import kerf
+from sbafab.cli.map import map_
 from sbafab.cli.mesh import mesh
 from sbafab.cli.nest import nest
 from sbafab.cli.new import new
+from sbafab.cli.picture import picture
 from sbafab.cli.predict import predict
 from sbafab.cli.press import press
+from sbafab.cli.progress_line import add_verbosity
 from sbafab.cli.record import record
+from sbafab.cli.reproduce import reproduce
 from sbafab.cli.schema import schema
 from sbafab.cli.simulate import simulate
+from sbafab.cli.studio import studio
+from sbafab.cli.sweep import sweep
 from sbafab.cli.templates import templates
 
 COMMANDS = (
@@ -29,16 +38,38 @@ COMMANDS = (
     new,
     generate,
     check,
+    explain,
     cut,
     press,
     mesh,
     nest,
     kerf,
     predict,
+    map_,
+    picture,
     simulate,
+    sweep,
+    find,
     record,
+    reproduce,
+    studio,
     schema,
 )
+for _command in COMMANDS:
+    add_verbosity(_command)
+
+
+EXTRAS = {
+    "dask": ("distributed", "sweep --dask"),
+    "mesh": ("netgen", "sbafab mesh, simulate --with calculix"),
+    "mujoco": ("mujoco", "simulate --with mujoco"),
+    "nest": ("spyrrow", "--nest spyrrow"),
+    "optuna": ("optuna", "find with many keys"),
+    "parquet": ("pyarrow", "tables of sweeps as Parquet"),
+    "python": ("trimesh", "meshes for trimesh, meshio and PyVista"),
+    "studio": ("starlette", "sbafab studio"),
+}
+"""What each extra brings: a module to look for, and what needs it."""
 
 
 class InOrder(click.Group):
@@ -47,8 +78,19 @@ class InOrder(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(self.commands)
 
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        missing = [
+            f'{what}: pip install "sbafab[{extra}]"'
+            for extra, (module, what) in EXTRAS.items()
+            if find_spec(module) is None
+        ]
+        if missing:
+            with formatter.section("Not installed"):
+                formatter.write("".join(f"  {line}\n" for line in missing))
+
     def invoke(self, ctx: click.Context) -> Any:
-        with ended_plainly():
+        # Click hands a command what is left of the line here; it is read before a command is.
+        with ended_plainly("--json" in ctx.args):
             return super().invoke(ctx)
 
 
@@ -63,8 +105,8 @@ def app() -> None:
 
     DESIGN is a template's name or a TOML file. Start with: sbafab generate 3dof-15mm
 
-    Exit codes: 0 done, 1 a rule failed or a simulation stopped early, 2 bad input or usage,
-    130 stopped by Ctrl-C.
+    Exit codes: 0 done, 1 a rule failed, a part is too large for its film, or a simulation stopped
+    early, 2 bad input or usage, 130 stopped by Ctrl-C.
     """
 
 

@@ -3,28 +3,63 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
+from sbafab.cli.completing import designs_or_folders
 from sbafab.cli.options import json_option, set_option, waive_option
 from sbafab.cli.working import RULE_FAILED
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from sbafab.assemblies.records import Assembly
+    from sbafab.cli.verdicts import Group
     from sbafab.design.records import Design
     from sbafab.output.advice import Advice
+    from sbafab.output.planned import Checked
     from sbafab.progress import Progress
     from sbafab.rules.finding import Finding
 
-    Told = tuple[str, tuple[Finding, ...], list[str], list[Design]]
-    """What was checked ("design" or "as-built"), what was found, notes, and the designs."""
+
+class CheckRequest(NamedTuple):
+    """What the command line asks for."""
+
+    source: str
+    assignments: tuple[str, ...]
+    waivers: tuple[str, ...]
+    target: float | None
+    as_json: bool
+    verbose: bool
+
+    @property
+    def is_folder(self) -> bool:
+        from sbafab.design.reading import template_names
+
+        return self.source not in template_names() and Path(self.source).is_dir()
+
+
+class Told(NamedTuple):
+    """What was checked ("design" or "as-built"), its name, findings, notes, and the designs.
+
+    ``sizes``: those of each design by name, and in words.
+    """
+
+    kind: str
+    name: str
+    findings: Sequence[Finding]
+    groups: Sequence[Group]
+    notes: Sequence[str] = ()
+    designs: Sequence[Design] = ()
+    sizes: Mapping[str, Mapping[str, float]] = {}
+    sizes_said: Sequence[str] = ()
 
 
 @click.command()
-@click.argument("source", metavar="DESIGN|FOLDER")
+@click.argument("source", metavar="DESIGN|FOLDER", shell_complete=designs_or_folders)
 @set_option
-@waive_option
+@waive_option("Take this rule's failure as accepted; cut files would say so. Repeatable.")
 @click.option(
     "--target-yield",
     type=click.FloatRange(0, 1, min_open=True, max_open=True),
@@ -32,117 +67,169 @@ if TYPE_CHECKING:
     help="Fail below this share of good random builds, and advise the least bond and overhang "
     "that reach it, e.g. 0.99.",
 )
+@click.option("-v", "--verbose", is_flag=True, help="All findings with their places and reasons.")
+@click.option("--watch", is_flag=True, help="Check again whenever a file of the design changes.")
 @json_option
 def check(
     source: str,
     assignments: tuple[str, ...],
     waivers: tuple[str, ...],
     target_yield: float | None,
+    verbose: bool,
+    watch: bool,
     as_json: bool,
 ) -> None:
     """Run the rule deck on a design, or on the cut files of a folder; write nothing.
 
     FOLDER is one that sbafab generate has written: its files are read back as they lie on disk.
     """
-    from sbafab.cli.printing import console, findings_table, print_json
-    from sbafab.design.kits import cited
+    asked = CheckRequest(source, assignments, waivers, target_yield, as_json, verbose)
+    if watch:
+        from sbafab.cli.watching import repeated
+
+        if as_json:
+            raise click.UsageError("--watch is for people; leave out --json or --watch")
+        repeated(lambda: _checked(asked), Path(source))
+    elif _checked(asked):
+        click.get_current_context().exit(RULE_FAILED)
+
+
+def _checked(asked: CheckRequest) -> bool:
+    """Checks once and prints what was found; whether a rule failed."""
+    from sbafab.cli.printing import print_json
     from sbafab.output.manifest import checks
     from sbafab.rules.deck import has_failed
 
-    kind, findings, notes, designs = _findings(source, assignments, waivers, target_yield, as_json)
-    advice = None if target_yield is None else _advice(source, assignments, target_yield)
-    if as_json:
+    told = _of_folder(asked) if asked.is_folder else _of_source(asked)
+    advice = None if asked.target is None else _advice(asked, asked.target)
+    if asked.as_json:
         advised = {"advice": advice.as_dict()} if advice else {}
-        print_json({**checks(findings, kind, designs), "notes": notes, **advised})
+        found = checks(told.findings, told.kind, told.name, told.designs)
+        sized = {"sizes": told.sizes} if told.sizes else {}
+        print_json({**found, **sized, "notes": list(told.notes), **advised})
     else:
-        out = console()
-        if kind == "as-built":
-            out.print(f"as built: {source}", markup=False, soft_wrap=True)
-        for said in dict.fromkeys(map(cited, designs)):
-            out.print(said, markup=False, soft_wrap=True)
-        for note in notes:
-            out.print(f"note: {note}", markup=False, soft_wrap=True)
-        out.print(findings_table(findings))
-        if advice:
-            out.print(advice.sentence, markup=False, soft_wrap=True)
-    if has_failed(findings):
-        click.get_current_context().exit(RULE_FAILED)
+        _print(told, advice, asked.verbose)
+    return has_failed(told.findings)
+
+
+def _print(told: Told, advice: Advice | None, verbose: bool) -> None:
+    from rich.text import Text
+
+    from sbafab.cli.printing import console, print_failed
+    from sbafab.cli.verdicts import print_findings, verdict_said
+    from sbafab.design.kits import cited
+    from sbafab.rules.deck import has_failed
+
+    out = console()
+    if told.kind == "as-built":
+        out.print(f"as built: {told.name}", markup=False, soft_wrap=True)
+    for said in told.sizes_said:
+        out.print(said, markup=False, soft_wrap=True)
+    for said in dict.fromkeys(map(cited, told.designs)):
+        out.print(said, markup=False, soft_wrap=True)
+    for note in told.notes:
+        out.print(f"note: {note}", markup=False, soft_wrap=True)
+    print_findings(told.groups, verbose)
+    if advice:
+        out.print(advice.sentence, markup=False, soft_wrap=True)
+    if has_failed(told.findings):
+        change = "files" if told.kind == "as-built" else "design"
+        print_failed(told.findings, f"{told.name} must not be cut", change)
+        return
+    more = "" if verbose else "Details: -v"
+    out.print(Text(verdict_said(told.name, told.groups, more).strip(), style="bold"))
+
+
+def _of_source(asked: CheckRequest) -> Told:
+    """What is found in a design or an assembly."""
+    from sbafab.actuators import load_design
+    from sbafab.assemblies.reading import load
+    from sbafab.assemblies.records import Assembly
+    from sbafab.cli.printing import shown_progress
+    from sbafab.errors import DesignError
+
+    found = load(asked.source, asked.assignments, asked.waivers)
+    with shown_progress(asked.as_json) as progress:
+        if isinstance(found, Assembly):
+            if asked.target is not None:
+                raise DesignError(
+                    "--target-yield goes with a design, and this is an assembly; check its "
+                    "parts' designs one by one"
+                )
+            return _of_assembly(found, progress)
+        if asked.target is not None:
+            found = load_design(asked.source, _asking(asked, asked.target), asked.waivers)
+        return _of_design(found, progress)
 
 
 def _of_design(design: Design, progress: Progress) -> Told:
     """The findings and notes; what press and sheets cannot do is refused, as a run would do."""
-    from sbafab.cli.printing import notes_of
-    from sbafab.output.batch import refuse_undoable
     from sbafab.output.planned import Checked
     from sbafab.output.run import check as run_check
 
     checked = Checked(design, *run_check(design, progress))
-    if not checked.failed:
-        refuse_undoable([checked])
-    return "design", checked.findings, notes_of([checked]), [design]
+    return _of_checked(design.name, checked.findings, [checked])
 
 
 def _of_assembly(assembly: Assembly, progress: Progress) -> Told:
     """Those of its designs and between its parts, likewise."""
-    from sbafab.cli.printing import notes_of
     from sbafab.output.assembly import check_assembly
-    from sbafab.output.batch import refuse_undoable
 
     checked = check_assembly(assembly, progress)
-    if not checked.failed:
-        refuse_undoable(checked.designs)
-    designs = [one.design for one in checked.designs]
-    return "design", checked.findings, notes_of(checked.designs), designs
+    return _of_checked(assembly.name, checked.findings, checked.designs, checked.between)
 
 
-def _advice(source: str, assignments: tuple[str, ...], target: float) -> Advice:
+def _of_checked(
+    name: str,
+    findings: Sequence[Finding],
+    checked: Sequence[Checked],
+    between: Sequence[Finding] | None = None,
+) -> Told:
+    from sbafab.cli.printing import notes_of
+    from sbafab.cli.verdicts import groups_of
+    from sbafab.models.sizes import size_said, sizes
+    from sbafab.output.batch import refuse_undoable
+    from sbafab.rules.deck import has_failed
+
+    if not has_failed(findings):
+        refuse_undoable(checked)
+    designs = [one.design for one in checked]
+    groups = groups_of(checked, between)
+    measured = {one.design.name: sizes(one.design, one.laminate) for one in checked}
+    said = [
+        f"{f'{one.design.name}, ' if len(checked) > 1 else ''}{size_said(one.design, one.laminate)}"
+        for one in checked
+    ]
+    return Told("design", name, findings, groups, notes_of(checked), designs, measured, said)
+
+
+def _advice(asked: CheckRequest, target: float) -> Advice:
     from sbafab.actuators import load_design
+    from sbafab.cli.printing import shown_progress
     from sbafab.output.advice import advise
 
-    return advise(load_design(source, _asking(assignments, target)), target)
+    with shown_progress(asked.as_json) as tell:
+        return advise(load_design(asked.source, _asking(asked, target)), target, tell)
 
 
-def _asking(assignments: tuple[str, ...], target: float) -> tuple[str, ...]:
-    return (*assignments, f"rules.target_yield={target}")
+def _asking(asked: CheckRequest, target: float) -> tuple[str, ...]:
+    return (*asked.assignments, f"rules.target_yield={target}")
 
 
-def _findings(
-    source: str,
-    assignments: tuple[str, ...],
-    waivers: tuple[str, ...],
-    target: float | None,
-    quiet: bool,
-) -> Told:
-    from sbafab.cli.printing import shown_progress
-    from sbafab.design.reading import template_names
+def _of_folder(asked: CheckRequest) -> Told:
+    """What is found in the files of an output folder."""
+    import logging
+
+    from sbafab.as_built.check import check_folder
+    from sbafab.cli.verdicts import Group
     from sbafab.errors import DesignError
 
-    if source in template_names() or not Path(source).is_dir():
-        from sbafab.actuators import load_design
-        from sbafab.assemblies.reading import load
-        from sbafab.assemblies.records import Assembly
-
-        found = load(source, assignments, waivers)
-        with shown_progress(quiet) as progress:
-            if isinstance(found, Assembly):
-                if target is not None:
-                    raise DesignError(
-                        "--target-yield goes with a design, and this is an assembly; check its "
-                        "parts' designs one by one"
-                    )
-                return _of_assembly(found, progress)
-            if target is not None:
-                found = load_design(source, _asking(assignments, target), waivers)
-            return _of_design(found, progress)
-    if assignments or waivers or target is not None:
+    if asked.assignments or asked.waivers or asked.target is not None:
         raise DesignError(
             "--set, --waive and --target-yield go with a design; a folder is checked as it lies, "
             "so leave them out"
         )
-    import logging
-
-    from sbafab.as_built.check import check_folder
-
     # A broken file is told of in a finding; what ezdxf logs of it would stand in between.
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())
-    return "as-built", check_folder(Path(source)), [], []
+    findings = check_folder(Path(asked.source))
+    return Told("as-built", asked.source, findings, [Group(asked.source, findings)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import signal
 import sys
@@ -11,15 +12,36 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
+from typing import NamedTuple, NoReturn
 
 import click
 
 from sbafab.cli.working import RULE_FAILED
-from sbafab.errors import BY_SIGNAL, STOPPED, DefectError, SbafabError
+from sbafab.errors import BY_SIGNAL, ERROR_SCHEMA, STOPPED, DefectError, SbafabError, TooLargeError
 
 BAD_INPUT = 2
 LATER = 0.01
 """Seconds after which an interrupt that got lost is raised once more."""
+
+
+class Exit(NamedTuple):
+    """What ended a command: its kind, one sentence, the exit code."""
+
+    kind: str
+    sentence: str
+    code: int
+
+
+def end(ending: Exit, as_json: bool) -> NoReturn:
+    """Says what ended the command, for programs as well where they asked, and leaves."""
+    say(ending.sentence)
+    if as_json:
+        kind, sentence, code = ending
+        found = {"kind": kind, "message": " ".join(sentence.split()), "exit_code": code}
+        # Where standard output is what failed, there is nobody to tell.
+        with suppress(OSError):
+            click.echo(json.dumps({"schema": ERROR_SCHEMA, "error": found}, indent=1))
+    sys.exit(ending.code)
 
 
 def say(sentence: str) -> None:
@@ -38,8 +60,8 @@ def prepared_streams() -> None:
 
 
 @contextmanager
-def ended_plainly() -> Iterator[None]:
-    """Turns what may stop a command into one sentence and an exit code."""
+def ended_plainly(as_json: bool = False) -> Iterator[None]:
+    """Turns what may stop a command into one sentence and an exit code; as JSON too if asked."""
     asked: list[int] = []
     try:
         try:
@@ -52,31 +74,31 @@ def ended_plainly() -> Iterator[None]:
             sys.stdout.flush()
     except click.UsageError as error:
         help_of = f"; see {error.ctx.command_path} --help" if error.ctx is not None else ""
-        say(f"{error.format_message().rstrip('.')}{help_of}")
-        sys.exit(BAD_INPUT)
+        sentence = f"{error.format_message().rstrip('.')}{help_of}"
+        end(Exit("usage", sentence, BAD_INPUT), as_json)
     except DefectError as error:
-        say(str(error))
-        sys.exit(RULE_FAILED)
+        end(Exit("defect", str(error), RULE_FAILED), as_json)
+    except TooLargeError as error:
+        end(Exit("too-large", str(error), RULE_FAILED), as_json)
     except SbafabError as error:
-        say(str(error))
-        sys.exit(BAD_INPUT)
+        end(Exit("input", str(error), BAD_INPUT), as_json)
     except KeyboardInterrupt as stop:
-        say(STOPPED)
-        sys.exit(BY_SIGNAL + (stop.args[0] if stop.args else signal.SIGINT))
+        code = BY_SIGNAL + (stop.args[0] if stop.args else signal.SIGINT)
+        end(Exit("stopped", STOPPED, code), as_json)
     except BrokenPipeError:
         # The reader of standard output has seen enough (``| head``); the files are written.
         _silence()
         sys.exit(BY_SIGNAL + getattr(signal, "SIGPIPE", 13))
     except MemoryError:
-        say("there is not enough memory; make the design smaller")
-        sys.exit(BAD_INPUT)
+        sentence = "there is not enough memory; make the design smaller"
+        end(Exit("memory", sentence, BAD_INPUT), as_json)
     except OSError as error:
         if error.filename is None:
             _silence()
         where = error.filename or "standard output"
         reason = error.strerror or str(error)
-        say(f"{where}: {reason[:1].lower()}{reason[1:]}; make room there or name another place")
-        sys.exit(BAD_INPUT)
+        told = f"{where}: {reason[:1].lower()}{reason[1:]}; make room there or name another place"
+        end(Exit("files", told, BAD_INPUT), as_json)
 
 
 def _silence() -> None:

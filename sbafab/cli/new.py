@@ -7,12 +7,14 @@ from pathlib import Path
 
 import click
 
+from sbafab.cli.completing import templates
+
 COUPON = "coupon"
 KIT = "kit"
 
 
 @click.command()
-@click.argument("template")
+@click.argument("template", shell_complete=templates)
 @click.argument("file", type=click.Path(path_type=Path), required=False)
 def new(template: str, file: Path | None) -> None:
     """Write a commented design file to start from (FILE: by default TEMPLATE.toml here).

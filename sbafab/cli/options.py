@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sbafab.cli import completing
+
 if TYPE_CHECKING:
     from sbafab.cutting.dxf_write import DxfProfile
 
@@ -21,15 +23,33 @@ set_option = click.option(
     "assignments",
     metavar="KEY=VALUE",
     multiple=True,
+    shell_complete=completing.assignments,
     help="Override a key of the design, e.g. --set chamber.diameter=6. Repeatable.",
 )
 
-waive_option = click.option(
-    "--waive",
-    "waivers",
-    metavar="RULE",
-    multiple=True,
-    help="Let cut files be written although this rule fails; they will say so. Repeatable.",
+
+def waive_option(words: str) -> Callable[[Command], Command]:
+    """``--waive``, told in the words of the command that it stands in."""
+    return click.option(
+        "--waive",
+        "waivers",
+        metavar="RULE",
+        multiple=True,
+        shell_complete=completing.rules,
+        help=words,
+    )
+
+
+WAIVES = {
+    "press": "Let the schedule be written although this rule fails; it will say so. Repeatable.",
+    "mesh": "Let the meshes be written although this rule fails; the manifest will say so. "
+    "Repeatable.",
+    "predict": "Let the prediction be written although this rule fails, for an actuator that may "
+    "not hold. Repeatable.",
+    "simulate": "Simulate although this rule fails, an actuator that may not hold. Repeatable.",
+}
+CUT_ALL_THE_SAME = (
+    "Let cut files be written although this rule fails; they will say so. Repeatable."
 )
 
 out_option = click.option(
@@ -58,12 +78,19 @@ class Request:
 
 def run_options(command: Command) -> Command:
     """DESIGN and the options of a writing command, handed over as one Request."""
-    return _requested(command, click.argument("designs", metavar="DESIGN", nargs=1))
+    one = click.argument("designs", metavar="DESIGN", nargs=1, shell_complete=completing.designs)
+    return _requested(command, one)
 
 
 def several_run_options(command: Command) -> Command:
     """The same with any number of designs."""
-    several = click.argument("designs", metavar="DESIGN...", nargs=-1, required=True)
+    several = click.argument(
+        "designs",
+        metavar="DESIGN...",
+        nargs=-1,
+        required=True,
+        shell_complete=completing.designs,
+    )
     return _requested(command, several)
 
 
@@ -81,7 +108,8 @@ def _requested(command: Command, argument: Callable[[Command], Command]) -> Comm
         return command(request=Request(named, out, assignments, waivers, as_json), **others)
 
     decorated: Command = gathered
-    for option in (json_option, waive_option, set_option, out_option, argument):
+    waive = waive_option(WAIVES.get(command.__name__, CUT_ALL_THE_SAME))
+    for option in (json_option, waive, set_option, out_option, argument):
         decorated = option(decorated)
     return decorated
 

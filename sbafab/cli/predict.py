@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sbafab.cli.options import Request, finite, run_options
-from sbafab.cli.quantities import FLOW, PRESSURE, VOLUME
+from sbafab.cli.quantities import FLOW, LENGTH, MODULUS, PRESSURE, VOLUME
 from sbafab.cli.working import RULE_FAILED
 
 if TYPE_CHECKING:
@@ -56,14 +56,29 @@ if TYPE_CHECKING:
     default=1.0,
     callback=finite,
     metavar="F",
-    help="Measured force over the predicted one, if measured.  [default: 1, off]",
+    help="Measured force over the one of Eqs. 1-4, if measured.  [default: 1, off]",
+)
+@click.option(
+    "--pocket-loss",
+    type=LENGTH.read,
+    default="0 mm",
+    metavar="L",
+    help="By how much pockets come out smaller in radius than drawn, mm or with a unit, if "
+    "measured; for the elastic models.  [default: 0]",
+)
+@click.option(
+    "--modulus",
+    "modulus_mpa",
+    type=MODULUS.read,
+    metavar="E",
+    help="Young's modulus of the film, MPa or with a unit, if measured.  [default: the film's]",
 )
 def predict(
     request: Request,
     pressures: tuple[float, ...],
     flow: float,
     volumes: tuple[float, ...],
-    **factors: float,
+    **factors: Any,
 ) -> None:
     """Predict sizes, stroke, force, time, bending: predict.json and plots.
 
@@ -75,6 +90,7 @@ def predict(
     from sbafab.errors import OutputError
     from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict as predicted
+    from sbafab.models.sizes import size_said
     from sbafab.output.earlier import PREDICTION
     from sbafab.output.predicting import prediction_json, with_prediction
     from sbafab.output.run import Extras, generate
@@ -95,6 +111,7 @@ def predict(
     if request.as_json:
         print_json({**prediction_json(design, found), "failed": failed, "folder": str(run.folder)})
     else:
+        click.echo(size_said(design, run.laminate))
         _print(found)
         if not run.failed:
             click.echo(f"written to {run.folder}: predict.json, predict/")

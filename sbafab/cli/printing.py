@@ -34,7 +34,7 @@ def print_json(value: object) -> None:
 
 
 def console() -> Console:
-    """A console on standard output; 100 columns where there is no terminal."""
+    """A console on standard output; 80 columns where there is no terminal and no COLUMNS."""
     from rich.console import Console
 
     class Told(Console):
@@ -43,20 +43,24 @@ def console() -> Console:
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError
 
-    return Told(highlight=False, soft_wrap=False, width=None if sys.stdout.isatty() else 100)
+    return Told(highlight=False, soft_wrap=False)
 
 
 @contextmanager
 def shown_progress(quiet: bool) -> Iterator[Progress]:
-    """A progress line on standard error, where that is a terminal."""
-    if quiet or not sys.stderr.isatty():
-        yield unheard
-        return
-    from rich.console import Console
-    from rich.status import Status
+    """Tells on standard error how far the work in the block is, as -q and -v ask for.
 
-    with Status("starting", console=Console(stderr=True)) as status:
-        yield lambda what, done, total: status.update(f"{what}: {done} of {total}")
+    A line that stays fresh on a terminal; elsewhere plain lines, the first after some seconds.
+    """
+    from sbafab.cli.progress_line import QUIET, VERBOSE, asked_for, live_line, plain_lines
+
+    if quiet or asked_for(QUIET):
+        yield unheard
+    elif sys.stderr.isatty() and not asked_for(VERBOSE):
+        with live_line() as tell:
+            yield tell
+    else:
+        yield plain_lines(asked_for(VERBOSE))
 
 
 def findings_table(findings: Sequence[Finding]) -> Table:
@@ -134,11 +138,10 @@ def print_failed(findings: Iterable[Finding], written: str, change: str) -> None
 
     failed = sorted({finding.rule for finding in findings if finding.verdict == "fail"})
     words = (
-        f"{written}: {', '.join(failed)} failed. Change the {change}, or waive by name: "
-        f"{' '.join(f'--waive {name}' for name in failed)}"
+        f"{written}: {', '.join(failed)} failed. Change the {change} (sbafab explain {failed[0]}), "
+        f"or waive by name: {' '.join(f'--waive {name}' for name in failed)}"
     )
     out = console()
-    out.print()
     out.print(Text(words, style="bold red"), soft_wrap=True)
 
 
@@ -160,16 +163,33 @@ def print_run(run: Run) -> None:
             made.add_row(label, Text(text))
         out.print(made)
         out.print()
-    out.print(findings_table(run.findings))
+    print_verdict(run, "design")
+
+
+def print_verdict(run: Run, change: str) -> None:
+    """What needs something done, and last whether the design or assembly holds."""
+    from rich.text import Text
+
+    from sbafab.cli.verdicts import groups_of, print_open, verdict_said
+
+    out = console()
+    groups = groups_of(run.checked, run.between)
+    for group in groups:
+        print_open(group.findings, out.width)
     if run.failed:
-        print_failed(run.findings, "No cut files were written", "design")
+        print_failed(run.findings, "No cut files were written", change)
         if run.kept:
             out.print(Text(f"{run.folder} {LEFT_AS_IT_WAS}"), soft_wrap=True)
+        return
+    more = f"sbafab check {run.folder} says more"
+    out.print(Text(verdict_said(run.folder.name, groups, more), style="bold"), soft_wrap=True)
 
 
 def print_job(job: Run) -> None:
     """What a job made; for a design that a rule stopped, what the rules found."""
     from rich.text import Text
+
+    from sbafab.cli.verdicts import print_open
 
     out = console()
     made = facts_table()
@@ -179,7 +199,7 @@ def print_job(job: Run) -> None:
         if one.failed:
             out.print()
             out.print(Text(one.design.name, style="bold red"))
-            out.print(findings_table(one.findings))
+            print_open(one.findings, out.width)
     if job.failed:
         every = (finding for one in job.checked for finding in one.findings)
         print_failed(every, f"Nothing was written; {job.folder} is as it was", "designs")

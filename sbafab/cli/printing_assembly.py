@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sbafab.cli.printing import (
-    LEFT_AS_IT_WAS,
     add_batch,
     console,
     facts_table,
-    findings_table,
-    print_failed,
+    print_verdict,
 )
 
 if TYPE_CHECKING:
@@ -21,21 +19,11 @@ if TYPE_CHECKING:
 
 def print_assembly(run: Run) -> None:
     """What was made of an assembly, what the rules found, and the checks between its parts."""
-    from rich.text import Text
-
     out = console()
     if not run.kept:
         out.print(_made(run))
         out.print()
-    for one in run.checked:
-        if one.failed:
-            out.print(Text(one.design.name, style="bold red"))
-            out.print(findings_table(one.findings))
-    out.print(findings_table(run.between or ()))
-    if run.failed:
-        print_failed(run.findings, "No cut files were written", "assembly")
-        if run.kept:
-            out.print(Text(f"{run.folder} {LEFT_AS_IT_WAS}"), soft_wrap=True)
+    print_verdict(run, "assembly")
 
 
 def _made(run: Run) -> Table:

@@ -42,6 +42,7 @@ PRESSURE = MeasuredQuantity(
     {"kPa": 1.0, "Pa": 0.001, "MPa": 1000.0, "mbar": 0.1, "bar": 100.0, "psi": 6.894757},
     '6, "6 kPa" or "60 mbar"',
 )
+MODULUS = MeasuredQuantity("modulus", {"MPa": 1.0, "kPa": 0.001, "GPa": 1000.0}, '10 or "10 MPa"')
 VOLUME = MeasuredQuantity("volume", {"ul": 1.0, "ml": 1000.0, "mm3": 1.0}, '5, 5ul or "0.005 ml"')
 FLOW = MeasuredQuantity(
     "flow",

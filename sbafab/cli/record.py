@@ -12,7 +12,6 @@ from sbafab.cli.options import json_option, set_option
 from sbafab.cli.quantities import LENGTH, PRESSURE
 
 if TYPE_CHECKING:
-    from sbafab.design.records import Design
     from sbafab.results.records import LabResult
     from sbafab.results.store import Lab
 
@@ -93,8 +92,9 @@ def record(
 ) -> None:
     """Record what came out of the press and the test bench; see what all records say.
 
-    DESIGN is a template's name, a TOML file or the folder that was built from. Records are only
-    added: --correct adds one that names the record it corrects. Nothing leaves this machine.
+    DESIGN is a template's name, a TOML file or the folder that was built from, an assembly's
+    likewise. Records are only added: --correct adds one that names the record it corrects. Nothing
+    leaves this machine.
 
     \b
     sbafab record 3dof-15mm --serial A1 --leak pass --stroke 16.8
@@ -169,13 +169,10 @@ def _change(said: Mapping[str, Any]) -> LabResult:
 def _recorded(
     store: Lab, source: str, assignments: tuple[str, ...], said: Mapping[str, Any]
 ) -> list[Any]:
-    """Loads the design, reads what came out and stores both."""
-    from dataclasses import replace
-
-    from sbafab.design.writing import design_sha256
-    from sbafab.output.settings import GENERATOR
+    """Loads what was built, reads what came out and stores both."""
     from sbafab.results.batch import read_batch
-    from sbafab.results.builds import kit_name, promised
+    from sbafab.results.recording import built_from
+    from sbafab.results.recording import record as record_results
     from sbafab.results.records import checked
 
     if said["table"] is not None:
@@ -186,26 +183,4 @@ def _recorded(
             raise click.UsageError("give --serial, the actuator's number on its traveller")
         if results[0].is_empty:
             raise click.UsageError("say what came out, such as --leak pass or --note TEXT")
-    design = _built(source, assignments)
-    kit = kit_name(design)
-    results = [replace(result, kit=result.kit or kit) for result in results]
-    sha256 = design_sha256(design)
-    is_known = store.knows(sha256, GENERATOR)
-    return store.add(sha256, None if is_known else promised(design), results)
-
-
-def _built(source: str, assignments: tuple[str, ...]) -> Design:
-    """The design of a template, a file, or the folder that was built from."""
-    from sbafab.assemblies.reading import load
-    from sbafab.design.records import Design
-    from sbafab.errors import DesignError
-
-    folder = Path(source)
-    resolved = folder / "design.toml"
-    found = load(resolved if folder.is_dir() and resolved.is_file() else source, assignments)
-    if not isinstance(found, Design):
-        raise DesignError(
-            f"{found.name} is an assembly; record its actuators one by one, each by its own design "
-            "file or by its folder in the assembly's"
-        )
-    return found
+    return record_results(store, built_from(source, assignments), results)

@@ -1,15 +1,21 @@
-"""``sbafab schema``: JSON schema of a design file."""
+"""``sbafab schema``: JSON schemas of design files and of what the program writes."""
 
 from __future__ import annotations
 
 import click
 
+FORMATS = ("design", "checks", "manifest", "assembly", "error")
+"""As in ``sbafab.output.schemas``, whose imports would slow ``--help`` down."""
+
 
 @click.command()
-def schema() -> None:
-    """Print the JSON schema of design and assembly files, for editors to complete and check."""
-    from sbafab.actuators import schema as design_schema
-    from sbafab.assemblies.records import Assembly
-    from sbafab.cli.printing import print_json
+@click.argument("name", type=click.Choice(FORMATS), default="design", required=False)
+def schema(name: str) -> None:
+    """Print a JSON schema, by default that of design and assembly files.
 
-    print_json(design_schema(Assembly))
+    Editors complete and check design files from it; the other formats are what programs read.
+    """
+    from sbafab.cli.printing import print_json
+    from sbafab.output.schemas import schema_of
+
+    print_json(schema_of(name))

@@ -89,7 +89,8 @@ def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> N
     reached is kept.
     """
     from sbafab.actuators import load_design
-    from sbafab.cli.printing import console, findings_table, print_json, shown_progress
+    from sbafab.cli.printing import print_json, shown_progress
+    from sbafab.cli.verdicts import Group, print_findings
     from sbafab.models.paper import BURST
     from sbafab.output.manifest import checks
     from sbafab.output.simulating import simulate as run
@@ -102,9 +103,9 @@ def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> N
         made = run(design, simulator, wish, request.out, tell, export)
     if made.folder is None:
         if request.as_json:
-            print_json(checks(made.findings, "design"))
+            print_json(checks(made.findings, "design", design.name))
         else:
-            console().print(findings_table(made.findings))
+            print_findings([Group(design.name, made.findings)])
         click.get_current_context().exit(RULE_FAILED)
     found = made.result
     if request.as_json:

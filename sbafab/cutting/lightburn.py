@@ -63,6 +63,8 @@ def drawn(contours: Sequence[Contour], sheet: Surroundings) -> Iterator[LaserRun
         yield LaserRun(layer, contour.edges, True, contour.circle)
     for run in sheet.parting:
         yield _run(CUT_SHEET, run)
+    for run in sheet.marks:
+        yield _run(REFERENCE, run)
     if sheet.frame is not None:
         x, y = sheet.frame
         yield _run(REFERENCE, ((0.0, 0.0), (x, 0.0), (x, y), (0.0, y), (0.0, 0.0)))
@@ -83,7 +85,10 @@ def parts_of(edge: Edge) -> Sequence[Edge]:
 
 
 def project_text(
-    contours: Sequence[Contour], sheet: Surroundings, properties: Mapping[str, str]
+    contours: Sequence[Contour],
+    sheet: Surroundings,
+    properties: Mapping[str, str],
+    advice: str = ADVICE,
 ) -> str:
     """The project of a film sheet; ``properties`` are those of its cut file, for its notes.
 
@@ -93,7 +98,7 @@ def project_text(
     shapes, outlines = list(drawn(contours, sheet)), _Outlines()
     layers = [layer for layer in INDICES if any(shape.layer == layer for shape in shapes)]
     prefs = {**ORDER, **{f"Optimize_{name}": 0 for name in NOT_OPTIMIZED}}
-    notes = "\n".join((ADVICE, *(f"{name}: {value}" for name, value in properties.items())))
+    notes = "\n".join((advice, *(f"{name}: {value}" for name, value in properties.items())))
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         '<LightBurnProject AppVersion="1.0.00" FormatVersion="1" MaterialHeight="0" '

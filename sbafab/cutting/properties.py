@@ -67,10 +67,16 @@ def fixture_properties(settings: CutSettings) -> dict[str, str]:
     return _properties(settings, "plate", "fixture", None)
 
 
-def second_cut_properties(settings: CutSettings) -> dict[str, str]:
-    """Custom properties of the second cut of registered sheets: it goes through masks as well."""
-    properties = _properties(settings, "TPE", "second cut", settings.kerf_width("TPE"))
-    return {**properties, "WARNING": PTFE_WARNING}
+def second_cut_properties(
+    settings: CutSettings,
+    films: Sequence[Material],
+    masks: Sequence[Material],
+    kerf: Kerf | None,
+) -> dict[str, str]:
+    """Custom properties of the second cut of registered sheets, through ``films`` and ``masks``."""
+    properties = _properties(settings, ", ".join(films), "second cut", kerf)
+    said = dict.fromkeys(settings.warnings.get(material) for material in (*films, *masks))
+    return {**properties, **warning_property(" ".join(words for words in said if words))}
 
 
 def coupon_properties(generator: str) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from sbafab.cutting.dxf_write import DATUM_ARM, Surroundings, dxf_text
@@ -10,10 +11,12 @@ from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import CutSettings, second_cut_properties
 from sbafab.cutting.verify import check_surroundings, verify_file
 from sbafab.errors import OutputError
-from sbafab.geometry.beam import Kerf
+from sbafab.geometry.beam import Kerf, widths
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import rectangle
+from sbafab.laminate.films import Material
+from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.panel import SheetPanel
 
 PATH = "sheets/second_cut.dxf"
@@ -36,11 +39,45 @@ def marks(panel: SheetPanel) -> Surroundings:
     return Surroundings(marks=((*outline, outline[0]), *crosses))
 
 
-def write_second_cut(panel: SheetPanel, folder: Path, settings: CutSettings) -> str:
+def severed(laminate: Laminate) -> tuple[Material, ...]:
+    """The films whose bridges the second cut goes through, lowest first."""
+    return tuple(dict.fromkeys(layer.film.material for layer in laminate.tpe_layers))
+
+
+def stack_kerf(kerfs: Mapping[Material, Kerf | None], films: Sequence[Material]) -> Kerf | None:
+    """The kerf of one beam through all of the films: the widest of theirs along x and along y.
+
+    None where that of any was not measured. A beam that is narrower leaves the parts a little
+    larger at their bridges; one that is wider would take of them.
+    """
+    known = [kerf for kerf in map(kerfs.get, films) if kerf is not None]
+    if len(known) < len(films):
+        return None
+    x, y = (max(widths(kerf)[axis] for kerf in known) for axis in (0, 1))
+    return x if x == y else (x, y)
+
+
+def laser_path(laminate: Laminate, settings: CutSettings) -> Region:
+    """The beam's path in the second cut of a laminate in registered sheets."""
+    assert laminate.panel is not None
+    kerf = stack_kerf(settings.kerf_widths, severed(laminate))
+    return second_path(laminate.panel, kerf or 0.0)
+
+
+def properties_of(laminate: Laminate, settings: CutSettings) -> dict[str, str]:
+    """Custom properties of the second cut's file: it goes through masks as well."""
+    films = severed(laminate)
+    masks = dict.fromkeys(layer.film.material for layer in laminate.layers if layer.is_mask)
+    kerf = stack_kerf(settings.kerf_widths, films)
+    return second_cut_properties(settings, films, tuple(masks), kerf)
+
+
+def write_second_cut(laminate: Laminate, folder: Path, settings: CutSettings) -> str:
     """Writes and reads back the file; its path in ``folder``. Raises OutputError, OSError."""
-    properties = second_cut_properties(settings)
-    path = second_path(panel, settings.kerf_width("TPE") or 0.0)
-    around = marks(panel)
+    assert laminate.panel is not None
+    properties = properties_of(laminate, settings)
+    path = laser_path(laminate, settings)
+    around = marks(laminate.panel)
     text = dxf_text(cutting_order(path), properties, settings.curves.profile, around)
     target = folder / PATH
     target.parent.mkdir(parents=True, exist_ok=True)

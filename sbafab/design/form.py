@@ -70,6 +70,20 @@ class Form:
         return self.stacks if self.wrap is None else 1
 
 
+@dataclass(frozen=True)
+class Free:
+    """A key that a search may change: from ``low`` to ``high`` in steps.
+
+    ``asked``: only where a requirement names this quantity; else it stays as it is.
+    """
+
+    key: str
+    low: float
+    high: float
+    step: float
+    asked: str = ""
+
+
 def degrees_of_freedom(stacks: int) -> str:
     """Words for round stacks on common plates: one lengthens (1-DoF), three also bend (3-DoF)."""
     said = {1: " (1-DoF)", 3: " (3-DoF)"}.get(stacks, "")

@@ -10,6 +10,7 @@ from sbafab.design.strands import JOIN, Strand, Traced, counted, joined, sealed,
 from sbafab.errors import DesignError
 from sbafab.geometry.biarc import FitError
 from sbafab.geometry.boolean import tidy
+from sbafab.geometry.centroid import centroid
 from sbafab.geometry.edges import EPSILON, Point
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import close_pairs
@@ -32,10 +33,10 @@ class Outline(NamedTuple):
 def read_outline(path: Path) -> Region:
     """The one closed path of a DXF or SVG file as lines and arcs, in mm, counter-clockwise.
 
-    The file's origin becomes the chamber's axis and must lie inside. DXF units follow $INSUNITS,
-    none meaning mm; an SVG without width and height in physical units is read as 1 unit = 1 mm,
-    and its y axis is turned upward, so that the outline looks as it is drawn. Ellipses, Béziers
-    and splines become arcs within 0.5 um. Raises DesignError.
+    The chamber's axis is the file's origin where that lies inside, else the outline's centroid.
+    DXF units follow $INSUNITS, none meaning mm; an SVG without width and height in physical units
+    is read as 1 unit = 1 mm, and its y axis is turned upward, so that the outline looks as it is
+    drawn. Ellipses, Béziers and splines become arcs within 0.5 um. Raises DesignError.
     """
     return understood(path).region
 
@@ -44,7 +45,7 @@ def understood(path: Path) -> Outline:
     """The same with the size that was understood, in words. Raises DesignError."""
     try:
         strands, scale = _traced(path)
-        region = _checked(sealed(_one_loop(list(counted(strands)))))
+        region, moved = _on_its_axis(_checked(sealed(_one_loop(list(counted(strands))))))
     except FitError as error:
         raise DesignError(f"outline {path} has a {error}; round it off") from None
     except DesignError as error:
@@ -52,7 +53,7 @@ def understood(path: Path) -> Outline:
     low_x, low_y, high_x, high_y = region.bounds
     size = f"{high_x - low_x:.3f} x {high_y - low_y:.3f} mm"
     # Without the file's name: a design is the same wherever its drawing lies.
-    return Outline(region, f"drawn outline: {size}, {scale}")
+    return Outline(region, f"drawn outline: {size}, {scale}{moved}")
 
 
 def _traced(path: Path) -> Traced:
@@ -113,7 +114,7 @@ def _refuse_doubles(strands: list[Strand]) -> None:
 
 
 def _checked(loop: Strand) -> Region:
-    """The region inside a loop, if it is a simple one of sensible size round the origin."""
+    """The region inside a loop, if it is a simple one of sensible size."""
     if not loop:
         raise DesignError("encloses no area; draw the outline of a pocket")
     low_x, low_y, high_x, high_y = Contour(loop).bounds
@@ -127,14 +128,26 @@ def _checked(loop: Strand) -> Region:
     contour = tidy(loop)
     if contour is None:
         raise DesignError("encloses no area; draw the outline of a pocket")
-    region = Region((contour.reversed() if contour.is_hole else contour,))
-    if region.distance_to_edge((0.0, 0.0)) < EPSILON or not region.contains((0.0, 0.0)):
+    return Region((contour.reversed() if contour.is_hole else contour,))
+
+
+def _on_its_axis(region: Region) -> tuple[Region, str]:
+    """The region round the chamber's axis at (0, 0), and how it got there, in words."""
+    if _surrounds(region, (0.0, 0.0)):
+        return region, ""
+    x, y = centroid(region)
+    if not _surrounds(region, (x, y)):
         raise DesignError(
-            "does not contain the origin, where the chamber's axis is; move it by "
-            f"x {0.0 - (low_x + high_x) / 2:.4g}, y {0.0 - (low_y + high_y) / 2:.4g} mm to "
-            "centre it there"
+            "has its centroid outside itself, so the chamber's axis has no place; draw it round "
+            "(0, 0)"
         )
-    return region
+    # What is printed is what is done.
+    x, y = round(x, 6), round(y, 6)
+    return region.moved(-x, -y), ", centred on its centroid"
+
+
+def _surrounds(region: Region, p: Point) -> bool:
+    return region.contains(p) and region.distance_to_edge(p) >= EPSILON
 
 
 def _refuse_crossings(loop: Strand) -> None:

@@ -6,6 +6,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,12 +14,13 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from sbafab.design.records import Design
-from sbafab.design.writing import plain_tables
+from sbafab.design.writing import FITS, plain_tables
 from sbafab.errors import DesignError
 
 Change = str | Mapping[str, Any]
 """A key to set: "key.path=value", or a table of keys, which may be dotted, with their values."""
 OUTLINE = "chamber.outline"
+DIAMETER = "chamber.diameter"
 KIT = "kit"
 KITS = "kits"
 """The folder of the kits that ship, among the templates."""
@@ -63,9 +65,27 @@ def design_path(source: str | Path) -> Path:
         is_folder = False
     if is_folder:
         raise DesignError(f"{shown(source)} is a folder; give a design file (.toml) or a template")
-    near = difflib.get_close_matches(str(source), names, 1)
-    hint = f"did you mean {near[0]}?" if near else f"the templates are {', '.join(names)}"
-    raise DesignError(f"{shown(source)} is neither a template nor a design file; {hint}")
+    raise DesignError(f"{shown(source)} is neither a template nor a design file; {_hint(path)}")
+
+
+def _hint(missing: Path) -> str:
+    """What may have been meant by a design that is not there."""
+    with suppress(OSError, ValueError):
+        beside = missing.with_name(f"{missing.name}.toml")
+        if beside.is_file():
+            return f"did you mean {beside}?"
+    names = template_names()
+    near = difflib.get_close_matches(str(missing), names, 1)
+    return f"did you mean {near[0]}?" if near else f"the templates are {', '.join(names)}"
+
+
+def template_text(name: str) -> str:
+    """The commented text of a design that ships. Raises DesignError if there is none."""
+    if name not in template_names():
+        raise DesignError(
+            f"{shown(name)} is not a template; there are {', '.join(template_names())}"
+        )
+    return design_path(name).read_text(encoding="utf-8")
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -83,6 +103,11 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise DesignError(f"{path} is not a text file in UTF-8; save it as UTF-8") from None
     except OSError as error:
         raise DesignError(f"{path} cannot be read: {error.strerror or error}") from None
+    return toml_tables(text, path)
+
+
+def toml_tables(text: str, path: str | Path) -> dict[str, Any]:
+    """The tables of a design file's text; ``path`` names it in messages. Raises DesignError."""
     # The parser's time grows with the square of the parts of a key.
     deep = _TOO_DEEP.search(text)
     if deep is not None:
@@ -166,6 +191,15 @@ def start_where_the_user_stands(data: dict[str, Any], changes: Iterable[Change])
         data[KIT] = str(Path(data[KIT]).absolute())
 
 
+def open_what_fits(data: dict[str, Any], changes: Iterable[Change]) -> None:
+    """A change to what the design must fit opens its chamber, unless a change names that too."""
+    keys = set(changed_keys(changes))
+    chamber = data.get("chamber")
+    fits = DIAMETER not in keys and any(key.startswith(f"{FITS}.") for key in keys)
+    if fits and isinstance(chamber, dict):
+        chamber.pop("diameter", None)
+
+
 def changed(design: AnyDesign, changes: Iterable[Change]) -> AnyDesign:
     """The same design with changes made to its keys. Raises DesignError with one sentence."""
     from sbafab.design.kits import under_kit, without_kit
@@ -176,9 +210,10 @@ def changed(design: AnyDesign, changes: Iterable[Change]) -> AnyDesign:
         data = without_kit(data, design)
     data = override(data, changes)
     start_where_the_user_stands(data, changes)
+    open_what_fits(data, changes)
     data = under_kit(data, design.folder)
     family = type(design)
-    return checked(family, data, {design.family: family}).placed(design.folder)
+    return checked(family, data, {design.family: family}).placed(design.folder).fitted()
 
 
 def add_waivers(data: dict[str, Any], waivers: Sequence[str]) -> dict[str, Any]:
@@ -223,7 +258,7 @@ def validated(
         raise DesignError(f"family = {shown(family)} must be one of {listed(families)}{hint}")
     from sbafab.design.kits import under_kit
 
-    return checked(families[family], under_kit(data, folder), families).placed(folder)
+    return checked(families[family], under_kit(data, folder), families).placed(folder).fitted()
 
 
 def checked(

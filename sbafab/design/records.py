@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, PrivateAttr
 
 from sbafab.design.films import UNCALIBRATED, Films, KerfWidth, LayerFilms, Sheet
-from sbafab.design.form import Form
+from sbafab.design.form import Form, Free
 from sbafab.design.section import Section
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres
 from sbafab.notebook import table_html
@@ -117,9 +117,10 @@ class Registration(Section):
     """By how much the holes of the ears are wider than their pins; up to three steps add it up."""
     pin_stretch: float = Field(default=0.3, ge=0, le=2)
     """The most by which a hole may be stretched over its pin, as a share of itself. Ours, untested:
-    a tenth of the 300 % that PTFE film must stand before it tears (ASTM D3308); TPE stands more."""
+    less than a tenth of the 400 % that cast PTFE film of 0.025 mm must stand before it tears (ASTM
+    D3369, Table 1); skived film stands less, TPE more."""
     pin_standard: Literal["ISO 8734", "ISO 2338"] = "ISO 8734"
-    """Whose diameters and lengths the dowel pins have; both are ground to m6."""
+    """Whose diameters and lengths the dowel pins have; order them ground to m6."""
     pin_lengths: tuple[Length, ...] = Field(default=(), max_length=30, strict=False)
     """Lengths of pins that you have, in place of the standard's."""
     cutting_error: Annotated[float, Millimetres(0, 1)] = 0.1
@@ -185,8 +186,8 @@ class Press(Section):
     pad_thickness: Length | None = None
     """Of the press pad; by default the thinnest sold that gives films 1.5 times the pressure."""
     pad_hardness: float = Field(default=10.0, ge=5, le=90)
-    """Shore A; 10 is a soft closed-cell silicone sponge, grade 4 of ASTM D1056 by Gent's formula;
-    sheets of solid silicone rubber have 40 to 70."""
+    """Shore A; 10 is a soft closed-cell silicone sponge, between grades 3 and 4 of ASTM D1056 class
+    D; sheets of solid silicone rubber have 40 to 70."""
     flash_bottom_minutes: float = Field(default=3.0, gt=0, le=600)
     """Step 1: the bottom balloon's upper two layers."""
     bond_bottom_minutes: float = Field(default=12.0, gt=0, le=600)
@@ -278,8 +279,8 @@ class Chamber(Section):
     """The pockets of one chamber; a family adds their sizes."""
 
     outline: str | None = Field(default=None, max_length=1000)
-    """DXF or SVG file with one closed path, drawn round (0, 0): the pocket, in place of the shape
-    that the family gives it."""
+    """DXF or SVG file with one closed path: the pocket, in place of the shape that the family gives
+    it. Drawn round (0, 0) it stays as it lies, else its centroid comes to the chamber's axis."""
 
 
 class Design(Section):
@@ -310,11 +311,17 @@ class Design(Section):
     chamber: Chamber = Chamber()
 
     _folder: Path = PrivateAttr(default=Path())
+    _is_solved: bool = PrivateAttr(default=False)
 
     @property
     def folder(self) -> Path:
         """Where relative paths of the design start: the folder of its file."""
         return self._folder
+
+    @property
+    def is_solved(self) -> bool:
+        """Whether ``chamber.diameter`` was solved from what the design must fit."""
+        return self._is_solved
 
     @property
     def drawing(self) -> Path | None:
@@ -345,6 +352,16 @@ class Design(Section):
     def form(self) -> Form:
         """What the actuator is like, for models, checks and pages. Raises DesignError."""
 
+    @property
+    def free(self) -> tuple[Free, ...]:
+        """The keys that a search may change unless it is told otherwise; a family adds its own."""
+        most, bond, reach = self.rules.validated_balloons, self.rules.bond_width, self.mask.overhang
+        return (
+            Free("stack.balloons", 2, most, 1),
+            Free("bond.width", bond, bond + 0.5, 0.05, asked="yield"),
+            Free("mask.overhang", reach, reach + 0.5, 0.05, asked="yield"),
+        )
+
     def with_(self, *changes: str | Mapping[str, Any], **tables: Any) -> Self:
         """The same design with keys changed, checked like a design file.
 
@@ -367,6 +384,19 @@ class Design(Section):
         """The same design with every default that depends on another value filled in."""
         inlet = self.inlet.model_copy(update={"width": self.strip_width})
         return self.model_copy(update={"inlet": inlet})
+
+    def fitted(self) -> Self:
+        """The same design with what it must fit solved for. Raises DesignError where nothing does.
+
+        A family that knows ``fits`` does so.
+        """
+        return self
+
+    def solved(self) -> Self:
+        """The same design, of which ``chamber.diameter`` is known to be solved, not given."""
+        copy = self.model_copy()
+        copy._is_solved = True
+        return copy
 
     def placed(self, folder: Path) -> Self:
         """The same design with relative paths starting at ``folder``."""

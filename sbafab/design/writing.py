@@ -10,15 +10,28 @@ from typing import Any
 from sbafab.design.films import LayerFilms
 from sbafab.design.records import Design, Inlet
 
+FITS = "fits"
+
 
 def resolved(design: Design) -> dict[str, Any]:
     """The design with every default written out, as plain TOML values."""
-    return _without_none(design.completed().model_dump(mode="json"))
+    return _tables(design.completed())
 
 
 def plain_tables(design: Design) -> dict[str, Any]:
     """The design as tables of a TOML file, defaults that depend on other values left open."""
-    return _without_none(design.model_dump(mode="json"))
+    tables = _tables(design)
+    if design.is_solved:
+        del tables["chamber"]["diameter"]
+    return tables
+
+
+def _tables(design: Design) -> dict[str, Any]:
+    tables = _without_none(design.model_dump(mode="json"))
+    if not tables.get(FITS):
+        # Nothing is asked for: an empty table would say nothing.
+        tables.pop(FITS, None)
+    return tables
 
 
 def _without_none(table: dict[str, Any]) -> dict[str, Any]:

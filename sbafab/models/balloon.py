@@ -1,8 +1,9 @@
 """One round balloon as an elastic membrane of revolution: inflated free, or between plates.
 
 Two equal films, bonded round the pocket and, where there are neighbours, at the neck. One film is
-computed; the other one mirrors it. A film stretches (Saint Venant-Kirchhoff, plane stress) and
-bends. Where its hoop is compressed it wrinkles, and carries what wrinkles of least energy do:
+computed; the other one mirrors it. A film stretches (plane stress; Saint Venant and Kirchhoff's law,
+or Hencky's) and bends. Where its hoop is compressed it wrinkles, and carries what wrinkles of least
+energy do:
 
     N = 2 pi / L sqrt(B T)      (after Cerda and Mahadevan, 2003)
 
@@ -21,6 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.errors import DesignError
+from sbafab.laminate.films import PAPER_TPE
 from sbafab.models.film_elements import Flat, Term, add, air, bending, membrane, strain
 
 if TYPE_CHECKING:
@@ -28,8 +30,8 @@ if TYPE_CHECKING:
 
     from sbafab.models.film_elements import Array
 
-FILM_ELEMENTS = 40
-RIM_ELEMENTS = 8
+FILM_ELEMENTS = 24
+RIM_ELEMENTS = 5
 NECK_ELEMENTS = 2
 FARTHEST = 0.7
 """Share of its length by which an element may change in one step."""
@@ -39,6 +41,8 @@ ROUNDING = 1e-13
 HALVINGS = 12
 CLOSE = 1e-9
 """Force out of balance, as a share of pressure times pocket area, that is none."""
+LEAST = 0.01
+"""Pressure in kPa that balance is judged by where there is less."""
 PLATE = 20_000.0
 """What a plate gives way by: the pressure on the film presses it in by 1 / PLATE mm."""
 ROUNDS = 3
@@ -52,7 +56,8 @@ class Balloon:
     ``neck`` is the radius bonded to the next balloon, ``bore`` that of the hole in it; both 0 for a
     lone balloon. Without ``wrinkles`` films stay as smooth as an axisymmetric mesh keeps them.
     ``inextensible`` is the limit of a film that neither bends nor carries any compression, its rim
-    included: the modulus has then to be large.
+    included: the modulus has then to be large. ``order`` is that of the film's law (``Flat``): 2 for
+    Saint Venant's and Kirchhoff's, which programs for linear films take; 0 for Hencky's.
     """
 
     pocket: float = 2.5
@@ -60,10 +65,11 @@ class Balloon:
     neck: float = 0.0
     bore: float = 0.0
     thickness: float = 0.038
-    modulus: float = 10_000.0
-    poisson: float = 0.2
+    modulus: float = 1000 * PAPER_TPE[0]
+    poisson: float = PAPER_TPE[1]
     wrinkles: bool = True
     inextensible: bool = False
+    order: int = 2
 
     @cached_property
     def nodes(self) -> Array:
@@ -88,7 +94,12 @@ class Balloon:
 
     @cached_property
     def film(self) -> Flat:
-        return Flat(self.nodes, self.thickness, self.modulus, self.poisson)
+        return Flat(self.nodes, self.thickness, self.modulus, self.poisson, self.order)
+
+    @cached_property
+    def widths(self) -> Array:
+        """Area in mm2 that belongs to each node."""
+        return np.asarray(math.tau * self.nodes * np.gradient(self.nodes))
 
     @property
     def rigidity(self) -> float:
@@ -98,19 +109,21 @@ class Balloon:
         return self.modulus * self.thickness**3 / (12 * (1 - self.poisson**2))
 
     @cached_property
-    def freedoms(self) -> Array:
-        """What moves: a row a coordinate (r, z of each node in turn), a column a freedom.
+    def freedoms(self) -> NDArray[np.int_]:
+        """Numbers of the coordinates (r, z of each node in turn) that move on their own.
 
-        The neck stays level, the rim in the plane between the films, the pole on the axis.
+        The neck stays level: its heights follow ``level``. The rim stays in the plane between the
+        films, the pole on the axis.
         """
         nodes = range(len(self.nodes))
-        columns = [[2 * node] for node in nodes if node or self.bore]
-        columns.append([2 * node + 1 for node in nodes[: self.held + 1]])
-        columns += [[2 * node + 1] for node in nodes[self.held + 1 : self.edge]]
-        matrix = np.zeros((2 * len(self.nodes), len(columns)))
-        for column, rows in enumerate(columns):
-            matrix[rows, column] = 1.0
-        return matrix
+        found = [2 * node for node in nodes if node or self.bore]
+        found += [2 * node + 1 for node in nodes[self.held : self.edge]]
+        return np.array(sorted(found))
+
+    @property
+    def level(self) -> int:
+        """Number of the height that the neck's others are equal to."""
+        return 2 * self.held + 1
 
     @cached_property
     def may_wrinkle(self) -> NDArray[np.bool_]:
@@ -143,22 +156,30 @@ class _Load(NamedTuple):
     pressure: Array
     half: Array
     cap: Array
+    tied: bool
+
+    def rows(self, these: NDArray[np.int_]) -> _Load:
+        return _Load(self.pressure[these], self.half[these], self.cap[these], self.tied)
 
 
-def inflate(balloon: Balloon, pressure: ArrayLike, height: ArrayLike | None = None) -> Shapes:
+def inflate(
+    balloon: Balloon, pressure: ArrayLike, height: ArrayLike | None = None, tied: bool = False
+) -> Shapes:
     """The shapes at pressures (kPa), free or between plates at heights (mm).
 
-    A free balloon with a bore is pulled on by the air in it, as one in a stack is. Raises
-    DesignError for pressures or heights that are not above 0, or where no balance is found.
+    A free balloon with a bore is pulled on by the air in it, as one in a stack is. With ``tied``
+    the plates hold its necks, and pull where they stand higher than it would rise; the force is
+    then below 0. Raises DesignError for pressures or heights that are not above 0 (a tied one may
+    have no pressure), or where no balance is found.
     """
     p = np.atleast_1d(np.asarray(pressure, dtype=float))
     high = math.inf if height is None else np.asarray(height, dtype=float)
     p, high = np.broadcast_arrays(p, high)
-    if not ((p > 0) & np.isfinite(p) & (high > 0)).all():
+    if not (((p > 0) | (tied & (p == 0))) & np.isfinite(p) & (high > 0)).all():
         raise DesignError("pressure and height of a balloon must be above 0 kPa and 0 mm")
     elements = len(balloon.nodes) - 1
     smooth = np.where(balloon.may_wrinkle & balloon.inextensible, 0.0, math.inf)
-    load = _Load(p, high / 2, np.broadcast_to(smooth, (len(p), elements)))
+    load = _Load(p, high / 2, np.broadcast_to(smooth, (len(p), elements)), tied)
     r, z = _settled(balloon, load, *_start(balloon, load))
     if balloon.wrinkles and not balloon.inextensible:
         zone = _compressed(balloon, r, z)
@@ -174,32 +195,42 @@ def _start(balloon: Balloon, load: _Load) -> tuple[Array, Array]:
     """Bulged films to begin with, as high as their pressure may lift them."""
     flat, free = balloon.nodes, balloon.pocket - balloon.neck
     rise = 0.3 * free * np.cbrt(load.pressure * balloon.pocket / (balloon.modulus * 0.0025))
-    rise = np.minimum(np.clip(rise, 0.05 * free, 0.8 * free), load.half)
+    rise = np.clip(rise, 0.05 * free, 0.8 * free)
+    rise = load.half if load.tied else np.minimum(rise, load.half)
     shape = np.clip(1 - ((flat - balloon.neck) / free) ** 2, 0.0, 1.0)
     shape[: balloon.held + 1] = 1.0
     return np.tile(flat, (len(rise), 1)), rise[:, None] * shape
 
 
-def _total(balloon: Balloon, load: _Load, r: Array, z: Array) -> tuple[Term, Array]:
+def _total(
+    balloon: Balloon, load: _Load, r: Array, z: Array, slopes: bool = True
+) -> tuple[Term, Array]:
     """Energy of films and plates less the work of the air, by coordinate, and the plates' force."""
     film, edge = balloon.film, balloon.edge
-    total = bending(film, balloon.rigidity, balloon.held, edge, r, z)
-    stretched = membrane(film, r, z, load.cap)
-    filled = air(film, edge, r, z)
+    bent = slice(balloon.held, edge)
+    total = bending(film, balloon.rigidity, bent, r, z, slopes)
+    stretched = membrane(film, r, z, load.cap, slopes)
+    filled = air(film, edge, r, z, slopes)
     p = load.pressure
+    number = np.arange(len(film.nodes))
+    stiff = PLATE * p[:, None] * np.where(number < edge, balloon.widths, 0.0)
+    over = np.maximum(z - load.half[:, None], 0.0)
+    if load.tied:
+        holds = number <= balloon.held
+        stiff = np.where(holds, PLATE * np.maximum(p, 1.0)[:, None] * balloon.widths, stiff)
+        over = np.where(holds, z - load.half[:, None], over)
+    pressed = stiff * over
+    energy = total.energy + stretched.energy - p * filled.energy + (pressed * over).sum(-1) / 2
+    if not slopes:
+        return total._replace(energy=energy), pressed.sum(-1)
     add(
         total,
         stretched.gradient - p[:, None, None] * filled.gradient,
         stretched.hessian - p[:, None, None, None] * filled.hessian,
     )
-    width = math.tau * film.nodes * np.gradient(film.nodes)
-    stiff = PLATE * p[:, None] * np.where(np.arange(len(film.nodes)) < edge, width, 0.0)
-    over = np.maximum(z - load.half[:, None], 0.0)
-    pressed = stiff * over
     heights = np.arange(1, 2 * len(film.nodes), 2)
     total.gradient[:, heights] += pressed
-    total.hessian[:, heights, heights] += np.where(over > 0, stiff, 0.0)
-    energy = total.energy + stretched.energy - p * filled.energy + (pressed * over).sum(-1) / 2
+    total.hessian[:, heights, heights] += np.where(over != 0, stiff, 0.0)
     return total._replace(energy=energy), pressed.sum(-1)
 
 
@@ -209,28 +240,41 @@ def _settled(balloon: Balloon, load: _Load, r: Array, z: Array) -> tuple[Array, 
     Raises DesignError where it does not end.
     """
     freedoms = balloon.freedoms
-    damping = np.zeros(len(r))
-    small = CLOSE * load.pressure * math.pi * balloon.pocket**2
-    eye = np.eye(freedoms.shape[1])
-    term, _ = _total(balloon, load, r, z)
+    r, z, damping = r.copy(), z.copy(), np.zeros(len(r))
+    live = np.arange(len(r))
+    own = np.ix_(freedoms, freedoms)
+    diagonal = np.arange(len(freedoms))
     for _ in range(MOST_STEPS):
-        gradient = term.gradient @ freedoms
-        stiffness = freedoms.T @ term.hessian @ freedoms
-        size = np.abs(np.einsum("nii->ni", stiffness))
-        stiffness += (damping[:, None] * size)[..., None] * eye
+        part, at = load.rows(live), (r[live], z[live])
+        term, _ = _total(balloon, part, *at)
+        for height in range(1, balloon.level, 2):
+            term.gradient[:, balloon.level] += term.gradient[:, height]
+            term.hessian[:, balloon.level] += term.hessian[:, height]
+        for height in range(1, balloon.level, 2):
+            term.hessian[:, :, balloon.level] += term.hessian[:, :, height]
+        gradient = term.gradient[:, freedoms]
+        stiffness = term.hessian[:, own[0], own[1]]
+        stiffness[:, diagonal, diagonal] += damping[live, None] * np.abs(
+            stiffness[:, diagonal, diagonal]
+        )
         move = -np.linalg.solve(stiffness, gradient[..., None])[..., 0]
         slope = (move * gradient).sum(-1)
+        small = CLOSE * np.maximum(part.pressure, LEAST) * math.pi * balloon.pocket**2
         still = np.abs(gradient).max(-1) <= small
         # Where rounding alone decides whether the energy falls, there is nothing left to gain.
-        still |= (np.abs(slope) <= ROUNDING * np.abs(term.energy)) & (damping == 0.0)
+        digits = ROUNDING * (np.abs(term.energy) + part.pressure * balloon.pocket**3)
+        still |= (np.abs(slope) <= digits) & (damping[live] == 0.0)
         if still.all():
             return r, z
-        ahead = np.where(still[:, None], 0.0, move) @ freedoms.T
-        share = _downhill(balloon, load, (r, z), ahead, term.energy, slope)
-        r, z = r + share[:, None] * ahead[:, ::2], z + share[:, None] * ahead[:, 1::2]
-        term, _ = _total(balloon, load, r, z)
-        damping = np.where(share > 0, damping / 10, np.clip(10 * damping, 1e-3, 1e9))
-        damping[damping < 1e-6] = 0.0
+        ahead = np.zeros_like(term.gradient)
+        ahead[:, freedoms] = np.where(still[:, None], 0.0, move)
+        ahead[:, 1 : balloon.level : 2] = ahead[:, balloon.level, None]
+        share = _downhill(balloon, part, at, ahead, term.energy, slope)
+        r[live] += share[:, None] * ahead[:, ::2]
+        z[live] += share[:, None] * ahead[:, 1::2]
+        damped = np.where(share > 0, damping[live] / 10, np.clip(10 * damping[live], 1e-3, 1e9))
+        damping[live] = np.where(damped < 1e-6, 0.0, damped)
+        live = live[~still]
     raise DesignError(
         f"a balloon of radius {balloon.pocket:g} mm finds no balance; try another load"
     )
@@ -250,10 +294,11 @@ def _downhill(
     change = np.hypot(np.diff(ahead[:, ::2]), np.diff(ahead[:, 1::2]))
     share = np.minimum(1.0, FARTHEST / np.maximum((change / length).max(-1), 1e-300))
     share = np.where(slope <= 0, share, 0.0)
-    room = 1e-12 * np.abs(energy)
+    room = 1e-12 * (np.abs(energy) + load.pressure * balloon.pocket**3)
     for _ in range(HALVINGS):
         step = share[:, None] * ahead
-        tried = _total(balloon, load, at[0] + step[:, ::2], at[1] + step[:, 1::2])[0].energy
+        to = at[0] + step[:, ::2], at[1] + step[:, 1::2]
+        tried = _total(balloon, load, *to, slopes=False)[0].energy
         good = tried <= energy + 1e-4 * share * slope + room
         if good.all():
             return share

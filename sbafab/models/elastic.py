@@ -4,51 +4,65 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-
-import numpy as np
+from dataclasses import replace
 
 from sbafab.errors import DesignError
 from sbafab.models.actuator import Actuator
-from sbafab.models.balloon import Balloon, Shapes, inflate
-from sbafab.models.figures import Asked, Figure, LeftOut, Model
+from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.balloon_map import MOST_STRETCH, stretch
+from sbafab.models.balloons import balloons_of
+from sbafab.models.figures import Asked, Factors, Figure, LeftOut, Model
 
 ELASTIC = Model(
     "elastic balloon",
-    "membrane of revolution, E = 10 MPa",
+    "membrane of revolution, the film's modulus",
     "one balloon to 10 kPa: within 1 % of an axisymmetric mesh, 2 % of a solid one that wrinkles; "
     "all balloons of a stack are taken for inner ones, inlets left out",
 )
-MOST_STRETCH = 0.15
-"""Share by which films may stretch; one modulus is unlikely to hold beyond."""
+
+
+def calibrated(model: Model, factors: Factors) -> Model:
+    """The same model with the factors it took, named unless they are the defaults."""
+    said = []
+    if factors.press_factor != 1:
+        said.append(f"press factor {factors.press_factor:g}")
+    if factors.pocket_loss:
+        said.append(f"pocket loss {factors.pocket_loss:g} mm")
+    if factors.modulus_mpa is not None:
+        said.append(f"E = {factors.modulus_mpa:g} MPa")
+    return replace(model, name=f"{model.name}, {', '.join(said)}") if said else model
 
 
 def free_strokes(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
     """What a stack of round pockets rises by, holds and stores at the pressures asked for."""
     if not one.radii:
         return
-    others = {film for film in _films(one) if film != "TPE"}
-    if others:
-        yield LeftOut("free stroke, elastic balloon", f"no modulus of {min(others)} is known")
+    try:
+        kinds = Counter(balloons_of(one.design, one.laminate, asked.calibration))
+    except DesignError as error:
+        yield LeftOut("free stroke, elastic balloon", str(error))
         return
+    model = calibrated(ELASTIC, asked.calibration)
     for pressure in asked.pressures_kpa:
         at = f"at {pressure:g} kPa"
         try:
-            stroke, volume, stored = _risen(one, pressure)
+            stroke, volume, stored = _risen(kinds, pressure)
         except DesignError as error:
             yield LeftOut(f"free stroke {at}, elastic balloon", str(error))
             continue
-        yield Figure("stroke", f"free stroke {at}", stroke, "mm", ELASTIC)
-        yield Figure("stroke", f"volume a balloon {at}", volume / one.balloons, "ul", ELASTIC)
+        yield Figure("stroke", f"free stroke {at}", stroke, "mm", model)
+        yield Figure("stroke", f"free height {at}", one.thickness + stroke, "mm", model)
+        yield Figure("stroke", f"volume a balloon {at}", volume / one.balloons, "ul", model)
         work = stored * one.form.stacks / 1000
-        yield Figure("actuation", f"pneumatic input work {at}, free", work, "mJ", ELASTIC)
+        yield Figure("actuation", f"pneumatic input work {at}, free", work, "mJ", model)
 
 
-def _risen(one: Actuator, pressure: float) -> tuple[float, float, float]:
+def _risen(kinds: Counter[Balloon], pressure: float) -> tuple[float, float, float]:
     """Stroke in mm, air in ul and energy in uJ (that is the integral of p dV) of one stack."""
     stroke = volume = stored = 0.0
-    for kind, count in _balloons(one).items():
+    for kind, count in kinds.items():
         shape = inflate(kind, pressure)
-        longer = _stretch(kind, shape)
+        longer = float(stretch(kind, shape)[0])
         if longer > MOST_STRETCH:
             raise DesignError(
                 f"the film would be {100 * longer:.0f} % longer, and one modulus is unlikely to "
@@ -58,26 +72,3 @@ def _risen(one: Actuator, pressure: float) -> tuple[float, float, float]:
         volume += count * float(shape.volume[0])
         stored += count * float(shape.energy[0])
     return stroke, volume, stored
-
-
-def _films(one: Actuator) -> set[str]:
-    """Materials of the films that balloons are made of."""
-    return {layer.film.material for layer in one.laminate.layers if not layer.is_mask}
-
-
-def _balloons(one: Actuator) -> Counter[Balloon]:
-    """The balloons of a stack, alike ones together."""
-    design = one.design
-    film = next(layer.film for layer in one.laminate.layers if not layer.is_mask)
-    bore = design.bore.diameter / 2 if one.balloons > 1 else 0.0
-    neck = bore + design.bond.width if one.balloons > 1 else 0.0
-    return Counter(
-        Balloon(radius, design.bond.width, neck, bore, film.thickness) for radius in one.radii
-    )
-
-
-def _stretch(kind: Balloon, shape: Shapes) -> float:
-    """By what share the film between neck and rim is longer than it was flat."""
-    part = slice(kind.held, kind.edge + 1)
-    lengths = np.hypot(np.diff(shape.r[:, part]), np.diff(shape.z[:, part]))
-    return float(lengths.sum()) / (kind.pocket - kind.neck) - 1

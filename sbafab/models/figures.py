@@ -120,14 +120,18 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class Factors:
-    """Factors from a measurement of one's own; 1 leaves a model as it is.
+    """What a measurement of one's own says; the defaults leave models as they are.
 
     ``press_factor`` is what is left of the films' thickness after pressing, ``contact_factor`` the
-    measured force over the predicted one.
+    measured force over that of the paper's own models. The elastic balloon takes ``pocket_loss``,
+    by how many mm the press leaves pockets smaller in radius than drawn, and ``modulus_mpa``, the
+    film's modulus where it is not the one of the design.
     """
 
     press_factor: float = 1.0
     contact_factor: float = 1.0
+    pocket_loss: float = 0.0
+    modulus_mpa: float | None = None
 
     def __post_init__(self) -> None:
         for name, value, most in (
@@ -136,6 +140,10 @@ class Factors:
         ):
             if not 0 < value <= most:
                 raise DesignError(f"{name} = {value:g} must be above 0 and at most {most:g}")
+        if not 0 <= self.pocket_loss <= 100:
+            raise DesignError(f"pocket loss = {self.pocket_loss:g} mm must be from 0 to 100 mm")
+        if self.modulus_mpa is not None and not 0.1 <= self.modulus_mpa <= 1e4:
+            raise DesignError(f"modulus = {self.modulus_mpa:g} MPa must be from 0.1 to 10000 MPa")
 
 
 @dataclass(frozen=True)
@@ -197,6 +205,8 @@ class Prediction:
                 "volumes_ul": list(self.asked.volumes_ul),
                 "press_factor": self.asked.calibration.press_factor,
                 "contact_factor": self.asked.calibration.contact_factor,
+                "pocket_loss": self.asked.calibration.pocket_loss,
+                "modulus_mpa": self.asked.calibration.modulus_mpa,
             },
             "figures": [figure.as_dict() for figure in self.figures],
             "left_out": [{"name": left.name, "reason": left.reason} for left in self.left_out],

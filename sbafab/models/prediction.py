@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,8 +13,9 @@ from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import GeometryError
 from sbafab.geometry.region import Region
+from sbafab.laminate.extent import film_mass
 from sbafab.laminate.laminate import Laminate
-from sbafab.models import axial, elastic, lobes, paper
+from sbafab.models import axial, elastic, lobes, paper, stacked
 from sbafab.models.actuator import NO_OUTLINE, Actuator, actuator
 from sbafab.models.figures import (
     Asked,
@@ -26,8 +28,10 @@ from sbafab.models.figures import (
 )
 from sbafab.models.inlet import largest_tube
 from sbafab.models.sizes import sizes
+from sbafab.models.stack import Stack
 from sbafab.models.stiffness import second_moments, tip_stiffness
 
+GROUPS = ("size", "inlet", "stroke", "force", "actuation", "bending", "stiffness")
 GEOMETRY = Model("plain geometry", "of the cut files", "exact for what is cut")
 PAPER_SLOTS = Slots(width=10.0, run=8.5)
 """The paper's SBAs of 11.5 x 20 mm less a bond of 0.75 all round (Sec. 2.1)."""
@@ -53,11 +57,17 @@ def predict(
         raise DesignError(f"design {design.name} cannot be resolved: {error}") from None
     one = actuator(design, flat, wish.calibration)
     axial.check_asked(one, wish)
+    together = stacked.stacked(one, wish)
     found = list(_all(one, wish))
+    if isinstance(together, LeftOut):
+        found.append(together)
+    elif together is not None:
+        found += stacked.figures(one, wish, together)
+    found.sort(key=_place)
     return Prediction(
         wish,
         tuple(item for item in found if isinstance(item, Figure)),
-        tuple(_relations(one, wish)),
+        tuple(_relations(one, wish, together if isinstance(together, Stack) else None)),
         tuple(item for item in found if isinstance(item, LeftOut)),
     )
 
@@ -82,14 +92,28 @@ def _all(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
     yield from _stiffness(one)
 
 
-def _relations(one: Actuator, asked: Asked) -> Iterator[Relation]:
+def _place(item: Figure | LeftOut) -> int:
+    """Where the figures of a group stand; within it the order is as they come."""
+    if isinstance(item, LeftOut):
+        return len(GROUPS)
+    return GROUPS.index(item.group)
+
+
+def _relations(one: Actuator, asked: Asked, together: Stack | None) -> Iterator[Relation]:
     if not one.kinematics:
         return
     yield axial.stroke_relation(one)
     if asked.pressures_kpa:
-        yield axial.force_relation(one, asked)
+        pushed = axial.force_relation(one, asked)
+        if together is not None:
+            pushed = replace(
+                pushed, lines=(*pushed.lines, *stacked.force_traces(one, asked, together))
+            )
+        yield pushed
     if one.form.is_parallel:
         yield lobes.bending_relation(one, asked)
+        if together is not None:
+            yield stacked.bend_relation(asked, together)
         yield lobes.workspace_relation(one)
     if one.form.wrap is not None:
         yield _diameter_relation(one, one.form.wrap)
@@ -121,10 +145,7 @@ def _round_tube(name: str, factor: float) -> Model:
 
 
 def _mass(laminate: Laminate) -> Figure:
-    grams = sum(
-        layer.profile.area * layer.film.thickness * layer.film.density * 1e-6
-        for layer in laminate.layers
-    )
+    grams = film_mass(laminate)
     trust = "exact for the films, masks, tabs and ears included; without tubing, glue and fluid"
     return Figure("size", "mass", grams, "g", Model("area x thickness x density", "", trust))
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 from sbafab.design.form import Form, Slots, Wrap
 from sbafab.design.records import Design
-from sbafab.geometry.region import Region
+from sbafab.laminate.extent import beyond_the_outline, outline_diameter, overall_diameter
 from sbafab.laminate.laminate import Laminate
 
 
@@ -37,27 +36,6 @@ def sizes(design: Design, laminate: Laminate) -> dict[str, float]:
     return found
 
 
-def outline_diameter(laminate: Laminate) -> float:
-    """Diameter of the circle round the axis that holds all films, tabs and ears taken off.
-
-    The paper's 3-DoF actuator fits 15 (Sec. 2). Measured on every film as it is cut: what of it
-    lies within the laminate's outline.
-    """
-    films = {layer.pattern: layer.profile for layer in laminate.tpe_layers}
-    return _round_axis(Region(film.outers) & laminate.outline for film in films.values())
-
-
-def overall_diameter(laminate: Laminate) -> float:
-    """Diameter of the circle round the axis that holds every layer, with tabs, tails and ears."""
-    return _round_axis(layers[0].profile for layers in laminate.patterns.values())
-
-
-def _round_axis(regions: Iterable[Region]) -> float:
-    return 2 * max(
-        (edge.farthest_from((0.0, 0.0)) for region in regions for edge in region.edges), default=0.0
-    )
-
-
 def deflated_diameter(wrap: Wrap, laminate: Laminate) -> float:
     """Tube plus the flat laminate on both sides; the paper gives 15.33 (Sec. 2.1)."""
     return wrap.tube_diameter + 2 * laminate.thickness
@@ -73,3 +51,19 @@ def inflated_diameter(form: Form, laminate: Laminate) -> float | None:
         return None
     height = laminate.balloons * 2 * form.pockets.width / math.pi
     return form.wrap.tube_diameter + 2 * (height + laminate.thickness)
+
+
+def size_said(design: Design, laminate: Laminate) -> str:
+    """The size in one line: across with what stands out of it, without, flat, and its height."""
+    found = sizes(design, laminate)
+    said = []
+    if "overall_diameter" in found:
+        over = beyond_the_outline(laminate)
+        said.append(f"{found['overall_diameter']:.2f} mm overall diameter with {over}")
+    if "outline_diameter" in found:
+        said.append(f"{found['outline_diameter']:.2f} without")
+    if "deflated_diameter" in found:
+        said.append(f"{found['deflated_diameter']:.2f} mm round its tube")
+    flat = "flat, " if design.form.wrap is not None else ""
+    said.append(f"{flat}{found['width']:.2f} x {found['length']:.2f} mm")
+    return f"size: {', '.join(said)}, folded height {laminate.thickness:.3f} mm"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sbafab.errors import DesignError
+from sbafab.errors import DesignError, TooLargeError
 from sbafab.laminate.films import FIRST, Material
 from sbafab.nesting.records import NestPart, Stock
 
@@ -21,11 +21,11 @@ def no_usable_area(material: Material, stock: Stock) -> DesignError:
     )
 
 
-def too_large(part: NestPart, stock: Stock) -> DesignError:
+def too_large(part: NestPart, stock: Stock) -> TooLargeError:
     where = field(part.material)
     low_x, low_y, high_x, high_y = part.region.bounds
     left, bottom, right, top = stock.usable
-    return DesignError(
+    return TooLargeError(
         f"pattern {part.pattern} of {part.design} ({high_x - low_x:.1f} x {high_y - low_y:.1f} mm) "
         f"does not fit the usable {right - left:.1f} x {top - bottom:.1f} mm of {where}; enlarge "
         f"{where}.width or length, or lower its border of {stock.border:g} mm."

@@ -14,6 +14,7 @@ from sbafab.actuators import build
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.output.settings import limits
+from sbafab.progress import Progress, unheard
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.registration_yield import SEED, Share, simulate
 
@@ -71,14 +72,14 @@ class Advice:
         }
 
 
-def advise(design: Design, target: float) -> Advice:
+def advise(design: Design, target: float, tell: Progress = unheard) -> Advice:
     """The smallest bond and overhang whose interval of 95 % lies at or above ``target``.
 
     First both grow by the same amount above the rules' limits until the target is reached; then
     the overhang, and after it the bond, is taken back as far as the target allows. Neither can
     then be smaller by itself. Where the other seed falls short, both grow by one step more.
     """
-    trial = _Trial(design, target)
+    trial = _Trial(design, target, tell)
     both = _least(lambda steps: trial.verdict(steps, steps))
     if both is None:
         return Advice(target, design.registration.method)
@@ -101,9 +102,10 @@ Outcome = Literal["short", "reached", "impossible"]
 class _Trial:
     """Builds the design with steps more of bond and overhang than the rules ask for."""
 
-    def __init__(self, design: Design, target: float) -> None:
+    def __init__(self, design: Design, target: float, tell: Progress) -> None:
         self.design = design
         self.target = target
+        self.tell = tell
         self.verdicts: dict[tuple[int, int], Outcome] = {}
 
     def lengths(self, bond: int, overhang: int) -> tuple[float, float]:
@@ -137,6 +139,10 @@ class _Trial:
     def verdict(self, bond: int, overhang: int) -> Outcome:
         key = bond, overhang
         if key not in self.verdicts:
+            # How many it takes nobody knows.
+            self.tell(
+                f"bond and overhang that reach the yield, trial {len(self.verdicts) + 1}", 0, 0
+            )
             share = self.share(bond, overhang, SEED)
             if share is None:
                 self.verdicts[key] = "impossible"

@@ -145,7 +145,8 @@ def write_assembly(
     sha256 = assembly_sha256(assembled)
     write_findings(assembled.assembly.name, sha256, checked.designs, checked.between, folder)
     designs = [one.design for one in checked.designs]
-    write_text(folder / "checks.json", as_json(checks(checked.findings, "design", designs)))
+    found = checks(checked.findings, "design", assembled.assembly.name, designs)
+    write_text(folder / "checks.json", as_json(found))
     write_text(folder / DESIGN_FILE, assembly_toml(assembled))
     index |= {**_claims(assembled), "meshes": meshes, "files": {}}
     return AssemblyManifest.model_validate_json(as_json(index)).as_dict()

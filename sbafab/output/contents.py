@@ -75,7 +75,7 @@ def write_contents(
         write_text(folder / TRAVELLER, _traveller(planned, sheets, solid))
     if has_page and "preview" in wanted:
         write_findings(checked.design.name, design_sha256(checked.design), [checked], (), folder)
-    found = checks(checked.findings, "design", [checked.design])
+    found = checks(checked.findings, "design", checked.design.name, [checked.design])
     write_text(folder / "checks.json", as_json(found))
     _write_design(checked.design, folder)
     return manifest(planned, sheets, meshes)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from sbafab.cutting.fixture import PATH as FIXTURE
+from sbafab.cutting.panel_projects import projects
 from sbafab.cutting.properties import CutSettings, layer_path, said_of
 from sbafab.cutting.second_cut import PATH as SECOND_CUT
 from sbafab.cutting.sheets import SheetFile
@@ -52,7 +53,7 @@ from sbafab.output.settings import GENERATOR, kerf_widths, warnings
 from sbafab.output.shop import film_use
 from sbafab.output.swap import SCHEMA
 from sbafab.pressing.together import Runs, design_runs
-from sbafab.rules.finding import Finding
+from sbafab.rules.finding import Finding, summary
 
 
 def as_json(value: object) -> str:
@@ -60,12 +61,21 @@ def as_json(value: object) -> str:
     return json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
+CHECKS_SCHEMA = "sbafab/checks@1"
+
+
 def checks(
-    findings: Sequence[Finding], source: str, designs: Sequence[Design] = ()
+    findings: Sequence[Finding], source: str, name: str, designs: Sequence[Design] = ()
 ) -> dict[str, Any]:
-    """``checks.json``; ``source`` is "design" or "as-built", ``designs`` are what was checked."""
+    """``checks.json``: of the design, assembly or folder called ``name``.
+
+    ``source`` is "design" or "as-built", ``designs`` are what was checked.
+    """
     return {
+        "schema": CHECKS_SCHEMA,
+        "design": name,
         "source": source,
+        "summary": summary(findings),
         "kits": [{"design": design.name, **citation(design)} for design in designs],
         "findings": [finding.as_dict() for finding in findings],
     }
@@ -85,7 +95,7 @@ def manifest(
     if runs.copies > 1:
         optional["batch"] = _batch(runs)
     if is_cut and laminate.panel is not None:
-        optional["panel"] = _panel(laminate.panel)
+        optional["panel"] = _panel(laminate, laminate.panel, planned.settings)
     if planned.conforming is not None:
         optional["mesh_statistics"] = planned.conforming.statistics
     return Manifest(
@@ -185,7 +195,8 @@ def _batch(runs: Runs) -> BatchClaim:
     return BatchClaim(at_once=runs.together, cycles=runs.cycles, places=places)
 
 
-def _panel(panel: SheetPanel) -> PanelClaim:
+def _panel(laminate: Laminate, panel: SheetPanel, settings: CutSettings) -> PanelClaim:
+    masks = dict.fromkeys(layer.film.material for layer in laminate.layers if layer.is_mask)
     width, length = (round(side, 6) for side in panel.size)
     return PanelClaim(
         size=(width, length),
@@ -196,7 +207,8 @@ def _panel(panel: SheetPanel) -> PanelClaim:
             FiducialClaim(**_place(place), diameter=panel.fiducial_diameter)
             for place in panel.fiducials
         ),
-        turned_over="PTFE",
+        turned_over=", ".join(masks),
+        projects=tuple(projects(laminate, settings)),
     )
 
 

@@ -188,7 +188,8 @@ class FiducialClaim(PlaceClaim):
 class PanelClaim(_Claim):
     """Registered sheets, in the frame of the first copy; lengths in mm.
 
-    ``turned_over`` is the material whose sheets are drawn as seen from below.
+    ``turned_over`` are the materials whose sheets are drawn as seen from below; ``projects`` the
+    first and second cut for LightBurn.
     """
 
     size: tuple[float, float]
@@ -197,6 +198,7 @@ class PanelClaim(_Claim):
     second_cut: str
     fiducials: tuple[FiducialClaim, ...]
     turned_over: str
+    projects: tuple[str, ...] = ()
 
 
 class Manifest(_Claim):

@@ -10,11 +10,13 @@ from typing import Any
 
 from sbafab.cutting.files import write_layer_files
 from sbafab.cutting.fixture import write_fixture
+from sbafab.cutting.panel_projects import write_projects
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.second_cut import write_second_cut
 from sbafab.cutting.sheets import FOLDER, SheetFile, write_sheets
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
+from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.check import check_nest
@@ -52,13 +54,16 @@ def write_cut_files(planned: Planned, folder: Path, tell: Progress) -> None:
     told = partial(tell, "cut files")
     write_layer_files(laminate, planned.paths, folder, settings, told)
     write_fixture(laminate, folder, settings, design_runs(planned.checked.design, laminate).places)
-    write_second(laminate, folder, settings)
+    write_panel(laminate, planned.paths, folder, settings)
 
 
-def write_second(laminate: Laminate, folder: Path, settings: CutSettings) -> None:
-    """Writes the second cut of registered sheets, if the laminate is made in any."""
+def write_panel(
+    laminate: Laminate, paths: Mapping[str, Region], folder: Path, settings: CutSettings
+) -> None:
+    """Writes the second cut of registered sheets and their LightBurn projects, if there are any."""
     if laminate.panel is not None:
-        write_second_cut(laminate.panel, folder, settings)
+        write_second_cut(laminate, folder, settings)
+        write_projects(laminate, paths, folder, settings)
 
 
 def write_nested_sheets(

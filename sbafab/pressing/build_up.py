@@ -39,7 +39,8 @@ class Pad:
     """The compliant sheet: ``thickness`` None stands for the thinnest that is even enough.
 
     ``hardness`` is Shore A. The default is a soft closed-cell sponge, 0.41 MPa by Gent's formula:
-    103 kPa at a quarter of its height, what ASTM D1056 calls grade 4 (90 to 117 kPa).
+    103 kPa at a quarter of its height, where grade 3 of ASTM D1056 ends for silicone (class D, 9 to
+    15 psi) and grade 4 begins (15 to 22 psi; suppliers' summaries, the standard was not opened).
     """
 
     material: PadMaterial = "silicone sponge"
@@ -91,7 +92,9 @@ def gent_modulus(shore_a: float) -> float:
     """Young's modulus in kPa of rubber of a Shore A hardness.
 
     A. N. Gent, On the relation between indentation hardness and Young's modulus, Trans. Inst.
-    Rubber Ind. 34 (1958) 46-57. Good to a quarter for solid rubber; for a sponge an order.
+    Rubber Ind. 34 (1958) 46-57; its abstract says the relation with Shore hardness is approximate.
+    The numbers are those that other programs quote of it (the paper itself was not opened). Below
+    40 degrees it is stretched past what its abstract claims, and for a sponge it is an order.
     """
     return 1000 * 0.0981 * (56 + 7.62336 * shore_a) / (0.137505 * (254 - 2.54 * shore_a))
 
@@ -124,7 +127,8 @@ def column_modulus(pad: Pad, thickness: float, under: Footprint) -> float:
 
     A sponge gives way column by column. Solid rubber keeps its volume and must flow aside: E (1 +
     2 S^2), S the pressed area over the free rim (Gent and Lindley, Proc. Inst. Mech. Eng. 173
-    (1959) 111).
+    (1959) 111, as Strojniski vestnik 60 (2014) 506, Eq. 1, quotes it: 2 is for unfilled rubber
+    between plates it is bonded to).
     """
     if pad.material == "silicone sponge":
         return pad.modulus

@@ -1,7 +1,10 @@
 """Dowel pins as they are sold, and how deep they sit in the base plate.
 
-Lengths, diameters and chamfers: ISO 8734:1997 (hardened) and ISO 2338:1997 (unhardened), both
-ground to m6.
+Lengths, diameters and chamfers: ISO 8734:1997 (hardened) and ISO 2338:1997 (unhardened, m6 or h8:
+order m6). The standards themselves were not opened. Held against the tables of FreeCAD's workbench
+for fasteners (FsData/iso8734*.csv, iso2338*.csv), all equal; against a table of ISO 8734 in the
+public part library of geop, equal from 1.5 mm up; chamfers of ISO 8734 against a transcription of
+its Table 1 in tscircuit's modelprinter, equal.
 """
 
 from __future__ import annotations
@@ -44,7 +47,19 @@ RANGES: Mapping[Standard, Mapping[float, tuple[int, int]]] = {
     },
 }
 """Shortest and longest length by diameter, mm."""
-CHAMFERS = {0.6: 0.12, 0.8: 0.16, 1.0: 0.2, 1.2: 0.25, 1.5: 0.3, 2.0: 0.35, 2.5: 0.4, 3.0: 0.5}
+CHAMFERS = {
+    0.6: 0.12,
+    0.8: 0.16,
+    1.0: 0.2,
+    1.2: 0.25,
+    1.5: 0.3,
+    2.0: 0.35,
+    2.5: 0.4,
+    3.0: 0.5,
+    4.0: 0.63,
+    5.0: 0.8,
+    6.0: 1.2,
+}
 """Height of the chamfer at a pin's end by diameter, mm; of others a fifth of the diameter."""
 PLATES = (6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
 """Thicknesses in which plate is sold, mm."""
@@ -100,7 +115,8 @@ def settings_by_step(
     standard: Standard,
     own: Sequence[float] = (),
 ) -> list[tuple[PinSetting, ...]]:
-    """The pins of every step, given the height of its stack in mm and the pins that are in.
+    """The pins of every step, given the height of its stack's top over the plate in mm, release
+    film included, and the pins that are in.
 
     A pin has the same length in all steps, the shortest that is sold and sits firm under the
     highest stack; it is driven in until it stands over the stack by its chamfer. Raises DesignError

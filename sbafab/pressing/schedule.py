@@ -138,6 +138,12 @@ class Step:
         """Height of the stack that is pressed."""
         return next(item.thickness_mm for item in self.build_up if item.part == LAMINATE)
 
+    @property
+    def top_mm(self) -> float:
+        """Height of the stack's top over the base plate: the stack lies on a release film."""
+        release = next(item.thickness_mm for item in self.build_up if item.part == RELEASE)
+        return self.stack_mm + release
+
 
 @dataclass(frozen=True)
 class Schedule:
@@ -168,7 +174,10 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
     stacks = [*under, *chain.from_iterable(others)]
     pad = build_up.pad_thickness(press.pressure_kpa, press.platen, press.pad, stacks)
     pins = settings_by_step(
-        [(stack.height, part.pins) for stack, part in zip(under, parts, strict=True)],
+        [
+            (height + press.release_thickness, part.pins)
+            for height, part in zip(_pinned_heights(laminate, under), parts, strict=True)
+        ],
         press.pin_standard,
         press.pin_lengths,
     )
@@ -194,6 +203,15 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
         "1.75 h in all)",
         tuple(_warnings(laminate, press, steps)),
     )
+
+
+def _pinned_heights(laminate: Laminate, under: Sequence[Footprint]) -> list[float]:
+    """Height of the stack that the pins of each step reach through, mm.
+
+    Registered sheets stay on their pins from step to step, so these are set once.
+    """
+    heights = [stack.height for stack in under]
+    return heights if laminate.panel is None else [max(heights)] * len(heights)
 
 
 def _tacked(minutes: float) -> str:
@@ -243,7 +261,8 @@ def _step(
 
 
 def _round_pins(press: PressSettings, own: _Setting) -> str:
-    out = max((pin.stands_mm - own.under.height for pin in own.pins), default=0.0)
+    beneath = own.under.height + press.release_thickness
+    out = max((pin.stands_mm - beneath for pin in own.pins), default=0.0)
     if not out:
         return ""
     free = build_up.unpressed(press.pressure_kpa, press.pad, out)

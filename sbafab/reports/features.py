@@ -36,6 +36,22 @@ class WidthDimension:
     end: Point
 
 
+Dimension = Circle | WidthDimension
+
+
+def dimensions(laminate: Laminate, layer: Layer) -> list[Dimension]:
+    """All that a drawing of a layer gives the size of, beside its overall width and height."""
+    profile = layer.profile
+    around = circumscribed(profile)
+    widths = inlet_width(laminate, layer), piece_width(profile)
+    return [
+        *circles(laminate, layer),
+        *radii(profile),
+        *([around] if around is not None else []),
+        *(width for width in widths if width is not None),
+    ]
+
+
 def balloons(laminate: Laminate) -> str:
     """How many balloons there are: 15 balloons, or 3 stacks of 1 balloon side by side."""
     high = f"{laminate.balloons} balloon{'s' if laminate.balloons > 1 else ''}"

@@ -15,14 +15,10 @@ from sbafab.reports import drawing as draw
 from sbafab.reports.features import (
     Circle,
     WidthDimension,
-    circles,
-    circumscribed,
-    inlet_width,
+    dimensions,
     is_disc,
     layer_numbers,
     length,
-    piece_width,
-    radii,
 )
 
 CAPTION, LEFT, UNDER, PAD = 17.0, 11.0, 10.0, 3.0
@@ -87,11 +83,10 @@ def pattern_card(
 ) -> Card:
     """The card of the layers that share one pattern; ``held`` says which pins hold each layer."""
     profile = layers[0].profile
-    marks: list[Circle | WidthDimension] = [*circles(laminate, layers[0]), *radii(profile)]
+    marks = dimensions(laminate, layers[0])
     low_x, low_y, high_x, high_y = profile.bounds
-    around = circumscribed(profile)
+    around = next((mark for mark in marks if isinstance(mark, Circle) and mark.phantom), None)
     if around is not None:
-        marks.append(around)
         r = around.radius
         low_x, low_y, high_x, high_y = (
             min(low_x, -r),
@@ -99,8 +94,6 @@ def pattern_card(
             max(high_x, r),
             max(high_y, r),
         )
-    widths = inlet_width(laminate, layers[0]), piece_width(profile)
-    marks += [width for width in widths if width is not None]
     pins = tuple(pin for pin in laminate.pins if all(pin in held[x.index] for x in layers))
     if laminate.panel is not None:
         # Corner pins stand in the sheet round the part.

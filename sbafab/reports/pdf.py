@@ -1,13 +1,13 @@
-"""A page of lines, curves and words as PDF, in millimetres and to scale.
+"""Pages of lines, curves and words as PDF, in millimetres and to scale.
 
-PDF 1.4 without compression, dates or fonts of its own: the same page gives the same bytes with
+PDF 1.4 without compression, dates or fonts of its own: the same pages give the same bytes with
 every version of every library. Arcs become Bezier curves that leave them by 5e-6 of their radius.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from sbafab.geometry.edges import Arc, Edge, Point
 from sbafab.geometry.region import Contour
@@ -23,7 +23,7 @@ BLACK: Rgb = (0.0, 0.0, 0.0)
 
 
 class PdfPage:
-    """One page, its lower left corner at (0, 0); what is drawn later covers what was earlier."""
+    """A page, its lower left corner at (0, 0); what is drawn later covers what was earlier."""
 
     def __init__(self, width: float, height: float) -> None:
         self.width, self.height = width, height
@@ -48,22 +48,32 @@ class PdfPage:
         font = "F2" if bold else "F1"
         self._drawn.append(f"BT /{font} {number(size)} Tf {_at(at)} Td {_string(words)} Tj ET")
 
-    def pdf(self, title: str) -> bytes:
-        """The whole file; a printer that obeys it prints at actual size."""
+    def objects(self, number: int) -> tuple[bytes, bytes]:
+        """The page and what is drawn on it, as objects of a file; the latter has this number."""
         content = "\n".join(self._drawn).encode(ENCODING, "replace")
-        font = "<< /Type /Font /Subtype /Type1 /BaseFont /%s /Encoding /WinAnsiEncoding >>"
         box = f"[0 0 {self.width * POINTS:.4f} {self.height * POINTS:.4f}]"
-        objects = [
+        return (
+            f"<< /Type /Page /Parent 2 0 R /MediaBox {box} /Contents {number} 0 R /Resources "
+            "<< /Font << /F1 3 0 R /F2 4 0 R >> >> >>".encode(),
+            b"<< /Length %d >>\nstream\n%s\nendstream" % (len(content), content),
+        )
+
+
+def pdf(pages: Sequence[PdfPage], title: str) -> bytes:
+    """The whole file; a printer that obeys it prints at actual size."""
+    font = "<< /Type /Font /Subtype /Type1 /BaseFont /%s /Encoding /WinAnsiEncoding >>"
+    own = [page.objects(6 + 2 * place) for place, page in enumerate(pages)]
+    kids = " ".join(f"{5 + 2 * place} 0 R" for place in range(len(pages)))
+    return _file(
+        [
             b"<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>",
-            b"<< /Type /Pages /Kids [3 0 R] /Count 1 >>",
-            f"<< /Type /Page /Parent 2 0 R /MediaBox {box} /Contents 6 0 R /Resources "
-            "<< /Font << /F1 4 0 R /F2 5 0 R >> >> >>".encode(),
+            f"<< /Type /Pages /Kids [{kids}] /Count {len(pages)} >>".encode(),
             (font % "Helvetica").encode(),
             (font % "Helvetica-Bold").encode(),
-            b"<< /Length %d >>\nstream\n%s\nendstream" % (len(content), content),
+            *(part for pair in own for part in pair),
             f"<< /Title {_string(title)} >>".encode(ENCODING, "replace"),
         ]
-        return _file(objects)
+    )
 
 
 def _file(objects: Iterable[bytes]) -> bytes:

@@ -1,7 +1,9 @@
-"""underlay.pdf: a page to print at 1:1 and to lay up on, below the release film.
+"""underlay.pdf: pages to print at 1:1 and to lay up on, below the release film.
 
 It shows the edges of all that no pin holds, as it lies in the stack: seen from above, the axis of
-the actuator where the cross is. Ours; how much steadier it makes a hand was not measured.
+the actuator where the cross is. A cycle of many laminates that one page does not hold is spread
+over several, whole laminates on each: their dotted frames are cut out and laid edge to edge. Ours;
+how much steadier it makes a hand was not measured.
 """
 
 from __future__ import annotations
@@ -14,12 +16,13 @@ from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import disc
 from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.reports.pdf import BLACK, PdfPage, Rgb
+from sbafab.reports.pdf import BLACK, PdfPage, Rgb, pdf
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.layup import Bed, beds
 
 NAME = "underlay.pdf"
-A4 = (210.0, 297.0)
+PAPER = (210.0, 279.4)
+"""mm: as wide as A4 and as long as Letter, so that either prints it whole at 100 %."""
 BAR = 100.0
 """mm of the bars that show whether a print has the right size."""
 CLOSE = 0.3
@@ -31,7 +34,7 @@ BEYOND = 8.0
 FILM: Rgb = (0.05, 0.25, 0.55)
 MASK: Rgb = (0.85, 0.4, 0.0)
 GREY: Rgb = (0.55, 0.55, 0.55)
-THIN, WORDS, TITLE, ROW = 0.1, 3.0, 5.0, 4.5
+THIN, SMALL, WORDS, TITLE, ROW = 0.1, 2.2, 3.0, 5.0, 4.5
 USE = (
     "Print at 100 % (“actual size”, not “fit to page”) on plain paper. Measure both bars:",
     f"if either is not {BAR:g} mm, {CLOSE:g} more or less, do not use this print.",
@@ -43,18 +46,37 @@ NOTES = (
 )
 
 
+TRIM = (
+    "Cut along the dotted frames and lay the pages edge to edge on the plate: crosses go on across "
+    "the cut."
+)
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """One page: its size in mm, and which places of a cycle lie on it, counted from 1.
+
+    ``trim`` is the frame to cut out, in the frame of the places; None where one page has them all.
+    """
+
+    size: tuple[float, float]
+    places: tuple[int, ...]
+    trim: Bounds | None = None
+
+
 @dataclass(frozen=True)
 class Guide:
     """An outline to lay by: contours of films or masks, the patterns that have it, the steps."""
 
     region: Region
     is_mask: bool
+    films: tuple[str, ...]
     patterns: tuple[str, ...]
     steps: tuple[int, ...]
 
     @property
     def words(self) -> str:
-        what = "PTFE, dashed" if self.is_mask else "TPE"
+        what = say.listed(self.films) + (", dashed" if self.is_mask else "")
         return (
             f"{say.listed(self.patterns)} ({what}): outer edge, press step"
             f"{'s' if len(self.steps) > 1 else ''} {say.listed([str(n) for n in self.steps])}"
@@ -64,31 +86,109 @@ class Guide:
 def underlay_pdf(
     laminate: Laminate, design_sha256: str, places: Sequence[Point] = ((0.0, 0.0),)
 ) -> bytes | None:
-    """The page; None for a laminate of which pins hold every part in every step.
+    """The pages; None for a laminate of which pins hold every part in every step.
 
-    It shows the laminate at each of the ``places`` that it has in the press.
+    They show the laminate at each of the ``places`` that it has in the press.
     """
     found = guides(laminate)
     if not found:
         return None
+    spread = leaves(laminate, places)
+    pages = []
+    for number, leaf in enumerate(spread, 1):
+        page = PdfPage(*leaf.size)
+        _draw(page, laminate, found, [places[place - 1] for place in leaf.places], leaf)
+        _bars(page)
+        which = f", page {number} of {len(spread)}" if len(spread) > 1 else ""
+        _words(page, f"{laminate.name}: alignment underlay{which}, seen from above, 1:1")
+        _notes(page, found, design_sha256, leaf)
+        pages.append(page)
+    return pdf(pages, f"{laminate.name}: alignment underlay")
+
+
+def leaves(laminate: Laminate, places: Sequence[Point]) -> tuple[Leaf, ...]:
+    """Which places lie on which page, whole rows and columns of them; none without a guide.
+
+    A laminate that is itself larger than the paper gets a page as large as it takes.
+    """
+    found = guides(laminate)
+    if not found:
+        return ()
     own = _bounds(found)
-    xs, ys = [x for x, _ in places], [y for _, y in places]
-    low_x, low_y, high_x, high_y = (
-        min(xs) + own[0],
-        min(ys) + own[1],
-        max(xs) + own[2],
-        max(ys) + own[3],
-    )
-    foot = 20 + ROW * (len(found) + len(NOTES))
-    wide, high = high_x - low_x + 2 * BEYOND, high_y - low_y + 2 * BEYOND
-    page = PdfPage(max(A4[0], wide + 2 * SIDE), max(A4[1], high + HEAD + foot))
+    xs, ys = (sorted({place[axis] for place in places}) for axis in (0, 1))
+    margins = 2 * SIDE, HEAD + _foot(found)
+    room = [PAPER[axis] - margins[axis] - 2 * BEYOND for axis in (0, 1)]
+    columns = _runs(xs, own[2] - own[0], room[0])
+    rows = _runs(ys, own[3] - own[1], room[1])
+    spread = []
+    for row in rows:
+        for column in columns:
+            numbers = tuple(n for n, (x, y) in enumerate(places, 1) if x in column and y in row)
+            if not numbers:
+                continue
+            wide = max(column) - min(column) + own[2] - own[0] + 2 * BEYOND
+            high = max(row) - min(row) + own[3] - own[1] + 2 * BEYOND
+            size = max(PAPER[0], wide + margins[0]), max(PAPER[1], high + margins[1])
+            trim = None
+            if len(rows) * len(columns) > 1:
+                (x0, x1), (y0, y1) = _between(xs, column, own, 0), _between(ys, row, own, 1)
+                trim = x0, y0, x1, y1
+            spread.append(Leaf(size, numbers, trim))
+    return tuple(spread)
+
+
+def _runs(steps: Sequence[float], own: float, room: float) -> list[list[float]]:
+    """Rows or columns page by page, as evenly as may be, at least one on each."""
+    pitch = steps[1] - steps[0] if len(steps) > 1 else 0.0
+    most = max(1, int((room - own) / pitch + 1 + 1e-9)) if pitch else 1
+    pages = -(-len(steps) // most)
+    each = -(-len(steps) // pages)
+    return [list(steps[first : first + each]) for first in range(0, len(steps), each)]
+
+
+def _between(
+    steps: Sequence[float], here: Sequence[float], own: Bounds, axis: int
+) -> tuple[float, float]:
+    """From half-way to the page before to half-way to the next; at an end as far as the cross."""
+    low, high = own[axis], own[axis + 2]
+    pitch = steps[1] - steps[0] if len(steps) > 1 else 0.0
+    half = (pitch - (high - low)) / 2
+    first = min(here) + low - (half if min(here) > steps[0] else BEYOND)
+    last = max(here) + high + (half if max(here) < steps[-1] else BEYOND)
+    return first, last
+
+
+def _foot(found: Sequence[Guide]) -> float:
+    """Room below the drawing for what its lines are, mm."""
+    return 24 + ROW * (len(found) + len(NOTES))
+
+
+def _draw(
+    page: PdfPage,
+    laminate: Laminate,
+    found: tuple[Guide, ...],
+    places: Sequence[Point],
+    leaf: Leaf,
+) -> None:
+    """The laminates of a page in its middle, numbered where there are several, and its frame."""
+    own = _bounds(found)
+    foot = _foot(found)
+    low_x, high_x = (pick(x for x, _ in places) for pick in (min, max))
+    low_y, high_y = (pick(y for _, y in places) for pick in (min, max))
     middle = page.width / 2, foot + (page.height - HEAD - foot) / 2
-    x, y = middle[0] - (low_x + high_x) / 2, middle[1] - (low_y + high_y) / 2
-    for place in places:
-        _laminate(page, laminate, found, (x + place[0], y + place[1]))
-    _bars(page)
-    _words(page, laminate, design_sha256, found, foot)
-    return page.pdf(f"{laminate.name}: alignment underlay")
+    x = middle[0] - (low_x + own[0] + high_x + own[2]) / 2
+    y = middle[1] - (low_y + own[1] + high_y + own[3]) / 2
+    for number, place in zip(leaf.places, places, strict=True):
+        at = x + place[0], y + place[1]
+        _laminate(page, laminate, found, at)
+        if len(leaf.places) > 1 or leaf.trim is not None:
+            page.text((at[0] + own[0], at[1] + own[1] - 2.3), f"{number}", SMALL)
+    if leaf.trim is not None:
+        left, low, right, top = leaf.trim
+        ring = [(left, low), (right, low), (right, top), (left, top), (left, low)]
+        page.stroke(BLACK, THIN, (0.2, 0.8))
+        for start, end in zip(ring, ring[1:], strict=False):
+            page.line((start[0] + x, start[1] + y), (end[0] + x, end[1] + y))
 
 
 def _laminate(page: PdfPage, laminate: Laminate, found: tuple[Guide, ...], shift: Point) -> None:
@@ -106,7 +206,7 @@ def _laminate(page: PdfPage, laminate: Laminate, found: tuple[Guide, ...], shift
 
 def guides(laminate: Laminate) -> tuple[Guide, ...]:
     """What is laid by hand in any step, equal outlines once, in the order of the steps."""
-    shapes: dict[tuple[object, bool], tuple[Region, list[str], list[int]]] = {}
+    shapes: dict[tuple[object, bool], tuple[Region, list[Layer], list[int]]] = {}
     parts = assembly(laminate)
     # What is laid down again as one whole stack has no edge to lie by.
     for step in (part for part in parts if part.adds):
@@ -114,12 +214,18 @@ def guides(laminate: Laminate) -> tuple[Guide, ...]:
             for layer in _loose(laminate, step, bed):
                 outline = Region(tuple(layer.profile.outers))
                 key = outline.key, layer.is_mask
-                _, patterns, steps = shapes.setdefault(key, (outline, [], []))
-                patterns.append(layer.pattern)
+                _, laid, steps = shapes.setdefault(key, (outline, [], []))
+                laid.append(layer)
                 steps.append(step.number)
     return tuple(
-        Guide(region, is_mask, tuple(dict.fromkeys(patterns)), tuple(dict.fromkeys(steps)))
-        for (_, is_mask), (region, patterns, steps) in shapes.items()
+        Guide(
+            region,
+            is_mask,
+            tuple(dict.fromkeys(layer.film.material for layer in laid)),
+            tuple(dict.fromkeys(layer.pattern for layer in laid)),
+            tuple(dict.fromkeys(steps)),
+        )
+        for (_, is_mask), (region, laid, steps) in shapes.items()
     )
 
 
@@ -175,22 +281,24 @@ def _bars(page: PdfPage) -> None:
     page.text((x - 4, low - 6), f"{BAR:g} mm", WORDS)
 
 
-def _words(
-    page: PdfPage, laminate: Laminate, sha256: str, found: tuple[Guide, ...], foot: float
-) -> None:
-    """Title and use above the drawing, what its lines are below."""
+def _words(page: PdfPage, title: str) -> None:
+    """Title and use, above the drawing."""
     top = page.height - 16
-    title = f"{laminate.name}: alignment underlay, seen from above, 1:1"
     page.text((14, top), title, TITLE, bold=True)
-    page.text((page.width - 60, top), f"design {sha256[:12]}", WORDS)
     for number, line in enumerate(USE, 1):
         page.text((14, top - 1 - ROW * number), line, WORDS)
-    y = foot - 8
+
+
+def _notes(page: PdfPage, found: tuple[Guide, ...], sha256: str, leaf: Leaf) -> None:
+    """What the lines are, below the drawing."""
+    y = _foot(found) - 8
     for guide in found:
         _stroke(page, guide)
         page.line((14, y + 1), (24, y + 1))
         page.text((27, y), guide.words, WORDS)
         y -= ROW
-    for line in NOTES:
+    join = (TRIM,) if leaf.trim is not None else ()
+    for line in (*join, *NOTES):
         page.text((14, y), line, WORDS)
         y -= ROW
+    page.text((page.width - 46, y + ROW), f"design {sha256[:12]}", WORDS)

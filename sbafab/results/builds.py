@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from sbafab.actuators import build as laminate_of
+from sbafab.assemblies.build import Assembled
+from sbafab.assemblies.writing import assembly_sha256, assembly_toml
 from sbafab.design.kits import kit_of
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256, design_toml
@@ -44,6 +46,35 @@ def promised(design: Design) -> Build:
         predicted=_predicted(predict(design, Asked(pressures_kpa=(100.0,)))),
         tolerances={name: getattr(registration, key) for name, key in TOLERANCES.items()},
         good_builds=(share.good, share.builds),
+    )
+
+
+def promised_assembly(assembled: Assembled) -> Build:
+    """The same of a whole assembly: it holds where every part holds. Raises DesignError.
+
+    No figure of a whole is predicted. Of the tolerances of its designs each is the widest.
+    """
+    from sbafab.rules.registration_yield import simulate
+
+    good, builds = 1.0, 0
+    for made in assembled.designs:
+        share = simulate(made.laminate, limits(made.design)).whole
+        good *= (share.good / share.builds) ** len(made.parts)
+        builds = max(builds, share.builds)
+    designs = [made.design for made in assembled.designs]
+    return Build(
+        sha256=assembly_sha256(assembled),
+        generator=GENERATOR,
+        name=assembled.assembly.name,
+        family="assembly",
+        method=", ".join(dict.fromkeys(design.registration.method for design in designs)),
+        toml=assembly_toml(assembled),
+        predicted={},
+        tolerances={
+            name: max(getattr(design.registration, key) for design in designs)
+            for name, key in TOLERANCES.items()
+        },
+        good_builds=(round(good * builds), builds),
     )
 
 

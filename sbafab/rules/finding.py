@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -26,7 +27,8 @@ class Finding:
     """A verdict with the measured worst value, its limit, unit and place.
 
     ``by_user`` tells a failure that the design waives by name from a waiver that the rule itself
-    grants (a flush mask at a pinned bore).
+    grants (a flush mask at a pinned bore). ``remedy`` says what to do about a warning; the message
+    begins with it.
     """
 
     rule: str
@@ -37,6 +39,7 @@ class Finding:
     where: Place
     message: str
     by_user: bool = False
+    remedy: str = ""
 
     def __post_init__(self) -> None:
         # Limits are in um: what arithmetic leaves below 1 nm says nothing.
@@ -59,6 +62,33 @@ class Finding:
             },
             "message": self.message,
         }
+
+
+def decisive(findings: Iterable[Finding]) -> dict[str, Finding]:
+    """One finding a rule, the one that decides its verdict, in the order of the rules.
+
+    A failure goes before a warning, that before a waiver by the user, that before what holds; what
+    a rule waives itself comes last.
+    """
+    found: dict[str, Finding] = {}
+    for finding in findings:
+        known = found.get(finding.rule)
+        if known is None or _gravity(finding) > _gravity(known):
+            found[finding.rule] = finding
+    return found
+
+
+def summary(findings: Iterable[Finding]) -> dict[str, object]:
+    """Whether all may be cut, and how many rules have each verdict, as ``checks.json`` holds it."""
+    counts = Counter(finding.verdict for finding in decisive(findings).values())
+    verdicts: tuple[Verdict, ...] = ("pass", "warn", "waived", "fail")
+    return {"holds": counts["fail"] == 0, **{name: counts[name] for name in verdicts}}
+
+
+def _gravity(finding: Finding) -> int:
+    if finding.verdict == "waived":
+        return 2 if finding.by_user else 0
+    return {"pass": 1, "warn": 3, "fail": 4}[finding.verdict]
 
 
 class Findings(tuple[Finding, ...]):

@@ -18,7 +18,7 @@ class Tolerances:
 
     ``cutting``: mm, any cut edge along its normal; ``pin``: mm, a layer on its pins; ``placement``
     mm and ``turn`` degrees: a layer laid by hand. The first two are the paper's (Sec. 2); the hand
-    is calibrated on its success rate (``docs/hand.py``).
+    is calibrated on its success rate (``docs/scripts/hand.py``).
     ``sheet``: mm, a part in its registered sheet; ``second_cut``: mm, the second cut of these.
     """
 

@@ -27,6 +27,15 @@ class Measures:
         self._bond = cache(_bond)
         self._reaches = cache(_reaches)
 
+    def by_hand(self, limits: Limits) -> Measures:
+        """The same laminate laid by a hand no rougher than this one's, as ``limits`` say.
+
+        Places that are narrow with the rougher hand hold all that are so with a steadier one.
+        """
+        other = Measures(self.laminate, limits)
+        other.margins = self.margins
+        return other
+
     @cached_property
     def facing(self) -> tuple[Facing, ...]:
         """The films that face each other past others."""

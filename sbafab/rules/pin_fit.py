@@ -96,6 +96,11 @@ def _fits(laminate: Laminate, limits: Limits) -> Iterator[_Fit]:
                         yield _Fit(pin, layer, 2 * circle[1], least)
 
 
+def most_on_a_pin(laminate: Laminate) -> int:
+    """How many layers at most are threaded on one pin in one step."""
+    return max((_threaded(laminate, pin) for pin in laminate.pins), default=0)
+
+
 def _threaded(laminate: Laminate, pin: Pin) -> int:
     """How many layers go on the pin in the step that lays most of them."""
     counts = [

@@ -32,9 +32,10 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
         place = Place(None, (largest.index,), high_x, high_y)
     found = [Finding(NAME, "pass" if good else "fail", limit, measured, "mm", place, message)]
     if laminate.balloons > limits.validated_balloons:
+        remedy = "press a test piece of this height first"
         message = (
-            f"{laminate.balloons} balloons are more than the {limits.validated_balloons} that have "
-            "been built and tested; heat may not reach the middle of the stack"
+            f"{remedy}: {laminate.balloons} balloons are more than the {limits.validated_balloons} "
+            "that have been built and tested; heat may not reach the middle of the stack"
         )
         found.append(
             Finding(
@@ -45,6 +46,7 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
                 "balloons",
                 Place(),
                 message,
+                remedy=remedy,
             )
         )
     return found

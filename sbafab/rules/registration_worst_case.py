@@ -111,6 +111,7 @@ def _finding(
         verdict = "warn"
     interface = worst.interfaces[0]
     message = _message(worst, limits.tolerances)
+    remedy = ""
     if verdict == "fail":
         message += (
             f"; even without what is laid by hand {_mm(least_pinned.pinned)} is left at "
@@ -119,12 +120,14 @@ def _finding(
         )
     elif verdict == "warn":
         short = sum(len(place.interfaces) for place in own if not holds(place.worst, limit))
-        message += (
-            f"; that is short of {limit:g} at {short} interface{'s' if short > 1 else ''}, "
-            f"{_why(least_pinned.pinned)}: {_advice(worst, laminate)}"
+        remedy = _remedy(worst, laminate)
+        message = (
+            f"{remedy}: {message}; that is short of {limit:g} at {short} "
+            f"interface{'s' if short > 1 else ''}, {_why(least_pinned.pinned)}"
         )
     place = Place(interface.index, interface.layer_indices, *worst.margin.middle)
-    return Finding(NAME, verdict, limit, max(0.0, worst.worst), "mm", place, message)
+    left = max(0.0, worst.worst)
+    return Finding(NAME, verdict, limit, left, "mm", place, message, remedy=remedy)
 
 
 def _message(worst: Remaining, tolerances: Tolerances) -> str:
@@ -151,10 +154,15 @@ def costs(found: Iterable[Push]) -> list[tuple[Freedom, float]]:
     return sorted(total.values(), key=lambda entry: -round(entry[1], 9))
 
 
+def _moved(freedom: Freedom) -> str:
+    """The layers that move."""
+    one = freedom.lowest == freedom.highest
+    return f"layer {freedom.lowest}" if one else f"layers {freedom.lowest} to {freedom.highest}"
+
+
 def _source(freedom: Freedom) -> str:
     """What may move which layers, and in which press step."""
-    one = freedom.lowest == freedom.highest
-    what = f"layer {freedom.lowest}" if one else f"layers {freedom.lowest} to {freedom.highest}"
+    what = _moved(freedom)
     if freedom.in_sheet:
         return f"stretch or transfer of {what} in its sheet"
     how = {0: "hand placement", 1: "turn about the only pin"}.get(freedom.pins, "play on the pins")
@@ -167,16 +175,18 @@ def _why(pinned: float) -> str:
     return f"though pins and cutting alone leave {_mm(pinned)}"
 
 
-def _advice(worst: Remaining, laminate: Laminate) -> str:
+def _remedy(worst: Remaining, laminate: Laminate) -> str:
+    """What to do about what the hand may take."""
     loose = next((freedom for freedom, _ in costs(worst.pushes) if freedom.pins < 2), None)
     if loose is None:
         return f"make {REMEDY[worst.margin.quantity]} larger"
+    where = f"{_moved(loose)} in step {loose.step}"
     on_its_own = loose.lowest == loose.highest
     masks_pocket = on_its_own and laminate.layer(loose.lowest).role == "chamber-mask"
     if laminate.registration == "channel-pin" and not masks_pocket:
-        return 'registration.method = "ears" pins it'
+        return f'align {where} with care, or set registration.method = "ears", which pins it'
     return (
-        "align it with care (registration.hand_placement, registration.hand_turn), or make "
+        f"align {where} with care (registration.hand_placement, registration.hand_turn), or make "
         f"{REMEDY[worst.margin.quantity]} larger"
     )
 

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -154,6 +156,14 @@ def test_a_kerf_undone_wrongly_shows_in_areas_and_bores(times: int, tmp_path: Pa
     assert {"channel-clear", "mask-overhang"} & set(found)
 
 
+def rename_twin(manifest: dict[str, Any]) -> dict[str, Any]:
+    """The last layer of the first pattern that two share gets a pattern of its own; that layer."""
+    shared = Counter(layer["pattern"] for layer in manifest["layers"]).most_common(1)[0][0]
+    twin: dict[str, Any] = [one for one in manifest["layers"] if one["pattern"] == shared][-1]
+    twin["pattern"] = "P99"
+    return twin
+
+
 def swap_layers(manifest: dict[str, list[object]]) -> None:
     layers = manifest["layers"]
     layers[3], layers[5] = layers[5], layers[3]
@@ -169,6 +179,7 @@ CLAIMS: list[tuple[str, Callable[..., object], str]] = [
     ("pieces", lambda m: m["layers"][5].update(pieces=3), "falls into 1 pieces"),
     ("bores", lambda m: m["layers"][0].update(bores=["chamber1"]), "open at the bores of none"),
     ("pattern", lambda m: m["layers"][4].update(pattern="P01"), "PATTERN"),
+    ("twin pattern", rename_twin, "are equal, and of patterns"),
     ("hash", lambda m: m["files"].update({"press.json": "0" * 64}), "press.json"),
     ("file hash", lambda m: m["files"].update({m["layers"][2]["file"]: "0" * 64}), "was changed"),
     (
@@ -198,6 +209,16 @@ def test_wrong_claims_are_told(change: Callable[..., object], said: str, doctor:
         if problem.rule == "manifest-claims" and problem.verdict == "fail"
     ]
     assert any(said in message for message in told), told
+
+
+def test_patterns_that_differ_by_less_than_files_can_tell_are_no_fault(doctor: Doctor) -> None:
+    """Such as by a tab of 1 um: equal on disk, and told apart by their areas in the manifest."""
+
+    def by_a_tab(manifest: dict[str, Any]) -> None:
+        rename_twin(manifest)["area"] += 1e-5
+
+    doctor.set_manifest(by_a_tab)
+    assert not [p for p in read_folder(doctor.folder).problems if "pattern" in p.message]
 
 
 def test_files_too_many_are_told_cut_files_as_faults(doctor: Doctor) -> None:

@@ -25,8 +25,8 @@ BOND, OVERHANG, TOLERANCE = 0.75, 0.5, 1e-3
 CASES = [
     ("1dof-5mm", (), 0.005),
     ("1dof-5mm", (), 0.1),
-    ("3dof-15mm", (), 0.02),
-    ("radial-15mm", (), 0.1),
+    pytest.param("3dof-15mm", (), 0.02, marks=pytest.mark.long),
+    pytest.param("radial-15mm", (), 0.1, marks=pytest.mark.long),
 ]
 
 

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import ezdxf
 import pytest
@@ -33,7 +34,12 @@ FOLDERS: list[tuple[str, tuple[str, ...], DxfProfile]] = [
 ]
 
 
-@pytest.fixture(scope="module", params=FOLDERS, ids=[f"{t}-{p}" for t, _, p in FOLDERS])
+def _param(template: str, settings: tuple[str, ...], profile: DxfProfile) -> Any:
+    marks = [pytest.mark.long] if profile == "chords" else []
+    return pytest.param((template, settings, profile), marks=marks, id=f"{template}-{profile}")
+
+
+@pytest.fixture(scope="module", params=[_param(*one) for one in FOLDERS])
 def good(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     template, settings, profile = request.param
     design = load_design(template, [*settings, "rules.yield_builds=100"])

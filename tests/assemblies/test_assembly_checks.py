@@ -126,7 +126,9 @@ def test_a_stiff_part_on_a_round_one_warns(tables: Tables, put_together: Togethe
     data = tables("standing")
     data["parts"]["tag"] = {"kind": "magnet", "on": "tube", "at": "outside", "angle": 180}
     seats = [f for f in run_checks(put_together(data)) if f.rule == "seat"]
-    assert [f.message.split()[0] for f in seats if f.verdict == "warn"] == ["tag"]
+    assert [f.remedy for f in seats if f.verdict == "warn"] == [
+        "build the joint of tag up with adhesive"
+    ]
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,6 @@ CUT_ONE = ["cut", "1dof-5mm", "--set", "bore.diameter=1"]
         ["new", "nosuch"],
         ["cut", "1dof-5mm", "--copies", "0"],
         ["cut", "1dof-5mm", "--copies", "900", "--set", "sheets.tpe.most=1"],
-        ["cut", "radial-15mm", "--set", "sheets.tpe.width=40"],
         ["cut", "1dof-5mm", "--set", "sheets.ptfe.border=80"],
         ["cut", "1dof-5mm", "--set", "sheets.tpe.spacing=0"],
         ["cut", "1dof-5mm", "--set", "sheets.tpe.spacing=90", "--set", "sheets.tpe.most=3"],
@@ -103,7 +102,7 @@ def test_no_command_is_exit_2_and_shows_the_help(capsys: pytest.CaptureFixture[s
 def test_generate_says_what_it_made(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     code, out, _ = run(["generate", "1dof-5mm", "-o", str(tmp_path)], capsys)
     assert code == 0
-    for text in ("23 in 7 patterns", "read back", "45 min", "2.555 kN", "bond-width", "pass"):
+    for text in ("23 in 7 patterns", "read back", "45 min", "2.555 kN", "1dof-5mm holds: "):
         assert text in out, text
     assert (tmp_path / "1dof-5mm" / "manifest.json").is_file()
 
@@ -187,19 +186,25 @@ def test_a_sheet_without_room_for_its_label_says_so(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "says"),
+    ("arguments", "says", "exit_code"),
     [
-        (["1dof-5mm", "--set", "sheets.tpe.width=25"], "does not fit the usable 5.0 x 132.4 mm"),
-        (["brace", "--set", "sheets.tpe.width=30"], "does not fit the usable 10.0 x 132.4 mm"),
-        (["1dof-5mm", "--set", "order.copies=900"], "sheets.tpe.most allows 20"),
+        (["1dof-5mm", "--set", "sheets.tpe.width=25"], "does not fit the usable 5.0 x 132.4 mm", 1),
+        (["brace", "--set", "sheets.tpe.width=30"], "does not fit the usable 10.0 x 132.4 mm", 1),
+        (["1dof-5mm", "--set", "order.copies=900"], "sheets.tpe.most allows 20", 2),
     ],
 )
 def test_check_refuses_what_generate_would_refuse(
-    arguments: list[str], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    arguments: list[str],
+    says: str,
+    exit_code: int,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
+    # A part that no sheet takes ends as one that the press does not take: exit code 1.
     code, out, said_by_check = run(["check", *arguments], capsys)
-    assert (code, out) == (2, "")
+    assert (code, out) == (exit_code, "")
     assert says in said_by_check
     code, _, said_by_generate = run(["generate", *arguments, "-o", str(tmp_path)], capsys)
-    assert code == 2
-    assert said_by_generate == said_by_check
+    assert code == exit_code
+    # A slow machine may say how far it was before.
+    assert said_by_generate.splitlines()[-1] == said_by_check.splitlines()[-1]

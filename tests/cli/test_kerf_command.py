@@ -164,7 +164,7 @@ def test_a_calibrated_folder_checks_as_built(
     kerf = json.loads((folder / "manifest.json").read_text())["kerf"]
     assert kerf["TPE"] == {"state": "compensated", "width": 0.12}
     assert kerf["PTFE"] == {"state": "compensated", "width": [0.1, 0.08]}
-    code, out, _ = run(["check", str(folder)], capsys)
+    code, out, _ = run(["check", "-v", str(folder)], capsys)
     assert code == 0
     assert "the manifest's claims hold" in " ".join(out.split())
 

@@ -34,7 +34,9 @@ def test_writes_figures_and_plots_that_the_manifest_lists(
         assert set(figure) == {"group", "name", "value", "unit", "model", "trust"}
         assert all(figure[key] for key in ("name", "unit", "model", "trust"))
     plots = {relation["plot"] for relation in found["relations"]}
-    assert plots == {f"predict/{name}.svg" for name in ("stroke", "force", "bending", "workspace")}
+    assert plots == {
+        f"predict/{name}.svg" for name in ("stroke", "force", "bend", "bending", "workspace")
+    }
     manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     assert found["design_sha256"] == manifest["design_sha256"]
     for path in (*plots, "predict.json"):

@@ -113,10 +113,6 @@ def test_a_folder_is_recorded_as_the_design_that_it_was_built_from(
         (["--correct", "1", "--leak", "fail"], "lab.sqlite does not exist"),
         (["--report"], "lab.sqlite is no file of records; record something first"),
         (["nosuch", "--serial", "A1", "--leak", "pass"], "nosuch"),
-        (
-            ["brace", "--serial", "A1", "--leak", "pass"],
-            "brace is an assembly; record its actuators",
-        ),
         (["1dof-5mm", "--serial", "A1", "--burst", "3 N"], "must be a pressure"),
         (["1dof-5mm", "--serial", "A1", "--force", "nan"], "force_n is nan"),
         (

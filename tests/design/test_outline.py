@@ -342,8 +342,10 @@ BAD_DXF: dict[str, tuple[Callable[[Any], object], str]] = {
         ),
         r"crosses or touches itself at x 0\.0000, y -1\.0000",
     ),
-    "off the axis": (lambda m: m.add_circle((10, 1), 2), r"origin.*move it by x -10, y -1 mm"),
-    "through the axis": (lambda m: m.add_circle((2, 0), 2), "does not contain the origin"),
+    "crescent": (
+        lambda m: m.add_lwpolyline([(4, -5, 1.0), (4, 5, -0.8)], format="xyb", close=True),
+        "has its centroid outside itself",
+    ),
     "too large": (lambda m: m.add_circle((0, 0), 75.1), r"150\.2 x 150\.2 mm"),
     "too small": (lambda m: m.add_circle((0, 0), 0.4), r"0\.8 x 0\.8 mm"),
     "NaN": (lambda m: m.add_circle((0, math.nan), 4), "coordinate of x 0, y nan"),
@@ -500,3 +502,25 @@ def test_a_compensated_cut_file_is_no_outline(tmp_path: Path, state: str) -> Non
             read_outline(path)
     else:
         assert read_outline(path).area == pytest.approx(9 * math.pi)
+
+
+@pytest.mark.parametrize("centre", [(10.0, 1.0), (2.0, 0.0), (-92.4, 121.3)])
+def test_an_outline_drawn_elsewhere_is_centred_on_its_centroid(
+    tmp_path: Path, centre: tuple[float, float]
+) -> None:
+    outline = understood(dxf(tmp_path, lambda m: m.add_circle(centre, 2)))
+    assert outline.region.bounds == pytest.approx((-2, -2, 2, 2), abs=1e-6)
+    assert outline.said.endswith("centred on its centroid")
+
+
+def test_an_outline_round_the_origin_stays_as_it_is_drawn(tmp_path: Path) -> None:
+    outline = understood(dxf(tmp_path, lambda m: m.add_circle((1, 0), 2)))
+    assert outline.region.bounds == pytest.approx((-1, -2, 3, 2))
+    assert "centred" not in outline.said
+
+
+def test_a_shape_that_is_not_alike_both_ways_is_centred_by_area(tmp_path: Path) -> None:
+    # A triangle's centroid is the mean of its corners.
+    corners = [(30, 30), (39, 30), (30, 36)]
+    region = read_outline(dxf(tmp_path, lambda m: m.add_lwpolyline(corners, close=True)))
+    assert region.bounds == pytest.approx((-3, -2, 6, 4), abs=1e-6)

@@ -20,7 +20,10 @@ from sbafab.output.settings import press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.rules.deck import has_failed
 from sbafab.simulators.calculix.settings import deck_settings
+from sbafab.simulators.coarse.actuator import actuator
 from sbafab.simulators.coarse.rounds import why_not_round
+from sbafab.simulators.mujoco.model import model_text
+from sbafab.simulators.sofa.files import why_no_scene
 
 FILMS = """
 [films.tpu50]
@@ -137,11 +140,26 @@ def test_a_film_that_is_not_there_or_cannot_do_the_work_is_named(design: Design)
         build(design.with_("layup.cap=ptfe50"))
 
 
-def test_calculix_takes_each_film_and_the_coarse_shell_says_that_it_does_not(
+def test_calculix_takes_each_film_and_the_coarse_shell_one_that_is_known(
     design: Design,
 ) -> None:
     laminate = build(design)
-    assert "films of PET, TPU50" in (why_not_round(laminate) or "")
+    assert "of one film" in (why_not_round(laminate) or "")
+    assert "films of PET, TPE, TPU50" in (why_not_round(laminate) or "")
+    tpu, tpe, pet = (
+        build(design.with_(*(f"layup.{role}={name}" for role in ("base", "wall", "cap"))))
+        for name in ("tpu50", "tpe", "pet")
+    )
+    model = model_text(actuator(tpu))
+    assert 'young="20000"' in model
+    assert 'poisson="0.3"' in model
+    # Two bonded films of 0.05 mm, and the mass of TPU at 1200 kg/m3 instead of TPE's.
+    assert 'thickness="0.1"' in model
+    assert actuator(tpu).bending(1) == pytest.approx(20e3 * 0.05**3 / 12 / (1 - 0.09))
+    ratio = actuator(tpu).mass / actuator(tpe).mass
+    assert ratio == pytest.approx(0.05 * 1200 / (0.038 * 1122))
+    assert "add films.pet.modulus, in MPa" in (why_not_round(pet) or "")
+    assert why_no_scene(tpu) is None
     with pytest.raises(DesignError, match=r"add films.pet.modulus, in MPa"):
         deck_settings(laminate)
     stiff = build(design.with_("films.pet.modulus=3000"))

@@ -9,6 +9,8 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+from sbafab.cli import EXTRAS
+
 ROOT = Path(__file__).resolve().parents[2]
 INSTALLED_AS = {
     "PIL": "pillow",
@@ -38,6 +40,10 @@ OUR_OWN = {
 }
 
 
+APART = {"all", "dev", "docs"}
+"""All extras together, what the tests take, and what the site does."""
+
+
 def names(requirements: list[str]) -> set[str]:
     return {re.split(r"[<>=~!\[; ]", requirement)[0].lower() for requirement in requirements}
 
@@ -52,7 +58,7 @@ def test_the_package_needs_what_it_imports_and_no_more() -> None:
     extras = {
         name
         for extra, needed in project["optional-dependencies"].items()
-        if extra != "dev"
+        if extra not in APART
         for name in names(needed)
     }
     assert third_party(ROOT / "sbafab") == names(project["dependencies"]) | extras
@@ -63,3 +69,15 @@ def test_the_tests_need_nothing_undeclared() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     declared = names(project["dependencies"]) | names(project["optional-dependencies"]["dev"])
     assert third_party(ROOT / "tests") <= declared
+
+
+def test_the_extra_all_is_all_that_the_package_can_use() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    (said,) = extras["all"]
+    assert said == f"sbafab[{','.join(sorted(extras.keys() - APART))}]"
+
+
+def test_help_names_every_extra_that_the_package_can_use() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert set(EXTRAS) == project["optional-dependencies"].keys() - APART

@@ -12,7 +12,7 @@ from sbafab.actuators import build, load_design
 from sbafab.laminate.assembly import assembly, laying_pins
 from sbafab.output.settings import limits
 from sbafab.reports.traveller.findings import Inspected, findings_html
-from sbafab.reports.traveller.hand import on_laying_pins
+from sbafab.reports.traveller.hand import at_roughest, on_laying_pins
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.registration_yield import simulate
@@ -68,7 +68,7 @@ def test_the_lumens_pin_is_offered_where_it_passes_every_film() -> None:
         assert found == steps
     lobed = load_design("3dof-15mm", ("stack.balloons=2",))
     laminate, asked = build(lobed), limits(lobed)
-    on_pin = on_laying_pins(laminate, asked)
+    on_pin = on_laying_pins(at_roughest(laminate, asked), asked)
     assert on_pin is not None
     by_eye = simulate(laminate, replace(asked, yield_builds=1000)).whole.value
     assert on_pin.share > by_eye + 0.03

@@ -19,14 +19,16 @@ from sbafab.design.records import Design
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.records import Nest
-from sbafab.output.settings import press_settings
+from sbafab.output.settings import limits, press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.traveller.bill import cut_list
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import traveller_html
 from sbafab.reports.traveller.sheet_map import sheet_map
+from sbafab.rules.deck import run_deck
 
+EARS = 'registration.method="ears"'
 SHA = hashlib.sha256(b"design").hexdigest()
 TPE, PTFE, BOND, OVERHANG = 0.038, 0.025, 0.75, 0.5
 
@@ -100,7 +102,8 @@ def test_pins_stand_over_the_stack_by_their_chamfer(sheet_files: Any) -> None:
     for step, stack in ((first, TPE + PTFE), (third, 27 * TPE + 28 * PTFE)):
         # Chamfers of ISO 8734: 0.2 at a diameter of 1, 0.35 at 2; lengths 4 and 6.
         for size, length, chamfer in (("⌀1", 4, 0.2), ("⌀2", 6, 0.35)):
-            stands = stack + chamfer
+            # The stack lies on a release film of 0.05 mm, which the pins are pricked through.
+            stands = 0.05 + stack + chamfer
             said = f"{length - stands:.2f} mm in the plate, {stands:.2f} mm over it"
             assert f"{size} {TIMES} {length} mm, {said}, {chamfer:.2f} mm over the stack" in step
         assert "pushed from below through the plate" in step
@@ -195,7 +198,7 @@ def test_the_legend_names_the_cross_only_where_it_is_seen(sheet_files: Any) -> N
         said = [words_of(plan) for plan in plans]
         assert [f"middle of pin {pin}" in words for words in said] == [True, False] * 2
         assert ["+ datum" in words for words in said] == [False, True] * 2
-    eared = page(sheet_files, "1dof-5mm", "stack.balloons=1", 'registration.method="ears"')
+    eared = page(sheet_files, "1dof-5mm", "stack.balloons=1", EARS)
     assert all("+ datum" in step for step in steps(eared))
 
 
@@ -210,15 +213,25 @@ def test_what_good_hands_know_stands_where_it_happens(sheet_files: Any) -> None:
     assert "45 loose mask pieces: pick them up with antistatic tweezers" in cut
     first, second, third, fourth = steps(tree)
     for step, minutes in ((first, 3), (second, 12), (third, 10), (fourth, 20)):
-        warm = step.index(f"the {minutes} min count from when it reads 130 °C")
-        assert warm < step.index("start the timer")
+        # One line says when the time begins, and nothing else on the page says otherwise.
+        assert f"start the timer, {minutes} min, when a thermocouple at its edge reads 130" in step
+        assert step.count("timer") == 1
+        assert step.index("base plate down, cold") < step.index("Close the press")
+    press = words_of(tree.get_element_by_id("press").getparent())
+    assert "Lay up on the plate while it is cold" in press
+    assert "platens' temperature, then lay up" not in press
     assert "push it down on its pin" in first
     assert "push it down on its pin" in third
     assert "Has a mask slipped?" not in second
     # The lumen is open in base and cap too.
     for step, says in ((first, False), (second, True), (third, False), (fourth, True)):
-        assert ("with the pin of the lumen (⌀2 mm) alone" in step) == says
+        assert ("the pin of the lumen (⌀2 mm) passes every film here" in step) == says
     assert "the pin of the lumen" not in " ".join(steps(page(sheet_files, "1dof-5mm")))
+    # A tacked stack that is laid down again by itself is aligned with nothing.
+    for step in steps(page(sheet_files, "1dof-5mm", "stack.balloons=1", EARS)):
+        if "no pins in it" in step:
+            assert "lay them by eye" not in step
+            assert "Better than by eye" not in step
 
 
 def test_the_underlay_is_laid_where_it_has_a_line(sheet_files: Any) -> None:
@@ -342,3 +355,33 @@ def test_a_long_sheet_is_drawn_in_rows_across_the_page(sheet_files: Any) -> None
     )
     # Turned, not mirrored: the page's y points down, so the determinant stays negative.
     assert a * d - b * c < 0
+
+
+def test_narrow_holes_are_tried_on_their_pins_before_the_press(sheet_files: Any) -> None:
+    design, laminate = built("3dof-15mm")
+    plan = schedule(laminate, press_settings(design))
+    tight = [finding for finding in run_deck(laminate, limits(design)) if finding.rule == "pin-fit"]
+    job = Job(SHA, "sbafab 1.0.0", findings=tuple(tight))
+    sheets = sheet_files(laminate)
+    tree = lxml_html.fromstring(traveller_html(design, laminate, plan, sheets, job))
+    cut = words_of(tree.get_element_by_id("cut").getparent())
+    # 1.04 less twice 0.104 is 0.832; a pin of 1 mm m6 has up to 1.008: 21 %. In step 3 a chamber's
+    # pin has 27 walls and 14 masks.
+    assert "a film must stretch by 21% over its pin (30% is allowed; nobody has tried it)" in cut
+    assert "up to 41 films go on one pin" in cut
+    assert cut.index("Wipe the soot") < cut.index("Try one part of every pattern on its pins")
+
+
+def test_tubes_and_leaks_are_those_of_every_copy() -> None:
+    design, laminate = built("1dof-5mm", "stack.balloons=1", "order.copies=3")
+    plan = schedule(laminate, press_settings(design))
+    tree = lxml_html.fromstring(
+        traveller_html(design, laminate, plan, [], Job(SHA, "sbafab 1.0.0", copies=3))
+    )
+    for part in ("tubes", "leak"):
+        section = tree.get_element_by_id(part).getparent()
+        assert "of all 3 copies, one after the other" in words_of(section)
+        first = section.xpath(".//ul[@class='ticks']/li")[0]
+        assert len(first.xpath(".//input[@type='checkbox']")) == 3
+    alone = traveller_html(design, laminate, plan, [], Job(SHA, "sbafab 1.0.0"))
+    assert "one after the other" not in alone

@@ -82,7 +82,7 @@ def check_pages(printed: Path, pages: int) -> None:
         [own] = [sheet for sheet in sheets if f"Press step {number} of 4" in sheet]
         after = own[own.index(f"Press step {number} of 4") :]
         assert "You now hold" in after
-    assert re.search(r"Printed: \d", sheets[-1])
+    assert re.search(r"Printed: \d", sheets[0])
 
 
 def test_the_browser_reads_it_as_it_was_written(html: str, tmp_path: Path) -> None:

@@ -15,7 +15,8 @@ import shapely.affinity
 
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
-from sbafab.reports.underlay import guides, underlay_pdf
+from sbafab.pressing.together import design_runs
+from sbafab.reports.underlay import guides, leaves, underlay_pdf
 
 SHA = "0123456789abcdef" * 4
 MM = 25.4 / 72
@@ -30,9 +31,11 @@ def printed(*given: str) -> tuple[Laminate, pypdfium2.PdfDocument]:
     return laminate, pypdfium2.PdfDocument(data)
 
 
-def paths(document: pypdfium2.PdfDocument, colour: tuple[int, int, int]) -> Iterator[Points]:
+def paths(
+    document: pypdfium2.PdfDocument, colour: tuple[int, int, int], page: int = 0
+) -> Iterator[Points]:
     """Points in mm along every path of a colour, curves followed in eight steps."""
-    for thing in document[0].get_objects(filter=[pdfium.FPDF_PAGEOBJ_PATH]):
+    for thing in document[page].get_objects(filter=[pdfium.FPDF_PAGEOBJ_PATH]):
         shades = [ctypes.c_uint() for _ in range(4)]
         assert pdfium.FPDFPageObj_GetStrokeColor(thing.raw, *shades)
         if tuple(int(shade.value) for shade in shades[:3]) == colour:
@@ -75,7 +78,8 @@ def test_the_print_is_at_actual_size(template: str) -> None:
     laminate, document = printed(template)
     assert len(document) == 1
     width, height = document[0].get_size()
-    assert (width * MM, height * MM) == pytest.approx((210.0, 297.0), abs=0.01)
+    # As wide as A4, as long as Letter: both print it whole.
+    assert (width * MM, height * MM) == pytest.approx((210.0, 279.4), abs=0.01)
     # What a printer's window asks is answered in the file: no scaling.
     assert b"/PrintScaling /None" in (underlay_pdf(laminate, SHA) or b"")
     lengths = [math.dist(path[0], path[-1]) for path in paths(document, BLACK)]
@@ -116,6 +120,43 @@ def test_it_has_every_place_of_a_cycle() -> None:
         assert (moved[0] - first[0], moved[1] - first[1]) == pytest.approx((x, y), abs=2e-3)
 
 
+def test_a_cycle_larger_than_the_paper_is_tiled_edge_to_edge() -> None:
+    wide = ("press.platen_width=300", "press.platen_length=300", "order.copies=40")
+    design = load_design("3dof-15mm", wide)
+    laminate = build(design)
+    places = design_runs(design, laminate).places
+    spread = leaves(laminate, places)
+    assert sorted(n for leaf in spread for n in leaf.places) == list(range(1, 41))
+    data = underlay_pdf(laminate, SHA, places)
+    assert data is not None
+    document = pypdfium2.PdfDocument(data)
+    assert len(document) == len(spread) == 4
+    tiles = []
+    for page, leaf in enumerate(spread):
+        assert tuple(side * MM for side in document[page].get_size()) == pytest.approx(
+            (210.0, 279.4), abs=0.01
+        )
+        bars = sorted(math.dist(path[0], path[-1]) for path in paths(document, BLACK, page))
+        assert bars.count(pytest.approx(100.0, abs=1e-3)) == 2
+        lines = [line for line in paths(document, FILM, page) if len(line) > 2]
+        assert len(lines) == 2 * len(leaf.places)
+        # Every outline lies whole within the frame that is cut out.
+        assert leaf.trim is not None
+        tile = shapely.box(*leaf.trim)
+        drawn = shapely.MultiLineString(lines).bounds
+        frame = [path for path in paths(document, BLACK, page) if len(path) == 2]
+        frame = [path for path in frame if path[0][0] > 14.5 and path[0][1] < 220]
+        left, low, right, top = shapely.MultiLineString(frame).bounds
+        assert (right - left, top - low) == pytest.approx(
+            (tile.bounds[2] - tile.bounds[0], tile.bounds[3] - tile.bounds[1]), abs=2e-3
+        )
+        assert shapely.box(left, low, right, top).contains_properly(shapely.box(*drawn))
+        tiles.append(tile)
+    whole = shapely.union_all(tiles)
+    assert sum(tile.area for tile in tiles) == pytest.approx(whole.area)
+    assert whole.area == pytest.approx(whole.envelope.area)
+
+
 def test_it_shows_what_a_hand_lays() -> None:
     # Base and cap; a 1-DoF separator, whose hole is wider than the pin, in step 3 as well.
     one = {guide.patterns[0]: guide.steps for guide in guides(printed("1dof-5mm")[0])}
@@ -135,3 +176,18 @@ def test_words_stand_as_they_were_given() -> None:
     assert "a.b_c-d: alignment underlay" in words
     assert "“actual size”" in words
     assert "(TPE): outer edge" in words
+
+
+def test_films_other_than_the_papers_go_by_their_names() -> None:
+    tpu = (
+        'films.tpu50={kind="structural", product="TPU", thickness=0.05, density=1200, '
+        "melting_point=115}"
+    )
+    mask = (
+        'films.ptfe50={kind="mask", product="PTFE", thickness=0.05, density=2200, '
+        "temperature_limit=250}"
+    )
+    layup = ("layup.cap=tpu50", "layup.separator_mask=ptfe50")
+    found = guides(build(load_design("1dof-5mm", (tpu, mask, *layup))))
+    assert [guide.films for guide in found] == [("TPE",), ("PTFE50",), ("TPU50",)]
+    assert "(PTFE50, dashed): outer edge" in found[1].words

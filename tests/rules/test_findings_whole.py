@@ -74,8 +74,9 @@ def test_more_balloons_than_were_ever_built(good: Good) -> None:
         3.0,
         "balloons",
         Place(),
-        "3 balloons are more than the 2 that have been built and tested; heat may not reach the "
-        "middle of the stack",
+        "press a test piece of this height first: 3 balloons are more than the 2 that have been "
+        "built and tested; heat may not reach the middle of the stack",
+        remedy="press a test piece of this height first",
     )
 
 

@@ -124,10 +124,10 @@ def test_decks_of_a_whole_run(tmp_path: Path) -> None:
 
 def test_a_simulator_that_cannot_take_a_design(tmp_path: Path) -> None:
     result = CliRunner().invoke(
-        app, ["simulate", "radial-15mm", "--with", "sofa", "--export", "-o", str(tmp_path)]
+        app, ["simulate", "radial-15mm", "--with", "mujoco", "--export", "-o", str(tmp_path)]
     )
     assert result.exit_code == 2
-    assert "round" in result.stderr
+    assert "lie on a sheet" in result.stderr
 
 
 def test_results_of_another_input_are_not_kept(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from docs.hand import BUILT, share
+from docs.scripts.hand import BUILT, share
 from sbafab.models.paper import SUCCESS
 
 BUILDS = 2000

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from docs.validate import PATH, validation
+from docs.scripts.validate import PATH, validation
 from sbafab.models import parabola, printed
 
 MEASURED = (

@@ -165,7 +165,7 @@ def layup(laminate: Laminate, settings: MeshSettings) -> Layup:
 def _check_size(laminate: Laminate, settings: MeshSettings) -> None:
     """Raises DesignError if h is larger than the narrowest ring, or far too small."""
     h = settings.h
-    width, place = min([*_rings(laminate)] or _open_rings(laminate), default=(h, ""))
+    width, place = narrowest_ring(laminate) or (h, "")
     if not 0 < h <= width * (1 + 1e-6):
         raise DesignError(
             f"h = {h:g} mm is larger than {place}, which is {width:.3f} mm wide; "
@@ -181,6 +181,11 @@ def _check_size(laminate: Laminate, settings: MeshSettings) -> None:
             f"h = {h:g} mm makes about {elements:.2g} elements of this laminate, more than "
             f"{MOST_ELEMENTS:,}; ask for {least:.2f} mm or more"
         )
+
+
+def narrowest_ring(laminate: Laminate) -> tuple[float, str] | None:
+    """Width in mm of the narrowest bonded ring, the largest h there can be, and what it is."""
+    return min([*_rings(laminate)] or _open_rings(laminate), default=None)
 
 
 def _rings(laminate: Laminate) -> Iterator[tuple[float, str]]:

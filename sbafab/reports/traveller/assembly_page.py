@@ -14,12 +14,12 @@ from sbafab.assemblies.colours import colours
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
 from sbafab.pressing.together import Runs
-from sbafab.reports.traveller import bench, bill, joining, notes, times
+from sbafab.reports.traveller import base_plate, bench, bill, joining, notes, times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.cautions import cautions, for_the_designer
-from sbafab.reports.traveller.code import code_svg, code_text
+from sbafab.reports.traveller.code import code_svg, record_text
 from sbafab.reports.traveller.job import Work
-from sbafab.reports.traveller.page import context, environment, frame, materials, sheet_rows
+from sbafab.reports.traveller.page import context, environment, frame, sheet_rows
 from sbafab.reports.traveller.page import films as page_films
 from sbafab.reports.traveller.shapes import definitions, pattern_regions
 from sbafab.reports.traveller.sheet_map import part_regions
@@ -70,9 +70,8 @@ class AssemblyJob:
 def assembly_html(job: AssemblyJob) -> str:
     """The whole page."""
     name = job.assembled.assembly.name
-    text = code_text(name, job.sha256, job.generator)
+    text = record_text(name, job.sha256, job.generator)
     works = [one.work for one in job.works]
-    films = list(dict.fromkeys(m for work in works for m in materials(work.laminate)))
     return (
         environment()
         .get_template(PAGE)
@@ -90,7 +89,6 @@ def assembly_html(job: AssemblyJob) -> str:
             bill=_bill(job),
             before_cutting=bench.before_cutting(f for w in works for f in page_films(w.laminate)),
             after_cutting=bench.after_cutting(works),
-            kerf=bill.kerf_states(works[0].job, films),
             sheet_rows=sheet_rows(works[0].design, job.sheets, _marks(job)),
             laser_minutes=times.laser_minutes(works[0]),
             laser_basis=times.laser_basis(works[0]),
@@ -119,9 +117,20 @@ def _chapter(one: DesignWork, number: int, mark: str) -> str:
     html = (
         environment()
         .get_template(CHAPTER)
-        .render(**said, runs=one.runs, press_words=_press_words(one), number=number, mark=mark)
+        .render(
+            **said | _again(one, number),
+            runs=one.runs,
+            press_words=_press_words(one),
+            number=number,
+            mark=mark,
+        )
     )
     return _NAMES.sub(rf"\g<1>d{number}-", html)
+
+
+def _again(one: DesignWork, number: int) -> dict[str, tuple[str, ...]]:
+    """What the first chapter has said of the build-up, in short in those that follow."""
+    return {} if number == 1 else {"force_notes": base_plate.build_up_again(one.work)}
 
 
 def _parts(job: AssemblyJob) -> list[tuple[str, str, str, str]]:

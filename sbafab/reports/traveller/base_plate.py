@@ -78,16 +78,25 @@ def build_up_notes(work: Work) -> tuple[str, ...]:
         f"platen), release film ({release.material}), {LAMINATE}, release film, press pad "
         f"({pad.material}, {say.millimetres(pad.thickness_mm)}, as large as the platen), upper "
         "platen. Nothing rigid lies on the films: no second plate.",
-        f"The paper gives a pressure and a heated area, no force: {newtons} is {kilopascals} on "
-        f"the whole platen of {size}. The pad brings it to the films; without it {newtons} on the "
-        f"{what} alone ({alone:.0f} mm²) would be {step.force_n / alone:.1f} MPa. What the paper "
-        "laid between platen and films is not known. Over the films the pad is pressed together by "
-        "their height more than beside them and pushes back the more. The pressures at each step "
-        "are estimates that no press has confirmed: check them once, cold, with "
-        "pressure-indicating film.",
-        "The pad has no holes: pins press their chamfers into it.",
-        "The pad keeps heat back: the films are heated from below, through the base plate. Let the "
-        "plate lie in the closed press until it has the platens' temperature, then lay up.",
+        f"{newtons} is {kilopascals} on the whole platen of {size}; the paper gives no force. The "
+        f"pad brings it to the films; without it {newtons} on the {what} alone ({alone:.0f} mm²) "
+        f"would be {step.force_n / alone:.1f} MPa. What the paper laid between platen and films is "
+        "not known. The pressures at each step are estimates that no press has confirmed: check "
+        "them once, cold, with pressure-indicating film.",
+        "The pad has no holes: pins press their chamfers into it. It keeps heat back: films are "
+        "heated from below, through the base plate. Lay up on the plate while it is cold, out of "
+        "the press; it warms with the films on it, and each step counts from when it is hot.",
+    )
+
+
+def build_up_again(work: Work) -> tuple[str, ...]:
+    """The same where another design's page has said it: only what is this design's own."""
+    thick = {item.part: item for item in work.schedule.steps[-1].build_up}
+    plate, pad = thick[BASE_PLATE], thick[PAD]
+    return (
+        "Build-up, force and heating are those of the first Press section, with a press pad of "
+        f"{say.millimetres(pad.thickness_mm)} ({pad.material}) and a base plate of "
+        f"{say.millimetres(plate.thickness_mm)}; what reaches the films stands at each step.",
     )
 
 

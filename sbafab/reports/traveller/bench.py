@@ -12,6 +12,8 @@ from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.underlay import guides
+from sbafab.rules.pin_fit import NAME as PIN_FIT
+from sbafab.rules.pin_fit import most_on_a_pin
 
 WARM = 5.0
 """C by which a plate may be colder than the platens when the timer starts."""
@@ -46,6 +48,7 @@ def after_cutting(works: Sequence[Work]) -> list[Action]:
             "bond is a leak."
         )
     ]
+    actions += _threading(works)
     loose = sum(_loose(work.laminate) * work.job.copies for work in works)
     if loose:
         actions.append(
@@ -55,6 +58,29 @@ def after_cutting(works: Sequence[Work]) -> list[Action]:
             )
         )
     return actions
+
+
+def _threading(works: Sequence[Work]) -> list[Action]:
+    """What the rule pin-fit means at the bench, for the design whose films stretch most."""
+    tight = [
+        (finding.measured, finding.limit or 0.0, work)
+        for work in works
+        for finding in work.job.findings
+        if finding.rule == PIN_FIT and finding.measured
+    ]
+    if not tight:
+        return []
+    stretch, allowed, work = max(tight, key=lambda one: one[0])
+    error = say.millimetres(work.design.registration.cutting_error)
+    return [
+        Action(
+            "Try one part of every pattern on its pins before you lay up. With edges off by "
+            f"{error}, the worst that is reckoned with, a film must stretch by {stretch:.0%} over "
+            f"its pin ({allowed:.0%} is allowed; nobody has tried it), and up to "
+            f"{say.count(most_on_a_pin(work.laminate), 'film')} go on one pin. If one tears or "
+            "wrinkles, stop: the designer takes a thinner pin or a wider bore."
+        )
+    ]
 
 
 def _loose(laminate: Laminate) -> int:
@@ -73,11 +99,13 @@ def underlay(work: Work, part: AssemblyStep) -> list[Action]:
     ]
     if work.job.underlay is None or not patterns:
         return []
-    prick = ", the pins pricked through" if part.pins else ""
+    film, eye = ("a release film over it", ": lay by eye along them, as each line says")
+    if part.pins:
+        film, eye = "a release film over it, the pins pricked through both", ""
     return [
         Action(
-            f"{work.job.underlay}, printed at 100 % and its bars measured: tape it to the plate"
-            f"{prick}, release film over it. It has the edges of {say.listed(patterns)}."
+            f"Tape {work.job.underlay}, printed at 100 % and its bars measured, to the plate, "
+            f"{film}. It has the edges of {say.listed(patterns)}{eye}."
         )
     ]
 
@@ -90,9 +118,8 @@ def on_the_lumen(laminate: Laminate, part: AssemblyStep) -> list[Action]:
     names = say.listed([f"{pin.name} (⌀{say.millimetres(pin.diameter)})" for pin in pins])
     return [
         Action(
-            f"Better than by eye: lay up on the base plate with the pin of the {names} alone, "
-            "which passes every film here; then only the turn is yours. Draw it before the press "
-            "closes."
+            f"Better than by eye alone: the pin of the {names} passes every film here. Lay up on "
+            "it, so that only the turn is yours, and push it out before the press closes."
         )
     ]
 
@@ -110,10 +137,11 @@ def reseat(laminate: Laminate, adds: Sequence[int], pinned: bool) -> list[Action
     ]
 
 
-def warm_plate(step: Step) -> Action:
-    """When a timer starts whose plate goes in cold."""
+def closing(step: Step, cycles: tuple[str, ...] = ()) -> Action:
+    """When the timer starts, as the plate goes in cold; a box for each of the ``cycles``."""
     return Action(
-        "The plate goes in cold. Keep a thermocouple at its edge: the "
-        f"{say.minutes(step.minutes)} count from when it reads "
-        f"{step.temperature_c - WARM:g} °C, not from when the press closes."
+        f"Close the press. The plate goes in cold: start the timer, {say.minutes(step.minutes)}, "
+        f"when a thermocouple at its edge reads {step.temperature_c - WARM:g} °C, not before.",
+        (),
+        cycles,
     )

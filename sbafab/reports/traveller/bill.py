@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from sbafab.reports.traveller import base_plate
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.shapes import thumbnail
+from sbafab.reports.underlay import PAPER, leaves
 
 
 @dataclass(frozen=True)
@@ -43,10 +45,21 @@ def bill(work: Work) -> list[Item]:
         items.append(Item("Adhesive of the wrap", what, "as needed"))
     items += [Item(*row) for row in base_plate.items(work)]
     if job.underlay is not None:
-        what = f"{job.underlay} printed at 100 % on plain paper; its bars must measure 100 mm"
-        items.append(Item("Underlay", what, "1 page"))
+        items.append(_underlay(work, job.underlay))
     items += [Item(name, "", quantity) for name, quantity in job.extras]
     return items
+
+
+def _underlay(work: Work, path: str) -> Item:
+    """The pages to print, and on what paper where A4 and Letter are too small."""
+    spread = leaves(work.laminate, work.runs.places)
+    width, height = (max(leaf.size[axis] for leaf in spread) for axis in (0, 1))
+    paper = "A4 or Letter"
+    if (width, height) != PAPER:
+        paper = f"at least {say.size(math.ceil(width), math.ceil(height))}"
+    join = "; cut out along their dotted frames and laid edge to edge" if len(spread) > 1 else ""
+    what = f"{path} printed at 100 % on plain paper, {paper}; its bars must measure 100 mm{join}"
+    return Item("Underlay", what, say.count(len(spread), "page"))
 
 
 def _films(work: Work) -> list[Item]:

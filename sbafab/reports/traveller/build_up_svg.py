@@ -40,7 +40,7 @@ INKS = {
 def factor(step: Step) -> int:
     """By how much films are enlarged: pins that stand over the stack must end inside the pad."""
     pad = next(item.thickness_mm for item in step.build_up if item.part == PAD) * THICK
-    over = max((pin.stands_mm for pin in step.pin_settings), default=step.stack_mm) - step.stack_mm
+    over = max((pin.stands_mm for pin in step.pin_settings), default=step.top_mm) - step.top_mm
     fits = (one for one in FACTORS if step.stack_mm * one <= TALLEST and over * one <= DEEP * pad)
     return next(fits, FACTORS[-1])
 
@@ -155,7 +155,7 @@ def pin_lines(step: Step) -> str:
     )
     return "; ".join(
         f"{say.listed([pin.pin for pin in pins])}: ⌀{diameter:g} {draw.TIMES} {length:g} mm, "
-        f"{seat:.2f} mm in the plate, {stands:.2f} mm over it, {stands - step.stack_mm:.2f} mm "
+        f"{seat:.2f} mm in the plate, {stands:.2f} mm over it, {stands - step.top_mm:.2f} mm "
         "over the stack"
         for (diameter, length, seat, stands), pins in alike
     )

@@ -23,9 +23,13 @@ from sbafab.reports.traveller.shapes import Picture, pattern_id
 WIDE = 58.0
 TILT = 0.34
 """How much of its depth a layer keeps, seen from the front and above."""
-LABELS = 46.0
+LABELS = 50.0
 TALLEST = 64.0
 NEAREST, FARTHEST, TWO_LINES = 4.0, 12.0, 6.0
+COLUMN, BRACKET = 4.0, 13.0
+"""mm from the layers to their labels, and for a bracket with its count."""
+BOLD = 1.25
+"""How much wider bold letters are, at most."""
 PAGE = 1.1
 """mm on the page between the layers of a finished stack."""
 MOST = 20
@@ -75,7 +79,8 @@ def exploded(laminate: Laminate, step: AssemblyStep, lying: Sequence[Bed], name:
     plate = shown(laminate) if step.pins else None
     view = _view(plate.bounds if plate is not None else laminate.bounds, len(levels), bool(plate))
     words = "; ".join(f"{level.words} {level.detail}" for level in levels)
-    picture = Picture(name, WIDE + LABELS, view.height, f"step {step.number} taken apart: {words}")
+    width = WIDE + _labels(levels, view.gap)
+    picture = Picture(name, width, view.height, f"step {step.number} taken apart: {words}")
     if plate is not None:
         picture.add(*_plate(plate, view))
     under = view.ground
@@ -91,7 +96,7 @@ def exploded(laminate: Laminate, step: AssemblyStep, lying: Sequence[Bed], name:
         picture.add(*_beside(edge, level.words, level.detail, view.gap))
         under = here - PAGE * (len(level.layers) - 1)
     picture.add(*_pins(step.pins, view, under, under - STANDS_OUT))
-    picture.add(*_brackets(levels, view))
+    picture.add(*_brackets(levels, view, width))
     return picture.svg()
 
 
@@ -141,13 +146,26 @@ def _shortened(levels: list[Level]) -> list[Level]:
     return [*levels[: MOST - 5], gap, *levels[-4:]]
 
 
+def _labels(levels: Sequence[Level], gap: float) -> float:
+    """Room beside the layers for the longest label and the bracket behind it, mm."""
+    if gap >= TWO_LINES:
+        return LABELS
+    longest = max((_one_line(level.words, level.detail) for level in levels), default=0.0)
+    return max(LABELS, COLUMN + longest + 2.0 + BRACKET)
+
+
+def _one_line(words: str, detail: str) -> float:
+    """How long a label is whose detail follows on the same line."""
+    return BOLD * draw.text_width(words, 2.5) + 1.2 + draw.text_width(detail, 2.2)
+
+
 def _beside(edge: Point, words: str, detail: str, gap: float) -> list[str]:
     """Words with a leader to what they name; on one line where the next are near."""
     x, y = edge
-    column = WIDE + 4.0
+    column = WIDE + COLUMN
     leader = draw.line([(min(x, WIDE) + 0.4, y), (column - 0.8, y)], colour=draw.GREY, width=0.12)
     if gap < TWO_LINES:
-        after = column + draw.text_width(words, 2.5) + 1.2
+        after = column + BOLD * draw.text_width(words, 2.5) + 1.2
         return [
             leader,
             draw.text((column, y + 0.9), words, size=2.5, bold=True),
@@ -174,14 +192,14 @@ def _pins(pins: Sequence[Pin], view: _View, under: float, over: float) -> list[s
     return parts
 
 
-def _brackets(levels: Sequence[Level], view: _View) -> list[str]:
+def _brackets(levels: Sequence[Level], view: _View, width: float) -> list[str]:
     """A bracket beside the levels of a round, with how often they are laid."""
     parts: list[str] = []
     marked = [(i, level.round) for i, level in enumerate(levels) if level.round is not None]
     for turn in {id(turn): turn for _, turn in marked}.values():
         places = [i for i, other in marked if other is turn]
         low, high = view.level(places[0]) + 3.2, view.level(places[-1]) - 2.4
-        x = WIDE + LABELS - 9.0
+        x = width - BRACKET
         parts.append(draw.line([(x - 1.2, low), (x, low), (x, high), (x - 1.2, high)], width=0.3))
         words = f"{draw.TIMES} {turn.count}"
         parts.append(draw.text((x + 1.2, (low + high) / 2 + 1.0), words, size=3.4, bold=True))

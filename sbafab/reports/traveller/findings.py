@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from sbafab.laminate.laminate import Laminate
-from sbafab.reports.traveller.hand import Hand, on_laying_pins, rougher_hands
+from sbafab.reports.traveller.hand import Hand, at_roughest, on_laying_pins, rougher_hands
 from sbafab.reports.traveller.page import environment, frame
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import Limits
+from sbafab.rules.measures import Measures
 
 TEMPLATE = "findings.html.j2"
 YIELD, WORST = "registration-yield", "registration-worst-case"
@@ -47,8 +48,8 @@ def findings_html(title: str, sha256: str, generator: str, inspected: Sequence[I
 def _chapter(one: Inspected) -> _Chapter:
     is_open = [f for f in one.findings if f.verdict in ("fail", "warn") or f.by_user]
     rest = [f for f in one.findings if f not in is_open]
-    hands = _hands(one)
-    return _Chapter(one.name, is_open, rest, _own(one), hands, tuple(_helps(one, hands)))
+    hands, helps = _hands(one)
+    return _Chapter(one.name, is_open, rest, _own(one), hands, helps)
 
 
 def _own(one: Inspected) -> Hand | None:
@@ -59,24 +60,23 @@ def _own(one: Inspected) -> Hand | None:
     return Hand(own.placement, own.turn, found.measured)
 
 
-def _hands(one: Inspected) -> tuple[Hand, ...]:
-    """A rougher hand is asked about where the laminate could be counted at all."""
+def _hands(one: Inspected) -> tuple[Sequence[Hand], Sequence[str]]:
+    """Rougher hands and what helps, asked about where the laminate could be counted at all."""
     if one.laminate is None or one.limits is None or _own(one) is None:
-        return ()
-    return rougher_hands(one.laminate, one.limits)
+        return (), ()
+    places = at_roughest(one.laminate, one.limits)
+    hands = rougher_hands(places, one.limits)
+    return hands, tuple(_helps(places, one.limits)) if hands else ()
 
 
-def _helps(one: Inspected, hands: Sequence[Hand]) -> Iterator[str]:
+def _helps(places: Measures, limits: Limits) -> Iterator[str]:
     """What leaves less to the hand, cheapest first."""
-    laminate = one.laminate
-    if laminate is None or not hands:
-        return
     yield (
         "Print underlay.pdf at 1:1 and lay up on it: its lines show where every edge goes that no "
         "pin holds. How much steadier that makes a hand nobody has measured; half the error "
         "gives the first row."
     )
-    pinned = on_laying_pins(laminate, one.limits) if one.limits is not None else None
+    pinned = on_laying_pins(places, limits)
     if pinned is not None:
         yield (
             f"Lay up the steps without pins on the lumen's pin, and draw it before the press "
@@ -86,7 +86,7 @@ def _helps(one: Inspected, hands: Sequence[Hand]) -> Iterator[str]:
         "sbafab check design.toml --target-yield 0.99 says how much wider bonds and overhangs "
         "reach 99 % with the hand as it is."
     )
-    if laminate.registration == "channel-pin":
+    if places.laminate.registration == "channel-pin":
         yield (
             'registration.method = "ears" pins every film and separator in every step; the ears '
             "are snipped off afterwards."

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 from typing import NamedTuple
 
 from sbafab.laminate.assembly import assembly, laying_pins
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules.limits import Limits, Tolerances
+from sbafab.rules.limits import Limits
+from sbafab.rules.measures import Measures
 from sbafab.rules.registration_yield import simulate
 
 ROUGHER = (0.5, 1.5, 2.0, 2.5)
@@ -27,49 +27,39 @@ class Hand(NamedTuple):
     share: float
 
 
-def rougher_hands(laminate: Laminate, limits: Limits) -> tuple[Hand, ...]:
+def at_roughest(laminate: Laminate, limits: Limits) -> Measures:
+    """What the roughest hand asked about can make narrow; steadier ones are asked there too."""
+    return Measures(laminate, _rougher(limits, ROUGHER[-1]))
+
+
+def rougher_hands(places: Measures, limits: Limits) -> tuple[Hand, ...]:
     """Shares of good builds of steadier and rougher hands; empty where no hand decides anything."""
-    roughest = _hand(laminate, limits, ROUGHER[-1])
+    roughest = _hand(places, places.limits)
     if roughest.share == 1:
         return ()
-    return (*(_hand(laminate, limits, factor) for factor in ROUGHER[:-1]), roughest)
+    asked = (_hand(places, _rougher(limits, factor)) for factor in ROUGHER[:-1])
+    return (*asked, roughest)
 
 
-def _hand(laminate: Laminate, limits: Limits, factor: float) -> Hand:
-    own = limits.tolerances
-    hand = replace(own, placement=factor * own.placement, turn=factor * own.turn)
-    return Hand(hand.placement, hand.turn, _share(laminate, replace(limits, tolerances=hand)))
-
-
-def on_laying_pins(laminate: Laminate, limits: Limits) -> Hand | None:
+def on_laying_pins(places: Measures, limits: Limits) -> Hand | None:
     """The design's hand where every step without pins is laid up on one, and only turns are left.
 
     None where a step has no pin that passes all its films.
     """
+    laminate, own = places.laminate, limits.tolerances
     steps = [step for step in assembly(laminate) if not step.pins]
     if not steps or not all(laying_pins(laminate, step) for step in steps):
         return None
+    return _hand(places, replace(limits, tolerances=replace(own, placement=own.pin)))
+
+
+def _rougher(limits: Limits, factor: float) -> Limits:
     own = limits.tolerances
-    on_pin = replace(limits, tolerances=replace(own, placement=own.pin))
-    return Hand(own.pin, own.turn, _share(laminate, on_pin))
+    hand = replace(own, placement=factor * own.placement, turn=factor * own.turn)
+    return replace(limits, tolerances=hand)
 
 
-def _share(laminate: Laminate, limits: Limits) -> float:
-    """Share of good builds. Of the limits only those of registration count, and can be hashed."""
-    own = limits.tolerances, limits.worst_bond_width, limits.worst_mask_overhang
-    return _counted(laminate, *own, limits.mask_overhang)
-
-
-@lru_cache(maxsize=16)
-def _counted(
-    laminate: Laminate, tolerances: Tolerances, bond: float, overhang: float, drawn: float
-) -> float:
-    """Kept, for a run makes the page and then checks it."""
-    asked = Limits(
-        mask_overhang=drawn,
-        tolerances=tolerances,
-        worst_bond_width=bond,
-        worst_mask_overhang=overhang,
-        yield_builds=BUILDS,
-    )
-    return simulate(laminate, asked).whole.value
+def _hand(places: Measures, limits: Limits) -> Hand:
+    asked = replace(limits, yield_builds=BUILDS)
+    found = simulate(places.laminate, asked, measures=places.by_hand(asked))
+    return Hand(limits.tolerances.placement, limits.tolerances.turn, found.whole.value)

@@ -92,7 +92,7 @@ def context(work: Work) -> dict[str, Any]:
         "departures": departures(work.design),
         "code": code_svg(text),
         "code_text": text,
-        "legend": [(words, f"#{bytes(COLOURS[tone]).hex()}") for tone, words in KEY],
+        "legend": _legend(laminate),
         "solid": None if job.solid_png is None else b64encode(job.solid_png).decode("ascii"),
         "cautions": [*cautions(work), *for_the_designer(job.findings)],
         "before_cutting": bench.before_cutting(films(laminate)),
@@ -101,7 +101,6 @@ def context(work: Work) -> dict[str, Any]:
         "others": others,
         "sheet_rows": sheet_rows(work.design, work.sheets, {work.design.name: "", **others}),
         "cuts": bill.cut_list(work),
-        "kerf": bill.kerf_states(job, materials(laminate)),
         "laser_minutes": times.laser_minutes(work),
         "laser_basis": times.laser_basis(work),
         "lay_up": _lay_up(work),
@@ -121,6 +120,13 @@ def context(work: Work) -> dict[str, Any]:
         "expected_sizes": notes.expected_sizes(work),
         **panel.chapter(work),
     }
+
+
+def _legend(laminate: Laminate) -> list[tuple[str, str]]:
+    """What the solid's colours are, each with its colour."""
+    own = ", ".join(dict.fromkeys(film.material for film in films(laminate) if not film.is_mask))
+    said = [(own if tone == "film" else words, tone) for tone, words in KEY]
+    return [(words, f"#{bytes(COLOURS[tone]).hex()}") for words, tone in said]
 
 
 def _others(work: Work) -> dict[str, str]:

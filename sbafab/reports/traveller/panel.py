@@ -15,13 +15,13 @@ from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.laminate.panel import SheetPanel
 from sbafab.pressing.sheets import tackings
 from sbafab.reports import drawing as draw
-from sbafab.reports.traveller import process
+from sbafab.reports.traveller import bench, process
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
 from sbafab.reports.traveller.bill import Cut, Item, bill, cut_list
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.notes import expected_sizes
-from sbafab.reports.traveller.process import StepPage
+from sbafab.reports.traveller.process import COVER, StepPage
 from sbafab.reports.traveller.shapes import Picture, label
 from sbafab.reports.traveller.times import PAPER_MINUTES, Time
 
@@ -116,11 +116,12 @@ def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
             "film."
         ),
         Action(
-            "Pins into the plate. Tack the masks, a film at a time: the film sheet on the pins, "
-            "cut corner over the plate's, its mask sheet face down on it, a release film on top; "
-            f"press for {tack} at {say.temperature(design.press.temperature_c)} (ours), let it "
-            "cool, peel off the transfer film flat and slowly. Masks and PTFE sheet stay on the "
-            "film.",
+            "Pins into the plate, a release film pricked over them. Tack the masks, a film at a "
+            "time: the film sheet on the pins, cut corner over the plate's, its mask sheet face "
+            "down on it, a release film and the press pad on top; press for "
+            f"{tack} at {say.temperature(design.press.temperature_c)} (ours), counted from when "
+            "the plate is hot, let it cool, peel off the transfer film flat and slowly. Masks and "
+            "PTFE sheet stay on the film.",
             tuple(mask.index for _, masks in pairs for mask in masks),
             ticks,
         ),
@@ -166,8 +167,8 @@ def _pressing(laminate: Laminate, page: StepPage, last: bool) -> list[Action]:
         lay = f"Lay the sheet of layer {films[0][0].index}, the cap, on the pins over the stack."
     start = [
         Action(
-            "Lay the base plate down, cut corner at the back right, all corner pins in. Prick a "
-            "release film over them."
+            "Lay the base plate down, cold, cut corner at the back right. Drive in the corner pins "
+            "to their heights (above) and prick a release film over them."
         )
     ]
     end = [
@@ -188,10 +189,10 @@ def _pressing(laminate: Laminate, page: StepPage, last: bool) -> list[Action]:
         Action(lay, tuple(i for i in step.adds), ticks if len(ticks) > 1 else ()),
         Action(
             "Check: every sheet's cut corner lies over the next, no sheet is stretched between its "
-            "pins or folded, and the pins do not stand higher than the stack."
+            "pins or folded, and every pin reaches through the highest sheet."
         ),
-        Action("Cover with a release film."),
-        Action(f"Close the press and start the timer: {say.minutes(step.minutes)}."),
+        Action(COVER),
+        bench.closing(step),
         Action("Take it out on its plate and let it cool flat before you touch it."),
         *end,
     ]

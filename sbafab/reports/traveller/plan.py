@@ -74,9 +74,12 @@ def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: s
                 flat(view.scale, view.origin),
                 look,
             )
+    inlets = inlets_in(laminate, step.layers)
+    # An arrow at its tab names the pin of a chamber, too.
+    told = {inlet.chamber for inlet in inlets}
     for pin in laminate.pins:
-        picture.add(*_pin(pin, pin in step.pins, view))
-    for inlet in inlets_in(laminate, step.layers):
+        picture.add(*_pin(pin, pin in step.pins, view, pin.name not in told))
+    for inlet in inlets:
         picture.add(*_inlet(inlet, _reach(laminate, inlet), view))
     at_datum = next((pin.name for pin in step.pins if math.hypot(*pin.centre) < AT_DATUM), None)
     if at_datum is None:
@@ -101,16 +104,20 @@ def _widened(bounds: Bounds) -> Bounds:
     return low_x - FREE, low_y - FREE, high_x + FREE, high_y + FREE
 
 
-def _pin(pin: Pin, is_in: bool, view: _View) -> list[str]:
-    """A pin that is in: filled, with its name; one that is out: hollow."""
+def _pin(pin: Pin, is_in: bool, view: _View, is_named: bool) -> list[str]:
+    """A pin that is in: filled, with its name on the side away from the middle; out: hollow."""
     (x, y), r = view.at(pin.centre), max(pin.diameter * view.scale / 2, 0.7)
     fill = draw.DARK if is_in else "#ffffff"
     circle = (
         f'<circle cx="{number(x)}" cy="{number(y)}" r="{number(r)}" fill="{fill}" '
         f'stroke="{draw.DARK}" stroke-width="0.3"/>'
     )
-    named = [label((x, y + r + 2.2), pin.name, 1.9)] if is_in else []
-    return [circle, *named]
+    if not (is_in and is_named):
+        return [circle]
+    far = math.hypot(*pin.centre)
+    u, v = (pin.centre[0] / far, pin.centre[1] / far) if far > AT_DATUM else (0.0, -1.0)
+    aside = r + 0.8 + draw.text_width(pin.name, 1.9) / 2
+    return [circle, label((x + aside * u, y - (r + 1.6) * v + 0.7), pin.name, 1.9)]
 
 
 def _reach(laminate: Laminate, inlet: Inlet) -> float:

@@ -13,7 +13,7 @@ from sbafab.pressing.together import Runs
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
-from sbafab.reports.traveller.bench import on_the_lumen, reseat, underlay, warm_plate
+from sbafab.reports.traveller.bench import closing, on_the_lumen, reseat, underlay
 from sbafab.reports.traveller.build_up_svg import build_up_svg, pin_lines
 from sbafab.reports.traveller.exploded import exploded
 from sbafab.reports.traveller.job import Work
@@ -24,8 +24,14 @@ from sbafab.reports.traveller.plan import plan
 LEAK_KILOPASCALS = 5.0
 """Our choice, far below the paper's burst pressure and enough to open every balloon."""
 LEAK_SECONDS = 60
+COVER = (
+    "Cover with a release film and the press pad, flush with the platen all round. No second plate "
+    "on top."
+)
 MOST_LINES = 12
 """Single layers up to which each has a line of its own."""
+MOST_COPIES = 36
+"""Copies up to which each has a box."""
 BONDS = {
     "flash": "Flash bond: the layers just barely stick together.",
     "full": "Full bond: all TPE that touches melts into one.",
@@ -105,10 +111,24 @@ def _place_notes(runs: Runs) -> tuple[str, ...]:
 def _bench_actions(
     work: Work, part: AssemblyStep, step: Step, lying: Sequence[Bed], runs: Runs
 ) -> tuple[Action, ...]:
-    """A step's actions; what it is laid up on comes right after the press is set."""
-    first, *others = _actions(work.laminate, part, step, lying, runs)
-    own = (*underlay(work, part), *on_the_lumen(work.laminate, part))
-    return (first, *own, *others)
+    """A step's actions; what it is laid up on comes between base plate and release film."""
+    heat, *others = _actions(work.laminate, part, step, lying, runs)
+    laid = underlay(work, part)
+    plate = _plate(part, bool(laid))
+    # One whole stack that is laid down again has nothing to be aligned with.
+    on_pin = on_the_lumen(work.laminate, part) if part.adds else []
+    return (heat, plate, *laid, *on_pin, *others)
+
+
+def _plate(part: AssemblyStep, has_underlay: bool) -> Action:
+    """Base plate and pins, and the release film unless an underlay comes first."""
+    text = "Lay the base plate down, cold, cut corner at the back right"
+    if part.pins:
+        film = "." if has_underlay else " and prick a release film over them."
+        return Action(f"{text}. Drive in the pins to their heights (above){film}")
+    film = "" if has_underlay else ", and a release film on it"
+    by_eye = " Lay by eye, as each line says." if part.adds and not has_underlay else ""
+    return Action(f"{text}, no pins in it{film}.{by_eye}")
 
 
 def _actions(
@@ -119,16 +139,6 @@ def _actions(
         f"Heat both platens to {say.temperature(step.temperature_c)}; set the force to "
         f"{say.force(step.force_n)}."
     )
-    if part.pins:
-        yield Action(
-            "Lay the base plate down, cut corner at the back right. Drive in the pins to their "
-            "heights (above) and prick a release film over them."
-        )
-    else:
-        yield Action(
-            "Lay the base plate down, cut corner at the back right, no pins in it, and a release "
-            "film on it. Lay by eye, as each line says."
-        )
     for bed in lying:
         yield from _lay(things, bed, part.pins)
     yield from reseat(laminate, part.adds, bool(part.pins))
@@ -140,17 +150,9 @@ def _actions(
     )
     if part.pins:
         yield Action("Check: every pin reaches through the highest layer that has its hole.")
-    yield Action(
-        "Cover with a release film and the press pad, flush with the platen all round. No second "
-        "plate on top."
-    )
-    yield warm_plate(step)
+    yield Action(COVER)
     cycles = tuple(f"cycle {n}" for n in range(1, runs.count + 1))
-    yield Action(
-        f"Close the press and start the timer: {say.minutes(step.minutes)}.",
-        (),
-        cycles if 1 < len(cycles) <= MOST_LINES else (),
-    )
+    yield closing(step, cycles if 1 < len(cycles) <= MOST_LINES else ())
     yield Action("Take it out: it is as hot as the platens. Let it cool flat before you touch it.")
     if part.pins:
         names = say.listed([pin.name for pin in part.pins])
@@ -284,6 +286,7 @@ def tubing(work: Work) -> list[Action]:
     strip = work.laminate.interfaces[-1].masks[0].film.material
     first = f"the tab of {inlets[0].chamber}" if len(inlets) > 1 else "the tab"
     return [
+        *_each_copy(work, "Fit the tubes"),
         Action(
             f"Mark {first} with a pen, on the side that lay up in the press: the base is below."
         ),
@@ -311,6 +314,15 @@ def tubing(work: Work) -> list[Action]:
     ]
 
 
+def _each_copy(work: Work, what: str) -> list[Action]:
+    """That what follows is done for every copy of a batch, with a box for each."""
+    count = work.job.copies
+    if count == 1 or work.laminate.panel is not None:
+        return []
+    numbers = tuple(str(copy) for copy in range(1, count + 1)) if count <= MOST_COPIES else ()
+    return [Action(f"{what} of all {count} copies, one after the other, as follows.", (), numbers)]
+
+
 def _apart(names: Sequence[str]) -> tuple[str, ...]:
     """A box for each of several; a single one needs no name."""
     return tuple(names) if len(names) > 1 else ()
@@ -332,6 +344,7 @@ def leak_test(work: Work) -> list[Action]:
         else []
     )
     return [
+        *_each_copy(work, "Test the chambers"),
         Action("Connect a regulator or a syringe with a gauge. Wear eye protection."),
         Action(
             f"Under water, or brushed with soapy water, raise each chamber slowly to "

@@ -9,39 +9,56 @@ from functools import cached_property
 
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
+from sbafab.simulators.coarse.meridian import Start, fullest
 from sbafab.simulators.coarse.mesh import SECTORS, CoarseMesh, coarse_mesh
-from sbafab.simulators.coarse.rounds import RoundStack, round_stack
+from sbafab.simulators.coarse.rounds import RoundStack, equal_area, round_stack
 from sbafab.simulators.simulator import refuse_unknown
 
-YOUNG = 10_000.0
-"""kPa (paper, Sec. 3.2.1)."""
-POISSON = 0.2
-"""Likewise."""
 PRESSURE = 5.0
 """kPa in each chamber that is told nothing else."""
 
 
 @dataclass(frozen=True)
 class CoarseActuator:
-    """A stack of round balloons, and the pressure in kPa of every chamber."""
+    """A stack of round balloons, the pressure in kPa of every chamber, and how it is meshed.
+
+    A ring has so many ``sectors``; it has the area of its circle if ``is_fair``, else it is
+    inscribed in it.
+    """
 
     stack: RoundStack
     pressures: tuple[tuple[str, float], ...]
     sectors: int = SECTORS
+    start: Start = fullest
+    is_fair: bool = False
 
     @cached_property
     def mesh(self) -> CoarseMesh:
         """The coarse shell, inflated."""
-        return coarse_mesh(self.stack, sectors=self.sectors)
+        return self.mesh_from(self.start)
+
+    def mesh_from(self, start: Start) -> CoarseMesh:
+        """The coarse shell, inflated to another start."""
+        ringed = equal_area(self.stack, self.sectors) if self.is_fair else self.stack
+        return coarse_mesh(ringed, start, self.sectors)
+
+    @property
+    def young(self) -> float:
+        """Young's modulus of the film in kPa."""
+        return 1000 * self.stack.elastic[0]
+
+    @property
+    def poisson(self) -> float:
+        return self.stack.elastic[1]
 
     @property
     def membrane(self) -> float:
         """E t of one film in kPa mm = mN/mm."""
-        return YOUNG * self.stack.film.thickness
+        return self.young * self.stack.film.thickness
 
     def bending(self, films: int) -> float:
         """Bending stiffness of so many films bonded, in mN mm."""
-        return YOUNG * (films * self.stack.film.thickness) ** 3 / (12 * (1 - POISSON**2))
+        return self.young * (films * self.stack.film.thickness) ** 3 / (12 * (1 - self.poisson**2))
 
     @cached_property
     def mass(self) -> float:
@@ -63,16 +80,20 @@ class CoarseActuator:
 
 
 def actuator(
-    laminate: Laminate, pressures: Mapping[str, float] | None = None, sectors: int = SECTORS
+    laminate: Laminate,
+    pressures: Mapping[str, float] | None = None,
+    sectors: int = SECTORS,
+    start: Start = fullest,
 ) -> CoarseActuator:
     """An actuator under pressure: 5 kPa a chamber, or what is given by chamber in kPa, 0 elsewhere.
 
-    ``sectors`` nodes make a ring. Raises DesignError where the laminate has other than round
-    pockets, or a chamber is unknown.
+    ``sectors`` nodes make a ring; ``start`` says how far each balloon is inflated. Raises
+    DesignError where the laminate has other than round pockets of one film, or a chamber is
+    unknown.
     """
     stack = round_stack(laminate)
     told = checked(stack.chambers, pressures, PRESSURE, "pressure", "kPa")
-    return CoarseActuator(stack, tuple(told.items()), sectors)
+    return CoarseActuator(stack, tuple(told.items()), sectors, start)
 
 
 def checked(

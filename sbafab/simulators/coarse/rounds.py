@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Arc, Point
@@ -26,7 +26,8 @@ class RoundStack:
 
     ``pockets`` and ``rims`` (pocket and outline) are given by balloon, bottom to top; ``axes``
     by chamber; ``hub`` is the outline's radius between two lobes, ``lumen`` that of the hole in
-    the films; both are 0 for a single axis.
+    the films; both are 0 for a single axis. ``elastic`` are the film's Young's modulus in MPa
+    and Poisson's ratio.
     """
 
     name: str
@@ -39,6 +40,7 @@ class RoundStack:
     hub: float
     lumen: float
     film: Film
+    elastic: tuple[float, float]
 
     @property
     def radius(self) -> float:
@@ -57,12 +59,14 @@ def round_stack(laminate: Laminate) -> RoundStack:
             f"{SUPPORTED}; the pockets of {laminate.name} lie on a sheet and need the conforming "
             "shell mesh"
         )
-    others = sorted({layer.film.material for layer in laminate.tpe_layers} - {"TPE"})
-    if others:
+    films = sorted({layer.film.material for layer in laminate.tpe_layers})
+    if len(films) > 1:
         raise DesignError(
-            f"{SUPPORTED} of TPE alone; {laminate.name} has films of {', '.join(others)}, which "
-            "CalculiX takes"
+            f"{SUPPORTED} of one film; {laminate.name} has films of {', '.join(films)} and needs "
+            "the conforming shell mesh"
         )
+    film = laminate.tpe_layers[0].film
+    elastic = elastic_of(film)
     axes = tuple(chamber.centres[0] for chamber in laminate.chambers)
     rooms = [gap for gap in laminate.interfaces if gap.kind == "chamber"]
     necks = [gap for gap in laminate.interfaces if gap.kind == "separator"]
@@ -95,7 +99,34 @@ def round_stack(laminate: Laminate) -> RoundStack:
         bore=bore,
         hub=hub,
         lumen=lumen,
-        film=laminate.tpe_layers[0].film,
+        film=film,
+        elastic=elastic,
+    )
+
+
+def elastic_of(film: Film) -> tuple[float, float]:
+    """Young's modulus in MPa and Poisson's ratio. Raises DesignError where they are not known."""
+    if film.elastic is None:
+        raise DesignError(
+            f"a simulation needs Young's modulus of {film.material}; add "
+            f"films.{film.material.lower()}.modulus, in MPa, and poisson, its ratio"
+        )
+    return film.elastic
+
+
+def equal_area(stack: RoundStack, sectors: int) -> RoundStack:
+    """The stack whose rings of ``sectors`` corners have the area of its circles.
+
+    Corners on the circles themselves would take 10 % off a pocket of eight.
+    """
+    turn = math.tau / sectors
+    grown = math.sqrt(turn / math.sin(turn))
+    return replace(
+        stack,
+        pockets=tuple(radius * grown for radius in stack.pockets),
+        rims=tuple(radius * grown for radius in stack.rims),
+        neck=stack.neck * grown,
+        bore=stack.bore * grown,
     )
 
 

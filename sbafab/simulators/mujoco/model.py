@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Sequence
 
 from sbafab.meshing.surface import Vector
-from sbafab.simulators.coarse.actuator import POISSON, YOUNG, CoarseActuator
+from sbafab.simulators.coarse.actuator import CoarseActuator
 from sbafab.simulators.coarse.mesh import area
 from sbafab.simulators.coarse.web import Triangle
 
@@ -95,8 +95,8 @@ def _add_films(deformable: ET.Element, actuator: CoarseActuator) -> None:
         contact = {"selfcollide": "none", "contype": "0", "conaffinity": "0"}
         ET.SubElement(flex, "contact", contact)
         elasticity = {
-            "young": _number(YOUNG),
-            "poisson": _number(POISSON),
+            "young": _number(actuator.young),
+            "poisson": _number(actuator.poisson),
             "thickness": _number(thickness),
             "elastic2d": "both",
         }

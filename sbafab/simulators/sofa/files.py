@@ -7,11 +7,20 @@ from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 
+from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-from sbafab.simulators.coarse.actuator import POISSON, CoarseActuator, actuator
-from sbafab.simulators.coarse.rounds import why_not_round
-from sbafab.simulators.sofa.frames import beam_scene, frames_scene
-from sbafab.simulators.sofa.parts import NODAL_STIFFNESS, film_groups
+from sbafab.simulators.coarse.rounds import elastic_of, why_not_round
+from sbafab.simulators.sofa.conforming import conforming_shell
+from sbafab.simulators.sofa.frames import FRAMES_START, beam_scene, frames_scene
+from sbafab.simulators.sofa.parts import nodal_stiffness
+from sbafab.simulators.sofa.shell import (
+    COARSE_SECTORS,
+    FilmGroup,
+    Shell,
+    half_full,
+    round_actuator,
+    round_shell,
+)
 from sbafab.simulators.sofa.shell_scene import shell_scene, volume_scene
 
 SHELL, FRAMES, VOLUME, BEAM = (
@@ -27,7 +36,12 @@ LEAST_LOBES = 3
 
 def why_no_scene(laminate: Laminate) -> str | None:
     """The reason why no scene can be written for a laminate, or None."""
-    return why_not_round(laminate)
+    try:
+        for layer in laminate.tpe_layers:
+            elastic_of(layer.film)
+    except DesignError as reason:
+        return str(reason)
+    return None
 
 
 def write_scenes(
@@ -39,18 +53,23 @@ def write_scenes(
     """Writes the scenes of a laminate with all that they load; the files, the default one first.
 
     ``pressures`` in kPa and ``volumes`` (scene C, above its start) in ul, by chamber; chambers
-    left out get 0. By default 5 kPa and some 80 ul in every chamber. Scene D needs three
-    chambers. Raises DesignError where the pockets are not round or a chamber is unknown.
+    left out get 0. By default 5 kPa and some 80 ul in every chamber. Scenes B and C are for round
+    pockets of one film, scene D for three chambers of them or more. Raises DesignError where a
+    chamber is unknown, and for other pockets where the mesher is not installed.
     """
-    made = actuator(laminate, pressures)
-    texts = {
-        SHELL: shell_scene(made),
-        FRAMES: frames_scene(made),
-        VOLUME: volume_scene(made, volumes),
-    }
-    if made.stack.lobes >= LEAST_LOBES:
-        texts[BEAM] = beam_scene(made)
-    texts[DATA] = json.dumps(_data(made), separators=(",", ":")) + "\n"
+    texts = {}
+    if why_not_round(laminate) is None:
+        shell = round_shell(round_actuator(laminate, pressures))
+        frames = round_actuator(laminate, pressures, COARSE_SECTORS, FRAMES_START)
+        volume = round_actuator(laminate, pressures, COARSE_SECTORS, half_full)
+        texts = {SHELL: shell_scene(shell), FRAMES: frames_scene(frames)}
+        texts[VOLUME] = volume_scene(volume, volumes)
+        if frames.stack.lobes >= LEAST_LOBES:
+            texts[BEAM] = beam_scene(frames)
+    else:
+        shell = conforming_shell(laminate, pressures)
+        texts = {SHELL: shell_scene(shell)}
+    texts[DATA] = json.dumps(_data(shell), separators=(",", ":")) + "\n"
     texts[PYTHON] = files("sbafab.simulators.sofa").joinpath("scene.py.txt").read_text("utf-8")
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
@@ -58,28 +77,29 @@ def write_scenes(
     return [folder / name for name in texts]
 
 
-def _data(made: CoarseActuator) -> dict[str, object]:
-    mesh = made.mesh
-    membranes, bending = film_groups(made, mesh)
-    groups = {
-        kind: [
-            {"name": name, "stiffness": float(f"{stiffness:.6g}"), "triangles": triangles}
-            for name, triangles, stiffness in found
-        ]
-        for kind, found in (("membranes", membranes), ("bending", bending))
-    }
+def _data(shell: Shell) -> dict[str, object]:
+    highest = max(shell.pressures.values())
     return {
         "schema": "sbafab/sofa@1",
-        "name": made.stack.name,
+        "name": shell.name,
         "units": {"length": "mm", "mass": "kg", "time": "s", "pressure": "kPa", "volume": "ul"},
-        "position": mesh.position,
-        "rest_position": mesh.rest,
-        **groups,
-        "poisson": POISSON,
-        "cavities": dict(mesh.cavities),
-        "pressures": dict(made.pressures),
-        "fixed": mesh.fixed,
-        "tip": mesh.tip,
-        "true_mass": float(f"{made.mass:.4g}"),
-        "nodal_mass_by_dt2": round(NODAL_STIFFNESS, 4),
+        "position": shell.position,
+        "rest_position": shell.rest,
+        "membranes": [_group(group) for group in shell.membranes],
+        "bending": [_group(group) for group in shell.bending],
+        "cavities": dict(shell.cavities),
+        "pressures": dict(shell.pressures),
+        "fixed": shell.fixed,
+        "tip": shell.tip,
+        "true_mass": float(f"{shell.mass:.4g}"),
+        "nodal_mass_by_dt2": round(nodal_stiffness(highest, shell.size), 4),
+    }
+
+
+def _group(group: FilmGroup) -> dict[str, object]:
+    return {
+        "name": group.name,
+        "stiffness": float(f"{group.stiffness:.6g}"),
+        "poisson": group.poisson,
+        "triangles": group.triangles,
     }

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 Attribute = str | float | int | Sequence[float] | Sequence[Sequence[float]]
 
 PLUGINS = {
+    "AMDOrderingMethod": "Sofa.Component.LinearSolver.Ordering",
     "BeamFEMForceField": "Sofa.Component.SolidMechanics.FEM.Elastic",
     "CGLinearSolver": "Sofa.Component.LinearSolver.Iterative",
     "EulerImplicitSolver": "Sofa.Component.ODESolver.Backward",
@@ -25,7 +26,7 @@ PLUGINS = {
     "SurfacePressureConstraint": "SoftRobots",
     "SurfacePressureForceField": "Sofa.Component.MechanicalLoad",
     "TriangleSetTopologyContainer": "Sofa.Component.Topology.Container.Dynamic",
-    "TriangularFEMForceField": "Sofa.Component.SolidMechanics.FEM.Elastic",
+    "TriangularFEMForceFieldOptim": "Sofa.Component.SolidMechanics.FEM.Elastic",
     "UniformMass": "Sofa.Component.Mass",
     "WriteState": "Sofa.Component.Playback",
 }

@@ -11,14 +11,17 @@ from typing import Literal
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.progress import Progress
+from sbafab.simulators.coarse.actuator import PRESSURE, checked
+from sbafab.simulators.coarse.rounds import why_not_round
 from sbafab.simulators.coarse.tip import Tip
 from sbafab.simulators.program import Ended, program_path, run_program
 from sbafab.simulators.simulator import refuse_time
 from sbafab.simulators.sofa.files import BEAM, FRAMES, SHELL, VOLUME, write_scenes
 from sbafab.simulators.sofa.frames import BEAM_DT, FRAMES_DT
+from sbafab.simulators.sofa.judge import Limits, impossible, limits
 from sbafab.simulators.sofa.parts import TIP_FILE, TIP_PERIOD
 from sbafab.simulators.sofa.shell_scene import DT
-from sbafab.simulators.sofa.tip import Log, read_log, read_tips
+from sbafab.simulators.sofa.tip import Log, plugins_needed, read_log, read_tips
 
 Scene = Literal["shell", "frames", "volume", "beam"]
 
@@ -68,6 +71,11 @@ class SofaRun:
     def last(self) -> Tip:
         return self.tips[-1]
 
+    def before(self, seconds: float) -> Tip:
+        """The tip so many s before the end, or at the start."""
+        until = self.last.time - seconds
+        return next((tip for tip in reversed(self.tips) if tip.time <= until), self.tips[0])
+
 
 def simulate(
     laminate: Laminate,
@@ -86,11 +94,21 @@ def simulate(
     refuse_time(job.seconds, TIP_PERIOD)
     program = find_program()
     if folder / name not in write_scenes(laminate, folder, pressures, job.volumes):
-        raise DesignError(
-            f"scene {job.scene} needs three chambers or more, {laminate.name} has "
-            f"{len(laminate.chambers)}; take scene shell"
-        )
-    return run_scene(program, folder / name, job.seconds, dt, job.limit, tell)
+        raise DesignError(_no_such_scene(laminate, job.scene))
+    told = job.volumes if job.scene == "volume" else pressures
+    names = tuple(chamber.name for chamber in laminate.chambers)
+    limit = limits(laminate, checked(names, told, PRESSURE, "pressure", "kPa").values())
+    return run_scene(program, folder / name, job.seconds, dt, job.limit, tell, limit)
+
+
+def _no_such_scene(laminate: Laminate, scene: Scene) -> str:
+    reason = why_not_round(laminate)
+    if reason is not None:
+        return f"scene {scene} is for round pockets of one film: {reason}; take scene shell"
+    return (
+        f"scene {scene} needs three chambers or more, {laminate.name} has "
+        f"{len(laminate.chambers)}; take scene shell"
+    )
 
 
 def find_program() -> str:
@@ -109,11 +127,13 @@ def run_scene(
     dt: float,
     limit: float | None = None,
     tell: Progress | None = None,
+    can_be: Limits | None = None,
 ) -> SofaRun:
     """Runs a scene for so many s in steps of ``dt``; its log stays beside it in runSofa.log.
 
     It is stopped after ``limit`` s of real time. Raises OutputError if it ends by itself, is
-    killed, or logs what makes it void; the sentence says how far the tip was known.
+    killed, logs what makes it void, or ends outside of what ``can_be``; the sentence says how far
+    the tip was known.
     """
     folder = scene.parent
     state = folder / TIP_FILE
@@ -123,7 +143,8 @@ def run_scene(
     log_path = folder / LOG_FILE
     command = [program, "-g", "batch", "-n", str(steps), scene.name]
     ended = run_program(command, log_path, limit, lambda: _report(state, dt, steps, tell))
-    log = read_log(log_path.read_text(encoding="utf-8", errors="replace"))
+    needed = plugins_needed(scene)
+    log = read_log(log_path.read_text(encoding="utf-8", errors="replace"), needed)
     tips = read_tips(state)
     if ended.stopped is not None and tips and log.trouble is None:
         stopped = (
@@ -137,6 +158,8 @@ def run_scene(
             f"the tip is known to {tips[-1].time:g} s" if tips else "nothing is known of the tip"
         )
         raise OutputError(f"{scene.name} did not run to its end: {why}; {known} (see {log_path})")
+    if can_be is not None and (wrong := impossible(tips, can_be)) is not None:
+        raise OutputError(f"{scene.name} ran to its end, but its result cannot be: {wrong}")
     if tell is not None:
         tell("runSofa", steps, steps)
     return SofaRun(scene, tuple(tips), log.steps or steps, log.seconds, log.rate)

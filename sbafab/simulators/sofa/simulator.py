@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import cast
 
@@ -10,15 +11,17 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.progress import Progress
 from sbafab.simulators.coarse.actuator import PRESSURE
 from sbafab.simulators.simulator import Result, Wish, chamber_pressures, refuse_time
+from sbafab.simulators.sofa.conforming import tube_radius
 from sbafab.simulators.sofa.files import why_no_scene, write_scenes
-from sbafab.simulators.sofa.parts import TIP_PERIOD
-from sbafab.simulators.sofa.run import USUAL, Scene, SofaJob, simulate
+from sbafab.simulators.sofa.parts import TIP_FILE, TIP_PERIOD
+from sbafab.simulators.sofa.run import USUAL, Scene, SofaJob, SofaRun, simulate
+from sbafab.simulators.sofa.tip import read_points
 
 USES = ("scene", "seconds", "volumes")
 
 
 def why_not(laminate: Laminate) -> str | None:
-    """The coarse mesh is made of rings: pockets must be round."""
+    """A film whose modulus is not known."""
     return why_no_scene(laminate)
 
 
@@ -37,14 +40,24 @@ def run(laminate: Laminate, wish: Wish, folder: Path, tell: Progress) -> Result:
     scene = cast(Scene, wish.scene or USUAL.scene)
     job = SofaJob(scene, seconds, 60 * wish.minutes, wish.volumes or None)
     found = simulate(laminate, folder, pressures, job, tell)
-    x, y, z = found.last.place
     rows = [] if scene == "volume" else [(name, p, "kPa") for name, p in pressures.items()]
-    rows += [("tip x", x, "mm"), ("tip y", y, "mm"), ("tip z", z, "mm")]
-    rows += [("tilt", found.last.tilt, "degrees")]
+    rows += _reached(laminate, found)
     rows += [] if found.rate is None else [("rate", found.rate, "steps/s")]
     tips = [{"time": tip.time, "place": tip.place, "tilt": tip.tilt} for tip in found.tips]
     figures = {"scene": found.scene.name, "tips": tips, "rate": found.rate}
     return Result(tuple(rows), figures, found.stopped)
+
+
+def _reached(laminate: Laminate, found: SofaRun) -> list[tuple[str, float, str]]:
+    """The tip's place and lean, or how far the crowns of balloons lie from their tube's axis."""
+    if tube_radius(laminate) is not None:
+        _, crowns = read_points(found.scene.with_name(TIP_FILE))[-1]
+        across = [2 * math.hypot(x, z) for x, _, z in crowns]
+        return [("diameter over the crowns", sum(across) / len(across), "mm")]
+    x, y, z = found.last.place
+    tip = [("tip x", x, "mm"), ("tip y", y, "mm"), ("tip z", z, "mm")]
+    drift = math.dist(found.last.place, found.before(1.0).place)
+    return [*tip, ("tilt", found.last.tilt, "degrees"), ("drift in 1 s", drift, "mm")]
 
 
 def _pressures(laminate: Laminate, wish: Wish) -> dict[str, float]:

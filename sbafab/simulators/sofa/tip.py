@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,8 @@ from sbafab.meshing.surface import Vector
 from sbafab.simulators.coarse.tip import Tip, tip_at
 
 TROUBLE = re.compile(r"\[ERROR\]|\bnan\b|Division by zero|Null determinant", re.IGNORECASE)
+NO_PLUGIN = re.compile(r"\[ERROR\].*Plugin not found: \"([^\"]*)\"")
+NEEDED = re.compile(r'<RequiredPlugin name="([^"]*)"')
 DONE = re.compile(r"(\d+) iterations done in (\S+) s \(\s*(\S+) FPS\s*\)")
 
 
@@ -26,10 +28,15 @@ class Log:
 
 
 def read_tips(path: Path) -> list[Tip]:
-    """The records in time up to the first that is cut short or is no finite number."""
+    """The tip's records in time up to the first that is cut short or is no finite number."""
+    return [tip_at(time, points) for time, points in read_points(path)]
+
+
+def read_points(path: Path) -> list[tuple[float, list[Vector]]]:
+    """Time in s and places in mm of the recorded nodes, as far as ``read_tips`` reads them."""
     if not path.is_file():
         return []
-    found: list[Tip] = []
+    found: list[tuple[float, list[Vector]]] = []
     time: float | None = None
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True):
         key, _, values = line.strip().partition("=")
@@ -41,13 +48,24 @@ def read_tips(path: Path) -> list[Tip]:
         elif key == "X" and time is not None:
             if len(numbers) < 9 or len(numbers) % 3:
                 break
-            points = list(_points(numbers))
-            found.append(tip_at(time, points))
+            found.append((time, list(_points(numbers))))
     return found
 
 
-def read_log(text: str) -> Log:
-    trouble = next((line.strip() for line in text.splitlines() if TROUBLE.search(line)), None)
+def plugins_needed(scene: Path) -> list[str]:
+    """The plugins that a scene asks for."""
+    return NEEDED.findall(scene.read_text(encoding="utf-8")) if scene.is_file() else []
+
+
+def read_log(text: str, plugins: Collection[str] = ()) -> Log:
+    """What a log tells of a run whose scene asks for these plugins; others may be missing."""
+
+    def voids(line: str) -> bool:
+        missing = NO_PLUGIN.search(line)
+        return missing is None or missing[1] in plugins
+
+    lines = (line.strip() for line in text.splitlines() if TROUBLE.search(line))
+    trouble = next(filter(voids, lines), None)
     done = DONE.search(text)
     if done is None:
         return Log(trouble, None, None, None)

@@ -1,0 +1,67 @@
+"""The site: ``python -m docs`` writes generated pages, then has Sphinx build all of them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import sbafab
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+
+HERE = Path(__file__).parent
+
+project = "sbafab"
+author = "sbafab contributors"
+project_copyright = "sbafab contributors"
+release = version = sbafab.__version__
+
+extensions = ["myst_nb", "sphinx.ext.autodoc"]
+exclude_patterns = ["scripts", "__main__.py", "conf.py"]
+myst_enable_extensions = ["attrs_block", "attrs_inline", "colon_fence", "deflist"]
+myst_heading_anchors = 3
+smartquotes = False  # an option is --set, not one dash
+
+# Notebooks are run by the build; one that fails stops it.
+nb_execution_mode = "auto"
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
+nb_merge_streams = True
+# Widgets would be fetched from another host.
+nb_ipywidgets_js: dict[str, dict[str, str]] = {}
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "description"
+autodoc_typehints_format = "short"
+
+html_theme = "furo"
+html_title = f"sbafab {release}"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_logo = "_static/mark.svg"
+html_favicon = "_static/mark.svg"
+html_extra_path = ["llms.txt"]
+html_copy_source = False
+html_show_sourcelink = False
+html_theme_options = {
+    "light_css_variables": {"color-brand-primary": "#0b4f86", "color-brand-content": "#0b4f86"},
+    "dark_css_variables": {"color-brand-primary": "#a9cfea", "color-brand-content": "#a9cfea"},
+}
+
+OTHERS = "<!-- every other page -->"
+"""In index.md, where the guides that no list names are put."""
+
+
+def with_other_pages(app: Sphinx, docname: str, source: list[str]) -> None:
+    """Puts pages that index.md does not name among its guides, so that none is lost."""
+    if docname != "index":
+        return
+    named = set(re.findall(r"^([\w./-]+)$", source[0], re.MULTILINE))
+    pages = sorted(path.stem for path in HERE.glob("*.md") if path.stem != "index")
+    source[0] = source[0].replace(OTHERS, "\n".join(p for p in pages if p not in named))
+
+
+def setup(app: Sphinx) -> None:
+    app.connect("source-read", with_other_pages)

@@ -1,0 +1,61 @@
+"""The page of file formats, with a JSON schema and a stable id each."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from sbafab.output.schemas import SCHEMAS, schema_of
+
+HEAD = """# File formats
+
+What a program may rely on. Every JSON file carries the id of its format as `schema`; additions keep the id, a change
+that would break a reader gets a new number. `sbafab schema NAME` prints these schemas (JSON Schema 2020-12).
+
+| name | id | what it describes | schema |
+|---|---|---|---|
+"""
+
+CUT = """
+## Cut files
+
+ASCII DXF R2010 in millimetres (`$INSUNITS` 4), model space only, everything at z = 0.
+
+| DXF layer | colour | what it holds |
+|---|---|---|
+| `ENGRAVE` | 7 | labels, in waste only |
+| `CUT_INNER` | 5 | holes, cut first |
+| `CUT_OUTER` | 1 | outlines |
+| `CUT_SHEET` | 6 | the parting cut, last |
+| `REFERENCE` | | not cut: datum cross, sheet frame |
+
+One closed `LWPOLYLINE` with bulges a contour, `CIRCLE` for a full circle. Layer files have the actuator's axis at
+(0, 0); sheets have their lower left corner there. Custom properties hold the design's hash, the state of the kerf and
+what was waived. See [cutting](../cutting.md) for kerf, order and readers that take no bulges.
+
+## Meshes
+
+STL, 3MF and GLB of the flat solid and of each chamber's cavity in millimetres (GLB in metres, as its standard asks);
+conforming meshes as VTU, legacy VTK, Gmsh MSH 4.1 and Abaqus INP with named sets: see [meshing](../meshing.md).
+
+## A folder
+
+| file | what it is |
+|---|---|
+| `manifest.json` | the index: every file with its SHA-256, layers, interfaces, sheets, bores, films |
+| `design.toml` | the design with every default written out; it makes the folder again |
+| `checks.json` | what the rules found |
+| `press.json`, `press.csv` | the press schedule |
+| `predict.json` | from `sbafab predict`: every figure with model and trust |
+"""
+
+
+def write(folder: Path) -> None:
+    """The page, and beside it the schemas as files."""
+    rows = []
+    for name, (identity, said) in SCHEMAS.items():
+        text = json.dumps(schema_of(name), indent=1) + "\n"
+        (folder / f"{name}.schema.json").write_text(text, encoding="utf-8")
+        link = f"{{download}}`{name}.schema.json`"
+        rows.append(f"| `{name}` | `{identity}` | {said} | {link} |")
+    (folder / "formats.md").write_text(HEAD + "\n".join(rows) + "\n" + CUT, encoding="utf-8")

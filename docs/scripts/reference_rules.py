@@ -1,0 +1,61 @@
+"""The page of rules and checks: what each asks, with a picture of right and wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from docs.scripts.rule_pictures import pair
+from sbafab.rules.explained import AS_BUILT, BETWEEN_PARTS, DECK, Explanation
+
+HEAD = """# Rules, right and wrong
+
+Every rule of the deck with a laminate that it passes and one that it fails. The pictures are drawn from the faulty
+laminates of the tests, each of which one rule alone catches; the sentence below a picture is what the rule says of it.
+TPE is blue, PTFE masks are orange, the ring marks the place that is named. `sbafab explain RULE` prints the same words.
+How each is measured: [the rule deck](../rules.md).
+"""
+
+
+def write(folder: Path) -> None:
+    """The page, and two pictures a rule."""
+    pictures = folder / "rules"
+    pictures.mkdir()
+    parts = [HEAD, "\n## On a design\n"]
+    for name, one in DECK.items():
+        drawn = pair(name)
+        for which, text in (("right", drawn.right), ("wrong", drawn.wrong)):
+            (pictures / f"{name}-{which}.svg").write_text(text, encoding="utf-8")
+        parts += [f"\n### {name}\n", _words(one), _figure(name), f"> {_plain(drawn.said)}\n"]
+    parts.append("\n## Between the parts of an assembly\n")
+    parts += [_short(BETWEEN_PARTS)]
+    parts.append("\n## On a folder\n\nThe rules above are run on what the files will cut, and:\n")
+    parts += [_short(AS_BUILT)]
+    (folder / "rules.md").write_text("\n".join(parts), encoding="utf-8")
+
+
+def _words(one: Explanation) -> str:
+    keys = ", ".join(f"`{key}`" for key in one.keys) or "none"
+    return (
+        f"Holds when {_plain(one.holds)}. {_plain(one.why)}\n\n"
+        f"**If it fails:** {_plain(one.mend)}\n\n**Keys:** {keys}\n"
+    )
+
+
+def _figure(name: str) -> str:
+    return (
+        "| right | wrong |\n|---|---|\n"
+        f"| ![{name} passes](rules/{name}-right.svg) | ![{name} fails](rules/{name}-wrong.svg) |\n"
+    )
+
+
+def _short(explained: Mapping[str, Explanation]) -> str:
+    rows = "\n".join(
+        f"| `{name}` | {_plain(one.holds)} | {_plain(one.why)} | {_plain(one.mend)} |"
+        for name, one in explained.items()
+    )
+    return f"| check | holds when | because | if it fails |\n|---|---|---|---|\n{rows}\n"
+
+
+def _plain(text: str) -> str:
+    return text.replace("<", "&lt;").replace("*", "\\*").replace("|", "\\|")

@@ -1,0 +1,27 @@
+"""Pictures of the tutorials' steps, made by the commands that the tutorials name."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+import sbafab
+
+KEPT = ("preview/solid.png", "preview/layers.svg", "preview/stack.svg", "sheets/TPE_1.svg")
+
+
+def write_steps(folder: Path) -> None:
+    """What ``sbafab generate`` draws of the first actuator, and of the drawn outline."""
+    gallery = Path(__file__).parents[1] / "gallery"
+    with tempfile.TemporaryDirectory() as scratch:
+        first = sbafab.generate("1dof-5mm", "stack.balloons=4", out=scratch, name="first")
+        _keep(first.folder, folder / "first")
+        oval = sbafab.generate(str(gallery / "oval.toml"), out=scratch)
+        _keep(oval.folder, folder / "oval")
+
+
+def _keep(made: Path, target: Path) -> None:
+    target.mkdir()
+    for name in KEPT:
+        shutil.copyfile(made / name, target / Path(name).name)

@@ -1,0 +1,69 @@
+"""How fast the studio answers, measured in the browser: ``python -m docs.studio_latency``.
+
+Turns the chamber's diameter of 3dof-15mm again and again and prints, from the change to what is
+painted, the median and the 95th percentile; then poses drawn a second. Run it on an idle machine.
+"""
+
+from __future__ import annotations
+
+import os
+import statistics
+import sys
+import tempfile
+from pathlib import Path
+
+from sbafab import api
+from tests.studio.browsing import Watched, browser, served
+
+PARTS = {
+    "geometry": "layers, section and solid painted",
+    "figures": "prediction",
+    "deck": "rules but the yield",
+    "all": "rules with the yield",
+}
+
+
+def main(changes: int = 25) -> None:
+    """Prints a table in Markdown."""
+    with tempfile.TemporaryDirectory() as scratch, browser() as chromium:
+        folder = Path(scratch)
+        (folder / "gripper.toml").write_text(api.template("3dof-15mm"), encoding="utf-8")
+        with served(folder, "gripper.toml") as link:
+            seen = Watched(chromium, link, viewport={"width": 1280, "height": 800})
+            seen.ready()
+            seen.page.click("#tab-layers")
+            _warm(seen)
+            for number in range(changes):
+                seen.say(f"studio.edit([['chamber.diameter', '{5.05 + number / 50:.3f}']])")
+                seen.page.wait_for_timeout(50)
+                seen.ready()
+            print(f"load of the machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+            print("\n| from a change to | median ms | 95th percentile ms |\n|---|---|---|")
+            for part, words in PARTS.items():
+                times = sorted(seen.say(f"studio.latency.{part}"))
+                late = times[min(len(times) - 1, round(0.95 * len(times)))]
+                print(f"| {words} | {statistics.median(times):.0f} | {late:.0f} |")
+            seen.page.click("#tab-motion")
+            seen.until("Boolean(studio.motion.pose)")
+            seen.say("studio.motion.set(() => 15)")
+            seen.page.get_by_role("button", name="Play", exact=True).click()
+            seen.page.wait_for_timeout(1000)
+            seen.say("studio.motion.times.length = 0")
+            seen.page.wait_for_timeout(5000)
+            rate = seen.say("studio.motion.rate()")
+            costs = seen.say("studio.motion.costs.slice(-100)")
+            print(
+                f"\nposes drawn a second: {rate:.0f}; drawing one: {statistics.median(costs):.1f} ms"
+            )
+
+
+def _warm(seen: Watched) -> None:
+    for value in ("5.3", "5.4", "5.01"):
+        seen.say(f"studio.edit([['chamber.diameter', '{value}']])")
+        seen.page.wait_for_timeout(50)
+        seen.ready()
+    seen.say("Object.values(studio.latency).forEach(times => { times.length = 0; })")
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))

@@ -1,0 +1,166 @@
+"""Round actuators by what they must fit: the chamber that is as large as that allows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from sbafab.design.records import Design
+from sbafab.design.section import Section
+from sbafab.design.units import Length
+from sbafab.errors import DesignError
+from sbafab.laminate.extent import beyond_the_outline, outline_diameter, overall_diameter
+from sbafab.laminate.laminate import Laminate
+
+AnyDesign = TypeVar("AnyDesign", bound=Design)
+STEP = 0.01
+"""mm: chambers are solved in whole steps."""
+STARTS = (500, 800, 1200, 300, 2000, 3000)
+"""Steps of diameters from which to look, until one of them can be built."""
+ROUNDING = 1e-6
+
+
+class Fits(Section):
+    """What the actuator must fit; without ``chamber.diameter`` the largest that does is taken."""
+
+    diameter: Length | None = None
+    """All of it, inlet tabs, tails and ears counted, lies in a circle of this diameter round the
+    axis."""
+    outline: Length | None = None
+    """Its films, with tabs and ears taken off, lie in a circle of this diameter round the axis; the
+    paper's 3-DoF actuator fits 15."""
+
+
+def fitted(design: AnyDesign, fits: Fits, build: Callable[[AnyDesign], Laminate]) -> AnyDesign:
+    """The design with its chamber solved from what it must fit, unless it names its chamber.
+
+    Raises DesignError where no chamber fits.
+    """
+    chamber = design.chamber
+    if fits == Fits() or chamber.outline or "diameter" in chamber.model_fields_set:
+        return design
+    found = _Search(design, fits, build).largest() * STEP
+    return _with_chamber(design, round(found, 6)).solved()
+
+
+def refuse_unfit(design: Design, fits: Fits, laminate: Laminate) -> str | None:
+    """What to say of a laminate that fits, None where nothing is asked. Raises DesignError."""
+    over = beyond_the_outline(laminate)
+    said = []
+    for key, asked, measured, what in (
+        ("diameter", fits.diameter, overall_diameter, f"with {over}"),
+        ("outline", fits.outline, outline_diameter, f"without {over}"),
+    ):
+        if asked is None:
+            continue
+        found = measured(laminate)
+        if found > asked + ROUNDING:
+            raise DesignError(
+                f"{design.name} measures {found:.3f} mm across {what}, and fits.{key} = {asked:g}; "
+                f"leave chamber.diameter out to have it solved, or make fits.{key} at least "
+                f"{found:.3f}"
+            )
+        said.append(f"{found:.3f} mm across {what}, within fits.{key} = {asked:g}")
+    return "; ".join(said) or None
+
+
+def _with_chamber(design: AnyDesign, diameter: float, balloons: int | None = None) -> AnyDesign:
+    changes: dict[str, Any] = {"chamber": design.chamber.model_copy(update={"diameter": diameter})}
+    if balloons is not None:
+        changes["stack"] = design.stack.model_copy(update={"balloons": balloons})
+    return design.model_copy(update=changes)
+
+
+class _Search:
+    """Looks for the largest chamber, in steps of its diameter."""
+
+    def __init__(self, design: Any, fits: Fits, build: Callable[[Any], Laminate]) -> None:
+        self._design = design
+        self._fits = fits
+        self._build = build
+        self._known: dict[int, float | None] = {}
+        self._why = ""
+
+    def over(self, steps: int) -> float | None:
+        """By how many mm the design is too wide, None where it cannot be built."""
+        if steps not in self._known:
+            # Balloons above the second change nothing seen from above.
+            few = min(2, self._design.stack.balloons)
+            try:
+                laminate = self._build(_with_chamber(self._design, steps * STEP, few))
+            except DesignError as error:
+                self._why = str(error)
+                self._known[steps] = None
+            else:
+                self._known[steps] = self._excess(laminate)
+        return self._known[steps]
+
+    def _excess(self, laminate: Laminate) -> float:
+        fits = self._fits
+        asked = [(fits.diameter, overall_diameter), (fits.outline, outline_diameter)]
+        return max(measured(laminate) - most for most, measured in asked if most is not None)
+
+    def largest(self) -> int:
+        """The most steps that fit. Raises DesignError where none do."""
+        start = next((n for n in STARTS if self.over(n) is not None), None)
+        if start is None:
+            raise DesignError(self._why)
+        first = self.over(start)
+        assert first is not None
+        if first <= 0:
+            good, bad = start, start + 1
+            while self._fit(bad):
+                good, bad = bad, bad + max(1, self._guess(bad))
+        else:
+            bad, good = start, max(1, start - self._guess(start))
+            while not self._fit(good):
+                if self.over(good) is None or good == 1:
+                    return self._between(self._least(good, bad), bad)
+                bad, good = good, max(1, good - self._guess(good))
+        return self._between(good, bad)
+
+    def _fit(self, steps: int) -> bool:
+        over = self.over(steps)
+        return over is not None and over <= ROUNDING
+
+    def _guess(self, steps: int) -> int:
+        """Steps by which the chamber could change if all were as much wider as it is, and one."""
+        over = self.over(steps)
+        return 1 + int(abs(over or 0.0) / STEP)
+
+    def _least(self, none: int, some: int) -> int:
+        """The fewest steps that can be built, if they fit. Raises DesignError if not."""
+        while some - none > 1:
+            middle = (none + some) // 2
+            if self.over(middle) is None:
+                none = middle
+            else:
+                some = middle
+        over = self.over(some)
+        if over is not None and over <= ROUNDING:
+            return some
+        asked = [(f"fits.{key}", value) for key, value in self._fits if value is not None]
+        said = " and ".join(f"{key} = {value:g}" for key, value in asked)
+        raise DesignError(
+            f"no chamber fits {said}: the smallest that can be built, chamber.diameter = "
+            f"{some * STEP:.2f}, is {over or 0.0:.3f} mm too wide; shorten inlet.tab_length, or "
+            "make room"
+        )
+
+    def _between(self, good: int, bad: int) -> int:
+        """The most steps that fit, from some that do and more that do not."""
+        while bad - good > 1:
+            middle = self._straight_between(good, bad)
+            if self._fit(middle):
+                good = middle
+            else:
+                bad = middle
+        return good
+
+    def _straight_between(self, good: int, bad: int) -> int:
+        """Where all would be just as wide as it may, were it to widen evenly; else the middle."""
+        low, high = self.over(good), self.over(bad)
+        if low is None or high is None or high <= low:
+            return (good + bad) // 2
+        guess = good + int(-low / (high - low) * (bad - good) + ROUNDING)
+        return min(max(guess, good + 1), bad - 1)

@@ -1,0 +1,82 @@
+"""``sbafab map``: force and volume of a design's balloons, for other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from sbafab.cli import completing
+from sbafab.cli.options import set_option
+from sbafab.cli.quantities import LENGTH, MODULUS, PRESSURE
+
+
+@click.command(name="map")
+@click.argument("source", metavar="DESIGN", shell_complete=completing.designs)
+@set_option
+@click.option(
+    "--to",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Write FILE.csv, FILE.json or FILE.py.  [default: CSV on the screen]",
+)
+@click.option(
+    "--pressure",
+    type=PRESSURE.read,
+    default="110 kPa",
+    show_default=True,
+    metavar="P",
+    help="Map up to this pressure.",
+)
+@click.option(
+    "--points",
+    type=click.IntRange(2, 1000),
+    default=31,
+    show_default=True,
+    metavar="N",
+    help="Pressures, and heights, of CSV and JSON.",
+)
+@click.option(
+    "--pocket-loss",
+    type=LENGTH.read,
+    default="0 mm",
+    metavar="L",
+    help="By how much pockets come out smaller in radius than drawn.  [default: 0]",
+)
+@click.option(
+    "--modulus", "modulus_mpa", type=MODULUS.read, metavar="E", help="Of the film, if measured."
+)
+def map_(
+    source: str,
+    assignments: tuple[str, ...],
+    to: Path | None,
+    pressure: float,
+    points: int,
+    **factors: Any,
+) -> None:
+    """Map the balloons of a design: force and volume at any pressure and height."""
+    from sbafab.actuators import load_design
+    from sbafab.errors import DesignError, OutputError
+    from sbafab.models.figures import Factors
+    from sbafab.models.force import force
+    from sbafab.models.map_files import FORMATS, map_text
+    from sbafab.models.stack import stack
+
+    form = "csv" if to is None else to.suffix.removeprefix(".")
+    if form not in FORMATS:
+        raise DesignError(f"{to} must end with .{', .'.join(FORMATS)}, which says its format")
+    if pressure <= 0:
+        raise DesignError(f"a map to {pressure:g} kPa holds nothing; give more than 0 kPa")
+    force(pressure, 0.0)  # raises past the burst pressure
+    design = load_design(source, assignments, ())
+    found = stack(design, most_pressure=pressure, factors=Factors(**factors))
+    text = map_text(design.name, found, form, points)
+    if to is None:
+        click.echo(text, nl=False)
+        return
+    try:
+        to.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise OutputError(f"{to} cannot be written: {error.strerror}") from None
+    click.echo(f"written to {to}")

@@ -1,0 +1,109 @@
+"""What the rules found, as people read it: a line a rule, what to do, a summary last."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from sbafab.cli.printing import COLOURS, console, findings_table
+
+if TYPE_CHECKING:
+    from sbafab.output.planned import Checked
+    from sbafab.rules.finding import Finding, Verdict
+
+
+class Group(NamedTuple):
+    """Findings that belong together: of one design, or between the parts of an assembly."""
+
+    name: str
+    findings: Sequence[Finding]
+
+
+def groups_of(
+    checked: Iterable[Checked], between: Sequence[Finding] | None = None
+) -> tuple[Group, ...]:
+    """A group a design, and one for what lies between parts."""
+    own = tuple(Group(one.design.name, one.findings) for one in checked)
+    return own if between is None else (*own, Group("between the parts", between))
+
+
+def print_findings(groups: Sequence[Group], verbose: bool = False) -> None:
+    """A line for every rule; for several groups, and below, what needs something done."""
+    out = console()
+    width = out.width
+    for group in groups:
+        if len(groups) > 1:
+            out.print(f"{group.name}: {counted(group.findings)}", style="bold", markup=False)
+        if verbose:
+            out.print(findings_table(group.findings))
+            continue
+        if len(groups) == 1:
+            print_lines(group.findings)
+        print_open(group.findings, width)
+
+
+def print_lines(findings: Sequence[Finding]) -> None:
+    """A line a rule: the finding that decides."""
+    from rich.text import Text
+
+    from sbafab.rules.finding import decisive
+
+    out = console()
+    rules = decisive(findings)
+    wide = max(map(len, rules), default=0)
+    out.print(Text(f"{'rule':{wide}}  verdict  {'measured':>13}  {'limit':>11}", style="bold"))
+    for rule, one in rules.items():
+        line = Text(f"{rule:{wide}}  ")
+        line.append(f"{one.verdict:7}", style=COLOURS[one.verdict])
+        measured, limit = short_figure(one.measured, one.unit), short_figure(one.limit, one.unit)
+        line.append(f"  {measured:>13}  {limit:>11}")
+        line.rstrip()
+        out.print(line, soft_wrap=True)
+
+
+def print_open(findings: Sequence[Finding], width: int = 80) -> None:
+    """What to do about each warning, and what is wrong in each failure."""
+    from rich.text import Text
+
+    out = console()
+    # Bond and overhang may ask for the same.
+    for said, verdict in dict.fromkeys(_told(findings)):
+        lines = textwrap.wrap(said, width, subsequent_indent="  ", break_on_hyphens=False)
+        for line in lines:
+            out.print(Text(line, style=COLOURS[verdict]), soft_wrap=True)
+
+
+def _told(findings: Sequence[Finding]) -> Iterator[tuple[str, Verdict]]:
+    for one in findings:
+        if one.verdict in ("fail", "warn") or one.by_user:
+            yield f"{one.rule}: {one.remedy or one.message}", one.verdict
+
+
+def counted(findings: Iterable[Finding]) -> str:
+    """How many rules pass, warn, are waived by the design, or fail."""
+    from sbafab.rules.finding import summary
+
+    counts = summary(findings)
+    words = [
+        f"{counts['pass']} {'rule passes' if counts['pass'] == 1 else 'rules pass'}",
+        f"{counts['warn']} warn{'s' if counts['warn'] == 1 else ''}" if counts["warn"] else "",
+        f"{counts['waived']} waived" if counts["waived"] else "",
+        f"{counts['fail']} fail{'s' if counts['fail'] == 1 else ''}" if counts["fail"] else "",
+    ]
+    return ", ".join(word for word in words if word)
+
+
+def verdict_said(name: str, groups: Sequence[Group], more: str) -> str:
+    """The closing line of what holds; ``more`` tells where the details are."""
+    if len(groups) == 1:
+        return f"{name} holds: {counted(groups[0].findings)}. {more}"
+    return f"{name} holds. {more}"
+
+
+def short_figure(value: float | None, unit: str) -> str:
+    """A measured value in a column; none where nothing was measured."""
+    if value is None:
+        return ""
+    digits = f"{value:.3f}" if unit == "mm" else f"{value:.4g}"
+    return f"{digits} {unit}".strip()

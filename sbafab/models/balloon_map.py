@@ -1,0 +1,242 @@
+"""One balloon as a smooth map: what it holds and pushes with, at any pressure and height.
+
+Both come from one potential, the films' energy less the work of the air: force -dW/dh, volume
+-dW/dp. It is a quintic spline in the height and in asinh(p / P0), fitted by least squares to W and
+both derivatives of balloons from ``inflate``. So the map keeps energy: what the air gives on any
+way round comes back. Lengths mm, pressures kPa, volumes ul, forces mN, energies uJ.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from sbafab.errors import DesignError
+from sbafab.models.balloon import Balloon, Shapes, inflate
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from sbafab.models.film_elements import Array
+
+DEGREE = 5
+PRESSURE_SPANS, HEIGHT_SPANS = 9, 9
+"""Pieces of the spline each way."""
+PRESSURE_POINTS, HEIGHT_POINTS = 14, 14
+"""Balloons computed each way."""
+P0 = 0.3
+"""Pressure in kPa below which the spline's pieces are alike in pressure, above alike in ratio."""
+ABOVE = 1.15
+"""How far the map goes on above the highest free balloon, as a share of it."""
+FLATTEST = 0.01
+"""Least height in mm that is computed; what lies below is carried on."""
+MOST_STRETCH = 0.15
+"""Share by which films may stretch; one modulus is unlikely to hold beyond."""
+
+
+def _pieces() -> Array:
+    """Polynomials of the uniform B-spline: row j is that of coefficient j, in powers of u."""
+    rows = np.ones((1, 1))
+    for degree in range(1, DEGREE + 1):
+        wider = np.zeros((degree + 1, degree + 1))
+        for j, row in enumerate(rows):
+            # Cox-de Boor: basis j counts from degree - 1 - j pieces before u.
+            start = degree - 1 - j
+            rising = np.convolve(row, [start, 1.0]) / degree
+            falling = np.convolve(row, [degree - start, -1.0]) / degree
+            wider[j + 1] += rising[: degree + 1]
+            wider[j] += falling[: degree + 1]
+        rows = wider
+    return rows
+
+
+PIECES = _pieces()
+SLOPES = np.stack([PIECES[:, k] * k for k in range(1, DEGREE + 1)], -1)
+CURVES = np.stack([SLOPES[:, k] * k for k in range(1, DEGREE)], -1)
+
+
+def basis(x: Array, order: int = 0) -> tuple[NDArray[np.int_], Array]:
+    """Where the piece at ``x`` (in pieces) begins among the coefficients, and their weights there:
+    of the value, or of its first or second derivative.
+    """
+    first = x.astype(np.int_)
+    table = (PIECES, SLOPES, CURVES)[order]
+    u = x - first
+    powers = u[..., None] ** np.arange(table.shape[1])
+    return first, powers @ table.T
+
+
+@dataclass(frozen=True, eq=False)
+class BalloonMap:
+    """The map of one balloon from no pressure to ``most_pressure`` kPa and from flat to
+    ``most_height`` mm; ``coefficients`` are those of the potential.
+    """
+
+    balloon: Balloon
+    most_pressure: float
+    most_height: float
+    coefficients: Array
+
+    @cached_property
+    def spans(self) -> float:
+        """Pieces of the spline a mm of height."""
+        return HEIGHT_SPANS / self.most_height
+
+    def pressed(self, pressure: ArrayLike) -> tuple[Array, Array]:
+        """Coefficients by height of W and of -dW/dp (the volume) at pressures, a row each.
+
+        Raises DesignError for a pressure outside the map.
+        """
+        p = np.asarray(pressure, dtype=float)
+        if not ((p >= 0) & (p <= self.most_pressure)).all():
+            raise DesignError(
+                f"a pressure of {float(p.max()):g} kPa is outside the balloon's map; give 0 to "
+                f"{self.most_pressure:g} kPa"
+            )
+        x, rate = self._scaled(p)
+        first, weights = basis(x)
+        slopes = basis(x, 1)[1] * -rate[..., None]
+        rows = self.coefficients[first[..., None] + np.arange(DEGREE + 1)]
+        return (
+            np.einsum("...i,...ij->...j", weights, rows),
+            np.einsum("...i,...ij->...j", slopes, rows),
+        )
+
+    def _scaled(self, p: Array) -> tuple[Array, Array]:
+        """Place among the pieces in pressure, and its rate by pressure."""
+        each = PRESSURE_SPANS / math.asinh(self.most_pressure / P0)
+        x = np.minimum(np.arcsinh(p / P0) * each, PRESSURE_SPANS * (1 - 1e-12))
+        return x, each / np.hypot(p, P0)
+
+    def force(self, pressure: ArrayLike, height: ArrayLike) -> Array:
+        """MN on the plate at either end; below 0 where the balloon is pulled on."""
+        return -self._along(0, pressure, height).first * self.spans
+
+    def volume(self, pressure: ArrayLike, height: ArrayLike) -> Array:
+        """Ul in the balloon."""
+        return self._along(1, pressure, height).value
+
+    def potential(self, pressure: ArrayLike, height: ArrayLike) -> Array:
+        """uJ: energy of the films less pressure times volume."""
+        return self._along(0, pressure, height).value
+
+    def _along(self, which: int, pressure: ArrayLike, height: ArrayLike) -> Along:
+        p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
+        found = pieces(self.pressed(p)[which]).reshape(-1, DEGREE + 1)
+        return along(found, HEIGHT_SPANS * np.arange(p.size).reshape(p.shape), h * self.spans)
+
+    def free_height(self, pressure: ArrayLike) -> Array:
+        """Mm to which it rises where nothing holds it."""
+        p = np.asarray(pressure, float)
+        low, high = np.zeros(p.shape), np.full(p.shape, self.most_height)
+        for _ in range(50):
+            middle = (low + high) / 2
+            pushes = self.force(p, middle) > 0
+            low, high = np.where(pushes, middle, low), np.where(pushes, high, middle)
+        return np.asarray((low + high) / 2)
+
+
+class Along(NamedTuple):
+    """Value, first and second derivative of splines, by pieces."""
+
+    value: Array
+    first: Array
+    second: Array
+
+
+def pieces(coefficients: Array) -> Array:
+    """Polynomials of splines: (..., coefficients) become (..., pieces, powers)."""
+    windows = np.lib.stride_tricks.sliding_window_view(coefficients, DEGREE + 1, axis=-1)
+    return np.asarray(windows @ PIECES)
+
+
+def along(polynomials: Array, which: NDArray[np.int_], y: Array) -> Along:
+    """Splines at places ``y``, in pieces.
+
+    ``polynomials`` (rows, powers) holds the pieces of all splines; ``which`` says at which row each
+    one begins. Outside its ends it goes on with the second derivative that it has there.
+    """
+    inside = np.minimum(np.maximum(y, 0.0), HEIGHT_SPANS - 1e-9)
+    first = inside.astype(np.int_)
+    u = inside - first
+    c0, c1, c2, c3, c4, c5 = polynomials[which + first].T
+    value = c0.T + u * (c1.T + u * (c2.T + u * (c3.T + u * (c4.T + u * c5.T))))
+    slope = c1.T + u * (2 * c2.T + u * (3 * c3.T + u * (4 * c4.T + u * 5 * c5.T)))
+    curve = 2 * c2.T + u * (6 * c3.T + u * (12 * c4.T + u * 20 * c5.T))
+    beyond = y - inside
+    if beyond.any():
+        value, slope = value + beyond * (slope + beyond * curve / 2), slope + beyond * curve
+    return Along(value, slope, curve)
+
+
+@lru_cache(maxsize=64)
+def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
+    """The map of a balloon from 0 to a pressure in kPa, and somewhat higher than it may rise."""
+    top = ABOVE * highest(balloon, most_pressure)
+    p = P0 * np.sinh(_spread(PRESSURE_POINTS) * math.asinh(most_pressure / P0))
+    h = FLATTEST + (top - FLATTEST) * _spread(HEIGHT_POINTS)
+    pressures, heights = (grid.ravel() for grid in np.meshgrid(p, h))
+    found = inflate(balloon, pressures, heights, tied=True)
+    return BalloonMap(
+        balloon, most_pressure, top, _fitted(pressures, heights, found, most_pressure, top)
+    )
+
+
+def highest(balloon: Balloon, most_pressure: float) -> float:
+    """Height in mm to which it may rise freely: at a pressure, or where its films stretch most."""
+    pressures = np.linspace(most_pressure / 8, most_pressure, 8)
+    free = inflate(balloon, pressures)
+    longer = stretch(balloon, free)
+    return float(np.interp(MOST_STRETCH, longer, free.height))
+
+
+def _spread(count: int) -> Array:
+    """Points from 0 to 1, closer at the ends."""
+    even = np.linspace(0, 1, count)
+    return (even + (1 - np.cos(math.pi * even)) / 2) / 2
+
+
+def _fitted(p: Array, h: Array, found: Shapes, most: float, top: float) -> Array:
+    """Coefficients of the potential: least squares of W, the force and the volume."""
+    blank = np.zeros((PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE))
+    x, rate = BalloonMap(Balloon(), most, top, blank)._scaled(p)
+    y = np.minimum(h * HEIGHT_SPANS / top, HEIGHT_SPANS * (1 - 1e-12))
+    by_p = [_rows(x, order, blank.shape[0]) for order in (0, 1)]
+    by_h = [_rows(y, order, blank.shape[1]) for order in (0, 1)]
+
+    def equations(i: int, j: int, scale: Array) -> Array:
+        return np.asarray((by_p[i][:, :, None] * by_h[j][:, None, :]).reshape(len(p), -1) * scale)
+
+    area = found.r[:, -1].max() ** 2 * math.pi
+    push = 1 / (area * (p + 0.5) + 3 * np.abs(found.force))
+    room = 2 / (area * top + 3 * np.abs(found.force) / (p + 1.0))
+    potential = found.energy - p * found.volume
+    scale = push / top
+    matrix = np.concatenate(
+        [
+            equations(0, 0, scale[:, None]),
+            equations(0, 1, (-push * HEIGHT_SPANS / top)[:, None]),
+            equations(1, 0, (-rate * room)[:, None]),
+        ]
+    )
+    wanted = np.concatenate([potential * scale, found.force * push, found.volume * room])
+    best = np.linalg.lstsq(matrix, wanted, rcond=None)[0]
+    return np.asarray(best.reshape(blank.shape))
+
+
+def _rows(x: Array, order: int, count: int) -> Array:
+    first, weights = basis(x, order)
+    rows = np.zeros((len(x), count))
+    np.put_along_axis(rows, first[:, None] + np.arange(DEGREE + 1), weights, 1)
+    return rows
+
+
+def stretch(kind: Balloon, shape: Shapes) -> Array:
+    """By what share the film between neck and rim is longer than it was flat."""
+    part = slice(kind.held, kind.edge + 1)
+    lengths = np.hypot(np.diff(shape.r[:, part]), np.diff(shape.z[:, part]))
+    return np.asarray(lengths.sum(-1) / (kind.pocket - kind.neck) - 1)

@@ -1,0 +1,197 @@
+"""The balloons of a design as files for other programs: CSV, JSON, and Python that needs nothing.
+
+Pressures kPa, heights mm (what a balloon has risen by), forces mN, volumes ul, potentials uJ.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sbafab.models.balloon_map import DEGREE, HEIGHT_SPANS, P0, PIECES, PRESSURE_SPANS
+
+if TYPE_CHECKING:
+    from sbafab.models.balloon_map import BalloonMap
+    from sbafab.models.film_elements import Array
+    from sbafab.models.stack import Stack
+
+SCHEMA = "sbafab/balloon-map@1"
+POINTS = 31
+COLUMNS = ("balloon", "pressure_kpa", "height_mm", "force_mn", "volume_ul", "potential_uj")
+FORMATS = ("csv", "json", "py")
+
+
+def map_text(name: str, stack: Stack, form: str, points: int = POINTS) -> str:
+    """The text of a file of one of FORMATS."""
+    if form == "py":
+        return _python(name, stack)
+    if form == "json":
+        return json.dumps(_record(name, stack, points), indent=1) + "\n"
+    return _csv(stack, points)
+
+
+def _grid(one: BalloonMap, points: int) -> tuple[Array, Array]:
+    """Pressures, closer together where they are low, and heights."""
+    even = np.linspace(0.0, 1.0, points)
+    pressures = one.most_pressure * even**2
+    return pressures, one.most_height * even
+
+
+def _csv(stack: Stack, points: int) -> str:
+    lines = [",".join(COLUMNS)]
+    for number, one in enumerate(stack.maps, start=1):
+        pressures, heights = _grid(one, points)
+        p, h = (grid.ravel() for grid in np.meshgrid(pressures, heights, indexing="ij"))
+        columns = (p, h, one.force(p, h), one.volume(p, h), one.potential(p, h))
+        for row in zip(*(column.tolist() for column in columns), strict=True):
+            lines.append(",".join([str(number), *(f"{value:.7g}" for value in row)]))
+    return "\n".join(lines) + "\n"
+
+
+def _record(name: str, stack: Stack, points: int) -> dict[str, Any]:
+    return {
+        "schema": SCHEMA,
+        "design": name,
+        "units": {"pressure": "kPa", "height": "mm", "force": "mN", "volume": "ul"},
+        "levels": [int(kind) + 1 for kind in stack.levels],
+        "flat_level_mm": _short(stack.pitch),
+        "chamber_axes_mm": [[_short(x) for x in axis] for axis in stack.axes.tolist()],
+        "balloons": [_balloon(one, points) for one in stack.maps],
+    }
+
+
+def _balloon(one: BalloonMap, points: int) -> dict[str, Any]:
+    pressures, heights = _grid(one, points)
+    p, h = np.meshgrid(pressures, heights, indexing="ij")
+    return {
+        **_drawn(one),
+        "pressure": [_short(value) for value in pressures.tolist()],
+        "height": [_short(value) for value in heights.tolist()],
+        "force": _rows(one.force(p, h)),
+        "volume": _rows(one.volume(p, h)),
+        "potential": _rows(one.potential(p, h)),
+    }
+
+
+def _drawn(one: BalloonMap) -> dict[str, float]:
+    film = one.balloon
+    return {
+        "pocket_radius_mm": film.pocket,
+        "neck_radius_mm": film.neck,
+        "bore_radius_mm": film.bore,
+        "film_mm": film.thickness,
+        "modulus_kpa": film.modulus,
+        "poisson": film.poisson,
+    }
+
+
+def _rows(values: Array) -> list[list[float]]:
+    return [[_short(value) for value in row] for row in values.tolist()]
+
+
+def _short(value: float) -> float:
+    """Seven digits."""
+    return float(f"{value:.7g}")
+
+
+PYTHON = '''"""The balloons of {name}, as sbafab maps them. Plain Python, no imports but math.
+
+force(p, h), volume(p, h), stiffness(p, h) of one balloon at a pressure p (kPa) and a height h (mm,
+what it has risen by): mN on the plates, ul, mN/mm. Below 0 the plates pull. All three come from one
+potential W, so force = -dW/dh, volume = -dW/dp and dvolume/dh = dforce/dp. balloon is one of
+BALLOONS; LEVELS says which one each level of a chamber has, bottom to top.
+"""
+
+import math
+
+LEVELS = {levels}
+FLAT_LEVEL = {pitch}  # mm, to be added to a balloon's height for that of its level
+CHAMBER_AXES = {axes}  # mm
+P0, SPANS_P, SPANS_H = {p0}, {spans_p}, {spans_h}
+PIECES = {pieces}
+BALLOONS = {balloons}
+
+
+def _weights(u, order):
+    found = []
+    for row in PIECES:
+        coefficients = list(row)
+        for _ in range(order):
+            coefficients = [k * c for k, c in enumerate(coefficients)][1:]
+        value = 0.0
+        for c in reversed(coefficients):
+            value = value * u + c
+        found.append(value)
+    return found
+
+
+def _spline(balloon, p, h, by_p, by_h):
+    b = BALLOONS[balloon]
+    if not (0.0 <= p <= b["most_pressure"] and 0.0 <= h <= b["most_height"]):
+        raise ValueError(
+            "outside the map: give 0 to %g kPa and 0 to %g mm" % (b["most_pressure"], b["most_height"])
+        )
+    each = SPANS_P / math.asinh(b["most_pressure"] / P0)
+    x = min(math.asinh(p / P0) * each, SPANS_P * (1 - 1e-12))
+    y = min(h * SPANS_H / b["most_height"], SPANS_H * (1 - 1e-12))
+    i, j = int(x), int(y)
+    across, along = _weights(x - i, by_p), _weights(y - j, by_h)
+    rate = (each / math.hypot(p, P0)) ** by_p * (SPANS_H / b["most_height"]) ** by_h
+    rows = b["coefficients"][i : i + {count}]
+    return rate * sum(
+        a * sum(w * c for w, c in zip(along, row[j : j + {count}])) for a, row in zip(across, rows)
+    )
+
+
+def potential(p, h, balloon=0):
+    """uJ: energy of the films less pressure times volume."""
+    return _spline(balloon, p, h, 0, 0)
+
+
+def force(p, h, balloon=0):
+    """mN on the plate at either end."""
+    return -_spline(balloon, p, h, 0, 1)
+
+
+def volume(p, h, balloon=0):
+    """ul in the balloon."""
+    return -_spline(balloon, p, h, 1, 0)
+
+
+def stiffness(p, h, balloon=0):
+    """mN/mm by which the force falls with the height."""
+    return _spline(balloon, p, h, 0, 2)
+
+
+def area(p, h, balloon=0):
+    """mm2: dvolume/dheight at a pressure, the effective area of the balloon."""
+    return -_spline(balloon, p, h, 1, 1)
+'''
+
+
+def _python(name: str, stack: Stack) -> str:
+    balloons = [
+        {
+            **_drawn(one),
+            "most_pressure": one.most_pressure,
+            "most_height": one.most_height,
+            "coefficients": [
+                [float(f"{c:.10g}") for c in row] for row in one.coefficients.tolist()
+            ],
+        }
+        for one in stack.maps
+    ]
+    return PYTHON.format(
+        name=name,
+        levels=stack.levels.tolist(),
+        pitch=_short(stack.pitch),
+        axes=[[_short(x) for x in axis] for axis in stack.axes.tolist()],
+        p0=P0,
+        spans_p=PRESSURE_SPANS,
+        spans_h=HEIGHT_SPANS,
+        pieces=PIECES.tolist(),
+        balloons=balloons,
+        count=DEGREE + 1,
+    )

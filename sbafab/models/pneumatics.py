@@ -1,0 +1,96 @@
+"""What feeds a chamber: fluid, tube, valve and pump (paper, Sec. 4.5 and 7).
+
+Flow through the tube is laminar (Poiseuille) or, where that is less, turbulent in a smooth tube
+(Blasius). A gas is isothermal: pressures squared take the place of pressures, and its volumes are
+counted at the atmosphere. Pressures kPa above the atmosphere, volumes ul, lengths mm, times s.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from sbafab.errors import DesignError
+from sbafab.models.flow import ATMOSPHERE_KPA
+
+TUBE_DIAMETER = 0.635
+"""Inner diameter of Braintree RPT040 in mm (paper, Sec. 2)."""
+TUBE_LENGTH = 150.0
+"""mm; ours, the paper gives none."""
+
+
+@dataclass(frozen=True)
+class Fluid:
+    """Viscosity in kPa s, density in kg/mm3 x 1e-9 (kg/m3), at 20 C, and whether it is a gas."""
+
+    name: str
+    viscosity: float
+    density: float
+    is_gas: bool
+
+
+WATER = Fluid("water", 1.002e-6, 998.0, False)
+AIR = Fluid("air", 1.82e-8, 1.204, True)
+FLUIDS = {"water": WATER, "air": AIR}
+
+
+@dataclass(frozen=True)
+class Line:
+    """The line to each chamber.
+
+    ``length`` and ``diameter`` of its tube; ``dead_volume`` ul between pump and tube (syringe,
+    valve, fittings), where a gas is squeezed before it flows; ``delay`` s until valve or pump act.
+    """
+
+    fluid: Fluid = AIR
+    length: float = TUBE_LENGTH
+    diameter: float = TUBE_DIAMETER
+    dead_volume: float = 0.0
+    delay: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value, least in (
+            ("length", self.length, 1e-3),
+            ("diameter", self.diameter, 1e-3),
+            ("dead_volume", self.dead_volume, 0.0),
+            ("delay", self.delay, 0.0),
+        ):
+            if not (math.isfinite(value) and value >= least):
+                raise DesignError(f"line {name} = {value:g} must be at least {least:g}")
+
+    @property
+    def tube_volume(self) -> float:
+        """Ul in the tube."""
+        return math.pi * self.diameter**2 / 4 * self.length
+
+    def flow(self, source: float, chamber: float) -> float:
+        """ul/s from a pressure at the pump to one in the chamber; a gas at the atmosphere."""
+        drop = self._drop(source, chamber)
+        head = abs(drop)
+        laminar = head * math.pi * self.diameter**4 / (128 * self.fluid.viscosity * self.length)
+        # Blasius: drop = 0.316 Re^-1/4 (length / diameter) density speed^2 / 2, in kPa and mm.
+        dense = self.fluid.density * 1e-9
+        friction = 0.316 * self.length * dense**0.75 * self.fluid.viscosity**0.25
+        speed = (2 * head * self.diameter**1.25 / friction) ** (1 / 1.75)
+        turbulent = speed * math.pi * self.diameter**2 / 4
+        return math.copysign(min(laminar, turbulent), drop)
+
+    def source_pressure(self, flow: float, chamber: float) -> float:
+        """Pressure at the pump that drives a flow into a chamber."""
+        low, high = chamber, chamber + 1.0
+        while self.flow(high, chamber) < flow:
+            high = chamber + 2 * (high - chamber)
+        for _ in range(60):
+            middle = (low + high) / 2
+            low, high = (middle, high) if self.flow(middle, chamber) < flow else (low, middle)
+        return (low + high) / 2
+
+    def _drop(self, source: float, chamber: float) -> float:
+        if not self.fluid.is_gas:
+            return source - chamber
+        up, down = source + ATMOSPHERE_KPA, chamber + ATMOSPHERE_KPA
+        return (up * up - down * down) / (2 * ATMOSPHERE_KPA)
+
+    def content(self, volume: float, pressure: float) -> float:
+        """How much fluid a volume holds: ul, of a gas at the atmosphere."""
+        return volume * (1 + pressure / ATMOSPHERE_KPA) if self.fluid.is_gas else volume

@@ -1,0 +1,332 @@
+"""A whole actuator in real time: plates joined by balloons, in balance with what acts on it.
+
+Plates are the planes between balloons. Two neighbours are joined by one balloon a chamber: it
+lengthens and tilts, and carries no shear ("a 2-DoF spring joint", paper, Sec. 4.4). A tilted
+balloon is taken to push at six points of a ring, each as hard as the axisymmetric balloon does at
+the gap there; between rigid plates that touch the film in a disc the ring's radius would be the
+disc's, and it is taken midway between neck and pocket. Flat balloons do not sink into each other.
+Balance is the least of one energy, found by Newton's method. Levels of alike balloons without a
+load are alike and found once. Lengths mm, pressures kPa, volumes ul; forces mN inside, N outside.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sbafab.errors import DesignError
+from sbafab.models.balloon_map import (
+    DEGREE,
+    HEIGHT_SPANS,
+    BalloonMap,
+    balloon_map,
+    pieces,
+)
+from sbafab.models.chain import Chain, chain
+from sbafab.models.stack_balance import Load, Springs, free, held
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sbafab.design.records import Design
+    from sbafab.laminate.laminate import Laminate
+    from sbafab.models.figures import Factors
+    from sbafab.models.film_elements import Array
+    from sbafab.models.motion import Motion
+    from sbafab.models.pneumatics import Line
+
+RING = 6
+"""Points of each balloon at which its gap is looked at."""
+MOST_PRESSURE = 110.0
+"""kPa to which maps are made unless more is asked for."""
+GRAVITY = 9.80665
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Plate:
+    """An outer plate that the tip may push on: through ``point`` (mm), ``normal`` pointing away.
+
+    ``Plate.at(height)`` lies level. The middle of the tip ``sticks`` to the line through the point
+    along the normal, as rubbing holds it, or slides along the plate.
+    """
+
+    point: tuple[float, float, float]
+    normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    sticks: bool = True
+
+    @classmethod
+    def at(cls, height: float) -> Plate:
+        return cls((0.0, 0.0, height))
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """A stack in balance.
+
+    ``freedoms`` (levels, 3) are rise in mm and tilt in rad of each level; ``gaps`` (levels,
+    chambers) by how many mm each balloon has risen at its own centre; ``volumes`` ul a chamber;
+    ``force`` N on the outer plate; ``energy`` uJ stored in the films. Where
+    it is not ``stable`` it stands as a straight column does that would rather buckle.
+    """
+
+    pressures: tuple[float, ...]
+    freedoms: Array
+    gaps: Array
+    volumes: Array
+    force: float
+    energy: float
+    stable: bool
+    pitch: float
+
+    @cached_property
+    def _chain(self) -> Chain:
+        return chain(self.freedoms, self.pitch)
+
+    @property
+    def frames(self) -> tuple[Array, Array]:
+        """Origins (n, 3) in mm and axes (n, 3, 3) of the plates, the base first; the columns of
+        ``axes[i]`` are the x, y and z of plate i.
+        """
+        return self._chain.places, self._chain.axes
+
+    @property
+    def tip(self) -> Array:
+        """Middle of the top plate (3,) in mm."""
+        return np.asarray(self._chain.places[-1])
+
+    @property
+    def height(self) -> float:
+        """Height of the middle of the top plate above the base, mm."""
+        return float(self.tip[2])
+
+    @property
+    def bend(self) -> float:
+        """Degrees from base to top; along the stack, so that it may be more than half a turn."""
+        return math.degrees(math.hypot(*self.freedoms[:, 1:].sum(0)))
+
+    @property
+    def direction(self) -> float:
+        """Degrees round the base, from x, towards which it bends; 0 where it stands straight."""
+        x, y = self.freedoms[:, 1:].sum(0)
+        return math.degrees(math.atan2(-x, y)) if math.hypot(x, y) > 1e-9 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """Levels of balloons, bottom to top.
+
+    ``maps`` are those of the unlike balloons, ``levels`` which of them each level has; ``axes``
+    (chambers, 2) where the chambers stand, ``pitch`` the height of a flat level and ``outline`` the
+    radius of the plates, in mm; ``weight`` mN of each level.
+    """
+
+    maps: tuple[BalloonMap, ...]
+    levels: NDArray[np.int_]
+    axes: Array
+    pitch: float
+    outline: float
+    weight: float = 0.0
+    _springs: dict[tuple[float, ...], Springs] = field(default_factory=dict, repr=False)
+
+    @property
+    def chambers(self) -> int:
+        return len(self.axes)
+
+    @property
+    def flat_height(self) -> float:
+        """Height in mm of all levels when flat."""
+        return self.pitch * len(self.levels)
+
+    @cached_property
+    def _centres(self) -> Array:
+        """Gap at each chamber's middle, by rise and tilt: (3, chambers)."""
+        x, y = self.axes.T
+        return np.stack([np.ones_like(x), y, -x])
+
+    @cached_property
+    def _gap_of(self) -> Array:
+        """Gap at each point of each balloon's ring, by rise and tilt: (chambers x points, 3)."""
+        turn = np.arange(RING) * math.tau / RING
+        ring = np.stack([np.cos(turn), np.sin(turn)], -1)
+        found = []
+        for one in self.maps:
+            across = (one.balloon.neck + one.balloon.pocket) / 2
+            x, y = (self.axes[:, None] + across * ring).reshape(-1, 2).T
+            found.append(np.stack([np.ones_like(x), y, -x], -1))
+        return np.stack(found)
+
+    def springs(self, pressures: Sequence[float]) -> Springs:
+        """What the levels do at pressures, one a chamber. Raises DesignError."""
+        asked = tuple(float(p) for p in pressures)
+        if len(asked) != self.chambers:
+            raise DesignError(
+                f"{len(asked)} pressures are given for {self.chambers} chambers; give one a chamber"
+            )
+        rows = [one.pressed(np.array(asked)) for one in self.maps]
+        found = pieces(np.array(rows).transpose(1, 0, 2, 3)).reshape(2, -1, DEGREE + 1)
+        return Springs(found[0], found[1], *self._rows)
+
+    @cached_property
+    def _rows(self) -> tuple[NDArray[np.int_], Array, Array, Array, int]:
+        """What springs hold beside their polynomials."""
+        count = len(self.maps) * self.chambers
+        begins = np.arange(count).reshape(len(self.maps), -1) * HEIGHT_SPANS
+        spans = np.array([[one.spans] for one in self.maps])
+        top = np.array([one.most_height for one in self.maps])
+        return np.repeat(begins, RING, axis=1), self._gap_of, spans, top, RING
+
+    def pose(
+        self,
+        pressures: Sequence[float],
+        tip_load: Sequence[float] = (0.0, 0.0, 0.0),
+        gravity: bool | Sequence[float] = False,
+        plate: float | Plate | None = None,
+        near: Pose | None = None,
+    ) -> Pose:
+        """The pose at pressures (kPa, one a chamber), in balance.
+
+        ``tip_load`` is a force in N on the middle of the top; ``gravity`` is True where the base
+        lies level, or the direction (3) of down; ``plate`` an outer plate, or its height in mm.
+        ``near`` is a pose to start from, such as the last one of a motion. Raises DesignError for
+        pressures outside the maps, and where no balance is found.
+        """
+        springs = self.springs(pressures)
+        load = self._load(tip_load, gravity, plate)
+        if load is None:
+            start = None if near is None else near.freedoms[self._first]
+            kinds = free(springs, start)
+            return self._pose(pressures, springs, kinds[self.levels], kinds)
+        start = near.freedoms if near is not None else free(springs, None)[self.levels]
+        found, push, stable = held(springs, self.levels, self.pitch, load, start)
+        return self._pose(pressures, springs, found, None, push / 1000, stable)
+
+    def motion(
+        self, pressures: Sequence[float] | None = None, line: Line | None = None, **load: Any
+    ) -> Motion:
+        """A motion that starts at pressures (kPa, by default 0); ``line`` feeds each chamber, and
+        ``load`` is what ``pose`` takes beside pressures.
+        """
+        from sbafab.models.motion import Motion
+        from sbafab.models.pneumatics import Line
+
+        start = self.pose(pressures or (0.0,) * self.chambers, **load)
+        return Motion(self, line or Line(), load, start)
+
+    @cached_property
+    def most_pressure(self) -> float:
+        """How far its maps go, in kPa."""
+        return min(one.most_pressure for one in self.maps)
+
+    @cached_property
+    def _first(self) -> NDArray[np.int_]:
+        """The first level with each of the unlike balloons."""
+        return np.array([int(np.argmax(self.levels == kind)) for kind in range(len(self.maps))])
+
+    def _load(
+        self,
+        tip_load: Sequence[float],
+        gravity: bool | Sequence[float],
+        plate: float | Plate | None,
+    ) -> Load | None:
+        force = 1000 * np.asarray(tip_load, dtype=float)
+        if force.shape != (3,) or not np.isfinite(force).all():
+            raise DesignError("tip_load must be three finite numbers in N, such as (0, 0, -0.1)")
+        down = np.zeros(3)
+        if not isinstance(gravity, bool):
+            down = np.asarray(gravity, dtype=float) / np.linalg.norm(gravity)
+        elif gravity:
+            down = np.array([0.0, 0.0, -1.0])
+        if not force.any() and not down.any() and plate is None:
+            return None
+        wall = plate if isinstance(plate, Plate) or plate is None else Plate.at(float(plate))
+        if wall is None:
+            return Load(force, down * self.weight, None, UP, False, self.outline)
+        point, normal = np.asarray(wall.point, float), np.asarray(wall.normal, float)
+        normal = normal / np.linalg.norm(normal)
+        if normal[2] > 1 - 1e-9 and point[2] < self.flat_height - 1e-9:
+            raise DesignError(
+                f"a plate {point[2]:g} mm high is lower than the flat stack; give at least "
+                f"{self.flat_height:.4g} mm"
+            )
+        return Load(force, down * self.weight, point, normal, wall.sticks, self.outline)
+
+    def _pose(
+        self,
+        pressures: Sequence[float],
+        springs: Springs,
+        found: Array,
+        kinds: Array | None = None,
+        force: float = 0.0,
+        stable: bool = True,
+    ) -> Pose:
+        """The record of a pose; ``kinds`` are its freedoms by kind of balloon where levels of one
+        kind are alike.
+        """
+        gaps = found @ self._centres
+        top = springs.top[self.levels]
+        highest = float((gaps - top[:, None]).max())
+        if highest > 0:
+            raise DesignError(
+                "a balloon would rise higher than its films can be stretched "
+                f"({highest:.2g} mm above {float(top.min()):.3g} mm); give less pressure or load"
+            )
+        if kinds is None:
+            volumes, energies = springs.of(self.levels).contents(found)
+        else:
+            each, stored = springs.contents(kinds)
+            volumes, energies = each[self.levels], stored[self.levels]
+        volumes, energy = volumes.sum(0), float(energies.sum())
+        p = np.asarray(pressures, dtype=float)
+        return Pose(
+            tuple(p.tolist()),
+            found,
+            gaps,
+            volumes,
+            force,
+            energy + float(p @ volumes),
+            stable,
+            self.pitch,
+        )
+
+
+def stack(
+    design: Design,
+    laminate: Laminate | None = None,
+    most_pressure: float = MOST_PRESSURE,
+    factors: Factors | None = None,
+) -> Stack:
+    """The stack of a design with round pockets on one axis or side by side.
+
+    ``most_pressure`` in kPa is what maps are made to. ``factors`` are measured ones. Raises
+    DesignError for pockets of another shape, for actuators round a tube and for films of unknown
+    modulus.
+    """
+    from sbafab.actuators import build
+    from sbafab.models.balloons import balloons_of
+
+    flat = laminate or build(design)
+    row = balloons_of(design, flat, factors)
+    press = 1.0 if factors is None else factors.press_factor
+    kinds = list(dict.fromkeys(row))
+    axes = np.array([chamber.centres[0] for chamber in flat.chambers])
+    if len(axes) == 1:
+        axes = np.zeros((1, 2))
+    reach = float(np.hypot(*axes.T).max()) + max(one.pocket + one.ring for one in row)
+    grams = sum(
+        layer.profile.area * layer.film.thickness * layer.film.density * 1e-6
+        for layer in flat.layers
+    )
+    return Stack(
+        tuple(balloon_map(kind, most_pressure) for kind in kinds),
+        np.array([kinds.index(one) for one in row]),
+        axes,
+        flat.thickness * press / len(row),
+        reach,
+        grams * GRAVITY / len(row),
+    )

@@ -1,0 +1,253 @@
+"""What the stack of elastic balloons says of a design: forces, bending, time, stiffness."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sbafab.errors import DesignError
+from sbafab.models import paper
+from sbafab.models.actuator import Actuator
+from sbafab.models.elastic import calibrated
+from sbafab.models.figures import Asked, Figure, LeftOut, Model, Relation, Trace
+from sbafab.models.motion import Motion
+from sbafab.models.pneumatics import AIR, TUBE_LENGTH, WATER, Fluid, Line
+from sbafab.models.series import blocked
+from sbafab.models.stack import MOST_PRESSURE, Plate, Pose, Stack, stack
+
+if TYPE_CHECKING:
+    from sbafab.models.film_elements import Array
+
+SAMPLES = 21
+SHARES = (0.0, 0.25, 0.75)
+ANGLES = (30.0, 60.0, 90.0)
+SLIGHT = 1e-5
+"""N on the tip by which its stiffness is found."""
+SOURCE = "membrane of revolution between plates, the film's modulus"
+FORCE = Model(
+    "elastic stack",
+    SOURCE,
+    "no shear between plates; films of constant modulus to 100 kPa. The paper's 3-DoF at 100 kPa "
+    "has 0.9, 0.8 and 0.6 of it, its 1-DoF less",
+)
+BEND = Model(
+    "elastic stack",
+    SOURCE,
+    "rigid plates that tilt, balloons that push by the gap at their ring: at 5 kPa within 2 deg "
+    "(one chamber, SOFA 117, two, 80 to 92) to 12 of shells in SOFA; the paper's largest is "
+    "81 +- 6 deg at a pressure that it does not give",
+)
+TIME = Model(
+    "elastic stack in time",
+    f"Poiseuille or Blasius in {TUBE_LENGTH:g} mm of tube to each chamber",
+    "the paper gives no length, and this one makes its 0.92 s come out; the sensor is taken to sit "
+    "at the pump; no lag of valve and pump",
+)
+SHUT = Model(
+    "elastic stack, chambers shut",
+    SOURCE,
+    "the air that is in the chambers stays in, tubes left out; no shear between plates",
+)
+
+
+def stacked(one: Actuator, asked: Asked) -> Stack | LeftOut | None:
+    """The stack of an actuator with round pockets, or why there is none."""
+    if not one.radii:
+        return None
+    most = max(MOST_PRESSURE, *asked.pressures_kpa, 0.0)
+    try:
+        return stack(one.design, one.laminate, most, asked.calibration)
+    except DesignError as error:
+        return LeftOut("elastic stack", str(error))
+
+
+def figures(one: Actuator, asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
+    """Forces, bending, times and stiffness of the stack."""
+    yield from _forces(one, asked, found)
+    if one.form.is_parallel:
+        yield from _bends(asked, found)
+        yield from _bent_forces(asked, found)
+    yield from _times(asked, found)
+    yield from _stiffness(asked, found)
+
+
+def stroke_at(one: Actuator, share: float) -> float:
+    """Stroke in mm at a share of the way from the flat to the paper's full height."""
+    return max(share * (one.full_height - one.thickness), 0.0)
+
+
+def _forces(one: Actuator, asked: Asked, found: Stack) -> Iterator[Figure]:
+    model = calibrated(FORCE, asked.calibration)
+    for pressure in asked.pressures_kpa:
+        for share in SHARES:
+            at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
+            value = one.form.pushing * float(blocked(found, pressure, stroke_at(one, share)))
+            name = f"blocked force at {pressure:g} kPa, {at}"
+            yield Figure("force", name, value, "N", model)
+
+
+def _some(found: Stack, chambers: int, pressure: float) -> tuple[float, ...]:
+    return (pressure,) * chambers + (0.0,) * (found.chambers - chambers)
+
+
+def _chambers(number: int) -> str:
+    return "one chamber" if number == 1 else f"{number} chambers"
+
+
+def _bends(asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
+    model = calibrated(BEND, asked.calibration)
+    for pressure in asked.pressures_kpa:
+        for chambers in range(1, found.chambers):
+            name = f"bend at {pressure:g} kPa in {_chambers(chambers)}, the others empty"
+            try:
+                pose = found.pose(_some(found, chambers, pressure))
+            except DesignError as error:
+                yield LeftOut(name, str(error))
+                continue
+            yield Figure("bending", name, pose.bend, "deg", model)
+
+
+def bent(found: Stack, chambers: int, angle: float) -> Pose | None:
+    """The pose in which some chambers, the others empty, bend it by so many degrees."""
+    low, high = 1e-4, found.most_pressure
+    pose = None
+    for _ in range(40):
+        middle = math.sqrt(low * high)
+        try:
+            pose = found.pose(_some(found, chambers, middle))
+        except DesignError:
+            high = middle
+            continue
+        if abs(pose.bend - angle) < 1e-3:
+            break
+        low, high = (middle, high) if pose.bend < angle else (low, middle)
+    return pose if pose is not None and abs(pose.bend - angle) < 0.01 else None
+
+
+def _bent_forces(asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
+    """Force on a plate that lies square on the bent tip, as those chambers are pressed harder."""
+    if not asked.pressures_kpa:
+        return
+    model = calibrated(FORCE, asked.calibration)
+    pressure = max(asked.pressures_kpa)
+    for chambers in range(1, min(found.chambers, 3)):
+        for angle in ANGLES:
+            name = f"force at {pressure:g} kPa in {_chambers(chambers)}, bent by {angle:g} deg"
+            pose = bent(found, chambers, angle)
+            if pose is None or pose.pressures[0] > pressure:
+                yield LeftOut(name, "it does not bend so far")
+                continue
+            plate = Plate(_three(pose.tip), _three(pose.frames[1][-1][:, 2]))
+            try:
+                held = found.pose(_some(found, chambers, pressure), plate=plate, near=pose)
+            except DesignError as error:
+                yield LeftOut(name, str(error))
+                continue
+            yield Figure("force", name, held.force, "N", model)
+
+
+def _three(values: Array) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return (x, y, z)
+
+
+def filling(
+    found: Stack, fluid: Fluid, flow_ml_min: float, until: float, length: float = TUBE_LENGTH
+) -> tuple[float, Motion]:
+    """Seconds at a flow, shared by all chambers, until the sensor at the pump shows a pressure in
+    kPa, through tubes of a ``length`` in mm; and the motion by then.
+    """
+    flow = flow_ml_min * 1000 / 60 / found.chambers
+    motion = found.motion(line=Line(fluid, length))
+    most = float(found.pose((until,) * found.chambers).volumes.max())
+    dt = most / flow / SAMPLES
+    before, shown = 0.0, motion.line.source_pressure(flow, 0.0)
+    while shown < until and motion.time < 3 * SAMPLES * dt:
+        before = shown
+        motion.step(dt, flows=(flow,) * found.chambers)
+        shown = max(motion.sources)
+    if motion.time == 0:
+        return 0.0, motion
+    share = (until - before) / (shown - before) if shown > until else 1.0
+    return motion.time - dt * (1 - share), motion
+
+
+def _times(asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
+    model = calibrated(TIME, asked.calibration)
+    try:
+        time, motion = filling(found, WATER, asked.flow_ml_min, paper.FULL_KPA)
+    except DesignError as error:
+        yield LeftOut("time to 10 kPa at the pump", str(error))
+        return
+    if not motion.sources:
+        tube = motion.line.source_pressure(asked.flow_ml_min * 1000 / 60 / found.chambers, 0.0)
+        reason = f"at this flow the tube alone takes {tube:.3g} kPa"
+        yield LeftOut("time to 10 kPa at the pump", reason)
+        return
+    until = f"{paper.FULL_KPA:g} kPa at the pump"
+    name = f"time to {until}, water at {asked.flow_ml_min:g} ml/min in all"
+    yield Figure("actuation", name, time, "s", model)
+    name = f"height when the water's pump shows {paper.FULL_KPA:g} kPa"
+    yield Figure("actuation", name, motion.pose.height, "mm", model)
+
+
+def _stiffness(asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
+    for pressure in asked.pressures_kpa[:1]:
+        name = f"lateral tip stiffness at {pressure:g} kPa"
+        try:
+            start = found.pose((pressure,) * found.chambers)
+            aside = (SLIGHT, 0.0, 0.0)
+            held = found.pose(start.pressures, aside, near=start)
+            yield _per_mm(
+                f"{name}, pressure held", held, replace(SHUT, name="elastic stack"), asked
+            )
+            shut = Motion(found, Line(AIR, length=1e-3), {"tip_load": aside}, start)
+            shut.step(1.0, flows=(0.0,) * found.chambers)
+            yield _per_mm(f"{name}, chambers shut", shut.pose, SHUT, asked)
+        except DesignError as error:
+            yield LeftOut(name, str(error))
+
+
+def _per_mm(name: str, pose: Pose, model: Model, asked: Asked) -> Figure:
+    value = SLIGHT / float(pose.tip[0])
+    return Figure("stiffness", name, value, "N/mm", calibrated(model, asked.calibration))
+
+
+def force_traces(one: Actuator, asked: Asked, found: Stack) -> list[Trace]:
+    """Force against stroke at every pressure asked for."""
+    strokes = np.linspace(0, one.full_height - one.thickness, SAMPLES)
+    model = calibrated(FORCE, asked.calibration)
+    lines = []
+    for pressure in asked.pressures_kpa:
+        values = (one.form.pushing * blocked(found, pressure, strokes)).tolist()
+        lines.append(Trace(f"elastic stack, {pressure:g} kPa", strokes.tolist(), values, model))
+    return lines
+
+
+def bend_relation(asked: Asked, found: Stack) -> Relation:
+    """Bend against pressure."""
+    model = calibrated(BEND, asked.calibration)
+    pressures = np.geomspace(0.01, 20.0, SAMPLES)
+    lines = []
+    for chambers in range(1, found.chambers):
+        poses = _poses(found, chambers, pressures)
+        label = f"{_chambers(chambers)}, the others empty"
+        x = [pose.pressures[0] for pose in poses]
+        lines.append(Trace(label, x, [pose.bend for pose in poses], model))
+    return Relation(
+        "bend", "Bending against pressure", "pressure, kPa", "bend of the top, deg", tuple(lines)
+    )
+
+
+def _poses(found: Stack, chambers: int, pressures: Sequence[float] | Array) -> list[Pose]:
+    poses: list[Pose] = []
+    for pressure in pressures:
+        try:
+            poses.append(found.pose(_some(found, chambers, float(pressure))))
+        except DesignError:
+            break
+    return poses

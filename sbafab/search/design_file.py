@@ -1,0 +1,72 @@
+"""A found design as a file that generates: the one it started from, with the found keys."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from sbafab.design.reading import (
+    KIT,
+    OUTLINE,
+    changed_keys,
+    design_path,
+    kit_names,
+    override,
+    read_toml,
+    start_where_the_user_stands,
+)
+from sbafab.errors import DesignError, OutputError
+from sbafab.search.find import Found
+
+
+def refuse_present(target: Path) -> None:
+    """Raises DesignError where a file is already: nobody's design is overwritten."""
+    if target.exists():
+        raise DesignError(
+            f"{target} exists; name another file with -o, or remove it first: a search may take "
+            "minutes and overwrites nothing"
+        )
+
+
+def found_toml(source: str | Path, assignments: Sequence[str], name: str, found: Found) -> str:
+    """The design file of what was found, its figures as comments."""
+    path = design_path(source)
+    data = override(read_toml(path), [*assignments, dict(found.best.values), {"name": name}])
+    start_where_the_user_stands(data, assignments)
+    _from_anywhere(data, path.parent, set(changed_keys(assignments)))
+    first = {key: value for key, value in data.items() if not isinstance(value, dict)}
+    tables = {key: value for key, value in data.items() if isinstance(value, dict)}
+    said = [
+        f"# {one.quantity.said} = {found.best.value(one):.4g} {one.quantity.unit} ({one.bound})"
+        for one in found.wanted.requirements
+    ]
+    goal = found.wanted.goal
+    best = f"# {goal.quantity.said} = {found.best.value(goal):.4g} {goal.quantity.unit} (the goal)"
+    keys = ", ".join(f"{key} = {value:g}" for key, value in found.best.values.items())
+    head = [f"# Found by sbafab find, from {Path(source).name}: {keys}.", *said, best]
+    return "\n".join(line.rstrip() for line in head) + "\n\n" + tomli_w.dumps(first | tables)
+
+
+def _from_anywhere(data: dict[str, Any], folder: Path, given: set[str]) -> None:
+    """Paths of the file that it started from, made absolute: the new one may lie elsewhere."""
+    chamber: Any = data.get("chamber")
+    if OUTLINE not in given and isinstance(chamber, Mapping) and "outline" in chamber:
+        chamber = dict(chamber)
+        chamber["outline"] = str((folder / str(chamber["outline"])).absolute())
+        data["chamber"] = chamber
+    if KIT not in given and KIT in data and data[KIT] not in kit_names():
+        data[KIT] = str((folder / str(data[KIT])).absolute())
+
+
+def write_found(text: str, target: Path) -> None:
+    """Raises OutputError where it cannot be written, also where a file came to be meanwhile."""
+    try:
+        with target.open("x", encoding="utf-8", newline="\n") as opened:
+            opened.write(text)
+    except OSError as error:
+        raise OutputError(
+            f"{target} cannot be written: {error.strerror or error}; name another file with -o"
+        ) from None

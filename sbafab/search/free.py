@@ -1,0 +1,44 @@
+"""Which keys a search may change, as people say it: ``KEY=LOW:HIGH:STEP``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from sbafab.design.form import Free
+from sbafab.design.reading import shown
+from sbafab.design.records import Design
+from sbafab.errors import DesignError
+from sbafab.search.vary import read_varied, refuse_unknown
+
+
+def read_free(design: Design, texts: Sequence[str], fixed: Sequence[str]) -> tuple[Free, ...]:
+    """The family's own keys without those ``fixed``, and those of the ``texts`` in their place.
+
+    Raises DesignError.
+    """
+    varied = [_stepped(text) for text in texts]
+    refuse_unknown(design, [read_varied(text) for text in texts])
+    own = {one.key: one for one in design.free}
+    for key in fixed:
+        if key not in own:
+            raise DesignError(
+                f"--fix {shown(key)}: a search changes only {', '.join(own) or 'nothing'} by itself"
+            )
+        del own[key]
+    # What is named is free whatever the requirements name.
+    own |= {one.key: one for one in varied}
+    return tuple(own.values())
+
+
+def _stepped(text: str) -> Free:
+    found = read_varied(text)
+    numbers = [one for one in found.values if isinstance(one, int | float)]
+    parts = text.partition("=")[2].split(":")
+    if len(parts) != 3 or len(numbers) != len(found.values):
+        raise DesignError(
+            f"--free {shown(text)} is not KEY=LOW:HIGH:STEP; write for example "
+            "--free chamber.diameter=3:12:0.1"
+        )
+    step = numbers[1] - numbers[0] if len(numbers) > 1 else 1
+    return replace(Free(found.key, numbers[0], numbers[-1], 1), step=round(step, 9))

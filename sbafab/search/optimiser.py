@@ -1,0 +1,55 @@
+"""The same search by Optuna, whose storage keeps it, resumes it and shares it between machines."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sbafab.errors import DesignError
+from sbafab.search.find import Search
+from sbafab.search.trial import IMPOSSIBLE
+
+EXTRA = 'Optuna is not installed: pip install "sbafab[optuna]"'
+SEED = 20_240
+
+
+def with_optuna(search: Search) -> None:
+    """Tries as many designs as are asked for. Raises DesignError without the extra."""
+    try:
+        import optuna
+    except ImportError:
+        raise DesignError(EXTRA) from None
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    request = search.request
+    try:
+        study = optuna.create_study(
+            storage=request.storage,
+            study_name=_name(search),
+            load_if_exists=True,
+            sampler=optuna.samplers.TPESampler(seed=SEED, n_startup_trials=request.tries // 4),
+        )
+    except Exception as error:
+        said = " ".join(str(error).split())[:200]
+        raise DesignError(
+            f"--storage {request.storage} cannot be used ({said}); write for example "
+            "--storage sqlite:///search.db"
+        ) from None
+
+    def objective(trial: Any) -> float:
+        place = tuple(
+            trial.suggest_int(free.key, 0, count)
+            for free, count in zip(search.free, search.counts, strict=True)
+        )
+        found = search.trial(place)
+        # What misses is worse than all that holds, by how much it misses.
+        return found.cost if found.holds else IMPOSSIBLE * (1 + min(found.missed, IMPOSSIBLE))
+
+    # What is stored was tried by an earlier run: here it is looked up again, and tried no more.
+    for old in study.get_trials(states=[optuna.trial.TrialState.COMPLETE]):
+        search.trial(tuple(old.params[free.key] for free in search.free))
+    study.optimize(objective, n_trials=max(0, request.tries - len(study.trials)))
+
+
+def _name(search: Search) -> str:
+    asked = [one.said for one in search.wanted.requirements]
+    keys = [f"{one.key} {one.low:g} to {one.high:g} by {one.step:g}" for one in search.free]
+    return "; ".join([search.wanted.design.name, *asked, search.wanted.goal.said, *keys])

@@ -1,0 +1,221 @@
+"""What a requirement may be about: sizes, mass, yield, stroke and force of a design, and its keys.
+
+Strokes and forces are those of the elastic balloon, one on the other: all balloons of a stack push
+with the same force, and each rises by its share of the stroke.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from sbafab.design.form import Slots
+from sbafab.design.reading import key_paths, listed, shown
+from sbafab.design.records import Design
+from sbafab.design.units import millimetres
+from sbafab.design.writing import keys_of
+from sbafab.errors import DesignError
+from sbafab.laminate.extent import film_mass
+from sbafab.laminate.laminate import Laminate
+from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.balloons import balloons_of
+from sbafab.models.force import force
+from sbafab.models.kinematics import slot_stack
+from sbafab.models.sizes import sizes
+
+MOST_STRETCH = 0.15
+"""Share by which films may be longer; one modulus is unlikely to hold beyond."""
+SHARES = np.linspace(0.1, 1.0, 10)
+"""Of the pressure asked for: tried until the film would be longer than that."""
+PRESSURES = {"kPa": 1.0, "Pa": 0.001, "MPa": 1000.0, "mbar": 0.1, "bar": 100.0, "psi": 6.894757}
+USUAL_KPA = 10.0
+_PRESSURE = re.compile(r"\s*(\d+\.?\d*|\.\d+)\s*([A-Za-z]+)\s*")
+SIZES = (
+    "overall_diameter",
+    "outline_diameter",
+    "deflated_diameter",
+    "inflated_diameter",
+    "width",
+    "length",
+)
+PLAIN = {**dict.fromkeys(SIZES, "mm"), "height": "mm", "lumen": "mm", "mass": "g", "yield": ""}
+AT = {"stroke": "mm", "force": "N"}
+KEYS = {"lumen": "lumen.diameter"}
+"""Quantities that are keys: they are asked for, and need no model."""
+HOW = 'for example overall_diameter, mass, "stroke@50kPa", "force@12.5mm@50kPa" or chamber.diameter'
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One of the names above or a dotted key; force and stroke with their pressure in kPa, force
+    with the stroke in mm at which it is wanted.
+    """
+
+    name: str
+    unit: str
+    kpa: float | None = None
+    stroke: float | None = None
+
+    @property
+    def said(self) -> str:
+        at = f"@{self.stroke:g}mm" if self.stroke is not None else ""
+        return f"{self.name}{at}{f'@{self.kpa:g}kPa' if self.kpa is not None else ''}"
+
+    @property
+    def key(self) -> str | None:
+        """The key that it is, if it is one."""
+        return self.name if "." in self.name else KEYS.get(self.name)
+
+
+def read_quantity(text: str, kpa: float | None = None) -> Quantity:
+    """The quantity of a text; ``kpa`` counts where it names no pressure. Raises DesignError."""
+    name, *places = (part.strip() for part in text.split("@"))
+    name = name.replace("-", "_")
+    if name in AT:
+        return _at(name, places, text, kpa)
+    if places:
+        raise DesignError(f"{shown(text)}: only stroke and force are told at a pressure; {HOW}")
+    if name not in PLAIN and "." not in name:
+        known = listed([*PLAIN, *AT])
+        raise DesignError(f"{shown(text)} is no quantity; there are {known} and the design's keys")
+    return Quantity(name, PLAIN.get(name, ""))
+
+
+def _at(name: str, places: list[str], text: str, kpa: float | None) -> Quantity:
+    pressure, stroke = kpa, None
+    for place in places:
+        found = _PRESSURE.fullmatch(place)
+        if found is not None and found[2] in PRESSURES:
+            pressure = float(found[1]) * PRESSURES[found[2]]
+            continue
+        try:
+            stroke = millimetres(place)
+        except ValueError:
+            raise DesignError(
+                f"{shown(text)}: {shown(place)} is neither a pressure nor a length; {HOW}"
+            ) from None
+    if (name == "force") != (stroke is not None):
+        raise DesignError(f"{shown(text)}: a force is told at a stroke, a stroke is not; {HOW}")
+    if pressure is None:
+        pressure = USUAL_KPA
+    force(pressure, 0.0)
+    return Quantity(name, AT[name], pressure, stroke)
+
+
+def named_pressure(texts: list[str]) -> float | None:
+    """The highest pressure that any of the quantities names, kPa."""
+    named = [
+        float(found[1]) * PRESSURES[found[2]]
+        for text in texts
+        for place in text.split("@")[1:]
+        if (found := _PRESSURE.fullmatch(place)) is not None and found[2] in PRESSURES
+    ]
+    return max(named, default=None)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A design of which quantities are asked; each is worked out once."""
+
+    design: Design
+    laminate: Laminate
+
+    @cached_property
+    def _sizes(self) -> Mapping[str, float]:
+        return sizes(self.design, self.laminate)
+
+    @cached_property
+    def _keys(self) -> Mapping[str, Any]:
+        return {key: value for key, value, _ in keys_of(self.design)}
+
+    def value(self, quantity: Quantity, share_of_good: Callable[[], float]) -> float:
+        """Raises DesignError where the design has no such quantity, or no model knows it."""
+        if quantity.name == "yield":
+            return share_of_good()
+        if quantity.name == "stroke":
+            return self._stroke(quantity.kpa or 0.0)
+        if quantity.name == "force":
+            return self._force(quantity.stroke or 0.0, quantity.kpa or 0.0)
+        if quantity.name == "mass":
+            return film_mass(self.laminate)
+        if quantity.name == "height":
+            return self.laminate.thickness
+        found: Any = self._sizes.get(quantity.name)
+        if quantity.name == "lumen":
+            found = self.design.form.lumen
+        elif "." in quantity.name:
+            found = self._keys.get(quantity.name)
+        if isinstance(found, int | float):
+            return float(found)
+        raise DesignError(f"{self.design.name} has no {quantity.name} that is a number")
+
+    def _stroke(self, kpa: float) -> float:
+        pockets = self.design.form.pockets
+        if isinstance(pockets, Slots):
+            stack = slot_stack(pockets.width, pockets.run, self.design.stack.balloons)
+            return stack[0].largest_stroke
+        kinds = balloons_of(self.design, self.laminate)
+        return sum(kinds.count(kind) * free_height(kind, kpa) for kind in dict.fromkeys(kinds))
+
+    def _force(self, stroke: float, kpa: float) -> float:
+        form = self.design.form
+        if isinstance(form.pockets, Slots):
+            first = slot_stack(form.pockets.width, form.pockets.run, self.design.stack.balloons)[0]
+            if stroke > first.largest_stroke:
+                return first.largest_stroke - stroke
+            return form.pushing * float(force(kpa, first.rate(stroke)))
+        kinds = balloons_of(self.design, self.laminate)
+        if len(set(kinds)) > 1:
+            raise DesignError("the force of a tapered stack at a stroke is not searched for")
+        return form.pushing * pressed_force(kinds[0], kpa, stroke / len(kinds)) / 1000
+
+
+@lru_cache(maxsize=4096)
+def free_height(kind: Balloon, kpa: float) -> float:
+    """By how many mm a balloon rises: at the pressure, or at the most that its film stands.
+
+    The latter is less than it would rise by.
+    """
+    shapes = inflate(kind, SHARES * kpa)
+    stretch = _stretch(kind, shapes.r, shapes.z)
+    return float(np.interp(MOST_STRETCH, stretch, shapes.height))
+
+
+@lru_cache(maxsize=4096)
+def pressed_force(kind: Balloon, kpa: float, height: float) -> float:
+    """The force in mN of a balloon between plates at a height; below 0 where it does not get there.
+
+    Raises DesignError where its film would be stretched too far.
+    """
+    free = free_height(kind, kpa)
+    if height > free:
+        # How far it is from getting there, in the force of so much of it.
+        return -kpa * math.pi * kind.pocket**2 * (height / max(free, 1e-6) - 1)
+    shape = inflate(kind, [kpa], [max(height, 1e-3)])
+    longer = float(_stretch(kind, shape.r, shape.z)[0])
+    if longer > MOST_STRETCH:
+        raise DesignError(
+            f"at {kpa:g} kPa and a rise of {height:.3g} mm a balloon's film would be "
+            f"{100 * longer:.0f} % longer, and one modulus is unlikely to hold beyond "
+            f"{100 * MOST_STRETCH:g} %"
+        )
+    return float(shape.force[0])
+
+
+def _stretch(kind: Balloon, r: Any, z: Any) -> Any:
+    """By what share the films between neck and rim are longer than flat."""
+    part = slice(kind.held, kind.edge + 1)
+    lengths = np.hypot(np.diff(r[:, part]), np.diff(z[:, part])).sum(-1)
+    return lengths / (kind.pocket - kind.neck) - 1
+
+
+def refuse_unknown_key(quantity: Quantity, design: Design) -> None:
+    """Raises DesignError for a key that the design does not have."""
+    if "." in quantity.name and quantity.name not in key_paths(type(design)):
+        design.with_({quantity.name: 1})

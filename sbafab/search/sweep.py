@@ -1,0 +1,206 @@
+"""A sweep: every design measured once, its rows in a journal, then tables and a page."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from filelock import FileLock, Timeout
+
+from sbafab.design.reading import KIT, OUTLINE, kit_names
+from sbafab.design.records import Design
+from sbafab.design.writing import design_sha256, plain_tables
+from sbafab.errors import OutputError
+from sbafab.output.swap import MANIFEST
+from sbafab.progress import Progress, unheard
+from sbafab.search.fingerprint import fingerprint
+from sbafab.search.journal import Journal
+from sbafab.search.measure import Outcome, Row
+from sbafab.search.page import sweep_html
+from sbafab.search.pool import dask_pool, local_pool, run_jobs
+from sbafab.search.table import Table, write_csv, write_parquet, write_times
+from sbafab.search.vary import Values, Varied, grid, latin_hypercube, refuse_unknown
+from sbafab.search.worker import Job
+
+JOURNAL = "journal.jsonl"
+SECONDS = 300.0
+"""How long one design may take."""
+MEASURED = "measuring designs"
+
+
+@dataclass(frozen=True)
+class SweepRequest:
+    """What is swept and how: ``samples`` drawn by Latin hypercube, or the whole grid.
+
+    ``workers`` processes of this machine (as many as processors by default), or the cluster behind
+    ``dask``; each design may take ``seconds``.
+    """
+
+    design: Design
+    varied: tuple[Varied, ...]
+    samples: int | None = None
+    seed: int = 0
+    pressures_kpa: tuple[float, ...] = (10.0, 100.0)
+    workers: int | None = None
+    dask: str | None = None
+    seconds: float = SECONDS
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What a sweep made: its folder, how many designs of each outcome, how many measured now."""
+
+    folder: Path
+    designs: int
+    measured: int
+    outcomes: dict[Outcome, int]
+    files: tuple[str, ...]
+
+
+class SweepStopped(KeyboardInterrupt):
+    """An interrupt that knows how many of the ``designs`` are ``measured``."""
+
+    def __init__(self, measured: int, designs: int, *signal: object) -> None:
+        super().__init__(*signal)
+        self.measured = measured
+        self.designs = designs
+
+
+def trials(request: SweepRequest) -> list[Values]:
+    """The values of every design, in the tables' order. Raises DesignError."""
+    varied = [_from_here(one) for one in request.varied]
+    refuse_unknown(request.design, varied)
+    if request.samples is None:
+        return list(grid(varied))
+    return list(latin_hypercube(varied, request.samples, request.seed))
+
+
+def sweep(request: SweepRequest, out: Path, tell: Progress = unheard) -> Sweep:
+    """Measures all designs into ``out/<name>-sweep/`` and returns what came of them.
+
+    What an earlier run measured there counts, as long as design, values and program are the same.
+    Raises DesignError for bad input, OutputError where nothing can be written or no worker answers.
+    """
+    values = trials(request)
+    folder = out / f"{request.design.name}-sweep"
+    with _held(folder):
+        journal = Journal(folder / JOURNAL, request.seconds)
+        try:
+            keys = _keys(request, values)
+            missing = [number for number, key in enumerate(keys) if key not in journal]
+            _measure(request, values, keys, missing, journal, tell)
+        except KeyboardInterrupt as stop:
+            measured = sum(key in journal for key in keys)
+            raise SweepStopped(measured, len(keys), *stop.args) from stop
+        finally:
+            journal.close()
+        tell("writing tables", 0, 1)
+        table = Table(lambda: journal.rows(iter(keys)), values)
+        files = _write(folder, request, table)
+    outcomes = Counter(row["outcome"] for row in table.rows())
+    return Sweep(folder, len(values), len(missing), dict(outcomes), files)
+
+
+def _measure(
+    request: SweepRequest,
+    values: Sequence[Values],
+    keys: Sequence[str],
+    missing: Sequence[int],
+    journal: Journal,
+    tell: Progress,
+) -> None:
+    if not missing:
+        return
+    base: Job = {
+        "program": fingerprint(),
+        "tables": plain_tables(request.design),
+        "folder": str(request.design.folder.absolute()),
+        "pressures": list(request.pressures_kpa),
+    }
+    done = 0
+
+    def note(key: str, row: Row) -> None:
+        nonlocal done
+        journal.add(key, row)
+        done += 1
+        still()
+
+    def still() -> None:
+        tell(MEASURED, done, len(missing))
+
+    still()
+    pool = local_pool(request.workers) if request.dask is None else dask_pool(request.dask)
+    jobs = ((keys[number], {**base, "values": dict(values[number])}) for number in missing)
+    with pool as workers:
+        run_jobs(workers, jobs, request.seconds, note, still)
+
+
+def _keys(request: SweepRequest, values: Sequence[Values]) -> list[str]:
+    """A hash of each design and of what is asked of it, by this program."""
+    asked = [fingerprint(), design_sha256(request.design), list(request.pressures_kpa)]
+    return [
+        hashlib.sha256(json.dumps([*asked, _contents(one)]).encode()).hexdigest() for one in values
+    ]
+
+
+def _contents(values: Values) -> dict[str, Any]:
+    """The values; for a drawing or a kit, what is in the file."""
+    return {
+        key: hashlib.sha256(Path(value).read_bytes()).hexdigest()
+        if key in (OUTLINE, KIT) and isinstance(value, str) and Path(value).is_file()
+        else value
+        for key, value in values.items()
+    }
+
+
+def _from_here(varied: Varied) -> Varied:
+    """With paths of drawings and kits starting where the user stands, wherever they are read."""
+    if varied.key not in (OUTLINE, KIT):
+        return varied
+    paths = tuple(
+        one if varied.key == KIT and one in kit_names() else str(Path(str(one)).absolute())
+        for one in varied.values
+    )
+    return Varied(varied.key, paths)
+
+
+def _write(folder: Path, request: SweepRequest, table: Table) -> tuple[str, ...]:
+    write_csv(table, folder / "sweep.csv")
+    write_times(table, folder / "times.csv")
+    files = ["sweep.csv", "times.csv"]
+    if write_parquet(table, folder / "sweep.parquet"):
+        files.append("sweep.parquet")
+    page = sweep_html(request.design, request.varied, table)
+    with table.replacing(folder / "sweep.html") as opened:
+        opened.write(page)
+    return (*files, "sweep.html", JOURNAL)
+
+
+@contextmanager
+def _held(folder: Path) -> Iterator[None]:
+    """The folder, there and ours alone. Raises OutputError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if (folder / MANIFEST).exists():
+            raise OutputError(
+                f"{folder} holds a design of that name; choose another folder with -o"
+            )
+        with FileLock(folder / ".lock", timeout=0):
+            yield
+    except Timeout:
+        raise OutputError(
+            f"another sweep is writing {folder}; wait for it to end or choose another folder "
+            "with -o"
+        ) from None
+    except OutputError:
+        raise
+    except OSError as error:
+        raise OutputError(
+            f"{folder} cannot be written: {error.strerror or error}; choose another folder with -o"
+        ) from None

@@ -1,0 +1,126 @@
+"""One design tried: its figures against the requirements, its rules by their margins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from sbafab.actuators import build
+from sbafab.design.records import Design
+from sbafab.errors import DesignError
+from sbafab.geometry.boolean import GeometryError
+from sbafab.laminate.laminate import Laminate
+from sbafab.output.batch import refuse_undoable
+from sbafab.output.planned import Checked
+from sbafab.output.settings import limits
+from sbafab.rules.deck import run_deck
+from sbafab.search.margins import Margin, margins
+from sbafab.search.quantities import Subject
+from sbafab.search.requirements import CLOSE, Goal, Requirement
+
+YIELD = "registration-yield"
+IMPOSSIBLE = 1e6
+"""By how much a design that cannot be made misses: by more than any that can."""
+Place = tuple[int, ...]
+"""A design by the step at which each free key stands."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A design with what was found of it. ``rules`` is None where they were not asked.
+
+    ``missed`` is by what share requirements and rules are missed, all together; 0 where none is.
+    ``refused`` says why no such design can be made.
+    """
+
+    values: Mapping[str, Any]
+    figures: Mapping[str, float] = field(default_factory=dict)
+    rules: Mapping[str, Margin] | None = None
+    missed: float = 0.0
+    cost: float = 0.0
+    refused: str = ""
+    laminate: Laminate | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def holds(self) -> bool:
+        return self.missed == 0.0 and not self.refused
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """The less, the better."""
+        return self.missed, self.cost
+
+    def value(self, requirement: Requirement | Goal) -> float:
+        return self.figures[requirement.quantity.said]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """All that is asked: requirements, the goal, and the design whose keys change."""
+
+    design: Design
+    requirements: tuple[Requirement, ...]
+    goal: Goal
+
+    @property
+    def asks_for_yield(self) -> bool:
+        asked = [*(one.quantity for one in self.requirements), self.goal.quantity]
+        return any(quantity.name == "yield" for quantity in asked)
+
+
+def tried(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+    """The trial of a design; without rules only requirements count, which is much quicker."""
+    try:
+        design = wanted.design.with_(dict(values))
+        laminate = build(design)
+        rules = None
+        if with_rules or wanted.asks_for_yield:
+            findings = run_deck(laminate, limits(design))
+            rules = margins(findings)
+            checked = Checked(design, laminate, findings)
+            if not checked.failed:
+                refuse_undoable([checked])
+        figures = _figures(wanted, Subject(design, laminate), rules)
+    except (DesignError, GeometryError) as error:
+        said = " ".join(str(error).split())
+        return Trial(values, missed=IMPOSSIBLE, refused=said)
+    missed = sum(
+        -min(0.0, one.margin(figures[one.quantity.said]) + CLOSE) for one in wanted.requirements
+    )
+    missed += sum(_short(one) for one in (rules or {}).values())
+    cost = wanted.goal.cost(figures[wanted.goal.quantity.said])
+    return Trial(values, figures, rules, missed, cost, laminate=laminate)
+
+
+def _short(rule: Margin) -> float:
+    """By what share a rule that fails misses its limit."""
+    if rule.verdict != "fail":
+        return 0.0
+    return max(1e-3, -(rule.share or 0.0))
+
+
+def _figures(
+    wanted: Wanted, subject: Subject, rules: Mapping[str, Margin] | None
+) -> dict[str, float]:
+    def share_of_good() -> float:
+        found = (rules or {}).get(YIELD)
+        if found is None or found.measured is None:
+            raise DesignError(f"no yield of {subject.design.name} can be counted")
+        return found.measured
+
+    asked = [*(one.quantity for one in wanted.requirements), wanted.goal.quantity]
+    return {quantity.said: subject.value(quantity, share_of_good) for quantity in asked}
+
+
+def misses(wanted: Wanted, trial: Trial) -> list[str]:
+    """What a design breaks, a sentence each: requirements, then rules."""
+    if trial.refused:
+        return [trial.refused]
+    said = [
+        f"{one.quantity.said} {trial.value(one):.4g} {one.quantity.unit}, not {one.bound}"
+        for one in wanted.requirements
+        if not one.holds(trial.value(one))
+    ]
+    failed = [one for one in (trial.rules or {}).values() if one.verdict == "fail"]
+    return [*said, *(f"{one.rule}: {one.message}" for one in failed)]

@@ -1,0 +1,166 @@
+"""Which keys are varied over which values, and the designs that come of it."""
+
+from __future__ import annotations
+
+import itertools
+import random
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import Any
+
+from sbafab.design.reading import key_paths, override, shown
+from sbafab.design.records import Design
+from sbafab.design.units import millimetres
+from sbafab.errors import DesignError
+
+MOST_DESIGNS = 100_000
+MOST_VALUES = 10_000
+HOW = "write for example --vary chamber.diameter=4:8:0.5 or --vary stack.balloons=3,6,9"
+DIGITS = 6
+
+Values = Mapping[str, Any]
+"""A value for each key that is varied, by dotted key."""
+
+
+@dataclass(frozen=True)
+class Varied:
+    """A key with the values that it takes; without values, all numbers from ``low`` to ``high``."""
+
+    key: str
+    values: tuple[Any, ...] = ()
+    low: float = 0.0
+    high: float = 0.0
+
+    @property
+    def is_continuous(self) -> bool:
+        return not self.values
+
+
+def read_varied(text: str) -> Varied:
+    """``KEY=START:STOP:STEP``, ``KEY=START:STOP`` or ``KEY=a,b,c``. Raises DesignError."""
+    key, equals, said = text.partition("=")
+    key = key.strip()
+    if not equals or not key or not said.strip():
+        raise DesignError(f"--vary {shown(text)} is not KEY=VALUES; {HOW}")
+    if ":" in said:
+        return _range(key, said.split(":"), text)
+    # A list in brackets is one value; what else a comma parts are several.
+    table = override({}, [f"values=[{said}]"])["values"]
+    if not isinstance(table, list):
+        table = [override({}, [f"value={one.strip()}"])["value"] for one in said.split(",")]
+    if any(isinstance(one, float) for one in table):
+        table = [float(one) if type(one) is int else one for one in table]
+    return _distinct(Varied(key, tuple(table)), text)
+
+
+def _range(key: str, parts: Sequence[str], text: str) -> Varied:
+    try:
+        ends = [_exact(part) for part in parts]
+    except ValueError as error:
+        raise DesignError(f"--vary {shown(text)}: START, STOP and STEP {error}") from None
+    if len(ends) not in (2, 3):
+        raise DesignError(f"--vary {shown(text)} is not START:STOP:STEP; {HOW}")
+    start, stop = ends[:2]
+    if stop < start:
+        raise DesignError(
+            f"--vary {shown(text)} stops below its start; write the smaller number first"
+        )
+    if len(ends) == 2:
+        return Varied(key, (), float(start), float(stop))
+    step = ends[2]
+    if step <= 0:
+        raise DesignError(f"--vary {shown(text)}: STEP = {step} must be above 0")
+    count = int((stop - start) / step) + 1
+    if count > MOST_VALUES:
+        raise DesignError(
+            f"--vary {shown(text)} gives {count:,} values, and at most {MOST_VALUES:,} are "
+            "allowed; make STEP larger"
+        )
+    steps = [start + number * step for number in range(count)]
+    is_whole = all(one == one.to_integral_value() for one in (start, step))
+    return Varied(key, tuple(int(one) if is_whole else float(one) for one in steps))
+
+
+def _exact(text: str) -> Decimal:
+    """The number, mm where it has a unit. Raises ValueError."""
+    return Decimal(repr(millimetres(text)))
+
+
+def _distinct(varied: Varied, text: str) -> Varied:
+    seen: list[Any] = []
+    for value in varied.values:
+        if value in seen:
+            raise DesignError(f"--vary {shown(text)} names {shown(value)} twice; once is enough")
+        seen.append(value)
+    return varied
+
+
+def refuse_unknown(design: Design, varied: Sequence[Varied]) -> None:
+    """Raises DesignError for a key that the design does not know, and for one varied twice."""
+    keys = [one.key for one in varied]
+    for one in varied:
+        if keys.count(one.key) > 1:
+            raise DesignError(f"--vary {one.key} is given twice; put all its values into one")
+        if one.key not in key_paths(type(design)):
+            # Says which key may be meant.
+            design.with_({one.key: one.values[0] if one.values else one.low})
+        problems = []
+        for value in one.values or (one.low, one.high):
+            try:
+                design.with_({one.key: value})
+            except DesignError as error:
+                problems.append(error)
+            else:
+                break
+        else:
+            raise problems[0]
+
+
+def grid(varied: Sequence[Varied]) -> Iterator[Values]:
+    """Every value of every key with every other's, the last key the fastest. Raises DesignError."""
+    for one in varied:
+        if one.is_continuous:
+            raise DesignError(
+                f"--vary {one.key}={one.low:g}:{one.high:g} has no step; add one, "
+                f"--vary {one.key}={one.low:g}:{one.high:g}:STEP, or draw from it with --samples N"
+            )
+    count = 1
+    for one in varied:
+        count *= len(one.values)
+    if count > MOST_DESIGNS:
+        raise DesignError(
+            f"the grid has {count:,} designs, and at most {MOST_DESIGNS:,} are allowed; take "
+            "fewer values, or --samples N"
+        )
+    names = [one.key for one in varied]
+    every = itertools.product(*(one.values for one in varied))
+    return (dict(zip(names, values, strict=True)) for values in every)
+
+
+def latin_hypercube(varied: Sequence[Varied], samples: int, seed: int) -> Iterator[Values]:
+    """``samples`` designs that take each key's range in equal parts, each part once.
+
+    The same seed draws the same designs. Raises DesignError for more than are allowed.
+    """
+    if samples > MOST_DESIGNS:
+        raise DesignError(f"--samples {samples:,} must be at most {MOST_DESIGNS:,}")
+    dice = random.Random(seed)
+    columns = []
+    for one in varied:
+        order = list(range(samples))
+        dice.shuffle(order)
+        columns.append([_at(one, (place + dice.random()) / samples) for place in order])
+    names = [one.key for one in varied]
+    seen = set()
+    for values in zip(*columns, strict=True):
+        # Few values leave few combinations: each is one design.
+        if repr(values) not in seen:
+            seen.add(repr(values))
+            yield dict(zip(names, values, strict=True))
+
+
+def _at(varied: Varied, share: float) -> Any:
+    if varied.is_continuous:
+        return round(varied.low + share * (varied.high - varied.low), DIGITS)
+    return varied.values[int(share * len(varied.values))]

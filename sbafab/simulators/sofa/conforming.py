@@ -1,0 +1,214 @@
+"""The shell of any laminate, from its conforming mesh: drawn pockets, several films, tubes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.surface import Vector
+from sbafab.simulators.coarse.actuator import PRESSURE, checked
+from sbafab.simulators.coarse.rounds import elastic_of
+from sbafab.simulators.coarse.web import Triangle
+from sbafab.simulators.sofa.shell import FilmGroup, Shell
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from sbafab.meshing.conforming.layup import Layup
+    from sbafab.meshing.conforming.model import Mesh
+
+STEPS_ACROSS = 3.0
+"""Sides of triangles in the smallest pocket's radius, where its bonds are not narrower."""
+STRETCH, MASS, BENDING, RATIO, LOWEST = range(5)
+"""What is known of a cell: E t in mN/mm, kg/mm2, mN mm, Poisson's ratio, its lowest film."""
+
+
+def conforming_shell(laminate: Laminate, pressures: Mapping[str, float] | None = None) -> Shell:
+    """The shell of a laminate, flat at the start; a radial one wrapped round its tube.
+
+    The mouths of inlets are open and free. Raises DesignError where a chamber is unknown, a
+    film's modulus is not known, or the mesher is not installed.
+    """
+    from sbafab.meshing.conforming.elements import volumes
+    from sbafab.meshing.conforming.form import flat
+    from sbafab.meshing.conforming.layup import layup, narrowest_ring
+    from sbafab.meshing.conforming.settings import MeshSettings
+    from sbafab.meshing.conforming.shell_mesh import shell_mesh, thin
+
+    names = tuple(chamber.name for chamber in laminate.chambers)
+    told = checked(names, pressures, PRESSURE, "pressure", "kPa")
+    for layer in laminate.tpe_layers:
+        elastic_of(layer.film)
+    radii = pocket_radii(laminate)
+    side = min(radii) / STEPS_ACROSS
+    ring = narrowest_ring(laminate)
+    stack = thin(layup(laminate, MeshSettings(h=side if ring is None else min(side, ring[0]))))
+    mesh = shell_mesh(stack, flat(stack))
+    number, corners = _linear(mesh)
+    cells = _cells(stack, mesh)
+    rest = tuple((float(x), float(y), 0.0) for x, y, _ in _rounded(mesh.points[number >= 0]))
+    tube = tube_radius(laminate)
+    start = "flat" if tube is None else f"wrapped round a tube of radius {tube:.4g} mm"
+    return Shell(
+        name=laminate.name,
+        rest=rest,
+        position=rest if tube is None else tuple(wrapped(point, tube) for point in rest),
+        membranes=_membranes(corners, cells),
+        bending=_bending(corners, cells),
+        cavities=tuple((name, _walls(mesh.face_sets[f"cavity_{name}"], corners)) for name in names),
+        pressures=told,
+        fixed=tuple(n for n in number[mesh.node_sets["base"]].tolist() if n >= 0),
+        tip=tuple(int(number[node]) for node in _marks(stack, mesh, number)),
+        mass=float(volumes(mesh.kind, mesh.points, mesh.cells) @ cells[:, MASS]),
+        size=max(radii) / 2.5,
+        about=(
+            f"{len(rest)} nodes, {len(corners)} triangles, inlets and their strips among them.\n"
+            f"It starts {start}."
+        ),
+        reading="tip" if tube is None else "crowns",
+    )
+
+
+def pocket_radii(laminate: Laminate) -> list[float]:
+    """Half the least width in mm of every pocket."""
+    found = []
+    for gap in laminate.interfaces:
+        if gap.kind == "chamber":
+            for contour in gap.mask.outers:
+                left, bottom, right, top = contour.bounds
+                found.append(min(right - left, top - bottom) / 2)
+    return found
+
+
+def tube_radius(laminate: Laminate) -> float | None:
+    """Radius in mm of the tube that a laminate on a sheet is wrapped round, None without a sheet.
+
+    The stacks lie at equal pitch round it.
+    """
+    sheet = next((layer for layer in laminate.layers if layer.role == "sheet"), None)
+    if sheet is None:
+        return None
+    places = sorted({x for chamber in laminate.chambers for x, _ in chamber.centres})
+    if len(places) > 1:
+        return (places[-1] - places[0]) / (len(places) - 1) * len(places) / math.tau
+    left, _, right, _ = sheet.profile.bounds
+    return (right - left) / math.tau
+
+
+def wrapped(point: Vector, radius: float) -> Vector:
+    """Where a point of the flat laminate lies on the tube, whose axis is y."""
+    x, y, z = point
+    turn = x / radius
+    out = radius + z
+    return round(out * math.sin(turn), 6), y, round(out * math.cos(turn), 6)
+
+
+def _rounded(points: NDArray[np.float64]) -> list[list[float]]:
+    """Six decimals, and no minus before a zero."""
+    rounded: list[list[float]] = (points.round(6) + 0.0).tolist()
+    return rounded
+
+
+def _linear(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The new number of each node, -1 for those between corners; and the triangles' corners."""
+    import numpy as np
+
+    number = np.full(len(mesh.points), -1)
+    used = np.unique(mesh.cells[:, :3])
+    number[used] = np.arange(len(used))
+    return number, number[mesh.cells[:, :3]]
+
+
+def _walls(faces: NDArray[np.int64], corners: NDArray[np.int64]) -> tuple[Triangle, ...]:
+    """A cavity's walls, normals out of the air."""
+    import numpy as np
+
+    # Face 0 of a triangle looks down, face 1 up, each into the air that touches it.
+    walls = corners[faces[:, 0]]
+    return _rows(np.where(faces[:, 1:] == 0, walls, walls[:, ::-1]))
+
+
+def _cells(stack: Layup, mesh: Mesh) -> NDArray[np.float64]:
+    """What every cell is made of, a row each: its films, one on the other, bonded."""
+    import numpy as np
+
+    made = np.zeros((len(mesh.cells), 5))
+    thickness = np.zeros(len(mesh.cells))
+    made[:, LOWEST] = -1
+    for k, ply in enumerate(stack.plies):
+        own = mesh.cell_sets[ply.name]
+        young, ratio = elastic_of(ply.layer.film)
+        made[own, STRETCH] += 1000 * young * ply.thickness
+        made[own, MASS] += 1e-9 * ply.layer.film.density * ply.thickness
+        made[own, RATIO] += ratio * ply.thickness
+        thickness[own] += ply.thickness
+        new = own[made[own, LOWEST] < 0]
+        made[new, LOWEST] = k
+    made[:, RATIO] /= thickness
+    made[:, BENDING] = made[:, STRETCH] * thickness**2 / (12 * (1 - made[:, RATIO] ** 2))
+    return made.round(12)
+
+
+def _membranes(corners: NDArray[np.int64], cells: NDArray[np.float64]) -> tuple[FilmGroup, ...]:
+    import numpy as np
+
+    kinds, kind = np.unique(cells[:, [STRETCH, RATIO]], axis=0, return_inverse=True)
+    kind = kind.ravel()
+    return tuple(
+        FilmGroup(f"membrane{n + 1}", _rows(corners[kind == n]), float(stretch), float(ratio))
+        for n, (stretch, ratio) in enumerate(kinds)
+    )
+
+
+def _bending(corners: NDArray[np.int64], cells: NDArray[np.float64]) -> tuple[FilmGroup, ...]:
+    """Groups in which no edge has more than two triangles.
+
+    What begins with the same film lies side by side; films apart go together where they share
+    no node.
+    """
+    import numpy as np
+
+    bins: list[tuple[float, set[int], list[NDArray[np.int64]]]] = []
+    kinds, kind = np.unique(cells[:, [BENDING, LOWEST]], axis=0, return_inverse=True)
+    kind = kind.ravel()
+    for n, (stiffness, _) in enumerate(kinds):
+        own = corners[kind == n]
+        nodes = set(np.unique(own).tolist())
+        free = (b for b in bins if b[0] == stiffness and not b[1] & nodes)
+        place = next(free, None)
+        if place is None:
+            place = (float(stiffness), set(), [])
+            bins.append(place)
+        place[1].update(nodes)
+        place[2].append(own)
+    return tuple(
+        FilmGroup(f"bend{n + 1}", _rows(np.concatenate(parts)), stiffness, 0.0)
+        for n, (stiffness, _, parts) in enumerate(bins)
+    )
+
+
+def _marks(stack: Layup, mesh: Mesh, number: NDArray[np.int64]) -> tuple[int, ...]:
+    """Nodes of the highest film: the axes of three stacks or more, or four round its middle."""
+    import numpy as np
+
+    top = mesh.node_sets["tip"]
+    top = top[number[top] >= 0]
+    places = mesh.points[top][:, :2]
+
+    def nearest(place: Iterable[float]) -> int:
+        away = np.linalg.norm(places - np.array(list(place)), axis=1)
+        return int(top[int(np.argmin(away))])
+
+    if len(stack.centres) >= 3:
+        return tuple(nearest(centre) for centre in stack.centres)
+    middle = np.mean(stack.centres, axis=0)
+    reach = float(np.abs(places - middle).max())
+    quarters = ((1, 0), (0, 1), (-1, 0), (0, -1))
+    return tuple(nearest(middle + reach * np.array(one)) for one in quarters)
+
+
+def _rows(triangles: NDArray[np.int64]) -> tuple[Triangle, ...]:
+    return tuple((a, b, c) for a, b, c in triangles.tolist())

@@ -1,0 +1,71 @@
+"""Keys of a design's text changed one by one, with comments and order kept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, MutableMapping
+from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+
+from sbafab.errors import DesignError
+
+Edit = tuple[str, str | None]
+"""A dotted key and its value as TOML writes it; None takes the key out."""
+MOST_EDITS = 200
+
+
+def edited(text: str, edits: Iterable[Edit]) -> str:
+    """The text with every key changed. Raises DesignError where text or value is no TOML."""
+    try:
+        document = tomlkit.parse(text)
+    except (TOMLKitError, ValueError, RecursionError) as error:
+        raise DesignError(f"the text is not valid TOML ({error}); mend it first") from None
+    for key, value in edits:
+        parts = key.split(".")
+        if value is None:
+            _take_out(document, parts)
+        else:
+            _put(document, parts, _value(key, value))
+    return tomlkit.dumps(document)
+
+
+def _value(key: str, text: str) -> Any:
+    try:
+        return tomlkit.value(text)
+    except (TOMLKitError, ValueError, RecursionError, IndexError):
+        raise DesignError(f"{key} = {text[:60]} is no value; write a number or a text") from None
+
+
+def _put(table: MutableMapping[str, Any], parts: list[str], value: Any) -> None:
+    *above, last = parts
+    for part in above:
+        inner = table.get(part)
+        if inner is None:
+            table[part] = tomlkit.table()
+            inner = table[part]
+        if not isinstance(inner, MutableMapping):
+            raise DesignError(f"{'.'.join(parts)}: {part} is a value, not a table")
+        table = inner
+    old = table.get(last)
+    if old is not None and hasattr(old, "trivia") and hasattr(value, "trivia"):
+        _comment_like(old, value)
+    table[last] = value
+
+
+def _comment_like(old: Any, value: Any) -> None:
+    """Gives the value the old one's comment, in the same column."""
+    trivia = value.trivia
+    trivia.comment, trivia.trail = old.trivia.comment, old.trivia.trail
+    column = len(old.as_string()) + len(old.trivia.comment_ws)
+    trivia.comment_ws = " " * max(1, column - len(value.as_string())) if trivia.comment else ""
+
+
+def _take_out(table: MutableMapping[str, Any], parts: list[str]) -> None:
+    above: list[MutableMapping[str, Any]] = [table]
+    for part in parts[:-1]:
+        inner = above[-1].get(part)
+        if not isinstance(inner, MutableMapping):
+            return
+        above.append(inner)
+    above[-1].pop(parts[-1], None)

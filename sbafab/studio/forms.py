@@ -1,0 +1,132 @@
+"""The form of a family from the JSON schema: one flat list of fields, in the file's order."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+Schema = Mapping[str, Any]
+Field = dict[str, Any]
+# key: least, most, step of the slider that spares typing; what it cannot reach is typed.
+SLIDERS: dict[str, tuple[float, float, float]] = {
+    "stack.balloons": (1, 24, 1),
+    "chamber.diameter": (2, 15, 0.1),
+    "chamber.count": (2, 8, 1),
+    "chamber.width": (5, 25, 0.25),
+    "chamber.length": (8, 40, 0.5),
+    "lumen.diameter": (0.5, 8, 0.1),
+    "bore.diameter": (0.5, 3, 0.02),
+    "bond.width": (0.3, 2, 0.05),
+    "mask.overhang": (0.1, 1.5, 0.05),
+    "fillet.radius": (0, 3, 0.1),
+    "inlet.tab_length": (2, 15, 0.25),
+    "tube.outer_diameter": (6, 40, 0.5),
+    "films.tpe.thickness": (0.01, 0.15, 0.001),
+    "films.ptfe.thickness": (0.01, 0.1, 0.001),
+}
+FIRST = ("stack", "chamber", "lumen", "bore", "bond", "mask", "fillet", "inlet", "tube", "sheet")
+"""Sections that shape the actuator; the form begins with them."""
+UNITS = (
+    (re.compile(r"temperature_c$|melting_point$|temperature_limit$"), "\u00b0C"),
+    (re.compile(r"_kpa$"), "kPa"),
+    (re.compile(r"minutes$"), "min"),
+    (re.compile(r"seconds$"), "s"),
+    (re.compile(r"density$"), "kg/m\u00b3"),
+    (re.compile(r"hand_turn$"), "\u00b0"),
+    (re.compile(r"_speed$"), "mm/s"),
+    (re.compile(r"pad_hardness$"), "Shore A"),
+)
+
+
+def families(schema: Schema) -> dict[str, list[Field]]:
+    """The fields of every family of single designs; an assembly's parts take a text."""
+    found = {}
+    for record in schema["oneOf"]:
+        table = _named(record["$ref"], schema)
+        name = (
+            table["properties"]["family"].get("const") or table["properties"]["family"]["default"]
+        )
+        if name != "assembly":
+            fields = list(_fields(table, schema, ""))
+            found[name] = sorted(fields, key=_rank)
+    return found
+
+
+def keys(schema: Schema) -> set[str]:
+    """Every dotted key of any family."""
+    return {field["key"] for fields in families(schema).values() for field in fields}
+
+
+def _rank(field: Field) -> int:
+    section = field["key"].partition(".")[0] if "." in field["key"] else ""
+    if not section:
+        return -1
+    return FIRST.index(section) if section in FIRST else len(FIRST)
+
+
+def _fields(table: Schema, schema: Schema, prefix: str) -> Iterator[Field]:
+    for name, own in table["properties"].items():
+        reference = own.get("$ref") or _single(own)
+        if reference is not None:
+            inner = _named(reference, schema)
+            if "properties" in inner:
+                yield from _fields(inner, schema, f"{prefix}{name}.")
+            continue
+        key = prefix + name
+        if key != "family" and own.get("type") != "object":
+            yield _field(key, own)
+
+
+def _field(key: str, own: Schema) -> Field:
+    ways = own.get("anyOf", [own])
+    kinds = [way.get("type") for way in ways]
+    number = next((way for way in ways if way.get("type") in {"number", "integer"}), None)
+    is_length = number is not None and any("pattern" in way for way in ways)
+    choices = next((way["enum"] for way in ways if "enum" in way), None)
+    field: Field = {
+        "key": key,
+        "meaning": " ".join(own.get("description", "").split()),
+        "default": own.get("default"),
+        "unit": "mm" if is_length else _unit(key),
+        "kind": _kind(kinds, choices),
+        "list": "array" in kinds,
+        "optional": "null" in kinds,
+    }
+    if choices:
+        field["choices"] = choices
+    if "items" in own and "enum" in own["items"]:
+        field["choices"], field["kind"] = own["items"]["enum"], "set"
+    if number is not None:
+        field["least"] = number.get("minimum", number.get("exclusiveMinimum"))
+        field["most"] = number.get("maximum", number.get("exclusiveMaximum"))
+    if key in SLIDERS:
+        field["slider"] = SLIDERS[key]
+    return field
+
+
+def _kind(kinds: list[str | None], choices: object) -> str:
+    if choices:
+        return "choice"
+    if "boolean" in kinds:
+        return "switch"
+    if "integer" in kinds:
+        return "whole"
+    if "number" in kinds:
+        return "number"
+    return "list" if "array" in kinds else "text"
+
+
+def _unit(key: str) -> str:
+    return next((unit for pattern, unit in UNITS if pattern.search(key)), "")
+
+
+def _single(own: Schema) -> str | None:
+    """The reference of a key that is one table, whatever stands beside it."""
+    ways = own.get("allOf") or []
+    return ways[0].get("$ref") if len(ways) == 1 else None
+
+
+def _named(reference: str, schema: Schema) -> Schema:
+    found: Schema = schema["$defs"][reference.rpartition("/")[2]]
+    return found

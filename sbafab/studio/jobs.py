@@ -1,0 +1,160 @@
+"""What the page asks for, worked out in a process of its own: each job yields its answers.
+
+A job is a table with ``do`` and the text of a design; ``beat`` raises where the answer is no longer
+wanted. Files are looked for in ``folder`` alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sbafab import api
+from sbafab.errors import DesignError
+from sbafab.studio import places
+from sbafab.studio.editing import MOST_EDITS, edited
+from sbafab.studio.model import Beat, finding_model, laminate_model
+from sbafab.studio.moving import Filling, poses, stack_model
+
+if TYPE_CHECKING:
+    from sbafab.design.records import Design
+    from sbafab.laminate.laminate import Laminate
+    from sbafab.models.stack import Stack
+
+Job = dict[str, Any]
+Answer = dict[str, Any]
+_FILLINGS: dict[str, Filling] = {}
+MOST_FILLINGS = 8
+"""Tabs whose actuators fill at the same time."""
+
+
+def live(job: Job, beat: Beat) -> Iterator[Answer]:
+    """Text after the edits, resolved design, laminate, then rule by rule; the yield comes last."""
+    text = _text(job)
+    yield {"kind": "text", "text": text}
+    found = _loaded(text, job)
+    if found.family == "assembly":
+        yield {"kind": "assembly", "name": found.name}
+        yield from _assembly_findings(found)
+        return
+    yield {"kind": "design", "name": found.name, "family": found.family, **_values(found)}
+    beat()
+    laminate = _laminate(text, job["folder"], job["path"])
+    yield laminate_model(laminate, frozenset(job.get("has", ())), beat)
+    beat()
+    for number, (rule, findings) in enumerate(api.checking(found, laminate), 1):
+        yield {
+            "kind": "rule",
+            "rule": rule,
+            "number": number,
+            "findings": [finding_model(finding) for finding in findings],
+        }
+        beat()
+    yield {"kind": "checked"}
+
+
+def _values(design: Design) -> Answer:
+    return {"values": api.resolved(design)}
+
+
+def _assembly_findings(assembly: Any) -> Iterator[Answer]:
+    findings = [finding_model(finding) for finding in api.check(assembly)]
+    yield {"kind": "rule", "rule": "assembly", "number": 1, "findings": findings}
+    yield {"kind": "checked"}
+
+
+def predict(job: Job, beat: Beat) -> Iterator[Answer]:
+    """Figures and curves by closed formulas."""
+    design = _loaded(_text(job), job)
+    beat()
+    yield {"kind": "prediction", **api.predict(design).as_dict()}
+
+
+def generate(job: Job, beat: Beat) -> Iterator[Answer]:
+    """Writes the folder of a design into ``out``; every step is told, the last answer names it."""
+    steps: list[Answer] = []
+    tell: Callable[[Answer], None] = job.get("tell", steps.append)
+
+    def progress(what: str, done: int, total: int) -> None:
+        beat()
+        tell({"kind": "progress", "what": what, "done": done, "total": total})
+
+    run = api.generate(_loaded(_text(job), job), out=job["out"], progress=progress)
+    yield {
+        "kind": "made",
+        "name": run.folder.name,
+        "failed": run.failed,
+        "kept": run.kept,
+        "files": sorted(
+            [*run.manifest.get("files", ()), *(["manifest.json"] * bool(run.manifest))]
+        ),
+        "findings": [finding_model(finding) for finding in run.findings],
+    }
+
+
+def motion(job: Job, beat: Beat) -> Iterator[Answer]:
+    """The actuator as the fast stack has it, and how it moves as its pressures grow together.
+
+    The pose asks for ``pressures``, or gives none for what the page has to know beforehand.
+    """
+    text, asked = _text(job), job.get("pose") or {}
+    design = _loaded(text, job)
+    stack = _stack(text, job["folder"], job["path"])
+    beat()
+    if "pressures" not in asked:
+        yield stack_model(design.name, stack)
+        return
+    if asked.get("tube"):
+        filling = _FILLINGS.setdefault(job["tab"], Filling())
+        while len(_FILLINGS) > MOST_FILLINGS:
+            del _FILLINGS[next(iter(_FILLINGS))]
+        yield filling.step(stack, asked)
+        return
+    for pose in poses(stack, asked):
+        yield pose
+        beat()
+
+
+def _text(job: Job) -> str:
+    """The design's text with the edits made. Raises DesignError."""
+    edits = job.get("edits", ())
+    if len(edits) > MOST_EDITS:
+        raise DesignError(f"{len(edits)} keys are changed at once; change at most {MOST_EDITS}")
+    return edited(job["text"], edits) if edits else str(job["text"])
+
+
+def _loaded(text: str, job: Job) -> Any:
+    return _design(text, job["folder"], job["path"])
+
+
+@lru_cache(maxsize=4)
+def _read(text: str, folder: str, path: str) -> Any:
+    return api.loads(text, Path(folder) / path)
+
+
+def _design(text: str, folder: str, path: str) -> Any:
+    """A design, read again each time where it names a file, which may have changed."""
+    if places.refuse_outside(text, Path(folder)):
+        _laminate.cache_clear()
+        return api.loads(text, Path(folder) / path)
+    return _read(text, folder, path)
+
+
+@lru_cache(maxsize=2)
+def _laminate(text: str, folder: str, path: str) -> Laminate:
+    return api.build(_design(text, folder, path))
+
+
+@lru_cache(maxsize=2)
+def _stack(text: str, folder: str, path: str) -> Stack:
+    return api.stack(_design(text, folder, path))
+
+
+JOBS: dict[str, Callable[[Job, Beat], Iterator[Answer]]] = {
+    "live": live,
+    "predict": predict,
+    "generate": generate,
+    "motion": motion,
+}

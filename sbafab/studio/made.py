@@ -1,0 +1,37 @@
+"""Folders that runs wrote, as the page shows them and hands them out."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+DAY_ONE = (1980, 1, 1, 0, 0, 0)
+"""The date of every file in a zip: equal runs give equal zips."""
+
+
+@dataclass(frozen=True)
+class Made:
+    """The folder of a run and the name that it goes by."""
+
+    folder: Path
+    name: str
+
+    def file(self, path: str) -> Path | None:
+        """A file of the run, None for any other place."""
+        found = (self.folder / path).resolve()
+        inside = found.is_relative_to(self.folder.resolve()) and "\0" not in path
+        return found if inside and found.is_file() else None
+
+
+def zipped(made: Made) -> bytes:
+    """The run's folder as a zip, its files byte for byte, in the order of their names."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in sorted(path for path in made.folder.rglob("*") if path.is_file()):
+            name = f"{made.name}/{path.relative_to(made.folder).as_posix()}"
+            entry = zipfile.ZipInfo(name, DAY_ONE)
+            entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
+            archive.writestr(entry, path.read_bytes())
+    return content.getvalue()

@@ -1,0 +1,111 @@
+"""What the page draws of a laminate: numbers and words, no pictures.
+
+A contour is a flat list of x, y and bulge (mm; the DXF convention), so arcs stay arcs on screen. A
+shape is sent under its key once, and not again to a page that says it has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from sbafab import api
+
+if TYPE_CHECKING:
+    from sbafab.geometry.region import Region
+    from sbafab.laminate.laminate import Laminate, Layer
+    from sbafab.rules.finding import Finding
+
+Beat = Callable[[], None]
+"""Called between steps of work; raises where nobody waits for it any more."""
+
+
+@dataclass
+class Shapes:
+    """The shapes of one answer; those the page ``has`` are named only."""
+
+    has: Collection[str]
+    new: dict[str, list[list[float]]] = field(default_factory=dict)
+    used: set[str] = field(default_factory=set)
+
+    def key(self, region: Region) -> str:
+        """The name of a region, which is sent along if the page lacks it."""
+        key = region.key[:24]
+        self.used.add(key)
+        if key not in self.has and key not in self.new:
+            self.new[key] = [_flat(contour.vertices) for contour in region.contours]
+        return key
+
+
+def _flat(vertices: Iterable[tuple[float, float, float]]) -> list[float]:
+    return [round(number, 6) for vertex in vertices for number in vertex]
+
+
+def laminate_model(laminate: Laminate, has: Collection[str], beat: Beat) -> dict[str, Any]:
+    """Layers, patterns, bonds and what lies at which place, for every view."""
+    shapes = Shapes(has)
+    layers = [_layer(layer) for layer in laminate.layers]
+    patterns = {name: _pattern(laminate, own, shapes) for name, own in laminate.patterns.items()}
+    beat()
+    bonds = [
+        {
+            "interface": interface.index,
+            "kind": interface.kind,
+            "layers": list(interface.layer_indices),
+            "z": interface.z,
+            "gap": interface.gap,
+            "shape": shapes.key(interface.bond),
+            "open": shapes.key(interface.unbonded),
+        }
+        for interface in laminate.interfaces
+    ]
+    return {
+        "kind": "laminate",
+        "name": laminate.name,
+        "family": laminate.family,
+        "thickness": laminate.thickness,
+        "balloons": laminate.balloons,
+        "lumen": laminate.lumen,
+        "bounds": list(laminate.bounds),
+        "registration": laminate.registration,
+        "notes": list(laminate.notes),
+        "layers": layers,
+        "patterns": patterns,
+        "bonds": bonds,
+        "chambers": [asdict(chamber) for chamber in laminate.chambers],
+        "bores": [asdict(bore) for bore in laminate.bores],
+        "inlets": [asdict(inlet) for inlet in laminate.inlets],
+        "pins": [asdict(pin) for pin in laminate.pins],
+        "shapes": shapes.new,
+    }
+
+
+def _layer(layer: Layer) -> dict[str, Any]:
+    return {
+        "index": layer.index,
+        "role": layer.role,
+        "balloon": layer.balloon,
+        "pattern": layer.pattern,
+        "material": layer.film.material,
+        "mask": layer.is_mask,
+        "shade": layer.film.shade,
+        "thickness": layer.film.thickness,
+        "z": layer.z,
+    }
+
+
+def _pattern(laminate: Laminate, layers: tuple[Layer, ...], shapes: Shapes) -> dict[str, Any]:
+    first = layers[0]
+    return {
+        "shape": shapes.key(first.profile),
+        "layers": [layer.index for layer in layers],
+        "area": round(first.profile.area, 4),
+        "bounds": list(first.profile.bounds),
+        "marks": [asdict(mark) for mark in api.dimensions(laminate, first)],
+    }
+
+
+def finding_model(finding: Finding) -> dict[str, Any]:
+    """A finding as ``checks.json`` has it."""
+    return {**finding.as_dict(), "by_user": finding.by_user}

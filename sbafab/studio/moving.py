@@ -1,0 +1,137 @@
+"""Poses of the fast stack, as the page asks for them and draws them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+from sbafab import api
+from sbafab.errors import DesignError
+
+if TYPE_CHECKING:
+    from sbafab.models.motion import Motion
+    from sbafab.models.stack import Pose, Stack
+
+CURVE = 25
+"""Points of the curves beside the view."""
+LONGEST_STEP = 0.2
+"""Seconds that one step of a motion spans at most."""
+MOST_LOAD = 0.5
+"""N that a hand may put on the tip."""
+
+
+def stack_model(name: str, stack: Stack) -> dict[str, Any]:
+    """What the page draws balloons from: radii, axes, pitch, and how far pressures may go."""
+    return {
+        "kind": "stack",
+        "name": name,
+        "axes": _numbers(stack.axes),
+        "pitch": stack.pitch,
+        "flat_height": stack.flat_height,
+        "outline": stack.outline,
+        "levels": [int(level) for level in stack.levels],
+        "balloons": [
+            {
+                "neck": one.balloon.neck,
+                "pocket": one.balloon.pocket,
+                "ring": one.balloon.ring,
+                "thickness": one.balloon.thickness,
+            }
+            for one in stack.maps
+        ],
+        "most_pressure": min(one.most_pressure for one in stack.maps),
+    }
+
+
+def poses(stack: Stack, asked: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """The pose asked for; with ``curves``, also those on the way to it, as lists of figures.
+
+    Raises DesignError for what is out of the model's range.
+    """
+    pressures = _asked(asked.get("pressures"), stack.chambers, "pressures")
+    yield _pose_model(stack.pose(pressures, **_loads(asked)))
+    if not asked.get("curves"):
+        return
+    most = max(pressures) or 1.0
+    rows = []
+    for number in range(CURVE):
+        share = number / (CURVE - 1)
+        try:
+            one = stack.pose([share * p for p in pressures], gravity=bool(asked.get("gravity")))
+        except DesignError:
+            break
+        rows.append((share * most, one.height, one.bend, float(sum(one.volumes))))
+    names = ("pressure", "height", "bend", "volume")
+    columns = zip(*rows, strict=True)
+    yield {"kind": "curves", **{name: _numbers(c) for name, c in zip(names, columns, strict=False)}}
+
+
+class Filling:
+    """A motion through the tubes of one tab: the state from which its next step starts."""
+
+    def __init__(self) -> None:
+        self.known: tuple[object, ...] = ()
+        self.motion: Motion | None = None
+
+    def step(self, stack: Stack, asked: dict[str, Any]) -> dict[str, Any]:
+        """The pose ``dt`` s on, with pressures in kPa at the valves. Raises DesignError.
+
+        It starts anew, vented, with another stack, tube or load, and where ``restart`` is asked.
+        """
+        tube = asked["tube"] if isinstance(asked.get("tube"), dict) else {}
+        pressures = _asked(asked.get("pressures"), stack.chambers, "pressures")
+        length, diameter, dt = _asked(
+            [tube.get("length"), tube.get("diameter"), tube.get("dt")], 3, "tube"
+        )
+        load = _loads(asked)
+        known = (id(stack), length, diameter, repr(load))
+        if self.motion is None or known != self.known or tube.get("restart"):
+            self.known = known
+            self.motion = api.motion(stack, length=length, diameter=diameter, **load)
+        pose = self.motion.step(min(max(dt, 1e-4), LONGEST_STEP), pressures=pressures)
+        return {**_pose_model(pose), "valves": pressures, "time": round(self.motion.time, 4)}
+
+
+def _loads(asked: dict[str, Any]) -> dict[str, Any]:
+    """What acts on the tip: a pull, weight, an outer plate."""
+    load = _asked(asked.get("load") or [0, 0, 0], 3, "load")
+    size = math.hypot(*load)
+    if size > MOST_LOAD:
+        load = [part * MOST_LOAD / size for part in load]
+    plate = asked.get("plate")
+    height = float(plate) if isinstance(plate, int | float) else None
+    return {"tip_load": load, "gravity": bool(asked.get("gravity")), "plate": height}
+
+
+def _pose_model(pose: Pose) -> dict[str, Any]:
+    origins, axes = pose.frames
+    return {
+        "kind": "pose",
+        "pressures": list(pose.pressures),
+        "origins": _numbers(origins),
+        "axes": _numbers(axes.reshape(len(axes), 9)),
+        "gaps": _numbers(pose.gaps),
+        "height": round(pose.height, 4),
+        "bend": round(pose.bend, 3),
+        "direction": round(pose.direction, 2),
+        "volumes": _numbers(pose.volumes),
+        "force": round(float(pose.force), 6),
+        "stable": bool(pose.stable),
+    }
+
+
+def _asked(values: Any, count: int, what: str) -> list[float]:
+    good = isinstance(values, list) and len(values) == count
+    if not good or not all(isinstance(v, int | float) and math.isfinite(v) for v in values):
+        raise DesignError(f"{what} must be {count} finite numbers")
+    return [float(value) for value in values]
+
+
+def _numbers(values: Any) -> Any:
+    """Nested lists with five decimals: 10 nm."""
+    if hasattr(values, "tolist"):
+        values = values.tolist()
+    if isinstance(values, Sequence):
+        return [_numbers(value) for value in values]
+    return round(float(values), 5)

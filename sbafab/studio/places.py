@@ -1,0 +1,118 @@
+"""Files the page may name: design files in the chosen folder, and what designs refer to there."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import tempfile
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from sbafab import api
+from sbafab.errors import DesignError, OutputError
+
+MOST_LISTED = 200
+REFERRING = ("outline", "kit", "design")
+"""Keys whose values may be paths of files."""
+
+
+def design_file(folder: Path, name: str) -> Path:
+    """The design file of this name in the folder. Raises DesignError for any other place."""
+    path = folder / name
+    if not name.endswith(".toml") or "\0" in name or not _lies_in(path, folder):
+        raise DesignError(f"{name[:80]!r} is not a design file (.toml) in {folder}")
+    return path
+
+
+def listed(folder: Path) -> list[str]:
+    """Names of the design files right in the folder."""
+    names = sorted(path.name for path in folder.glob("*.toml") if _lies_in(path, folder))
+    return names[:MOST_LISTED]
+
+
+def read(path: Path) -> tuple[str, str]:
+    """Text and hash of a design file. Raises DesignError where it cannot be read."""
+    try:
+        content = path.read_bytes()
+        return content.decode("utf-8-sig"), _hash(content)
+    except UnicodeDecodeError:
+        raise DesignError(f"{path.name} is not a text file in UTF-8; save it as UTF-8") from None
+    except OSError as error:
+        raise DesignError(f"{path.name} cannot be read: {error.strerror or error}") from None
+
+
+def state(path: Path) -> str:
+    """Hash of what lies on disk; empty where nothing does."""
+    try:
+        return _hash(path.read_bytes())
+    except OSError:
+        return ""
+
+
+def save(path: Path, text: str, seen: str | None) -> str:
+    """Writes the file whole and returns its hash.
+
+    ``seen``: the hash of what the page has read; where another lies there now, raises OutputError.
+    """
+    if seen is not None and state(path) != seen:
+        raise OutputError(f"{path.name} was changed on disk meanwhile; load it, or save over it")
+    content = text.encode("utf-8")
+    try:
+        mode = path.stat().st_mode & 0o777 if path.exists() else 0o644
+        number, fresh = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        try:
+            with os.fdopen(number, "wb") as opened:
+                opened.write(content)
+            Path(fresh).chmod(mode)
+            Path(fresh).replace(path)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                Path(fresh).unlink()
+            raise
+    except OSError as error:
+        raise OutputError(f"{path.name} cannot be written: {error.strerror or error}") from None
+    return _hash(content)
+
+
+def refuse_outside(text: str, folder: Path) -> bool:
+    """Whether a design's text names files; raises DesignError for one outside the folder.
+
+    What is no TOML, or holds a value of another type there, is left to who reads it.
+    """
+    try:
+        tables = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError):
+        return False
+    named = False
+    for key, value in _references(tables):
+        if value in (*api.templates(), "paper"):
+            continue
+        named = True
+        path = folder / value
+        if "\0" in value or not _lies_in(path, folder):
+            raise DesignError(f"{key} = {value[:60]!r} lies outside {folder}; copy it into there")
+        if key.endswith("design") and path.is_file():
+            refuse_outside(path.read_text("utf-8", "replace"), path.parent)
+    return named
+
+
+def _references(tables: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    for key, value in tables.items():
+        if isinstance(value, Mapping):
+            yield from _references(value, f"{prefix}{key}.")
+        elif isinstance(value, str) and key in REFERRING:
+            yield prefix + key, value
+
+
+def _lies_in(path: Path, folder: Path) -> bool:
+    try:
+        return path.resolve().is_relative_to(folder.resolve())
+    except (OSError, ValueError, RuntimeError):
+        return False
+
+
+def _hash(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

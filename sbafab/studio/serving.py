@@ -1,0 +1,83 @@
+"""Starting the studio: what is opened, the port, the link."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+from collections.abc import Callable
+from pathlib import Path
+
+from sbafab import api
+from sbafab.errors import DesignError, OutputError
+from sbafab.studio import places
+from sbafab.studio.links import design_in
+
+ADDRESS = "127.0.0.1"
+PORT = 8417
+"""Tried first, so that a link that was kept finds the studio again."""
+
+
+def opened(source: str | None) -> tuple[Path, str | None, str | None]:
+    """Folder, name of its design file, and text, of what the studio shall open.
+
+    ``source`` is a file, a folder, a template's name, a link that holds a design, or None for the
+    folder one stands in. Raises DesignError.
+    """
+    if source is None:
+        return Path.cwd(), None, None
+    if source.startswith(("http://", "https://")):
+        return Path.cwd(), None, design_in(source)
+    if source in api.templates():
+        return Path.cwd(), None, api.template(source)
+    path = Path(source)
+    if path.is_dir():
+        return path.resolve(), None, None
+    if not path.is_file():
+        raise DesignError(
+            f"{source} is no design file, folder, template or link; the templates are "
+            f"{', '.join(api.templates())}"
+        )
+    folder = path.resolve().parent
+    return folder, places.design_file(folder, path.name).name, None
+
+
+def listening(port: int | None) -> socket.socket:
+    """A socket on this machine alone, at the port or, if none is asked for, at a free one."""
+    for number in (PORT, 0) if port is None else (port,):
+        sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            sock.bind((ADDRESS, number))
+            return sock
+        except OSError as error:
+            sock.close()
+            reason = error.strerror
+    raise OutputError(f"port {port} cannot be used ({reason}); leave out --port to take a free one")
+
+
+def serve(source: str | None, port: int | None, announce: Callable[[str], None]) -> None:
+    """Serves the studio until Ctrl-C; ``announce`` gets the link.
+
+    Raises DesignError and OutputError.
+    """
+    try:
+        import uvicorn
+
+        from sbafab.studio.app import Studio, app
+    except ImportError as error:
+        raise DesignError(
+            f'{error.name} is not installed; add it with pip install "sbafab[studio]"'
+        ) from None
+    folder, name, text = opened(source)
+    studio = Studio(folder, secrets.token_urlsafe(24), name, text)
+    sock = listening(port)
+    announce(f"http://{ADDRESS}:{sock.getsockname()[1]}/#token={studio.token}")
+    config = uvicorn.Config(
+        app(studio),
+        log_level="warning",
+        ws="none",
+        server_header=False,
+        lifespan="on",
+        timeout_graceful_shutdown=1,
+    )
+    uvicorn.Server(config).run(sockets=[sock])

@@ -1,0 +1,98 @@
+// Two designs side by side with one zoom; what only one of them has is marked.
+import { el, plain } from "./dom.js";
+import { PanZoom } from "./panzoom.js";
+import { pathOf } from "./shapes.js";
+import { inkOf } from "./layers.js";
+import { significant } from "./findings.js";
+
+export class Compare {
+  title = "Compare";
+  constructor(studio) {
+    this.studio = studio;
+    this.role = el("select", { "aria-label": "Layer compared", onchange: () => this.draw() });
+    this.halves = ["Before", "Now"].map((words, i) => {
+      const svg = el("svg", { role: "img" }), name = el("h3", {}, words);
+      const half = el("div", { class: "half" }, name, i ? this.role : null, svg);
+      return { half, svg, name };
+    });
+    this.diffs = el("div", { class: "diffs" });
+    this.element = el("div", { class: "view" }, el("div", { class: "surface compare" }, el("div", { class: "twin" }, ...this.halves.map(({ half }) => half)), this.diffs), el("div", { class: "stale-mark" }, "Updating"));
+    this.eyes = this.halves.map(({ half }, i) => new PanZoom(half, () => this.follow(i)));
+    studio.on("laminate reference figures checked theme", () => this.update());
+  }
+  show() { this.update(); }
+  follow(i) {
+    if (this.following) return;
+    this.following = true;
+    const { x, y, scale, touched } = this.eyes[i];
+    Object.assign(this.eyes[1 - i], { x, y, scale, touched });
+    this.draw();
+    this.following = false;
+  }
+  update() {
+    const { reference, laminate } = this.studio;
+    if (!reference || !laminate || this.element.hidden) return;
+    const roles = kinds(laminate), before = kinds(reference.laminate), chosen = this.role.value;
+    this.role.replaceChildren(...[...new Set([...roles.keys(), ...before.keys()])].map((name) => el("option", { value: name }, name)));
+    if (chosen && [...this.role.options].some((option) => option.value === chosen)) this.role.value = chosen;
+    const boxes = [reference.laminate.bounds, laminate.bounds];
+    const box = [0, 1].map((i) => Math.min(...boxes.map((own) => own[i]))).concat([2, 3].map((i) => Math.max(...boxes.map((own) => own[i]))));
+    this.eyes.forEach((eye) => eye.bounds(box, [34, 20, 20, 20]));
+    this.halves[0].name.textContent = `Before: ${reference.name}`;
+    this.halves[1].name.textContent = `Now: ${this.studio.designName}`;
+    this.list();
+    this.draw();
+  }
+  draw() {
+    const { reference, laminate } = this.studio;
+    if (!reference || !laminate) return;
+    const two = [reference.laminate, laminate].map((one) => ({ one, layer: kinds(one).get(this.role.value) }));
+    const paths = two.map(({ one, layer }) => (layer ? pathOf(this.studio.shape(one.patterns[layer.pattern].shape)) : ""));
+    this.halves.forEach(({ svg }, i) => {
+      const eye = this.eyes[i], [ox, oy] = eye.px(0, 0), line = { "vector-effect": "non-scaling-stroke", "fill-rule": "evenodd" };
+      svg.replaceChildren(el("g", { transform: `translate(${ox} ${oy}) scale(${eye.scale} ${-eye.scale})` },
+        two[i].layer ? el("path", { d: paths[i], ...inkOf(two[i].layer), ...line }) : el("g"),
+        // Even-odd of both shapes is what only one of them has.
+        el("path", { d: paths[0] + paths[1], fill: "var(--ghost)", "fill-opacity": 0.45, ...line, class: "difference" }),
+        el("path", { d: paths[1 - i], fill: "none", stroke: "var(--ghost)", "stroke-width": 1, "stroke-dasharray": "4 3", ...line })));
+      svg.setAttribute("aria-label", `${i ? "Now" : "Before"}, ${this.role.value}`);
+    });
+  }
+  list() {
+    const { reference, values, findings, prediction, laminate } = this.studio, rows = [];
+    const head = (words) => rows.push(el("tr", {}, el("th", { colspan: 4, scope: "rowgroup" }, words)));
+    const row = (name, a, b) => rows.push(el("tr", {}, el("td", {}, name), el("td", { class: "v" }, a), el("td", { class: "n" }, "→"), el("td", { class: "v" }, b)));
+    const a = flat(reference.values), b = flat(values);
+    const keys = [...new Set([...a.keys(), ...b.keys()])].filter((key) => a.get(key) !== b.get(key));
+    head(keys.length ? "Keys" : "No key differs");
+    for (const key of keys) row(key, a.get(key) ?? "–", b.get(key) ?? "–");
+    if (laminate.thickness !== reference.laminate.thickness) row("thickness, mm", plain(reference.laminate.thickness), plain(laminate.thickness));
+    const verdicts = (list) => new Map(list.map((finding) => [finding.rule, `${finding.verdict} ${finding.measured ?? ""}`]));
+    const before = verdicts(reference.findings), now = verdicts(findings);
+    const other = [...now.keys()].filter((rule) => before.has(rule) && before.get(rule) !== now.get(rule));
+    if (other.length) head("Rules");
+    for (const rule of other) row(rule, before.get(rule), now.get(rule));
+    const figures = new Map((reference.prediction?.figures ?? []).map((figure) => [figure.group + figure.name + figure.model, figure]));
+    const moved = (prediction?.figures ?? []).filter((figure) => { const was = figures.get(figure.group + figure.name + figure.model); return was && was.value !== figure.value; });
+    if (moved.length) head("Prediction");
+    for (const figure of moved) row(`${figure.name}, ${figure.unit}`, significant(figures.get(figure.group + figure.name + figure.model).value), significant(figure.value));
+    this.diffs.replaceChildren(el("table", { class: "figures" }, el("tbody", {}, ...rows)));
+  }
+}
+// The first layer of each kind, as both designs have it.
+function kinds(laminate) {
+  const found = new Map();
+  for (const layer of laminate.layers) {
+    const place = layer.balloon === 1 ? ", bottom" : layer.balloon === laminate.balloons ? ", top" : "";
+    const name = `${layer.material} ${layer.role.replace("-", " ")}${place}`;
+    if (!found.has(name)) found.set(name, layer);
+  }
+  return found;
+}
+function flat(table, prefix = "", found = new Map()) {
+  for (const [key, value] of Object.entries(table ?? {})) {
+    if (value && typeof value === "object" && !Array.isArray(value)) flat(value, `${prefix}${key}.`, found);
+    else found.set(prefix + key, typeof value === "object" ? JSON.stringify(value) : String(value));
+  }
+  return found;
+}

@@ -1,0 +1,384 @@
+// The actuator under pressure: poses from the fast stack, drawn as they come.
+import { css, el, plain } from "./dom.js";
+import { area, polygons } from "./shapes.js";
+import { listen, tab } from "./server.js";
+import { Stage3D, THREE } from "./stage3d.js";
+
+const TURN = 28, RINGS = 7;
+const PER_MM = 0.003;
+
+export class Motion {
+  title = "Motion";
+  constructor(studio) {
+    this.studio = studio;
+    this.surface = el("div", { class: "surface" });
+    this.side = el("div", { class: "side" });
+    this.element = el("div", { class: "view" }, el("div", { class: "motion" }, this.surface, this.side));
+    this.frames = [];
+    this.times = [];
+    this.trace = [];
+    this.costs = [];
+    this.build();
+    try { this.stage = new Stage3D(this.surface, { up: 10 }); } catch {
+      this.surface.append(el("p", { class: "fallback" }, "This view takes WebGL, which the browser does not offer here. The figures beside it are the same."));
+    }
+    if (this.stage) this.scene();
+    studio.on("laminate", () => { this.stack = null; if (!this.element.hidden) this.load(); });
+    studio.on("opened", () => { this.fitted = false; });
+    studio.on("theme", () => { if (this.stage) { this.stage.repaint(); this.colours(); } this.plots(); });
+  }
+  show() { this.stage?.resize(); if (!this.stack) this.load(); }
+  hide() { this.stop(); }
+
+  build() {
+    this.knobs = el("div", { role: "group", "aria-label": "Pressures" });
+    this.playing = el("button", { "aria-pressed": "false", onclick: () => (this.timer ? this.stop() : this.play()) }, "Play");
+    const gravity = el("input", { type: "checkbox", onchange: (event) => { this.gravity = event.target.checked; this.want(); } });
+    const plate = el("input", { type: "checkbox", "aria-label": "Plate", onchange: (event) => { this.plated = event.target.checked; this.plateHeight.disabled = !this.plated; this.want(); } });
+    this.plateHeight = el("input", { type: "range", min: 0, max: 40, step: 0.1, value: 12, disabled: true, "aria-label": "Height of the plate, mm", oninput: () => { this.plateOut.textContent = `${plain(Number(this.plateHeight.value), 1)} mm`; this.want(); } });
+    this.plateOut = el("output", {}, "12 mm");
+    const number = (label, value, changed) => el("input", { type: "text", inputmode: "decimal", value, "aria-label": label, oninput: changed });
+    this.flow = number("Flow into each chamber, ml/min", "35", () => this.read());
+    this.tubeLength = number("Length of the tube, mm", "150", () => this.fill(true));
+    this.tubeDiameter = number("Inner diameter of the tube, mm", "0.635", () => this.fill(true));
+    const tube = el("input", { type: "checkbox", onchange: (event) => { this.tubed = event.target.checked; this.fill(true); } });
+    this.tubeRows = el("div", {}, el("label", { class: "knob" }, el("span", {}, "Length"), this.tubeLength, el("output", {}, "mm")), el("label", { class: "knob" }, el("span", {}, "Inside"), this.tubeDiameter, el("output", {}, "mm")));
+    this.values = el("dl", { class: "reading", "aria-live": "off" });
+    this.trust = el("div", { class: "trust", role: "status" });
+    this.plot = el("div");
+    this.side.append(el("h3", {}, "Pressure, kPa"), this.knobs, el("div", { class: "group" }, this.playing, el("button", { onclick: () => this.set(() => 0) }, "Vent")),
+      el("h3", {}, "Acting on it"), el("label", { class: "knob" }, el("span", {}, plate, " Plate"), this.plateHeight, this.plateOut), el("label", {}, gravity, " Gravity, base level"), el("p", { class: "trust" }, "Drag the top of the actuator to pull it aside."),
+      el("h3", {}, "Supply"), el("label", {}, tube, " Air through a tube, in real time"), this.tubeRows,
+      el("h3", {}, "Reading"), this.values, el("label", { class: "knob" }, el("span", {}, "Flow"), this.flow, el("output", {}, "ml/min")), this.trust, this.plot);
+    this.tubeRows.hidden = true;
+  }
+  pressures() { return this.sliders?.map(({ input }) => Number(input.value)) ?? []; }
+  set(of) { this.sliders.forEach(({ input, out }, i) => { input.value = of(i); out.textContent = `${plain(Number(input.value), 1)}`; }); this.want(); }
+
+  // The stack of this design; a map of its balloon takes a second or two, once a shape.
+  async load() {
+    const { studio } = this;
+    if (studio.error || !studio.laminate) return;
+    this.say("Working out the balloon of this design", false);
+    const own = (this.loading = {});
+    const text = studio.text;
+    try {
+      await listen("/api/motion", { tab, text, edits: [], name: studio.name, pose: {} }, (answer) => {
+        if (this.loading !== own) return;
+        if (answer.kind === "stack") this.start(answer, text);
+        else if (answer.message) this.refuse(answer.message);
+      });
+    } catch (error) { this.refuse(error.message); }
+  }
+  refuse(message) {
+    this.knobs.replaceChildren();
+    this.sliders = [];
+    this.values.replaceChildren();
+    this.plot.replaceChildren();
+    this.body?.geometry.setDrawRange(0, 0);
+    this.stage?.draw();
+    this.say(message, true);
+  }
+  say(words, beyond) { this.trust.textContent = words; this.trust.classList.toggle("beyond", beyond); }
+  start(stack, text) {
+    const old = this.sliders?.map(({ input }) => input.value) ?? [];
+    Object.assign(this, { stack, text });
+    this.sliders = stack.axes.map((_, i) => {
+      const name = this.studio.laminate.chambers[i]?.name ?? `chamber${i + 1}`;
+      const out = el("output", {});
+      const input = el("input", { type: "range", min: 0, max: stack.most_pressure, step: 0.1, value: old[i] ?? (i ? 0 : 5), "aria-label": `${name}, kPa`, oninput: () => { out.textContent = plain(Number(input.value), 1); this.want(); } });
+      out.textContent = plain(Number(input.value), 1);
+      return { input, out, row: el("label", { class: "knob" }, el("span", {}, name), input, out) };
+    });
+    this.knobs.replaceChildren(...this.sliders.map(({ row }) => row));
+    this.plateHeight.min = Math.ceil(stack.flat_height * 10) / 10;
+    this.plateHeight.max = Math.max(10, stack.levels.length * 2.6);
+    if (this.stage) this.shape();
+    this.fitted = false;
+    this.want();
+  }
+
+  // The newest wish goes out as soon as the last one is answered.
+  want() {
+    this.wanted = true;
+    if (this.tubed) this.settled = false;
+    clearTimeout(this.rest);
+    this.rest = setTimeout(() => { this.curves = true; this.want(); }, 260);
+    if (!this.asking) this.ask();
+  }
+  async ask() {
+    if (!this.stack) return;
+    this.wanted = false;
+    this.asking = true;
+    const now = performance.now(), dt = Math.min(0.1, (now - (this.stepped ?? now)) / 1000) || 0.01;
+    this.stepped = now;
+    const tube = this.tubed ? { length: Number(this.tubeLength.value), diameter: Number(this.tubeDiameter.value), dt, restart: this.restart } : null;
+    this.restart = false;
+    const pose = { tube, pressures: this.pressures(), load: this.pull ?? [0, 0, 0], gravity: Boolean(this.gravity), plate: this.plated ? Number(this.plateHeight.value) : null, curves: this.curves };
+    if (this.curves) clearTimeout(this.rest);
+    this.curves = false;
+    try {
+      await listen("/api/motion", { tab, text: this.text, edits: [], name: this.studio.name, pose }, (answer) => {
+        if (answer.kind === "pose") this.take(answer);
+        else if (answer.kind === "curves") { this.way = answer; this.plots(); }
+        else if (answer.kind === "error") this.say(answer.message, true);
+        else if (answer.message) this.say(answer.message, true);
+      });
+    } catch (error) { this.say(error.message, true); }
+    this.asking = false;
+    // Through a tube the chambers follow their valves until they are as full.
+    if (this.tubed && !this.settled && !this.element.hidden) this.wanted = true;
+    if (this.wanted) this.ask(); else this.stepped = null;
+  }
+  fill(restart) { this.restart = restart; this.tubeRows.hidden = !this.tubed; this.stepped = null; this.want(); }
+  take(pose) {
+    this.pose = pose;
+    if (pose.valves) this.settled = pose.valves.every((p, i) => Math.abs(p - pose.pressures[i]) < 0.01 + 0.002 * p);
+    if (pose.valves?.join() !== this.valves) { this.valves = pose.valves?.join(); this.valvesAt = pose.time; }
+    this.times.push(performance.now());
+    this.trace.push([performance.now() / 1000, pose.height, pose.bend, pose.volumes.reduce((sum, one) => sum + one, 0)]);
+    while (this.trace.length > 2 && this.trace.at(-1)[0] - this.trace[0][0] > 8) this.trace.shift();
+    if (this.times.length > 240) this.times.shift();
+    const before = performance.now();
+    if (this.stage) this.draw();
+    this.read();
+    this.plots();
+    this.costs.push(performance.now() - before);
+    if (this.costs.length > 240) this.costs.shift();
+  }
+  read() {
+    const { pose, stack } = this;
+    if (!pose) return;
+    const volume = pose.volumes.reduce((sum, one) => sum + one, 0), flow = Number(this.flow.value);
+    const most = Math.max(...pose.volumes);
+    const rows = [["Height", `${pose.height.toFixed(2)} mm`], ["Stroke", `${(pose.height - stack.flat_height).toFixed(2)} mm`], ["Bend", `${pose.bend.toFixed(1)}°`], ["Towards", pose.bend > 0.05 ? `${pose.direction.toFixed(0)}°` : "–"], ["Volume", `${volume.toFixed(1)} µl`], ["Force on plate", this.plated ? `${pose.force.toFixed(3)} N` : "–"], ["Fill time", flow > 0 ? `${((most / 1000 / flow) * 60).toFixed(2)} s` : "–"]];
+    if (pose.valves) rows.push(["In the chambers", `${pose.pressures.map((p) => p.toFixed(1)).join(" · ")} kPa`], ["Since the valves", `${(pose.time - this.valvesAt).toFixed(2)} s${this.settled ? ", filled" : ""}`]);
+    if (this.pull) rows.push(["Pull", `${(1000 * Math.hypot(...this.pull)).toFixed(1)} mN`]);
+    this.values.replaceChildren(...rows.flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)]));
+    if (!pose.stable) this.say("Stands as a straight column that would rather buckle", true);
+    else this.say("Elastic films, still air, no calibration on a built actuator; fill time is the fullest chamber at this flow, without the tube's resistance, which Supply has. Walls are drawn as arcs of the film's length.", false);
+  }
+
+  plots() {
+    if (!this.pose) return;
+    if (this.timer || this.tubed) {
+      const t = this.trace.map((row) => row[0] - this.trace[0][0]), of = (i) => this.trace.map((row) => row[i]);
+      this.plot.replaceChildren(el("h3", {}, "The last seconds"), ...[["Height, mm", 1], ["Bend, °", 2], ["Volume, µl", 3]].map(([words, i]) => chart(t, of(i), t.at(-1), of(i).at(-1), words, "s")));
+      return;
+    }
+    if (!this.way?.pressure) return;
+    const p = Math.max(...this.pose.pressures);
+    this.plot.replaceChildren(el("h3", {}, "On the way to these pressures"), chart(this.way.pressure, this.way.height, p, this.pose.height, "Height, mm"), chart(this.way.pressure, this.way.bend, p, this.pose.bend, "Bend, °"), chart(this.way.pressure, this.way.volume, p, this.pose.volumes.reduce((sum, one) => sum + one, 0), "Volume, µl"));
+  }
+
+  scene() {
+    const geometry = new THREE.BufferGeometry();
+    this.body = new THREE.Mesh(geometry, new THREE.MeshPhongMaterial({ side: THREE.DoubleSide, shininess: 26, specular: 0x333a42, vertexColors: true }));
+    this.body.frustumCulled = false;
+    this.base = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 64), new THREE.MeshLambertMaterial());
+    this.base.rotation.x = Math.PI / 2;
+    this.plate = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 64), new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.35 }));
+    this.plate.rotation.x = Math.PI / 2;
+    this.arrow = new THREE.ArrowHelper(new THREE.Vector3(1, 0, 0), new THREE.Vector3(), 1, 0xd6336c, 1.2, 0.7);
+    this.arrow.visible = this.plate.visible = false;
+    this.trail = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ transparent: true, opacity: 0.7 }));
+    this.trail.frustumCulled = false;
+    this.stage.scene.add(this.body, this.base, this.plate, this.arrow, this.trail);
+    this.colours();
+    this.grab();
+  }
+  colours() {
+    this.base.material.color.set(css("--strong"));
+    this.plate.material.color.set(css("--accent"));
+    this.arrow.setColor(css("--select"));
+    this.trail.material.color.set(css("--select"));
+    if (this.stack) { this.shape(); if (this.pose) this.draw(); }
+  }
+  shape() {
+    const { stack } = this, count = stack.levels.length * stack.axes.length;
+    const rows = 2 * RINGS + 2, each = rows * TURN;
+    this.points = new Float32Array(count * each * 3);
+    const colours = new Float32Array(count * each * 3), index = [];
+    const tones = ["--tpe", "--bond", "--waived", "--ptfe", "--pass", "--warn", "--tpe", "--bond"].map((name) => new THREE.Color(css(name)));
+    for (let b = 0; b < count; b++) {
+      const tone = tones[0].clone().lerp(tones[1], 0.22 * (b % stack.axes.length));
+      for (let i = 0; i < each; i++) tone.toArray(colours, (b * each + i) * 3);
+      for (let row = 0; row < rows - 1; row++) for (let t = 0; t < TURN; t++) {
+        const a = b * each + row * TURN + t, c = b * each + row * TURN + ((t + 1) % TURN);
+        index.push(a, c, a + TURN, c, c + TURN, a + TURN);
+      }
+    }
+    const geometry = this.body.geometry;
+    geometry.setAttribute("position", new THREE.BufferAttribute(this.points, 3).setUsage(THREE.DynamicDrawUsage));
+    geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
+    geometry.setIndex(index);
+    geometry.setDrawRange(0, Infinity);
+    this.webs();
+    this.base.scale.set(stack.outline * 1.12, 0.6, stack.outline * 1.12);
+    this.base.position.z = -0.32;
+    this.plate.scale.set(stack.outline * 1.6, 0.15, stack.outline * 1.6);
+    this.tips = [];
+  }
+  // The bonded films between the balloons of a level: the plate's outline, one a level.
+  webs() {
+    const { stack, studio } = this, { laminate } = studio;
+    if (this.web) { this.stage.scene.remove(this.web); this.web.dispose(); this.web = null; }
+    const walls = Object.values(laminate.patterns).filter(({ layers }) => laminate.layers[layers[0] - 1].role === "wall");
+    const wall = walls.sort((a, b) => b.layers.length - a.layers.length)[0];
+    if (!wall || stack.axes.length < 2) return;
+    const round = (x, y, r) => Array.from({ length: 32 }, (_, t) => new THREE.Vector2(x + r * Math.cos(-t * Math.PI / 16), y + r * Math.sin(-t * Math.PI / 16)));
+    const outer = polygons(studio.shape(wall.shape), 0.02).filter((points) => area(points) > 0).sort((a, b) => area(b) - area(a))[0];
+    const shape = new THREE.Shape(outer.map(([x, y]) => new THREE.Vector2(x, y)));
+    for (const [x, y] of stack.axes) shape.holes.push(new THREE.Path(round(x, y, stack.balloons[0].pocket * 0.9)));
+    if (laminate.lumen) shape.holes.push(new THREE.Path(round(0, 0, laminate.lumen / 2)));
+    const flat = new THREE.ShapeGeometry(shape, 1);
+    this.web = new THREE.InstancedMesh(flat, new THREE.MeshLambertMaterial({ color: css("--tpe"), side: THREE.DoubleSide }), stack.levels.length);
+    this.web.frustumCulled = false;
+    this.stage.scene.add(this.web);
+  }
+  place() {
+    const { pose, stack } = this, m = new THREE.Matrix4();
+    stack.levels.forEach((_, level) => {
+      const a = pose.origins[level], b = pose.origins[level + 1], u = pose.axes[level], v = pose.axes[level + 1];
+      const x = new THREE.Vector3(u[0] + v[0], u[3] + v[3], u[6] + v[6]).normalize(), z = new THREE.Vector3(u[2] + v[2], u[5] + v[5], u[8] + v[8]).normalize();
+      const y = new THREE.Vector3().crossVectors(z, x).normalize();
+      // The rims draw the bonded films in as the balloons rise.
+      const { pocket, neck } = stack.balloons[stack.levels[level]], rise = Math.max(...pose.gaps[level]) + stack.pitch;
+      const k = 1 - (pocket - meridian(rise, pocket - neck, neck)[RINGS][0]) / stack.outline;
+      m.makeBasis(x.multiplyScalar(k), y.multiplyScalar(k), z).setPosition((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2);
+      this.web.setMatrixAt(level, m);
+    });
+    this.web.instanceMatrix.needsUpdate = true;
+  }
+  draw() {
+    if (this.web) this.place();
+    const { pose, stack, points } = this, chambers = stack.axes.length;
+    let at = 0;
+    const put = (x, y, z) => { points[at++] = x; points[at++] = y; points[at++] = z; };
+    stack.levels.forEach((kind, level) => {
+      const { neck, pocket, ring } = stack.balloons[kind];
+      const low = frame(pose, level), high = frame(pose, level + 1);
+      for (let c = 0; c < chambers; c++) {
+        const [ax, ay] = stack.axes[c];
+        const bottom = low(ax, ay, 0), top = high(ax, ay, 0);
+        const h = Math.max(0.02, Math.hypot(top[0] - bottom[0], top[1] - bottom[1], top[2] - bottom[2]));
+        const wall = meridian(h, pocket - neck, neck);
+        // From the lower neck out to the rim, along the bonded ring and back to the upper neck.
+        for (let half = 0; half < 2; half++) for (let k = 0; k <= RINGS; k++) {
+          const j = half ? RINGS - k : k;
+          const r = j === RINGS ? wall[RINGS][0] + ring * 0.55 : wall[j][0];
+          const z = wall[j][1];
+          // Between the two plates the frames are blended by height.
+          const s = half ? 1 - z / h : z / h;
+          for (let t = 0; t < TURN; t++) {
+            const x = ax + r * COS[t], y = ay + r * SIN[t];
+            const p = low(x, y, 0), q = high(x, y, 0);
+            put(p[0] + (q[0] - p[0]) * s, p[1] + (q[1] - p[1]) * s, p[2] + (q[2] - p[2]) * s);
+          }
+        }
+      }
+    });
+    const geometry = this.body.geometry;
+    geometry.attributes.position.needsUpdate = true;
+    geometry.computeVertexNormals();
+    const tip = pose.origins.at(-1);
+    this.tips.push(...tip);
+    if (this.tips.length > 900) this.tips.splice(0, 3);
+    this.trail.geometry.dispose();
+    this.trail.geometry = new THREE.BufferGeometry().setAttribute("position", new THREE.Float32BufferAttribute(this.tips, 3));
+    this.plate.visible = Boolean(this.plated);
+    this.plate.position.z = Number(this.plateHeight.value) + 0.1;
+    this.arrow.visible = Boolean(this.pull);
+    if (this.pull) {
+      const way = new THREE.Vector3(...this.pull);
+      this.arrow.position.set(...tip);
+      this.arrow.setLength(Math.max(0.01, way.length() / PER_MM), 1.2, 0.7);
+      this.arrow.setDirection(way.normalize());
+    }
+    if (!this.fitted) {
+      const tall = Math.max(14, stack.levels.length * 1.9), wide = stack.outline * 1.5;
+      this.stage.touched = false;
+      this.stage.fit(new THREE.Box3(new THREE.Vector3(-wide, -wide, -1), new THREE.Vector3(wide, wide, tall)));
+      this.fitted = true;
+    }
+    this.surface.firstChild.setAttribute("aria-label", `Actuator, ${pose.height.toFixed(2)} mm high, bent ${pose.bend.toFixed(1)} degrees`);
+    this.stage.draw();
+  }
+  // Hold the top and pull: a force on the tip along the way of the hand, gone when it lets go.
+  grab() {
+    const canvas = this.surface.firstChild;
+    canvas.addEventListener("pointerdown", (down) => {
+      if (!this.pose || down.button) return;
+      const tip = new THREE.Vector3(...this.pose.origins.at(-1));
+      const seen = tip.clone().project(this.stage.camera), box = canvas.getBoundingClientRect();
+      const away = Math.hypot(((seen.x + 1) / 2) * box.width + box.left - down.clientX, ((1 - seen.y) / 2) * box.height + box.top - down.clientY);
+      const scale = this.stage.camera.position.distanceTo(tip) * 2 * Math.tan((this.stage.camera.fov * Math.PI) / 360) / box.height;
+      if (away * scale > this.stack.outline * 0.8) return;
+      this.stage.controls.enabled = false;
+      canvas.setPointerCapture(down.pointerId);
+      const right = new THREE.Vector3().setFromMatrixColumn(this.stage.camera.matrixWorld, 0), up = new THREE.Vector3().setFromMatrixColumn(this.stage.camera.matrixWorld, 1);
+      const move = (event) => {
+        const way = right.clone().multiplyScalar((event.clientX - down.clientX) * scale).addScaledVector(up, (down.clientY - event.clientY) * scale);
+        this.pull = way.multiplyScalar(PER_MM).toArray();
+        this.want();
+      };
+      const end = () => { canvas.removeEventListener("pointermove", move); this.stage.controls.enabled = true; this.pull = null; this.want(); };
+      canvas.addEventListener("pointermove", move);
+      canvas.addEventListener("pointerup", end, { once: true });
+      canvas.addEventListener("pointercancel", end, { once: true });
+    }, { capture: true });
+  }
+  // Pressure that goes round the chambers; a single chamber breathes.
+  play() {
+    if (!this.sliders?.length) return;
+    const most = Math.max(5, ...this.pressures()), start = performance.now();
+    this.playing.textContent = "Pause";
+    this.playing.setAttribute("aria-pressed", "true");
+    const step = () => {
+      const turn = ((performance.now() - start) / 4000) * 2 * Math.PI, n = this.sliders.length;
+      this.set((i) => (most * (1 + Math.cos(turn - (i * 2 * Math.PI) / n))) / 2);
+      clearTimeout(this.rest);
+      this.timer = requestAnimationFrame(step);
+    };
+    this.timer = requestAnimationFrame(step);
+  }
+  stop() {
+    if (!this.timer) return;
+    cancelAnimationFrame(this.timer);
+    this.timer = null;
+    this.playing.textContent = "Play";
+    this.playing.setAttribute("aria-pressed", "false");
+    this.want();
+  }
+  // Poses drawn a second, over the last ones.
+  rate() { const t = this.times; return t.length > 1 ? (1000 * (t.length - 1)) / (t.at(-1) - t[0]) : 0; }
+  picture() { return this.stage.picture("motion.png"); }
+}
+
+const COS = Array.from({ length: TURN }, (_, t) => Math.cos((2 * Math.PI * t) / TURN));
+const SIN = Array.from({ length: TURN }, (_, t) => Math.sin((2 * Math.PI * t) / TURN));
+
+function frame(pose, i) {
+  const [ox, oy, oz] = pose.origins[i], a = pose.axes[i];
+  return (x, y, z) => [ox + a[0] * x + a[1] * y + a[2] * z, oy + a[3] * x + a[4] * y + a[5] * z, oz + a[6] * x + a[7] * y + a[8] * z];
+}
+
+// A wall as an arc of the film's length, level at the neck: radius and height above the lower plate.
+function meridian(h, length, neck) {
+  const ratio = Math.min(0.72, h / (2 * length));
+  let low = 1e-6, high = 2.33;
+  for (let i = 0; i < 30; i++) { const mid = (low + high) / 2; if ((1 - Math.cos(mid)) / mid < ratio) low = mid; else high = mid; }
+  const turn = low, bow = length / turn;
+  return Array.from({ length: RINGS + 1 }, (_, k) => { const t = (turn * k) / RINGS; return [neck + bow * Math.sin(t), Math.min(h / 2, bow * (1 - Math.cos(t)))]; });
+}
+
+function chart(xs, ys, x, y, words, unit = "kPa") {
+  const w = 268, h = 112, left = 34, low = 92, top = Math.max(...ys, y) || 1, far = Math.max(...xs, x) || 1;
+  const px = (value) => left + ((w - left - 8) * value) / far, py = (value) => low - ((low - 12) * value) / top;
+  const label = (text, ax, ay, anchor) => el("text", { x: ax, y: ay, "text-anchor": anchor, "font-size": 10.5, fill: "var(--soft)" }, text);
+  return el("svg", { viewBox: `0 0 ${w} ${h}`, class: "plot", role: "img", "aria-label": `${words}: ${y.toFixed(1)} at ${x.toFixed(1)} ${unit}` },
+    el("path", { d: `M${left} 8V${low}H${w - 6}`, stroke: "var(--strong)", fill: "none" }),
+    el("path", { d: xs.map((value, i) => `${i ? "L" : "M"}${px(value).toFixed(1)} ${py(ys[i]).toFixed(1)}`).join(""), stroke: "var(--accent)", "stroke-width": 1.8, fill: "none" }),
+    el("circle", { cx: px(x), cy: py(y), r: 4, fill: "var(--select)" }),
+    label(words, left + 6, 16, "start"), label(plain(top, 1), left - 4, 16, "end"), label("0", left - 4, low + 3, "end"), label(`${plain(far, 1)} ${unit}`, w - 6, low + 14, "end"));
+}

@@ -1,0 +1,328 @@
+// The design being edited and what is known of it; views listen, none keeps a copy.
+import { ask, listen, tab } from "./server.js";
+import { recall, remember } from "./dom.js";
+
+const SETTLE = 500;
+const MOST_HISTORY = 200;
+const DRAFT_DAYS = 14;
+
+export class Studio {
+  constructor(started) {
+    Object.assign(this, started);
+    this.name = null;
+    this.text = "";
+    this.savedText = "";
+    this.seen = null;
+    this.pending = new Map();
+    this.history = [];
+    this.place = -1;
+    this.shapes = new Map();
+    this.laminate = null;
+    this.values = null;
+    this.family = null;
+    this.findings = [];
+    this.running = [];
+    this.prediction = null;
+    this.error = null;
+    this.stale = { laminate: true, rules: true, figures: true };
+    this.picked = null;
+    this.hovered = null;
+    this.cut = null;
+    this.reference = null;
+    this.latency = { geometry: [], deck: [], all: [], figures: [] };
+    this.listeners = new Map();
+    this.flight = null;
+    this.figuresFlight = null;
+    this.draftKey = "sbafab-draft:" + (sessionStorage.getItem("sbafab-tab") ?? freshTab());
+  }
+
+  on(names, heard) {
+    for (const name of names.split(" ")) {
+      if (!this.listeners.has(name)) this.listeners.set(name, []);
+      this.listeners.get(name).push(heard);
+    }
+  }
+  emit(name, what) {
+    for (const heard of this.listeners.get(name) ?? []) heard(what);
+  }
+
+  // What is opened: a text with the file it came from (or none) and what lies on disk.
+  open(text, { name = null, seen = null, saved = text } = {}) {
+    Object.assign(this, { text, name, seen, savedText: saved, picked: null, cut: null });
+    this.pending.clear();
+    this.history = [text];
+    this.place = 0;
+    this.emit("opened");
+    this.emit("text", "opened");
+    this.ask();
+    this.watch();
+    this.keep();
+  }
+  get unsaved() { return this.current !== this.savedText; }
+  get current() { return this.text; }
+
+  // Changes keys: [[key, TOML literal or null]]; the server writes them into the text.
+  edit(edits) {
+    for (const [key, value] of edits) this.pending.set(key, value);
+    this.changed();
+  }
+  write(text, from) {
+    if (text === this.text && !this.pending.size) return;
+    this.text = text;
+    this.pending.clear();
+    this.emit("text", from);
+    this.changed();
+    this.settle();
+  }
+  changed() {
+    this.changedAt = performance.now();
+    for (const part of Object.keys(this.stale)) this.stale[part] = true;
+    this.emit("stale");
+    this.ask();
+  }
+
+  // A step of the history, once the hand rests.
+  settle() {
+    clearTimeout(this.settling);
+    this.settling = setTimeout(() => this.commit(), SETTLE);
+    this.keep();
+  }
+  commit() {
+    clearTimeout(this.settling);
+    if (this.history[this.place] === this.text) return;
+    this.history.splice(this.place + 1, Infinity, this.text);
+    if (this.history.length > MOST_HISTORY) this.history.shift();
+    this.place = this.history.length - 1;
+    this.emit("history");
+  }
+  step(by) {
+    this.commit();
+    const next = this.history[this.place + by];
+    if (next === undefined) return;
+    this.place += by;
+    this.text = next;
+    this.pending.clear();
+    this.emit("text", "history");
+    this.emit("history");
+    this.changed();
+    this.keep();
+  }
+
+  // A draft in the browser's store, so that a reload loses nothing.
+  keep() {
+    const { name, text, savedText, seen, folder } = this;
+    remember(this.draftKey, { name, text, savedText, seen, folder, at: Date.now() });
+    this.emit("kept");
+  }
+  draft() {
+    const own = recall(this.draftKey, null);
+    return own && own.folder === this.folder ? own : null;
+  }
+  // The newest unsaved text of a tab that was closed.
+  orphan() {
+    let best = null;
+    for (const key of Object.keys(localStorage).filter((key) => key.startsWith("sbafab-draft:"))) {
+      const found = recall(key, null);
+      if (!found || Date.now() - found.at > DRAFT_DAYS * 864e5) localStorage.removeItem(key);
+      else if (key !== this.draftKey && found.folder === this.folder && found.text !== found.savedText && (!best || found.at > best.at)) best = { ...found, key };
+    }
+    return best;
+  }
+
+  body() {
+    return { tab, text: this.text, edits: [...this.pending], name: this.name, has: [...this.shapes.keys()] };
+  }
+
+  // One request at a time: a drag shows every state it can, and never waits for the rules.
+  ask() {
+    this.wanted = true;
+    if (this.flight && !this.flight.shown) return;
+    this.flight?.abort.abort();
+    this.send();
+    this.askFigures();
+  }
+  async send() {
+    this.wanted = false;
+    const sent = [...this.pending];
+    const flight = (this.flight = { abort: new AbortController(), shown: false, at: this.changedAt ?? performance.now() });
+    this.running = [];
+    this.emit("busy", true);
+    try {
+      await listen("/api/live", this.body(), (answer) => this.heard(answer, flight, sent), flight.abort.signal);
+    } catch (error) {
+      if (error.name !== "AbortError") this.fail({ kind: "lost", message: error.status ? error.message : "the studio does not answer; start sbafab studio again, and this page goes on" });
+    }
+    if (this.flight !== flight) return;
+    this.flight = null;
+    this.emit("busy", false);
+    if (this.wanted) this.ask();
+  }
+  heard(answer, flight, sent) {
+    if (this.flight !== flight) return;
+    const hears = {
+      text: () => this.heardText(answer.text, sent),
+      design: () => {
+        Object.assign(this, { values: answer.values, family: answer.family, designName: answer.name });
+        this.error = null;
+        this.emit("design");
+      },
+      assembly: () => {
+        Object.assign(this, { family: "assembly", designName: answer.name, laminate: null, error: null });
+        this.emit("design");
+        this.emit("laminate");
+      },
+      laminate: () => this.heardLaminate(answer, flight),
+      rule: () => {
+        this.running.push(answer);
+        this.emit("rule", answer);
+        if (answer.rule === "registration-worst-case") this.time("deck", flight);
+      },
+      checked: () => {
+        this.findings = this.running.flatMap((answer) => answer.findings);
+        this.stale.rules = this.wanted;
+        this.time("all", flight);
+        this.emit("checked");
+        this.emit("stale");
+      },
+      superseded: () => {},
+    };
+    (hears[answer.kind] ?? (() => this.fail(answer)))();
+    if (["laminate", "error", "defect", "crashed", "assembly"].includes(answer.kind)) {
+      flight.shown = true;
+      if (this.wanted) this.ask();
+    }
+  }
+  heardText(text, sent) {
+    for (const [key, value] of sent) if (this.pending.get(key) === value) this.pending.delete(key);
+    if (text === this.text) return;
+    this.text = text;
+    this.emit("text", "edits");
+    this.settle();
+  }
+  heardLaminate(answer, flight) {
+    for (const [key, shape] of Object.entries(answer.shapes)) this.shapes.set(key, shape);
+    this.laminate = answer;
+    this.drop();
+    this.stale.laminate = this.wanted;
+    if (!this.cut || !this.cut.moved) this.cut = firstCut(answer);
+    this.emit("laminate");
+    this.emit("stale");
+    requestAnimationFrame(() => setTimeout(() => this.time("geometry", flight)));
+  }
+  drop() {
+    // Shapes of states long gone.
+    if (this.shapes.size < 400) return;
+    const used = new Set([this.laminate, this.reference?.laminate].filter(Boolean).flatMap(shapeKeys));
+    for (const key of this.shapes.keys()) if (!used.has(key)) this.shapes.delete(key);
+  }
+  time(what, flight) {
+    this.latency[what].push(performance.now() - flight.at);
+    this.emit("timing");
+  }
+  fail(answer) {
+    this.error = answer;
+    this.emit("failed", answer);
+    this.emit("stale");
+  }
+  async askFigures() {
+    if (this.figuresFlight) { this.figuresWanted = true; return; }
+    this.figuresWanted = false;
+    const at = this.changedAt ?? performance.now();
+    this.figuresFlight = true;
+    let good = null;
+    try {
+      await listen("/api/predict", this.body(), (answer) => { if (answer.kind === "prediction") good = answer; else if (answer.kind === "error") this.noFigures = answer.message; });
+    } catch { /* the other request says what is wrong */ }
+    this.figuresFlight = false;
+    if (good) {
+      this.prediction = good;
+      this.noFigures = null;
+      this.stale.figures = this.figuresWanted;
+      this.latency.figures.push(performance.now() - at);
+      this.emit("figures");
+      this.emit("stale");
+    } else this.emit("figures");
+    if (this.figuresWanted) this.askFigures();
+  }
+
+  // A look at the file on disk whenever it changes.
+  async watch() {
+    this.watching?.abort();
+    if (!this.name) return;
+    const own = (this.watching = new AbortController());
+    while (!own.signal.aborted) {
+      try {
+        await listen(`/api/watch/${encodeURIComponent(this.name)}`, undefined, ({ sha }) => this.onDisk(sha), own.signal);
+      } catch (error) { if (error.name === "AbortError") return; }
+      await new Promise((done) => setTimeout(done, 1500));
+    }
+  }
+  async onDisk(sha) {
+    if (sha === this.seen || sha === "") return;
+    const found = await ask(`/api/file/${encodeURIComponent(this.name)}`).catch(() => null);
+    if (!found || found.sha === this.seen) return;
+    if (this.unsaved && found.text !== this.text) { this.emit("conflict", found); return; }
+    this.take(found);
+  }
+  take(found) {
+    this.seen = found.sha;
+    this.savedText = found.text;
+    this.write(found.text, "disk");
+    this.keep();
+    this.emit("saved");
+  }
+  async save(name, over = false) {
+    this.commit();
+    const same = name === this.name;
+    const { sha } = await ask("/api/save", { name, text: this.text, seen: over ? null : same ? this.seen : "" });
+    Object.assign(this, { name, seen: sha, savedText: this.text });
+    if (!same) this.watch();
+    this.keep();
+    this.emit("saved");
+  }
+
+  pin() {
+    this.reference = this.reference ? null : {
+      name: this.designName, text: this.text, laminate: this.laminate, values: this.values,
+      findings: this.findings, prediction: this.prediction,
+    };
+    this.emit("reference");
+  }
+  layer(index) { return this.laminate?.layers[index - 1]; }
+  pick(layer) { this.picked = layer; this.emit("pick"); }
+  hover(layer, words = "") {
+    if (layer === this.hovered && words === this.hoverWords) return;
+    this.hovered = layer;
+    this.hoverWords = words;
+    this.emit("hover", words);
+  }
+  recut() { this.cut = firstCut(this.laminate); this.emit("cut"); }
+  moveCut(cut) { this.cut = { ...cut, moved: true }; this.emit("cut"); }
+  shape(key) { return this.shapes.get(key) ?? []; }
+}
+
+export const shapeKeys = (laminate) => [
+  ...Object.values(laminate.patterns).map((pattern) => pattern.shape),
+  ...laminate.bonds.flatMap((bond) => [bond.shape, bond.open]),
+];
+
+function freshTab() {
+  const id = crypto.randomUUID();
+  sessionStorage.setItem("sbafab-tab", id);
+  return id;
+}
+
+// The plane through the first chamber's axis and its inlet.
+function firstCut(laminate) {
+  const inlet = laminate.inlets[0], chamber = laminate.chambers[0];
+  const bore = laminate.bores.find((found) => found.chamber === chamber?.name);
+  const [x, y] = bore?.centre ?? chamber?.centres[0] ?? [0, 0];
+  const [u, v] = inlet?.chamber === chamber?.name ? inlet.direction : [1, 0];
+  return { x, y, u, v, moved: false };
+}
+
+export const roleWords = (layer) => layer.role.replace("-", " ");
+export function layerWords(layer) {
+  const balloon = layer.balloon ? `, balloon ${layer.balloon}` : "";
+  return `Layer ${layer.index} ${layer.material} ${roleWords(layer)}${balloon}, ${layer.pattern}`;
+}

@@ -1,0 +1,176 @@
+"""What a newcomer meets: a screenful, errors for programs, hints, completion, watching."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.shell_completion import ShellComplete
+
+from sbafab.assemblies.checks import CHECKS
+from sbafab.cli import app, main
+from sbafab.cli.watching import repeated, stamps
+from sbafab.rules.deck import rule_names
+from sbafab.rules.explained import AS_BUILT, BETWEEN_PARTS, DECK, EXPLAINED
+
+
+def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    out, err = capsys.readouterr()
+    return int(ended.value.code or 0), out, err
+
+
+def test_check_fits_a_screen_and_sums_up_last(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    code, out, _ = run(["check", "3dof-15mm"], capsys)
+    assert code == 0
+    lines = out.splitlines()
+    assert len(lines) <= 24
+    assert max(map(len, lines)) <= 80
+    for rule in rule_names():
+        assert sum(line.startswith(f"{rule} ") for line in lines) == 1, rule
+    assert "registration-worst-case: align layers 2 to 3 in step 2 with care" in out
+    assert lines[-1] == "3dof-15mm holds: 15 rules pass, 1 warns. Details: -v"
+    _, said, _ = run(["check", "3dof-15mm", "-v"], capsys)
+    assert "largest contribution" in said
+
+
+def test_check_json_names_schema_design_and_summary(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["check", "1dof-5mm", "--set", "stack.balloons=1", "--json"]
+    code, out, _ = run([*arguments, "--set", "mask.overhang=0.47"], capsys)
+    found = json.loads(out)
+    assert code == 1
+    assert (found["schema"], found["design"]) == ("sbafab/checks@1", "1dof-5mm")
+    failed = {f["rule"] for f in found["findings"] if f["verdict"] == "fail"}
+    assert (found["summary"]["holds"], found["summary"]["fail"]) == (False, len(failed))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "kind", "exit_code"),
+    [
+        (["check", "nosuch", "--json"], "input", 2),
+        (["check", "--json"], "usage", 2),
+        (["generate", "1dof-5mm", "--json", "--bogus"], "usage", 2),
+        (["cut", "radial-15mm", "--json", "--set", "sheets.tpe.width=40"], "too-large", 1),
+    ],
+)
+def test_errors_are_told_to_programs_too(
+    arguments: list[str],
+    kind: str,
+    exit_code: int,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(arguments, capsys)
+    told = json.loads(out)
+    assert code == told["error"]["exit_code"] == exit_code
+    assert (told["schema"], told["error"]["kind"]) == ("sbafab/error@1", kind)
+    assert err == f"sbafab: {told['error']['message']}\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_without_its_ending_is_guessed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "colon.toml").write_text('family = "1dof"\n')
+    code, _, err = run(["generate", "colon"], capsys)
+    assert code == 2
+    assert err.endswith("did you mean colon.toml?\n")
+
+
+def test_every_rule_and_check_is_explained(capsys: pytest.CaptureFixture[str]) -> None:
+    assert tuple(DECK) == rule_names()
+    assert set(BETWEEN_PARTS) == set(CHECKS)
+    assert set(AS_BUILT) == {"file-integrity", "manifest-claims", "as-designed"}
+    code, out, _ = run(["explain", "mask-overhang"], capsys)
+    assert code == 0
+    assert "rules.mask_overhang" in out
+    code, out, _ = run(["explain"], capsys)
+    assert [line.split()[0] for line in out.splitlines()] == list(EXPLAINED)
+    code, _, err = run(["explain", "mask-overhag"], capsys)
+    assert code == 2
+    assert "did you mean mask-overhang?" in err
+
+
+def test_the_keys_that_are_named_are_keys(capsys: pytest.CaptureFixture[str]) -> None:
+    from sbafab.actuators import records
+    from sbafab.assemblies.records import Assembly
+    from sbafab.design.reading import key_paths
+
+    known = set(key_paths(Assembly))
+    for record in records().values():
+        known |= set(key_paths(record))
+    assert {key for one in EXPLAINED.values() for key in one.keys} - known == set()
+
+
+def completed(arguments: list[str], typed: str) -> list[str]:
+    shell = ShellComplete(app, {}, "sbafab", "_SBAFAB_COMPLETE")
+    return [str(item.value) for item in shell.get_completions(arguments, typed)]
+
+
+def test_shells_complete_templates_keys_and_rules() -> None:
+    assert set(completed(["check"], "3d")) >= {"3dof-15mm"}
+    assert set(completed(["new"], "")) >= {"kit", "coupon", "brace"}
+    assert completed(["explain"], "seal") == ["sealing"]
+    assert completed(["generate", "1dof-5mm", "--waive"], "bond") == ["bond-width"]
+    assert "chamber.diameter=" in completed(["check", "1dof-5mm", "--set"], "chamber.")
+    methods = completed(["check", "1dof-5mm", "--set"], "registration.method=")
+    assert methods == [f"registration.method={name}" for name in ("channel-pin", "ears", "sheet")]
+
+
+def test_a_shell_gets_its_script() -> None:
+    script = subprocess.run(
+        [sys.executable, "-c", "from sbafab.entry import main; main()"],
+        env={"_SBAFAB_COMPLETE": "zsh_source", "PATH": "/usr/bin:/bin"},
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=Path(__file__).parents[2],
+    )
+    assert "compdef" in script.stdout
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("check", "cut files would say so"),
+        ("cut", "Let cut files be written"),
+        ("press", "Let the schedule be written"),
+        ("predict", "Let the prediction be written"),
+    ],
+)
+def test_waive_speaks_of_its_command(
+    command: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, out, _ = run([command, "--help"], capsys)
+    assert words in " ".join(out.split())
+
+
+def test_watching_looks_again_at_what_changed_only(tmp_path: Path) -> None:
+    design = tmp_path / "mine.toml"
+    design.write_text("a = 1\n")
+    assert list(stamps(design)) == [design]
+    seen: list[str] = []
+
+    def once() -> None:
+        seen.append(design.read_text())
+        if len(seen) == 1:
+            design.write_text("a = 22\n")
+
+    repeated(once, design, looks=3)
+    assert seen == ["a = 1\n", "a = 22\n"]
+
+
+def test_watch_is_for_people(capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, err = run(["check", "1dof-5mm", "--watch", "--json"], capsys)
+    assert code == 2
+    assert "--watch is for people" in err

@@ -1,0 +1,199 @@
+"""The stack in real time: symmetry, energy, series, loads, and what other programs found."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import sbafab
+from sbafab.errors import DesignError
+from sbafab.models.balloon import inflate
+from sbafab.models.balloon_map import BalloonMap
+from sbafab.models.series import blocked
+from sbafab.models.stack import Plate, Stack
+from sbafab.models.stack_balance import _loaded
+
+
+@pytest.fixture(scope="module")
+def three() -> Stack:
+    return sbafab.stack("3dof-15mm")
+
+
+@pytest.fixture(scope="module")
+def balloon(three: Stack) -> BalloonMap:
+    return three.maps[0]
+
+
+def test_a_map_is_the_balloon_that_it_was_made_from(balloon: BalloonMap) -> None:
+    # Places that no balloon of the map was computed at, pushed on and pulled on.
+    p, h = np.array([0.7, 3.3, 8.1, 47.0]), np.array([0.33, 0.81, 1.6, 0.52])
+    found = inflate(balloon.balloon, p, h, tied=True)
+    assert balloon.force(p, h) == pytest.approx(found.force, rel=0.02, abs=0.5)
+    assert balloon.volume(p, h) == pytest.approx(found.volume, rel=0.01)
+    free = inflate(balloon.balloon, [1.0, 5.0, 20.0])
+    assert balloon.free_height([1.0, 5.0, 20.0]) == pytest.approx(free.height, rel=0.01)
+
+
+def test_a_map_keeps_energy(balloon: BalloonMap) -> None:
+    """Force and volume are slopes of one potential, so what goes in on a way round comes out."""
+    p, h = np.meshgrid(np.linspace(1.0, 9.0, 41), np.linspace(0.2, 1.4, 41))
+    force, volume = balloon.force(p, h), balloon.volume(p, h)
+    by_height = np.gradient(volume, h[:, 0], axis=0, edge_order=2)
+    by_pressure = np.gradient(force, p[0], axis=1, edge_order=2)
+    # Maxwell: dF/dp at a height is dV/dh at a pressure.
+    assert by_pressure[2:-2, 2:-2] == pytest.approx(by_height[2:-2, 2:-2], rel=0.02)
+
+
+def test_a_pressure_outside_the_map_is_refused(three: Stack) -> None:
+    with pytest.raises(DesignError, match="give 0 to 110 kPa"):
+        three.pose((111, 0, 0))
+    with pytest.raises(DesignError, match="2 pressures are given for 3 chambers"):
+        three.pose((1, 1))
+
+
+def test_equal_pressures_stand_straight(three: Stack) -> None:
+    pose = three.pose((5, 5, 5))
+    assert pose.bend == pytest.approx(0.0, abs=1e-6)
+    assert pose.tip[:2] == pytest.approx([0.0, 0.0], abs=1e-6)
+    alone = inflate(three.maps[0].balloon, 5.0)
+    assert pose.height == pytest.approx(1.865 + 15 * alone.height[0], rel=0.01)
+    assert pose.volumes == pytest.approx(np.full(3, 15 * alone.volume[0]), rel=0.01)
+
+
+def test_chambers_that_change_places_turn_the_pose(three: Stack) -> None:
+    first, second = three.pose((5, 2, 0)), three.pose((0, 5, 2))
+    third = math.tau / 3
+    turn = np.array([[math.cos(third), -math.sin(third)], [math.sin(third), math.cos(third)]])
+    assert turn @ first.tip[:2] == pytest.approx(second.tip[:2], abs=1e-6)
+    assert second.height == pytest.approx(first.height)
+    assert second.bend == pytest.approx(first.bend)
+    assert (second.direction - first.direction) % 360 == pytest.approx(120)
+
+
+def test_bends_as_shells_in_other_programs_do(three: Stack) -> None:
+    # SOFA, shells, 5 kPa: 81 and 91.6 degrees with two chambers on two meshes, 96 and 117 with one.
+    assert 78 < three.pose((5, 5, 0)).bend < 92
+    assert 96 < three.pose((5, 0, 0)).bend < 117
+
+
+def test_one_chamber_is_its_balloons_in_series() -> None:
+    one = sbafab.stack("1dof-5mm")
+    alone = inflate(one.maps[0].balloon, [10.0, 100.0], [0.5, 0.5], tied=True)
+    for pressure, force in zip((10, 100), alone.force, strict=True):
+        held = one.pose((pressure,), plate=one.flat_height + 6 * 0.5)
+        assert held.force == pytest.approx(force / 1000, rel=0.02)
+        assert float(blocked(one, pressure, 6 * 0.5)) == pytest.approx(force / 1000, rel=0.02)
+
+
+def test_a_tapered_stack_pushes_at_most_as_its_smallest_balloon() -> None:
+    sizes = [12.0, 9.0, 6.0]
+    taper = sbafab.stack("1dof-10mm", {"chamber.diameter": sizes}, "stack.balloons=3")
+    bound = 100e-3 * math.pi * 3.0**2
+    found = blocked(taper, 100.0, np.linspace(0, 3, 7))
+    assert (found <= bound).all()
+    assert (np.diff(found) <= 1e-9).all()
+    assert found[0] > 0.9 * bound
+    predicted = sbafab.predict("1dof-10mm", {"chamber.diameter": sizes}, "stack.balloons=3")
+    assert predicted.value("blocked force at 100 kPa, flat", "elastic stack") <= bound
+
+
+def test_without_a_load_all_levels_are_alike_in_the_full_solve_too(three: Stack) -> None:
+    alike = three.pose((6, 3, 1))
+    full = three.pose((6, 3, 1), tip_load=(1e-9, 0, 0))
+    assert full.freedoms == pytest.approx(alike.freedoms, abs=1e-5)
+
+
+def test_gradients_of_a_loaded_stack_are_those_of_its_energy(three: Stack) -> None:
+    springs = three.springs((20, 8, 3)).of(three.levels)
+    plate = Plate((0.3, 0.0, 9.0), (0.1, 0.0, 1.0))
+    load = three._load((0.1, 0.2, -0.3), (0.0, 0.3, -1.0), plate)
+    assert load is not None
+    at = np.full((15, 3), 0.02) + np.linspace(0, 0.01, 45).reshape(15, 3)
+    at[:, 0] += 0.6
+    _, slope, matrix, push = _loaded(springs, three.pitch, load, at)
+    assert push > 0
+    for number in (0, 1, 20, 43):
+        step = np.zeros(45)
+        step[number] = 1e-6
+        up = _loaded(springs, three.pitch, load, at + step.reshape(15, 3))
+        down = _loaded(springs, three.pitch, load, at - step.reshape(15, 3))
+        assert (up[0] - down[0]) / 2e-6 == pytest.approx(slope[number], rel=1e-4)
+        # What the tilts of one joint do to each other is taken at their mean.
+        other = np.arange(45) // 3 != number // 3
+        found = (up[1] - down[1]) / 2e-6
+        assert found[other] == pytest.approx(matrix[number][other], rel=0.01, abs=2e3)
+        assert found == pytest.approx(matrix[number], rel=0.1, abs=2e3)
+
+
+def test_a_plate_gets_the_work_that_the_air_does_not_leave_in_the_films(three: Stack) -> None:
+    low, high = (three.pose((10, 10, 10), plate=height) for height in (12.0, 12.1))
+    gained = 10 * (high.volumes - low.volumes).sum() - (high.energy - low.energy)
+    force = 1000 * (low.force + high.force) / 2
+    assert gained == pytest.approx(force * (high.height - low.height), rel=0.01)
+
+
+def test_loads_move_the_tip_their_way(three: Stack) -> None:
+    free = three.pose((5, 5, 5))
+    pressed = three.pose((5, 5, 5), tip_load=(0, 0, -0.05))
+    assert pressed.height < free.height
+    assert pressed.tip[:2] == pytest.approx([0, 0], abs=1e-6)
+    pushed = three.pose((5, 5, 5), tip_load=(0.002, 0, 0))
+    assert pushed.tip[0] > 0.5
+    assert pushed.direction == pytest.approx(0.0, abs=1e-6)
+    hanging = three.pose((5, 0, 0), gravity=True)
+    assert hanging.height < three.pose((5, 0, 0)).height
+
+
+def test_antagonists_stand_stiffer_at_one_height() -> None:
+    """Two chambers against each other: where they bend to is their difference, how firmly their
+    sum.
+    """
+    two = sbafab.stack("3dof-15mm", "chamber.count=2")
+    soft, firm = two.pose((2, 2)), two.pose((10, 10))
+    assert [soft.bend, firm.bend] == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert firm.height > soft.height
+
+    def gives(pressure: float) -> float:
+        return two.pose((pressure, pressure), tip_load=(1e-4, 0, 0)).bend
+
+    assert gives(10) < gives(2)
+
+
+def test_empty_chambers_do_not_sink_into_each_other(three: Stack) -> None:
+    pose = three.pose((20, 0, 0))
+    assert pose.gaps.min() > -0.02
+
+
+def test_frames_are_a_chain_of_plates(three: Stack) -> None:
+    pose = three.pose((5, 3, 0))
+    places, axes = pose.frames
+    assert places.shape == (16, 3)
+    assert axes @ axes.transpose(0, 2, 1) == pytest.approx(np.tile(np.eye(3), (16, 1, 1)))
+    assert places[-1] == pytest.approx(pose.tip)
+    top = axes[-1][:, 2]
+    assert math.degrees(math.acos(top[2])) == pytest.approx(pose.bend, abs=0.01)
+    assert math.degrees(math.atan2(top[1], top[0])) == pytest.approx(pose.direction, abs=0.01)
+    assert np.linalg.norm(np.diff(places, axis=0), axis=1) == pytest.approx(
+        three.pitch + pose.freedoms[:, 0]
+    )
+
+
+def test_calibration_makes_pockets_smaller_or_films_stiffer() -> None:
+    from sbafab.models.figures import Factors
+    from sbafab.models.stack import stack
+
+    design = sbafab.load("1dof-5mm")
+    smaller = stack(design, factors=Factors(pocket_loss=0.3))
+    drawn = smaller.maps[0].balloon
+    assert (drawn.pocket, drawn.ring) == pytest.approx((2.2, 1.05))
+    assert replace(drawn, pocket=2.5, ring=0.75) == stack(design).maps[0].balloon
+    with pytest.raises(DesignError, match="no wider than the neck"):
+        stack(design, factors=Factors(pocket_loss=1.2))
+
+
+def test_what_has_no_round_pockets_is_refused() -> None:
+    with pytest.raises(DesignError, match="no round pockets"):
+        sbafab.stack("radial-15mm")

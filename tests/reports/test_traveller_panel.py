@@ -1,0 +1,75 @@
+"""The traveller of registered sheets at the bench: nothing missing between the platens."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import Any
+
+from lxml import html as lxml_html
+
+from sbafab.actuators import build, load_design
+from sbafab.output.settings import press_settings
+from sbafab.pressing.schedule import schedule
+from sbafab.reports.traveller.exploded import BOLD
+from sbafab.reports.traveller.job import Job
+from sbafab.reports.traveller.page import traveller_html
+
+SHA = "0123456789abcdef" * 4
+
+
+@cache
+def tree() -> Any:
+    design = load_design("3dof-15mm", ('registration.method="sheet"',))
+    laminate = build(design)
+    plan = schedule(laminate, press_settings(design))
+    return lxml_html.fromstring(traveller_html(design, laminate, plan, [], Job(SHA, "sbafab 1")))
+
+
+def words_of(node: Any) -> str:
+    return " ".join(node.text_content().split())
+
+
+def steps() -> list[str]:
+    return [words_of(step) for step in tree().find_class("step")]
+
+
+def test_every_press_step_has_its_pad_its_pins_and_one_time() -> None:
+    first, last = steps()
+    for step, minutes in ((first, 10), (last, 20)):
+        # Without the pad the force would lie on the sheets alone.
+        assert "Cover with a release film and the press pad" in step
+        assert step.count("timer") == 1
+        assert f"start the timer, {minutes} min, when a thermocouple" in step
+        assert "every pin reaches through the highest sheet" in step
+        assert "do not stand higher" not in step
+    assert "Drive in the corner pins to their heights (above)" in first
+    # The stack stays on its pins, so that they are set once, for the highest stack.
+    heights = {
+        found[1] for step in (first, last) if (found := re.search(r"([\d.]+) mm over it", step))
+    }
+    assert heights == {f"{30 * 0.038 + 29 * 0.025 + 0.05 + 0.3:.2f}"}
+    tack = words_of(tree().get_element_by_id("sheets").getparent())
+    assert "a release film and the press pad on top" in tack
+
+
+def test_labels_of_the_picture_do_not_run_into_each_other() -> None:
+    def wide(words: str, size: float) -> float:
+        # Digits and capitals of Helvetica, Arial and Liberation Sans are at most 0.72 em wide,
+        # and 0.58 on average in words.
+        return 0.5 * size * len(words)
+
+    for picture in tree().xpath(
+        '//svg[starts-with(@id, "exploded") or contains(@aria-label, "apart")]'
+    ):
+        width = float(picture.get("viewbox", picture.get("viewBox")).split()[2])
+        rows: dict[str, list[tuple[float, float]]] = {}
+        for text in picture.iter("text"):
+            size, x = float(text.get("font-size")), float(text.get("x"))
+            bold = BOLD if "bold" in (text.get("font-weight") or "") else 1.0
+            rows.setdefault(text.get("y"), []).append((x, x + bold * wide(text.text, size)))
+        assert rows
+        for spans in rows.values():
+            spans.sort()
+            assert all(b <= c for (_, b), (c, _) in zip(spans, spans[1:], strict=False)), spans
+            assert spans[-1][1] <= width

@@ -1,0 +1,86 @@
+"""Recording from Python, and of whole assemblies."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import sbafab
+from sbafab.assemblies.build import assemble
+from sbafab.assemblies.reading import load
+from sbafab.assemblies.records import Assembly
+from sbafab.assemblies.writing import assembly_sha256, assembly_toml
+from sbafab.design.writing import design_toml
+from sbafab.errors import DesignError
+from sbafab.reports.traveller.code import record_text
+from sbafab.results.finding import found_by
+from sbafab.results.store import Lab
+
+SMALL = {"stack": {"balloons": 2}, "rules": {"yield_builds": 100}}
+
+
+def test_python_records_what_the_command_does(tmp_path: Path) -> None:
+    lab = tmp_path / "lab.sqlite"
+    design = sbafab.load("1dof-5mm", **SMALL)
+    [first] = sbafab.record(
+        design, lab=lab, serial="A1", leak="pass", stroke_mm=2.2, offset_mm=(0.03, 0.05)
+    )
+    [second] = sbafab.record("1dof-5mm", lab=lab, serial="A1", burst_kpa=350, cut_mm=0.1, **SMALL)
+    assert (first.id, second.id) == (1, 2)
+    assert first.design_sha256 == second.design_sha256
+    assert first.kit == "paper"
+    assert first.errors["offset_mm"] == (0.03, 0.05)
+    table = tmp_path / "batch.csv"
+    table.write_text("serial;leak\nB1;pass\nB2;fail\n")
+    assert [one.serial for one in sbafab.record(design, lab=lab, table=table)] == ["B1", "B2"]
+    told = sbafab.report(lab)
+    assert (told.records, told.items) == (4, 3)
+    records, _ = Lab(lab).contents()
+    assert records[0] == first
+
+
+@pytest.mark.parametrize(
+    ("said", "says"),
+    [
+        ({"leak": "pass"}, "needs its serial"),
+        ({"serial": "A1"}, "say what came out"),
+        ({"serial": "A1", "leak": "maybe"}, "write pass or fail"),
+        ({"serial": "A1", "stroke_mm": -1}, "stroke_mm is -1; it must be above 0"),
+        ({"serial": "A1", "leak": "pass", "table": "x.csv"}, "leave out serial, leak"),
+    ],
+)
+def test_bad_input_is_one_sentence(said: dict[str, object], says: str, tmp_path: Path) -> None:
+    lab = tmp_path / "lab.sqlite"
+    with pytest.raises(DesignError, match=says):
+        sbafab.record("1dof-5mm", lab=lab, **SMALL, **said)
+    assert not lab.exists()
+
+
+def test_an_assembly_is_recorded_as_a_whole(tmp_path: Path) -> None:
+    lab = tmp_path / "lab.sqlite"
+    [made] = sbafab.record("standing", lab=lab, serial="S1", leak="pass", mass_g=12.5)
+    whole = load("standing")
+    assert isinstance(whole, Assembly)
+    put = assemble(whole)
+    assert made.design_sha256 == assembly_sha256(put)
+    # The folder that it was built from is the same assembly.
+    folder = tmp_path / "standing"
+    folder.mkdir()
+    (folder / "design.toml").write_text(assembly_toml(put))
+    for own in put.designs:
+        (folder / own.design.name).mkdir()
+        (folder / own.design.name / "design.toml").write_text(design_toml(own.design))
+    [again] = sbafab.record(folder, lab=lab, serial="S1", note="dropped")
+    assert again.design_sha256 == made.design_sha256
+    records, builds = Lab(lab).contents()
+    build = builds[made.design_sha256]
+    assert (build.name, build.family, build.predicted) == ("standing", "assembly", {})
+    assert made.kit == "paper"
+    # Three actuators of one design: the whole holds where all three do.
+    sbafab.record("3dof-15mm", lab=lab, serial="P1", leak="pass")
+    part = next(one for one in Lab(lab).contents()[1].values() if one.name == "3dof-15mm")
+    good, of = part.good_builds
+    assert build.good_builds[0] / build.good_builds[1] == pytest.approx((good / of) ** 3, abs=1e-4)
+    scanned = record_text("standing", made.design_sha256, "sbafab 1.0.0")
+    assert found_by(scanned, "", records, builds) == [made, again]

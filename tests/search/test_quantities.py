@@ -1,0 +1,100 @@
+"""What requirements are about: read, refused, and worth what geometry and other models say."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+import sbafab
+from sbafab.errors import DesignError
+from sbafab.search.quantities import Quantity, Subject, read_quantity
+from sbafab.search.requirements import read_all
+
+
+def _value(text: str, name: str = "1dof-5mm", **tables: Any) -> float:
+    design = sbafab.load(name, **tables)
+    return Subject(design, sbafab.build(design)).value(read_quantity(text), lambda: 0.875)
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("mass", Quantity("mass", "g")),
+        ("overall-diameter", Quantity("overall_diameter", "mm")),
+        ("stroke@0.5bar", Quantity("stroke", "mm", 50.0)),
+        ("stroke", Quantity("stroke", "mm", 10.0)),
+        ("force@12.5mm@50kPa", Quantity("force", "N", 50.0, 12.5)),
+        ("force@50 kPa@0.5 in", Quantity("force", "N", 50.0, 12.7)),
+        ("chamber.diameter", Quantity("chamber.diameter", "")),
+    ],
+)
+def test_a_quantity_is_read(text: str, found: Quantity) -> None:
+    assert read_quantity(text) == found
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("masses", "is no quantity"),
+        ("mass@50kPa", "only stroke and force"),
+        ("force@50kPa", "told at a stroke"),
+        ("stroke@5mm@50kPa", "a stroke is not"),
+        ("stroke@50 apples", "neither a pressure nor a length"),
+        ("stroke@500kPa", "367"),
+    ],
+)
+def test_what_is_no_quantity_is_said(text: str, said: str) -> None:
+    with pytest.raises(DesignError, match=said):
+        read_quantity(text)
+
+
+def test_a_stroke_without_a_pressure_is_at_the_highest_named() -> None:
+    requirements, goal = read_all(["stroke=25", "force@12.5mm@50kPa=3"], ["mass=1"], "stroke")
+    assert requirements[0].quantity.kpa == goal.quantity.kpa == 50
+    assert goal.more
+    stroke, force, mass = requirements
+    assert stroke.margin(26.0) == pytest.approx(0.04)
+    assert mass.margin(1.1) == pytest.approx(-0.1)
+    assert force.holds(3.0)
+    assert not force.holds(2.99)
+    for text in ("stroke", "stroke=", "stroke=much"):
+        with pytest.raises(DesignError, match="--min"):
+            read_all([text], [], "mass")
+
+
+def test_sizes_are_those_of_the_geometry() -> None:
+    # d + 2 bonds; 2 x (1 + 2 bonds + d) round the lumen, the paper's 15.
+    assert _value("outline_diameter") == pytest.approx(6.5)
+    assert _value("outline_diameter", "3dof-15mm") == pytest.approx(15.0)
+    assert _value("lumen", "3dof-15mm") == 2.0
+    assert _value("deflated_diameter", "radial-15mm") == pytest.approx(15.328)
+    assert _value("height") == pytest.approx(12 * 0.038 + 11 * 0.025)
+    assert _value("chamber.diameter") == 5.0
+    assert _value("yield") == 0.875
+    with pytest.raises(DesignError, match="has no lumen"):
+        _value("lumen")
+
+
+def test_balloons_in_series_rise_more_and_push_as_hard() -> None:
+    six, twelve = {"balloons": 6}, {"balloons": 12}
+    one = _value("force@3mm@30kPa", stack=six)
+    assert _value("force@6mm@30kPa", stack=twelve) == pytest.approx(one, rel=1e-9)
+    assert _value("stroke@10kPa", stack=twelve) == pytest.approx(
+        2 * _value("stroke@10kPa", stack=six), rel=1e-9
+    )
+    # Three chambers push on one plate.
+    assert _value("force@3mm@30kPa", "3dof-15mm", stack=six) == pytest.approx(3 * one, rel=1e-9)
+
+
+def test_stroke_and_force_are_those_of_predict_and_of_a_flat_balloon() -> None:
+    said = sbafab.predict("1dof-5mm", pressures_kpa=[5.0]).value("free stroke at 5 kPa")
+    assert _value("stroke@5kPa") == pytest.approx(said, rel=1e-3)
+    # Hardly raised, the film lies flat on the plates all over its pocket.
+    flat = 10e-3 * math.pi * 2.5**2
+    assert flat * 0.9 < _value("force@0.05mm@10kPa") <= flat
+    # It gets no higher than its free stroke, and pushes the less the nearer it is to it.
+    near = [_value(f"force@{stroke}mm@5kPa") for stroke in (2, 4, 6)]
+    assert near == sorted(near, reverse=True)
+    assert _value(f"force@{1.05 * said}mm@5kPa") < 0

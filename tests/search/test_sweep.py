@@ -1,0 +1,138 @@
+"""A sweep of real designs: its rows against what check and predict say, one by one."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pyarrow import parquet
+
+import sbafab
+from sbafab.design.writing import design_sha256
+from sbafab.search import sweep as module
+from sbafab.search.measure import measured
+from sbafab.search.sweep import Sweep
+from sbafab.search.worker import Job
+
+VARY = ("chamber.diameter=2,5", "bond.width=0.7,0.75")
+QUICK: dict[str, Any] = {"rules": {"yield_builds": 100}, "pressures_kpa": (10.0,)}
+
+
+def _swept(out: Path, **more: Any) -> Sweep:
+    return sbafab.sweep("1dof-5mm", vary=VARY, out=out, **{**QUICK, **more})
+
+
+def _rows(found: Sweep, name: str = "sweep.csv") -> list[dict[str, str]]:
+    with (found.folder / name).open(newline="") as opened:
+        return list(csv.DictReader(opened))
+
+
+def _here(
+    pool: object, jobs: Iterable[tuple[str, Job]], seconds: float, done: Any, waiting: object
+) -> None:
+    """Measures in this process, which begins no other: the long tests do."""
+    for key, job in jobs:
+        del job["program"]
+        done(key, {**measured(**job), "seconds": 0.5})
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> Sweep:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "run_jobs", _here)
+        made = _swept(tmp_path_factory.mktemp("sweep"))
+    return made
+
+
+def test_each_row_says_what_check_and_predict_say(found: Sweep) -> None:
+    rows = _rows(found)
+    assert [row["outcome"] for row in rows] == ["refused", "refused", "fails", "passes"]
+    assert found.outcomes == {"refused": 2, "fails": 1, "passes": 1}
+    assert "neck ring" in rows[0]["reason"]
+    for row in rows[2:]:
+        design = sbafab.load(
+            "1dof-5mm", {"bond.width": float(row["bond.width"]), "rules.yield_builds": 100}
+        )
+        assert row["sha256"] == design_sha256(design)
+        for finding in sbafab.check(design):
+            if finding.rule in ("bond-width", "tube-fit", "press-fit", "registration-yield"):
+                assert row[f"{finding.rule}.verdict"] == finding.verdict
+                assert float(row[f"{finding.rule}.measured"]) == finding.measured
+        said = sbafab.predict(design, pressures_kpa=[10.0])
+        assert float(row["mass [g]"]) == pytest.approx(said.value("mass"), rel=1e-6)
+        stroke = float(row["free stroke at 10 kPa [mm]"])
+        assert stroke == pytest.approx(said.value("free stroke at 10 kPa"), rel=1e-6)
+    assert float(rows[2]["bond-width.margin"]) == pytest.approx(-0.05, abs=1e-5)
+    assert rows[2]["reason"].startswith("bond-width: ")
+    # Every key stands there, defaults too, and times do not.
+    assert rows[3]["mask.overhang"] == "0.5"
+    assert "seconds" not in rows[3]
+    assert all(float(row["seconds"]) > 0 for row in _rows(found, "times.csv"))
+
+
+def test_parquet_holds_what_the_csv_holds(found: Sweep) -> None:
+    table = parquet.read_table(found.folder / "sweep.parquet")
+    rows = _rows(found)
+    assert table.column_names == list(rows[0])
+    for name in table.column_names:
+        for cell, text in zip(table[name].to_pylist(), [row[name] for row in rows], strict=True):
+            assert text == "" if cell is None else str(cell) == text or float(text) == cell
+
+
+def test_the_page_stands_alone_and_counts_right(found: Sweep) -> None:
+    page = (found.folder / "sweep.html").read_text()
+    assert "4 designs" in page
+    assert "<b>1</b>pass every rule" in page
+    assert "<b>2</b>cannot be made" in page
+    # Names of XML vocabularies are no addresses to fetch.
+    assert not re.findall(r"(?:src|href)=[\"'](?!#)", page)
+    assert "@import" not in page
+
+
+def test_what_was_measured_before_is_not_measured_again(
+    found: Sweep, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = {name: (found.folder / name).read_bytes() for name in found.files}
+
+    def refuse(*_: Any) -> None:
+        raise AssertionError("measured again")
+
+    monkeypatch.setattr(module, "run_jobs", refuse)
+    again = _swept(found.folder.parent)
+    assert again.measured == 0
+    assert {name: (again.folder / name).read_bytes() for name in again.files} == before
+    # Another pressure, another design or another program asks for something else.
+    for more in ({"pressures_kpa": (20.0,)}, {"bore": {"clearance": 0.05}}):
+        with pytest.raises(AssertionError, match="again"):
+            _swept(found.folder.parent, **more)
+    monkeypatch.setattr(module, "fingerprint", lambda: "0.0+other")
+    with pytest.raises(AssertionError, match="again"):
+        _swept(found.folder.parent)
+
+
+@pytest.mark.long
+def test_a_row_that_a_journal_lost_is_the_only_one_measured(found: Sweep, tmp_path: Path) -> None:
+    folder = tmp_path / "1dof-5mm-sweep"
+    folder.mkdir()
+    lines = (found.folder / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    (folder / "journal.jsonl").write_bytes(b"".join(lines[1:3]) + lines[3][:50])
+    again = _swept(tmp_path, workers=2)
+    assert again.measured == 2
+    for name in ("sweep.csv", "sweep.parquet", "sweep.html"):
+        assert (folder / name).read_bytes() == (found.folder / name).read_bytes()
+    keys = [json.loads(line)["key"] for line in (folder / "journal.jsonl").read_text().splitlines()
+            if line.endswith("}}")]  # fmt: skip
+    assert len(keys) == len(set(keys)) == 4
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "1dof-5mm-sweep"
+    folder.mkdir()
+    (folder / "manifest.json").write_text("{}")
+    with pytest.raises(OSError, match="holds a design of that name"):
+        _swept(tmp_path)

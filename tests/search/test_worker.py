@@ -1,0 +1,99 @@
+"""Processes that die, hang or run another program become rows with a reason."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from sbafab.errors import OutputError
+from sbafab.search import worker
+from sbafab.search.pool import local_pool, run_jobs
+from sbafab.search.worker import Job, close_all, guarded, open_all
+
+PUPPET = """
+import json, os, signal, sys, time
+from pathlib import Path
+for line in sys.stdin:
+    job = json.loads(line)
+    if job["do"] == "hang":
+        time.sleep(600)
+    if job["do"] == "die" or (job["do"] == "die once" and not Path(job["mark"]).exists()):
+        Path(job["mark"]).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    if job["do"] == "leave":
+        sys.exit(3)
+    print(json.dumps({"outcome": job.get("outcome", "passes"), "reason": "", "pid": os.getpid()}),
+          flush=True)
+"""
+
+
+@pytest.fixture(autouse=True)
+def puppet(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A process that does what its job says, in place of the one that measures."""
+    monkeypatch.setattr(worker, "COMMAND", (sys.executable, "-S", "-c", PUPPET))
+    monkeypatch.setattr(worker, "_own", threading.local())
+    open_all()
+    yield
+    close_all()
+    open_all()
+
+
+def test_one_process_does_job_after_job() -> None:
+    rows = [guarded({"do": "answer"}, 60) for _ in range(3)]
+    assert len({row["pid"] for row in rows}) == 1
+
+
+def test_a_killed_process_is_replaced_and_one_that_kills_two_is_said(tmp_path: Path) -> None:
+    mark = str(tmp_path / "died")
+    assert guarded({"do": "die once", "mark": mark}, 60)["outcome"] == "passes"
+    row = guarded({"do": "die", "mark": mark}, 60)
+    assert row["outcome"] == "crashed"
+    assert "SIGKILL" in row["reason"]
+    assert "exit code 3" in guarded({"do": "leave"}, 60)["reason"]
+    assert guarded({"do": "answer"}, 60)["outcome"] == "passes"
+
+
+def test_what_takes_too_long_is_killed_and_not_tried_again() -> None:
+    row = guarded({"do": "hang"}, 0.3)
+    assert row == {
+        "outcome": "too long",
+        "reason": "stopped after 0.3 s; --timeout gives it longer",
+        "seconds": 0.3,
+    }
+    assert guarded({"do": "answer"}, 60)["outcome"] == "passes"
+
+
+def test_a_pool_does_every_job_once_and_leaves_no_process(tmp_path: Path) -> None:
+    jobs: dict[str, Job] = {str(number): {"do": "answer"} for number in range(20)}
+    jobs["7"] = {"do": "die", "mark": str(tmp_path / "died")}
+    found: list[tuple[str, str]] = []
+    with local_pool(2) as pool:
+        run_jobs(
+            pool, jobs.items(), 60, lambda k, row: found.append((k, row["outcome"])), lambda: None
+        )
+    assert sorted(key for key, _ in found) == sorted(jobs)
+    assert [outcome for key, outcome in found if key == "7"] == ["crashed"]
+    assert not worker._started.children
+
+
+def test_stopped_half_way_it_leaves_no_process() -> None:
+    def stop(key: str, row: object) -> None:
+        raise KeyboardInterrupt
+
+    jobs: list[tuple[str, Job]] = [
+        ("0", {"do": "answer"}),
+        *((str(n), {"do": "hang"}) for n in "12"),
+    ]
+    with pytest.raises(KeyboardInterrupt), local_pool(2) as pool:
+        run_jobs(pool, jobs, 60, stop, lambda: None)
+    assert not worker._started.children
+
+
+def test_another_program_is_told_apart() -> None:
+    jobs: list[tuple[str, Job]] = [("0", {"do": "answer", "outcome": "unlike"})]
+    with pytest.raises(OutputError, match="install the same"), local_pool(1) as pool:
+        run_jobs(pool, jobs, 60, lambda key, row: None, lambda: None)

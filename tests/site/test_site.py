@@ -1,0 +1,136 @@
+"""What the site is made of, without building it: references, gallery, links, examples."""
+
+from __future__ import annotations
+
+import json
+import re
+import runpy
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+import sbafab
+from docs.scripts import reference_cli, reference_keys
+from docs.scripts.offline import complaints
+from docs.scripts.rule_pictures import CHOSEN, OTHERS, pair
+from sbafab.cli import COMMANDS, main
+from sbafab.output.schemas import SCHEMAS, schema_of
+from sbafab.rules.deck import rule_names
+from tests.rules.test_deck import FAULTS
+
+ROOT = Path(__file__).parents[2]
+LINK = re.compile(r"\]\((?!https?://|#|mailto:)([^)#\s]+)")
+
+
+def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    with pytest.raises(SystemExit):
+        main(arguments)
+    return capsys.readouterr().out
+
+
+def test_the_page_of_commands_has_every_command_and_option() -> None:
+    page = reference_cli.page()
+    for command in COMMANDS:
+        assert f"## sbafab {command.name}\n" in page
+        for param in command.params:
+            if param.param_type_name == "option":
+                assert param.opts[-1] in page, param.opts
+
+
+def test_the_page_of_keys_has_every_key_of_every_family() -> None:
+    from sbafab.actuators import records
+    from sbafab.design.reading import key_paths
+
+    page = reference_keys.page()
+    for record in records().values():
+        paths = key_paths(record)
+        tables = {path.rpartition(".")[0] for path in paths}
+        assert [path for path in paths if path not in tables and f"`{path}`" not in page] == []
+
+
+def test_every_rule_has_its_picture() -> None:
+    assert CHOSEN.keys() | OTHERS.keys() == set(rule_names())
+    assert all(FAULTS[name].rule == rule for rule, name in CHOSEN.items())
+    for rule in ("film-limits", "bridges"):
+        drawn = pair(rule)
+        assert drawn.right != drawn.wrong
+        assert drawn.wrong.count("<circle") == 1
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_a_schema_is_one_and_has_an_id(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    schema = json.loads(run(["schema", name], capsys))
+    assert schema == schema_of(name)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    assert schema["$id"] == f"urn:{SCHEMAS[name][0].replace('/', ':')}"
+
+
+def test_what_is_printed_and_written_is_of_its_schema(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    one = ["1dof-5mm", "--set", "stack.balloons=1"]
+    made = sbafab.cut("1dof-5mm", "stack.balloons=1", out=tmp_path)
+    found = {
+        "checks": [
+            json.loads(run(["check", *one, "--json"], capsys)),
+            json.loads((made.folder / "checks.json").read_text()),
+        ],
+        "manifest": [json.loads((made.folder / "manifest.json").read_text())],
+        "error": [json.loads(run(["check", "nosuch", "--json"], capsys))],
+        "design": [made.design.model_dump(mode="json", exclude_none=True)],
+    }
+    for name, documents in found.items():
+        for document in documents:
+            jsonschema.validate(document, schema_of(name))
+    del found["checks"][0]["summary"]
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(found["checks"][0], schema_of("checks"))
+
+
+def test_links_between_the_pages_of_the_source_lead_somewhere() -> None:
+    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "docs").glob("[lr]*/*.md")]
+    assert len(pages) > 20
+    lost = [
+        f"{page.relative_to(ROOT)}: {path}"
+        for page in pages
+        for path in LINK.findall(page.read_text(encoding="utf-8"))
+        if "_made" not in path and not (page.parent / path).exists()
+    ]
+    assert lost == []
+
+
+def test_a_site_that_asks_another_host_or_leads_nowhere_is_told(tmp_path: Path) -> None:
+    (tmp_path / "a.html").write_text(
+        '<p id="x"></p><a href="b.html#y">b</a><a href="https://example.org">away</a>'
+        '<a href="c.html">c</a><script src="https://example.org/x.js"></script>'
+    )
+    (tmp_path / "b.html").write_text('<a href="a.html#x">a</a>')
+    (tmp_path / "a.css").write_text("p { background: url(//example.org/x.png) }")
+    assert list(complaints(tmp_path)) == [
+        "a.html loads https://example.org/x.js from another host",
+        "a.html leads to b.html#y: no 'y' in it",
+        "a.html leads to c.html: no such file",
+        "a.css loads from another host",
+    ]
+
+
+@pytest.mark.long
+def test_the_examples_for_assistants_pass(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "llms.txt").read_text(encoding="utf-8")
+    examples = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    assert len(examples) == 3
+    for number, example in enumerate(examples):
+        path = tmp_path / f"{number}.toml"
+        path.write_text(example)
+        assert sbafab.check(path).failed == ()
+
+
+def test_readme_is_published_with_absolute_links() -> None:
+    hook = runpy.run_path(str(ROOT / ".ci" / "metadata.py"))
+    text = "![a](docs/images/x.png) [b](docs/y.md) [c](https://d.org/z) [e](#f)"
+    assert hook["absolute"](text, "https://h.org/o/p") == (
+        "![a](https://h.org/o/p/raw/main/docs/images/x.png) "
+        "[b](https://h.org/o/p/blob/main/docs/y.md) [c](https://d.org/z) [e](#f)"
+    )
+    assert hook["urls"]("") == {}

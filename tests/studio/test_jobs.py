@@ -1,0 +1,171 @@
+"""What a worker answers: the same words and numbers as the command line, nothing from elsewhere."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sbafab import api
+from sbafab.errors import DesignError
+from sbafab.studio.editing import edited
+from sbafab.studio.links import design_in, packed
+from sbafab.studio.worker import _place
+from tests.studio.worked import answers, job
+
+SMALL = api.template("1dof-5mm").replace("balloons = 6", "balloons = 2") + (
+    "[rules]\nyield_builds = 100\n"
+)
+
+
+def test_the_answers_come_in_the_order_a_person_waits_for_them(tmp_path: Path) -> None:
+    got = answers(job(tmp_path, SMALL))
+    kinds = [answer["kind"] for answer in got]
+    assert kinds[:3] == ["text", "design", "laminate"]
+    assert kinds[-1] == "checked"
+    assert got[-2]["rule"] == "registration-yield"
+    found = [
+        finding for answer in got if answer["kind"] == "rule" for finding in answer["findings"]
+    ]
+    theirs = api.check(api.loads(SMALL))
+    assert [(f["rule"], f["measured"], f["message"]) for f in found] == [
+        (f.rule, f.measured, f.message) for f in theirs
+    ]
+
+
+def test_a_shape_that_the_page_has_is_not_sent_again(tmp_path: Path) -> None:
+    first = next(a for a in answers(job(tmp_path, SMALL)) if a["kind"] == "laminate")
+    has = list(first["shapes"])
+    again = next(
+        a for a in answers({**job(tmp_path, SMALL), "has": has}) if a["kind"] == "laminate"
+    )
+    assert has
+    assert again["shapes"] == {}
+    assert again["patterns"] == first["patterns"]
+
+
+def test_shapes_are_the_laminate_s_own(tmp_path: Path) -> None:
+    model = next(a for a in answers(job(tmp_path, SMALL)) if a["kind"] == "laminate")
+    laminate = api.build(api.loads(SMALL))
+    for name, layers in laminate.patterns.items():
+        flat = model["shapes"][model["patterns"][name]["shape"]]
+        corners = [
+            number
+            for contour in layers[0].profile.contours
+            for v in contour.vertices
+            for number in v
+        ]
+        assert [number for contour in flat for number in contour] == pytest.approx(
+            corners, abs=1e-6
+        )
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("chamber.diameter", "-5"), ("stack.balloons", '"many"'), ("bond.width", '"5 ft"')],
+)
+def test_an_error_has_the_command_line_s_words_and_its_field(
+    tmp_path: Path, key: str, value: str
+) -> None:
+    text = edited(SMALL, [(key, value)])
+    with pytest.raises(DesignError) as ours:
+        answers(job(tmp_path, text))
+    with pytest.raises(DesignError) as theirs:
+        api.loads(text)
+    assert str(ours.value) == str(theirs.value)
+    assert _place(str(ours.value)) == {"field": key}
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        '[chamber]\noutline = "../shape.dxf"',
+        'kit = "/etc/passwd"',
+        '[parts.a]\nkind = "sba"\ndesign = "../x.toml"',
+    ],
+)
+def test_a_design_names_no_file_outside_the_folder(tmp_path: Path, line: str) -> None:
+    with pytest.raises(DesignError, match="lies outside"):
+        answers(job(tmp_path, f'name = "a"\nfamily = "1dof"\n{line}\n'))
+
+
+def test_a_file_of_the_folder_may_name_one_outside_no_more(tmp_path: Path) -> None:
+    (tmp_path / "part.toml").write_text('kit = "/etc/passwd"', encoding="utf-8")
+    text = 'family = "assembly"\n[parts.a]\nkind = "sba"\ndesign = "./part.toml"\n'
+    with pytest.raises(DesignError, match="lies outside"):
+        answers(job(tmp_path, text))
+
+
+def test_work_that_nobody_waits_for_ends(tmp_path: Path) -> None:
+    class EnoughError(Exception):
+        pass
+
+    beats = 0
+
+    def beat() -> None:
+        nonlocal beats
+        beats += 1
+        if beats == 3:
+            raise EnoughError
+
+    with pytest.raises(EnoughError):
+        answers(job(tmp_path, SMALL), beat)
+
+
+def test_edits_keep_comments_and_order() -> None:
+    text = api.template("3dof-15mm")
+    new = edited(
+        text, [("chamber.diameter", "6.2"), ("rules.bond_width", "0.7"), ("lumen.diameter", None)]
+    )
+    assert tomllib.loads(new)["chamber"]["diameter"] == 6.2
+    assert tomllib.loads(new)["rules"] == {"bond_width": 0.7}
+    assert "diameter" not in tomllib.loads(new)["lumen"]
+    old_lines, new_lines = text.splitlines(), new.splitlines()
+    changed = [line for line in old_lines if line not in new_lines]
+    assert [line.split("=")[0].strip() for line in changed] == ["diameter", "diameter"]
+    assert "# of the pocket; a list gives one a balloon (a tapered stack)" in new
+    # The comment keeps its column.
+    column = next(line.index("#") for line in old_lines if "of the pocket" in line)
+    assert next(line.index("#") for line in new_lines if "of the pocket" in line) == column
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("a = [", "1"), ("a = 1", "= ="), ("a = 1", "1\nb = 2"), ("a = 1", "")]
+)
+def test_an_edit_that_is_no_toml_gets_one_sentence(text: str, value: str) -> None:
+    with pytest.raises(DesignError):
+        edited(text, [("a", value)])
+
+
+def test_a_table_is_not_written_into_a_value() -> None:
+    with pytest.raises(DesignError, match="a value, not a table"):
+        edited("bond = 3", [("bond.width", "1")])
+
+
+def test_a_link_holds_a_design() -> None:
+    text = api.template("3dof-15mm")
+    link = f"http://127.0.0.1:8417/#design={packed(text)}"
+    assert design_in(link) == text
+    assert len(link) < 1600
+    for broken in (
+        link[:-9],
+        "http://127.0.0.1/",
+        link + "x!",
+        "http://a/#design=" + packed("a" * 2_000_000),
+    ):
+        with pytest.raises(DesignError, match="holds no design"):
+            design_in(broken)
+
+
+@pytest.mark.long
+def test_poses_are_the_stack_s(tmp_path: Path) -> None:
+    text = api.template("1dof-5mm")
+    asked: dict[str, Any] = {"do": "motion", "pose": {"pressures": [20.0], "plate": 3.0}}
+    (pose,) = answers({**job(tmp_path, text), **asked})
+    theirs = api.stack(api.loads(text)).pose((20.0,), plate=3.0)
+    assert pose["force"] == pytest.approx(theirs.force, rel=1e-4)
+    assert pose["height"] == pytest.approx(theirs.height, abs=1e-3)
+    with pytest.raises(DesignError, match="pressures must be 1 finite"):
+        answers({**job(tmp_path, text), "do": "motion", "pose": {"pressures": [1, 2]}})

@@ -1,0 +1,26 @@
+"""Jobs of the studio run here and now, without a process of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from sbafab.studio.jobs import JOBS
+
+
+def job(folder: Path, text: str) -> dict[str, Any]:
+    """The job of showing a design whose file would lie in the folder."""
+    return {
+        "do": "live",
+        "text": text,
+        "edits": [],
+        "has": [],
+        "folder": str(folder),
+        "path": "design.toml",
+    }
+
+
+def answers(asked: dict[str, Any], beat: Callable[[], None] = lambda: None) -> list[dict[str, Any]]:
+    """Everything that the job answers."""
+    return list(JOBS[asked["do"]](asked, beat))
