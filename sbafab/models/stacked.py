@@ -36,8 +36,8 @@ FORCE = Model(
 BEND = Model(
     "elastic stack",
     SOURCE,
-    "rigid plates that tilt, balloons that push by the gap at their ring. The 3-DoF at 5 kPa has 80 "
-    "deg with two chambers, 109 with one, where shells in SOFA have 81 to 92 and 96 to 117; the "
+    "rigid plates that tilt, balloons that push by the gap at their ring. The 3-DoF at 5 kPa has "
+    "80 deg with two chambers, 109 with one, where shells in SOFA have 81 to 92 and 96 to 117; the "
     "paper's largest is 81 +- 6 at a pressure that it does not give",
 )
 TIME = Model(
@@ -49,8 +49,8 @@ TIME = Model(
 HELD = Model(
     "elastic stack",
     SOURCE,
-    "no shear between plates; the paper's moduli would make it 15 times as firm, at a pressure that "
-    "it does not give",
+    "no shear between plates; the paper's moduli would make it 15 times as firm, at a pressure "
+    "that it does not give",
 )
 SHUT = Model(
     "elastic stack, chambers shut",
