@@ -114,7 +114,11 @@ def _relations(one: Actuator, asked: Asked, together: Stack | None) -> Iterator[
         yield lobes.bending_relation(one, asked)
         if together is not None:
             yield stacked.bend_relation(asked, together)
-        yield lobes.workspace_relation(one)
+        reached = lobes.workspace_relation(one)
+        if together is not None:
+            more = stacked.workspace_traces(asked, together)
+            reached = replace(reached, lines=(*reached.lines, *more))
+        yield reached
     if one.form.wrap is not None:
         yield _diameter_relation(one, one.form.wrap)
 
