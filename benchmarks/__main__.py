@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from benchmarks import checking, copies, decks, outlines, scaling
+from benchmarks import stacks as equilibria
 from benchmarks.timing import (
     HEAD,
     ROOT,
@@ -40,6 +41,7 @@ def main() -> None:
     lobes(arguments.rounds)
     drawn_outlines(arguments.rounds)
     many_copies(arguments.rounds)
+    poses(arguments.rounds)
     commands(arguments.rounds)
 
 
@@ -143,6 +145,17 @@ def _told(what: str, times: Mapping[int, Sequence[float]], least: int = 1) -> No
         print(row(f"{size} {what}", taken))
     since = f" from {least} on" if least > min(times) else ""
     print(f"  time grows with the {what}{since} to the power of {exponent(times, least):.2f}")
+
+
+def poses(rounds: int) -> None:
+    """Equilibria of a whole actuator, one after the other along a motion."""
+    print("\n3dof-15mm in balance, 15 balloons in each of three chambers")
+    rates = {loaded: [equilibria.pose_seconds(loaded) for _ in range(rounds)] for loaded in (0, 1)}
+    print(HEAD)
+    print(row("map of its balloon", [equilibria.map_seconds() for _ in range(rounds)]))
+    for loaded, taken in rates.items():
+        name = "pose with a load on the tip" if loaded else "pose"
+        print(row(name, taken, f"{1 / min(taken):.0f} a second"))
 
 
 def commands(rounds: int) -> None:
