@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from benchmarks import checking, copies, outlines, scaling
+from benchmarks import stacks as equilibria
 from benchmarks.timing import HEAD, ROOT, by_turns, keep_to_one_core, row
 
 RIVALS = {"foldable": "foldable-robotics==0.0.37", "build123d": "build123d"}
@@ -30,6 +31,7 @@ def main() -> None:
     stacks(arguments.rounds)
     drawn_outlines(arguments.rounds)
     many_copies(arguments.rounds)
+    poses(arguments.rounds)
     commands(arguments.rounds)
 
 
@@ -131,6 +133,17 @@ def many_copies(rounds: int) -> None:
         print(row(f"{number} copies", taken))
     many = {number: min(taken) for number, taken in times.items() if number >= 10}
     print(f"  time grows with the copies to the power of {copies.exponent(many):.2f}")
+
+
+def poses(rounds: int) -> None:
+    """Equilibria of a whole actuator, one after the other along a motion."""
+    print("\n3dof-15mm in balance, 15 balloons in each of three chambers")
+    rates = {loaded: [equilibria.pose_seconds(loaded) for _ in range(rounds)] for loaded in (0, 1)}
+    print(HEAD)
+    print(row("map of its balloon", [equilibria.map_seconds() for _ in range(rounds)]))
+    for loaded, taken in rates.items():
+        name = "pose with a load on the tip" if loaded else "pose"
+        print(row(name, taken, f"{1 / min(taken):.0f} a second"))
 
 
 def commands(rounds: int) -> None:

@@ -6,6 +6,7 @@ be lost in them or come out as another error: so it ends the process there and t
 
 from __future__ import annotations
 
+import gc
 import os
 
 from sbafab.errors import BY_SIGNAL, STOPPED
@@ -15,6 +16,10 @@ if TYPE_CHECKING:
     from types import FrameType
 
 SIGINT = 2
+YOUNG = 20_000
+"""Records after which they are looked through for rings that nothing holds: a run makes many
+records, keeps them to its end and makes hardly any ring.
+"""
 
 
 def main() -> None:
@@ -25,6 +30,7 @@ def main() -> None:
         # Where it is ignored (nohup), it stays so.
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, stop_at_once)
+        gc.set_threshold(YOUNG, *gc.get_threshold()[1:])
         from sbafab.cli import main as run
     except KeyboardInterrupt:
         stop_at_once(SIGINT, None)

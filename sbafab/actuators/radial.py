@@ -203,6 +203,7 @@ def build(design: RadialDesign) -> Laminate:
         registration=design.registration.method,
         pins_in_full_bonds=design.registration.full_bond_pins == "in",
         notes=(NOTE,) if ears else (),
+        tube=design.tube.outer_diameter,
     )
 
 

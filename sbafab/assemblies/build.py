@@ -19,13 +19,13 @@ from sbafab.assemblies.poses import (
 from sbafab.assemblies.reading import part_design
 from sbafab.assemblies.records import AnyPart, Assembly, Base, Cup, Line, Magnet, Sba, Tube
 from sbafab.assemblies.tree import building_order
-from sbafab.assemblies.wrap import bent_point
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import GeometryError
 from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.meshing.surface import Vector
+from sbafab.meshing.wrap import bent_point
 
 if TYPE_CHECKING:
     import numpy as np

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 from sbafab.assemblies.build import PlacedPart
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Sba, Tube
-from sbafab.assemblies.wrap import bent
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, rectangle
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.prisms import Slab, closed_surface
 from sbafab.meshing.solid import solid_slabs
 from sbafab.meshing.surface import Surface
+from sbafab.meshing.wrap import bent
 
 if TYPE_CHECKING:
     from sbafab.assemblies.records import AnyPart

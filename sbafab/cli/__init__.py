@@ -21,6 +21,7 @@ from sbafab.cli.map import map_
 from sbafab.cli.mesh import mesh
 from sbafab.cli.nest import nest
 from sbafab.cli.new import new
+from sbafab.cli.picture import picture
 from sbafab.cli.predict import predict
 from sbafab.cli.press import press
 from sbafab.cli.progress_line import add_verbosity
@@ -45,6 +46,7 @@ COMMANDS = (
     kerf,
     predict,
     map_,
+    picture,
     simulate,
     sweep,
     find,
@@ -63,6 +65,7 @@ EXTRAS = {
     "mujoco": ("mujoco", "simulate --with mujoco"),
     "nest": ("spyrrow", "--nest spyrrow"),
     "optuna": ("optuna", "find --optuna"),
+    "optuna": ("optuna", "find with many keys"),
     "parquet": ("pyarrow", "tables of sweeps as Parquet"),
     "python": ("trimesh", "meshes for trimesh, meshio and PyVista"),
     "studio": ("starlette", "sbafab studio"),

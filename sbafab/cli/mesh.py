@@ -67,6 +67,7 @@ def _fill(
     help="Air in each balloon, e.g. 5ul. Repeatable for chambers.  [default: flat]",
 )
 @click.option("--gaps", is_flag=True, help="Keep films as far apart as the masks hold them.")
+@click.option("--flat", is_flag=True, help="Leave flat what is made for a tube.")
 @click.option(
     "--format",
     "formats",
@@ -74,22 +75,23 @@ def _fill(
     multiple=True,
     help="Formats of the volume, shell and cavity meshes. Repeatable.  [default: all]",
 )
-def mesh(
+def mesh(  # noqa: PLR0913, PLR0917 - one an option
     request: Request,
     size: float,
     element: Element,
     symmetry: Symmetry,
     fill: float | dict[str, float] | None,
     gaps: bool,
+    flat: bool,
     formats: tuple[str, ...],
 ) -> None:
-    """Write the meshes: solid and cavities, and conforming volume and shell meshes.
+    """Write meshes: solid, cavities, volume and shell.
 
     The conforming ones take the extra "mesh": pip install "sbafab[mesh]".
     """
     from sbafab.meshing.conforming.settings import MeshSettings
     from sbafab.output.run import Conforming, Extras
 
-    settings = MeshSettings(size, element, symmetry, fill, gaps)
+    settings = MeshSettings(size, element, symmetry, fill, gaps, not flat)
     conforming = Conforming(settings, formats or FORMATS)
     run_parts(request, ("mesh",), extras=Extras(conforming))

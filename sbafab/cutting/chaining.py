@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
 from sbafab.geometry.boolean import LEAST_AREA, tidy
+from sbafab.geometry.copies import Copies
 from sbafab.geometry.edges import EPSILON, Edge, Point, edge_from_bulge
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
@@ -85,8 +86,9 @@ def _between(edge: Edge, start: Point, end: Point) -> Edge:
 def check_clear(contours: Sequence[Contour]) -> None:
     """Raises OutputError where an edge is drawn twice or contours touch or cross."""
     rounds = [_full_circle(contour) for contour in contours]
+    copies = Copies()
     for contour, circled in zip(contours, rounds, strict=True):
-        if circled is None:
+        if circled is None and copies.first(contour) is contour:
             _check_own(contour)
     for i, j in close_pairs([contour.bounds for contour in contours], EPSILON):
         if not _are_clear(rounds[i], rounds[j]):
@@ -162,6 +164,8 @@ def nested_region(inner: Sequence[Contour], outer: Sequence[Contour]) -> Region:
     Raises OutputError for a contour whose nesting is not what its layer says.
     """
     drawn = [*inner, *outer]
+    copies = Copies()
+    turns: dict[int, int | None] = {}
     turned = []
     for index, (contour, depth) in enumerate(zip(drawn, _depths(drawn), strict=True)):
         is_hole = index < len(inner)
@@ -175,16 +179,41 @@ def nested_region(inner: Sequence[Contour], outer: Sequence[Contour]) -> Region:
         if abs(contour.area) < LEAST_AREA:
             raise OutputError(f"contour at x {x:.3f}, y {y:.3f} encloses nothing; remove it.")
         right = contour if contour.is_hole == is_hole else contour.reversed()
-        turned.append(_tidied(right))
+        if right.circle is not None:
+            turned.append(_whole(right, *right.circle))
+            continue
+        first = copies.first(right)
+        tidied = (tidy(right.edges) or right) if first is right else None
+        if tidied is not None:
+            turns[id(first)] = _turn(first.edges, tidied.edges)
+        turn = turns[id(first)]
+        turned.append(tidied or _from(right, turn) or tidy(right.edges) or right)
     return Region(tuple(turned))
 
 
-def _tidied(contour: Contour) -> Contour:
-    if contour.circle is not None:
-        whole = circle(*contour.circle)
-        whole = whole.reversed() if contour.is_hole else whole
-        return contour if contour.edges == whole.edges else whole
-    return tidy(contour.edges) or contour
+def _turn(edges: Sequence[Edge], others: Sequence[Edge]) -> int | None:
+    """From which of the edges on the others are these; None where they are others."""
+    turn = next((i for i, edge in enumerate(edges) if edge == others[0]), 0)
+    return turn if (*edges[turn:], *edges[:turn]) == tuple(others) else None
+
+
+def _from(contour: Contour, turn: int | None) -> Contour | None:
+    """The contour from one of its edges on."""
+    if not turn:
+        return contour if turn == 0 else None
+    return Contour((*contour.edges[turn:], *contour.edges[:turn]))
+
+
+def _whole(contour: Contour, centre: Point, radius: float) -> Contour:
+    """A circle as four quarter arcs from its rightmost point on; as it is where it is drawn so."""
+    (x, y), is_hole = centre, contour.is_hole
+    compass = [(x + radius, y), (x, y + radius), (x - radius, y), (x, y - radius)]
+    if is_hole:
+        compass[1:] = compass[:0:-1]
+    if [edge.start for edge in contour.edges] == compass:
+        return contour
+    whole = circle(centre, radius)
+    return whole.reversed() if is_hole else whole
 
 
 def _depths(contours: Sequence[Contour]) -> list[int]:

@@ -1,9 +1,13 @@
-"""Cut files read back with ezdxf, into exact contours, and refused where they could not be cut."""
+"""Cut files read back into exact contours, and refused where they could not be cut.
+
+Those that stand letter by letter as this program writes them are read by that form; of all others,
+and so of all that was touched by hand or another program, ezdxf says what they hold.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from io import StringIO
@@ -13,8 +17,10 @@ from typing import TYPE_CHECKING
 from sbafab.cutting.appearance import check_appearance, check_space
 from sbafab.cutting.chaining import check_clear, closed_loops, nested_region
 from sbafab.cutting.cut_layers import COLOURS, CUT_INNER, CUT_OUTER
+from sbafab.cutting.dxf_own import as_written
+from sbafab.cutting.dxf_shapes import Drawn, arc, of_polyline, polyline
 from sbafab.errors import OutputError
-from sbafab.geometry.edges import EPSILON, Edge, Line, Point, edge_from_bulge, quarter_arcs
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import circle
 
@@ -68,8 +74,33 @@ def _read_text(text: str) -> ReadBack:
     """Equal texts hold the same, and are parsed once: a run reads its files when it writes them,
     and again, from the disk, when it checks the folder.
     """
+    own = as_written(text)
+    if own is not None:
+        return _put_together(own.drawn, own.properties, "mm")
+    return read_with_ezdxf(text)
+
+
+def read_with_ezdxf(text: str) -> ReadBack:
+    """What ezdxf says that a text holds. Raises OutputError as ``read_profile`` does."""
     check_space(text)
-    return _read(_parsed(text))
+    document = _parsed(text)
+    units = document.header.get("$INSUNITS"), document.header.get("$MEASUREMENT")
+    says_units = document.dxfversion != R12 or units != (None, None)
+    if says_units and units != (4, 1):
+        raise OutputError(
+            f"not in millimetres: $INSUNITS is {units[0]} and $MEASUREMENT {units[1]}; "
+            "set them to 4 and 1."
+        )
+    model = document.modelspace()
+    for layout in document.layouts:
+        if layout is not model and any(entity.dxftype() != "VIEWPORT" for entity in layout):
+            raise OutputError(f"layout {layout.name} is not empty; draw in model space only.")
+    return _put_together(
+        map(_drawn, model),
+        dict(document.header.custom_vars.properties),
+        "mm" if says_units else "",
+        document,
+    )
 
 
 def _parsed(text: str) -> Drawing:
@@ -94,58 +125,61 @@ def _text(path: Path) -> str:
         raise OutputError(f"cannot be read ({error.strerror}); regenerate it.") from error
 
 
-def _read(document: Drawing) -> ReadBack:
-    units = document.header.get("$INSUNITS"), document.header.get("$MEASUREMENT")
-    says_units = document.dxfversion != R12 or units != (None, None)
-    if says_units and units != (4, 1):
-        raise OutputError(
-            f"not in millimetres: $INSUNITS is {units[0]} and $MEASUREMENT {units[1]}; "
-            "set them to 4 and 1."
-        )
-    model = document.modelspace()
-    for layout in document.layouts:
-        if layout is not model and any(entity.dxftype() != "VIEWPORT" for entity in layout):
-            raise OutputError(f"layout {layout.name} is not empty; draw in model space only.")
+def _put_together(
+    entities: Iterable[Drawn],
+    properties: dict[str, str],
+    units: str,
+    document: Drawing | None = None,
+) -> ReadBack:
+    """The contours that entities draw; the ``document`` they are of, if it may look otherwise."""
     closed: dict[str, list[Contour]] = {CUT_INNER: [], CUT_OUTER: []}
     loose: dict[str, list[Edge]] = {CUT_INNER: [], CUT_OUTER: []}
+    layers: list[str] = []
     other: list[str] = []
     strokes: list[tuple[str, tuple[Edge, ...]]] = []
-    for entity in model:
-        layer = entity.dxf.layer
-        contour, edges = _geometry(entity, may_be_open=layer not in closed)
+    for kind, layer, contour, edges in entities:
         drawn = contour.edges if contour else edges
-        x, y = drawn[0].start
-        place = f"{entity.dxftype()} at x {x:.3f}, y {y:.3f}"
-        if min(edge.length for edge in drawn) < EPSILON:
-            raise OutputError(f"{place} has an edge of no length; remove it.")
+        if any(map(_is_short, drawn[:1] if kind == "CIRCLE" else drawn)):
+            raise OutputError(f"{_place(kind, drawn)} has an edge of no length; remove it.")
         if layer not in COLOURS:
-            raise OutputError(f"{place} is on layer {layer}; use {', '.join(COLOURS)}.")
+            on = f"is on layer {layer}; use {', '.join(COLOURS)}."
+            raise OutputError(f"{_place(kind, drawn)} {on}")
+        layers.append(layer)
         if layer not in closed:
-            other.append(entity.dxftype())
+            other.append(kind)
             strokes.append((layer, tuple(drawn)))
         elif contour:
             closed[layer].append(contour)
         else:
             loose[layer] += edges
-    check_appearance(document)
+    if document is not None:
+        check_appearance(document)
     contours = {layer: [*closed[layer], *closed_loops(loose[layer])] for layer in closed}
     check_clear([*contours[CUT_INNER], *contours[CUT_OUTER]])
-    return ReadBack(
-        nested_region(contours[CUT_INNER], contours[CUT_OUTER]),
-        dict(document.header.custom_vars.properties),
-        "mm" if says_units else "",
-        tuple(entity.dxf.layer for entity in model),
-        tuple(other),
-        tuple(strokes),
+    region = nested_region(contours[CUT_INNER], contours[CUT_OUTER])
+    return ReadBack(region, properties, units, tuple(layers), tuple(other), tuple(strokes))
+
+
+def _place(kind: str, drawn: Sequence[Edge]) -> str:
+    x, y = drawn[0].start
+    return f"{kind} at x {x:.3f}, y {y:.3f}"
+
+
+def _is_short(edge: Edge) -> bool:
+    """Whether an edge has no length: none is shorter than its chord, but for a radius below 0."""
+    may_be = math.dist(edge.start, edge.end) < EPSILON or (
+        isinstance(edge, Arc) and edge.radius < EPSILON
     )
+    return may_be and edge.length < EPSILON
 
 
-def _geometry(entity: DXFEntity, may_be_open: bool) -> tuple[Contour | None, list[Edge]]:
-    """The closed contour, or else the loose edges, that an entity draws."""
+def _drawn(entity: DXFEntity) -> Drawn:
+    """What an entity draws; polylines on the layers of strokes may be open."""
     from ezdxf.entities.lwpolyline import LWPolyline
     from ezdxf.entities.polyline import Polyline
 
     kind, dxf = entity.dxftype(), entity.dxf
+    may_be_open = dxf.layer not in (CUT_INNER, CUT_OUTER)
     if kind not in DRAWN or (isinstance(entity, Polyline) and not _is_plain(entity)):
         raise OutputError(f"{kind} (handle {dxf.handle}) cannot be cut; use {', '.join(DRAWN)}.")
     if not all(math.isfinite(value) for value in _numbers(entity)):
@@ -153,26 +187,21 @@ def _geometry(entity: DXFEntity, may_be_open: bool) -> tuple[Contour | None, lis
     if isinstance(entity, LWPolyline):
         _check_flat(entity, dxf.elevation)
         rows = [tuple(map(float, row)) for row in entity.lwpoints]
-        edges = _polyline(rows, entity.closed, dxf.get("const_width", 0.0), may_be_open)
-        return (Contour(tuple(edges)), []) if entity.closed else (None, edges)
+        edges = polyline(rows, entity.closed, dxf.get("const_width", 0.0), may_be_open)
+        return of_polyline(kind, dxf.layer, edges, entity.closed)
     if isinstance(entity, Polyline):
         _check_flat(entity, *(vertex.dxf.location.z for vertex in entity.vertices))
-        edges = _polyline(list(_old_rows(entity)), entity.is_closed, 0.0, may_be_open)
-        return (Contour(tuple(edges)), []) if entity.is_closed else (None, edges)
+        edges = polyline(list(_old_rows(entity)), entity.is_closed, 0.0, may_be_open)
+        return of_polyline(kind, dxf.layer, edges, entity.is_closed)
     if kind == "LINE":
         _check_flat(entity, dxf.start.z, dxf.end.z)
-        return None, [Line((dxf.start.x, dxf.start.y), (dxf.end.x, dxf.end.y))]
+        line = Line((dxf.start.x, dxf.start.y), (dxf.end.x, dxf.end.y))
+        return Drawn(kind, dxf.layer, None, [line])
     _check_flat(entity, dxf.center.z)
     centre = dxf.center.x, dxf.center.y
     if kind == "CIRCLE":
-        return circle(centre, dxf.radius), []
-    first = math.radians(dxf.start_angle)
-    sweep = math.radians((dxf.end_angle - dxf.start_angle) % 360.0)
-    start, end = (
-        (centre[0] + dxf.radius * math.cos(angle), centre[1] + dxf.radius * math.sin(angle))
-        for angle in (first, first + sweep)
-    )
-    return None, quarter_arcs(start, end, centre, dxf.radius, sweep)
+        return Drawn(kind, dxf.layer, circle(centre, dxf.radius), ())
+    return Drawn(kind, dxf.layer, None, arc(centre, dxf.radius, dxf.start_angle, dxf.end_angle))
 
 
 def _numbers(entity: DXFEntity) -> Iterator[float]:
@@ -209,33 +238,3 @@ def _check_flat(entity: DXFEntity, *heights: float) -> None:
         raise OutputError(
             f"{entity.dxftype()} (handle {entity.dxf.handle}) is not at z = 0; move it there."
         )
-
-
-def _polyline(
-    rows: Sequence[tuple[float, ...]], closed: bool, width: float, may_be_open: bool
-) -> list[Edge]:
-    """The edges of a polyline's rows: x, y, start and end width, bulge."""
-    x, y = rows[0][:2] if rows else (0.0, 0.0)
-    place = f"polyline at x {x:.3f}, y {y:.3f}"
-    if len(rows) < 2 or not (closed or may_be_open):
-        raise OutputError(f"{place} is open; close it.")
-    if width or any(row[2] or row[3] for row in rows):
-        raise OutputError(f"{place} has a width; draw the cut's middle without width.")
-    edges: list[Edge] = []
-    followers = [*rows[1:], rows[0]] if closed else rows[1:]
-    for row, following in zip(rows, followers, strict=False):
-        start, end = (row[0], row[1]), (following[0], following[1])
-        if start == end:
-            raise OutputError(
-                f"{place} repeats its vertex x {row[0]:.3f}, y {row[1]:.3f}; remove one."
-            )
-        edges += _bulge_edges(start, end, row[4])
-    return edges
-
-
-def _bulge_edges(start: Point, end: Point, bulge: float) -> list[Edge]:
-    """What a polyline draws from a vertex to the next; arcs may turn more than half round."""
-    edge = edge_from_bulge(start, end, bulge)
-    if isinstance(edge, Line):
-        return [edge]
-    return quarter_arcs(start, end, edge.centre, edge.radius, 4 * math.atan(bulge))

@@ -29,6 +29,8 @@ class Curves(NamedTuple):
 TRUE_ARCS = Curves()
 """How curves are written: polylines with bulges, LINE and ARC, or polylines of short chords."""
 
+QUARTER = math.sqrt(2)
+"""The chord of a quarter turn, in radii."""
 DATUM_ARM = 1.0
 """Half the length in mm of the datum cross at the origin."""
 
@@ -55,7 +57,7 @@ class _Entity(NamedTuple):
     body: str
 
 
-class _Skeleton(NamedTuple):
+class Skeleton(NamedTuple):
     """The empty document, cut open where a file differs from another."""
 
     before_properties: str
@@ -80,7 +82,7 @@ def dxf_text(
     has a cross at the origin on REFERENCE, after all that is cut; a ``sheet`` has its engraving,
     parting cut and frame instead.
     """
-    skeleton = _skeleton()
+    form = skeleton()
     cuts = _cuts(contours, profile)
     if sheet is None:
         entities = [*cuts, *_datum_cross()]
@@ -93,23 +95,23 @@ def dxf_text(
             *(_stroke(REFERENCE, run) for run in (*_frames(sheet), *sheet.marks)),
         ]
         low, high = (0.0, 0.0), sheet.frame or (0.0, 0.0)
-    seed = skeleton.first_handle + len(entities)
+    seed = form.first_handle + len(entities)
     drawn = "".join(
-        f"  0\n{entity.kind}\n  5\n{handle:X}\n330\n{skeleton.model_space}\n100\nAcDbEntity\n"
+        f"  0\n{entity.kind}\n  5\n{handle:X}\n330\n{form.model_space}\n100\nAcDbEntity\n"
         f"  8\n{entity.layer}\n100\n{entity.subclass}\n{entity.body}"
-        for handle, entity in enumerate(entities, skeleton.first_handle)
+        for handle, entity in enumerate(entities, form.first_handle)
     )
     return "".join(
         (
-            skeleton.before_properties,
+            form.before_properties,
             _custom_properties(properties),
-            skeleton.before_extents,
+            form.before_extents,
             _extents([*(contour.bounds for contour in contours), (*low, *high)]),
-            skeleton.before_seed,
+            form.before_seed,
             f"{seed:X}",
-            skeleton.before_entities,
+            form.before_entities,
             drawn,
-            skeleton.tail,
+            form.tail,
         )
     )
 
@@ -132,7 +134,7 @@ def _cuts(contours: Iterable[Contour], profile: DxfProfile) -> Iterator[_Entity]
 
 def _quarters(edge: Edge) -> Sequence[Edge]:
     """The edge in arcs of at most a quarter turn."""
-    if not isinstance(edge, Arc):
+    if not isinstance(edge, Arc) or math.dist(edge.start, edge.end) <= QUARTER * edge.radius:
         return [edge]
     return quarter_arcs(edge.start, edge.end, edge.centre, edge.radius, edge.sweep)
 
@@ -227,7 +229,8 @@ def _extents(boxes: Sequence[Bounds]) -> str:
 
 
 @cache
-def _skeleton() -> _Skeleton:
+def skeleton() -> Skeleton:
+    """The packaged empty document, cut open where files differ."""
     from sbafab.cutting.skeleton import SKELETON
 
     text = SKELETON.read_text(encoding="utf-8")
@@ -242,7 +245,7 @@ def _skeleton() -> _Skeleton:
     )
     if record is None:
         raise ValueError("skeleton.dxf has no model space: regenerate it.")
-    return _Skeleton(
+    return Skeleton(
         before_properties,
         base + before_extents,
         after_extents + before_seed + seed_tag,

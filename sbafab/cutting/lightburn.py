@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from xml.sax.saxutils import quoteattr
+from typing import NamedTuple
 
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER, CUT_SHEET, ENGRAVE, REFERENCE
 from sbafab.cutting.dxf_write import Surroundings
+from sbafab.geometry.copies import Copies
 from sbafab.geometry.edges import Arc, Edge, Line, Point
 from sbafab.geometry.region import Contour
+from sbafab.markup import quoteattr
 
 ENDING = ".lbrn2"
 INDICES = {ENGRAVE: 0, CUT_INNER: 1, CUT_OUTER: 2, CUT_SHEET: 7, REFERENCE: 8}
@@ -42,8 +44,14 @@ ADVICE = (
     "frame (REFERENCE) without output. The engraved label must read from left to right"
 )
 
-LaserRun = tuple[str, tuple[Edge, ...], bool]
-"""A layer, edges one after the other, and whether they close."""
+
+class LaserRun(NamedTuple):
+    """Edges one after the other on a layer, whether they close, and whether they are a circle."""
+
+    layer: str
+    edges: tuple[Edge, ...]
+    closed: bool
+    circle: tuple[Point, float] | None = None
 
 
 def drawn(contours: Sequence[Contour], sheet: Surroundings) -> Iterator[LaserRun]:
@@ -51,7 +59,8 @@ def drawn(contours: Sequence[Contour], sheet: Surroundings) -> Iterator[LaserRun
     for run in sheet.engraved:
         yield _run(ENGRAVE, run)
     for contour in contours:
-        yield CUT_INNER if contour.is_hole else CUT_OUTER, contour.edges, True
+        layer = CUT_INNER if contour.is_hole else CUT_OUTER
+        yield LaserRun(layer, contour.edges, True, contour.circle)
     for run in sheet.parting:
         yield _run(CUT_SHEET, run)
     for run in sheet.marks:
@@ -63,7 +72,7 @@ def drawn(contours: Sequence[Contour], sheet: Surroundings) -> Iterator[LaserRun
 
 def _run(layer: str, run: Sequence[Point]) -> LaserRun:
     edges = tuple(map(Line, run[:-1], run[1:]))
-    return layer, edges, run[0] == run[-1]
+    return LaserRun(layer, edges, run[0] == run[-1])
 
 
 def parts_of(edge: Edge) -> Sequence[Edge]:
@@ -86,8 +95,8 @@ def project_text(
     Contours are cut in the order given, holes before outlines. Lower left corner at the origin,
     y upwards, mm.
     """
-    shapes = list(drawn(contours, sheet))
-    layers = [layer for layer in INDICES if any(shape[0] == layer for shape in shapes)]
+    shapes, outlines = list(drawn(contours, sheet)), _Outlines()
+    layers = [layer for layer in INDICES if any(shape.layer == layer for shape in shapes)]
     prefs = {**ORDER, **{f"Optimize_{name}": 0 for name in NOT_OPTIMIZED}}
     notes = "\n".join((advice, *(f"{name}: {value}" for name, value in properties.items())))
     lines = [
@@ -98,7 +107,7 @@ def project_text(
         *(f'<{name} Value="{value}"/>' for name, value in prefs.items()),
         "</UIPrefs>",
         *(_setting(layer, rank) for rank, layer in enumerate(layers)),
-        *(_shape(number, *shape) for number, shape in enumerate(shapes)),
+        *(_shape(number, shape, outlines) for number, shape in enumerate(shapes)),
         f'<Notes ShowOnLoad="1" Notes={quoteattr(notes)}/>',
         "</LightBurnProject>\n",
     ]
@@ -120,32 +129,75 @@ def _setting(layer: str, rank: int) -> str:
     return f'<CutSetting type="{CUT_MODE}">{inner}</CutSetting>'
 
 
-def _shape(number: int, layer: str, edges: Sequence[Edge], closed: bool) -> str:
-    index = INDICES[layer]
-    circle = Contour(tuple(edges)).circle if closed else None
-    if circle is not None:
-        (x, y), radius = circle
+def _shape(number: int, run: LaserRun, outlines: _Outlines) -> str:
+    index = INDICES[run.layer]
+    if run.circle is not None:
+        (x, y), radius = run.circle
         size = f'Rx="{_number(radius)}" Ry="{_number(radius)}"'
         place = f"<XForm>1 0 0 1 {_number(x)} {_number(y)}</XForm>"
         return f'<Shape Type="Ellipse" CutIndex="{index}" {size}>{place}</Shape>'
-    parts = [part for edge in edges for part in parts_of(edge)]
+    vertices, primitives = outlines.drawn(run)
+    return (
+        f'<Shape Type="Path" CutIndex="{index}" VertID="{number}" PrimID="{number}">'
+        f"<XForm>1 0 0 1 0 0</XForm><VertList>{vertices}</VertList>"
+        f"<PrimList>{primitives}</PrimList></Shape>"
+    )
+
+
+class _Outline(NamedTuple):
+    """A path from its first vertex: text with a gap for each number, these numbers, primitives."""
+
+    form: str
+    numbers: list[float]
+    primitives: str
+
+
+class _Outlines:
+    """The paths of a sheet, each shape counted once and moved to its places."""
+
+    def __init__(self) -> None:
+        self._copies = Copies()
+        self._known: dict[int, _Outline] = {}
+
+    def drawn(self, run: LaserRun) -> tuple[str, str]:
+        """Vertices and primitives of a run."""
+        x, y = run.edges[0].start
+        own = self._outline(run)
+        placed = [n + (y if k % 2 else x) for k, n in enumerate(own.numbers)]
+        return own.form % tuple(map(_number, placed)), own.primitives
+
+    def _outline(self, run: LaserRun) -> _Outline:
+        if not run.closed:
+            return _outline(Contour(run.edges), False)
+        first = self._copies.first(Contour(run.edges))
+        if id(first) not in self._known:
+            self._known[id(first)] = _outline(first, True)
+        return self._known[id(first)]
+
+
+def _outline(contour: Contour, closed: bool) -> _Outline:
+    parts = [part for edge in contour.edges for part in parts_of(edge)]
     count = len(parts) + (not closed)
     leaving = [_handles(part) for part in parts]
-    vertices = []
+    form, places = [], []
     for k in range(count):
-        x, y = parts[k].start if k < len(parts) else parts[-1].end
-        after = leaving[k][0] if k < len(parts) else None
-        before = leaving[k - 1][1] if closed or k else None
-        vertices.append(f"V{_number(x)} {_number(y)}{_handle('c0', after)}{_handle('c1', before)}")
+        places.append(parts[k].start if k < len(parts) else parts[-1].end)
+        form.append("V%s %s")
+        handles = (
+            ("c0", leaving[k][0] if k < len(parts) else None),
+            ("c1", leaving[k - 1][1] if closed or k else None),
+        )
+        for name, place in handles:
+            # A control point that is not there is said by a 1.
+            form.append(f"{name}x%s{name}y%s" if place is not None else f"{name}x1")
+            places += [place] if place is not None else []
+    x, y = contour.edges[0].start
     primitives = "".join(
         f"{'L' if isinstance(part, Line) else 'B'}{k} {(k + 1) % count}"
         for k, part in enumerate(parts)
     )
-    return (
-        f'<Shape Type="Path" CutIndex="{index}" VertID="{number}" PrimID="{number}">'
-        f"<XForm>1 0 0 1 0 0</XForm><VertList>{''.join(vertices)}</VertList>"
-        f"<PrimList>{primitives}</PrimList></Shape>"
-    )
+    numbers = [n for px, py in places for n in (px - x, py - y)]
+    return _Outline("".join(form), numbers, primitives)
 
 
 def _handles(part: Edge) -> tuple[Point, Point] | tuple[None, None]:
@@ -156,13 +208,6 @@ def _handles(part: Edge) -> tuple[Point, Point] | tuple[None, None]:
     (x, y), (u, v) = part.start, part.end
     (px, py), (qx, qy) = part.direction(part.start), part.direction(part.end)
     return (x + reach * px, y + reach * py), (u - reach * qx, v - reach * qy)
-
-
-def _handle(name: str, place: Point | None) -> str:
-    """A control point as it stands behind its vertex; one that is not there is said by a 1."""
-    if place is None:
-        return f"{name}x1"
-    return f"{name}x{_number(place[0])}{name}y{_number(place[1])}"
 
 
 def _number(value: float) -> str:

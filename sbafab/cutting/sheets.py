@@ -13,7 +13,7 @@ from sbafab.cutting.dxf_read import ReadBack
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.label import label
 from sbafab.cutting.lightburn import ENDING, project_text
-from sbafab.cutting.lightburn_read import verify_project
+from sbafab.cutting.lightburn_verify import verify_project
 from sbafab.cutting.order import cutting_order, travel
 from sbafab.cutting.properties import CutSettings, kerf_suffix, sheet_properties
 from sbafab.cutting.svg_write import sheet_svg

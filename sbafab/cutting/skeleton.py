@@ -1,7 +1,7 @@
 """The empty DXF document that every cut file is filled into.
 
 ``python -m sbafab.cutting.skeleton`` regenerates it with ezdxf. Keeping it as a file means that
-writing a cut file costs no import of ezdxf, and that reading one back is an independent check.
+writing a cut file costs no import of ezdxf, nor does reading one back in this program's own form.
 """
 
 from __future__ import annotations

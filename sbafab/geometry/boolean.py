@@ -7,6 +7,7 @@ side of it only; the pieces that stay are chained into contours. Nothing is flat
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 from typing import TypeVar
 
 from sbafab.errors import SbafabError
@@ -15,6 +16,7 @@ from sbafab.geometry.edges import EPSILON, Edge, Line, Point, quarter_arcs
 from sbafab.geometry.facets import run_sweep
 from sbafab.geometry.pieces import overlaid
 from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.remembered import MOST
 from sbafab.geometry.shapes import circle
 
 Found = TypeVar("Found")
@@ -55,7 +57,11 @@ def wound(edges: Sequence[Edge], above: int) -> Region:
 
     Raises GeometryError where no way to cut the edges where they meet gives one answer.
     """
+    return _wound(tuple(edges), above)
 
+
+@lru_cache(maxsize=MOST)
+def _wound(edges: tuple[Edge, ...], above: int) -> Region:
     def contours(found: Arrangement) -> list[Contour]:
         loops = found.loops(found.borders(above))
         return [contour for contour in map(tidy, loops) if contour is not None]

@@ -8,6 +8,11 @@ from itertools import chain
 
 from sbafab.geometry.edges import Bounds, Edge, Point, distance_to
 
+MANY_BOXES = 500
+"""From which on comparing all at once is worth fetching numpy."""
+AT_ONCE = 1_000_000
+"""Pairs that are compared at once, which bounds the memory."""
+
 
 def widened(box: Bounds, margin: float) -> Bounds:
     """The box with ``margin`` added on every side."""
@@ -18,8 +23,11 @@ def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, in
     """Numbers of the boxes that come within ``reach`` of each other, by a sweep along x.
 
     The sweep runs in bands along y as high as a box is on average, so its time grows with the boxes
-    and the pairs alone.
+    and the pairs alone. Of many boxes, all are compared at once with those that they meet along x.
     """
+    if len(boxes) >= MANY_BOXES:
+        yield from _close_among_many(boxes, reach)
+        return
     order = sorted(range(len(boxes)), key=lambda i: boxes[i][0])
     height = reach + sum(box[3] - box[1] for box in boxes) / max(1, len(boxes)) or 1.0
     active: dict[int, list[tuple[int, int, int]]] = {}
@@ -45,6 +53,34 @@ def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, in
         bottom, top = math.floor(low / height), math.floor(high / height)
         for band in range(bottom, top + 1):
             active.setdefault(band, []).append((rank, i, bottom))
+
+
+def _close_among_many(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
+    """The same pairs in the same order."""
+    import numpy as np
+
+    sides = np.array(boxes)
+    order = np.argsort(sides[:, 0], kind="stable")
+    left, low, right, high = sides[order].T
+    # Ranks: each box may meet those after it as far as they start before it ends.
+    last = np.searchsorted(left - reach, right, side="right")
+    counts = np.maximum(last - np.arange(1, len(order) + 1), 0)
+    until = np.cumsum(counts)
+    found = []
+    first = 0
+    while first < len(order):
+        done = until[first - 1] if first else 0
+        after = max(first + 1, int(np.searchsorted(until, done + AT_ONCE, side="right")))
+        own = counts[first:after]
+        before = np.repeat(np.arange(first, after), own)
+        ahead = np.arange(len(before)) - np.repeat(np.cumsum(own) - own, own)
+        behind = before + 1 + ahead
+        meets = (low[before] <= high[behind] + reach) & (high[before] >= low[behind] - reach)
+        found.append(np.array([behind[meets], before[meets]]))
+        first = after
+    behind, before = np.concatenate(found, axis=1)
+    turn = np.lexsort((before, behind))
+    yield from zip(order[before[turn]].tolist(), order[behind[turn]].tolist(), strict=True)
 
 
 class EdgeIndex:

@@ -156,7 +156,13 @@ class Contour:
 
     def reversed(self) -> Contour:
         turned = Contour(tuple([edge.reversed() for edge in reversed(self.edges)]))
+        known = self.__dict__
         turned.__dict__["circle"] = self.circle
+        for name, sign in (("length", 1), ("area", -1)):
+            if name in known:
+                turned.__dict__[name] = sign * known[name]
+        if "bounds" in known:
+            turned.__dict__["bounds"] = known["bounds"]
         return turned
 
     def winding(self, p: Point) -> int:
@@ -170,7 +176,11 @@ class Contour:
     def _level_with(self, y: float) -> Sequence[Edge]:
         """The edges that a level line at ``y`` can meet, and perhaps some more."""
         if len(self.edges) < MANY:
-            return self.edges
+            return [
+                edge
+                for edge, (_, bottom, _, top) in zip(self.edges, self.boxes, strict=True)
+                if bottom - EPSILON <= y <= top + EPSILON
+            ]
         low, step, rows = self._rows
         return rows[min(len(rows) - 1, int((y - low) / step))]
 
@@ -345,9 +355,16 @@ class Region:
                 ]
             )
             image = Contour(edges)
+            known = contour.__dict__
+            if "length" in known:
+                image.__dict__["length"] = scale * known["length"]
+            if "area" in known:
+                # A mirrored image keeps the material on its left once it is reversed.
+                image.__dict__["area"] = scale * scale * known["area"] * (-1 if mirror else 1)
             if contour.circle is not None:
-                centre, radius = contour.circle
-                image.__dict__["circle"] = point(centre), radius * scale
+                (x, y), radius = point(contour.circle[0]), contour.circle[1] * scale
+                image.__dict__["circle"] = (x, y), radius
+                image.__dict__["bounds"] = x - radius, y - radius, x + radius, y + radius
             return image.reversed() if mirror else image
 
         return Region(tuple(map(mapped_contour, self.contours)))

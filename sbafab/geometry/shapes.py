@@ -17,7 +17,12 @@ def circle(centre: Point, radius: float) -> Contour:
         tuple([Arc(compass[i], compass[(i + 1) % 4], centre, radius, True) for i in range(4)])
     )
     # Known without a look at the arcs.
-    contour.__dict__["circle"] = centre, radius
+    contour.__dict__.update(
+        circle=(centre, radius),
+        area=math.pi * radius * radius,
+        length=math.tau * radius,
+        bounds=(x - radius, y - radius, x + radius, y + radius),
+    )
     return contour
 
 

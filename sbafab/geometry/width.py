@@ -16,6 +16,7 @@ from sbafab.geometry.ends import ROUNDED, SMOOTH, tapered_ends
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.remembered import remembered
 
 ALONGSIDE = 1e-3
 """Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
@@ -43,6 +44,7 @@ class Width(NamedTuple):
         return (self.start[0] + self.end[0]) / 2, (self.start[1] + self.end[1]) / 2
 
 
+@remembered
 def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) -> Width | None:
     """The narrowest place of the material, if under ``below`` mm; None if no edge faces another.
 
@@ -51,15 +53,17 @@ def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) ->
     return _least(_Boundary(region.contours, sharp), below)
 
 
+@remembered
 def least_gap(region: Region, sharp: float = 90.0, below: float = math.inf) -> Width | None:
     """The narrowest slot, hole or gap between pieces, likewise."""
     outside = [contour.reversed() for contour in region.contours]
     return _least(_Boundary(outside, sharp), below)
 
 
+@remembered
 def facing_pairs(
     region: Region, slack: float, sharp: float = 90.0, least: Width | None = None
-) -> list[Width]:
+) -> tuple[Width, ...]:
     """Facing places that are at most ``slack`` mm wider than the narrowest, each once.
 
     Besides the places where edges are square on each other they hold samples along edges that run
@@ -69,7 +73,7 @@ def facing_pairs(
     boundary = _Boundary(region.contours, sharp)
     least = least or _least(boundary, math.inf)
     if least is None or least.value == 0.0:
-        return [] if least is None else [least]
+        return () if least is None else (least,)
     gathered = _Gathered(boundary, least.value + slack)
     _search(gathered)
     for a in boundary.sides:
@@ -77,7 +81,7 @@ def facing_pairs(
         for _, b in gathered.near(a, ASIDE):
             if a is not b and b.may_hold_feet(a, gathered.value):
                 _from_samples(samples, b, gathered)
-    return list(gathered.found.values())
+    return tuple(gathered.found.values())
 
 
 def spread(edge: Edge) -> list[Point]:

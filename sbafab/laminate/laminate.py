@@ -125,6 +125,7 @@ class Laminate:
     ``outline`` is that of the films of all balloons laid over each other, without inlet tabs and
     ears; empty where only the layers are known. ``pins_in_full_bonds``: whether the pins of ears
     stay in while TPE melts. ``panel``: the registered sheets that it is made in, if it is.
+    ``tube``: outer diameter in mm of the tube that its sheet is wrapped round, if it is.
     """
 
     name: str
@@ -141,6 +142,7 @@ class Laminate:
     outline: Region = NOTHING
     pins_in_full_bonds: bool = False
     panel: SheetPanel | None = None
+    tube: float | None = None
 
     def __repr__(self) -> str:
         return f"Laminate({self.name!r}, {self.family!r}, {len(self.layers)} layers)"

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
-from xml.sax.saxutils import escape
 
 from sbafab.geometry.edges import Bounds
 from sbafab.geometry.svg import number, path_data
 from sbafab.laminate.inks import ink
+from sbafab.markup import escape
 from sbafab.notebook import table_html
 
 if TYPE_CHECKING:

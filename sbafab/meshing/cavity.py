@@ -36,13 +36,19 @@ def cavity_slabs(laminate: Laminate, chamber: Chamber) -> list[Slab]:
     return sorted([*pockets, *channels], key=lambda slab: slab.bottom)
 
 
-def cavity(laminate: Laminate, chamber: Chamber, sagitta: float = SAGITTA) -> Surface:
+def cavity(
+    laminate: Laminate,
+    chamber: Chamber,
+    sagitta: float = SAGITTA,
+    cuts: Sequence[float] = (),
+) -> Surface:
     """The closed surface of a chamber's cavity, normals out of the air.
 
-    Its volume is that of :func:`cavity_slabs`. Raises OutputError if it does not close.
+    Its volume is that of :func:`cavity_slabs`. No face runs across the ``cuts``, x in mm. Raises
+    OutputError if it does not close.
     """
     return closed_surface(
-        f"the cavity of chamber {chamber.name}", cavity_slabs(laminate, chamber), sagitta
+        f"the cavity of chamber {chamber.name}", cavity_slabs(laminate, chamber), sagitta, cuts
     )
 
 

@@ -10,14 +10,15 @@ from typing import Literal
 
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.cavity import cavity
-from sbafab.meshing.prisms import SAGITTA
+from sbafab.meshing.prisms import SAGITTA, sealed
 from sbafab.meshing.solid import solid
 from sbafab.meshing.surface import Surface
+from sbafab.meshing.wrap import tube_wrap, wrapped
 from sbafab.meshing.write_3mf import write_3mf
 from sbafab.meshing.write_glb import write_glb
 from sbafab.meshing.write_stl import write_stl
 
-MeshKind = Literal["solid", "cavity", "volume", "shell"]
+MeshKind = Literal["solid", "cavity", "volume", "shell", "skin"]
 Writer = Callable[[Surface, Path], None]
 
 SOLID_WRITERS: dict[str, Writer] = {
@@ -50,14 +51,16 @@ def write_meshes(
     sagitta: float = SAGITTA,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[MeshFile]:
-    """Write ``mesh/solid.stl``, ``.3mf``, ``.glb`` and ``mesh/cavity_<chamber>.stl``.
+    """Write ``mesh/solid.stl``, ``.3mf``, ``.glb`` and ``mesh/cavity_<chamber>.stl``, all flat.
 
+    A laminate on a tube also gets ``mesh/solid_wrapped.*``, ``mesh/cavity_<chamber>_wrapped.stl``.
     ``folder`` is the output folder, ``sagitta`` the height in mm of an arc over its chord.
     ``progress`` is told how many of how many files are done. Raises OutputError if a surface is
     open or its volume is not the sum of area x thickness.
     """
     (folder / "mesh").mkdir(parents=True, exist_ok=True)
     total = len(SOLID_WRITERS) + len(laminate.chambers)
+    total *= 1 if laminate.tube is None else 2
     written: list[MeshFile] = []
     for mesh, surface, write in _meshes(laminate, sagitta):
         write(surface, folder / mesh.file)
@@ -68,7 +71,12 @@ def write_meshes(
 
 
 def _meshes(laminate: Laminate, sagitta: float) -> Iterator[tuple[MeshFile, Surface, Writer]]:
+    wrap = tube_wrap(laminate)
     surface = solid(laminate, sagitta)
+    around = None
+    if wrap is not None:
+        around = wrapped(solid(laminate, sagitta, wrap.cuts), wrap)
+        sealed("the solid round its tube", around)
     films = laminate.bonded_materials
     named: dict[str, Writer] = {
         "3mf": partial(write_3mf, material=films),
@@ -76,10 +84,17 @@ def _meshes(laminate: Laminate, sagitta: float) -> Iterator[tuple[MeshFile, Surf
     }
     for suffix, write in {**SOLID_WRITERS, **named}.items():
         yield _described(f"mesh/solid.{suffix}", "solid", None, surface), surface, write
+        if around is not None:
+            yield _described(f"mesh/solid_wrapped.{suffix}", "solid", None, around), around, write
     for chamber in laminate.chambers:
         file = f"mesh/cavity_{chamber.name}.stl"
         surface = cavity(laminate, chamber, sagitta)
         yield _described(file, "cavity", chamber.name, surface), surface, write_stl
+        if wrap is not None:
+            file = f"mesh/cavity_{chamber.name}_wrapped.stl"
+            around = wrapped(cavity(laminate, chamber, sagitta, wrap.cuts), wrap)
+            sealed(f"the cavity of {chamber.name} round its tube", around)
+            yield _described(file, "cavity", chamber.name, around), around, write_stl
 
 
 def _described(file: str, kind: MeshKind, chamber: str | None, surface: Surface) -> MeshFile:

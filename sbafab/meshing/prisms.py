@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
+from sbafab.geometry.shapes import rectangle
 from sbafab.meshing.partition import Partition, partition
 from sbafab.meshing.surface import Surface, open_edges
 
@@ -34,19 +36,20 @@ class Slab(NamedTuple):
         return self.region.area * (self.top - self.bottom)
 
 
-def fuse(slabs: Sequence[Slab], sagitta: float) -> Surface:
+def fuse(slabs: Sequence[Slab], sagitta: float, cuts: Sequence[float] = ()) -> Surface:
     """The surface of the union of the slabs, built film by film from one partition of the plane.
 
     Arcs become chords within ``sagitta`` mm of them, of equal area. No boolean of solids is
     needed: walls stand on the outline of a level, and what differs from the level above it or
-    below it is a face.
+    below it is a face. ``cuts`` (x in mm, ascending) are lines that no face runs across.
     """
     import numpy as np
 
     regions = list(dict.fromkeys(slab.region for slab in slabs))
-    plane = partition(regions, sagitta)
+    strips = list(_strips(regions, cuts))
+    plane = partition([*regions, *strips], sagitta)
     heights, levels = _levels(slabs, regions, plane)
-    faces = _faces(plane, levels)
+    faces = _faces(plane, levels, plane.inside[len(regions) :])
     count = len(plane.points)
     used = np.zeros(count * len(heights), dtype=bool)
     used[faces] = True
@@ -55,24 +58,42 @@ def fuse(slabs: Sequence[Slab], sagitta: float) -> Surface:
     return Surface(points, np.cumsum(used)[faces] - 1)
 
 
-def closed_surface(what: str, slabs: Sequence[Slab], sagitta: float) -> Surface:
+def _strips(regions: Sequence[Region], cuts: Sequence[float]) -> Iterator[Region]:
+    """What lies between two cuts each, and before the first and past the last of them."""
+    if not cuts:
+        return
+    boxes = [region.bounds for region in regions]
+    low = min(box[0] for box in boxes) - 1, min(box[1] for box in boxes) - 1
+    high = max(box[2] for box in boxes) + 1, max(box[3] for box in boxes) + 1
+    for left, right in pairwise([low[0], *cuts, high[0]]):
+        yield rectangle((left, low[1]), (right, high[1]))
+
+
+def closed_surface(
+    what: str, slabs: Sequence[Slab], sagitta: float, cuts: Sequence[float] = ()
+) -> Surface:
     """The verified surface of the slabs; ``what`` names it in errors.
 
     Raises OutputError if an edge does not join two triangles, or the volume is off.
     """
-    surface = fuse(slabs, sagitta)
+    surface = sealed(what, fuse(slabs, sagitta, cuts))
+    expected = sum(slab.volume for slab in slabs)
+    if not abs(surface.volume - expected) <= VOLUME_TOLERANCE * expected:
+        raise OutputError(
+            f"The mesh of {what} holds {surface.volume:.4f} mm3 where its films add up to "
+            f"{expected:.4f} mm3; ask for a smaller sagitta than {sagitta:g} mm."
+        )
+    return surface
+
+
+def sealed(what: str, surface: Surface) -> Surface:
+    """The surface itself. Raises OutputError if an edge does not join two triangles."""
     gaps = open_edges(surface)
     if len(gaps):
         x, y, z = gaps[0]
         raise OutputError(
             f"The mesh of {what} is not closed at {len(gaps)} edges, the first at x {x:.3f}, "
             f"y {y:.3f}, z {z:.3f}; move profiles apart that touch in one point there."
-        )
-    expected = sum(slab.volume for slab in slabs)
-    if not abs(surface.volume - expected) <= VOLUME_TOLERANCE * expected:
-        raise OutputError(
-            f"The mesh of {what} holds {surface.volume:.4f} mm3 where its films add up to "
-            f"{expected:.4f} mm3; ask for a smaller sagitta than {sagitta:g} mm."
         )
     return surface
 
@@ -94,7 +115,9 @@ def _levels(
     return np.array(heights), filled
 
 
-def _faces(plane: Partition, levels: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _faces(
+    plane: Partition, levels: NDArray[np.bool_], strips: NDArray[np.bool_]
+) -> NDArray[np.int64]:
     """Triangles (k, 3) of point + height x number of points, heights counted from the lowest."""
     import numpy as np
 
@@ -108,7 +131,8 @@ def _faces(plane: Partition, levels: NDArray[np.bool_]) -> NDArray[np.int64]:
     ):
         for chosen, order in ((below & ~here, (0, 1, 2)), (here & ~below, (0, 2, 1))):
             if (key := chosen.tobytes()) not in lids:
-                lids[key] = plane.triangles(chosen)
+                parts = [chosen & strip for strip in strips] if len(strips) else [chosen]
+                lids[key] = np.concatenate([plane.triangles(part) for part in parts])
             faces.append(lids[key][:, order] + index * count)
         if (key := here.tobytes()) not in walls:
             walls[key] = _walls(plane.boundary(here), count)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.prisms import SAGITTA, Slab, closed_surface
 from sbafab.meshing.surface import Surface
@@ -21,9 +23,10 @@ def solid_slabs(laminate: Laminate) -> list[Slab]:
     return sorted(slabs, key=lambda slab: slab.bottom)
 
 
-def solid(laminate: Laminate, sagitta: float = SAGITTA) -> Surface:
+def solid(laminate: Laminate, sagitta: float = SAGITTA, cuts: Sequence[float] = ()) -> Surface:
     """The surface of the flat actuator, pockets, bores, inlet channels and lumen open.
 
-    Its volume is that of :func:`solid_slabs`. Raises OutputError if it does not close.
+    Its volume is that of :func:`solid_slabs`. No face runs across the ``cuts``, x in mm. Raises
+    OutputError if it does not close.
     """
-    return closed_surface("the solid", solid_slabs(laminate), sagitta)
+    return closed_surface("the solid", solid_slabs(laminate), sagitta, cuts)

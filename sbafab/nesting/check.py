@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from sbafab.errors import OutputError
+from sbafab.geometry.copies import COPIED, Copies
 from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to
 from sbafab.geometry.intersect import line_circle, meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
@@ -17,6 +18,9 @@ from sbafab.nesting.records import Nest, Stock
 
 SLACK = 1e-6
 """mm by which a distance may miss what is asked for: rounding."""
+
+NEAR = 1e-4
+"""mm by which the places of two pairs may differ of which one tells the gap of the other."""
 
 
 class Gap(NamedTuple):
@@ -63,10 +67,15 @@ def check_placed(regions: Sequence[tuple[str, Region]], stock: Stock, slack: flo
     ]
     entries = [*regions, *pins]
     rounds = [_round(region) for _, region in entries]
+    known = _Gaps()
     for i, j in close_pairs([region.bounds for _, region in entries], stock.spacing):
         if min(i, j) >= len(regions) or _apart(rounds[i], rounds[j]) >= stock.spacing:
             continue
-        gap = least_distance(entries[i][1], entries[j][1], stock.spacing)
+        pair = entries[i][1], entries[j][1]
+        if known.least(*pair) >= stock.spacing - slack:
+            continue
+        gap = least_distance(*pair, stock.spacing)
+        known.add(*pair, min(gap.value, stock.spacing))
         if gap.value < stock.spacing - slack:
             (x, y), (one, other) = gap.place, (entries[min(i, j)][0], entries[max(i, j)][0])
             how = f"are {gap.value:.4f} mm apart" if gap.value > 0 else "overlap"
@@ -74,6 +83,38 @@ def check_placed(regions: Sequence[tuple[str, Region]], stock: Stock, slack: flo
                 f"{one} and {other} {how} at x {x:.3f}, y {y:.3f}, where {stock.spacing:g} mm is "
                 "asked for; nest again."
             )
+
+
+class _Gaps:
+    """Gaps between outlines, for pairs of copies that lie to each other as an earlier pair does."""
+
+    def __init__(self) -> None:
+        self._copies = Copies()
+        self._known: dict[tuple[int, int, int, int], tuple[Point, float]] = {}
+
+    def least(self, a: Region, b: Region) -> float:
+        """A distance in mm that the gap of two regions is surely no less than."""
+        key, (x, y) = self._between(a, b)
+        if key not in self._known:
+            return 0.0
+        # A copy moved by some distance comes nearer by no more than that.
+        place, gap = self._known[key]
+        return gap - math.dist(place, (x, y)) - 4 * COPIED
+
+    def add(self, a: Region, b: Region, gap: float) -> None:
+        key, shift = self._between(a, b)
+        self._known[key] = shift, gap
+
+    def _between(self, a: Region, b: Region) -> tuple[tuple[int, int, int, int], Point]:
+        """The shapes of two regions and how one lies to the other, rounded and exact."""
+        (x, y), (u, v) = a.contours[0].edges[0].start, b.contours[0].edges[0].start
+        one, other = self._shape(a), self._shape(b)
+        return (one, other, round((u - x) / NEAR), round((v - y) / NEAR)), (u - x, v - y)
+
+    def _shape(self, region: Region) -> int:
+        # What falls apart is a shape of its own.
+        alone = len(region.contours) == 1
+        return id(self._copies.first(region.contours[0]) if alone else region)
 
 
 def _round(region: Region) -> tuple[Point, float]:

@@ -109,4 +109,7 @@ class Nest:
 def placed(region: Region, turn: Turn, shift: Point) -> Region:
     """A region turned by exact quarter turns about the origin and then moved."""
     (c, s), (dx, dy) = unit(90.0 * turn), shift
+    for contour in region.contours:
+        # Once known, these are not counted again for every place.
+        _ = contour.area, contour.length
     return region.mapped(lambda p: (p[0] * c - p[1] * s + dx, p[0] * s + p[1] * c + dy), 1.0, False)

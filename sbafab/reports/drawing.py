@@ -8,12 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from typing import Literal
-from xml.sax.saxutils import escape
 
 from sbafab.geometry.edges import Point
 from sbafab.geometry.svg import number
 from sbafab.laminate.films import Film
 from sbafab.laminate.inks import MASKS, Ink, ink
+from sbafab.markup import escape
 
 Anchor = Literal["start", "middle", "end"]
 

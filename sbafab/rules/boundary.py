@@ -11,6 +11,7 @@ from sbafab.geometry.intersect import line_circle
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.pieces import by_owner, overlaid
 from sbafab.geometry.region import Region
+from sbafab.geometry.remembered import remembered
 from sbafab.geometry.width import spread
 
 END_ROOM = 1e-5
@@ -22,14 +23,15 @@ STEEP = 0.01
 """Sine of the angle to the normal up to which an edge runs along it."""
 
 
-def edges_along(region: Region, other: Region) -> list[Edge]:
+@remembered
+def edges_along(region: Region, other: Region) -> tuple[Edge, ...]:
     """The stretches of ``region``'s edges that run along edges of ``other``, the same way."""
     along = []
     for edge, turns in overlaid([region.edges, other.edges]).pieces:
         own, others = by_owner(turns, 2)
         if own * others > 0:
             along.append(edge if own > 0 else edge.reversed())
-    return along
+    return tuple(along)
 
 
 def beside(edge: Edge, distance: float) -> Point:

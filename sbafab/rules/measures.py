@@ -6,6 +6,7 @@ from functools import cache, cached_property
 
 from sbafab.geometry.edges import Edge
 from sbafab.geometry.region import Region
+from sbafab.geometry.remembered import remembered
 from sbafab.geometry.width import Width, least_width
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
@@ -44,7 +45,7 @@ class Measures:
         """The least width of its bond; None where nothing bonds or no edge faces another."""
         return self._bond(interface.bond)
 
-    def reaches(self, interface: Interface) -> list[tuple[Edge, Reach]]:
+    def reaches(self, interface: Interface) -> tuple[tuple[Edge, Reach], ...]:
         """Film edges that bound unbonded film, and how far off the mask's edge lies."""
         return self._reaches(interface.unbonded, interface.contact, interface.mask)
 
@@ -81,6 +82,7 @@ def _bond(bond: Region) -> Width | None:
     return None if bond.is_empty else least_width(bond, SHARP)
 
 
-def _reaches(unbonded: Region, contact: Region, mask: Region) -> list[tuple[Edge, Reach]]:
+@remembered
+def _reaches(unbonded: Region, contact: Region, mask: Region) -> tuple[tuple[Edge, Reach], ...]:
     found = ((edge, outward_reach(edge, mask.index)) for edge in edges_along(unbonded, contact))
-    return [(edge, reach) for edge, reach in found if reach is not None]
+    return tuple([(edge, reach) for edge, reach in found if reach is not None])

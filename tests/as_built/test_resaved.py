@@ -11,10 +11,10 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import ezdxf
 import pytest
-from _pytest.mark import ParameterSet
 from ezdxf.addons import r12export
 from ezdxf.document import Drawing
 
@@ -34,7 +34,7 @@ FOLDERS: list[tuple[str, tuple[str, ...], DxfProfile]] = [
 ]
 
 
-def _param(template: str, settings: tuple[str, ...], profile: DxfProfile) -> ParameterSet:
+def _param(template: str, settings: tuple[str, ...], profile: DxfProfile) -> Any:
     marks = [pytest.mark.long] if profile == "chords" else []
     return pytest.param((template, settings, profile), marks=marks, id=f"{template}-{profile}")
 

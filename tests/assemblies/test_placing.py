@@ -12,10 +12,10 @@ from sbafab.assemblies.build import assemble
 from sbafab.assemblies.poses import FLIPPED, LYING, OUTWARD, Pose, about_axis, along, shifted
 from sbafab.assemblies.reading import load_assembly
 from sbafab.assemblies.shapes import placed_surface
-from sbafab.assemblies.wrap import bent, cut_along
 from sbafab.geometry.shapes import rectangle
 from sbafab.meshing.prisms import Slab, fuse
 from sbafab.meshing.surface import open_edges
+from sbafab.meshing.wrap import bent, cut_along
 
 
 @pytest.mark.parametrize(

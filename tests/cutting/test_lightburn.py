@@ -12,7 +12,8 @@ import pytest
 
 from sbafab.cutting.dxf_write import Surroundings
 from sbafab.cutting.lightburn import project_text
-from sbafab.cutting.lightburn_read import read_project, verify_project
+from sbafab.cutting.lightburn_read import read_project
+from sbafab.cutting.lightburn_verify import verify_project
 from sbafab.cutting.order import cutting_order
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region

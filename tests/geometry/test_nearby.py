@@ -7,6 +7,7 @@ import random
 
 import pytest
 
+from sbafab.geometry import nearby
 from sbafab.geometry.edges import Arc, Bounds, Edge, Line, distance_to
 from sbafab.geometry.nearby import EdgeIndex, close_pairs
 
@@ -55,6 +56,24 @@ def test_the_distance_is_that_of_the_nearest_edge(seed: int) -> None:
     for _ in range(40):
         p = draw.uniform(-30, 50), draw.uniform(-30, 40)
         assert index.distance(p) == pytest.approx(min(distance_to(edge, p) for edge in edges))
+
+
+@pytest.mark.parametrize("reach", [0.0, 0.7])
+def test_pairs_of_many_boxes_come_as_those_of_few(
+    reach: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draw = random.Random(5)
+    boxes: list[Bounds] = []
+    for _ in range(600):
+        x, y = draw.choice([round(draw.uniform(0, 50)), draw.uniform(0, 50)]), draw.uniform(0, 50)
+        size = draw.choice([0.0, 0.5, 9.0])
+        boxes.append((x, y, x + size, y + size * draw.random()))
+    found = list(close_pairs(boxes, reach))
+    monkeypatch.setattr(nearby, "AT_ONCE", 100)
+    assert list(close_pairs(boxes, reach)) == found
+    monkeypatch.setattr(nearby, "MANY_BOXES", math.inf)
+    assert list(close_pairs(boxes, reach)) == found
+    assert len(found) > 500
 
 
 def test_the_distance_to_a_single_edge_is_found_from_anywhere() -> None:

@@ -47,7 +47,7 @@ def test_each_format_is_listed_and_there(written: Written) -> None:
     names = [Path(file.file).name for file in files]
     assert sorted(names) == sorted(path.name for path in folder.iterdir())
     assert {Path(name).suffix[1:] for name in names} == set(FORMATS)
-    assert {file.kind for file in files} == {"volume", "shell", "cavity"}
+    assert {file.kind for file in files} == {"volume", "shell", "cavity", "skin"}
     assert all(file.fill_ul == 2.0 and file.elements > 0 for file in files)
 
 
@@ -139,9 +139,20 @@ def test_inp_keeps_nodes_elements_and_sets(written: Written, name: str) -> None:
     found = [[int(cell) - 1, sides[side]] for cell, side in pairs]
     assert found == mesh.face_sets["cavity_A"].tolist()
     lines = (folder / f"{name}.inp").read_text().splitlines()
-    assert "A 2 ul. This shape is taken to be free of stress." in lines[2]
+    assert "A 2 ul. A start shape, not an equilibrium" in lines[2]
     longest = max(len(line.split(",")) for line in lines)
     assert longest <= 16
+
+
+def test_meshio_reads_the_shell_of_an_inp_file(written: Written) -> None:
+    meshes, _, folder = written
+    read = meshio.read(folder / "shell.inp")
+    assert {block.type for block in read.cells} == {"triangle6"}
+    assert np.allclose(read.points, meshes.shell.points, rtol=0, atol=1e-8)
+    cells = np.concatenate([block.data for block in read.cells])
+    wanted = np.concatenate([meshes.shell.cells[c] for c in meshes.shell.parts.values()])
+    assert np.array_equal(cells, wanted)
+    assert np.array_equal(np.sort(read.point_sets["tip"]), meshes.shell.node_sets["tip"])
 
 
 def read_inp(path: Path) -> tuple[np.ndarray, np.ndarray, dict[tuple[str, str], list[str]]]:
@@ -200,12 +211,13 @@ def test_faces_of_every_element_look_out() -> None:
 
 
 def test_only_the_formats_asked_for_are_written(two_balloons: Laminate, tmp_path: Path) -> None:
-    meshes = conforming_meshes(two_balloons, MeshSettings(h=0.75))
+    meshes = conforming_meshes(two_balloons, MeshSettings(h=0.75, gaps=True))
     told: list[tuple[int, int]] = []
     files = write_conforming(meshes, tmp_path, lambda *step: told.append(step), ("inp", "ply"))
     assert [file.file for file in files] == [
         "mesh/volume.inp",
         "mesh/shell.inp",
+        "mesh/skin.ply",
         "mesh/cavity_A_conforming.ply",
     ]
-    assert told == [(1, 3), (2, 3), (3, 3)]
+    assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]

@@ -50,7 +50,8 @@ def test_volumes_are_the_sums_of_area_times_thickness(template: str, tmp_path: P
     expected = [sum(slab.volume for slab in solid_slabs(laminate))] * 3
     for chamber in laminate.chambers:
         expected.append(sum(slab.volume for slab in cavity_slabs(laminate, chamber)))
-    assert [mesh.volume_mm3 for mesh in meshes] == pytest.approx(expected, rel=5e-4)
+    flat = [mesh.volume_mm3 for mesh in meshes if "wrapped" not in mesh.file]
+    assert flat == pytest.approx(expected, rel=5e-4)
 
 
 def test_the_lumen_and_three_necks_a_joint_are_the_only_handles(lobed: Laminate) -> None:

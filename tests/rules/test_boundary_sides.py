@@ -39,7 +39,7 @@ def test_edges_that_run_the_same_way_are_shared() -> None:
     [shared] = edges_along(low, high)
     assert sorted((shared.start, shared.end)) == [(1.0, 0.0), (3.0, 0.0)]
     # Side by side their common edge runs opposite ways.
-    assert edges_along(low, rectangle((4.0, 0.0), (6.0, 2.0))) == []
+    assert not edges_along(low, rectangle((4.0, 0.0), (6.0, 2.0)))
 
 
 def test_an_arc_is_not_shared_with_its_chord() -> None:

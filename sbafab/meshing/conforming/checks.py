@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sbafab.errors import OutputError
-from sbafab.meshing.conforming.cavities import open_sides
+from sbafab.meshing.conforming.cavities import flat_triangles, open_sides
 from sbafab.meshing.conforming.elements import CORNERS, FACES, scaled_jacobians, volumes
 from sbafab.meshing.conforming.model import Mesh
+from sbafab.meshing.surface import Surface
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -76,6 +77,13 @@ def skin(mesh: Mesh) -> NDArray[np.int64]:
     twin = np.append(False, ranked[1:] == ranked[:-1])
     alone = order[~twin & ~np.append(twin[1:], False)]
     return np.column_stack([np.concatenate(cells)[alone], np.concatenate(numbers)[alone]])
+
+
+def skin_surface(mesh: Mesh) -> Surface:
+    """The skin of a volume mesh, cavities included, as flat triangles through all of its nodes."""
+    triangles = flat_triangles(mesh.kind, mesh.cells, skin(mesh))
+    nodes, faces = np.unique(triangles, return_inverse=True)
+    return Surface(mesh.points[nodes], faces.reshape(-1, 3))
 
 
 def _check_skin(mesh: Mesh) -> None:

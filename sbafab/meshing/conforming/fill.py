@@ -1,9 +1,10 @@
 """Fill: films lifted off each other by the air of their balloons.
 
 The lift is vertical in the frame of each balloon, so no element changes its volume; balloons
-are then set on each other by their neck discs, leaning where chambers hold unlike amounts. Films
-stretch a little along the meridian (1 % at 5 ul in the paper's 5 mm balloon). The filled shape is
-free of stress as written; the flat mesh is the rest position for a solver that takes one.
+are then set on each other by their neck discs, leaning where chambers hold unlike amounts, and
+refused where they would lean into each other. Films stretch along the meridian (1 % at 5 ul in the
+paper's 5 mm balloon) and thin by as much; the flat mesh is the rest position for a solver that
+takes one.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.meshing.conforming.bodies import bodies
+from sbafab.meshing.conforming.crossing import crossing, said
 from sbafab.meshing.conforming.form import FormedFilm, flat
 from sbafab.meshing.conforming.layup import Layup
 from sbafab.meshing.conforming.pockets import Pocket, pockets
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
 
 ROUNDS = 4
 """Leaning discs change volumes, and these the lean, by less each round."""
+HALVINGS = 6
+"""How closely the least fill is sought that keeps films apart: to a part in 2^6 of the largest."""
 
 
 @dataclass(frozen=True)
@@ -39,16 +43,63 @@ class Fill:
     def largest(self) -> float:
         return max(self.ul.values())
 
+    @property
+    def is_even(self) -> bool:
+        return len(set(self.ul.values())) == 1
+
 
 def filled(stack: Layup, fill_ul: float | Mapping[str, float]) -> tuple[Fill, list[FormedFilm]]:
     """Every film where the air has moved it to.
 
     ``fill_ul`` is the air in every balloon in ul, or in those of the chambers named; 0 is flat.
     Raises DesignError for a chamber that is not there, for more air than a film of constant
-    length can hold, and where unlike fills have no common plane.
+    length can hold, where unlike fills have no common plane, and where they would make films pass
+    through each other.
     """
     fill = _fill(stack, fill_ul)
     held = pockets(stack)
+    forms = formed(stack, fill, held)
+    if fill.is_even:
+        return fill, forms
+    found = crossing(stack, forms)
+    if found is not None:
+        least = _least(stack, fill, held)
+        names = [name for name, ul in fill.ul.items() if ul < least.ul[name]]
+        asked = ", ".join(f"{name}={ul:g}ul" for name, ul in fill.ul.items())
+        wanted = " and ".join(f"{least.ul[name]:.1f} ul in {name}" for name in names)
+        raise DesignError(
+            f"with fill {asked} {said(stack, found)}, for balloons lean by what their chambers "
+            f"differ; ask for at least {wanted}, or for less in the others"
+        )
+    return fill, forms
+
+
+def _least(stack: Layup, fill: Fill, held: list[Pocket]) -> Fill:
+    """The fill that is raised least towards an even one, in steps of 0.1 ul, for films to clear."""
+
+    def raised(share: float) -> Fill:
+        return Fill(
+            {
+                name: min(
+                    math.ceil(10 * (ul + share * (fill.largest - ul)) - 1e-6) / 10, fill.largest
+                )
+                if ul < fill.largest
+                else ul
+                for name, ul in fill.ul.items()
+            }
+        )
+
+    low, high = 0.0, 1.0
+    for _ in range(HALVINGS):
+        share = (low + high) / 2
+        tried = raised(share)
+        crosses = crossing(stack, formed(stack, tried, held)) is not None
+        low, high = (share, high) if crosses else (low, share)
+    return raised(high)
+
+
+def formed(stack: Layup, fill: Fill, held: list[Pocket]) -> list[FormedFilm]:
+    """Every film where the air of these pockets has moved it to, films that cross included."""
     body_of_node, body_of_centre = bodies(stack)
     forms = [FormedFilm(form.base.copy(), form.up.copy()) for form in flat(stack)]
     for body in np.unique(body_of_centre).tolist():
@@ -58,7 +109,7 @@ def filled(stack: Layup, fill_ul: float | Mapping[str, float]) -> tuple[Fill, li
         for k, form in _raised(stack, own, centres, fill).items():
             forms[k].base[nodes] = form.base[nodes]
             forms[k].up[nodes] = form.up[nodes]
-    return fill, forms
+    return forms
 
 
 def _raised(

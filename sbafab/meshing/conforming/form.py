@@ -13,11 +13,13 @@ if TYPE_CHECKING:
 
 class FormedFilm(NamedTuple):
     """Lower face of a film over the plane's nodes, ``base`` (n, 3) mm, and the unit vectors ``up``
-    (n, 3) along which its thickness is measured.
+    (n, 3) along which its thickness is measured. ``growth`` is the part by which its volume is
+    larger than flat, where it is bent round a tube.
     """
 
     base: NDArray[np.float64]
     up: NDArray[np.float64]
+    growth: float = 0.0
 
     def at(self, height: float) -> NDArray[np.float64]:
         """Points (n, 3) of the film ``height`` mm above its lower face."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -10,15 +10,21 @@ from pathlib import Path
 import numpy as np
 
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.conforming.elements import volumes
-from sbafab.meshing.conforming.fill import Fill, filled
-from sbafab.meshing.conforming.form import flat
-from sbafab.meshing.conforming.layup import layup
+from sbafab.meshing.conforming.checks import skin_surface
+from sbafab.meshing.conforming.fill import Fill, filled, formed
+from sbafab.meshing.conforming.form import FormedFilm, flat
+from sbafab.meshing.conforming.layup import Layup, layup
 from sbafab.meshing.conforming.model import Mesh
+from sbafab.meshing.conforming.pockets import pockets
 from sbafab.meshing.conforming.settings import MeshSettings, Symmetry
 from sbafab.meshing.conforming.shell_mesh import shell_mesh, thin
-from sbafab.meshing.conforming.statistics import Statistics, mesh_statistics
-from sbafab.meshing.conforming.volume_mesh import volume_mesh
+from sbafab.meshing.conforming.statistics import (
+    Statistics,
+    Thinning,
+    mesh_statistics,
+    thinning,
+)
+from sbafab.meshing.conforming.volume_mesh import swept_points, volume_mesh
 from sbafab.meshing.conforming.write_inp import write_inp
 from sbafab.meshing.conforming.write_msh import write_msh
 from sbafab.meshing.conforming.write_obj import write_obj
@@ -49,7 +55,17 @@ PARTS: dict[Symmetry, str] = {
     "quarter": "A quarter of the actuator, away from its inlet, which is left out.",
     "sector": "One lobe of the actuator with its inlet.",
 }
+WRAPPED = (
+    "Wrapped round a tube of {:g} mm, its axis z: lengths in the middle of the sheet are kept, and "
+    "filled balloons straighten."
+)
+FILLED = (
+    "Filled with air, a balloon: {}. A start shape, not an equilibrium: films over the pockets are "
+    "{:.1%} larger than flat, {:.1%} at the steepest place, and as much thinner: {:.4f} mm there."
+)
+REST = "Films are free of stress when flat: the point field rest of the .vtu holds those places."
 HEIGHT_OF_SHELL = "Mid-surfaces: films have no height of their own, and lie in one plane when flat."
+ROUNDS = 2
 FORMATS = ("vtu", "vtk", "msh", "inp", "stl", "obj", "ply")
 
 
@@ -75,18 +91,22 @@ class ConformingMeshes:
 
         The fill keeps no length: 0.01 at 5 ul in the paper's 5 mm balloon.
         """
-        faces = list(self.shell.face_sets.values())
-        pockets = np.unique(np.concatenate(faces)[:, 0])
-        raised, flat_ones = (
-            float(volumes(mesh.kind, mesh.points, mesh.cells[pockets]).sum())
-            for mesh in (self.shell, self.flat_shell)
-        )
-        return raised / flat_ones - 1
+        return thinning(self.shell, self.flat_shell).mean
+
+    @property
+    def has_air(self) -> bool:
+        """Whether any film stands off another."""
+        return any(self.holds_air(chamber) for chamber in self.volume.cavities)
+
+    def holds_air(self, chamber: str) -> bool:
+        """Whether the pockets of a chamber are open: filled, or kept so by gaps."""
+        return self.settings.gaps or (self.fill is not None and self.fill.ul[chamber] > 0)
 
     @cached_property
     def statistics(self) -> dict[str, Statistics]:
         """The figures of both meshes, for printing and the manifest."""
-        return {mesh.name: mesh_statistics(mesh) for mesh in (self.volume, self.shell)}
+        thin_mm = thinning(self.shell, self.flat_shell).thinnest_mm
+        return {mesh.name: mesh_statistics(mesh, thin_mm) for mesh in (self.volume, self.shell)}
 
 
 def conforming_meshes(laminate: Laminate, settings: MeshSettings | None = None) -> ConformingMeshes:
@@ -99,30 +119,63 @@ def conforming_meshes(laminate: Laminate, settings: MeshSettings | None = None) 
     settings = settings or MeshSettings()
     stack = layup(laminate, settings)
     sheet = thin(stack)
-    flat_shell = shell_mesh(sheet, flat(sheet))
+    as_cut = replace(sheet, settings=replace(settings, wrapped=False))
+    flat_shell = shell_mesh(as_cut, flat(sheet))
+    fill = None
     if settings.fill_ul is None:
-        fill, volume, shell = None, volume_mesh(stack, flat(stack)), flat_shell
+        volume, shell = volume_mesh(stack, flat(stack)), shell_mesh(sheet, flat(sheet))
     else:
-        fill, forms = filled(stack, settings.fill_ul)
-        volume = volume_mesh(stack, forms)
-        shell = shell_mesh(sheet, filled(sheet, settings.fill_ul)[1])
-    return ConformingMeshes(
-        laminate.name,
-        settings,
-        replace(volume, notes=(HEIGHTS[settings.gaps], *_notes(settings.symmetry, fill))),
-        replace(shell, notes=(HEIGHT_OF_SHELL, *_notes(settings.symmetry, fill))),
-        flat_shell,
-        fill,
+        fill = filled(stack, settings.fill_ul)[0]
+        volume, shell = (
+            _filled(of, fill, make) for of, make in ((stack, volume_mesh), (sheet, shell_mesh))
+        )
+    rests = swept_points(stack, flat(stack)), flat_shell.points
+    notes = tuple(_notes(laminate, settings, fill, thinning(shell, flat_shell)))
+    volume, shell = (
+        replace(
+            mesh,
+            notes=(height, *notes),
+            rest=None if np.array_equal(mesh.points, rest) else rest,
+        )
+        for mesh, rest, height in zip(
+            (volume, shell), rests, (HEIGHTS[settings.gaps], HEIGHT_OF_SHELL), strict=True
+        )
     )
+    return ConformingMeshes(laminate.name, settings, volume, shell, flat_shell, fill)
 
 
-def _notes(symmetry: Symmetry, fill: Fill | None) -> tuple[str, ...]:
-    part = (PARTS[symmetry],) if symmetry in PARTS else ()
-    if fill is None:
-        return part
-    amounts = ", ".join(f"{name} {ul:g} ul" for name, ul in fill.ul.items())
-    note = f"Filled with air, a balloon: {amounts}. This shape is taken to be free of stress."
-    return (*part, note)
+def _filled(stack: Layup, fill: Fill, make: Callable[[Layup, Sequence[FormedFilm]], Mesh]) -> Mesh:
+    """The mesh whose balloons hold a fill, round a tube as well as flat."""
+    held = pockets(stack)
+    mesh = make(stack, formed(stack, fill, held))
+    if stack.laminate.tube is None or not stack.settings.wrapped or stack.sector is not None:
+        return mesh
+    # Bent round the tube balloons hold a little more than flat.
+    given, sizes = dict(fill.ul), stack.plane.areas()
+    for _ in range(ROUNDS):
+        for chamber in stack.laminate.chambers:
+            name = chamber.name
+            if fill.ul[name]:
+                films = stack.voids[name].in_films.items() if stack.is_thick else ()
+                bores = sum(sizes[cells].sum() * stack.plies[k].thickness for k, cells in films)
+                balloons = stack.laminate.balloons * len(chamber.centres)
+                found = (mesh.cavity(name)[0].volume - bores) / balloons
+                given[name] *= fill.ul[name] / found
+        mesh = make(stack, formed(stack, Fill(given), held))
+    return mesh
+
+
+def _notes(
+    laminate: Laminate, settings: MeshSettings, fill: Fill | None, thin_films: Thinning
+) -> Iterator[str]:
+    if settings.symmetry in PARTS:
+        yield PARTS[settings.symmetry]
+    if laminate.tube is not None and settings.wrapped:
+        yield WRAPPED.format(laminate.tube)
+    if fill is not None:
+        amounts = ", ".join(f"{name} {ul:g} ul" for name, ul in fill.ul.items())
+        yield FILLED.format(amounts, *thin_films)
+        yield REST
 
 
 def write_conforming(
@@ -131,7 +184,8 @@ def write_conforming(
     progress: Callable[[int, int], None] | None = None,
     formats: Collection[str] = FORMATS,
 ) -> list[MeshFile]:
-    """Write ``mesh/volume.*``, ``mesh/shell.*`` and ``mesh/cavity_<chamber>_conforming.*``.
+    """Write ``mesh/volume.*``, ``mesh/shell.*``, and of open pockets ``mesh/skin.*`` and
+    ``mesh/cavity_<chamber>_conforming.*``.
 
     ``folder`` is the output folder, ``formats`` the file endings wanted. Models of a part by
     symmetry have no closed cavities: their cavity walls are face sets of the meshes. ``progress``
@@ -158,7 +212,15 @@ def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path],
             file = MeshFile(f"mesh/{kind}.{suffix}", kind, None, fill, size, len(mesh.cells))
             yield file, partial(write, mesh)
     mesh = meshes.volume
+    if meshes.has_air and mesh.cavities:
+        outer = skin_surface(mesh)
+        skin_file = MeshFile("", "skin", None, fill, outer.volume, len(outer.faces))
+        for suffix, write_surface in SURFACE_WRITERS.items():
+            yield replace(skin_file, file=f"mesh/skin.{suffix}"), partial(write_surface, outer)
     for chamber in mesh.cavities:
+        # Films that lie on each other enclose nothing: such a surface has no inside.
+        if not meshes.holds_air(chamber):
+            continue
         surface, _ = mesh.cavity(chamber)
         described = MeshFile(
             f"mesh/cavity_{chamber}_conforming.vtu",

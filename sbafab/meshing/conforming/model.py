@@ -27,6 +27,8 @@ class Mesh:
     clockwise seen from outside of the air; inlets are closed by a patch. ``thickness`` is a
     shell's, in mm, a value a cell set. ``notes`` are sentences for whoever reads a file of it.
     ``materials`` names the film that each part of a volume mesh is of; a bond is of what melts.
+    ``rest`` (n, 3) is where the points are in the flat laminate, free of stress; None where they
+    are there.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Mesh:
     thickness: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     materials: Mapping[str, str] = field(default_factory=dict)
+    rest: NDArray[np.float64] | None = None
 
     @property
     def parts(self) -> dict[str, NDArray[np.int64]]:

@@ -14,6 +14,7 @@ from sbafab.geometry.edges import Arc, Point
 from sbafab.laminate.interfaces import Interface
 from sbafab.meshing.conforming.layup import Layup
 from sbafab.meshing.conforming.poisson import Lift, lift
+from sbafab.models.lens import fullest as fullest_slot
 from sbafab.models.parabola import fullest
 
 if TYPE_CHECKING:
@@ -145,11 +146,15 @@ def _largest(
     """Most air in ul that a balloon can hold, of which ``share`` is meshed.
 
     A round pocket's is that of two paraboloids whose meridian keeps its length (paper Eqs. 1 to
-    3); any other holds as much more than the disc in it as the even lift of equal height does.
+    3), an oblong one's that of two arcs (as ``predict`` says); a drawn one holds as much more than
+    the disc in it as the even lift of equal height does.
     """
-    radius = _round_radius(interface, places[0])
-    if radius is not None:
-        return 2 * fullest(radius).volume
+    ends = _round_ends(interface, places[0])
+    if len(ends) == 1:
+        return 2 * fullest(ends[0][1]).volume
+    if len(ends) == 2:
+        (first, radius), (last, _) = ends
+        return fullest_slot(2 * radius, math.dist(first, last)).volume
     offsets = stack.plane.points[held][:, None] - np.array(places)
     half = float(np.linalg.norm(offsets, axis=2).min())
     disc = math.pi * half**2 / 2
@@ -157,12 +162,27 @@ def _largest(
     return 2 * fullest(half).volume * wider / len(places) / share
 
 
-def _round_radius(interface: Interface, centre: Point) -> float | None:
-    """The radius of the pocket round a centre if most of its edge is one circle."""
-    turns: dict[float, float] = {}
+def _round_ends(interface: Interface, centre: Point) -> list[tuple[Point, float]]:
+    """Middles and radii of the circles that the pocket round a centre ends in.
+
+    One on the centre where most of its edge is that circle; two of one radius and at equal
+    distances on either side of it for a slot, of which at least a third of a turn is left beside
+    inlet and manifold.
+    """
+    turns: dict[tuple[Point, float], float] = {}
     for outer in interface.unbonded.outers:
         for edge in outer.edges:
-            if isinstance(edge, Arc) and math.dist(edge.centre, centre) < NEAR:
-                radius = round(edge.radius, 6)
-                turns[radius] = turns.get(radius, 0.0) + abs(edge.sweep)
-    return next((radius for radius, turn in sorted(turns.items()) if turn > math.pi), None)
+            if isinstance(edge, Arc):
+                x, y = edge.centre
+                place = (round(x, 5), round(y, 5)), round(edge.radius, 5)
+                turns[place] = turns.get(place, 0.0) + abs(edge.sweep)
+    found = sorted(place for place, turn in turns.items() if turn > math.tau / 3)
+    on_centre = [one for one in found if math.dist(one[0], centre) < NEAR and turns[one] > math.pi]
+    if on_centre:
+        return on_centre[:1]
+    for number, (first, radius) in enumerate(found):
+        for last, other in found[number + 1 :]:
+            middle = (first[0] + last[0]) / 2, (first[1] + last[1]) / 2
+            if abs(other - radius) < NEAR and math.dist(middle, centre) < NEAR:
+                return [(first, radius), (last, other)]
+    return []

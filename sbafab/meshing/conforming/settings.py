@@ -19,6 +19,7 @@ class MeshSettings:
     balloon's pocket in ul, or in those of each chamber by name; None is the flat shape.
     ``gaps`` keeps the films as far apart as the masks hold them, with bonds between them that
     are as thick; without it films lie on each other, and the height is the sum of the TPE films.
+    ``wrapped``: what is made for a tube lies round it, its axis z; else it lies flat.
     """
 
     h: float = 0.35
@@ -26,3 +27,4 @@ class MeshSettings:
     symmetry: Symmetry = "full"
     fill_ul: float | Mapping[str, float] | None = None
     gaps: bool = False
+    wrapped: bool = True

@@ -16,9 +16,11 @@ from sbafab.meshing.conforming.cavities import (
     wetted,
 )
 from sbafab.meshing.conforming.checks import check_cavities, check_mesh
+from sbafab.meshing.conforming.crossing import check_apart
 from sbafab.meshing.conforming.form import FormedFilm
 from sbafab.meshing.conforming.layup import Layup, MeshedVoid
 from sbafab.meshing.conforming.model import Mesh
+from sbafab.meshing.conforming.round_tube import round_tube
 from sbafab.meshing.conforming.sets import node_sets
 from sbafab.meshing.conforming.sweep import NONE, Sweep
 
@@ -39,6 +41,8 @@ def shell_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
     thicknesses. Cavities leave the neck rings out, which have the same air on both sides.
     Raises OutputError where a check fails.
     """
+    check_apart(stack, forms)
+    forms = round_tube(stack, forms)
     triangles = stack.plane.triangles
     numbers = np.full((len(stack.plies), len(stack.plane.points)), NONE)
     cell_of = np.full((len(stack.plies), len(triangles)), NONE)

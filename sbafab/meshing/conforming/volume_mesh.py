@@ -16,10 +16,12 @@ from sbafab.meshing.conforming.cavities import (
     wetted,
 )
 from sbafab.meshing.conforming.checks import check_cavities, check_mesh
+from sbafab.meshing.conforming.crossing import check_apart
 from sbafab.meshing.conforming.elements import ElementKind
 from sbafab.meshing.conforming.form import FormedFilm
 from sbafab.meshing.conforming.layup import Layup
 from sbafab.meshing.conforming.model import Mesh
+from sbafab.meshing.conforming.round_tube import round_tube
 from sbafab.meshing.conforming.sets import bond_name, node_sets
 from sbafab.meshing.conforming.sweep import Sweep, sweep, tetrahedra, wedges
 
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
 
 def volume_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
     """The volume mesh with its sets and cavities. Raises OutputError where a check fails."""
+    check_apart(stack, forms)
+    forms = round_tube(stack, forms)
     is_tet = stack.settings.element == "tet"
     kind: ElementKind = "tetra10" if is_tet else "wedge15"
     swept = sweep(stack, forms, full_middles=is_tet)
@@ -53,7 +57,9 @@ def volume_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
         if stack.sector is None:
             walls = flat_triangles(kind, cells, faces)[:, ::-1]
             cavities[name] = np.concatenate([walls, *patches])
-    cell_sets, expected = _cell_sets(stack, swept, 3 if is_tet else 1)
+    cell_sets, expected = _cell_sets(
+        stack, swept, 3 if is_tet else 1, [form.growth for form in forms]
+    )
     mesh = Mesh(
         "volume",
         kind,
@@ -68,6 +74,11 @@ def volume_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
     check_mesh(mesh, expected)
     check_cavities(mesh)
     return mesh
+
+
+def swept_points(stack: Layup, forms: Sequence[FormedFilm]) -> NDArray[np.float64]:
+    """The points alone of the volume mesh that these films have."""
+    return sweep(stack, forms, full_middles=stack.settings.element == "tet").points
 
 
 def _materials(stack: Layup) -> dict[str, str]:
@@ -89,9 +100,11 @@ def _corners_under(stack: Layup, swept: Sweep) -> NDArray[np.int64]:
 
 
 def _cell_sets(
-    stack: Layup, swept: Sweep, parts: int
+    stack: Layup, swept: Sweep, parts: int, growths: Sequence[float]
 ) -> tuple[dict[str, NDArray[np.int64]], dict[str, float]]:
-    """Cells of every film and bond, and the exact volume of each in mm3."""
+    """Cells of every film and bond, and the volume in mm3 that each must have; ``growths`` are the
+    parts by which films have grown.
+    """
     sets, expected = {}, {}
     for k, ply in enumerate(stack.plies):
         for name, numbers, volume in (
@@ -101,5 +114,5 @@ def _cell_sets(
             prisms = np.sort(numbers[numbers >= 0])
             if len(prisms):
                 sets[name] = (parts * prisms[:, None] + np.arange(parts)).ravel()
-                expected[name] = volume
+                expected[name] = volume * (1 + growths[k])
     return sets, expected

@@ -13,8 +13,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-TYPES: dict[ElementKind, str] = {"wedge15": "C3D15", "tetra10": "C3D10", "triangle6": "S6"}
-"""CalculiX's names; Abaqus calls S6 STRI65."""
+TYPES: dict[ElementKind, str] = {"wedge15": "C3D15", "tetra10": "C3D10", "triangle6": "STRI65"}
+"""Abaqus's names, which meshio knows too; CalculiX has the same but for STRI65, its S6."""
+SHELL = "CalculiX calls the element STRI65 S6: change that word on the *ELEMENT lines for it."
 SIDES = {0: "SNEG", 1: "SPOS"}
 NODE = "%d, %.10g, %.10g, %.10g\n"
 PER_LINE = 16
@@ -28,7 +29,9 @@ def write_inp(mesh: Mesh, path: Path) -> None:
 
 
 def _lines(mesh: Mesh) -> Iterator[str]:
-    yield "".join(f"** {note}\n" for note in (f"{mesh.name} mesh in mm", *mesh.notes))
+    notes = [f"{mesh.name} mesh in mm", *mesh.notes]
+    notes += [SHELL] if mesh.kind == "triangle6" else []
+    yield "".join(f"** {note}\n" for note in notes)
     yield "*NODE, NSET=all_nodes\n"
     rows = zip(range(1, len(mesh.points) + 1), *mesh.points.T.tolist(), strict=True)
     yield "".join([NODE % row for row in rows])

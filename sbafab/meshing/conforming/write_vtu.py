@@ -26,10 +26,13 @@ def write_vtu(mesh: Mesh, path: Path) -> None:
     """Write a mesh.
 
     The cell field ``part`` counts films and bonds, or a shell's sections, from 1 in their order;
-    node sets other than bonds are point fields of 0 and 1, face sets cell fields.
+    node sets other than bonds are point fields of 0 and 1, face sets cell fields. The point field
+    ``rest`` is where nodes are in the flat laminate, if they are elsewhere.
     """
-    fields = node_fields(mesh), cell_fields(mesh)
-    write_fields(path, mesh.kind, mesh.points, mesh.cells, *fields, mesh.notes)
+    of_nodes: dict[str, Field] = {**node_fields(mesh)}
+    if mesh.rest is not None:
+        of_nodes["rest"] = mesh.rest
+    write_fields(path, mesh.kind, mesh.points, mesh.cells, of_nodes, cell_fields(mesh), mesh.notes)
 
 
 def node_fields(mesh: Mesh) -> dict[str, NDArray[np.uint8]]:

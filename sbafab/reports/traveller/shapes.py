@@ -7,7 +7,6 @@ grey print still tells them from structural films.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from xml.sax.saxutils import escape, quoteattr
 
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
@@ -15,6 +14,7 @@ from sbafab.geometry.svg import number, path_data
 from sbafab.laminate.films import Film
 from sbafab.laminate.inks import Ink, ink
 from sbafab.laminate.laminate import Laminate
+from sbafab.markup import escape, quoteattr
 from sbafab.reports import drawing as draw
 
 LINE = 0.22

@@ -48,6 +48,7 @@ def _settings(laminate: Laminate, wish: Wish) -> tuple[MeshSettings, DeckSetting
     mesh = MeshSettings(
         h=usual.h if wish.h is None else wish.h,
         symmetry=cast(Symmetry, wish.symmetry or usual.symmetry),
+        wrapped=False,
     )
     settings = deck_settings(laminate, wish, cast(Procedure, wish.procedure or "dynamic"))
     for name, meshed in images(laminate, mesh.symmetry).items():

@@ -3,18 +3,99 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
+from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Surface, Vector
 
 if TYPE_CHECKING:
     import numpy as np
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 SAGITTA = 0.008
 """mm by which a facet of a bent film may leave its cylinder; a fifth of a film."""
 SNAP = 1e-3
 """mm: a point as near as this to a cut lies on it, so that no sliver is cut off."""
+
+
+RAMP = 1.5
+"""mm round the tube within which an overlapping end of the sheet climbs onto the other end."""
+
+
+class TubeWrap(NamedTuple):
+    """How a laminate lies round its tube, whose axis is z.
+
+    ``radius`` is the tube's; lengths ``neutral`` mm above it, in the middle of the sheet, stay.
+    Where the sheet overlaps, it is raised by ``thickness`` at and past x = ``seam``; ``cuts`` are
+    the x at which a solid is cut, so that its facets follow the tube. All mm.
+    """
+
+    radius: float
+    neutral: float
+    seam: float
+    thickness: float
+    cuts: tuple[float, ...]
+
+    def placed(
+        self, points: NDArray[np.float64], middle: float = 0.0, share: ArrayLike = 1.0
+    ) -> NDArray[np.float64]:
+        """Points (n, 3) of the flat laminate, z from the tube's surface, round the tube.
+
+        A body that is fixed at x = ``middle`` may be bent by a ``share`` of the tube's curvature:
+        0 leaves it straight, on the tangent.
+        """
+        import numpy as np
+
+        x, y, z = points.T
+        angle, at = self.angle(x, middle, share), middle / (self.radius + self.neutral)
+        bend = np.asarray(share, dtype=float) / self.radius
+        safe = np.where(bend > 0, bend, 1.0)
+        # 2 sin^2(a/2) / bend is (1 - cos a) / bend without its cancellation.
+        sag = np.where(bend > 0, 2 * np.sin(angle / 2) ** 2 / safe, 0.0)
+        sine = np.where(bend > 0, np.sin(angle) / safe, x - middle)
+        out, aside = self.radius + z * np.cos(angle) - sag, sine + z * np.sin(angle)
+        cos, sin = math.cos(at), math.sin(at)
+        return np.column_stack([out * cos - aside * sin, out * sin + aside * cos, y])
+
+    def angle(
+        self, x: NDArray[np.float64], middle: float = 0.0, share: ArrayLike = 1.0
+    ) -> NDArray[np.float64]:
+        """By what angle a body leans at x, seen from where it is fixed."""
+        import numpy as np
+
+        bend = np.asarray(share, dtype=float) / self.radius
+        angle: NDArray[np.float64] = bend * (x - middle) / (1 + bend * self.neutral)
+        return angle
+
+    def raised(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far the sheet is lifted by its own other end."""
+        import numpy as np
+
+        return self.thickness * np.clip((x - self.seam) / RAMP + 1, 0, 1)
+
+
+def tube_wrap(laminate: Laminate) -> TubeWrap | None:
+    """How a laminate is wrapped; None for one that is on no tube."""
+    if laminate.tube is None:
+        return None
+    sheet = laminate.tpe_layers[0]
+    radius, neutral = laminate.tube / 2, sheet.film.thickness / 2
+    low, _, high, _ = sheet.profile.bounds
+    # Where the sheet has gone all the way round, less what the facets of a solid may be wide.
+    seam = low + math.tau * (radius + neutral) - RAMP
+    step = math.sqrt(8 * radius * SAGITTA)
+    cuts = tuple(number * step for number in range(math.ceil(low / step), math.ceil(high / step)))
+    return TubeWrap(
+        radius, neutral, seam, 2 * (neutral + SAGITTA) if high > seam + RAMP else 0.0, cuts
+    )
+
+
+def wrapped(surface: Surface, wrap: TubeWrap) -> Surface:
+    """The surface of a flat laminate round its tube; it has been cut at ``wrap.cuts``."""
+    import numpy as np
+
+    x, y, z = surface.points.T
+    return Surface(wrap.placed(np.column_stack([x, y, z + wrap.raised(x)])), surface.faces)
 
 
 def bent_point(p: Vector, radius: float) -> Vector:

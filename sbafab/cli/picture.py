@@ -1,0 +1,112 @@
+"""``sbafab picture``: the actuator inflated, as picture, moving picture or scene for viewers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from sbafab.cli.options import finite, set_option
+from sbafab.cli.quantities import PRESSURE, VOLUME, OfChamber, by_chamber
+
+if TYPE_CHECKING:
+    from sbafab.reports.inflated_picture import Motion
+
+
+@click.command()
+@click.argument("design", metavar="DESIGN")
+@set_option
+@click.option(
+    "--pressure",
+    "pressures",
+    type=OfChamber(PRESSURE, all_chambers=True).read,
+    callback=by_chamber,
+    multiple=True,
+    metavar="KPA|CHAMBER=KPA",
+    help="Pressure in all chambers, or in one, e.g. chamber1=5. Repeatable.  [default: 5]",
+)
+@click.option(
+    "--volume",
+    "volumes",
+    type=OfChamber(VOLUME, all_chambers=True).read,
+    callback=by_chamber,
+    multiple=True,
+    metavar="UL|CHAMBER=UL",
+    help="In place of pressures: what a chamber holds, all its balloons together. Repeatable.",
+)
+@click.option(
+    "--to",
+    "path",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="A .png, a moving .gif or .webp, or a .glb.  [default: NAME-inflated.png]",
+)
+@click.option(
+    "--motion",
+    type=click.Choice(["inflate", "circle"]),
+    default="inflate",
+    show_default=True,
+    help="Moving pictures: from flat and back, or pressure going round the chambers.",
+)
+@click.option("--elevation", type=float, callback=finite, default=18.0, show_default=True)
+@click.option("--azimuth", type=float, callback=finite, default=-60.0, show_default=True)
+@click.option(
+    "--width",
+    type=click.IntRange(100, 4000),
+    help="Pixels; the height is 4/5 of it.  [default: 1000, moving 480]",
+)
+def picture(  # noqa: PLR0913, PLR0917 - one an option
+    design: str,
+    assignments: tuple[str, ...],
+    pressures: dict[str, float],
+    volumes: dict[str, float],
+    path: Path | None,
+    motion: Motion,
+    width: int | None,
+    elevation: float,
+    azimuth: float,
+) -> None:
+    """Draw the actuator at given pressures or volumes, from the elastic stack.
+
+    Balloons are drawn as they stand between their plates; inlet tubes are left out. Elevation and
+    azimuth are degrees over the bench and round it.
+    """
+    from sbafab.actuators import build, load_design
+    from sbafab.cli.printing import shown_progress
+    from sbafab.errors import DesignError, OutputError
+    from sbafab.models.stack import stack
+    from sbafab.reports.inflated_picture import MOVING, PictureWish, write_picture
+
+    if pressures and volumes:
+        raise DesignError("give --pressure or --volume, not both")
+    loaded = load_design(design, assignments)
+    path = path or Path(f"{loaded.name}-inflated.png")
+    wide = width or (480 if path.suffix.lower() in MOVING else 1000)
+    wish = PictureWish(
+        pressures or {"": 5.0},
+        volumes or None,
+        elevation=elevation,
+        azimuth=azimuth,
+        width=wide,
+        height=wide * 4 // 5,
+        motion=motion,
+    )
+    laminate = build(loaded)
+    with shown_progress(False) as tell:
+        try:
+            shown = write_picture(
+                laminate,
+                stack(loaded, laminate),
+                wish,
+                path,
+                lambda done, total: tell("frames", done, total),
+            )
+        except OSError as error:
+            raise OutputError(f"{path} cannot be written: {error.strerror}") from error
+    kpa = ", ".join(f"{p:.3g}" for p in shown.pressures)
+    held = ", ".join(f"{v:.0f}" for v in shown.volumes)
+    click.echo(
+        f"written to {path}: {kpa} kPa, {held} ul, tip {shown.height:.2f} mm high, "
+        f"bent {shown.bend:.1f} degrees"
+    )

@@ -1,0 +1,197 @@
+"""Films that pass through each other: looked for in every mesh before it is written.
+
+Each film is a surface over the plane, seen along its own upright. A film must lie above the one
+below it wherever both are; of films farther apart in the stack, none may have one node on this side
+of the other and the next node on that side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from sbafab.errors import OutputError
+from sbafab.meshing.conforming.cavities import TRIANGLE_PARTS
+from sbafab.meshing.conforming.form import FormedFilm
+from sbafab.meshing.conforming.layup import Layup
+
+if TYPE_CHECKING:
+    from matplotlib.tri import TriFinder
+    from numpy.typing import NDArray
+
+SLACK = 0.002
+"""mm by which a film may seem to lie in another: chords leave curved films by as much."""
+
+PARALLEL = 1e-9
+"""mm, and sine, by which frames may differ and be one."""
+
+
+class Crossing(NamedTuple):
+    """Two films, by their place in the layup, that pass ``depth`` mm through each other; where the
+    upper one is deepest in the lower one, on the flat laminate, in mm.
+    """
+
+    lower: int
+    upper: int
+    depth: float
+    x: float
+    y: float
+
+
+def check_apart(stack: Layup, forms: Sequence[FormedFilm]) -> None:
+    """Raises OutputError where films of a mesh cross; ``forms`` are not wrapped round a tube."""
+    found = crossing(stack, forms)
+    if found is not None:
+        raise OutputError(f"{said(stack, found)}; ask for a more even fill")
+
+
+def said(stack: Layup, found: Crossing) -> str:
+    """One clause: which films cross, how deep and where."""
+    lower, upper = (stack.plies[k].layer.index for k in (found.lower, found.upper))
+    return (
+        f"films {lower} and {upper} would pass through each other by {found.depth:.2f} mm at "
+        f"x {found.x:.3f}, y {found.y:.3f}"
+    )
+
+
+def crossing(stack: Layup, forms: Sequence[FormedFilm]) -> Crossing | None:
+    """Where two films cross deepest; None where all are apart, or touch."""
+    films = [_Film(stack, k, form) for k, form in enumerate(forms)]
+    plane = _Plane(stack)
+    near = [_between(plane, lower, upper) for lower, upper in pairwise(films)]
+    # Films farther apart matter only where neighbours are in order.
+    far = (
+        _between(plane, lower, upper)
+        for k, lower in enumerate(films)
+        for upper in films[k + 2 :]
+        if not any(near)
+    )
+    found = [one for one in (*near, *far) if one is not None]
+    return max(found, key=lambda one: one.depth, default=None)
+
+
+class _Film:
+    """A film's faces, in space and in its own frame."""
+
+    def __init__(self, stack: Layup, k: int, form: FormedFilm) -> None:
+        ply = stack.plies[k]
+        self.number = k
+        self.cells = ply.cells
+        self.nodes = np.unique(stack.plane.triangles[ply.cells])
+        self.bottom = form.base[self.nodes]
+        self.top = form.at(ply.thickness if stack.is_thick else 0.0)[self.nodes]
+        up = form.up[self.nodes[0]]
+        flat = np.column_stack([stack.plane.points[self.nodes], np.ones(len(self.nodes))])
+        level = self.bottom - np.outer(self.bottom @ up, up)
+        ways, self.shift = np.split(np.linalg.lstsq(flat, level, rcond=None)[0], [2])
+        self.axes = np.vstack([ways, up])
+
+    def seen(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points (n, 3) in this film's frame: x and y of the flat laminate, and height."""
+        inside: NDArray[np.float64] = (points - self.shift) @ self.axes.T
+        return inside
+
+
+class _Plane:
+    """The triangulation that all films are surfaces over."""
+
+    def __init__(self, stack: Layup) -> None:
+        self.points = stack.plane.points
+        triangles = stack.plane.triangles
+        self.parts = np.concatenate([triangles[:, list(part)] for part in TRIANGLE_PARTS])
+        self.cells = np.tile(np.arange(len(triangles)), len(TRIANGLE_PARTS))
+        edges = np.concatenate(
+            [self.parts[:, [0, 1]], self.parts[:, [1, 2]], self.parts[:, [2, 0]]]
+        )
+        self.edges = np.unique(np.sort(edges, axis=1), axis=0)
+
+    @cached_property
+    def finder(self) -> TriFinder:
+        from matplotlib.tri import Triangulation
+
+        x, y = self.points.T
+        return Triangulation(x, y, self.parts).get_trifinder()
+
+    def over(
+        self, film: _Film, face: NDArray[np.float64], points: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Height of points (n, 3), in a film's frame, over a face of it; NaN beside the film."""
+        part = np.asarray(self.finder(points[:, 0], points[:, 1]), dtype=np.int64)
+        there = np.flatnonzero(part >= 0)
+        there = there[film.cells[self.cells[part[there]]]]
+        height = np.full(len(self.points), np.nan)
+        height[film.nodes] = film.seen(face)[:, 2]
+        corners = self.parts[part[there]]
+        a, b, c = (self.points[corners[:, i]] for i in range(3))
+        offset = points[there, :2] - a
+        twice = _cross(b - a, c - a)
+        s, t = _cross(offset, c - a) / twice, _cross(b - a, offset) / twice
+        h = height[corners]
+        found = np.full(len(points), np.nan)
+        found[there] = points[there, 2] - (h[:, 0] * (1 - s - t) + h[:, 1] * s + h[:, 2] * t)
+        return found
+
+
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    z: NDArray[np.float64] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return z
+
+
+def _between(plane: _Plane, lower: _Film, upper: _Film) -> Crossing | None:
+    low, high = lower.seen(lower.top), lower.seen(upper.bottom)
+    if high[:, 2].min() >= low[:, 2].max() - SLACK:
+        return None
+    low_above, high_above = upper.seen(lower.top), upper.seen(upper.bottom)
+    if high_above[:, 2].min() >= low_above[:, 2].max() - SLACK:
+        return None
+    if _is_parallel(lower, upper):
+        gaps = [(upper, _upright(plane, lower, upper))]
+    else:
+        gaps = [
+            (upper, plane.over(lower, lower.top, high)),
+            (lower, -plane.over(upper, upper.bottom, low_above)),
+        ]
+    worst: Crossing | None = None
+    for film, gap in gaps:
+        depth = -gap
+        if upper.number > lower.number + 1:
+            depth = np.where(_is_pierced(plane, film, gap), np.abs(gap), np.nan)
+        if not (depth > SLACK).any():
+            continue
+        deepest = int(np.nanargmax(depth))
+        x, y = plane.points[film.nodes[deepest]]
+        if worst is None or depth[deepest] > worst.depth:
+            worst = Crossing(lower.number, upper.number, float(depth[deepest]), float(x), float(y))
+    return worst
+
+
+def _is_parallel(lower: _Film, upper: _Film) -> bool:
+    """Whether two films are seen along the same upright, one right above the other."""
+    sideways = lower.axes[:2] @ (upper.shift - lower.shift).ravel()
+    alike = np.abs(lower.axes - upper.axes).max() < PARALLEL
+    return bool(alike and np.abs(sideways).max() < PARALLEL)
+
+
+def _upright(plane: _Plane, lower: _Film, upper: _Film) -> NDArray[np.float64]:
+    """Height of the upper film's nodes over the same nodes of the lower; NaN beside that."""
+    below = np.full(len(plane.points), np.nan)
+    below[lower.nodes] = lower.top @ lower.axes[2]
+    gap: NDArray[np.float64] = upper.bottom @ lower.axes[2] - below[upper.nodes]
+    return gap
+
+
+def _is_pierced(plane: _Plane, film: _Film, gap: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which nodes of a film have a neighbour on the other side of the other film."""
+    height = np.full(len(plane.points), np.nan)
+    height[film.nodes] = gap
+    a, b = height[plane.edges].T
+    across = np.minimum(a, b) < -SLACK
+    across &= np.maximum(a, b) > SLACK
+    pierced = np.zeros(len(plane.points), dtype=bool)
+    pierced[plane.edges[across]] = True
+    found: NDArray[np.bool_] = pierced[film.nodes]
+    return found

@@ -1,0 +1,264 @@
+"""An inflated actuator as surfaces: films between the plates of a pose of the elastic stack.
+
+Each balloon is two films turned round its chamber's axis on the plane midway between two plates,
+and set up to the plates, which may lean; its meridian is that of the balloon between plates as far
+apart as these (``models.balloon``). What is bonded round the pockets follows their edges inward.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from sbafab.errors import DesignError
+from sbafab.geometry.boolean import union
+from sbafab.geometry.shapes import disc
+from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.prisms import Slab, fuse
+from sbafab.meshing.surface import Surface
+from sbafab.models.balloon import Balloon, inflate
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sbafab.geometry.region import Region
+    from sbafab.models.stack import Pose, Stack
+
+    Array = NDArray[np.float64]
+
+FINE, COARSE = 56, 28
+"""Facets of a balloon round its axis."""
+SAGITTA = 0.02
+"""mm by which a chord of the web may leave its arc."""
+HIDDEN = 0.3
+"""mm by which the web reaches into a pocket, between its films."""
+REACH = 2.5
+"""mm over which what is drawn in at a pocket's edge fades out."""
+LEAST_GAP = 0.02
+"""mm that a balloon is open at least, so that its films are two."""
+SAME = 100
+"""Pressures and gaps that agree to 1 / SAME kPa and mm share a meridian."""
+FLATTEST = 0.12
+"""Least share of its height that a film keeps where plates lean into it."""
+
+
+class InflatedPart(NamedTuple):
+    """A closed surface of an inflated actuator: a chamber's balloons, or the bonded web.
+
+    ``chamber`` is its place in the laminate's, None for the web; ``normals`` (n, 3) are those of
+    the points.
+    """
+
+    name: str
+    surface: Surface
+    normals: Array
+    chamber: int | None
+
+
+def inflated(
+    laminate: Laminate, stack: Stack, pose: Pose, around: int = FINE
+) -> list[InflatedPart]:
+    """The parts of a laminate in a pose, in mm on its base: the web first, then each chamber.
+
+    Balloons have ``around`` facets round their axes, and half as many rings a film if that is less.
+    Raises DesignError where a balloon finds no balance.
+    """
+    levels = [_Level(pose, i) for i in range(len(stack.levels))]
+    meridians = _meridians(stack, pose)
+    webs = _webs(laminate, stack, levels, meridians)
+    parts = [InflatedPart("web", webs, _normals(webs), None)]
+    for number, chamber in enumerate(laminate.chambers):
+        found = [
+            _balloon(level, stack.axes[number], meridians[i][number], around)
+            for i, level in enumerate(levels)
+        ]
+        surface = _joined(found)
+        parts.append(InflatedPart(chamber.name, surface, _normals(surface), number))
+    return parts
+
+
+class Meridian(NamedTuple):
+    """One film from neck to rim: radii in mm and shares of the height to its plate; ``drawn`` is by
+    how much its pocket's edge has come in, ``pocket`` where that was, both in mm.
+    """
+
+    radii: Array
+    shares: Array
+    drawn: float
+    pocket: float
+
+
+class _Level:
+    """The frame midway between two plates, and how far the plates are from its plane."""
+
+    def __init__(self, pose: Pose, i: int) -> None:
+        origins, axes = pose.frames
+        self.low, self.high = origins[i], origins[i + 1]
+        self.normals = axes[i][:, 2], axes[i + 1][:, 2]
+        self.origin = (self.low + self.high) / 2
+        # The rotation nearest to the mean of both.
+        left, _, right = np.linalg.svd(axes[i] + axes[i + 1])
+        self.axes = left @ right
+
+    def points(self, x: Array, y: Array, z: Array) -> Array:
+        """Places in space of points in this frame."""
+        found: Array = self.origin + np.stack([x, y, z], axis=-1) @ self.axes.T
+        return found
+
+    def heights(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Heights of the lower and the upper plate over points of the plane."""
+        flat = self.points(x, y, np.zeros_like(x))
+        up = self.axes[:, 2]
+        below, above = (
+            (plate - flat) @ normal / (up @ normal)
+            for plate, normal in zip((self.low, self.high), self.normals, strict=True)
+        )
+        return below, above
+
+
+def _meridians(stack: Stack, pose: Pose) -> list[list[Meridian]]:
+    """The films of each level and chamber; alike ones are worked out once."""
+    keys = [
+        [
+            (int(kind), round(SAME * p), max(round(SAME * gap), round(SAME * LEAST_GAP)))
+            for p, gap in zip(pose.pressures, gaps, strict=True)
+        ]
+        for kind, gaps in zip(stack.levels, pose.gaps, strict=True)
+    ]
+    distinct = sorted({key for row in keys for key in row})
+    known: dict[tuple[int, int, int], Meridian] = {}
+    for kind in sorted({key[0] for key in distinct}):
+        own = [key for key in distinct if key[0] == kind]
+        p, gap = (np.array([key[place] for key in own]) / SAME for place in (1, 2))
+        known.update(zip(own, _films(stack.maps[kind].balloon, p, gap), strict=True))
+    return [[known[key] for key in row] for row in keys]
+
+
+def _films(balloon: Balloon, p: Array, gap: Array) -> list[Meridian]:
+    found = inflate(balloon, p, gap, tied=True)
+    part = slice(balloon.held, balloon.edge + 1)
+    shares = np.clip(found.z[:, part] / (gap[:, None] / 2), 0.0, 1.0)
+    drawn = balloon.pocket - found.r[:, balloon.edge]
+    return [
+        Meridian(r, share, float(inward), balloon.pocket)
+        for r, share, inward in zip(found.r[:, part], shares, drawn, strict=True)
+    ]
+
+
+def _balloon(level: _Level, axis: Array, film: Meridian, around: int) -> Surface:
+    """Both films of a balloon and its necks, closed."""
+    turn = np.arange(around) * (math.tau / around)
+    rings = np.linspace(0, len(film.radii) - 1, min(len(film.radii), around // 2 + 1))
+    kept_rings = np.rint(rings).astype(int)
+    radii = np.concatenate([[0.0], film.radii[kept_rings]])
+    shares = np.concatenate([film.shares[:1], film.shares[kept_rings]])
+    x = axis[0] + radii[:, None] * np.cos(turn)
+    y = axis[1] + radii[:, None] * np.sin(turn)
+    below, above = level.heights(x, y)
+    at_axis = level.heights(*(np.full(1, value) for value in axis))
+    sides = []
+    for height, middle, sign in ((above, at_axis[1][0], 1), (below, at_axis[0][0], -1)):
+        # Where plates lean so far that they meet the films keep a little height.
+        kept = sign * np.maximum(sign * height, FLATTEST * abs(middle))
+        sides.append(level.points(x, y, shares[:, None] * kept))
+    rows = len(radii)
+    # Down over the upper film, round the rim, which both films share, and back under the lower one.
+    points = np.concatenate([sides[0], sides[1][-2::-1]]).reshape(-1, 3)
+    k, j = np.meshgrid(np.arange(2 * rows - 2), np.arange(around), indexing="ij")
+    a, b = k * around + j, k * around + (j + 1) % around
+    c, d = a + around, b + around
+    # The first and the last ring are one point each, on the axis.
+    number = np.clip(np.arange(len(points)) - (around - 1), 0, len(points) - 2 * around + 1)
+    faces = number[
+        np.concatenate(
+            [
+                np.stack([a, c, b], -1)[1:].reshape(-1, 3),
+                np.stack([b, c, d], -1)[:-1].reshape(-1, 3),
+            ]
+        )
+    ]
+    return Surface(points[around - 1 : len(points) - around + 1], faces)
+
+
+def _webs(
+    laminate: Laminate, stack: Stack, levels: Sequence[_Level], films: list[list[Meridian]]
+) -> Surface:
+    """What is bonded round the pockets of every level, as a plate of two films."""
+    known: dict[Region, Surface] = {}
+    found = []
+    for i, (level, own) in enumerate(zip(levels, films, strict=True)):
+        region = _web(laminate, stack, i)
+        thick = laminate.tpe_layers[0].film.thickness * 2
+        if region not in known:
+            known[region] = fuse([Slab(region, -thick / 2, thick / 2)], SAGITTA)
+        flat = known[region]
+        x, y, z = flat.points.T
+        moved = np.zeros((len(x), 2))
+        for axis, film in zip(stack.axes, own, strict=True):
+            off = np.column_stack([x, y]) - axis
+            away = np.hypot(*off.T)
+            fade = np.exp(-np.maximum(away - film.pocket, 0.0) / REACH)
+            moved -= film.drawn * fade[:, None] * off / np.maximum(away, 1e-9)[:, None]
+        found.append(Surface(level.points(x + moved[:, 0], y + moved[:, 1], z), flat.faces))
+    return _joined(found)
+
+
+def _web(laminate: Laminate, stack: Stack, i: int) -> Region:
+    """The plate of a level without its pockets; inlet tabs belong to the lowest."""
+    lower, upper = laminate.tpe_layers[2 * i : 2 * i + 2]
+    radius = stack.maps[stack.levels[i]].balloon.pocket - HIDDEN
+    pockets = union(disc((float(x), float(y)), radius) for x, y in stack.axes)
+    return union([lower.profile, upper.profile]) - pockets
+
+
+def _joined(surfaces: Sequence[Surface]) -> Surface:
+    starts = np.cumsum([0, *(len(surface.points) for surface in surfaces)])
+    faces = [surface.faces + start for surface, start in zip(surfaces, starts[:-1], strict=True)]
+    return Surface(np.concatenate([s.points for s in surfaces]), np.concatenate(faces))
+
+
+def _normals(surface: Surface) -> Array:
+    """Unit normals (n, 3) of the points: means of their faces, by area."""
+    a, b, c = (surface.points[surface.faces[:, i]] for i in range(3))
+    of_faces = np.cross(b - a, c - a)
+    found = np.zeros_like(surface.points)
+    for corner in range(3):
+        np.add.at(found, surface.faces[:, corner], of_faces)
+    found /= np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-30)
+    return found
+
+
+def pressed(stack: Stack, volumes_ul: Sequence[float], rounds: int = 60) -> Pose:
+    """The pose whose chambers hold these volumes in ul, found by their pressures.
+
+    Raises DesignError for volumes that the stack's highest pressure does not reach.
+    """
+    wanted = np.asarray(volumes_ul, dtype=float)
+    if wanted.shape != (stack.chambers,) or not (np.isfinite(wanted) & (wanted >= 0)).all():
+        raise DesignError(
+            f"volumes must be {stack.chambers} numbers of ul, 0 or more, one a chamber"
+        )
+    p = np.full(stack.chambers, 1.0)
+    pose = stack.pose(tuple(p))
+    for _ in range(rounds):
+        miss = wanted - pose.volumes
+        if (np.abs(miss) <= 1e-3 * np.maximum(wanted, 1.0)).all():
+            return pose
+        slopes = np.empty((stack.chambers, stack.chambers))
+        for number in range(stack.chambers):
+            step = p.copy()
+            step[number] += 0.01 + 0.01 * p[number]
+            there = stack.pose(tuple(step), near=pose)
+            slopes[:, number] = (there.volumes - pose.volumes) / (step[number] - p[number])
+        move = np.linalg.lstsq(slopes, miss, rcond=None)[0]
+        p = np.clip(
+            p + np.clip(move, -0.6 * p - 0.02, 1.5 * p + 0.2), 0.0, 0.98 * stack.most_pressure
+        )
+        pose = stack.pose(tuple(p), near=pose)
+    raise DesignError(
+        "no pressures give the volumes asked for: nearest are "
+        + ", ".join(f"{v:.0f} ul" for v in pose.volumes)
+    )

@@ -1,0 +1,243 @@
+"""Pictures of an inflated actuator: PNG, animated GIF or WebP, and GLB for viewers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, get_args
+
+from sbafab.errors import DesignError
+from sbafab.reports.inflated import COARSE, InflatedPart, inflated, pressed
+from sbafab.reports.render import RGB, Body, rendered
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+    from sbafab.laminate.laminate import Laminate
+    from sbafab.models.stack import Pose, Stack
+
+Motion = Literal["inflate", "circle"]
+MOTIONS: tuple[Motion, ...] = get_args(Motion)
+ENDINGS = (".png", ".gif", ".webp", ".glb")
+MOVING = (".gif", ".webp")
+FRAMES = 30
+FRAME_MS = 70
+SHADES = 96
+"""Colours of a GIF."""
+WEB: RGB = (205, 222, 232)
+EMPTY: RGB = (172, 205, 229)
+FULL: RGB = (244, 156, 62)
+"""Films of the web, of a chamber without pressure, and of the fullest one."""
+PALEST = 0.4
+"""What of the colour a chamber shows at a tenth of the highest pressure, so that it is told."""
+MARGIN, FOOT = 0.06, 0.1
+GROUND = -0.06
+
+
+@dataclass(frozen=True)
+class PictureWish:
+    """What a picture is to show.
+
+    ``pressures_kpa`` or ``volumes_ul`` of the chambers by name, those not named 0; with "" for the
+    name, of all. ``elevation`` and ``azimuth`` in degrees are where the eye stands; ``width`` and
+    ``height`` in pixels. A moving picture goes from flat to there and back (``inflate``), or lets
+    the pressure go round the chambers (``circle``).
+    """
+
+    pressures_kpa: Mapping[str, float]
+    volumes_ul: Mapping[str, float] | None = None
+    elevation: float = 18.0
+    azimuth: float = -60.0
+    width: int = 1000
+    height: int = 800
+    motion: Motion = "inflate"
+    frames: int = FRAMES
+
+
+def pose_of(laminate: Laminate, stack: Stack, wish: PictureWish) -> Pose:
+    """The pose that a wish names. Raises DesignError for a chamber that is not there."""
+    if wish.volumes_ul is not None:
+        return pressed(stack, _by_chamber(laminate, wish.volumes_ul))
+    return stack.pose(_by_chamber(laminate, wish.pressures_kpa))
+
+
+def _by_chamber(laminate: Laminate, asked: Mapping[str, float]) -> tuple[float, ...]:
+    names = [chamber.name for chamber in laminate.chambers]
+    unknown = [name for name in asked if name and name not in names]
+    if unknown:
+        raise DesignError(f"chamber {unknown[0]} is not there; the chambers are {', '.join(names)}")
+    return tuple(float(asked.get(name, asked.get("", 0.0))) for name in names)
+
+
+def write_picture(
+    laminate: Laminate,
+    stack: Stack,
+    wish: PictureWish,
+    path: Path,
+    told: Callable[[int, int], None] | None = None,
+) -> Pose:
+    """Writes ``path``, as what its ending says, and returns the pose shown.
+
+    Raises DesignError for an ending that is none of ENDINGS and for poses that cannot be.
+    """
+    ending = path.suffix.lower()
+    if ending not in ENDINGS:
+        raise DesignError(f"{path.name} must end in {', '.join(ENDINGS[:-1])} or {ENDINGS[-1]}")
+    pose = pose_of(laminate, stack, wish)
+    if ending == ".glb":
+        _write_glb(inflated(laminate, stack, pose), pose, path)
+    elif ending == ".png":
+        path.write_bytes(picture_png(laminate, stack, pose, wish))
+    else:
+        poses = list(_poses(stack, pose, wish))
+        path.write_bytes(animation(laminate, stack, poses, wish, ending, told))
+    return pose
+
+
+def picture_png(laminate: Laminate, stack: Stack, pose: Pose, wish: PictureWish) -> bytes:
+    """One pose, with a caption, as PNG."""
+    parts = inflated(laminate, stack, pose)
+    (image,) = _images([(pose, parts)], laminate, wish)
+    out = BytesIO()
+    image.save(out, "PNG", compress_level=9)
+    return out.getvalue()
+
+
+def animation(
+    laminate: Laminate,
+    stack: Stack,
+    poses: Sequence[Pose],
+    wish: PictureWish,
+    ending: str = ".gif",
+    told: Callable[[int, int], None] | None = None,
+) -> bytes:
+    """Poses one after the other, for ever, as GIF or WebP."""
+    from PIL import Image
+
+    shown = [(pose, inflated(laminate, stack, pose, COARSE)) for pose in poses]
+    images = _images(shown, laminate, wish, told)
+    out = BytesIO()
+    if ending == ".webp":
+        images[0].save(
+            out,
+            "WEBP",
+            save_all=True,
+            append_images=images[1:],
+            duration=FRAME_MS,
+            loop=0,
+            quality=82,
+            method=4,
+        )
+        return out.getvalue()
+    # One palette for all: that of the first, the middle and the last third beside each other.
+    third = len(images) // 3
+    sample = Image.new("RGB", (images[0].width, 3 * images[0].height))
+    for place, image in enumerate((images[0], images[third], images[2 * third])):
+        sample.paste(image, (0, place * image.height))
+    palette = sample.quantize(SHADES, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    frames[0].save(
+        out,
+        "GIF",
+        save_all=True,
+        append_images=frames[1:],
+        duration=FRAME_MS,
+        loop=0,
+        optimize=False,
+        disposal=1,
+    )
+    return out.getvalue()
+
+
+def _poses(stack: Stack, last: Pose, wish: PictureWish) -> list[Pose]:
+    """Poses of a moving picture, which ends where it began."""
+    turns = [number / wish.frames * math.tau for number in range(wish.frames)]
+    found: list[Pose] = []
+    if wish.motion == "circle":
+        if stack.chambers < 3:
+            raise DesignError("pressure goes round three chambers or more; use motion inflate")
+        most = max(last.pressures)
+        at = [math.atan2(float(y), float(x)) for x, y in stack.axes]
+        steps = [tuple(most * _swell(math.cos(turn - angle)) for angle in at) for turn in turns]
+    else:
+        steps = [
+            tuple(p * ((1 - math.cos(turn)) / 2) ** 1.5 for p in last.pressures) for turn in turns
+        ]
+    for step in steps:
+        found.append(stack.pose(step, near=found[-1] if found else None))
+    return found
+
+
+def _swell(cosine: float) -> float:
+    """Part of the pressure by how far round a chamber is: full at 1, none from -0.5 on."""
+    share: float = max(0.0, (cosine + 0.5) / 1.5) ** 1.5
+    return share
+
+
+def _images(
+    shown: Sequence[tuple[Pose, Sequence[InflatedPart]]],
+    laminate: Laminate,
+    wish: PictureWish,
+    told: Callable[[int, int], None] | None = None,
+) -> list[Image]:
+    """All poses seen from one place at one scale."""
+    from sbafab.reports.depth import view_of
+
+    width, height = wish.width, wish.height
+    box = MARGIN * width, MARGIN * height, (1 - MARGIN) * width, (1 - MARGIN - FOOT) * height
+    every = [part.surface for _, parts in shown for part in parts]
+    view = view_of(every, wish.elevation, wish.azimuth, box)
+    most = max(max(pose.pressures) for pose, _ in shown)
+    images = []
+    for pose, parts in shown:
+        bodies = [Body(p.surface, p.normals, _colour(p, pose, most)) for p in parts]
+        image = rendered(bodies, view, width, height, GROUND)
+        _write(image, _caption(laminate, pose, moving=len(shown) > 1), view.scale)
+        images.append(image)
+        if told is not None:
+            told(len(images), len(shown))
+    return images
+
+
+def _colour(part: InflatedPart, pose: Pose, most: float) -> RGB:
+    """The web's, or a chamber's by its part of the highest pressure."""
+    if part.chamber is None:
+        return WEB
+    share = pose.pressures[part.chamber] / most if most > 0 else 0.0
+    share = min(1.0, share / 0.1) * PALEST + (1 - PALEST) * share
+    r, g, b = (round(e + (f - e) * share) for e, f in zip(EMPTY, FULL, strict=True))
+    return r, g, b
+
+
+def _caption(laminate: Laminate, pose: Pose, moving: bool) -> str:
+    pressures = ", ".join(f"{p:.3g}" for p in pose.pressures)
+    if moving:
+        return f"{laminate.name}, elastic stack"
+    bent = f", bent {pose.bend:.0f} degrees" if pose.bend > 0.5 else f", {pose.height:.1f} mm high"
+    return f"{laminate.name} at {pressures} kPa{bent} (elastic stack)"
+
+
+def _write(image: Image, caption: str, pixels_per_mm: float) -> None:
+    from PIL import ImageDraw, ImageFont
+
+    from sbafab.reports.length_bar import INK, draw_length_bar
+
+    width, height = image.size
+    size = max(11, round(height / 40))
+    font = ImageFont.load_default(size)
+    draw = ImageDraw.Draw(image)
+    draw.text((round(0.03 * width), height - round(1.9 * size)), caption, fill=INK, font=font)
+    draw_length_bar(draw, 0.97 * width, height - size, width / 5, pixels_per_mm, font)
+
+
+def _write_glb(parts: Sequence[InflatedPart], pose: Pose, path: Path) -> None:
+    from sbafab.assemblies.colours import linear
+    from sbafab.meshing.write_glb import Node, write_scene
+
+    most = max(pose.pressures)
+    write_scene(
+        [Node(p.name, p.surface, "TPE", linear(_colour(p, pose, most))) for p in parts], path
+    )

@@ -1,0 +1,111 @@
+"""Films of filled meshes do not pass through each other, judged as solids by manifold3d."""
+
+from __future__ import annotations
+
+import re
+from itertools import combinations
+
+import manifold3d
+import numpy as np
+import pytest
+
+from sbafab.api import build
+from sbafab.errors import DesignError, OutputError
+from sbafab.meshing.conforming.checks import skin
+from sbafab.meshing.conforming.crossing import check_apart, crossing
+from sbafab.meshing.conforming.elements import FACES
+from sbafab.meshing.conforming.fill import filled
+from sbafab.meshing.conforming.form import flat
+from sbafab.meshing.conforming.layup import layup
+from sbafab.meshing.conforming.meshes import conforming_meshes
+from sbafab.meshing.conforming.model import Mesh
+from sbafab.meshing.conforming.settings import MeshSettings
+
+SETTINGS = MeshSettings(h=0.75)
+
+
+def films(mesh: Mesh) -> dict[str, manifold3d.Manifold]:
+    """Each film as a solid of flat triangles through the corners of its wedges."""
+    found = {}
+    for name, cells in mesh.cell_sets.items():
+        if not name.startswith("film"):
+            continue
+        part = Mesh("film", mesh.kind, mesh.points, mesh.cells[cells], {}, {}, {}, {})
+        triangles = []
+        for number, local in enumerate(FACES["wedge15"]):
+            outer = skin(part)
+            corners = [node for node in local if node < 6]
+            nodes = part.cells[outer[outer[:, 1] == number, 0]][:, corners]
+            triangles += [nodes[:, [0, 1, 2]]]
+            triangles += [nodes[:, [0, 2, 3]]] if len(corners) == 4 else []
+        nodes, faces = np.unique(np.concatenate(triangles), return_inverse=True)
+        surface = manifold3d.Mesh64(mesh.points[nodes], faces.reshape(-1, 3).astype(np.uint64))
+        found[name] = manifold3d.Manifold(surface)
+        assert found[name].status() == manifold3d.Error.NoError
+    return found
+
+
+def shared(mesh: Mesh) -> float:
+    """Largest volume in mm3 that two films of a mesh have in common."""
+    solids = films(mesh)
+    return max((a ^ b).volume() for a, b in combinations(solids.values(), 2))
+
+
+def test_unlike_fills_that_would_cross_are_refused_with_the_least_that_does_not() -> None:
+    laminate = build("3dof-15mm", "stack.balloons=2")
+    asked = MeshSettings(h=0.75, fill_ul={"chamber1": 10.0})
+    with pytest.raises(DesignError, match=r"would pass through each other by 0\.3\d mm") as refused:
+        conforming_meshes(laminate, asked)
+    least = re.findall(r"([\d.]+) ul in (chamber\d)", str(refused.value))
+    fills = {"chamber1": 10.0, **{name: float(ul) for ul, name in least}}
+    assert set(fills) == {"chamber1", "chamber2", "chamber3"}
+    mesh = conforming_meshes(laminate, MeshSettings(h=0.75, fill_ul=fills)).volume
+    # Chords of the corner nodes overlap a little; films are 6 mm3 and more.
+    assert shared(mesh) < 0.01
+    # A little less than what the message asks for crosses.
+    short = {name: ul if name == "chamber1" else ul - 0.5 for name, ul in fills.items()}
+    with pytest.raises(DesignError, match="would pass through each other"):
+        filled(layup(laminate, SETTINGS), short)
+
+
+def test_films_that_cross_are_found_before_a_mesh_is_written() -> None:
+    stack = layup(build("3dof-15mm", "stack.balloons=2"), SETTINGS)
+    forms = filled(stack, 5.0)[1]
+    check_apart(stack, forms)
+    check_apart(stack, flat(stack))
+    # The upper balloon set down by 0.3 mm lies in the lower one.
+    sunk = [form._replace(base=form.base - [0, 0, 0.3 * (k > 1)]) for k, form in enumerate(forms)]
+    found = crossing(stack, sunk)
+    assert found is not None
+    assert (found.lower, found.upper) == (1, 2)
+    assert found.depth == pytest.approx(0.3, abs=0.01)
+    with pytest.raises(OutputError, match=r"films 3 and 5 would pass through each other by 0\.30"):
+        check_apart(stack, sunk)
+
+
+def test_a_film_that_pierces_one_far_from_it_is_found() -> None:
+    stack = layup(build("1dof-5mm", "stack.balloons=2"), SETTINGS)
+    forms = filled(stack, 3.0)[1]
+    # The cap turned upside down through the base, the two films between them out of the way.
+    x, y, _ = forms[3].base.T
+    tilted = forms[3]._replace(base=np.column_stack([x, y, 2 * x]))
+    above = [form._replace(base=form.base + np.array([0, 0, 40.0])) for form in forms[1:3]]
+    assert crossing(stack, [forms[0], *above, tilted]) is not None
+
+
+def test_what_a_film_loses_in_thickness_is_said() -> None:
+    laminate = build("1dof-5mm", "stack.balloons=1")
+    meshes = conforming_meshes(laminate, MeshSettings(h=0.5, symmetry="quarter", fill_ul=16.9))
+    # Two paraboloids over radius 2.5 hold pi 2.5^2 a: the slope at their edge is 2 a / 2.5.
+    slope = 2 * 16.9 / (np.pi * 2.5**2) / 2.5
+    thinnest = 0.038 / np.hypot(1, slope)
+    for figures in meshes.statistics.values():
+        assert figures["thinnest_film_mm"] == pytest.approx(thinnest, rel=0.02)
+    said = " ".join(meshes.volume.notes)
+    assert f"{meshes.statistics['volume']['thinnest_film_mm']:.4f} mm there" in said
+    assert "free of stress when flat" in said
+    # The nodes' places when flat are given: the film that they make is as thick as it was cut.
+    rest = meshes.volume.rest
+    assert rest is not None
+    assert rest[:, 2].max() == pytest.approx(2 * 0.038)
+    assert np.linalg.norm(rest - meshes.volume.points, axis=1).max() > 0.8

@@ -1,0 +1,145 @@
+"""The inflated actuator as drawn: what it holds, where it stands, and what the pictures show."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from click.testing import CliRunner
+from PIL import Image
+
+import sbafab
+from sbafab.cli import app
+from sbafab.errors import DesignError
+from sbafab.laminate.laminate import Laminate
+from sbafab.models.stack import Stack
+from sbafab.reports.inflated import InflatedPart, inflated, pressed
+from sbafab.reports.inflated_picture import PictureWish, picture_png, write_picture
+
+CHANGES = ("stack.balloons=4",)
+TWO = {"chamber1": 5.0, "chamber2": 5.0}
+SMALL = PictureWish(TWO, width=160, height=128, frames=4)
+
+
+@pytest.fixture(scope="module")
+def laminate() -> Laminate:
+    return sbafab.build("3dof-15mm", *CHANGES)
+
+
+@pytest.fixture(scope="module")
+def stack() -> Stack:
+    return sbafab.stack("3dof-15mm", *CHANGES)
+
+
+def solid(part: InflatedPart) -> trimesh.Trimesh:
+    return trimesh.Trimesh(part.surface.points, part.surface.faces, process=False)
+
+
+@pytest.mark.parametrize("pressures", [(5.0, 5.0, 5.0), (5.0, 5.0, 0.0), (3.0, 1.0, 0.0)])
+def test_drawn_balloons_hold_the_air_of_their_pose(
+    laminate: Laminate, stack: Stack, pressures: tuple[float, ...]
+) -> None:
+    pose = stack.pose(pressures)
+    for part in inflated(laminate, stack, pose):
+        body = solid(part)
+        assert body.is_watertight
+        if part.chamber is None:
+            continue
+        # Between its plates a balloon takes its films and masks along: pitch over the pocket.
+        films = stack.pitch * math.pi * 2.3**2 * 4
+        assert body.volume - films == pytest.approx(pose.volumes[part.chamber], abs=7.0)
+
+
+def test_it_stands_on_its_base_and_ends_at_the_tip(laminate: Laminate, stack: Stack) -> None:
+    pose = stack.pose((5.0, 5.0, 5.0))
+    parts = inflated(laminate, stack, pose)
+    points = np.concatenate([part.surface.points for part in parts])
+    assert points[:, 2].min() == pytest.approx(0.0, abs=0.01)
+    assert points[:, 2].max() == pytest.approx(pose.height, abs=0.02)
+    bent = stack.pose((5.0, 0.0, 0.0))
+    axes = bent.frames[1]
+    for part in inflated(laminate, stack, bent):
+        if part.chamber is not None:
+            # The topmost neck lies in the tip's plate.
+            across = (part.surface.points - bent.tip) @ axes[-1][:, 2]
+            assert across.max() == pytest.approx(0.0, abs=0.05)
+
+
+def test_films_of_a_chamber_do_not_pass_through_each_other(
+    laminate: Laminate, stack: Stack
+) -> None:
+    import manifold3d
+
+    pose = stack.pose((5.0, 5.0, 0.0))
+    chamber = next(part for part in inflated(laminate, stack, pose) if part.chamber == 0)
+    balloons = solid(chamber).split()
+    assert len(balloons) == 4
+    bodies = [
+        manifold3d.Manifold(manifold3d.Mesh64(b.vertices, b.faces.astype(np.uint64)))
+        for b in balloons
+    ]
+    for k, one in enumerate(bodies):
+        for other in bodies[k + 1 :]:
+            assert (one ^ other).volume() < 0.02 * one.volume()
+
+
+def test_chambers_can_be_given_volumes(stack: Stack) -> None:
+    assert pressed(stack, (50.0, 40.0, 40.0)).volumes == pytest.approx([50, 40, 40], rel=2e-3)
+    with pytest.raises(DesignError, match="no pressures give the volumes asked for"):
+        pressed(stack, (900.0, 0.0, 0.0))
+
+
+def test_the_picture_shows_full_chambers_and_is_the_same_again(
+    laminate: Laminate, stack: Stack
+) -> None:
+    pose = stack.pose((5.0, 5.0, 0.0))
+    first = picture_png(laminate, stack, pose, SMALL)
+    assert picture_png(laminate, stack, pose, SMALL) == first
+    image = np.asarray(Image.open(BytesIO(first)).convert("RGB")).astype(int)
+    red, _, blue = image.reshape(-1, 3).T
+    assert (red - blue > 60).sum() > 200
+    flat = np.asarray(
+        Image.open(BytesIO(picture_png(laminate, stack, stack.pose((0.0,) * 3), SMALL)))
+    ).astype(int)
+    assert (flat[..., 0] - flat[..., 2] > 60).sum() == 0
+    # No light leaks: the body's outline encloses no paper but the lumen and what lies behind it.
+    assert (image.sum(axis=2) < 700).mean() > 0.1
+
+
+def test_moving_pictures_and_scenes_are_read_by_others(
+    laminate: Laminate, stack: Stack, tmp_path: Path
+) -> None:
+    write_picture(laminate, stack, replace(SMALL, motion="circle"), tmp_path / "a.gif")
+    with Image.open(tmp_path / "a.gif") as moving:
+        assert getattr(moving, "n_frames", 1) == 4
+    pose = write_picture(laminate, stack, SMALL, tmp_path / "a.glb")
+    scene = trimesh.load(tmp_path / "a.glb")
+    assert isinstance(scene, trimesh.Scene)
+    assert set(scene.graph.nodes_geometry) == {"web", "chamber1", "chamber2", "chamber3"}
+    # Metres, y up.
+    assert scene.bounds[1, 1] * 1000 > pose.height
+    with pytest.raises(DesignError, match=r"must end in \.png, \.gif, \.webp or \.glb"):
+        write_picture(laminate, stack, SMALL, tmp_path / "a.jpg")
+
+
+def test_the_command_says_what_it_drew_and_refuses_in_a_sentence(tmp_path: Path) -> None:
+    run = CliRunner().invoke
+    asked = ["picture", "1dof-5mm", "--set", "stack.balloons=2", "--width", "120"]
+    done = run(app, [*asked, "--pressure", "5", "--to", str(tmp_path / "a.png")])
+    assert done.exit_code == 0, done.output
+    assert "5 kPa" in done.output
+    with Image.open(tmp_path / "a.png") as image:
+        assert image.size == (120, 96)
+    for extra, said in (
+        (["--pressure", "arm=5"], "chamber arm is not there; the chambers are chamber1"),
+        (["--pressure", "5", "--volume", "5"], "give --pressure or --volume, not both"),
+        (["--to", str(tmp_path / "no" / "a.png")], "cannot be written"),
+    ):
+        refused = run(app, [*asked, *extra])
+        assert refused.exit_code != 0
+        assert said in refused.output
