@@ -65,7 +65,6 @@ EXTRAS = {
     "mujoco": ("mujoco", "simulate --with mujoco"),
     "nest": ("spyrrow", "--nest spyrrow"),
     "optuna": ("optuna", "find --optuna"),
-    "optuna": ("optuna", "find with many keys"),
     "parquet": ("pyarrow", "tables of sweeps as Parquet"),
     "python": ("trimesh", "meshes for trimesh, meshio and PyVista"),
     "studio": ("starlette", "sbafab studio"),
