@@ -16,6 +16,7 @@ import sbafab
 from sbafab.design.writing import design_sha256
 from sbafab.search import sweep as module
 from sbafab.search.measure import measured
+from sbafab.search.plots import Dots, Objective, passes_svg, trades_svg
 from sbafab.search.sweep import SweptDesigns
 from sbafab.search.worker import MeasureJob
 
@@ -91,6 +92,17 @@ def test_the_page_stands_alone_and_counts_right(found: SweptDesigns) -> None:
     # Names of XML vocabularies are no addresses to fetch.
     assert not re.findall(r"(?:src|href)=[\"'](?!#)", page)
     assert "@import" not in page
+
+
+def test_a_picture_has_no_empty_panels() -> None:
+    dots = Dots(["passes"] * 3, {name: [1.0, 2.0, 3.0] for name in "abcd"})
+    drawn = passes_svg(dots, list("abcd"))
+    assert len(re.findall(r'id="axes_\d+"', drawn)) == 4
+    pair = (Objective("a", "a", False), Objective("b", "b", True))
+    drawn, best = trades_svg(dots, [pair])
+    assert len(re.findall(r'id="axes_\d+"', drawn)) == 1
+    # Each costs more and gives more: none betters another.
+    assert best == {0, 1, 2}
 
 
 def test_what_was_measured_before_is_not_measured_again(
