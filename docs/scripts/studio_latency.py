@@ -52,9 +52,8 @@ def main(changes: int = 25) -> None:
             seen.page.wait_for_timeout(5000)
             rate = seen.say("studio.motion.rate()")
             costs = seen.say("studio.motion.costs.slice(-100)")
-            print(
-                f"\nposes drawn a second: {rate:.0f}; drawing one: {statistics.median(costs):.1f} ms"
-            )
+            each = statistics.median(costs)
+            print(f"\nposes drawn a second: {rate:.0f}; drawing one: {each:.1f} ms")
 
 
 def _warm(seen: Watched) -> None:
