@@ -254,33 +254,37 @@ def predict(
     pressures_kpa: Sequence[float] = (10.0, 100.0),
     flow_ml_min: float = 35.0,
     volumes_ul: Sequence[float] = (),
-    press_factor: float = 1.0,
-    contact_factor: float = 1.0,
-    pocket_loss: float = 0.0,
-    modulus_mpa: float | None = None,
-    **tables: Any,
+    quick: bool = False,
+    **asked: Any,
 ) -> Prediction:
-    """What a design will do, by closed formulas; each figure names its model and its trust.
+    """What a design will do; each figure names its model and its trust.
 
-    Raises DesignError for what is out of every model's range.
+    ``quick`` leaves out the figures of the elastic stack, which take seconds. ``asked`` holds
+    fields of ``models.figures.Factors``, which are ``press_factor``, ``contact_factor``,
+    ``pocket_loss`` mm and ``modulus_mpa``, beside tables of the design. Raises DesignError for what
+    is out of every model's range.
     """
     from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict as model_predict
 
-    factors = Factors(press_factor, contact_factor, pocket_loss, modulus_mpa)
-    asked = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), factors)
-    return model_predict(load(source, *changes, **tables), asked)
+    factors, tables = _parted(asked, Factors)
+    wish = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), Factors(**factors))
+    return model_predict(load(source, *changes, **tables), wish, quick=quick)
 
 
-def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **tables: Any) -> Stack:
+def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **asked: Any) -> Stack:
     """The actuator as plates joined by balloons, for poses in real time: ``stack.pose((5, 5, 0))``.
 
-    ``most_pressure`` kPa is the most that it may be asked for. Raises DesignError for pockets that
-    are not round.
+    ``most_pressure`` kPa is the most that it may be asked for; ``asked`` holds fields of
+    ``models.figures.Factors`` beside tables of the design. Raises DesignError for pockets that are
+    not round.
     """
+    from sbafab.models.figures import Factors
     from sbafab.models.stack import stack as stack_of
 
-    return stack_of(load(source, *changes, **tables), most_pressure=most_pressure)
+    factors, tables = _parted(asked, Factors)
+    design = load(source, *changes, **tables)
+    return stack_of(design, most_pressure=most_pressure, factors=Factors(**factors))
 
 
 def find(
@@ -311,7 +315,8 @@ def find(
 def motion(stack: Stack, length: float = 150.0, diameter: float = 0.635, **load: Any) -> Motion:
     """A stack that is fed with air through tubes, to call ``motion.step(dt, pressures=...)``.
 
-    ``length`` and inner ``diameter`` of each chamber's tube are mm; ``load`` is what ``stack.pose`` takes beside pressures. Raises DesignError.
+    ``length`` and inner ``diameter`` of each chamber's tube are mm; ``load`` is what ``stack.pose``
+    takes beside pressures. Raises DesignError.
     """
     from sbafab.models.pneumatics import AIR, Line
 

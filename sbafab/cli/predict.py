@@ -92,11 +92,12 @@ def predict(
     load_g: float,
     **factors: Any,
 ) -> None:
-    """Predict sizes, stroke, force, time, bending: predict.json and plots.
+    """Predict sizes, stroke, force, time and bending.
 
-    Every figure names its model and how far that is trusted. A design that fails a rule is
-    predicted on the screen only (exit code 1). Of an assembly: reach, load, grip in its lumen, and
-    whether inflated parts meet, at the first pressure given (default 10 kPa), on the screen.
+    Writes predict.json and plots. Every figure names its model and how far that is trusted. A
+    design that fails a rule is predicted on the screen only (exit code 1). Of an assembly: reach,
+    load, grip in its lumen, and whether inflated parts meet, at the first pressure given (default
+    10 kPa), on the screen.
     """
     from sbafab.assemblies.reading import load
     from sbafab.assemblies.records import Assembly

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from sbafab.cutting.dxf_write import Surroundings
 from sbafab.cutting.lightburn import ENDING, project_text
-from sbafab.cutting.lightburn_read import verify_project
+from sbafab.cutting.lightburn_verify import verify_project
 from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import CutSettings, file_properties, kerf_suffix
 from sbafab.cutting.second_cut import PATH, laser_path, marks, properties_of

@@ -1,9 +1,9 @@
 """One round balloon as an elastic membrane of revolution: inflated free, or between plates.
 
 Two equal films, bonded round the pocket and, where there are neighbours, at the neck. One film is
-computed; the other one mirrors it. A film stretches (plane stress; Saint Venant and Kirchhoff's law,
-or Hencky's) and bends. Where its hoop is compressed it wrinkles, and carries what wrinkles of least
-energy do:
+computed; the other one mirrors it. A film stretches (plane stress; Saint Venant and Kirchhoff's
+law, or Hencky's) and bends. Where its hoop is compressed it wrinkles, and carries what wrinkles of
+least energy do:
 
     N = 2 pi / L sqrt(B T)      (after Cerda and Mahadevan, 2003)
 
@@ -56,8 +56,8 @@ class Balloon:
     ``neck`` is the radius bonded to the next balloon, ``bore`` that of the hole in it; both 0 for a
     lone balloon. Without ``wrinkles`` films stay as smooth as an axisymmetric mesh keeps them.
     ``inextensible`` is the limit of a film that neither bends nor carries any compression, its rim
-    included: the modulus has then to be large. ``order`` is that of the film's law (``Flat``): 2 for
-    Saint Venant's and Kirchhoff's, which programs for linear films take; 0 for Hencky's.
+    included: the modulus has then to be large. ``order`` is that of the film's law (``Flat``): 2
+    for Saint Venant's and Kirchhoff's, which programs for linear films take; 0 for Hencky's.
     """
 
     pocket: float = 2.5
@@ -180,12 +180,14 @@ def inflate(
     elements = len(balloon.nodes) - 1
     smooth = np.where(balloon.may_wrinkle & balloon.inextensible, 0.0, math.inf)
     load = _Load(p, high / 2, np.broadcast_to(smooth, (len(p), elements)), tied)
-    r, z = _settled(balloon, load, *_start(balloon, load))
-    if balloon.wrinkles and not balloon.inextensible:
-        zone = _compressed(balloon, r, z)
-        for _ in range(ROUNDS):
-            load = load._replace(cap=_wrinkling(balloon, r, z, zone))
-            r, z = _settled(balloon, load, r, z)
+    # Where no balance is found, elements may shrink to nothing on the way; that is said in the end.
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        r, z = _settled(balloon, load, *_start(balloon, load))
+        if balloon.wrinkles and not balloon.inextensible:
+            zone = _compressed(balloon, r, z)
+            for _ in range(ROUNDS):
+                load = load._replace(cap=_wrinkling(balloon, r, z, zone))
+                r, z = _settled(balloon, load, r, z)
     term, force = _total(balloon, load, r, z)
     held = air(balloon.film, balloon.edge, r, z).energy
     return Shapes(p, 2 * z[:, 0], 2 * held, force, 2 * (term.energy + p * held), r, z)

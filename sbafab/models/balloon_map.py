@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 DEGREE = 5
 PRESSURE_SPANS, HEIGHT_SPANS = 9, 9
 """Pieces of the spline each way."""
-PRESSURE_POINTS, HEIGHT_POINTS = 14, 14
+PRESSURE_POINTS, HEIGHT_POINTS = 12, 12
 """Balloons computed each way."""
 P0 = 0.3
 """Pressure in kPa below which the spline's pieces are alike in pressure, above alike in ratio."""

@@ -130,9 +130,8 @@ def _weights(u, order):
 def _spline(balloon, p, h, by_p, by_h):
     b = BALLOONS[balloon]
     if not (0.0 <= p <= b["most_pressure"] and 0.0 <= h <= b["most_height"]):
-        raise ValueError(
-            "outside the map: give 0 to %g kPa and 0 to %g mm" % (b["most_pressure"], b["most_height"])
-        )
+        most = (b["most_pressure"], b["most_height"])
+        raise ValueError("outside the map: give 0 to %g kPa and 0 to %g mm" % most)
     each = SPANS_P / math.asinh(b["most_pressure"] / P0)
     x = min(math.asinh(p / P0) * each, SPANS_P * (1 - 1e-12))
     y = min(h * SPANS_H / b["most_height"], SPANS_H * (1 - 1e-12))

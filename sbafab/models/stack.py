@@ -13,13 +13,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sbafab.errors import DesignError
+from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import (
     DEGREE,
     HEIGHT_SPANS,
@@ -45,6 +46,10 @@ RING = 6
 MOST_PRESSURE = 110.0
 """kPa to which maps are made unless more is asked for."""
 GRAVITY = 9.80665
+GRIP = 0.15
+"""Radius, as a share of its pocket's, of the disc that a lone balloon's plates hold it by."""
+SHARES = (1.0, 0.5, 0.2, 0.1)
+"""Of the pressure asked for, tried one after the other."""
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -132,7 +137,6 @@ class Stack:
     pitch: float
     outline: float
     weight: float = 0.0
-    _springs: dict[tuple[float, ...], Springs] = field(default_factory=dict, repr=False)
 
     @property
     def chambers(self) -> int:
@@ -303,7 +307,8 @@ def stack(
 ) -> Stack:
     """The stack of a design with round pockets on one axis or side by side.
 
-    ``most_pressure`` in kPa is what maps are made to. ``factors`` are measured ones. Raises
+    ``most_pressure`` in kPa is what maps are made to; those of wide pockets end before. A lone
+    balloon is held by a small disc. ``factors`` are measured ones. Raises
     DesignError for pockets of another shape, for actuators round a tube and for films of unknown
     modulus.
     """
@@ -311,7 +316,7 @@ def stack(
     from sbafab.models.balloons import balloons_of
 
     flat = laminate or build(design)
-    row = balloons_of(design, flat, factors)
+    row = [_gripped(one) for one in balloons_of(design, flat, factors)]
     press = 1.0 if factors is None else factors.press_factor
     kinds = list(dict.fromkeys(row))
     axes = np.array([chamber.centres[0] for chamber in flat.chambers])
@@ -323,10 +328,26 @@ def stack(
         for layer in flat.layers
     )
     return Stack(
-        tuple(balloon_map(kind, most_pressure) for kind in kinds),
+        tuple(_mapped(kind, most_pressure) for kind in kinds),
         np.array([kinds.index(one) for one in row]),
         axes,
         flat.thickness * press / len(row),
         reach,
         grams * GRAVITY / len(row),
     )
+
+
+def _gripped(one: Balloon) -> Balloon:
+    """The same with something that plates hold it by, where it has no neck."""
+    return one if one.neck else replace(one, neck=GRIP * one.pocket)
+
+
+def _mapped(kind: Balloon, most_pressure: float) -> BalloonMap:
+    """The map of a balloon, to a lower pressure where wide pockets have no balance at that one."""
+    for share in SHARES:
+        try:
+            return balloon_map(kind, share * most_pressure)
+        except DesignError:
+            if share == SHARES[-1]:
+                raise
+    raise AssertionError

@@ -15,7 +15,7 @@ from sbafab.models.actuator import Actuator
 from sbafab.models.elastic import calibrated
 from sbafab.models.figures import Asked, Figure, LeftOut, Model, Relation, Trace
 from sbafab.models.motion import Motion
-from sbafab.models.pneumatics import AIR, TUBE_LENGTH, WATER, Fluid, Line
+from sbafab.models.pneumatics import AIR, TUBE_LENGTH, WATER, Line
 from sbafab.models.series import blocked
 from sbafab.models.stack import MOST_PRESSURE, Plate, Pose, Stack, stack
 
@@ -80,18 +80,22 @@ def stroke_at(one: Actuator, share: float) -> float:
     return max(share * (one.full_height - one.thickness), 0.0)
 
 
-def _forces(one: Actuator, asked: Asked, found: Stack) -> Iterator[Figure]:
+def _forces(one: Actuator, asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
     model = calibrated(FORCE, asked.calibration)
     for pressure in asked.pressures_kpa:
         for share in SHARES:
             at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
-            value = one.form.pushing * float(blocked(found, pressure, stroke_at(one, share)))
             name = f"blocked force at {pressure:g} kPa, {at}"
-            yield Figure("force", name, value, "N", model)
+            try:
+                value = float(blocked(found, pressure, stroke_at(one, share)))
+            except DesignError as error:
+                yield LeftOut(f"{name}, elastic stack", str(error))
+                continue
+            yield Figure("force", name, one.form.pushing * value, "N", model)
 
 
-def _some(found: Stack, chambers: int, pressure: float) -> tuple[float, ...]:
-    return (pressure,) * chambers + (0.0,) * (found.chambers - chambers)
+def _some(found: Stack, chambers: int, pressure: float, rest: float = 0.0) -> tuple[float, ...]:
+    return (pressure,) * chambers + (rest,) * (found.chambers - chambers)
 
 
 def _chambers(number: int) -> str:
@@ -109,16 +113,18 @@ def _bends(asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
                 yield LeftOut(name, str(error))
                 continue
             yield Figure("bending", name, pose.bend, "deg", model)
+            aside = float(np.hypot(*pose.tip[:2]))
+            yield Figure("bending", name.replace("bend", "tip aside", 1), aside, "mm", model)
 
 
 def bent(found: Stack, chambers: int, angle: float) -> Pose | None:
     """The pose in which some chambers, the others empty, bend it by so many degrees."""
-    low, high = 1e-4, found.most_pressure
+    low, high = 0.01, found.most_pressure
     pose = None
     for _ in range(40):
         middle = math.sqrt(low * high)
         try:
-            pose = found.pose(_some(found, chambers, middle))
+            pose = found.pose(_some(found, chambers, middle), near=pose)
         except DesignError:
             high = middle
             continue
@@ -155,44 +161,34 @@ def _three(values: Array) -> tuple[float, float, float]:
     return (x, y, z)
 
 
-def filling(
-    found: Stack, fluid: Fluid, flow_ml_min: float, until: float, length: float = TUBE_LENGTH
-) -> tuple[float, Motion]:
-    """Seconds at a flow, shared by all chambers, until the sensor at the pump shows a pressure in
-    kPa, through tubes of a ``length`` in mm; and the motion by then.
+def filled(
+    found: Stack, flow_ml_min: float, until: float, length: float = TUBE_LENGTH
+) -> tuple[float, Pose]:
+    """Seconds of water at a flow, shared by all chambers through tubes of a ``length`` in mm, until
+    the pump shows a pressure in kPa; and the pose by then. Raises DesignError where the tubes
+    alone take that pressure.
     """
     flow = flow_ml_min * 1000 / 60 / found.chambers
-    motion = found.motion(line=Line(fluid, length))
-    most = float(found.pose((until,) * found.chambers).volumes.max())
-    dt = most / flow / SAMPLES
-    before, shown = 0.0, motion.line.source_pressure(flow, 0.0)
-    while shown < until and motion.time < 3 * SAMPLES * dt:
-        before = shown
-        motion.step(dt, flows=(flow,) * found.chambers)
-        shown = max(motion.sources)
-    if motion.time == 0:
-        return 0.0, motion
-    share = (until - before) / (shown - before) if shown > until else 1.0
-    return motion.time - dt * (1 - share), motion
+    tube = Line(WATER, length).source_pressure(flow, 0.0)
+    if tube >= until:
+        raise DesignError(f"at this flow a tube of {length:g} mm alone takes {tube:.3g} kPa")
+    pose = found.pose((until - tube,) * found.chambers)
+    empty = found.pose((0.0,) * found.chambers)
+    return float((pose.volumes - empty.volumes).mean()) / flow, pose
 
 
 def _times(asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
     model = calibrated(TIME, asked.calibration)
-    try:
-        time, motion = filling(found, WATER, asked.flow_ml_min, paper.FULL_KPA)
-    except DesignError as error:
-        yield LeftOut("time to 10 kPa at the pump", str(error))
-        return
-    if not motion.sources:
-        tube = motion.line.source_pressure(asked.flow_ml_min * 1000 / 60 / found.chambers, 0.0)
-        reason = f"at this flow the tube alone takes {tube:.3g} kPa"
-        yield LeftOut("time to 10 kPa at the pump", reason)
-        return
     until = f"{paper.FULL_KPA:g} kPa at the pump"
     name = f"time to {until}, water at {asked.flow_ml_min:g} ml/min in all"
+    try:
+        time, pose = filled(found, asked.flow_ml_min, paper.FULL_KPA)
+    except DesignError as error:
+        yield LeftOut(name, str(error))
+        return
     yield Figure("actuation", name, time, "s", model)
     name = f"height when the water's pump shows {paper.FULL_KPA:g} kPa"
-    yield Figure("actuation", name, motion.pose.height, "mm", model)
+    yield Figure("actuation", name, pose.height, "mm", model)
 
 
 def _stiffness(asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
@@ -223,6 +219,8 @@ def force_traces(one: Actuator, asked: Asked, found: Stack) -> list[Trace]:
     model = calibrated(FORCE, asked.calibration)
     lines = []
     for pressure in asked.pressures_kpa:
+        if pressure > found.most_pressure:
+            continue
         values = (one.form.pushing * blocked(found, pressure, strokes)).tolist()
         lines.append(Trace(f"elastic stack, {pressure:g} kPa", strokes.tolist(), values, model))
     return lines
@@ -243,11 +241,28 @@ def bend_relation(asked: Asked, found: Stack) -> Relation:
     )
 
 
-def _poses(found: Stack, chambers: int, pressures: Sequence[float] | Array) -> list[Pose]:
+def workspace_traces(asked: Asked, found: Stack) -> list[Trace]:
+    """Paths of the tip with 1, 2 ... chambers up to 10 kPa, the others empty or full."""
+    model = calibrated(BEND, asked.calibration)
+    pressures = np.linspace(0.1, paper.FULL_KPA**0.5, SAMPLES) ** 2
+    lines = []
+    for rest, words in ((0.0, "empty"), (paper.FULL_KPA, f"at {paper.FULL_KPA:g} kPa")):
+        for chambers in range(1, found.chambers):
+            poses = _poses(found, chambers, pressures, rest)
+            label = f"elastic stack, {_chambers(chambers)} to 10 kPa, the others {words}"
+            aside = [float(np.hypot(*pose.tip[:2])) for pose in poses]
+            lines.append(Trace(label, aside, [pose.height for pose in poses], model))
+    return lines
+
+
+def _poses(
+    found: Stack, chambers: int, pressures: Sequence[float] | Array, rest: float = 0.0
+) -> list[Pose]:
     poses: list[Pose] = []
     for pressure in pressures:
         try:
-            poses.append(found.pose(_some(found, chambers, float(pressure))))
+            near = poses[-1] if poses else None
+            poses.append(found.pose(_some(found, chambers, float(pressure), rest), near=near))
         except DesignError:
             break
     return poses

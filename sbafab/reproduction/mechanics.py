@@ -10,9 +10,9 @@ from sbafab.actuators import load_design
 from sbafab.models import paper
 from sbafab.models.figures import Factors, Prediction
 from sbafab.models.flow import seconds
-from sbafab.models.pneumatics import AIR, WATER, Line
+from sbafab.models.pneumatics import AIR, Line
 from sbafab.models.stack import Stack, stack
-from sbafab.models.stacked import bent, filling
+from sbafab.models.stacked import bent, filled
 from sbafab.models.stiffness import modulus
 from sbafab.reproduction.records import NONE, Row, exact, predicted
 
@@ -94,7 +94,7 @@ def forces(one: Prediction, three: Prediction) -> Iterator[Row]:
             whys = FORCE_WHY[name, model]
             for at, value, why in zip(heights(), measured, whys, strict=True):
                 yield Row(f"{name}, 100 kPa, {at}", value, force(found, at, model), model, why)
-    whys = {
+    bent_whys = {
         30: "near, with two chambers pressed against a plate square to the tip, which sticks",
         60: "high: the paper does not say which chambers push, nor how the sensor holds the tip",
         90: "with one chamber: two do not bend so far and stay within what films stretch",
@@ -103,7 +103,7 @@ def forces(one: Prediction, three: Prediction) -> Iterator[Row]:
         chambers = "one chamber" if angle == 90 else "2 chambers"
         name = f"force at 100 kPa in {chambers}, bent by {angle} deg"
         what = f"3-DoF, 100 kPa, bent by {angle} deg"
-        yield Row(what, value, three.value(name), f"{STACK}, {chambers}", whys[angle])
+        yield Row(what, value, three.value(name), f"{STACK}, {chambers}", bent_whys[angle])
 
 
 def heights() -> list[str]:
@@ -130,7 +130,7 @@ def _times(three: Prediction, whole: Stack) -> Iterator[Row]:
         "the chambers films take in half as much again",
     )
     for length in LENGTHS:
-        time, found = filling(whole, WATER, paper.WATER_FLOW, paper.FULL_KPA, length)
+        time, found = filled(whole, paper.WATER_FLOW, paper.FULL_KPA, length)
         held = found.pressures[0]
         yield Row(
             "time to 10 kPa, water, 35 ml/min",
@@ -140,11 +140,11 @@ def _times(three: Prediction, whole: Stack) -> Iterator[Row]:
             f"not a test, for the paper gives no length, and 150 mm is the one that makes it come "
             f"out: of the 10 kPa that the pump's sensor shows the chambers have {held:.2g}",
         )
-    _, found = filling(whole, WATER, paper.WATER_FLOW, paper.FULL_KPA)
+    _, found = filled(whole, paper.WATER_FLOW, paper.FULL_KPA)
     yield Row(
         "height of the 3-DoF of 15 balloons",
         paper.FULL_HEIGHT,
-        found.pose.height,
+        found.height,
         f"{STACK}, when that pump shows 10 kPa, 150 mm of tube",
         "held out: if the tubes' length makes the time right, the height follows",
     )
@@ -184,7 +184,7 @@ def _bends(three: Prediction, whole: Stack) -> Iterator[Row]:
         "constant curvature",
         "upper bound: one chamber is taken to be 17.5 long beside two flat ones",
     )
-    _, found = filling(whole, WATER, paper.WATER_FLOW, paper.FULL_KPA)
+    _, found = filled(whole, paper.WATER_FLOW, paper.FULL_KPA)
     full = found.pressures[0]
     for count, why in (
         (1, "high: the films' webs, taken for rigid here, likely fold; or the pressure was less"),
@@ -192,7 +192,7 @@ def _bends(three: Prediction, whole: Stack) -> Iterator[Row]:
     ):
         pose = whole.pose((full,) * count + (0.0,) * (3 - count))
         what = "one chamber" if count == 1 else "2 chambers"
-        model = f"{STACK}, {what} at the {full:.2g} kPa of the full height"
+        model = f"{STACK}, {what} at the {full:.2g} kPa that the pump's 10 leave"
         yield Row("largest bend", paper.LARGEST_BEND, pose.bend, model, why)
     empty = whole.pose((0.0, 0.0, 0.0)).volumes[0]
     for time, angle in paper.BENDING:

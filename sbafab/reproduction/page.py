@@ -13,8 +13,8 @@ that it is what the command writes. But for the section "Calibrated on the 1-DoF
 model is fitted. Where a number is itself a measurement of the paper (handling time, full height),
 the row says so. The residual is prediction minus paper; in parentheses, how many of the paper's own
 errors that is, where it gives one. A reason that we have not tested says "likely". Models and their
-ranges are in [prediction.md](prediction.md), the paper's inputs (films, widths, temperatures, errors
-of cutting and pins) in [paper.md](paper.md).
+ranges are in [prediction.md](prediction.md), the paper's inputs (films, widths, temperatures,
+errors of cutting and pins) in [paper.md](paper.md).
 
 Forces of Eqs. 1-4 count their stroke from nothing, as the paper does; those of the elastic stack
 count it from the flat height, so that flat and full height mean the same for force and bending.

@@ -14,7 +14,7 @@ SCHEMA = "sbafab/reproduction@1"
 
 
 def reproduce(folder: Path) -> dict[str, list[Row]]:
-    """Writes ``reproduction.md``, ``reproduction.json`` and a chart a figure of the paper; the rows.
+    """All rows, as ``reproduction.md`` and ``reproduction.json`` with charts in a folder.
 
     Raises OutputError where the folder cannot be written.
     """

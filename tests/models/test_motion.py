@@ -11,6 +11,7 @@ from sbafab.errors import DesignError
 from sbafab.models.flow import ATMOSPHERE_KPA
 from sbafab.models.pneumatics import AIR, WATER, Line
 from sbafab.models.stack import Stack
+from sbafab.models.stacked import filled
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +56,15 @@ def test_a_pump_of_water_puts_in_what_it_delivers(three: Stack) -> None:
     pressure, _, _ = motion.pressures
     tube = Line(WATER).source_pressure(300.0, 0.0)
     assert motion.sources[0] == pytest.approx(pressure + tube)
+
+
+def test_a_prediction_of_water_is_what_the_motion_does(three: Stack) -> None:
+    time, pose = filled(three, 35.0, 10.0)
+    motion = three.motion(line=Line(WATER))
+    for _ in range(4):
+        motion.step(time / 4, flows=(35e3 / 60 / 3,) * 3)
+    assert motion.sources[0] == pytest.approx(10.0, rel=1e-3)
+    assert motion.pose.height == pytest.approx(pose.height, rel=1e-3)
 
 
 def test_a_valve_fills_to_its_pressure_and_no_further(three: Stack) -> None:

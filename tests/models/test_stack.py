@@ -10,7 +10,7 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.models.balloon import inflate
+from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import BalloonMap
 from sbafab.models.series import blocked
 from sbafab.models.stack import Plate, Stack
@@ -197,3 +197,18 @@ def test_calibration_makes_pockets_smaller_or_films_stiffer() -> None:
 def test_what_has_no_round_pockets_is_refused() -> None:
     with pytest.raises(DesignError, match="no round pockets"):
         sbafab.stack("radial-15mm")
+
+
+def test_a_lone_balloon_rises_as_the_free_one_does() -> None:
+    lone = sbafab.stack("1dof-5mm", "stack.balloons=1")
+    free = inflate(Balloon(), 5.0)
+    assert lone.pose((5,)).gaps[0, 0] == pytest.approx(free.height[0], rel=0.03)
+
+
+def test_wide_pockets_are_mapped_as_far_as_they_hold() -> None:
+    wide = sbafab.stack("1dof-10mm", "chamber.diameter=30")
+    assert 10 < wide.most_pressure < 110
+    with pytest.raises(DesignError, match="outside the balloon's map"):
+        wide.pose((110,))
+    free = inflate(wide.maps[0].balloon, 1.0)
+    assert wide.pose((1,)).gaps[0, 0] == pytest.approx(free.height[0], rel=0.03)

@@ -21,6 +21,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.records import Nest
 from sbafab.output.settings import limits, press_settings
 from sbafab.pressing.schedule import schedule
+from sbafab.pressing.together import design_runs
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.traveller.bill import cut_list
 from sbafab.reports.traveller.job import Job, Work
@@ -239,7 +240,7 @@ def test_the_underlay_is_laid_where_it_has_a_line(sheet_files: Any) -> None:
     plan = schedule(laminate, press_settings(design))
     job = Job(SHA, "sbafab 1.0.0", underlay="underlay.pdf")
     tree = lxml_html.fromstring(traveller_html(design, laminate, plan, [], job))
-    told = [re.search(r"It has the edges of ([^.]*)\.", step) for step in steps(tree)]
+    told = [re.search(r"It has the edges of ([^.:]*)[.:]", step) for step in steps(tree)]
     assert [found and found[1] for found in told] == [
         None,
         "P01 and P03",
@@ -385,3 +386,21 @@ def test_tubes_and_leaks_are_those_of_every_copy() -> None:
         assert len(first.xpath(".//input[@type='checkbox']")) == 3
     alone = traveller_html(design, laminate, plan, [], Job(SHA, "sbafab 1.0.0"))
     assert "one after the other" not in alone
+
+
+def test_the_places_of_a_full_plate_are_said_as_a_grid() -> None:
+    design, laminate = built("1dof-5mm", "stack.balloons=1", "order.copies=90")
+    plan = schedule(laminate, press_settings(design))
+    job = Job(SHA, "sbafab 1.0.0", fixture="sheets/fixture.dxf", copies=90)
+    words = words_of(lxml_html.fromstring(traveller_html(design, laminate, plan, [], job)))
+    found = re.search(
+        r"rows of (\d+): .* next ([\d.]+) mm to the right, .* next ([\d.]+) mm", words
+    )
+    assert found is not None
+    places = design_runs(design, laminate).places
+    columns, right, back = int(found[1]), float(found[2]), float(found[3])
+    meant = [((n % columns) * right, (n // columns) * back) for n in range(len(places))]
+    assert [p for pair in meant for p in pair] == pytest.approx(
+        [p for place in places for p in place], abs=2e-2
+    )
+    assert "place 2 by" not in words

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 from lxml import html as lxml_html
@@ -11,7 +12,6 @@ from lxml import html as lxml_html
 from sbafab.actuators import build, load_design
 from sbafab.output.settings import press_settings
 from sbafab.pressing.schedule import schedule
-from sbafab.reports.traveller.exploded import BOLD
 from sbafab.reports.traveller.job import Job
 from sbafab.reports.traveller.page import traveller_html
 
@@ -53,23 +53,38 @@ def test_every_press_step_has_its_pad_its_pins_and_one_time() -> None:
     assert "a release film and the press pad on top" in tack
 
 
-def test_labels_of_the_picture_do_not_run_into_each_other() -> None:
-    def wide(words: str, size: float) -> float:
-        # Digits and capitals of Helvetica, Arial and Liberation Sans are at most 0.72 em wide,
-        # and 0.58 on average in words.
-        return 0.5 * size * len(words)
+EMS = {" ": 0.35, ",": 0.38, ".": 0.38, ":": 0.4, "…": 1.0, "-": 0.42}
+"""Widths of letters in DejaVu Sans Bold, the widest font that a page falls back to."""
 
-    for picture in tree().xpath(
-        '//svg[starts-with(@id, "exploded") or contains(@aria-label, "apart")]'
-    ):
+
+def test_labels_of_the_picture_do_not_run_into_each_other() -> None:
+    pictures = tree().xpath('//svg[contains(@aria-label, "taken apart")]')
+    assert len(pictures) == 2
+    for picture in pictures:
         width = float(picture.get("viewbox", picture.get("viewBox")).split()[2])
         rows: dict[str, list[tuple[float, float]]] = {}
         for text in picture.iter("text"):
             size, x = float(text.get("font-size")), float(text.get("x"))
-            bold = BOLD if "bold" in (text.get("font-weight") or "") else 1.0
-            rows.setdefault(text.get("y"), []).append((x, x + bold * wide(text.text, size)))
-        assert rows
+            bold = text.get("font-weight") == "bold"
+            ems = sum(EMS.get(letter, 0.696) for letter in text.text)
+            wide = size * ems * (1.0 if bold else 0.88)
+            rows.setdefault(text.get("y"), []).append((x, x + wide))
         for spans in rows.values():
             spans.sort()
-            assert all(b <= c for (_, b), (c, _) in zip(spans, spans[1:], strict=False)), spans
+            assert all(b <= c for (_, b), (c, _) in pairwise(spans))
             assert spans[-1][1] <= width
+
+
+def test_every_actuator_of_a_batch_has_its_serial_number() -> None:
+    design = load_design(
+        "1dof-5mm", ('registration.method="sheet"', "stack.balloons=2", "order.copies=3")
+    )
+    laminate = build(design)
+    plan = schedule(laminate, press_settings(design))
+    job = Job(SHA, "sbafab 1", copies=3)
+    page = lxml_html.fromstring(traveller_html(design, laminate, plan, [], job))
+    rows = page.find_class("serials")[0].findall("tbody/tr")
+    assert [words_of(row.find("th")) for row in rows] == ["1", "2", "3"]
+    assert all(len(row.findall("td/input")) == 3 for row in rows)
+    leak = words_of(page.get_element_by_id("leak").getparent())
+    assert "write the result beside its serial number" in leak

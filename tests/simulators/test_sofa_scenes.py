@@ -417,3 +417,14 @@ def test_other_pockets_have_the_shell_scene_alone(tmp_path: Path) -> None:
     for element in scene.iter():
         if element.tag != "Node":
             assert set(element.attrib) <= known_fields(element.tag), element.tag
+
+
+def test_each_film_of_a_stack_stretches_as_itself() -> None:
+    """E t of TPE, of a cap of PET, and of the two bonded; 3,000 MPa, 0.012 mm."""
+    film = ("films.pet.kind=structural", "films.pet.product=P", "films.pet.thickness=0.012")
+    film += ("films.pet.density=1390", "films.pet.modulus=3000", "films.pet.poisson=0.3")
+    laminate = sbafab.build("1dof-5mm", "stack.balloons=1", *film, "layup.cap=pet")
+    shell = conforming_shell(laminate)
+    stiffness = {round(group.stiffness): group.poisson for group in shell.membranes}
+    assert set(stiffness) == {380, 36_000, 36_380}
+    assert (stiffness[380], stiffness[36_000]) == (0.2, 0.3)

@@ -58,6 +58,7 @@ def rows() -> list[list[str]]:
     return [row for row in cells if len(row) == 7 and not row[0].startswith(("figure", "---"))]
 
 
+@pytest.mark.long
 def test_the_file_is_what_the_command_writes() -> None:
     assert PATH.read_text(encoding="utf-8") == validation()
 

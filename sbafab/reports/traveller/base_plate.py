@@ -12,6 +12,9 @@ from sbafab.pressing.schedule import BASE_PLATE, LAMINATE, PAD, RELEASE, Schedul
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.job import Work
 
+MOST_LISTED = 9
+"""Places of a plate up to which each is listed."""
+
 
 class PlateHole(NamedTuple):
     """A row of the hole table, mm: from the plate's front left corner, and from the datum."""
@@ -36,6 +39,20 @@ class PlatePlace(NamedTuple):
 def places(work: Work) -> list[PlatePlace]:
     """All places of the plate but the first."""
     return [PlatePlace(n, x, y) for n, (x, y) in enumerate(work.runs.places[1:], 2)]
+
+
+def grid(work: Work) -> str:
+    """The places of a full plate in one sentence, where a list of them is too long to use."""
+    every = work.runs.places
+    if len(every) <= MOST_LISTED:
+        return ""
+    xs, ys = (sorted({place[axis] for place in every}) for axis in (0, 1))
+    right, back = ((steps[1] - steps[0] if len(steps) > 1 else 0.0) for steps in (xs, ys))
+    return (
+        f"All {len(every)} places have the same holes. They lie in rows of {len(xs)}: from one "
+        f"place to the next {right:.3f} mm to the right, from one row to the next {back:.3f} mm to "
+        f"the back; the picture of the plate numbers them, and {work.job.fixture} has every hole."
+    )
 
 
 def holes(work: Work) -> list[PlateHole]:

@@ -107,6 +107,7 @@ def context(work: Work) -> dict[str, Any]:
         "force_notes": base_plate.build_up_notes(work),
         "plate_holes": base_plate.holes(work),
         "plate_places": base_plate.places(work),
+        "plate_grid": base_plate.grid(work),
         "batch": batch_page(work),
         "step_pages": process.step_pages(work),
         "finishing": process.finishing(work),

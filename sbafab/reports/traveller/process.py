@@ -332,6 +332,8 @@ def leak_test(work: Work) -> list[Action]:
     """The paper's way to find leaks; the pressure and the time are ours."""
     names = _apart([chamber.name for chamber in work.laminate.chambers])
     lumen = ["lumen"] if work.laminate.lumen else []
+    alone = work.job.copies == 1
+    where = "at the head of this traveller" if alone else "beside its serial number"
     places = say.listed(["outline", "tab", "tube", "cap", *lumen])
     several = (
         [
@@ -355,5 +357,5 @@ def leak_test(work: Work) -> list[Action]:
         Action("All balloons open evenly. One that stays shut was over-melted."),
         Action(f"No stream of bubbles anywhere; look at {places}."),
         *several,
-        Action("Let the pressure out, dry it, write the result at the head of this traveller."),
+        Action(f"Let the pressure out, dry it, write the result {where}."),
     ]

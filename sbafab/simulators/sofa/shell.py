@@ -17,7 +17,7 @@ Reading = Literal["tip", "crowns"]
 """What the recorded nodes tell: a tip and its tilt, or crowns round a tube and their radius."""
 
 SECTORS = 12
-"""Nodes of a ring in scene A. From 8 to 12 the height grows by 4.6 %, from 12 to 16 by 2.7 %."""
+"""Nodes of a ring in scene A. From 8 to 12 the height grows by 6.6 %, from 12 to 16 by 2.2 %."""
 COARSE_SECTORS = 8
 """Nodes of a ring in the other scenes."""
 RISE = 0.15
@@ -64,7 +64,7 @@ def nearly_flat(pocket: float, neck: float) -> Meridian:
 
 
 def half_full(pocket: float, neck: float) -> Meridian:
-    """7.5 ul in a pocket of 5 mm: with 80 ul more 15 balloons hold what 5 kPa hold."""
+    """7.5 ul in a pocket of 5 mm: with 80 ul more 15 balloons come near what 5 kPa hold."""
     return holding(neck, pocket - neck, 7.5 * (pocket / 2.5) ** 3)
 
 

@@ -1,0 +1,205 @@
+"""Runs the scenes in SOFA and writes what they gave into docs/sofa.md.
+
+python docs/sofa_runs.py takes some ten minutes on a busy core; it needs runSofa and ccx on PATH.
+A further model beside them is a further entry of ``OTHERS``.
+"""
+
+from __future__ import annotations
+
+import math
+import resource
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from unittest import mock
+
+import sbafab
+from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_strokes
+from sbafab.simulators.coarse.actuator import CoarseActuator
+from sbafab.simulators.sofa import files, shell
+from sbafab.simulators.sofa.run import SofaJob, SofaRun, simulate
+
+PAGE = Path(__file__).parent / "sofa.md"
+BEGIN, END = "<!-- written by docs/sofa_runs.py -->", "<!-- to here -->"
+NAME = "3dof-15mm"
+PRESSURES = (1.0, 2.0, 5.0, 10.0)
+CHAMBERS = ("chamber1", "chamber2", "chamber3")
+FILMS = 30 * 0.038
+"""mm that mid-surfaces leave out of the height of 15 balloons."""
+INNER = MeridianSection(neck=2.5, bore=1.0)
+SECONDS = {"shell": 10.0, "frames": 4.0, "volume": 5.0, "beam": 6.0}
+CALCULIX = {1.0: 2.17, 2.0: 2.77, 5.0: 3.73, 10.0: 4.59}
+"""Stroke in mm of three balloons on one axis: sbafab simulate 1dof-5mm --set stack.balloons=3
+--symmetry quarter --pressure 10 --with calculix, some ten minutes on a core."""
+Posed = Callable[[Sequence[float]], tuple[float, float]]
+"""Pressure in kPa of each chamber to height of mid-surfaces in mm and bend in degrees."""
+
+
+def section(pressures: Sequence[float]) -> tuple[float, float]:
+    """Fifteen inner balloons, each a section through its axis that cannot ripple."""
+    return 15 * axisymmetric_strokes([pressures[0]], INNER)[0], 0.0
+
+
+def fast_stack() -> Posed | None:
+    """The stack of sbafab itself, where it is there."""
+    make = getattr(sbafab, "stack", None)
+    if make is None:
+        return None
+    stack = make(NAME)
+
+    def pose(pressures: Sequence[float]) -> tuple[float, float]:
+        found = stack.pose(tuple(pressures))
+        turn = math.radians(found.bend)
+        # Bent into an arc, the films stand on each other the less upright the higher they are.
+        upright = math.sin(turn) / turn if turn > 1e-6 else 1.0
+        return float(found.tip[2]) - FILMS * upright, float(found.bend)
+
+    return pose
+
+
+OTHERS: dict[str, Posed | None] = {"CalculiX, 15 sections": section, "fast stack": fast_stack()}
+
+
+def ran(
+    pressures: Sequence[float], scene: str = "shell", design: Sequence[str] = (NAME,), **job: object
+) -> tuple[SofaRun, float]:
+    """A run, and its steps in a second of processor time, loading left in."""
+    laminate = sbafab.build(*design)
+    names = [chamber.name for chamber in laminate.chambers]
+    told = dict(zip(names, pressures, strict=True))
+    seconds = SECONDS[scene]
+    with tempfile.TemporaryDirectory() as place:
+        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        done = simulate(laminate, Path(place), told, SofaJob(scene, seconds, **job))  # type: ignore[arg-type]
+        used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    print(scene, list(pressures), done.last.place, done.last.tilt, round(done.steps / used))
+    return done, done.steps / used
+
+
+def told(done: SofaRun) -> str:
+    return f"{done.last.place[2]:.2f}, {done.last.tilt:.1f}"
+
+
+def scenes() -> Iterator[str]:
+    """Every scene at every pressure, in all chambers, in two and in one."""
+    known = {name: pose for name, pose in OTHERS.items() if pose is not None}
+    yield row("kPa in chambers", "A shell", "B frames", "D beam", *known)
+    yield row(*["---"] * (4 + len(known)))
+    rates: dict[str, list[float]] = {"shell": [], "frames": [], "beam": []}
+    for on in (3, 2, 1):
+        for kpa in PRESSURES:
+            pressures = [kpa] * on + [0.0] * (3 - on)
+            cells = []
+            for scene, found in rates.items():
+                done, rate = ran(pressures, scene)
+                cells.append(told(done))
+                found.append(rate)
+            for pose in known.values():
+                is_even = pose is not section or on == 3
+                cells.append("{:.2f}, {:.1f}".format(*pose(pressures)) if is_even else "")
+            yield row(", ".join(f"{p:g}" for p in pressures), *cells)
+    means = [f"{sum(found) / len(found):.0f}" for found in rates.values()]
+    yield row("steps/s", *means, *[""] * len(known))
+
+
+def volumes() -> Iterator[str]:
+    """Scene C."""
+    yield row("ul above the start", "C volume", "steps/s")
+    yield row("---", "---", "---")
+    for on in (3, 2, 1):
+        asked = dict(zip(CHAMBERS, [80.0] * on + [0.0] * (3 - on), strict=True))
+        done, rate = ran([0.0] * 2 + [5.0], "volume", volumes=asked)
+        yield row(", ".join(f"{ul:g}" for ul in asked.values()), told(done), f"{rate:.0f}")
+
+
+def finer() -> Iterator[str]:
+    """Scene A with rings of more and fewer corners at 5 kPa."""
+    yield row("corners of a ring", "nodes", "height, mm", "steps/s")
+    yield row(*["---"] * 4)
+    for sectors in (8, 12, 16):
+        with _changed(lambda made, n=sectors: replace(made, sectors=n)):
+            done, rate = ran([5.0] * 3)
+        nodes = len(shell.round_actuator(sbafab.build(NAME), None, sectors).mesh.rest)
+        yield row(sectors, nodes, f"{done.last.place[2]:.2f}", f"{rate:.0f}")
+
+
+def three() -> Iterator[str]:
+    """Three balloons on one axis against the ripples of CalculiX's wedges."""
+    yield row("kPa", "A shell, mm", "CalculiX, quarter, mm", "", "steps/s")
+    yield row(*["---"] * 5)
+    for kpa in PRESSURES:
+        done, rate = ran([kpa], design=("1dof-5mm", "stack.balloons=3"))
+        high = done.last.place[2]
+        off = f"{100 * (high / CALCULIX[kpa] - 1):+.0f} %"
+        yield row(f"{kpa:g}", f"{high:.2f}", f"{CALCULIX[kpa]:.2f}", off, f"{rate:.0f}")
+
+
+def bending() -> Iterator[str]:
+    """What the bend depends on, at 5 kPa in one chamber and in two."""
+    yield row("", "5 kPa in one chamber", "in two")
+    yield row("---", "---", "---")
+    cases: dict[str, Callable[[CoarseActuator], CoarseActuator]] = {
+        "as drawn": lambda made: made,
+        "pockets 0.3 mm smaller in radius": lambda made: _stack(made, pockets=(2.2,) * 15),
+        "neck discs of radius 1.6 for 1.25": lambda made: _stack(made, neck=1.6),
+        "films that bend ten times as hard": lambda made: _Stiff.of(made, 10.0),
+        "a tenth as hard": lambda made: _Stiff.of(made, 0.1),
+    }
+    for name, change in cases.items():
+        cells = []
+        for pressures in ([5.0, 0.0, 0.0], [5.0, 5.0, 0.0]):
+            with _changed(change):
+                done, _ = ran(pressures)
+            cells.append(f"{done.last.tilt:.1f}")
+        yield row(name, *cells)
+
+
+class _Stiff(CoarseActuator):
+    """An actuator whose films bend harder, and stretch as before."""
+
+    factor = 1.0
+
+    @classmethod
+    def of(cls, made: CoarseActuator, factor: float) -> CoarseActuator:
+        harder = cls(made.stack, made.pressures, made.sectors, made.start, made.is_fair)
+        object.__setattr__(harder, "factor", factor)
+        return harder
+
+    def bending(self, films: int) -> float:
+        return self.factor * super().bending(films)
+
+
+def _stack(made: CoarseActuator, **other: object) -> CoarseActuator:
+    return replace(made, stack=replace(made.stack, **other))  # type: ignore[arg-type]
+
+
+def _changed(change: Callable[[CoarseActuator], CoarseActuator]) -> mock._patch[object]:
+    make = shell.round_actuator
+    return mock.patch.object(files, "round_actuator", lambda *given: change(make(*given)))
+
+
+def row(*cells: object) -> str:
+    return "| " + " | ".join(map(str, cells)) + " |"
+
+
+PARTS: dict[str, Callable[[], Iterator[str]]] = {
+    "Height of the mid-surfaces in mm and tilt in degrees, 15 balloons of 5 mm": scenes,
+    "The same, driven by volume": volumes,
+    "Finer rings, 5 kPa in all chambers": finer,
+    "Three balloons of 5 mm on one axis": three,
+    "What the tilt depends on": bending,
+}
+
+
+def main() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    head, _, rest = text.partition(BEGIN)
+    _, _, tail = rest.partition(END)
+    parts = [f"**{title}**\n\n" + "\n".join(rows()) for title, rows in PARTS.items()]
+    body = "\n\n".join([BEGIN, *parts, END])
+    PAGE.write_text(head + body + tail, encoding="utf-8", newline="\n")
+
+
+if __name__ == "__main__":
+    main()

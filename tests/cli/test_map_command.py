@@ -1,0 +1,143 @@
+"""``sbafab map`` and ``sbafab reproduce``: files for other programs, and the paper's figures."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import sbafab
+from sbafab.cli import main
+from sbafab.models.balloon_map import BalloonMap
+
+
+def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    out, err = capsys.readouterr()
+    return int(ended.value.code or 0), out, err
+
+
+@pytest.fixture(scope="module")
+def balloon() -> BalloonMap:
+    return sbafab.stack("1dof-5mm").maps[0]
+
+
+def test_csv_holds_force_and_volume(
+    balloon: BalloonMap, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, _ = run(["map", "1dof-5mm", "--points", "4"], capsys)
+    assert code == 0
+    rows = list(csv.DictReader(out.splitlines()))
+    assert len(rows) == 16
+    for row in rows:
+        p, h = float(row["pressure_kpa"]), float(row["height_mm"])
+        force = float(balloon.force(p, h))
+        assert float(row["force_mn"]) == pytest.approx(force, rel=1e-4, abs=1e-4)
+        assert float(row["volume_ul"]) == pytest.approx(float(balloon.volume(p, h)), rel=1e-4)
+
+
+def test_json_says_where_each_balloon_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "map.json"
+    code, out, _ = run(["map", "3dof-15mm", "--points", "3", "--to", str(file)], capsys)
+    assert (code, out) == (0, f"written to {file}\n")
+    found = json.loads(file.read_text())
+    assert found["schema"] == "sbafab/balloon-map@1"
+    assert found["levels"] == [1] * 15
+    # Paper, Sec. 2: the axes stand 4.25 from the middle.
+    assert found["chamber_axes_mm"][0] == pytest.approx([4.25, 0.0])
+    (one,) = found["balloons"]
+    assert (one["pocket_radius_mm"], one["modulus_kpa"]) == (2.5, 10_000)
+    assert len(one["force"]) == len(one["pressure"]) == 3
+
+
+def test_python_file_needs_nothing_and_says_the_same(
+    balloon: BalloonMap, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "balloons.py"
+    assert run(["map", "1dof-5mm", "--to", str(file)], capsys)[0] == 0
+    program = (
+        "import balloons as b\n"
+        "print(b.force(7.0, 0.6), b.volume(7.0, 0.6), b.area(7.0, 0.6), b.stiffness(7.0, 0.6))\n"
+        "print((b.volume(7.0, 0.601) - b.volume(7.0, 0.599)) / 0.002)"
+    )
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-I",
+            "-c",
+            f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n{program}",
+        ],
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    force, volume, area, _, slope = map(float, done.stdout.split())
+    assert force == pytest.approx(float(balloon.force(7.0, 0.6)), rel=1e-6)
+    assert volume == pytest.approx(float(balloon.volume(7.0, 0.6)), rel=1e-6)
+    assert area == pytest.approx(slope, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["radial-15mm"], "no round pockets"),
+        (["1dof-5mm", "--to", "map.txt"], "must end with .csv, .json, .py"),
+        (["1dof-5mm", "--pressure", "400"], "give 0 to 367 kPa"),
+        (["1dof-5mm", "--pressure", "0"], "give more than 0 kPa"),
+        (["1dof-5mm", "--pocket-loss", "2"], "no wider than the neck"),
+        (["1dof-5mm", "--modulus", "0"], "from 0.1 to 10000 MPa"),
+    ],
+)
+def test_what_cannot_be_mapped_is_one_sentence(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, err = run(["map", *arguments], capsys)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.long
+def test_reproduce_writes_every_figure_with_the_papers_error_bars(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, _ = run(["reproduce", "-o", str(tmp_path), "--json"], capsys)
+    assert code == 0
+    folder = tmp_path / "reproduction"
+    rows = json.loads(out)["rows"]
+    assert rows == json.loads((folder / "reproduction.json").read_text())["rows"]
+    roles = {row["figure"].split("(")[-1] for row in rows if row["section"].startswith("Calib")}
+    assert roles == {"fitted)", "held out)"}
+    assert len(list(folder.glob("figure-*.svg"))) == 7
+    assert "1.48 +- 0.04 N" in (folder / "reproduction.md").read_text(encoding="utf-8")
+    assert "paper: 3-DoF, 100 kPa" in (folder / "figure-8a-force-3dof.svg").read_text()
+
+
+@pytest.mark.long
+def test_the_calibration_is_the_best_of_its_neighbours() -> None:
+    from sbafab.models import paper
+    from sbafab.models.figures import Factors
+    from sbafab.models.series import blocked
+    from sbafab.models.stack import stack
+    from sbafab.reproduction.mechanics import FITTED
+
+    design = sbafab.load("1dof-5mm")
+    strokes = [share * (7.0 - 6 * 0.124333 * FITTED.press_factor) for share in paper.HEIGHTS]
+    measured = [value.value for value in paper.FORCE_1DOF]
+
+    def missed(loss: float, modulus: float) -> float:
+        factors = Factors(FITTED.press_factor, 1.0, loss, modulus)
+        found = blocked(stack(design, factors=factors), 100.0, strokes)
+        return float(((found / measured - 1) ** 2).sum())
+
+    assert FITTED.modulus_mpa is not None
+    best = missed(FITTED.pocket_loss, FITTED.modulus_mpa)
+    for loss, modulus in ((-0.05, 0), (0.05, 0), (0, -10), (0, 10)):
+        assert missed(FITTED.pocket_loss + loss, FITTED.modulus_mpa + modulus) >= best
