@@ -47,7 +47,7 @@ export class Solid {
     studio.on("opened", () => { this.stage.touched = false; this.mark = null; });
     studio.on("theme", () => { this.materials(); this.stage.repaint(); this.update(); });
   }
-  show() { this.stage?.resize(); }
+  show() { this.stage?.resize(); if (this.behind) this.update(); }
   materials() {
     const make = (name) => {
       const material = new THREE.MeshLambertMaterial({ color: css(name), side: THREE.DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
@@ -85,6 +85,9 @@ export class Solid {
   }
   update() {
     if (!this.stage) return;
+    // A view that is not shown follows when it is.
+    this.behind = this.element.hidden;
+    if (this.behind) return;
     const { laminate } = this.studio;
     this.group.clear();
     if (!laminate) { this.caps.clear(); this.stage.draw(); return; }
@@ -189,6 +192,7 @@ export class Solid {
   goto(layers, x, y) {
     const layer = this.studio.layer(layers[0]);
     if (!layer || !this.stage) return;
+    this.gap ??= 0;
     this.mark = [x, y, layer];
     this.plane();
     const way = this.stage.camera.position.clone().sub(this.stage.controls.target);
