@@ -9,13 +9,21 @@ import argparse
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from benchmarks import checking, copies, outlines, scaling
+from benchmarks import checking, copies, decks, outlines, scaling
 from benchmarks import stacks as equilibria
-from benchmarks.timing import HEAD, ROOT, by_turns, keep_to_one_core, row
+from benchmarks.timing import (
+    HEAD,
+    ROOT,
+    by_turns,
+    exponent,
+    keep_to_one_core,
+    row,
+    sizes_by_turns,
+)
 
 RIVALS = {"foldable": "foldable-robotics==0.0.37", "build123d": "build123d"}
 MODULES = {"foldable": "foldable_robotics", "build123d": "build123d"}
@@ -28,7 +36,9 @@ def main() -> None:
         install(arguments.rivals)
     keep_to_one_core()
     plates(arguments.rivals, arguments.rounds)
+    rule_decks(arguments.rounds)
     stacks(arguments.rounds)
+    lobes(arguments.rounds)
     drawn_outlines(arguments.rounds)
     many_copies(arguments.rounds)
     poses(arguments.rounds)
@@ -78,7 +88,8 @@ def plates(rivals: Path, rounds: int) -> None:
                 print(f"  {name}: does not count, {wrong}")
                 continue
             arcs = "true arcs" if checking.has_true_arcs(root / name) else "chords"
-            print(row(name, times[name], arcs))
+            ratio = min(times[name]) / min(times["sbafab"])
+            print(row(name, times[name], f"{arcs}, {ratio:.1f} times sbafab's"))
 
 
 def importable(python: Path, module: str) -> bool:
@@ -88,51 +99,52 @@ def importable(python: Path, module: str) -> bool:
     return subprocess.run([python, "-c", find], check=False).returncode == 0
 
 
+def rule_decks(rounds: int) -> None:
+    """One design after the other, all different, on one core."""
+    print("\nA design built, and all rules")
+    print(HEAD)
+    for template in decks.VARIED:
+        decks.checked(template, -1)
+        taken = [decks.checked(template, turn) for turn in range(3 * rounds)]
+        print(row(template, taken, f"{len(taken) / sum(taken):.1f} designs a second"))
+
+
 def stacks(rounds: int) -> None:
     """Equal profiles are computed, checked and written once."""
-    print("\nRules and cut files, copying files aside")
-    times: dict[int, list[float]] = {15: [], 150: []}
-    for turn in range(rounds + 1):
-        for balloons, taken in times.items():
-            measured = scaling.rules_and_cut_files(balloons)
-            if turn:
-                taken.append(measured)
-    print(HEAD)
-    for balloons, taken in times.items():
-        print(row(f"{balloons} balloons", taken))
-    print(f"  ratio of the least: {min(times[150]) / min(times[15]):.2f}")
+    print("\nRules and cut files of stacks, copying files aside")
+    sizes = (1, 5, 15, 50, 150, 400)
+    _told("balloons", sizes_by_turns(sizes, rounds, scaling.rules_and_cut_files))
+
+
+def lobes(rounds: int) -> None:
+    """Bores, tabs and widths grow with the chambers round the lumen."""
+    print("\nRules for chambers round a lumen")
+
+    def checked(count: int, turn: int) -> float:
+        return decks.checked("3dof-15mm", turn, f"chamber.count={count}", "chamber.axis_radius=9")
+
+    _told("chambers", sizes_by_turns((2, 3, 4, 6, 8), rounds, checked))
 
 
 def drawn_outlines(rounds: int) -> None:
     """Rules on outlines of many edges grow with these, not their pairs."""
     print("\nA drawn outline: built, and all rules")
-    times: dict[int, list[float]] = {60: [], 120: [], 240: [], 480: []}
-    for turn in range(rounds + 1):
-        for edges, taken in times.items():
-            measured = sum(outlines.built_and_checked(edges))
-            if turn:
-                taken.append(measured)
-    print(HEAD)
-    for edges, taken in times.items():
-        print(row(f"{edges} edges", taken))
-    grown = copies.exponent({edges: min(taken) for edges, taken in times.items()})
-    print(f"  time grows with the edges to the power of {grown:.2f}")
+    _told("edges", sizes_by_turns((60, 120, 300, 480), rounds, outlines.built_and_checked))
 
 
 def many_copies(rounds: int) -> None:
     """Nesting, cutting order, writing and reading back grow with the parts, not their pairs."""
     print(f"\nCut files and {copies.SHEET} mm film sheets of many {copies.DESIGN}")
-    times: dict[int, list[float]] = {1: [], 10: [], 50: [], 100: []}
-    for turn in range(rounds + 1):
-        for number, taken in times.items():
-            measured = copies.nested_and_cut(number)
-            if turn:
-                taken.append(measured)
+    _told("copies", sizes_by_turns((1, 10, 50, 100, 200), rounds, copies.nested_and_cut), 10)
+
+
+def _told(what: str, times: Mapping[int, Sequence[float]], least: int = 1) -> None:
+    """Rows of a work of several sizes, and the power of the size with which its time grows."""
     print(HEAD)
-    for number, taken in times.items():
-        print(row(f"{number} copies", taken))
-    many = {number: min(taken) for number, taken in times.items() if number >= 10}
-    print(f"  time grows with the copies to the power of {copies.exponent(many):.2f}")
+    for size, taken in times.items():
+        print(row(f"{size} {what}", taken))
+    since = f" from {least} on" if least > min(times) else ""
+    print(f"  time grows with the {what}{since} to the power of {exponent(times, least):.2f}")
 
 
 def poses(rounds: int) -> None:
@@ -149,11 +161,12 @@ def poses(rounds: int) -> None:
 def commands(rounds: int) -> None:
     """The command line, imports included."""
     print("\nCommands")
-    sbafab = [sys.executable, "-c", "from sbafab.cli import main; main()"]
+    sbafab = [sys.executable, "-c", "from sbafab.entry import main; main()"]
     with folders() as root:
         runs = {
             "python -c pass": [sys.executable, "-c", "pass"],
             "sbafab --help": [*sbafab, "--help"],
+            "sbafab check 1dof-5mm": [*sbafab, "check", "1dof-5mm"],
             "sbafab generate 3dof-15mm": [*sbafab, "generate", "3dof-15mm", "-o", root],
         }
         times = by_turns(runs, rounds)

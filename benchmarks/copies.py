@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import math
 import tempfile
-import time
 from pathlib import Path
+
+from benchmarks.timing import own_seconds
 
 DESIGN = "3dof-15mm"
 SHEET = 900
 """mm along both sides of every film sheet."""
 
 
-def nested_and_cut(copies: int) -> float:
+def nested_and_cut(copies: int, turn: int) -> float:
     """Seconds from the design to its findings, layer files and film sheets, all read back."""
     from sbafab.actuators import load_design
     from sbafab.output.run import generate
@@ -20,15 +20,7 @@ def nested_and_cut(copies: int) -> float:
     sheets = [
         f"sheets.{film}.{side}={SHEET}" for film in ("tpe", "ptfe") for side in ("width", "length")
     ]
-    design = load_design(DESIGN, [f"order.copies={copies}", *sheets])
+    another = f"chamber.diameter={5 + turn / 1000}"
+    design = load_design(DESIGN, [f"order.copies={copies}", another, *sheets])
     with tempfile.TemporaryDirectory() as name:
-        began = time.perf_counter()
-        generate(design, Path(name), ("cut",))
-        return time.perf_counter() - began
-
-
-def exponent(times: dict[int, float]) -> float:
-    """The power of the number of copies with which time grows, by least squares of logarithms."""
-    points = [(math.log(copies), math.log(taken)) for copies, taken in times.items()]
-    x, y = (sum(values) / len(points) for values in zip(*points, strict=True))
-    return sum((a - x) * (b - y) for a, b in points) / sum((a - x) ** 2 for a, _ in points)
+        return own_seconds(lambda: generate(design, Path(name), ("cut",)))

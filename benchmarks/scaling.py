@@ -11,31 +11,32 @@ from pathlib import Path
 DESIGN = "3dof-15mm"
 
 
-def rules_and_cut_files(balloons: int) -> float:
+def rules_and_cut_files(balloons: int, turn: int) -> float:
     """Seconds from the design to its findings and cut files, without the copies' share."""
     from sbafab.actuators import build, load_design
     from sbafab.cutting.files import compensated_paths, write_layer_files
     from sbafab.output.settings import cut_settings, limits
     from sbafab.rules.deck import run_deck
 
-    design = load_design(DESIGN, [f"stack.balloons={balloons}"])
+    another = f"chamber.diameter={5 + turn / 1000}"
+    design = load_design(DESIGN, [f"stack.balloons={balloons}", another])
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        began = time.perf_counter()
+        began = time.process_time()
         laminate = build(design)
         run_deck(laminate, limits(design))
         settings = cut_settings(design, ())
         paths = compensated_paths(laminate, settings)
         files = write_layer_files(laminate, paths, folder, settings)
-        taken = time.perf_counter() - began
+        taken = time.process_time() - began
         copies = len(files) - len(laminate.patterns)
         return taken - copies * _copy_time(folder / files[0].path)
 
 
 def _copy_time(path: Path, times: int = 20) -> float:
     """Seconds to copy a cut file and to hash the copy."""
-    began = time.perf_counter()
+    began = time.process_time()
     for _ in range(times):
         copy = shutil.copyfile(path, path.with_suffix(".copy"))
         hashlib.sha256(copy.read_bytes()).hexdigest()
-    return (time.perf_counter() - began) / times
+    return (time.process_time() - began) / times

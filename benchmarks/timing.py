@@ -1,12 +1,17 @@
-"""Whole-process times on one core, programs run by turns."""
+"""Processor times on one core, programs run by turns.
+
+Processor time tells the same where other work waits for the core; on an idle machine it is the
+wall time of these programs, which neither wait nor share their work among threads.
+"""
 
 from __future__ import annotations
 
+import math
 import os
 import statistics
 import subprocess
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -21,10 +26,19 @@ def keep_to_one_core() -> None:
 
 
 def seconds(command: Sequence[str | Path]) -> float:
-    """Wall time of one run. Raises CalledProcessError with the program's output."""
-    began = time.perf_counter()
+    """Processor time of one run. Raises CalledProcessError with the program's output."""
+    began = os.times()
     subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
-    return time.perf_counter() - began
+    ended = os.times()
+    spent = ended.children_user - began.children_user, ended.children_system - began.children_system
+    return sum(spent)
+
+
+def own_seconds(work: Callable[[], object]) -> float:
+    """Processor time of something that this process does."""
+    began = time.process_time()
+    work()
+    return time.process_time() - began
 
 
 def by_turns(commands: Mapping[str, Sequence[str | Path]], rounds: int) -> dict[str, list[float]]:
@@ -38,8 +52,33 @@ def by_turns(commands: Mapping[str, Sequence[str | Path]], rounds: int) -> dict[
     return times
 
 
+def sizes_by_turns(
+    sizes: Iterable[int], rounds: int, work: Callable[[int, int], float]
+) -> dict[int, list[float]]:
+    """Times of a work of several sizes; it gets size and round, so that no round is as another.
+
+    A first, uncounted round fetches what is imported when it is used.
+    """
+    times: dict[int, list[float]] = {size: [] for size in sizes}
+    work(min(times), rounds)
+    for turn in range(rounds):
+        for size, taken in times.items():
+            taken.append(work(size, turn))
+    return times
+
+
+def exponent(times: Mapping[int, Sequence[float]], least: int = 1) -> float:
+    """The power of the size with which the least time grows, by least squares of logarithms.
+
+    Sizes below the ``least`` are left out: what is done once counts most there.
+    """
+    points = [(math.log(n), math.log(min(taken))) for n, taken in times.items() if n >= least]
+    x, y = (sum(values) / len(points) for values in zip(*points, strict=True))
+    return sum((a - x) * (b - y) for a, b in points) / sum((a - x) ** 2 for a, _ in points)
+
+
 def row(name: str, times: Sequence[float], remark: str = "") -> str:
     return f"  {name:<36}{min(times):8.3f}{statistics.median(times):8.3f}  {remark}".rstrip()
 
 
-HEAD = f"  {'seconds':<36}{'least':>8}{'median':>8}"
+HEAD = f"  {'seconds of processor time':<36}{'least':>8}{'median':>8}"

@@ -254,20 +254,22 @@ def predict(
     pressures_kpa: Sequence[float] = (10.0, 100.0),
     flow_ml_min: float = 35.0,
     volumes_ul: Sequence[float] = (),
+    quick: bool = False,
     **asked: Any,
 ) -> Prediction:
     """What a design will do; each figure names its model and its trust.
 
-    ``asked`` holds fields of ``models.figures.Factors``, which are ``press_factor``,
-    ``contact_factor``, ``pocket_loss`` mm and ``modulus_mpa``, beside tables of the design. Raises
-    DesignError for what is out of every model's range.
+    ``quick`` leaves out the figures of the elastic stack, which take seconds. ``asked`` holds
+    fields of ``models.figures.Factors``, which are ``press_factor``, ``contact_factor``,
+    ``pocket_loss`` mm and ``modulus_mpa``, beside tables of the design. Raises DesignError for what
+    is out of every model's range.
     """
     from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict as model_predict
 
     factors, tables = _parted(asked, Factors)
     wish = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), Factors(**factors))
-    return model_predict(load(source, *changes, **tables), wish)
+    return model_predict(load(source, *changes, **tables), wish, quick=quick)
 
 
 def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **asked: Any) -> Stack:

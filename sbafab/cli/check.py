@@ -79,9 +79,10 @@ def check(
     watch: bool,
     as_json: bool,
 ) -> None:
-    """Run the rule deck on a design, or on the cut files of a folder; write nothing.
+    """Run the rules on a design or on a written folder.
 
-    FOLDER is one that sbafab generate has written: its files are read back as they lie on disk.
+    Nothing is written. FOLDER is one that sbafab generate has written: its files are read back as
+    they lie on disk.
     """
     asked = CheckRequest(source, assignments, waivers, target_yield, as_json, verbose)
     if watch:

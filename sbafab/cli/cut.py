@@ -18,5 +18,5 @@ if TYPE_CHECKING:
 @dxf_options
 @sheet_options
 def cut(request: Request, curves: Curves) -> None:
-    """Write the cut files: one DXF a layer, and the layers nested on film sheets."""
+    """Write the cut files: a DXF a layer, and film sheets."""
     run_parts(request, ("cut",), curves)

@@ -12,7 +12,7 @@ from sbafab.cli.options import json_option
 @click.argument("rule", required=False, shell_complete=rules)
 @json_option
 def explain(rule: str | None, as_json: bool) -> None:
-    """Say what a rule asks, why, which keys set its limit, and what to change.
+    """Say what a rule asks, why, and what to change.
 
     Without RULE: a line for every rule and check.
     """

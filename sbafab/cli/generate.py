@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @sheet_options
 @click.option("--decks", is_flag=True, help="Write what each simulator reads, too.")
 def generate(request: Request, curves: Curves, decks: bool) -> None:
-    """Write everything: cut files, film sheets, press schedule, traveller, meshes, pictures.
+    """Write everything: cut files, schedule, traveller, meshes.
 
     With --decks also calculix/, sofa/ and mujoco/, as `sbafab simulate --export` writes them.
     An assembly gets a folder for each of its designs, and sheets, traveller and solid of the whole.

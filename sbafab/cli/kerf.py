@@ -41,7 +41,10 @@ if TYPE_CHECKING:
 def kerf(
     measurements: Path, material: str, resolution: float, split_xy: bool | None, as_json: bool
 ) -> None:
-    """Compute the kerf from a filled coupon.csv (see: sbafab new coupon)."""
+    """Compute the kerf from a filled coupon.csv.
+
+    `sbafab new coupon` writes the piece to cut and the table to fill in.
+    """
     from sbafab.cli.printing import print_json
     from sbafab.cutting.calibration import calibrated
     from sbafab.cutting.measured_table import read_measurements

@@ -85,7 +85,7 @@ def mesh(  # noqa: PLR0913, PLR0917 - one an option
     flat: bool,
     formats: tuple[str, ...],
 ) -> None:
-    """Write the meshes: solid and cavities, and conforming volume and shell meshes.
+    """Write meshes: solid, cavities, volume and shell.
 
     The conforming ones take the extra "mesh": pip install "sbafab[mesh]".
     """

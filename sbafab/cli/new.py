@@ -17,7 +17,9 @@ KIT = "kit"
 @click.argument("template", shell_complete=templates)
 @click.argument("file", type=click.Path(path_type=Path), required=False)
 def new(template: str, file: Path | None) -> None:
-    """Write a commented design file to start from (FILE: by default TEMPLATE.toml here).
+    """Write a commented design file to start from.
+
+    FILE is by default TEMPLATE.toml, here.
 
     TEMPLATE "coupon" writes the kerf's calibration piece, its picture and its table to fill in
     (FILE is then a folder: by default coupon). TEMPLATE "kit" writes the paper's films, tubes,

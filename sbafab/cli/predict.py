@@ -13,6 +13,7 @@ from sbafab.cli.working import RULE_FAILED
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from sbafab.assemblies.records import Assembly
     from sbafab.models.figures import Prediction
 
 
@@ -73,19 +74,33 @@ if TYPE_CHECKING:
     metavar="E",
     help="Young's modulus of the film, MPa or with a unit, if measured.  [default: the film's]",
 )
+@click.option(
+    "--load",
+    "load_g",
+    type=click.FloatRange(min=0, max=1000),
+    callback=finite,
+    default=1.2,
+    show_default=True,
+    metavar="G",
+    help="Assemblies: mass at the tips, g; the paper's marble by default.",
+)
 def predict(
     request: Request,
     pressures: tuple[float, ...],
     flow: float,
     volumes: tuple[float, ...],
+    load_g: float,
     **factors: Any,
 ) -> None:
-    """Predict sizes, stroke, force, time, bending: predict.json and plots.
+    """Predict sizes, stroke, force, time and bending.
 
-    Every figure names its model and how far that is trusted. A design that fails a rule is
-    predicted on the screen only (exit code 1).
+    Writes predict.json and plots. Every figure names its model and how far that is trusted. A
+    design that fails a rule is predicted on the screen only (exit code 1). Of an assembly: reach,
+    load, grip in its lumen, and whether inflated parts meet, at the first pressure given (default
+    10 kPa), on the screen.
     """
-    from sbafab.actuators import load_design
+    from sbafab.assemblies.reading import load
+    from sbafab.assemblies.records import Assembly
     from sbafab.cli.printing import print_json, shown_progress
     from sbafab.errors import OutputError
     from sbafab.models.figures import Asked, Factors
@@ -95,7 +110,10 @@ def predict(
     from sbafab.output.predicting import prediction_json, with_prediction
     from sbafab.output.run import Extras, generate
 
-    design = load_design(request.designs[0], request.assignments, request.waivers)
+    design = load(request.designs[0], request.assignments, request.waivers)
+    if isinstance(design, Assembly):
+        _predict_assembly(design, request, pressures[0] if pressures else 10.0, load_g)
+        return
     wish = Asked(pressures or Asked.pressures_kpa, flow, volumes, Factors(**factors))
     found = predicted(design, wish)
     with shown_progress(request.as_json) as tell:
@@ -121,6 +139,23 @@ def predict(
             "was written; change the design or waive the rule by name",
             err=True,
         )
+        click.get_current_context().exit(RULE_FAILED)
+
+
+def _predict_assembly(
+    assembly: Assembly, request: Request, pressure_kpa: float, load_g: float
+) -> None:
+    from sbafab.assemblies.build import assemble
+    from sbafab.cli.printing import print_json
+    from sbafab.cli.printing_assembly import print_assembly_prediction
+    from sbafab.reports.assembly_prediction import as_json, predict_assembly
+
+    found = predict_assembly(assemble(assembly), pressure_kpa, load_g)
+    if request.as_json:
+        print_json(as_json(found))
+    else:
+        print_assembly_prediction(found)
+    if found.touches:
         click.get_current_context().exit(RULE_FAILED)
 
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from sbafab.output.run import Run
+    from sbafab.reports.assembly_prediction import AssemblyPrediction
 
 
 def print_assembly(run: Run) -> None:
@@ -36,3 +37,42 @@ def _made(run: Run) -> Table:
     made.add_row("parts", Text(", ".join(parts)))
     add_batch(made, run)
     return made
+
+
+def print_assembly_prediction(found: AssemblyPrediction) -> None:
+    """What the parts of an assembly do inflated, and what they then touch."""
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("part", no_wrap=True)
+    table.add_column("figure")
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    table.add_column("model")
+    table.add_column("paper")
+    part = ""
+    for figure in found.figures:
+        table.add_row(
+            figure.part if figure.part != part else "",
+            Text(figure.name),
+            f"{figure.value:.4g}",
+            figure.unit,
+            Text(figure.model),
+            Text(figure.paper),
+        )
+        part = figure.part
+    out = console()
+    out.print(Text(f"{found.name} at {found.pressure_kpa:g} kPa", style="bold"))
+    out.print(table)
+    for touch in found.touches:
+        out.print(
+            Text(
+                f"{touch.part} and {touch.other} meet when inflated: they share "
+                f"{touch.volume:.2f} mm3; move them apart, or give less pressure"
+            )
+        )
+    if not found.touches:
+        out.print(Text("no inflated part meets another one"))
+    for one in found.left_out:
+        out.print(Text(f"left out: {one}"))

@@ -90,7 +90,7 @@ def _measured(command: Wrapped) -> Wrapped:
 def record(
     design: str | None, lab: Path, assignments: tuple[str, ...], as_json: bool, **said: Any
 ) -> None:
-    """Record what came out of the press and the test bench; see what all records say.
+    """Record what came out, and see what all records say.
 
     DESIGN is a template's name, a TOML file or the folder that was built from, an assembly's
     likewise. Records are only added: --correct adds one that names the record it corrects. Nothing

@@ -11,7 +11,7 @@ FORMATS = ("design", "checks", "manifest", "assembly", "error")
 @click.command()
 @click.argument("name", type=click.Choice(FORMATS), default="design", required=False)
 def schema(name: str) -> None:
-    """Print a JSON schema, by default that of design and assembly files.
+    """Print a JSON schema, by default that of design files.
 
     Editors complete and check design files from it; the other formats are what programs read.
     """

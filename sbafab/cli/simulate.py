@@ -81,7 +81,7 @@ MOST_MINUTES = 10_000
     help="sofa, scene volume: what a chamber is given above its start. Repeatable.",
 )
 def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> None:
-    """Inflate a design in a simulator that is installed, and read back what it says.
+    """Inflate a design in a simulator that is installed.
 
     Into OUT/<name>/calculix/ come stroke, air and wall stress against pressure as table and plot,
     the deformed shape as VTU and picture; into OUT/<name>/sofa/ or mujoco/ what it has read.

@@ -43,9 +43,12 @@ NOMINAL = Model(
 
 
 def predict(
-    design: Design, asked: Asked | None = None, laminate: Laminate | None = None
+    design: Design,
+    asked: Asked | None = None,
+    laminate: Laminate | None = None,
+    quick: bool = False,
 ) -> Prediction:
-    """Figures and curves of a design of any family.
+    """Figures and curves of a design of any family; ``quick`` leaves out the elastic stack's.
 
     Raises DesignError where the design cannot be built, or for pressures, a flow or volumes that
     are out of range.
@@ -57,7 +60,7 @@ def predict(
         raise DesignError(f"design {design.name} cannot be resolved: {error}") from None
     one = actuator(design, flat, wish.calibration)
     axial.check_asked(one, wish)
-    together = stacked.stacked(one, wish)
+    together = None if quick else stacked.stacked(one, wish)
     found = list(_all(one, wish))
     if isinstance(together, LeftOut):
         found.append(together)

@@ -73,6 +73,7 @@ def app(studio: Studio) -> Starlette:
         Route("/api/watch/{name}", watch),
         Route("/api/live", live, methods=["POST"]),
         Route("/api/predict", predict, methods=["POST"]),
+        Route("/api/elastic", elastic, methods=["POST"]),
         Route("/api/motion", motion, methods=["POST"]),
         Route("/api/generate", generate, methods=["POST"]),
         Route("/made/{key}.zip", made_zip),
@@ -160,6 +161,10 @@ async def live(request: Request) -> Response:
 
 async def predict(request: Request) -> Response:
     return await _worked(request, _studio(request).side, "predict")
+
+
+async def elastic(request: Request) -> Response:
+    return await _worked(request, _studio(request).mover, "elastic")
 
 
 async def motion(request: Request) -> Response:

@@ -66,7 +66,14 @@ def _assembly_findings(assembly: Any) -> Iterator[Answer]:
 
 
 def predict(job: Job, beat: Beat) -> Iterator[Answer]:
-    """Figures and curves by closed formulas."""
+    """Figures and curves by closed formulas, at once."""
+    design = _loaded(_text(job), job)
+    beat()
+    yield {"kind": "prediction", **api.predict(design, quick=True).as_dict()}
+
+
+def elastic(job: Job, beat: Beat) -> Iterator[Answer]:
+    """All figures, with those of the elastic stack, which take seconds."""
     design = _loaded(_text(job), job)
     beat()
     yield {"kind": "prediction", **api.predict(design).as_dict()}
@@ -155,6 +162,7 @@ def _stack(text: str, folder: str, path: str) -> Stack:
 JOBS: dict[str, Callable[[Job, Beat], Iterator[Answer]]] = {
     "live": live,
     "predict": predict,
+    "elastic": elastic,
     "generate": generate,
     "motion": motion,
 }

@@ -174,3 +174,14 @@ def test_watch_is_for_people(capsys: pytest.CaptureFixture[str]) -> None:
     code, _, err = run(["check", "1dof-5mm", "--watch", "--json"], capsys)
     assert code == 2
     assert "--watch is for people" in err
+
+
+def test_help_cuts_no_command_short(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    _, out, _ = run(["--help"], capsys)
+    ours = ("new", "generate", "check", "explain", "cut", "mesh", "kerf", "predict", "schema")
+    lines = [line for line in out.splitlines() if line.split()[:1] and line.split()[0] in ours]
+    assert len(lines) >= len(ours)
+    assert [line for line in lines if line.endswith("...")] == []

@@ -72,11 +72,8 @@ def test_it_finds_what_trying_every_design_finds(
 
 
 def test_the_same_search_finds_the_same() -> None:
-    asked: dict[str, Any] = {
-        "most": {"outline_diameter": 9},
-        "best": "chamber.diameter",
-        "tries": 8,
-    }
+    free = (Free("chamber.diameter", 2.3, 3.0, 0.1),)
+    asked: dict[str, Any] = {"most": {"width": 14}, "best": "chamber.diameter", "free": free}
     first, second = (sbafab.find("1dof-5mm", **asked) for _ in range(2))
     assert first.best == second.best
     # The smallest pocket that a bore of 1.04 and a bond round it leave.

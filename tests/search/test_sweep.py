@@ -45,8 +45,7 @@ def _here(
 def found(tmp_path_factory: pytest.TempPathFactory) -> Sweep:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "run_jobs", _here)
-        made = _swept(tmp_path_factory.mktemp("sweep"))
-    return made
+        return _swept(tmp_path_factory.mktemp("sweep"))
 
 
 def test_each_row_says_what_check_and_predict_say(found: Sweep) -> None:

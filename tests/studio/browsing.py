@@ -95,7 +95,7 @@ class Watched:
         page.on("websocket", lambda socket: self.hosts.add(socket.url))
 
     def _console(self, message: Any) -> None:
-        # Reading pixels back, as these tests do, makes the driver of the software's graphics grumble.
+        # Reading pixels back, as these tests do, makes the graphics driver grumble.
         if message.type == "error" or (
             message.type == "warning"
             and all(words not in message.text for words in ("GL Driver", "willReadFrequently"))

@@ -10,7 +10,7 @@ export class Findings {
     this.sum = el("span", { class: "sum" });
     this.block = el("div", { class: "section-block" }, el("h2", {}, "Rules", this.sum), this.list, el("div", { class: "stale-mark" }, "Checking"));
     this.figures = el("div", { class: "body" });
-    this.figuresBlock = el("div", { class: "section-block" }, el("h2", {}, "Prediction", el("span", { class: "sum" }, "closed formulas")), this.figures, el("div", { class: "stale-mark" }, "Updating"));
+    this.figuresBlock = el("div", { class: "section-block" }, el("h2", {}, "Prediction", el("span", { class: "sum" }, "formulas, elastic stack")), this.figures, el("div", { class: "stale-mark" }, "Updating"));
     $("#panel-findings").append(this.block, this.figuresBlock);
     studio.on("rule checked opened", () => this.draw());
     studio.on("figures reference", () => this.drawFigures());

@@ -32,6 +32,7 @@ async function start() {
   new Editor(studio);
   views = { solid: new Solid(studio), layers: new Layers(studio), motion: new Motion(studio), make: new Make(studio), compare: new Compare(studio) };
   studio.motion = views.motion;
+  studio.moving = () => !views.motion.element.hidden;
   const section = new Section(studio);
   $("#lower-stage").append(section.element);
   new Findings(studio, (finding) => goto(finding, section));

@@ -77,6 +77,8 @@ export class Studio {
   changed() {
     this.changedAt = performance.now();
     for (const part of Object.keys(this.stale)) this.stale[part] = true;
+    clearTimeout(this.elasticTimer);
+    this.elastic?.abort();
     this.emit("stale");
     this.ask();
   }
@@ -231,7 +233,7 @@ export class Studio {
     this.figuresFlight = true;
     let good = null;
     try {
-      await listen("/api/predict", this.body(), (answer) => { if (answer.kind === "prediction") good = answer; else if (answer.kind === "error") this.noFigures = answer.message; });
+      await listen("/api/predict", this.body(), (answer) => { if (answer.kind === "prediction") good = answer; else if (answer.message) this.noFigures = answer.message; });
     } catch { /* the other request says what is wrong */ }
     this.figuresFlight = false;
     if (good) {
@@ -241,8 +243,25 @@ export class Studio {
       this.latency.figures.push(performance.now() - at);
       this.emit("figures");
       this.emit("stale");
+      this.askElastic();
     } else this.emit("figures");
     if (this.figuresWanted) this.askFigures();
+  }
+  // What takes seconds comes once the hand rests, and not while the actuator is being moved.
+  askElastic() {
+    clearTimeout(this.elasticTimer);
+    this.elastic?.abort();
+    this.elasticTimer = setTimeout(async () => {
+      if (this.moving?.() || this.stale.figures || this.stale.laminate) return;
+      const own = (this.elastic = new AbortController());
+      try {
+        await listen("/api/elastic", this.body(), (answer) => {
+          if (answer.kind !== "prediction" || own.signal.aborted || this.stale.figures) return;
+          this.prediction = answer;
+          this.emit("figures");
+        }, own.signal);
+      } catch { /* the closed formulas stay */ }
+    }, 1500);
   }
 
   // A look at the file on disk whenever it changes.

@@ -1,6 +1,6 @@
 """Pictures of the studio for the docs, and of the templates for its gallery.
 
-``python -m docs.studio_pictures`` with Chromium installed writes both.
+``python -m docs.scripts.studio_pictures`` with Chromium installed writes both.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from PIL import Image, ImageChops
 from sbafab import api
 from tests.studio.browsing import Watched, browser, served
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 IMAGES = ROOT / "docs" / "images"
 GALLERY = ROOT / "sbafab" / "studio" / "static" / "templates"
 THUMB = (320, 240)

@@ -1,4 +1,4 @@
-"""How fast the studio answers, measured in the browser: ``python -m docs.studio_latency``.
+"""How fast the studio answers, measured in the browser: ``python -m docs.scripts.studio_latency``.
 
 Turns the chamber's diameter of 3dof-15mm again and again and prints, from the change to what is
 painted, the median and the 95th percentile; then poses drawn a second. Run it on an idle machine.
@@ -52,9 +52,8 @@ def main(changes: int = 25) -> None:
             seen.page.wait_for_timeout(5000)
             rate = seen.say("studio.motion.rate()")
             costs = seen.say("studio.motion.costs.slice(-100)")
-            print(
-                f"\nposes drawn a second: {rate:.0f}; drawing one: {statistics.median(costs):.1f} ms"
-            )
+            each = statistics.median(costs)
+            print(f"\nposes drawn a second: {rate:.0f}; drawing one: {each:.1f} ms")
 
 
 def _warm(seen: Watched) -> None:
