@@ -17,4 +17,4 @@ def test_plates_are_right_and_have_true_arcs(tmp_path: Path) -> None:
 
 
 def test_rules_and_cut_files_are_timed() -> None:
-    assert rules_and_cut_files(1) > 0
+    assert rules_and_cut_files(1, 0) > 0
