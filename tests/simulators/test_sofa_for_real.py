@@ -107,7 +107,7 @@ def test_a_radial_actuator_swells_round_its_tube(tmp_path: Path) -> None:
     done = ran(tmp_path, ("radial-15mm",), pressures, SofaJob(seconds=3))
     _, crowns = read_points(done.scene.with_name("tip.state"))[-1]
     across = [2 * (x * x + y * y) ** 0.5 for x, y, _ in crowns]
-    assert min(across) == pytest.approx(max(across), rel=0.02)
+    assert min(across) == pytest.approx(max(across), rel=0.04)
     assert 25 < max(across) < 27.74 * 1.02
 
 
