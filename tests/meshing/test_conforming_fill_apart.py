@@ -51,6 +51,7 @@ def shared(mesh: Mesh) -> float:
     return max((a ^ b).volume() for a, b in combinations(solids.values(), 2))
 
 
+@pytest.mark.long
 def test_unlike_fills_that_would_cross_are_refused_with_the_least_that_does_not() -> None:
     laminate = build("3dof-15mm", "stack.balloons=2")
     asked = MeshSettings(h=0.75, fill_ul={"chamber1": 10.0})
