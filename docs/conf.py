@@ -63,5 +63,11 @@ def with_other_pages(app: Sphinx, docname: str, source: list[str]) -> None:
     source[0] = source[0].replace(OTHERS, "\n".join(p for p in pages if p not in named))
 
 
+def always_anew(*_: object) -> list[str]:
+    """The page whose text hangs on which other pages there are."""
+    return ["index"]
+
+
 def setup(app: Sphinx) -> None:
     app.connect("source-read", with_other_pages)
+    app.connect("env-get-outdated", always_anew)

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from sbafab.results.records import Record
     from sbafab.results.report import Report
     from sbafab.rules.finding import Findings
-    from sbafab.search.find import Found
-    from sbafab.search.sweep import Sweep
+    from sbafab.search.find import FoundDesign
+    from sbafab.search.sweep import SweptDesigns
     from sbafab.simulators.simulator import Name
 
 Source = Design | str | Path
@@ -294,7 +294,7 @@ def find(
     most: Mapping[str, float] | None = None,
     best: str = "mass",
     **asked: Any,
-) -> Found:
+) -> FoundDesign:
     """The design that meets requirements and is best in one thing, or the nearest miss.
 
     ``find("3dof-15mm", least={"lumen": 3, "force@12.5mm@50kPa": 3}, most={"outline_diameter":
@@ -329,7 +329,7 @@ def sweep(
     vary: Sequence[str],
     out: str | Path = "out",
     **asked: Any,
-) -> Sweep:
+) -> SweptDesigns:
     """Checks and predicts a design with keys varied into ``out/<name>-sweep/``; a row a design.
 
     ``vary`` holds texts such as ``"chamber.diameter=4:8:0.5"`` and ``"stack.balloons=3,6,9"``.

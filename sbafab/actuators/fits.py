@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
+from sbafab.design.reading import AnyDesign
 from sbafab.design.records import Design
 from sbafab.design.section import Section
 from sbafab.design.units import Length
@@ -12,7 +13,6 @@ from sbafab.errors import DesignError
 from sbafab.laminate.extent import beyond_the_outline, outline_diameter, overall_diameter
 from sbafab.laminate.laminate import Laminate
 
-AnyDesign = TypeVar("AnyDesign", bound=Design)
 STEP = 0.01
 """mm: chambers are solved in whole steps."""
 STARTS = (500, 800, 1200, 300, 2000, 3000)

@@ -11,7 +11,7 @@ from sbafab.assemblies.poses import (
     FLIPPED,
     LYING,
     OUTWARD,
-    Pose,
+    PartPose,
     about_axis,
     along,
     shifted,
@@ -59,7 +59,7 @@ class PlacedPart:
 
     name: str
     part: AnyPart
-    pose: Pose
+    pose: PartPose
     made: PartDesign | None = field(default=None, init=False)
     radius: float | None = field(default=None, init=False)
 
@@ -128,7 +128,7 @@ def assemble(assembly: Assembly) -> Assembled:
         own = made.get(name)
         if part.on is None:
             _check_root(name, own)
-            pose = LYING if assembly.pose == "lying" else Pose()
+            pose = LYING if assembly.pose == "lying" else PartPose()
             placed[name] = _at_pose(name, part, pose, own)
         else:
             placed[name] = _placed(name, part, own, placed[part.on])
@@ -191,16 +191,16 @@ def _placed(name: str, part: AnyPart, made: PartDesign | None, other: PlacedPart
     return _at_pose(name, part, _frame(other).then(_on_axis(part, other)), made)
 
 
-def _at_pose(name: str, part: AnyPart, pose: Pose, made: PartDesign | None) -> PlacedPart:
+def _at_pose(name: str, part: AnyPart, pose: PartPose, made: PartDesign | None) -> PlacedPart:
     return PlacedPart(name, part, pose) if made is None else PlacedSba(name, part, pose, made)
 
 
-def _frame(placed: PlacedPart) -> Pose:
+def _frame(placed: PlacedPart) -> PartPose:
     """The frame that other parts are fixed in: turned with the part."""
     return placed.pose.then(about_axis(placed.turn))
 
 
-def _on_axis(part: AnyPart, other: PlacedPart) -> Pose:
+def _on_axis(part: AnyPart, other: PlacedPart) -> PartPose:
     x, y = part.offset
     if part.at == "lumen":
         return shifted(0.0, 0.0, part.along)
@@ -209,7 +209,7 @@ def _on_axis(part: AnyPart, other: PlacedPart) -> Pose:
     return shifted(x, y, 0.0).then(FLIPPED)
 
 
-def _at_inlet(name: str, line: Line, other: PlacedSba) -> Pose:
+def _at_inlet(name: str, line: Line, other: PlacedSba) -> PartPose:
     """At the mouth of a chamber's inlet, pointing outward."""
     inlet = inlet_of(name, line, other)
     (x, y), (u, v) = inlet.mouth, inlet.direction

@@ -64,7 +64,7 @@ EXTRAS = {
     "mesh": ("netgen", "sbafab mesh, simulate --with calculix"),
     "mujoco": ("mujoco", "simulate --with mujoco"),
     "nest": ("spyrrow", "--nest spyrrow"),
-    "optuna": ("optuna", "find with many keys"),
+    "optuna": ("optuna", "find --optuna"),
     "parquet": ("pyarrow", "tables of sweeps as Parquet"),
     "python": ("trimesh", "meshes for trimesh, meshio and PyVista"),
     "studio": ("starlette", "sbafab studio"),

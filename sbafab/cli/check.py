@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from sbafab.rules.finding import Finding
 
 
+PAPER = "paper"
+"""The kit that a design has by itself."""
+
+
 class CheckRequest(NamedTuple):
     """What the command line asks for."""
 
@@ -126,7 +130,9 @@ def _print(told: Told, advice: Advice | None, verbose: bool) -> None:
         out.print(f"as built: {told.name}", markup=False, soft_wrap=True)
     for said in told.sizes_said:
         out.print(said, markup=False, soft_wrap=True)
-    for said in dict.fromkeys(map(cited, told.designs)):
+    # The paper's kit is what everyone has; one's own is told of.
+    kits = [cited(design) for design in told.designs if verbose or design.kit != PAPER]
+    for said in dict.fromkeys(kits):
         out.print(said, markup=False, soft_wrap=True)
     for note in told.notes:
         out.print(f"note: {note}", markup=False, soft_wrap=True)

@@ -12,7 +12,7 @@ from sbafab.cli.working import RULE_FAILED
 
 if TYPE_CHECKING:
     from sbafab.progress import Progress
-    from sbafab.search.find import Found
+    from sbafab.search.find import FoundDesign
     from sbafab.search.trial import Trial
 
 
@@ -95,11 +95,11 @@ def find(source: str | None, **asked: Any) -> None:
         click.get_current_context().exit(RULE_FAILED)
 
 
-def _found(source: str | None, asked: dict[str, Any], tell: Progress) -> tuple[str, Found]:
+def _found(source: str | None, asked: dict[str, Any], tell: Progress) -> tuple[str, FoundDesign]:
     """The best of what is found from the design, or from one template of each family."""
     from sbafab.errors import DesignError
 
-    results: list[tuple[str, Found]] = []
+    results: list[tuple[str, FoundDesign]] = []
     problems = []
     for name in [source] if source else _one_of_each_family():
         try:
@@ -127,7 +127,7 @@ def _one_of_each_family() -> list[str]:
     return list(found.values())
 
 
-def _from(name: str, asked: dict[str, Any], tell: Progress) -> Found:
+def _from(name: str, asked: dict[str, Any], tell: Progress) -> FoundDesign:
     from sbafab.actuators import load_design
     from sbafab.search.find import FindRequest
     from sbafab.search.find import find as search
@@ -145,7 +145,7 @@ def _from(name: str, asked: dict[str, Any], tell: Progress) -> Found:
     return search(request, tell)
 
 
-def _as_json(found: Found, started: str, target: Path) -> dict[str, Any]:
+def _as_json(found: FoundDesign, started: str, target: Path) -> dict[str, Any]:
     def shown(trial: Trial) -> dict[str, Any]:
         return {"keys": dict(trial.values), "figures": dict(trial.figures)}
 
@@ -166,7 +166,7 @@ def _as_json(found: Found, started: str, target: Path) -> dict[str, Any]:
     }
 
 
-def _print(found: Found, started: str, target: Path) -> None:
+def _print(found: FoundDesign, started: str, target: Path) -> None:
     from rich.text import Text
 
     from sbafab.cli.printing import console

@@ -11,7 +11,7 @@ from sbafab.cli.options import finite, set_option
 from sbafab.cli.quantities import PRESSURE, VOLUME, OfChamber, by_chamber
 
 if TYPE_CHECKING:
-    from sbafab.reports.inflated_picture import Motion
+    from sbafab.reports.inflated_picture import Movement
 
 
 @click.command()
@@ -62,7 +62,7 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
     pressures: dict[str, float],
     volumes: dict[str, float],
     path: Path | None,
-    motion: Motion,
+    motion: Movement,
     width: int | None,
     elevation: float,
     azimuth: float,

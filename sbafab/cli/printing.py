@@ -320,6 +320,8 @@ def _for_simulation(run: Run) -> Iterator[tuple[str, str]]:
         )
     for note in run.conforming.volume.notes if run.conforming else ():
         yield "", note
+    if run.conforming is not None and run.conforming.fill is not None:
+        yield "", "solid.* and cavity_<chamber>.stl show it flat, skin.* shows it filled."
 
 
 def film_said(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], copies: int) -> str:

@@ -10,7 +10,7 @@ from sbafab.cli.options import Request, finite, run_options
 from sbafab.cli.quantities import PRESSURE
 
 if TYPE_CHECKING:
-    from sbafab.search.sweep import Sweep, SweepRequest
+    from sbafab.search.sweep import SweepRequest, SweptDesigns
 
 
 @click.command()
@@ -98,7 +98,7 @@ def sweep(
         _print(wanted, found)
 
 
-def _as_json(found: Sweep) -> dict[str, object]:
+def _as_json(found: SweptDesigns) -> dict[str, object]:
     return {
         "folder": str(found.folder),
         "designs": found.designs,
@@ -108,7 +108,7 @@ def _as_json(found: Sweep) -> dict[str, object]:
     }
 
 
-def _print(wanted: SweepRequest, found: Sweep) -> None:
+def _print(wanted: SweepRequest, found: SweptDesigns) -> None:
     said = ", ".join(f"{count} {outcome}" for outcome, count in found.outcomes.items())
     before = found.designs - found.measured
     earlier = f"; {before} were measured by an earlier run" if before else ""

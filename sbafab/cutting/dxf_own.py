@@ -13,7 +13,7 @@ from functools import cache
 from typing import NamedTuple
 
 from sbafab.cutting.cut_layers import COLOURS, CUT_INNER, CUT_OUTER
-from sbafab.cutting.dxf_shapes import Drawn, arc, of_polyline, polyline
+from sbafab.cutting.dxf_shapes import DrawnEntity, arc, of_polyline, polyline
 from sbafab.cutting.dxf_write import skeleton
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Line
@@ -41,7 +41,7 @@ class OwnFile(NamedTuple):
     """What a file in this program's form holds."""
 
     properties: dict[str, str]
-    drawn: list[Drawn]
+    drawn: list[DrawnEntity]
 
 
 def as_written(text: str) -> OwnFile | None:
@@ -98,9 +98,9 @@ def _entity(model_space: str) -> re.Pattern[str]:
     )
 
 
-def _entities(text: str, first_handle: int, seed: int) -> list[Drawn] | None:
+def _entities(text: str, first_handle: int, seed: int) -> list[DrawnEntity] | None:
     """All entities of a text of nothing else, their handles counted up to the ``seed``."""
-    drawn: list[Drawn] = []
+    drawn: list[DrawnEntity] = []
     place = 0
     for match in _entity(skeleton().model_space).finditer(text):
         if match.start() != place or match[2] != f"{first_handle + len(drawn):X}":
@@ -113,7 +113,7 @@ def _entities(text: str, first_handle: int, seed: int) -> list[Drawn] | None:
     return drawn if place == len(text) and first_handle + len(drawn) == seed else None
 
 
-def _drawn(match: re.Match[str]) -> Drawn | None:
+def _drawn(match: re.Match[str]) -> DrawnEntity | None:
     kind, _, layer, count, closed, rows, *numbers = match.groups()
     said = [float(number) for number in numbers if number is not None]
     if kind == "LWPOLYLINE" and rows is not None:
@@ -126,11 +126,11 @@ def _drawn(match: re.Match[str]) -> Drawn | None:
     if is_round and said[2] > 0:
         x, y, radius, *turn = said
         if kind == "CIRCLE":
-            return Drawn(kind, layer, circle((x, y), radius), ())
-        return Drawn(kind, layer, None, arc((x, y), radius, *turn))
+            return DrawnEntity(kind, layer, circle((x, y), radius), ())
+        return DrawnEntity(kind, layer, None, arc((x, y), radius, *turn))
     if kind == "LINE" and numbers[-1] is not None:
         x, y, u, v = said
-        return Drawn(kind, layer, None, [Line((x, y), (u, v))])
+        return DrawnEntity(kind, layer, None, [Line((x, y), (u, v))])
     return None
 
 

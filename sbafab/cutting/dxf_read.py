@@ -18,7 +18,7 @@ from sbafab.cutting.appearance import check_appearance, check_space
 from sbafab.cutting.chaining import check_clear, closed_loops, nested_region
 from sbafab.cutting.cut_layers import COLOURS, CUT_INNER, CUT_OUTER
 from sbafab.cutting.dxf_own import as_written
-from sbafab.cutting.dxf_shapes import Drawn, arc, of_polyline, polyline
+from sbafab.cutting.dxf_shapes import DrawnEntity, arc, of_polyline, polyline
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line
 from sbafab.geometry.region import Contour, Region
@@ -126,7 +126,7 @@ def _text(path: Path) -> str:
 
 
 def _put_together(
-    entities: Iterable[Drawn],
+    entities: Iterable[DrawnEntity],
     properties: dict[str, str],
     units: str,
     document: Drawing | None = None,
@@ -173,7 +173,7 @@ def _is_short(edge: Edge) -> bool:
     return may_be and edge.length < EPSILON
 
 
-def _drawn(entity: DXFEntity) -> Drawn:
+def _drawn(entity: DXFEntity) -> DrawnEntity:
     """What an entity draws; polylines on the layers of strokes may be open."""
     from ezdxf.entities.lwpolyline import LWPolyline
     from ezdxf.entities.polyline import Polyline
@@ -196,12 +196,14 @@ def _drawn(entity: DXFEntity) -> Drawn:
     if kind == "LINE":
         _check_flat(entity, dxf.start.z, dxf.end.z)
         line = Line((dxf.start.x, dxf.start.y), (dxf.end.x, dxf.end.y))
-        return Drawn(kind, dxf.layer, None, [line])
+        return DrawnEntity(kind, dxf.layer, None, [line])
     _check_flat(entity, dxf.center.z)
     centre = dxf.center.x, dxf.center.y
     if kind == "CIRCLE":
-        return Drawn(kind, dxf.layer, circle(centre, dxf.radius), ())
-    return Drawn(kind, dxf.layer, None, arc(centre, dxf.radius, dxf.start_angle, dxf.end_angle))
+        return DrawnEntity(kind, dxf.layer, circle(centre, dxf.radius), ())
+    return DrawnEntity(
+        kind, dxf.layer, None, arc(centre, dxf.radius, dxf.start_angle, dxf.end_angle)
+    )
 
 
 def _numbers(entity: DXFEntity) -> Iterator[float]:

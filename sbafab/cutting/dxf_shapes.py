@@ -14,7 +14,7 @@ QUARTER = math.tan(math.pi / 8)
 """The bulge of a quarter turn."""
 
 
-class Drawn(NamedTuple):
+class DrawnEntity(NamedTuple):
     """What one entity draws on a layer: the closed contour, or else the loose edges."""
 
     kind: str
@@ -23,11 +23,11 @@ class Drawn(NamedTuple):
     edges: Sequence[Edge]
 
 
-def of_polyline(kind: str, layer: str, edges: Sequence[Edge], closed: bool) -> Drawn:
+def of_polyline(kind: str, layer: str, edges: Sequence[Edge], closed: bool) -> DrawnEntity:
     """What a polyline of these edges draws."""
     if closed:
-        return Drawn(kind, layer, Contour(tuple(edges)), ())
-    return Drawn(kind, layer, None, edges)
+        return DrawnEntity(kind, layer, Contour(tuple(edges)), ())
+    return DrawnEntity(kind, layer, None, edges)
 
 
 def arc(centre: Point, radius: float, first_degrees: float, last_degrees: float) -> list[Edge]:

@@ -80,7 +80,7 @@ def inflated(
     return parts
 
 
-class Meridian(NamedTuple):
+class FilmMeridian(NamedTuple):
     """One film from neck to rim: radii in mm and shares of the height to its plate; ``drawn`` is by
     how much its pocket's edge has come in, ``pocket`` where that was, both in mm.
     """
@@ -119,7 +119,7 @@ class _Level:
         return below, above
 
 
-def _meridians(stack: Stack, pose: Pose) -> list[list[Meridian]]:
+def _meridians(stack: Stack, pose: Pose) -> list[list[FilmMeridian]]:
     """The films of each level and chamber; alike ones are worked out once."""
     keys = [
         [
@@ -129,7 +129,7 @@ def _meridians(stack: Stack, pose: Pose) -> list[list[Meridian]]:
         for kind, gaps in zip(stack.levels, pose.gaps, strict=True)
     ]
     distinct = sorted({key for row in keys for key in row})
-    known: dict[tuple[int, int, int], Meridian] = {}
+    known: dict[tuple[int, int, int], FilmMeridian] = {}
     for kind in sorted({key[0] for key in distinct}):
         own = [key for key in distinct if key[0] == kind]
         p, gap = (np.array([key[place] for key in own]) / SAME for place in (1, 2))
@@ -137,18 +137,18 @@ def _meridians(stack: Stack, pose: Pose) -> list[list[Meridian]]:
     return [[known[key] for key in row] for row in keys]
 
 
-def _films(balloon: Balloon, p: Array, gap: Array) -> list[Meridian]:
+def _films(balloon: Balloon, p: Array, gap: Array) -> list[FilmMeridian]:
     found = inflate(balloon, p, gap, tied=True)
     part = slice(balloon.held, balloon.edge + 1)
     shares = np.clip(found.z[:, part] / (gap[:, None] / 2), 0.0, 1.0)
     drawn = balloon.pocket - found.r[:, balloon.edge]
     return [
-        Meridian(r, share, float(inward), balloon.pocket)
+        FilmMeridian(r, share, float(inward), balloon.pocket)
         for r, share, inward in zip(found.r[:, part], shares, drawn, strict=True)
     ]
 
 
-def _balloon(level: _Level, axis: Array, film: Meridian, around: int) -> Surface:
+def _balloon(level: _Level, axis: Array, film: FilmMeridian, around: int) -> Surface:
     """Both films of a balloon and its necks, closed."""
     turn = np.arange(around) * (math.tau / around)
     rings = np.linspace(0, len(film.radii) - 1, min(len(film.radii), around // 2 + 1))
@@ -184,7 +184,7 @@ def _balloon(level: _Level, axis: Array, film: Meridian, around: int) -> Surface
 
 
 def _webs(
-    laminate: Laminate, stack: Stack, levels: Sequence[_Level], films: list[list[Meridian]]
+    laminate: Laminate, stack: Stack, levels: Sequence[_Level], films: list[list[FilmMeridian]]
 ) -> Surface:
     """What is bonded round the pockets of every level, as a plate of two films."""
     known: dict[Region, Surface] = {}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 from sbafab.errors import DesignError
 from sbafab.reports.inflated import COARSE, InflatedPart, inflated, pressed
-from sbafab.reports.render import RGB, Body, rendered
+from sbafab.reports.render import RGB, LitBody, rendered
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from sbafab.laminate.laminate import Laminate
     from sbafab.models.stack import Pose, Stack
 
-Motion = Literal["inflate", "circle"]
-MOTIONS: tuple[Motion, ...] = get_args(Motion)
+Movement = Literal["inflate", "circle"]
+MOTIONS: tuple[Movement, ...] = get_args(Movement)
 ENDINGS = (".png", ".gif", ".webp", ".glb")
 MOVING = (".gif", ".webp")
 FRAMES = 30
@@ -53,7 +53,7 @@ class PictureWish:
     azimuth: float = -60.0
     width: int = 1000
     height: int = 800
-    motion: Motion = "inflate"
+    motion: Movement = "inflate"
     frames: int = FRAMES
 
 
@@ -193,7 +193,7 @@ def _images(
     most = max(max(pose.pressures) for pose, _ in shown)
     images = []
     for pose, parts in shown:
-        bodies = [Body(p.surface, p.normals, _colour(p, pose, most)) for p in parts]
+        bodies = [LitBody(p.surface, p.normals, _colour(p, pose, most)) for p in parts]
         image = rendered(bodies, view, width, height, GROUND)
         _write(image, _caption(laminate, pose, moving=len(shown) > 1), view.scale)
         images.append(image)

@@ -27,7 +27,7 @@ SHADOW, SOFT_MM = 0.34, 0.9
 PAPER = (255, 255, 255)
 
 
-class Body(NamedTuple):
+class LitBody(NamedTuple):
     """A surface with unit normals (n, 3) of its points, and its colour on the screen."""
 
     surface: Surface
@@ -35,7 +35,9 @@ class Body(NamedTuple):
     colour: RGB
 
 
-def rendered(bodies: Sequence[Body], view: View, width: int, height: int, ground: float) -> Image:
+def rendered(
+    bodies: Sequence[LitBody], view: View, width: int, height: int, ground: float
+) -> Image:
     """The bodies before white paper, over a plane z = ``ground`` mm that takes their shadow.
 
     ``view`` is of the picture ``width`` by ``height`` pixels.

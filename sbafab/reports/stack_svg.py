@@ -33,7 +33,7 @@ STEEL = "#ccd2d8"
 PAST = 2.0
 """mm by which a pin's axis is drawn past its ends."""
 
-Dimension = tuple[Interval, str]
+SectionDimension = tuple[Interval, str]
 """A stretch of the section to give the length of, and its name (may be empty)."""
 
 
@@ -230,7 +230,7 @@ def _dimensions_below(view: StackView) -> list[str]:
     lowest = section.slabs[0].layer
     bottom = view.y(lowest.z, lowest.index)
     mouth = section.tab[1]
-    measured: list[Dimension] = [(section.tab, "tab")]
+    measured: list[SectionDimension] = [(section.tab, "tab")]
     masks = [slab for slab in section.slabs if slab.layer.role == "chamber-mask" and slab.spans]
     reach = max((slab.spans[-1][1] for slab in masks), default=mouth)
     if reach - mouth > 1e-3:
@@ -240,7 +240,7 @@ def _dimensions_below(view: StackView) -> list[str]:
 
 
 def _levels(
-    view: StackView, measured: Sequence[Dimension], y: float, away: Point
+    view: StackView, measured: Sequence[SectionDimension], y: float, away: Point
 ) -> tuple[list[str], int]:
     """Dimensions in as few rows as keep their words apart, and how many rows that took."""
     rows: list[list[Interval]] = []
@@ -259,7 +259,7 @@ def _levels(
 
 
 def _level(
-    view: StackView, measured: Dimension, y: float, away: Point, distance: float
+    view: StackView, measured: SectionDimension, y: float, away: Point, distance: float
 ) -> list[str]:
     (start, end), name = measured
     words = _words((start, end), name)

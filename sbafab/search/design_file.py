@@ -19,7 +19,7 @@ from sbafab.design.reading import (
     start_where_the_user_stands,
 )
 from sbafab.errors import DesignError, OutputError
-from sbafab.search.find import Found
+from sbafab.search.find import FoundDesign
 
 
 def refuse_present(target: Path) -> None:
@@ -31,7 +31,9 @@ def refuse_present(target: Path) -> None:
         )
 
 
-def found_toml(source: str | Path, assignments: Sequence[str], name: str, found: Found) -> str:
+def found_toml(
+    source: str | Path, assignments: Sequence[str], name: str, found: FoundDesign
+) -> str:
     """The design file of what was found, its figures as comments."""
     path = design_path(source)
     data = override(read_toml(path), [*assignments, dict(found.best.values), {"name": name}])

@@ -20,7 +20,7 @@ from sbafab.progress import Progress, unheard
 from sbafab.search.pareto import front
 from sbafab.search.places import place_said
 from sbafab.search.requirements import Goal, Requirement
-from sbafab.search.trial import Place, Trial, Wanted, misses, tried
+from sbafab.search.trial import Steps, Trial, Wanted, misses, tried
 
 TRIES = 120
 TRYING = "trying designs"
@@ -75,7 +75,7 @@ class Spare:
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundDesign:
     """What a search ends with: the ``best`` design, or where it does not hold the nearest miss.
 
     ``front``: designs that hold and that none betters in the goal and in every requirement.
@@ -142,14 +142,14 @@ class Search:
         self.wanted = Wanted(request.design, request.requirements, request.goal)
         self.free = free_keys(request)
         self.counts = [int(round((one.high - one.low) / one.step, 6)) for one in self.free]
-        self.trials: dict[Place, Trial] = {}
+        self.trials: dict[Steps, Trial] = {}
         self._tell = tell
 
     @property
     def is_over(self) -> bool:
         return len(self.trials) >= self.request.tries
 
-    def values(self, place: Place) -> Mapping[str, Any]:
+    def values(self, place: Steps) -> Mapping[str, Any]:
         """The keys' values at a place, whole numbers where low and step are."""
         found: dict[str, Any] = {}
         for free, step in zip(self.free, place, strict=True):
@@ -158,7 +158,7 @@ class Search:
             found[free.key] = int(value) if is_whole else value
         return found
 
-    def nearest(self) -> Place:
+    def nearest(self) -> Steps:
         """Where the design itself stands, or as near as the free keys come to it."""
         keys = {key: value for key, value, _ in keys_of(self.request.design)}
         found = []
@@ -168,7 +168,7 @@ class Search:
             found.append(min(max(round((at - free.low) / free.step), 0), count))
         return tuple(found)
 
-    def trial(self, place: Place) -> Trial:
+    def trial(self, place: Steps) -> Trial:
         """What is found there; a design that would be the best so far is asked for its rules."""
         if place not in self.trials:
             self._tell(TRYING, len(self.trials), self.request.tries)
@@ -184,7 +184,7 @@ class Search:
             return trial
         return tried(self.wanted, trial.values, with_rules=True)
 
-    def best(self) -> tuple[Place, Trial]:
+    def best(self) -> tuple[Steps, Trial]:
         """The best with its rules; where they change the order, the next best is asked."""
         while True:
             place = min(self.trials, key=lambda one: self.trials[one].rank)
@@ -194,7 +194,7 @@ class Search:
             self.trials[place] = self.with_rules(trial)
 
 
-def find(request: FindRequest, tell: Progress = unheard) -> Found:
+def find(request: FindRequest, tell: Progress = unheard) -> FoundDesign:
     """The best design, or the nearest miss. Raises DesignError for what cannot be asked."""
     search = Search(request, tell)
     if request.optuna:
@@ -208,7 +208,9 @@ def find(request: FindRequest, tell: Progress = unheard) -> Found:
     if best.refused:
         raise DesignError(f"no design could be made: {best.refused}")
     binds = tuple(_binding(search, place, best)) if best.holds else ()
-    return Found(search.wanted, best, binds, tuple(_front(search)), len(search.trials), search.free)
+    return FoundDesign(
+        search.wanted, best, binds, tuple(_front(search)), len(search.trials), search.free
+    )
 
 
 def _grid(search: Search) -> None:
@@ -246,7 +248,7 @@ def _steps(search: Search) -> None:
     _walked(search, last, [1] * len(search.free), len(search.trials) + FINEST)
 
 
-def _starts(search: Search) -> list[Place]:
+def _starts(search: Search) -> list[Steps]:
     """Where the design itself stands, and the best of the grid that are far from each other."""
     found = [search.nearest()]
     for place in sorted(search.trials, key=lambda place: search.trials[place].rank):
@@ -262,7 +264,7 @@ def _starts(search: Search) -> list[Place]:
     return found
 
 
-def _descended(search: Search, start: Place) -> None:
+def _descended(search: Search, start: Steps) -> None:
     """Walks with steps that are halved where none is better."""
     place, share = start, 4
     while share <= 2 * max(search.counts) and not search.is_over:
@@ -270,7 +272,7 @@ def _descended(search: Search, start: Place) -> None:
         share *= 2
 
 
-def _walked(search: Search, place: Place, stride: Sequence[int], most: int = 0) -> Place:
+def _walked(search: Search, place: Steps, stride: Sequence[int], most: int = 0) -> Steps:
     """Where steps lead while they are better: along a key, or along two against each other.
 
     Where two requirements meet, only a step of both keys leads on. What is better once is tried
@@ -305,7 +307,7 @@ def _moves(stride: Sequence[int]) -> list[tuple[int, ...]]:
     return [*single, *pairs]
 
 
-def _moved(search: Search, place: Place, move: Sequence[int]) -> Place | None:
+def _moved(search: Search, place: Steps, move: Sequence[int]) -> Steps | None:
     """The place of a step, kept within the keys' ranges; None where that leads nowhere."""
     inside = tuple(
         min(max(at + by, 0), most) for at, by, most in zip(place, move, search.counts, strict=True)
@@ -313,7 +315,7 @@ def _moved(search: Search, place: Place, move: Sequence[int]) -> Place | None:
     return inside if inside != place else None
 
 
-def _binding(search: Search, place: Place, best: Trial) -> list[Binding]:
+def _binding(search: Search, place: Steps, best: Trial) -> list[Binding]:
     """What stops every single step that would come nearer the goal."""
     found = []
     for move in _moves([1] * len(place))[: 2 * len(place)]:

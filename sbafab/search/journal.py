@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import IO
 
 from sbafab.errors import OutputError
-from sbafab.search.measure import Row
+from sbafab.search.measure import SweepRow
 
 
 class Journal:
@@ -47,7 +47,7 @@ class Journal:
     def __contains__(self, key: str) -> bool:
         return key in self._places
 
-    def add(self, key: str, row: Row) -> None:
+    def add(self, key: str, row: SweepRow) -> None:
         """Writes a row, unless there is one already."""
         if key in self._places:
             return
@@ -57,7 +57,7 @@ class Journal:
         self._file.write(line.encode() + b"\n")
         self._file.flush()
 
-    def rows(self, keys: Iterator[str]) -> Iterator[Row]:
+    def rows(self, keys: Iterator[str]) -> Iterator[SweepRow]:
         """The rows of these keys, in their order, one in memory at a time."""
         with self.path.open("rb") as opened:
             for key in keys:

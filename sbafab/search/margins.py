@@ -23,7 +23,7 @@ AT_MOST = frozenset(
 ORDER: tuple[Verdict, ...] = ("fail", "waived", "warn", "pass")
 
 
-class Margin(NamedTuple):
+class RuleMargin(NamedTuple):
     """A rule's worst verdict, and by how much the worst value keeps its limit: below 0 it does not.
 
     ``margin`` is None where nothing was measured, or where there is no limit.
@@ -54,13 +54,13 @@ def margin_of(finding: Finding) -> float | None:
     return round(-more if finding.rule in AT_MOST else more, 6)
 
 
-def margins(findings: Iterable[Finding]) -> dict[str, Margin]:
+def margins(findings: Iterable[Finding]) -> dict[str, RuleMargin]:
     """The worst of each rule, in the deck's order; what a rule waives by itself counts for none."""
-    found: dict[str, Margin] = {}
+    found: dict[str, RuleMargin] = {}
     for finding in findings:
         if finding.verdict == "waived" and not finding.by_user:
             continue
-        own = Margin(
+        own = RuleMargin(
             finding.rule,
             finding.verdict,
             margin_of(finding),
@@ -76,7 +76,7 @@ def margins(findings: Iterable[Finding]) -> dict[str, Margin]:
     return found
 
 
-def _badness(one: Margin) -> tuple[int, float]:
+def _badness(one: RuleMargin) -> tuple[int, float]:
     """The worse, the smaller."""
     share = one.share
     return ORDER.index(one.verdict), share if share is not None else 0.0

@@ -21,22 +21,22 @@ from sbafab.output.planned import Checked
 from sbafab.output.run import check
 from sbafab.search.margins import margins
 
-Outcome = Literal["passes", "fails", "refused", "crashed", "too long"]
+SweepOutcome = Literal["passes", "fails", "refused", "crashed", "too long"]
 """Every rule holds; a rule failed; no such design can be made; its process died; or took too long.
 """
-Row = dict[str, Any]
+SweepRow = dict[str, Any]
 """What is known of one design, in values that JSON has. ``outcome`` and ``reason`` are always
 there; ``sha256``, ``keys``, ``rules``, ``figures`` where the design could be measured so far."""
 
 
 def measured(
     tables: Mapping[str, Any], folder: str, values: Mapping[str, Any], pressures: Sequence[float]
-) -> Row:
+) -> SweepRow:
     """The row of the design that ``tables`` say, with ``values`` set; never raises a SbafabError.
 
     ``folder`` is where relative paths start, ``pressures`` kPa are those of forces and strokes.
     """
-    row: Row = {"outcome": "refused", "reason": ""}
+    row: SweepRow = {"outcome": "refused", "reason": ""}
     try:
         design = _base(json.dumps(tables), folder).with_(dict(values))
         row["keys"] = {key: value for key, value, _ in keys_of(design)}
@@ -54,7 +54,7 @@ def _base(tables: str, folder: str) -> Design:
     return checked_record(known[data["family"]], data, known).placed(Path(folder))
 
 
-def _measure(design: Design, pressures: Sequence[float], row: Row) -> None:
+def _measure(design: Design, pressures: Sequence[float], row: SweepRow) -> None:
     laminate, findings = check(design)
     found = margins(findings)
     row["rules"] = {

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-Values = Sequence[float]
 
-
-def front(rows: Sequence[Values], more: Sequence[bool]) -> list[int]:
+def front(rows: Sequence[Sequence[float]], more: Sequence[bool]) -> list[int]:
     """Numbers of the rows that none betters, in their order; of equal ones the first.
 
     ``more`` says of each value whether more of it is better.
@@ -24,6 +22,6 @@ def front(rows: Sequence[Values], more: Sequence[bool]) -> list[int]:
     return sorted(kept)
 
 
-def _betters(one: Values, other: Values) -> bool:
+def _betters(one: Sequence[float], other: Sequence[float]) -> bool:
     """Whether it is nowhere worse; equal rows come in their order."""
     return all(a <= b for a, b in zip(one, other, strict=True))

@@ -87,11 +87,11 @@ def _drawn(panels: Sequence[Any]) -> str:
     with rc_context(STYLE):
         figure = Figure(figsize=(4.3 * columns, 3.5 * rows), layout="constrained")
         FigureCanvasSVG(figure)
-        places = figure.subplots(rows, columns, squeeze=False).flat
+        places = list(figure.subplots(rows, columns, squeeze=False).flat)
         for axes, draw in zip(places, panels, strict=False):
             draw(axes)
-        for axes in list(places)[len(panels) :]:
-            axes.set_axis_off()
+        for axes in places[len(panels) :]:
+            axes.remove()
         labels = {
             text: handle
             for axes in figure.axes

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from sbafab.errors import DesignError, OutputError
-from sbafab.search.measure import Row
-from sbafab.search.worker import Job, close_all, guarded, open_all
+from sbafab.search.measure import SweepRow
+from sbafab.search.worker import MeasureJob, close_all, guarded, open_all
 
 AHEAD = 3
 """Jobs a worker is handed before it has done the first."""
@@ -80,9 +80,9 @@ def dask_pool(address: str) -> Iterator[Pool]:
 
 def run_jobs(
     pool: Pool,
-    jobs: Iterable[tuple[str, Job]],
+    jobs: Iterable[tuple[str, MeasureJob]],
     seconds: float,
-    done: Callable[[str, Row], None],
+    done: Callable[[str, SweepRow], None],
     waiting: Callable[[], None],
 ) -> None:
     """Has every job done once and tells its key and row as soon as it is; in no order.
@@ -91,7 +91,7 @@ def run_jobs(
     ``waiting`` is called every second in which none is done.
     """
     left = iter(jobs)
-    running: dict[Future[Row], str] = {}
+    running: dict[Future[SweepRow], str] = {}
     room = AHEAD * pool.size
     try:
         while True:
@@ -109,7 +109,7 @@ def run_jobs(
             future.cancel()
 
 
-def _first(jobs: Iterator[tuple[str, Job]], count: int) -> Iterator[tuple[str, Job]]:
+def _first(jobs: Iterator[tuple[str, MeasureJob]], count: int) -> Iterator[tuple[str, MeasureJob]]:
     for _ in range(count):
         job = next(jobs, None)
         if job is None:
@@ -117,7 +117,7 @@ def _first(jobs: Iterator[tuple[str, Job]], count: int) -> Iterator[tuple[str, J
         yield job
 
 
-def _row(future: Future[Row]) -> Row:
+def _row(future: Future[SweepRow]) -> SweepRow:
     try:
         row = future.result()
     except Exception as error:

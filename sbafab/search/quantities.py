@@ -52,7 +52,7 @@ HOW = 'for example overall_diameter, mass, "stroke@50kPa", "force@12.5mm@50kPa" 
 
 
 @dataclass(frozen=True)
-class Quantity:
+class AskedQuantity:
     """One of the names above or a dotted key; force and stroke with their pressure in kPa, force
     with the stroke in mm at which it is wanted.
     """
@@ -73,7 +73,7 @@ class Quantity:
         return self.name if "." in self.name else KEYS.get(self.name)
 
 
-def read_quantity(text: str, kpa: float | None = None) -> Quantity:
+def read_quantity(text: str, kpa: float | None = None) -> AskedQuantity:
     """The quantity of a text; ``kpa`` counts where it names no pressure. Raises DesignError."""
     name, *places = (part.strip() for part in text.split("@"))
     name = name.replace("-", "_")
@@ -84,10 +84,10 @@ def read_quantity(text: str, kpa: float | None = None) -> Quantity:
     if name not in PLAIN and "." not in name:
         known = listed([*PLAIN, *AT])
         raise DesignError(f"{shown(text)} is no quantity; there are {known} and the design's keys")
-    return Quantity(name, PLAIN.get(name, ""))
+    return AskedQuantity(name, PLAIN.get(name, ""))
 
 
-def _at(name: str, places: list[str], text: str, kpa: float | None) -> Quantity:
+def _at(name: str, places: list[str], text: str, kpa: float | None) -> AskedQuantity:
     pressure, stroke = kpa, None
     for place in places:
         found = _PRESSURE.fullmatch(place)
@@ -105,7 +105,7 @@ def _at(name: str, places: list[str], text: str, kpa: float | None) -> Quantity:
     if pressure is None:
         pressure = USUAL_KPA
     force(pressure, 0.0)
-    return Quantity(name, AT[name], pressure, stroke)
+    return AskedQuantity(name, AT[name], pressure, stroke)
 
 
 def named_pressure(texts: list[str]) -> float | None:
@@ -134,7 +134,7 @@ class Subject:
     def _keys(self) -> Mapping[str, Any]:
         return {key: value for key, value, _ in keys_of(self.design)}
 
-    def value(self, quantity: Quantity, share_of_good: Callable[[], float]) -> float:
+    def value(self, quantity: AskedQuantity, share_of_good: Callable[[], float]) -> float:
         """Raises DesignError where the design has no such quantity, or no model knows it."""
         if quantity.name == "yield":
             return share_of_good()
@@ -215,7 +215,7 @@ def _stretch(kind: Balloon, r: Any, z: Any) -> Any:
     return lengths / (kind.pocket - kind.neck) - 1
 
 
-def refuse_unknown_key(quantity: Quantity, design: Design) -> None:
+def refuse_unknown_key(quantity: AskedQuantity, design: Design) -> None:
     """Raises DesignError for a key that the design does not have."""
     if "." in quantity.name and quantity.name not in key_paths(type(design)):
         design.with_({quantity.name: 1})

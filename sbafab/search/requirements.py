@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from sbafab.design.reading import shown
 from sbafab.design.units import millimetres
 from sbafab.errors import DesignError
-from sbafab.search.quantities import Quantity, named_pressure, read_quantity
+from sbafab.search.quantities import AskedQuantity, named_pressure, read_quantity
 
 CLOSE = 1e-9
 
@@ -17,7 +17,7 @@ CLOSE = 1e-9
 class Requirement:
     """A quantity that must be at least, or at most, so much."""
 
-    quantity: Quantity
+    quantity: AskedQuantity
     limit: float
     at_least: bool
 
@@ -44,7 +44,7 @@ class Requirement:
 class Goal:
     """The quantity to be best in: as much of it as can be, or as little."""
 
-    quantity: Quantity
+    quantity: AskedQuantity
     more: bool
 
     def cost(self, value: float) -> float:

@@ -21,12 +21,12 @@ from sbafab.output.swap import MANIFEST
 from sbafab.progress import Progress, unheard
 from sbafab.search.fingerprint import fingerprint
 from sbafab.search.journal import Journal
-from sbafab.search.measure import Outcome, Row
+from sbafab.search.measure import SweepOutcome, SweepRow
 from sbafab.search.page import sweep_html
 from sbafab.search.pool import dask_pool, local_pool, run_jobs
 from sbafab.search.table import Table, write_csv, write_parquet, write_times
 from sbafab.search.vary import Values, Varied, grid, latin_hypercube, refuse_unknown
-from sbafab.search.worker import Job
+from sbafab.search.worker import MeasureJob
 
 JOURNAL = "journal.jsonl"
 SECONDS = 300.0
@@ -53,13 +53,13 @@ class SweepRequest:
 
 
 @dataclass(frozen=True)
-class Sweep:
+class SweptDesigns:
     """What a sweep made: its folder, how many designs of each outcome, how many measured now."""
 
     folder: Path
     designs: int
     measured: int
-    outcomes: dict[Outcome, int]
+    outcomes: dict[SweepOutcome, int]
     files: tuple[str, ...]
 
 
@@ -81,7 +81,7 @@ def trials(request: SweepRequest) -> list[Values]:
     return list(latin_hypercube(varied, request.samples, request.seed))
 
 
-def sweep(request: SweepRequest, out: Path, tell: Progress = unheard) -> Sweep:
+def sweep(request: SweepRequest, out: Path, tell: Progress = unheard) -> SweptDesigns:
     """Measures all designs into ``out/<name>-sweep/`` and returns what came of them.
 
     What an earlier run measured there counts, as long as design, values and program are the same.
@@ -104,7 +104,7 @@ def sweep(request: SweepRequest, out: Path, tell: Progress = unheard) -> Sweep:
         table = Table(lambda: journal.rows(iter(keys)), values)
         files = _write(folder, request, table)
     outcomes = Counter(row["outcome"] for row in table.rows())
-    return Sweep(folder, len(values), len(missing), dict(outcomes), files)
+    return SweptDesigns(folder, len(values), len(missing), dict(outcomes), files)
 
 
 def _measure(
@@ -117,7 +117,7 @@ def _measure(
 ) -> None:
     if not missing:
         return
-    base: Job = {
+    base: MeasureJob = {
         "program": fingerprint(),
         "tables": plain_tables(request.design),
         "folder": str(request.design.folder.absolute()),
@@ -125,7 +125,7 @@ def _measure(
     }
     done = 0
 
-    def note(key: str, row: Row) -> None:
+    def note(key: str, row: SweepRow) -> None:
         nonlocal done
         journal.add(key, row)
         done += 1

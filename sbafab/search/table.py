@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from sbafab.rules.deck import rule_names
-from sbafab.search.measure import Row
+from sbafab.search.measure import SweepRow
 from sbafab.search.vary import Values
 
 PARTS = (("verdict", 0), ("margin", 1), ("measured", 2), ("limit", 3))
@@ -34,7 +34,7 @@ class Column(NamedTuple):
 class Table:
     """Rows that are read anew each time, so that as many fit as the disk holds."""
 
-    def __init__(self, rows: Callable[[], Iterator[Row]], values: Sequence[Values]) -> None:
+    def __init__(self, rows: Callable[[], Iterator[SweepRow]], values: Sequence[Values]) -> None:
         self.rows = rows
         self.values = values
 
@@ -86,7 +86,7 @@ class Table:
         begun.replace(path)
 
 
-def _rules(row: Row) -> dict[str, Any]:
+def _rules(row: SweepRow) -> dict[str, Any]:
     found = row.get("rules", {})
     return {
         f"{name}.{part}": found[name][place]

@@ -15,14 +15,14 @@ from sbafab.output.batch import refuse_undoable
 from sbafab.output.planned import Checked
 from sbafab.output.settings import limits
 from sbafab.rules.deck import run_deck
-from sbafab.search.margins import Margin, margins
+from sbafab.search.margins import RuleMargin, margins
 from sbafab.search.quantities import Subject
 from sbafab.search.requirements import CLOSE, Goal, Requirement
 
 YIELD = "registration-yield"
 IMPOSSIBLE = 1e6
 """By how much a design that cannot be made misses: by more than any that can."""
-Place = tuple[int, ...]
+Steps = tuple[int, ...]
 """A design by the step at which each free key stands."""
 
 
@@ -36,7 +36,7 @@ class Trial:
 
     values: Mapping[str, Any]
     figures: Mapping[str, float] = field(default_factory=dict)
-    rules: Mapping[str, Margin] | None = None
+    rules: Mapping[str, RuleMargin] | None = None
     missed: float = 0.0
     cost: float = 0.0
     refused: str = ""
@@ -93,7 +93,7 @@ def tried(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -
     return Trial(values, figures, rules, missed, cost, laminate=laminate)
 
 
-def _short(rule: Margin) -> float:
+def _short(rule: RuleMargin) -> float:
     """By what share a rule that fails misses its limit."""
     if rule.verdict != "fail":
         return 0.0
@@ -101,7 +101,7 @@ def _short(rule: Margin) -> float:
 
 
 def _figures(
-    wanted: Wanted, subject: Subject, rules: Mapping[str, Margin] | None
+    wanted: Wanted, subject: Subject, rules: Mapping[str, RuleMargin] | None
 ) -> dict[str, float]:
     def share_of_good() -> float:
         found = (rules or {}).get(YIELD)

@@ -14,7 +14,7 @@ import threading
 from contextlib import suppress
 from typing import Any
 
-from sbafab.search.measure import Row
+from sbafab.search.measure import SweepRow
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """One a process: several processes share the processors already."""
@@ -23,7 +23,7 @@ ATTEMPTS = 2
 
 COMMAND = (sys.executable, "-m", "sbafab.search.child")
 
-Job = dict[str, Any]
+MeasureJob = dict[str, Any]
 """The keyword arguments of ``measured``, and ``program``, which has to do it."""
 
 _own = threading.local()
@@ -59,7 +59,7 @@ class Child:
             )
             _started.children.add(self)
 
-    def answer(self, job: Job, seconds: float) -> Row:
+    def answer(self, job: MeasureJob, seconds: float) -> SweepRow:
         """The row of a job; one that says why where the process dies or takes longer."""
         late = threading.Event()
 
@@ -75,7 +75,7 @@ class Child:
         finally:
             clock.cancel()
         if line.endswith("\n"):
-            row: Row = json.loads(line)
+            row: SweepRow = json.loads(line)
             return row
         self.close()
         if late.is_set():
@@ -108,9 +108,9 @@ class Child:
                     stream.close()
 
 
-def guarded(job: Job, seconds: float) -> Row:
+def guarded(job: MeasureJob, seconds: float) -> SweepRow:
     """The row of a job, measured in this thread's own process; dead ones are replaced."""
-    row: Row = {}
+    row: SweepRow = {}
     for _ in range(ATTEMPTS):
         child = getattr(_own, "child", None)
         if child is None or not child.is_alive:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-Schema = Mapping[str, Any]
+JsonSchema = Mapping[str, Any]
 Field = dict[str, Any]
 # key: least, most, step of the slider that spares typing; what it cannot reach is typed.
 SLIDERS: dict[str, tuple[float, float, float]] = {
@@ -39,7 +39,7 @@ UNITS = (
 )
 
 
-def families(schema: Schema) -> dict[str, list[Field]]:
+def families(schema: JsonSchema) -> dict[str, list[Field]]:
     """The fields of every family of single designs; an assembly's parts take a text."""
     found = {}
     for record in schema["oneOf"]:
@@ -53,7 +53,7 @@ def families(schema: Schema) -> dict[str, list[Field]]:
     return found
 
 
-def keys(schema: Schema) -> set[str]:
+def keys(schema: JsonSchema) -> set[str]:
     """Every dotted key of any family."""
     return {field["key"] for fields in families(schema).values() for field in fields}
 
@@ -65,7 +65,7 @@ def _rank(field: Field) -> int:
     return FIRST.index(section) if section in FIRST else len(FIRST)
 
 
-def _fields(table: Schema, schema: Schema, prefix: str) -> Iterator[Field]:
+def _fields(table: JsonSchema, schema: JsonSchema, prefix: str) -> Iterator[Field]:
     for name, own in table["properties"].items():
         reference = own.get("$ref") or _single(own)
         if reference is not None:
@@ -78,7 +78,7 @@ def _fields(table: Schema, schema: Schema, prefix: str) -> Iterator[Field]:
             yield _field(key, own)
 
 
-def _field(key: str, own: Schema) -> Field:
+def _field(key: str, own: JsonSchema) -> Field:
     ways = own.get("anyOf", [own])
     kinds = [way.get("type") for way in ways]
     number = next((way for way in ways if way.get("type") in {"number", "integer"}), None)
@@ -121,12 +121,12 @@ def _unit(key: str) -> str:
     return next((unit for pattern, unit in UNITS if pattern.search(key)), "")
 
 
-def _single(own: Schema) -> str | None:
+def _single(own: JsonSchema) -> str | None:
     """The reference of a key that is one table, whatever stands beside it."""
     ways = own.get("allOf") or []
     return ways[0].get("$ref") if len(ways) == 1 else None
 
 
-def _named(reference: str, schema: Schema) -> Schema:
-    found: Schema = schema["$defs"][reference.rpartition("/")[2]]
+def _named(reference: str, schema: JsonSchema) -> JsonSchema:
+    found: JsonSchema = schema["$defs"][reference.rpartition("/")[2]]
     return found

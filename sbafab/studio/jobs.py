@@ -23,14 +23,14 @@ if TYPE_CHECKING:
     from sbafab.laminate.laminate import Laminate
     from sbafab.models.stack import Stack
 
-Job = dict[str, Any]
+StudioJob = dict[str, Any]
 Answer = dict[str, Any]
 _FILLINGS: dict[str, Filling] = {}
 MOST_FILLINGS = 8
 """Tabs whose actuators fill at the same time."""
 
 
-def live(job: Job, beat: Beat) -> Iterator[Answer]:
+def live(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     """Text after the edits, resolved design, laminate, then rule by rule; the yield comes last."""
     text = _text(job)
     yield {"kind": "text", "text": text}
@@ -65,21 +65,21 @@ def _assembly_findings(assembly: Any) -> Iterator[Answer]:
     yield {"kind": "checked"}
 
 
-def predict(job: Job, beat: Beat) -> Iterator[Answer]:
+def predict(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     """Figures and curves by closed formulas, at once."""
     design = _loaded(_text(job), job)
     beat()
     yield {"kind": "prediction", **api.predict(design, quick=True).as_dict()}
 
 
-def elastic(job: Job, beat: Beat) -> Iterator[Answer]:
+def elastic(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     """All figures, with those of the elastic stack, which take seconds."""
     design = _loaded(_text(job), job)
     beat()
     yield {"kind": "prediction", **api.predict(design).as_dict()}
 
 
-def generate(job: Job, beat: Beat) -> Iterator[Answer]:
+def generate(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     """Writes the folder of a design into ``out``; every step is told, the last answer names it."""
     steps: list[Answer] = []
     tell: Callable[[Answer], None] = job.get("tell", steps.append)
@@ -101,7 +101,7 @@ def generate(job: Job, beat: Beat) -> Iterator[Answer]:
     }
 
 
-def motion(job: Job, beat: Beat) -> Iterator[Answer]:
+def motion(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     """The actuator as the fast stack has it, and how it moves as its pressures grow together.
 
     The pose asks for ``pressures``, or gives none for what the page has to know beforehand.
@@ -124,7 +124,7 @@ def motion(job: Job, beat: Beat) -> Iterator[Answer]:
         beat()
 
 
-def _text(job: Job) -> str:
+def _text(job: StudioJob) -> str:
     """The design's text with the edits made. Raises DesignError."""
     edits = job.get("edits", ())
     if len(edits) > MOST_EDITS:
@@ -132,7 +132,7 @@ def _text(job: Job) -> str:
     return edited(job["text"], edits) if edits else str(job["text"])
 
 
-def _loaded(text: str, job: Job) -> Any:
+def _loaded(text: str, job: StudioJob) -> Any:
     return _design(text, job["folder"], job["path"])
 
 
@@ -159,7 +159,7 @@ def _stack(text: str, folder: str, path: str) -> Stack:
     return api.stack(_design(text, folder, path))
 
 
-JOBS: dict[str, Callable[[Job, Beat], Iterator[Answer]]] = {
+JOBS: dict[str, Callable[[StudioJob, Beat], Iterator[Answer]]] = {
     "live": live,
     "predict": predict,
     "elastic": elastic,

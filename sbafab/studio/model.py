@@ -22,7 +22,7 @@ Beat = Callable[[], None]
 
 
 @dataclass
-class Shapes:
+class AnswerShapes:
     """The shapes of one answer; those the page ``has`` are named only."""
 
     has: Collection[str]
@@ -44,7 +44,7 @@ def _flat(vertices: Iterable[tuple[float, float, float]]) -> list[float]:
 
 def laminate_model(laminate: Laminate, has: Collection[str], beat: Beat) -> dict[str, Any]:
     """Layers, patterns, bonds and what lies at which place, for every view."""
-    shapes = Shapes(has)
+    shapes = AnswerShapes(has)
     layers = [_layer(layer) for layer in laminate.layers]
     patterns = {name: _pattern(laminate, own, shapes) for name, own in laminate.patterns.items()}
     beat()
@@ -95,7 +95,7 @@ def _layer(layer: Layer) -> dict[str, Any]:
     }
 
 
-def _pattern(laminate: Laminate, layers: tuple[Layer, ...], shapes: Shapes) -> dict[str, Any]:
+def _pattern(laminate: Laminate, layers: tuple[Layer, ...], shapes: AnswerShapes) -> dict[str, Any]:
     first = layers[0]
     return {
         "shape": shapes.key(first.profile),

@@ -48,6 +48,8 @@ def listening(port: int | None) -> socket.socket:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             sock.bind((ADDRESS, number))
+            # From now on a browser waits for the server, which is not up yet.
+            sock.listen(64)
             return sock
         except OSError as error:
             sock.close()

@@ -26,7 +26,7 @@ class BusyError(Exception):
 
 
 @dataclass(eq=False)
-class Wish:
+class WaitingJob:
     """A job that somebody waits for."""
 
     key: Key
@@ -42,8 +42,8 @@ class Worker:
         self.seconds, self.warm = seconds, warm
         self.context = multiprocessing.get_context("spawn")
         self.cancelled = self.context.Value("Q", 0, lock=False)
-        self.waiting: dict[Key, Wish] = {}
-        self.current: Wish | None = None
+        self.waiting: dict[Key, WaitingJob] = {}
+        self.current: WaitingJob | None = None
         self.number = 0
         self.timer: asyncio.TimerHandle | None = None
         self.closed = False
@@ -68,7 +68,7 @@ class Worker:
 
     async def answers(self, key: Key, job: dict[str, Any]) -> AsyncIterator[bytes]:
         """The job's answers, each a line of JSON; ends early where a newer wish replaces it."""
-        wish = Wish(key, job)
+        wish = WaitingJob(key, job)
         self._give_up(key)
         if len(self.waiting) >= MOST_WAITING:
             raise BusyError
@@ -88,7 +88,7 @@ class Worker:
         if self.current is not None and self.current.key == key:
             self.cancelled.value = self.current.number
 
-    def _forget(self, wish: Wish) -> None:
+    def _forget(self, wish: WaitingJob) -> None:
         """Whoever waited went away."""
         if self.waiting.get(wish.key) is wish:
             del self.waiting[wish.key]

@@ -9,7 +9,7 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.assemblies.build import assemble
-from sbafab.assemblies.poses import FLIPPED, LYING, OUTWARD, Pose, about_axis, along, shifted
+from sbafab.assemblies.poses import FLIPPED, LYING, OUTWARD, PartPose, about_axis, along, shifted
 from sbafab.assemblies.reading import load_assembly
 from sbafab.assemblies.shapes import placed_surface
 from sbafab.geometry.shapes import rectangle
@@ -21,7 +21,7 @@ from sbafab.meshing.wrap import bent, cut_along
 @pytest.mark.parametrize(
     "pose", [FLIPPED, LYING, OUTWARD, about_axis(30), along((0.6, 0.0, 0.8), (1, 2, 3))]
 )
-def test_poses_turn_and_do_not_mirror(pose: Pose) -> None:
+def test_poses_turn_and_do_not_mirror(pose: PartPose) -> None:
     rows = np.array(pose.rows)
     assert np.allclose(rows @ rows.T, np.eye(3))
     assert np.linalg.det(rows) == pytest.approx(1)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[2] / "sbafab"
-WORDS_OF_FILES = {"Bore", "Chamber", "Inlet", "Line", "Tube"}
+WORDS_OF_FILES = {"Bore", "Chamber", "Inlet", "Line", "Stack", "Tube"}
 """Tables of a design or assembly file, which are called as the things that they ask for."""
 
 
@@ -18,6 +18,8 @@ def public_types(module: Path) -> Iterator[str]:
         if isinstance(node, ast.ClassDef):
             name = node.name
         elif isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+            if isinstance(node.value, ast.Call):  # a type variable
+                continue
             name = node.targets[0].id
         else:
             continue

@@ -9,7 +9,7 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.search.quantities import Quantity, Subject, read_quantity
+from sbafab.search.quantities import AskedQuantity, Subject, read_quantity
 from sbafab.search.requirements import read_all
 
 
@@ -21,16 +21,16 @@ def _value(text: str, name: str = "1dof-5mm", **tables: Any) -> float:
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        ("mass", Quantity("mass", "g")),
-        ("overall-diameter", Quantity("overall_diameter", "mm")),
-        ("stroke@0.5bar", Quantity("stroke", "mm", 50.0)),
-        ("stroke", Quantity("stroke", "mm", 10.0)),
-        ("force@12.5mm@50kPa", Quantity("force", "N", 50.0, 12.5)),
-        ("force@50 kPa@0.5 in", Quantity("force", "N", 50.0, 12.7)),
-        ("chamber.diameter", Quantity("chamber.diameter", "")),
+        ("mass", AskedQuantity("mass", "g")),
+        ("overall-diameter", AskedQuantity("overall_diameter", "mm")),
+        ("stroke@0.5bar", AskedQuantity("stroke", "mm", 50.0)),
+        ("stroke", AskedQuantity("stroke", "mm", 10.0)),
+        ("force@12.5mm@50kPa", AskedQuantity("force", "N", 50.0, 12.5)),
+        ("force@50 kPa@0.5 in", AskedQuantity("force", "N", 50.0, 12.7)),
+        ("chamber.diameter", AskedQuantity("chamber.diameter", "")),
     ],
 )
-def test_a_quantity_is_read(text: str, found: Quantity) -> None:
+def test_a_quantity_is_read(text: str, found: AskedQuantity) -> None:
     assert read_quantity(text) == found
 
 

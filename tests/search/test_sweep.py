@@ -16,24 +16,25 @@ import sbafab
 from sbafab.design.writing import design_sha256
 from sbafab.search import sweep as module
 from sbafab.search.measure import measured
-from sbafab.search.sweep import Sweep
-from sbafab.search.worker import Job
+from sbafab.search.plots import Dots, Objective, passes_svg, trades_svg
+from sbafab.search.sweep import SweptDesigns
+from sbafab.search.worker import MeasureJob
 
 VARY = ("chamber.diameter=2,5", "bond.width=0.7,0.75")
 QUICK: dict[str, Any] = {"rules": {"yield_builds": 100}, "pressures_kpa": (10.0,)}
 
 
-def _swept(out: Path, **more: Any) -> Sweep:
+def _swept(out: Path, **more: Any) -> SweptDesigns:
     return sbafab.sweep("1dof-5mm", vary=VARY, out=out, **{**QUICK, **more})
 
 
-def _rows(found: Sweep, name: str = "sweep.csv") -> list[dict[str, str]]:
+def _rows(found: SweptDesigns, name: str = "sweep.csv") -> list[dict[str, str]]:
     with (found.folder / name).open(newline="") as opened:
         return list(csv.DictReader(opened))
 
 
 def _here(
-    pool: object, jobs: Iterable[tuple[str, Job]], seconds: float, done: Any, waiting: object
+    pool: object, jobs: Iterable[tuple[str, MeasureJob]], seconds: float, done: Any, waiting: object
 ) -> None:
     """Measures in this process, which begins no other: the long tests do."""
     for key, job in jobs:
@@ -42,13 +43,13 @@ def _here(
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory) -> Sweep:
+def found(tmp_path_factory: pytest.TempPathFactory) -> SweptDesigns:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "run_jobs", _here)
         return _swept(tmp_path_factory.mktemp("sweep"))
 
 
-def test_each_row_says_what_check_and_predict_say(found: Sweep) -> None:
+def test_each_row_says_what_check_and_predict_say(found: SweptDesigns) -> None:
     rows = _rows(found)
     assert [row["outcome"] for row in rows] == ["refused", "refused", "fails", "passes"]
     assert found.outcomes == {"refused": 2, "fails": 1, "passes": 1}
@@ -74,7 +75,7 @@ def test_each_row_says_what_check_and_predict_say(found: Sweep) -> None:
     assert all(float(row["seconds"]) > 0 for row in _rows(found, "times.csv"))
 
 
-def test_parquet_holds_what_the_csv_holds(found: Sweep) -> None:
+def test_parquet_holds_what_the_csv_holds(found: SweptDesigns) -> None:
     table = parquet.read_table(found.folder / "sweep.parquet")
     rows = _rows(found)
     assert table.column_names == list(rows[0])
@@ -83,7 +84,7 @@ def test_parquet_holds_what_the_csv_holds(found: Sweep) -> None:
             assert text == "" if cell is None else str(cell) == text or float(text) == cell
 
 
-def test_the_page_stands_alone_and_counts_right(found: Sweep) -> None:
+def test_the_page_stands_alone_and_counts_right(found: SweptDesigns) -> None:
     page = (found.folder / "sweep.html").read_text()
     assert "4 designs" in page
     assert "<b>1</b>pass every rule" in page
@@ -93,8 +94,19 @@ def test_the_page_stands_alone_and_counts_right(found: Sweep) -> None:
     assert "@import" not in page
 
 
+def test_a_picture_has_no_empty_panels() -> None:
+    dots = Dots(["passes"] * 3, {name: [1.0, 2.0, 3.0] for name in "abcd"})
+    drawn = passes_svg(dots, list("abcd"))
+    assert len(re.findall(r'id="axes_\d+"', drawn)) == 4
+    pair = (Objective("a", "a", False), Objective("b", "b", True))
+    drawn, best = trades_svg(dots, [pair])
+    assert len(re.findall(r'id="axes_\d+"', drawn)) == 1
+    # Each costs more and gives more: none betters another.
+    assert best == {0, 1, 2}
+
+
 def test_what_was_measured_before_is_not_measured_again(
-    found: Sweep, monkeypatch: pytest.MonkeyPatch
+    found: SweptDesigns, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = {name: (found.folder / name).read_bytes() for name in found.files}
 
@@ -115,7 +127,9 @@ def test_what_was_measured_before_is_not_measured_again(
 
 
 @pytest.mark.long
-def test_a_row_that_a_journal_lost_is_the_only_one_measured(found: Sweep, tmp_path: Path) -> None:
+def test_a_row_that_a_journal_lost_is_the_only_one_measured(
+    found: SweptDesigns, tmp_path: Path
+) -> None:
     folder = tmp_path / "1dof-5mm-sweep"
     folder.mkdir()
     lines = (found.folder / "journal.jsonl").read_bytes().splitlines(keepends=True)

@@ -12,7 +12,7 @@ import pytest
 from sbafab.errors import OutputError
 from sbafab.search import worker
 from sbafab.search.pool import local_pool, run_jobs
-from sbafab.search.worker import Job, close_all, guarded, open_all
+from sbafab.search.worker import MeasureJob, close_all, guarded, open_all
 
 PUPPET = """
 import json, os, signal, sys, time
@@ -68,7 +68,7 @@ def test_what_takes_too_long_is_killed_and_not_tried_again() -> None:
 
 
 def test_a_pool_does_every_job_once_and_leaves_no_process(tmp_path: Path) -> None:
-    jobs: dict[str, Job] = {str(number): {"do": "answer"} for number in range(20)}
+    jobs: dict[str, MeasureJob] = {str(number): {"do": "answer"} for number in range(20)}
     jobs["7"] = {"do": "die", "mark": str(tmp_path / "died")}
     found: list[tuple[str, str]] = []
     with local_pool(2) as pool:
@@ -84,7 +84,7 @@ def test_stopped_half_way_it_leaves_no_process() -> None:
     def stop(key: str, row: object) -> None:
         raise KeyboardInterrupt
 
-    jobs: list[tuple[str, Job]] = [
+    jobs: list[tuple[str, MeasureJob]] = [
         ("0", {"do": "answer"}),
         *((str(n), {"do": "hang"}) for n in "12"),
     ]
@@ -94,6 +94,6 @@ def test_stopped_half_way_it_leaves_no_process() -> None:
 
 
 def test_another_program_is_told_apart() -> None:
-    jobs: list[tuple[str, Job]] = [("0", {"do": "answer", "outcome": "unlike"})]
+    jobs: list[tuple[str, MeasureJob]] = [("0", {"do": "answer", "outcome": "unlike"})]
     with pytest.raises(OutputError, match="install the same"), local_pool(1) as pool:
         run_jobs(pool, jobs, 60, lambda key, row: None, lambda: None)

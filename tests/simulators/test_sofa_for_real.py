@@ -106,7 +106,7 @@ def test_a_radial_actuator_swells_round_its_tube(tmp_path: Path) -> None:
     pressures = evenly(1.0)
     done = ran(tmp_path, ("radial-15mm",), pressures, SofaJob(seconds=3))
     _, crowns = read_points(done.scene.with_name("tip.state"))[-1]
-    across = [2 * (x * x + z * z) ** 0.5 for x, _, z in crowns]
+    across = [2 * (x * x + y * y) ** 0.5 for x, y, _ in crowns]
     assert min(across) == pytest.approx(max(across), rel=0.02)
     assert 25 < max(across) < 27.74 * 1.02
 

@@ -169,3 +169,22 @@ def test_poses_are_the_stack_s(tmp_path: Path) -> None:
     assert pose["height"] == pytest.approx(theirs.height, abs=1e-3)
     with pytest.raises(DesignError, match="pressures must be 1 finite"):
         answers({**job(tmp_path, text), "do": "motion", "pose": {"pressures": [1, 2]}})
+
+
+@pytest.mark.long
+def test_air_through_a_tube_takes_its_time(tmp_path: Path) -> None:
+    """A longer tube fills later, both end at the valve's pressure, each tab has its own."""
+    text = api.template("1dof-5mm")
+
+    def filled(tab: str, length: float) -> list[float]:
+        tube = {"length": length, "diameter": 0.3, "dt": 0.005}
+        asked = {"do": "motion", "tab": tab, "pose": {"pressures": [20.0], "tube": tube}}
+        steps = [answers({**job(tmp_path, text), **asked})[0] for _ in range(120)]
+        assert steps[-1]["time"] == pytest.approx(0.6)
+        return [step["pressures"][0] for step in steps]
+
+    short, long = filled("a", 100.0), filled("b", 1000.0)
+    assert short[0] < 20
+    assert all(one >= other - 1e-6 for one, other in zip(short, long, strict=True))
+    assert short[5] > long[5]
+    assert short[-1] == pytest.approx(20.0, rel=0.01)

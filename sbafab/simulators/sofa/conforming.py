@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sbafab.laminate.laminate import Laminate
@@ -45,17 +45,21 @@ def conforming_shell(laminate: Laminate, pressures: Mapping[str, float] | None =
     radii = pocket_radii(laminate)
     side = min(radii) / STEPS_ACROSS
     ring = narrowest_ring(laminate)
-    stack = thin(layup(laminate, MeshSettings(h=side if ring is None else min(side, ring[0]))))
+    h = side if ring is None else min(side, ring[0])
+    stack = thin(layup(laminate, MeshSettings(h, wrapped=False)))
     mesh = shell_mesh(stack, flat(stack))
     number, corners = _linear(mesh)
     cells = _cells(stack, mesh)
-    rest = tuple((float(x), float(y), 0.0) for x, y, _ in _rounded(mesh.points[number >= 0]))
-    tube = tube_radius(laminate)
-    start = "flat" if tube is None else f"wrapped round a tube of radius {tube:.4g} mm"
+    rest = position = _vectors(mesh.points[number >= 0])
+    start = "flat"
+    if laminate.tube is not None:
+        start = f"wrapped round a tube of {laminate.tube:.4g} mm, whose axis is z"
+        on_tube = replace(stack, settings=MeshSettings(h))
+        position = _vectors(shell_mesh(on_tube, flat(on_tube)).points[number >= 0])
     return Shell(
         name=laminate.name,
         rest=rest,
-        position=rest if tube is None else tuple(wrapped(point, tube) for point in rest),
+        position=position,
         membranes=_membranes(corners, cells),
         bending=_bending(corners, cells),
         cavities=tuple((name, _walls(mesh.face_sets[f"cavity_{name}"], corners)) for name in names),
@@ -68,7 +72,7 @@ def conforming_shell(laminate: Laminate, pressures: Mapping[str, float] | None =
             f"{len(rest)} nodes, {len(corners)} triangles, inlets and their strips among them.\n"
             f"It starts {start}."
         ),
-        reading="tip" if tube is None else "crowns",
+        reading="tip" if laminate.tube is None else "crowns",
     )
 
 
@@ -83,33 +87,9 @@ def pocket_radii(laminate: Laminate) -> list[float]:
     return found
 
 
-def tube_radius(laminate: Laminate) -> float | None:
-    """Radius in mm of the tube that a laminate on a sheet is wrapped round, None without a sheet.
-
-    The stacks lie at equal pitch round it.
-    """
-    sheet = next((layer for layer in laminate.layers if layer.role == "sheet"), None)
-    if sheet is None:
-        return None
-    places = sorted({x for chamber in laminate.chambers for x, _ in chamber.centres})
-    if len(places) > 1:
-        return (places[-1] - places[0]) / (len(places) - 1) * len(places) / math.tau
-    left, _, right, _ = sheet.profile.bounds
-    return (right - left) / math.tau
-
-
-def wrapped(point: Vector, radius: float) -> Vector:
-    """Where a point of the flat laminate lies on the tube, whose axis is y."""
-    x, y, z = point
-    turn = x / radius
-    out = radius + z
-    return round(out * math.sin(turn), 6), y, round(out * math.cos(turn), 6)
-
-
-def _rounded(points: NDArray[np.float64]) -> list[list[float]]:
+def _vectors(points: NDArray[np.float64]) -> tuple[Vector, ...]:
     """Six decimals, and no minus before a zero."""
-    rounded: list[list[float]] = (points.round(6) + 0.0).tolist()
-    return rounded
+    return tuple((x, y, z) for x, y, z in (points.round(6) + 0.0).tolist())
 
 
 def _linear(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from sbafab.laminate.laminate import Laminate
 from sbafab.simulators.coarse.rounds import why_not_round
 from sbafab.simulators.coarse.tip import Tip
-from sbafab.simulators.sofa.conforming import pocket_radii, tube_radius
+from sbafab.simulators.sofa.conforming import pocket_radii
 
 LEAST_RISE = 0.01
 """mm that a tip must stand above its base: no scene starts as low and stays there."""
@@ -19,26 +19,26 @@ STRETCH = 1.3
 
 
 @dataclass(frozen=True)
-class Limits:
+class TipLimits:
     """What a tip can do: stand ``highest`` mm over its base at most, and lean or not."""
 
     highest: float
     must_stand: bool
 
 
-def limits(laminate: Laminate, told: Collection[float]) -> Limits | None:
+def limits(laminate: Laminate, told: Collection[float]) -> TipLimits | None:
     """The limits of a laminate whose chambers are told these pressures or volumes.
 
     A balloon is no higher than its two films are long; equal chambers lift a plate evenly, where
-    the mesh has no inlets. None for a laminate on a sheet, whose balloons have no common tip.
+    the mesh has no inlets. None for a laminate on a tube, whose balloons have no common tip.
     """
-    if tube_radius(laminate) is not None:
+    if laminate.tube is not None:
         return None
     reach = sum(pocket_radii(laminate)) / len(laminate.chambers)
-    return Limits(2 * STRETCH * reach, len(set(told)) == 1 and why_not_round(laminate) is None)
+    return TipLimits(2 * STRETCH * reach, len(set(told)) == 1 and why_not_round(laminate) is None)
 
 
-def impossible(tips: Sequence[Tip], limit: Limits) -> str | None:
+def impossible(tips: Sequence[Tip], limit: TipLimits) -> str | None:
     """What the last tip does that cannot be, None if it can."""
     last = tips[-1]
     z = last.place[2]

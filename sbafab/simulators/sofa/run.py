@@ -18,7 +18,7 @@ from sbafab.simulators.program import Ended, program_path, run_program
 from sbafab.simulators.simulator import refuse_time
 from sbafab.simulators.sofa.files import BEAM, FRAMES, SHELL, VOLUME, write_scenes
 from sbafab.simulators.sofa.frames import BEAM_DT, FRAMES_DT
-from sbafab.simulators.sofa.judge import Limits, impossible, limits
+from sbafab.simulators.sofa.judge import TipLimits, impossible, limits
 from sbafab.simulators.sofa.parts import TIP_FILE, TIP_PERIOD
 from sbafab.simulators.sofa.shell_scene import DT
 from sbafab.simulators.sofa.tip import Log, plugins_needed, read_log, read_tips
@@ -127,7 +127,7 @@ def run_scene(
     dt: float,
     limit: float | None = None,
     tell: Progress | None = None,
-    can_be: Limits | None = None,
+    can_be: TipLimits | None = None,
 ) -> SofaRun:
     """Runs a scene for so many s in steps of ``dt``; its log stays beside it in runSofa.log.
 

@@ -11,7 +11,6 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.progress import Progress
 from sbafab.simulators.coarse.actuator import PRESSURE
 from sbafab.simulators.simulator import Result, Wish, chamber_pressures, refuse_time
-from sbafab.simulators.sofa.conforming import tube_radius
 from sbafab.simulators.sofa.files import why_no_scene, write_scenes
 from sbafab.simulators.sofa.parts import TIP_FILE, TIP_PERIOD
 from sbafab.simulators.sofa.run import USUAL, Scene, SofaJob, SofaRun, simulate
@@ -50,9 +49,9 @@ def run(laminate: Laminate, wish: Wish, folder: Path, tell: Progress) -> Result:
 
 def _reached(laminate: Laminate, found: SofaRun) -> list[tuple[str, float, str]]:
     """The tip's place and lean, or how far the crowns of balloons lie from their tube's axis."""
-    if tube_radius(laminate) is not None:
+    if laminate.tube is not None:
         _, crowns = read_points(found.scene.with_name(TIP_FILE))[-1]
-        across = [2 * math.hypot(x, z) for x, _, z in crowns]
+        across = [2 * math.hypot(x, y) for x, y, _ in crowns]
         return [("diameter over the crowns", sum(across) / len(across), "mm")]
     x, y, z = found.last.place
     tip = [("tip x", x, "mm"), ("tip y", y, "mm"), ("tip z", z, "mm")]
