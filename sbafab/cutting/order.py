@@ -16,6 +16,8 @@ SWEEPS = 6
 """How often a path is looked through for crossings to undo."""
 LOOKED_AHEAD = 40
 """Contours along the path that one end of a crossing may lie from the other."""
+FEW = 20
+"""Contours up to which looking at every stretch costs less than fetching numpy."""
 SHORTER = 1e-6
 """mm by which a path has to become shorter to be turned round."""
 
@@ -69,7 +71,7 @@ def _undo_crossings(path: list[Contour], here: Point) -> bool:
     shorter = False
     stops = [here, *map(_start, path)]
     count = len(path)
-    worth = _worth_a_look(stops)
+    worth = _worth_a_look(stops) if count > FEW else [True] * count
     changed = -1
     for i in range(count - 1):
         if i > changed and not worth[i]:
