@@ -6,7 +6,6 @@ be lost in them or come out as another error: so it ends the process there and t
 
 from __future__ import annotations
 
-import gc
 import os
 
 from sbafab.errors import BY_SIGNAL, STOPPED
@@ -25,6 +24,7 @@ records, keeps them to its end and makes hardly any ring.
 def main() -> None:
     """Runs the command line with the arguments of the process."""
     try:
+        import gc
         import signal
 
         # Where it is ignored (nohup), it stays so.

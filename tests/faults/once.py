@@ -29,7 +29,7 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
     made: dict[str, Any] = {}
 
     def write_once(
-        folder: Path, fresh: Path, claims: Manifest, checked: Checked, parts: object
+        folder: Path, fresh: Path, claims: Manifest, checked: Checked, *made_of: object
     ) -> Any:
         asked = [folder / name for name in ("design.toml", "sheets/nest.json")]
         files = [path.read_bytes() if path.exists() else b"" for path in asked]
@@ -37,7 +37,7 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
         key = sha256(b"".join(files) + said).hexdigest()
         if key not in made:
             (root / key).mkdir(parents=True)
-            made[key] = write(folder, root / key, claims, checked, parts)
+            made[key] = write(folder, root / key, claims, checked, *made_of)
         shutil.copytree(root / key, fresh, dirs_exist_ok=True)
         return made[key]
 

@@ -178,7 +178,10 @@ REFUSALS: dict[str, tuple[str, Broken]] = {
     "strip wider than its pocket": ("inlet.width", pocket_within_strip()),
     "open drawing": ("is open", one_dof().map(drawn("M-5,-5 H5 V5 H-5 V-4.9"))),
     "drawing that crosses itself": ("crosses", one_dof().map(drawn("M-5,-5 L5,5 H-5 L5,-5 Z"))),
-    "drawing beside the axis": ("origin", one_dof().map(drawn("M5,5 H9 V9 H5 Z"))),
+    "drawing round nothing": (
+        "centroid outside itself",
+        one_dof().map(drawn("M0,0 H9 V9 H7 V1 H2 V9 H0 Z")),
+    ),
     "two drawings": ("2 closed", lobed().map(drawn("M-5,-5 H5 V5 H-5 Z M-9,-9 H9 V9 H-9 Z"))),
     "no drawing": (
         "nowhere.svg",

@@ -107,6 +107,7 @@ def test_broken_designs_fail_the_rule_named_for_it(fault: str, data: st.DataObje
 def test_impossible_designs_are_refused_in_one_sentence(fault: str, data: st.DataObject) -> None:
     words, designs = REFUSALS[fault]
     code, out, errors = refused(data.draw(designs))
-    assert (code, out) == (2, "")
+    told = json.loads(out)
+    assert (code, told["schema"], told["error"]["exit_code"]) == (2, "sbafab/error@1", 2)
     assert words in errors
     assert errors.count("\n") == 1
