@@ -135,7 +135,7 @@ def drawn_outlines(rounds: int) -> None:
 def many_copies(rounds: int) -> None:
     """Nesting, cutting order, writing and reading back grow with the parts, not their pairs."""
     print(f"\nCut files and {copies.SHEET} mm film sheets of many {copies.DESIGN}")
-    _told("copies", sizes_by_turns((1, 10, 50, 100), rounds, copies.nested_and_cut), 10)
+    _told("copies", sizes_by_turns((1, 10, 50, 100, 200), rounds, copies.nested_and_cut), 10)
 
 
 def _told(what: str, times: Mapping[int, Sequence[float]], least: int = 1) -> None:

@@ -30,7 +30,7 @@ from sbafab.laminate.films import Material
 from sbafab.output.manifest_records import LayerClaim, Manifest
 
 MOST_BYTES = 20_000_000
-MOST_MARKS = 100_000
+MOST_MARKS = 300_000
 """Entities and points a cut file may be drawn with: more would take minutes to be kept apart."""
 MARK = re.compile(rb"\n *1?0\r?\n")
 DATUM = "LINE"
