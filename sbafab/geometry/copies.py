@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from operator import sub
 
 from sbafab.geometry.edges import Arc
 from sbafab.geometry.region import Contour
@@ -35,7 +36,7 @@ class Copies:
         sizes = round(100 * (right - left)), round(100 * (high - low))
         filed = self._known[len(contour.edges), len(numbers), *sizes]
         for others, first in filed:
-            if all(abs(a - b) < COPIED for a, b in zip(numbers, others, strict=True)):
+            if max(map(abs, map(sub, numbers, others))) < COPIED:
                 return first
         filed.append((numbers, contour))
         return contour

@@ -90,6 +90,7 @@ class _Gaps:
 
     def __init__(self) -> None:
         self._copies = Copies()
+        self._shapes: dict[int, tuple[Region, int]] = {}
         self._known: dict[tuple[int, int, int, int], tuple[Point, float]] = {}
 
     def least(self, a: Region, b: Region) -> float:
@@ -112,9 +113,12 @@ class _Gaps:
         return (one, other, round((u - x) / NEAR), round((v - y) / NEAR)), (u - x, v - y)
 
     def _shape(self, region: Region) -> int:
-        # What falls apart is a shape of its own.
-        alone = len(region.contours) == 1
-        return id(self._copies.first(region.contours[0]) if alone else region)
+        if id(region) not in self._shapes:
+            # What falls apart is a shape of its own.
+            alone = len(region.contours) == 1
+            shape = id(self._copies.first(region.contours[0]) if alone else region)
+            self._shapes[id(region)] = region, shape
+        return self._shapes[id(region)][1]
 
 
 def _round(region: Region) -> tuple[Point, float]:
