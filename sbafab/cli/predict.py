@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from sbafab.models.figures import Prediction
 
 
+WIDE = 110
+"""Columns from which on a figure's row names its model; the list below it does so anyway."""
+
+
 @click.command()
 @run_options
 @click.option(
@@ -167,7 +171,7 @@ def _print(found: Prediction) -> None:
 
     models = list(dict.fromkeys(figure.model for figure in found.figures))
     out = console()
-    out.print(_table(found, models))
+    out.print(_table(found, models, out.width >= WIDE))
     out.print()
     out.print(Text("Models and validity", style="bold"))
     notes = _grid()
@@ -184,7 +188,8 @@ def _print(found: Prediction) -> None:
     out.print()
 
 
-def _table(found: Prediction, models: list[Any]) -> Table:
+def _table(found: Prediction, models: list[Any], named: bool) -> Table:
+    """The figures, each with the number of its model, and its name where there is room."""
     from rich.table import Table
     from rich.text import Text
 
@@ -202,7 +207,7 @@ def _table(found: Prediction, models: list[Any]) -> Table:
             Text(figure.name),
             f"{figure.value:.4g}",
             figure.unit,
-            Text(f"[{number}] {figure.model.name}"),
+            Text(f"[{number}] {figure.model.name}" if named else f"[{number}]"),
         )
         group = figure.group
     return table
