@@ -72,19 +72,24 @@ def _undo_crossings(path: list[Contour], here: Point) -> bool:
     stops = [here, *map(_start, path)]
     count = len(path)
     worth = _worth_a_look(stops) if count > FEW else [True] * count
+    steps = [math.dist(a, b) for a, b in pairwise(stops)] + [0.0]
     changed = -1
     for i in range(count - 1):
         if i > changed and not worth[i]:
             continue
         for j in range(i + 1, min(count, i + LOOKED_AHEAD)):
-            before = math.dist(stops[i], stops[i + 1])
+            # Behind the last stop there is nothing to go on to.
+            before = steps[i] + steps[j + 1]
             after = math.dist(stops[i], stops[j + 1])
-            if j + 1 < count:
-                before += math.dist(stops[j + 1], stops[j + 2])
+            if after < before - SHORTER and j + 1 < count:
                 after += math.dist(stops[i + 1], stops[j + 2])
             if after < before - SHORTER:
                 path[i : j + 1] = path[i : j + 1][::-1]
                 stops[i + 1 : j + 2] = stops[i + 1 : j + 2][::-1]
+                steps[i + 1 : j + 1] = steps[i + 1 : j + 1][::-1]
+                steps[i] = math.dist(stops[i], stops[i + 1])
+                if j + 1 < count:
+                    steps[j + 1] = math.dist(stops[j + 1], stops[j + 2])
                 shorter = True
                 changed = max(changed, j + 1)
     return shorter
