@@ -44,7 +44,9 @@ def opened(source: str | None) -> tuple[Path, str | None, str | None]:
 def listening(port: int | None) -> socket.socket:
     """A socket on this machine alone, at the port or, if none is asked for, at a free one."""
     for number in (PORT, 0) if port is None else (port,):
-        sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        # Only of a socket whose protocol is named does asyncio send small answers at once; others
+        # wait 40 ms for the browser to acknowledge what came before.
+        sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             sock.bind((ADDRESS, number))

@@ -3,11 +3,24 @@ import * as THREE from "./vendor/three.module.js";
 import { OrbitControls } from "./vendor/OrbitControls.js";
 import { css } from "./dom.js";
 
+// Frames that a computer without a graphics card draws one by one are coarser while they follow each other.
+const COARSE = 0.6, QUICK = 200;
+
+// Whether the browser draws without a graphics card.
+function isSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const told = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = told ? gl.getParameter(told.UNMASKED_RENDERER_WEBGL) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+}
+
 export class Stage3D {
   constructor(surface, { up = 14 } = {}) {
     this.surface = surface;
     this.scene = new THREE.Scene();
-    this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
+    this.software = isSoftware();
+    this.renderer = new THREE.WebGLRenderer({ antialias: !this.software, preserveDrawingBuffer: true });
     this.renderer.localClippingEnabled = true;
     this.camera = new THREE.PerspectiveCamera(28, 1, 0.1, 2000);
     this.camera.up.set(0, 0, 1);
@@ -37,7 +50,7 @@ export class Stage3D {
   resize() {
     const { clientWidth: w, clientHeight: h } = this.surface;
     if (!w || !h) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio || 1, 2));
+    this.renderer.setPixelRatio(this.finest());
     this.renderer.setSize(w, h, false);
     this.renderer.domElement.style.width = "100%";
     this.renderer.domElement.style.height = "100%";
@@ -72,13 +85,25 @@ export class Stage3D {
     this.controls.update();
     this.draw();
   }
+  // Without a graphics card twice as fine, for the edges that antialiasing would smooth.
+  finest() { return this.software ? 1.5 : Math.min(devicePixelRatio || 1, 2); }
   draw() {
     if (this.asked) return;
-    this.asked = requestAnimationFrame(() => {
+    this.asked = requestAnimationFrame((now) => {
       this.asked = null;
+      if (this.software) this.suit(now);
       if (this.surface.clientWidth) this.renderer.render(this.scene, this.camera);
       this.drawn?.();
     });
+  }
+  // Frames in quick succession are drawn coarser, the last one again as fine as it goes.
+  suit(now) {
+    const ratio = now - (this.last ?? -QUICK) < QUICK && !this.resting ? COARSE : this.finest();
+    this.last = now;
+    this.resting = false;
+    if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
+    clearTimeout(this.rest);
+    if (ratio === COARSE) this.rest = setTimeout(() => { this.resting = true; this.draw(); }, QUICK);
   }
   under(event) {
     const box = this.renderer.domElement.getBoundingClientRect();
@@ -87,6 +112,6 @@ export class Stage3D {
     ray.setFromCamera(at, this.camera);
     return ray;
   }
-  async picture(name) { this.renderer.render(this.scene, this.camera); return { name, blob: await new Promise((done) => this.renderer.domElement.toBlob(done)) }; }
+  async picture(name) { this.renderer.setPixelRatio(this.finest()); this.renderer.render(this.scene, this.camera); return { name, blob: await new Promise((done) => this.renderer.domElement.toBlob(done)) }; }
 }
 export { THREE };
