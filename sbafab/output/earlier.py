@@ -87,8 +87,8 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
     if _are_files(layers, carried):
         index["layers"] = layers
         index["fixture"] = plate if plate in carried else None
-        if "panel" in old:
-            index["panel"] = old["panel"]
+        # How the layers that stay were cut stays with them.
+        index.update({name: old[name] for name in ("panel", "curves") if name in old})
         if _are_files(old.get("sheets"), carried):
             index["sheets"], index["films"] = old["sheets"], old.get("films")
     if isinstance(meshes, list):

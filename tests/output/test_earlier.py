@@ -7,8 +7,10 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import load_design
+from sbafab.as_built.check import check_folder
 from sbafab.assemblies.reading import load
 from sbafab.assemblies.records import Assembly
+from sbafab.cutting.dxf_write import Curves
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.settings import MeshSettings
@@ -129,3 +131,11 @@ def test_meshes_of_another_fill_are_not_mixed(tmp_path: Path) -> None:
     # A flat pocket has no volume, so that a surface of the film alone is written.
     assert "mesh/cavity_chamber1_conforming.stl" not in flat
     assert any(path.endswith(".stl") for path in flat)
+
+
+def test_cut_files_in_chords_stay_so_beside_a_new_schedule(tmp_path: Path) -> None:
+    design = load_design("1dof-5mm", SMALL)
+    generate(design, tmp_path, ("cut",), curves=Curves("chords", 0.02))
+    run = generate(design, tmp_path, ("press",))
+    assert run.manifest["curves"] == "chords within 0.02 mm"
+    assert [f.message for f in check_folder(run.folder) if f.verdict == "fail"] == []
