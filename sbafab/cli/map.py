@@ -8,8 +8,8 @@ from typing import Any
 import click
 
 from sbafab.cli import completing
-from sbafab.cli.options import set_option
-from sbafab.cli.quantities import LENGTH, MODULUS, PRESSURE
+from sbafab.cli.options import calibration_options, set_option
+from sbafab.cli.quantities import PRESSURE
 
 
 @click.command(name="map")
@@ -37,16 +37,7 @@ from sbafab.cli.quantities import LENGTH, MODULUS, PRESSURE
     metavar="N",
     help="Pressures, and heights, of CSV and JSON.",
 )
-@click.option(
-    "--pocket-loss",
-    type=LENGTH.read,
-    default="0 mm",
-    metavar="L",
-    help="By how much pockets come out smaller in radius than drawn.  [default: 0]",
-)
-@click.option(
-    "--modulus", "modulus_mpa", type=MODULUS.read, metavar="E", help="Of the film, if measured."
-)
+@calibration_options
 def map_(
     source: str,
     assignments: tuple[str, ...],

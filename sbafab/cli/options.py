@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sbafab.cli import completing
+from sbafab.cli.quantities import LENGTH, MODULUS
 
 if TYPE_CHECKING:
     from sbafab.cutting.dxf_write import DxfProfile
@@ -26,6 +27,26 @@ set_option = click.option(
     shell_complete=completing.assignments,
     help="Override a key of the design, e.g. --set chamber.diameter=6. Repeatable.",
 )
+
+
+def calibration_options(command: Command) -> Command:
+    """What was measured of a built actuator, for the elastic models: ``models.figures.Factors``."""
+    lost = click.option(
+        "--pocket-loss",
+        type=LENGTH.read,
+        default="0 mm",
+        metavar="L",
+        help="By how much pockets come out smaller in radius than drawn, mm or with a unit, if "
+        "measured; for the elastic models.  [default: 0]",
+    )
+    modulus = click.option(
+        "--modulus",
+        "modulus_mpa",
+        type=MODULUS.read,
+        metavar="E",
+        help="Young's modulus of the film, MPa or with a unit, if measured.  [default: the film's]",
+    )
+    return lost(modulus(command))
 
 
 def waive_option(words: str) -> Callable[[Command], Command]:

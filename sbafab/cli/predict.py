@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sbafab.cli.options import Request, finite, run_options
-from sbafab.cli.quantities import FLOW, LENGTH, MODULUS, PRESSURE, VOLUME
+from sbafab.cli.options import Request, calibration_options, finite, run_options
+from sbafab.cli.quantities import FLOW, PRESSURE, VOLUME
 from sbafab.cli.working import RULE_FAILED
 
 if TYPE_CHECKING:
@@ -63,21 +63,7 @@ WIDE = 110
     metavar="F",
     help="Measured force over the one of Eqs. 1-4, if measured.  [default: 1, off]",
 )
-@click.option(
-    "--pocket-loss",
-    type=LENGTH.read,
-    default="0 mm",
-    metavar="L",
-    help="By how much pockets come out smaller in radius than drawn, mm or with a unit, if "
-    "measured; for the elastic models.  [default: 0]",
-)
-@click.option(
-    "--modulus",
-    "modulus_mpa",
-    type=MODULUS.read,
-    metavar="E",
-    help="Young's modulus of the film, MPa or with a unit, if measured.  [default: the film's]",
-)
+@calibration_options
 @click.option(
     "--load",
     "load_g",

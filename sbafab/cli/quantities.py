@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import click
 
+from sbafab.design.units import KILOPASCALS
+
 _WRITTEN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
 
 
@@ -37,11 +39,7 @@ class MeasuredQuantity:
 LENGTH = MeasuredQuantity(
     "length", {"mm": 1.0, "um": 0.001, "cm": 10.0, "in": 25.4}, '0.35 or "350 um"'
 )
-PRESSURE = MeasuredQuantity(
-    "pressure",
-    {"kPa": 1.0, "Pa": 0.001, "MPa": 1000.0, "mbar": 0.1, "bar": 100.0, "psi": 6.894757},
-    '6, "6 kPa" or "60 mbar"',
-)
+PRESSURE = MeasuredQuantity("pressure", KILOPASCALS, '6, "6 kPa" or "60 mbar"')
 MODULUS = MeasuredQuantity("modulus", {"MPa": 1.0, "kPa": 0.001, "GPa": 1000.0}, '10 or "10 MPa"')
 VOLUME = MeasuredQuantity("volume", {"ul": 1.0, "ml": 1000.0, "mm3": 1.0}, '5, 5ul or "0.005 ml"')
 FLOW = MeasuredQuantity(

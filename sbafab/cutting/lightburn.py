@@ -16,6 +16,7 @@ from sbafab.cutting.dxf_write import Surroundings
 from sbafab.geometry.copies import Copies
 from sbafab.geometry.edges import Arc, Edge, Line, Point
 from sbafab.geometry.region import Contour
+from sbafab.geometry.svg import number
 from sbafab.markup import quoteattr
 
 ENDING = ".lbrn2"
@@ -107,7 +108,7 @@ def project_text(
         *(f'<{name} Value="{value}"/>' for name, value in prefs.items()),
         "</UIPrefs>",
         *(_setting(layer, rank) for rank, layer in enumerate(layers)),
-        *(_shape(number, shape, outlines) for number, shape in enumerate(shapes)),
+        *(_shape(serial, shape, outlines) for serial, shape in enumerate(shapes)),
         f'<Notes ShowOnLoad="1" Notes={quoteattr(notes)}/>',
         "</LightBurnProject>\n",
     ]
@@ -129,16 +130,16 @@ def _setting(layer: str, rank: int) -> str:
     return f'<CutSetting type="{CUT_MODE}">{inner}</CutSetting>'
 
 
-def _shape(number: int, run: LaserRun, outlines: _Outlines) -> str:
+def _shape(serial: int, run: LaserRun, outlines: _Outlines) -> str:
     index = INDICES[run.layer]
     if run.circle is not None:
         (x, y), radius = run.circle
-        size = f'Rx="{_number(radius)}" Ry="{_number(radius)}"'
-        place = f"<XForm>1 0 0 1 {_number(x)} {_number(y)}</XForm>"
+        size = f'Rx="{number(radius)}" Ry="{number(radius)}"'
+        place = f"<XForm>1 0 0 1 {number(x)} {number(y)}</XForm>"
         return f'<Shape Type="Ellipse" CutIndex="{index}" {size}>{place}</Shape>'
     vertices, primitives = outlines.drawn(run)
     return (
-        f'<Shape Type="Path" CutIndex="{index}" VertID="{number}" PrimID="{number}">'
+        f'<Shape Type="Path" CutIndex="{index}" VertID="{serial}" PrimID="{serial}">'
         f"<XForm>1 0 0 1 0 0</XForm><VertList>{vertices}</VertList>"
         f"<PrimList>{primitives}</PrimList></Shape>"
     )
@@ -164,7 +165,7 @@ class _Outlines:
         x, y = run.edges[0].start
         own = self._outline(run)
         placed = [n + (y if k % 2 else x) for k, n in enumerate(own.numbers)]
-        return own.form % tuple(map(_number, placed)), own.primitives
+        return own.form % tuple(map(number, placed)), own.primitives
 
     def _outline(self, run: LaserRun) -> _Outline:
         if not run.closed:
@@ -208,9 +209,3 @@ def _handles(part: Edge) -> tuple[Point, Point] | tuple[None, None]:
     (x, y), (u, v) = part.start, part.end
     (px, py), (qx, qy) = part.direction(part.start), part.direction(part.end)
     return (x + reach * px, y + reach * py), (u - reach * qx, v - reach * qy)
-
-
-def _number(value: float) -> str:
-    """A decimal to a nanometre."""
-    text = f"{value:.6f}".rstrip("0").rstrip(".")
-    return "0" if text == "-0" else text

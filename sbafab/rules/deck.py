@@ -33,10 +33,14 @@ from sbafab.rules.measures import Measures
 
 
 class Rule(NamedTuple):
-    """A rule's stable name and the function that measures it."""
+    """A rule's stable name and the function that measures it.
+
+    ``at_most``: its limit is the most that may be measured; of all others it is the least.
+    """
 
     name: str
     check: Callable[[Measures], list[Finding]]
+    at_most: bool = False
 
 
 def _alone(
@@ -56,18 +60,18 @@ def _sharing(
 RULES = (
     Rule(bond_width.NAME, _sharing(bond_width.check)),
     Rule(mask_overhang.NAME, _sharing(mask_overhang.check)),
-    Rule(facing_films.NAME, _sharing(facing_films.check)),
-    Rule(sealing.NAME, _alone(sealing.check)),
+    Rule(facing_films.NAME, _sharing(facing_films.check), at_most=True),
+    Rule(sealing.NAME, _alone(sealing.check), at_most=True),
     Rule(channel_clear.NAME, _alone(channel_clear.check)),
     Rule(tube_fit.NAME, _alone(tube_fit.check)),
-    Rule(piece_count.NAME, _alone(piece_count.check)),
-    Rule(pin_holes.NAME, _alone(pin_holes.check)),
-    Rule(pin_fit.NAME, _alone(pin_fit.check)),
+    Rule(piece_count.NAME, _alone(piece_count.check), at_most=True),
+    Rule(pin_holes.NAME, _alone(pin_holes.check), at_most=True),
+    Rule(pin_fit.NAME, _alone(pin_fit.check), at_most=True),
     Rule(bridges.NAME, _alone(bridges.check)),
-    Rule(scrap.NAME, _alone(scrap.check)),
+    Rule(scrap.NAME, _alone(scrap.check), at_most=True),
     Rule(film_limits.NAME, _alone(film_limits.check)),
-    Rule(press_fit.NAME, _alone(press_fit.check)),
-    Rule(registration_nominal.NAME, _alone(registration_nominal.check)),
+    Rule(press_fit.NAME, _alone(press_fit.check), at_most=True),
+    Rule(registration_nominal.NAME, _alone(registration_nominal.check), at_most=True),
     Rule(registration_worst_case.NAME, _sharing(registration_worst_case.check)),
     Rule(registration_yield.NAME, _sharing(registration_yield.check)),
 )

@@ -35,8 +35,8 @@ TIGHT = ("bond-width", "mask-overhang", "tube-fit", "film-limits", "press-fit", 
 LITTLE = 0.005
 """Share of a limit that is nothing to spare."""
 STARTS = 4
-SEED = 20_240
 """Designs of the grid from which to go on."""
+SEED = 20_240
 
 
 @dataclass(frozen=True)

@@ -5,21 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from sbafab.rules.deck import RULES
 from sbafab.rules.finding import Finding, Place, Verdict
 
-AT_MOST = frozenset(
-    {
-        "facing-films",
-        "sealing",
-        "piece-count",
-        "pin-holes",
-        "pin-fit",
-        "scrap",
-        "press-fit",
-        "registration-nominal",
-    }
-)
-"""Rules whose limit is the most that may be measured; of all others it is the least."""
+AT_MOST = frozenset(rule.name for rule in RULES if rule.at_most)
 ORDER: tuple[Verdict, ...] = ("fail", "waived", "warn", "pass")
 
 

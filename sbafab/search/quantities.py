@@ -18,22 +18,20 @@ import numpy as np
 from sbafab.design.form import Slots
 from sbafab.design.reading import key_paths, listed, shown
 from sbafab.design.records import Design
-from sbafab.design.units import millimetres
+from sbafab.design.units import KILOPASCALS, millimetres
 from sbafab.design.writing import keys_of
 from sbafab.errors import DesignError
 from sbafab.laminate.extent import film_mass
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.force import force
 from sbafab.models.kinematics import slot_stack
 from sbafab.models.sizes import sizes
 
-MOST_STRETCH = 0.15
-"""Share by which films may be longer; one modulus is unlikely to hold beyond."""
 SHARES = np.linspace(0.1, 1.0, 10)
-"""Of the pressure asked for: tried until the film would be longer than that."""
-PRESSURES = {"kPa": 1.0, "Pa": 0.001, "MPa": 1000.0, "mbar": 0.1, "bar": 100.0, "psi": 6.894757}
+"""Of the pressure asked for: tried until the film would be longer than MOST_STRETCH."""
 USUAL_KPA = 10.0
 _PRESSURE = re.compile(r"\s*(\d+\.?\d*|\.\d+)\s*([A-Za-z]+)\s*")
 SIZES = (
@@ -91,8 +89,8 @@ def _at(name: str, places: list[str], text: str, kpa: float | None) -> AskedQuan
     pressure, stroke = kpa, None
     for place in places:
         found = _PRESSURE.fullmatch(place)
-        if found is not None and found[2] in PRESSURES:
-            pressure = float(found[1]) * PRESSURES[found[2]]
+        if found is not None and found[2] in KILOPASCALS:
+            pressure = float(found[1]) * KILOPASCALS[found[2]]
             continue
         try:
             stroke = millimetres(place)
@@ -111,10 +109,10 @@ def _at(name: str, places: list[str], text: str, kpa: float | None) -> AskedQuan
 def named_pressure(texts: list[str]) -> float | None:
     """The highest pressure that any of the quantities names, kPa."""
     named = [
-        float(found[1]) * PRESSURES[found[2]]
+        float(found[1]) * KILOPASCALS[found[2]]
         for text in texts
         for place in text.split("@")[1:]
-        if (found := _PRESSURE.fullmatch(place)) is not None and found[2] in PRESSURES
+        if (found := _PRESSURE.fullmatch(place)) is not None and found[2] in KILOPASCALS
     ]
     return max(named, default=None)
 
@@ -183,8 +181,7 @@ def free_height(kind: Balloon, kpa: float) -> float:
     The latter is less than it would rise by.
     """
     shapes = inflate(kind, SHARES * kpa)
-    stretch = _stretch(kind, shapes.r, shapes.z)
-    return float(np.interp(MOST_STRETCH, stretch, shapes.height))
+    return float(np.interp(MOST_STRETCH, stretch(kind, shapes), shapes.height))
 
 
 @lru_cache(maxsize=4096)
@@ -198,7 +195,7 @@ def pressed_force(kind: Balloon, kpa: float, height: float) -> float:
         # How far it is from getting there, in the force of so much of it.
         return -kpa * math.pi * kind.pocket**2 * (height / max(free, 1e-6) - 1)
     shape = inflate(kind, [kpa], [max(height, 1e-3)])
-    longer = float(_stretch(kind, shape.r, shape.z)[0])
+    longer = float(stretch(kind, shape)[0])
     if longer > MOST_STRETCH:
         raise DesignError(
             f"at {kpa:g} kPa and a rise of {height:.3g} mm a balloon's film would be "
@@ -206,13 +203,6 @@ def pressed_force(kind: Balloon, kpa: float, height: float) -> float:
             f"{100 * MOST_STRETCH:g} %"
         )
     return float(shape.force[0])
-
-
-def _stretch(kind: Balloon, r: Any, z: Any) -> Any:
-    """By what share the films between neck and rim are longer than flat."""
-    part = slice(kind.held, kind.edge + 1)
-    lengths = np.hypot(np.diff(r[:, part]), np.diff(z[:, part])).sum(-1)
-    return lengths / (kind.pocket - kind.neck) - 1
 
 
 def refuse_unknown_key(quantity: AskedQuantity, design: Design) -> None:

@@ -128,11 +128,10 @@ def test_other_versions_change_no_verdict_and_what_they_drop_is_told_once(
     assert all(dropped[version] in f.message for f in told)
 
 
+@pytest.mark.parametrize("good", [FOLDERS[0]], indirect=True, ids=["two balloons"])
 def test_a_fault_of_three_micrometres_is_told_among_jitter(doctor: Doctor) -> None:
     """The hole of one wall alone; the jitter is a tenth of it."""
     resave(doctor.folder, jittered(3e-4))
-    if len(doctor.manifest["layers"]) < 5:
-        pytest.skip("one balloon has no second wall")
     path = doctor.path(5)
     drawing = ezdxf.readfile(path)
     drawn = [entity for entity in drawing.modelspace() if entity.dxf.layer == "CUT_INNER"]
