@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import subprocess
 import sys
@@ -10,6 +11,10 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from PIL import Image, ImageChops
+
+from sbafab import api
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -28,6 +33,8 @@ FLAGS = (
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 )
+DESIGN = api.template("3dof-15mm")
+FILE = "gripper.toml"
 PATIENCE = 60.0
 """Seconds: other work may share the machine."""
 
@@ -121,3 +128,18 @@ class Watched:
 
     def close(self) -> None:
         self.context.close()
+
+
+def picture(seen: Watched, selector: str) -> Image.Image:
+    seen.page.wait_for_timeout(250)
+    return Image.open(io.BytesIO(seen.page.locator(selector).screenshot())).convert("RGB")
+
+
+def share_changed(a: Image.Image, b: Image.Image) -> float:
+    """The share of pixels that differ."""
+    grey = ImageChops.difference(a, b).convert("L").point(lambda value: 255 * (value > 8))
+    return grey.histogram()[255] / (a.width * a.height)
+
+
+def colours(image: Image.Image) -> int:
+    return len(image.quantize(32).getcolors() or ())
