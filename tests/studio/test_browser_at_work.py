@@ -306,7 +306,7 @@ def test_everything_is_named_and_reached_by_keyboard(seen: Watched) -> None:
 
 
 def test_templates_are_pictures(seen: Watched) -> None:
-    seen.page.get_by_role("button", name="sbafab").click()
+    seen.page.get_by_role("button", name="sbafab", exact=True).click()
     for name in api.templates():
         image = seen.page.locator(f"img[src='templates/{name}.webp']")
         image.wait_for()
@@ -315,7 +315,7 @@ def test_templates_are_pictures(seen: Watched) -> None:
         )
     seen.page.locator(".gallery button", has_text="1dof-10mm").click()
     seen.until("studio.laminate.name === '1dof-10mm'")
-    seen.page.get_by_role("button", name="sbafab").click()
+    seen.page.get_by_role("button", name="sbafab", exact=True).click()
     seen.page.locator(".gallery button", has_text="brace").click()
     seen.until("studio.family === 'assembly' && !studio.stale.rules")
     assert seen.say("studio.findings.length") > 10
