@@ -6,7 +6,6 @@ import math
 
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, distance_to
 
-
 EVERYWHERE: Bounds = (-math.inf, -math.inf, math.inf, math.inf)
 
 
@@ -52,9 +51,7 @@ def meeting_points(
     return found
 
 
-def _holds(
-    p: Point, reach: float, left: float, low: float, right: float, high: float
-) -> bool:
+def _holds(p: Point, reach: float, left: float, low: float, right: float, high: float) -> bool:
     """Whether a whole box lies within ``reach`` of a point."""
     return math.hypot(max(right - p[0], p[0] - left), max(high - p[1], p[1] - low)) <= reach
 
