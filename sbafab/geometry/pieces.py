@@ -92,6 +92,8 @@ def split_edges(edges: Sequence[Edge], tolerance: float = EPSILON) -> Split:
     # An arc may leave the box of its ends by as much as these are off its circle.
     near = [widened(box, tolerance + BENT) for box in bounds]
     for i, j in close_pairs(bounds, tolerance):
+        if _only_follows(edges[i], edges[j], near[i], near[j], 2 * tolerance):
+            continue
         points = meeting_points(edges[i], edges[j], tolerance, (near[i], near[j]))
         if points:
             cuts[i] += points
@@ -115,6 +117,24 @@ def split_edges(edges: Sequence[Edge], tolerance: float = EPSILON) -> Split:
             for p in own
         ),
     )
+
+
+def _only_follows(a: Edge, b: Edge, near_a: Bounds, near_b: Bounds, same: float) -> bool:
+    """Whether one edge starts where the other ends, and what else is near both is one with it.
+
+    Then neither is cut by the other.
+    """
+    if a.end == b.start:
+        x, y = a.end
+    elif a.start == b.end:
+        x, y = a.start
+    else:
+        return False
+    left, low, right, high = near_a
+    left_b, low_b, right_b, high_b = near_b
+    aside = max(min(right, right_b) - x, x - max(left, left_b))
+    above = max(min(high, high_b) - y, y - max(low, low_b))
+    return aside * aside + above * above < same * same
 
 
 def _share(
