@@ -13,6 +13,7 @@ CELLS = 16
 
 
 ASLANT = 0.7548776662466927
+"""Slope of a line along which points of drawings hardly ever lie side by side."""
 
 
 class PointPool:
