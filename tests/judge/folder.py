@@ -23,6 +23,8 @@ from tests.judge.reading import Drawing, UnreadableError, read
 
 ROUND = 24
 """Chords a quarter circle where kerf is taken back."""
+SPECK = 1e-8
+"""mm2: no piece of film; what buffers leave by rounding."""
 FINE = 2e-4
 """mm by which points are left out again where a shrunk path has more than it needs."""
 Kerf = tuple[float, float]
@@ -219,9 +221,9 @@ def open_folder(path: Path, design: Path, chord_error: float = 0.0) -> Folder:
 
 
 def pieces(region: BaseGeometry, thinner: float = 0.0) -> Iterator[shapely.Polygon]:
-    """The polygons of a region that are wider than ``thinner`` somewhere."""
+    """The polygons of a region that are wider than ``thinner`` somewhere, without its specks."""
     for part in getattr(region, "geoms", [region]):
-        if isinstance(part, shapely.Polygon) and not part.is_empty:
+        if isinstance(part, shapely.Polygon) and part.area > SPECK:
             if thinner == 0 or not part.buffer(-thinner / 2).is_empty:
                 yield part
         elif hasattr(part, "geoms"):

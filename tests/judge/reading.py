@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import shapely
 from ezdxf.addons import iterdxf
 from shapely import LineString, Polygon
@@ -190,22 +191,21 @@ def _piece(entity: Any) -> Points:
 
 
 def _chains(pieces: Iterable[Points]) -> Iterator[Points]:
-    """Lines and arcs put end to end, in any order and direction."""
-    left = list(pieces)
+    """Lines and arcs put end to end, in any order and direction.
+
+    Pieces may be shorter than JOIN, so each chain starts with the longest and takes what is
+    nearest to its end.
+    """
+    left = sorted(pieces, key=lambda piece: math.dist(piece[0], piece[-1]), reverse=True)
     while left:
         chain = list(left.pop(0))
-        grew = True
-        while grew and math.dist(chain[0], chain[-1]) > JOIN:
-            grew = False
-            for number, piece in enumerate(left):
-                for way in (piece, piece[::-1]):
-                    if math.dist(chain[-1], way[0]) <= JOIN:
-                        chain += way[1:]
-                        del left[number]
-                        grew = True
-                        break
-                if grew:
-                    break
+        while left:
+            ends = np.array([[piece[0], piece[-1]] for piece in left])
+            away = np.hypot(*(ends - chain[-1]).transpose(2, 0, 1))
+            number, side = np.unravel_index(away.argmin(), away.shape)
+            if away[number, side] > min(JOIN, math.dist(chain[0], chain[-1])):
+                break
+            chain += left.pop(int(number))[:: -1 if side else 1][1:]
         yield chain
 
 
