@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from sbafab import actuators
 from sbafab.api.sources import Source, design_of, either_of
-from sbafab.design.reading import Change, template_names, template_text
+from sbafab.design.reading import Change
 from sbafab.design.records import Design
+from sbafab.design.templates import template_names, template_text
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
