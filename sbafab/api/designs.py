@@ -91,8 +91,7 @@ def check(source: Source | Assembly, *changes: Change, **tables: Any) -> Finding
     """What the rule deck finds in a design; of an assembly, also what is found between parts.
 
     Each finding has its limit and worst measured value in its own ``unit``. Raises DesignError for
-    what cannot be built. Limits are the paper's (Sec. 2) where it gives one; ``sbafab.load(...)
-    .rules`` and docs/rules.md say which are ours.
+    what cannot be built. Limits are the paper's (Sec. 2) where it gives one, else ours.
     """
     from sbafab.assemblies.records import Assembly
     from sbafab.output.assembly import check_assembly
