@@ -95,7 +95,7 @@ def check(source: Source | Assembly, *changes: Change, **tables: Any) -> Finding
     """
     from sbafab.assemblies.records import Assembly
     from sbafab.output.assembly import check_assembly
-    from sbafab.output.run import check as run_check
+    from sbafab.output.checking import check as run_check
     from sbafab.rules.finding import Findings
 
     found = either_of(source, changes, tables)
