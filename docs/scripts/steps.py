@@ -7,7 +7,9 @@ import tempfile
 from pathlib import Path
 
 import sbafab
+from sbafab.cutting.svg_write import STROKE
 
+HAIRLINE = f'stroke-width="{STROKE:g}"'
 KEPT = ("preview/solid.png", "preview/layers.svg", "preview/stack.svg", "sheets/TPE_1.svg")
 
 
@@ -25,3 +27,7 @@ def _keep(made: Path, target: Path) -> None:
     target.mkdir()
     for name in KEPT:
         shutil.copyfile(made / name, target / Path(name).name)
+    sheet = target / "TPE_1.svg"
+    # A laser's lines are too fine for a small picture.
+    thicker = sheet.read_text(encoding="utf-8").replace(HAIRLINE, 'stroke-width="0.6"')
+    sheet.write_text(thicker, encoding="utf-8")

@@ -208,6 +208,8 @@ class _Wish(BaseModel):
     volumes_ul: tuple[float, ...]
     press_factor: float
     contact_factor: float
+    pocket_loss: float
+    modulus_mpa: float | None
 
 
 class _Predicted(BaseModel):
@@ -228,7 +230,8 @@ def _prediction_problems(
 
     try:
         told = _Predicted.model_validate_json((folder / "predict.json").read_bytes()).asked
-        factors = Factors(told.press_factor, told.contact_factor)
+        measured = told.pocket_loss, told.modulus_mpa
+        factors = Factors(told.press_factor, told.contact_factor, *measured)
         wish = Asked(told.pressures_kpa, told.flow_ml_min, told.volumes_ul, factors)
         apart = fresh / FOLDER
         apart.mkdir()

@@ -54,7 +54,7 @@ class PartDesign:
 class PlacedPart:
     """A part in its place: ``turn`` about its own axis comes first, ``pose`` is last.
 
-    Only an SBA is ``made`` from a design or bent round a ``radius``.
+    Only an SBA is ``made`` from a design or bent round a ``radius`` in mm.
     """
 
     name: str
@@ -65,6 +65,7 @@ class PlacedPart:
 
     @property
     def turn(self) -> float:
+        """Degrees about its own axis."""
         return self.part.turn
 
     @property
@@ -80,12 +81,12 @@ class PlacedPart:
         raise TypeError(f"{self.name} is placed without its design")
 
     def at(self, p: Vector) -> Vector:
-        """Where a point of the part's own frame lies in the assembly."""
+        """Where a point (x, y, z) in mm of the part's own frame lies in the assembly."""
         p = about_axis(self.turn).at(p)
         return self.pose.at(p if self.radius is None else bent_point(p, self.radius))
 
     def turned(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points (n, 3) turned about the part's own axis, before they are bent or placed."""
+        """Points (n, 3) in mm, turned about the part's own axis before they are bent or placed."""
         return about_axis(self.turn).points(points)
 
 

@@ -57,7 +57,7 @@ class Told(NamedTuple):
     notes: Sequence[str] = ()
     designs: Sequence[Design] = ()
     sizes: Mapping[str, Mapping[str, float]] = {}
-    sizes_said: Sequence[str] = ()
+    sizes_said: Mapping[str, Sequence[str]] = {}
 
 
 @click.command()
@@ -120,7 +120,7 @@ def _checked(asked: CheckRequest) -> bool:
 def _print(told: Told, advice: Advice | None, verbose: bool) -> None:
     from rich.text import Text
 
-    from sbafab.cli.printing import console, print_failed
+    from sbafab.cli.printing import FILES, console, print_failed, print_listed, print_wrapped
     from sbafab.cli.verdicts import print_findings, verdict_said
     from sbafab.design.kits import cited
     from sbafab.rules.deck import has_failed
@@ -128,19 +128,19 @@ def _print(told: Told, advice: Advice | None, verbose: bool) -> None:
     out = console()
     if told.kind == "as-built":
         out.print(f"as built: {told.name}", markup=False, soft_wrap=True)
-    for said in told.sizes_said:
-        out.print(said, markup=False, soft_wrap=True)
+    for name, phrases in told.sizes_said.items():
+        print_listed(f"{name}, size" if len(told.sizes_said) > 1 else "size", phrases)
     # The paper's kit is what everyone has; one's own is told of.
     kits = [cited(design) for design in told.designs if verbose or design.kit != PAPER]
     for said in dict.fromkeys(kits):
-        out.print(said, markup=False, soft_wrap=True)
+        print_wrapped(said)
     for note in told.notes:
-        out.print(f"note: {note}", markup=False, soft_wrap=True)
+        print_wrapped(f"note: {note}")
     print_findings(told.groups, verbose)
     if advice:
-        out.print(advice.sentence, markup=False, soft_wrap=True)
+        print_wrapped(advice.sentence)
     if has_failed(told.findings):
-        change = "files" if told.kind == "as-built" else "design"
+        change = FILES if told.kind == "as-built" else "design"
         print_failed(told.findings, f"{told.name} must not be cut", change)
         return
     more = "" if verbose else "Details: -v"
@@ -203,10 +203,7 @@ def _of_checked(
     designs = [one.design for one in checked]
     groups = groups_of(checked, between)
     measured = {one.design.name: sizes(one.design, one.laminate) for one in checked}
-    said = [
-        f"{f'{one.design.name}, ' if len(checked) > 1 else ''}{size_said(one.design, one.laminate)}"
-        for one in checked
-    ]
+    said = {one.design.name: size_said(one.design, one.laminate) for one in checked}
     return Told("design", name, findings, groups, notes_of(checked), designs, measured, said)
 
 

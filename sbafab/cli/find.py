@@ -146,11 +146,13 @@ def _from(name: str, asked: dict[str, Any], tell: Progress) -> FoundDesign:
 
 
 def _as_json(found: FoundDesign, started: str, target: Path) -> dict[str, Any]:
+    from sbafab.output.schemas import FIND_SCHEMA
+
     def shown(trial: Trial) -> dict[str, Any]:
         return {"keys": dict(trial.values), "figures": dict(trial.figures)}
 
     return {
-        "schema": "sbafab/find@1",
+        "schema": FIND_SCHEMA,
         "holds": found.holds,
         "file": str(target) if found.holds else None,
         "started_from": started,

@@ -11,14 +11,7 @@ from sbafab.cli.quantities import FLOW, PRESSURE, VOLUME
 from sbafab.cli.working import RULE_FAILED
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from sbafab.assemblies.records import Assembly
-    from sbafab.models.figures import Prediction
-
-
-WIDE = 110
-"""Columns from which on a figure's row names its model; the list below it does so anyway."""
 
 
 @click.command()
@@ -91,7 +84,8 @@ def predict(
     """
     from sbafab.assemblies.reading import load
     from sbafab.assemblies.records import Assembly
-    from sbafab.cli.printing import print_json, shown_progress
+    from sbafab.cli.printing import print_json, print_listed, shown_progress
+    from sbafab.cli.printing_prediction import print_prediction
     from sbafab.errors import OutputError
     from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict as predicted
@@ -105,22 +99,23 @@ def predict(
         _predict_assembly(design, request, pressures[0] if pressures else 10.0, load_g)
         return
     wish = Asked(pressures or Asked.pressures_kpa, flow, volumes, Factors(**factors))
-    found = predicted(design, wish)
     with shown_progress(request.as_json) as tell:
+        tell("predicting", 0, 1)
+        found = predicted(design, wish)
         extras = Extras(also=with_prediction(design, found), own=PREDICTION)
         try:
             run = generate(design, request.out, (), tell, extras=extras)
         except OutputError:
             # What was asked is known, only not written.
             if not request.as_json:
-                _print(found)
+                print_prediction(found)
             raise
     failed = sorted({finding.rule for finding in run.findings if finding.verdict == "fail"})
     if request.as_json:
         print_json({**prediction_json(design, found), "failed": failed, "folder": str(run.folder)})
     else:
-        click.echo(size_said(design, run.laminate))
-        _print(found)
+        print_listed("size", size_said(design, run.laminate))
+        print_prediction(found)
         if not run.failed:
             click.echo(f"written to {run.folder}: predict.json, predict/")
     if run.failed:
@@ -147,62 +142,3 @@ def _predict_assembly(
         print_assembly_prediction(found)
     if found.touches:
         click.get_current_context().exit(RULE_FAILED)
-
-
-def _print(found: Prediction) -> None:
-    """The table, with a number for each model, and below what the numbers stand for."""
-    from rich.text import Text
-
-    from sbafab.cli.printing import console
-
-    models = list(dict.fromkeys(figure.model for figure in found.figures))
-    out = console()
-    out.print(_table(found, models, out.width >= WIDE))
-    out.print()
-    out.print(Text("Models and validity", style="bold"))
-    notes = _grid()
-    for number, model in enumerate(models, start=1):
-        notes.add_row(Text(f"[{number}]"), Text(f"{model.title}: {model.trust}"))
-    out.print(notes)
-    if found.left_out:
-        out.print()
-        out.print(Text("Left out", style="bold"))
-        left = _grid()
-        for item in found.left_out:
-            left.add_row("-", Text(f"{item.name}: {item.reason}"))
-        out.print(left)
-    out.print()
-
-
-def _table(found: Prediction, models: list[Any], named: bool) -> Table:
-    """The figures, each with the number of its model, and its name where there is room."""
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("", no_wrap=True)
-    table.add_column("figure", ratio=1)
-    table.add_column("value", justify="right", no_wrap=True)
-    table.add_column("unit", no_wrap=True)
-    table.add_column("model", no_wrap=True)
-    group = ""
-    for figure in found.figures:
-        number = models.index(figure.model) + 1
-        table.add_row(
-            figure.group if figure.group != group else "",
-            Text(figure.name),
-            f"{figure.value:.4g}",
-            figure.unit,
-            Text(f"[{number}] {figure.model.name}" if named else f"[{number}]"),
-        )
-        group = figure.group
-    return table
-
-
-def _grid() -> Table:
-    from rich.table import Table
-
-    grid = Table.grid(padding=(0, 1))
-    grid.add_column(no_wrap=True)
-    grid.add_column(ratio=1)
-    return grid

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -26,6 +27,10 @@ LEFT_AS_IT_WAS = (
     "is unchanged: it holds an earlier design or version; with "
     "--set name=NAME this one gets its findings and pictures into a folder of its own"
 )
+FILES = "files"
+"""What is to be changed where a folder was checked."""
+KEPT = "\u00a0"
+"""A space at which no line is broken."""
 COLOURS = {"pass": "green", "fail": "bold red", "waived": "yellow", "warn": "yellow"}
 
 
@@ -44,6 +49,36 @@ def console() -> Console:
             raise BrokenPipeError
 
     return Told(highlight=False, soft_wrap=False)
+
+
+def print_listed(label: str, phrases: Sequence[str]) -> None:
+    """``label: one, two, three``, over several lines where one would be too long, none torn."""
+    from rich.text import Text
+
+    out = console()
+    line = f"{label}: {phrases[0]}"
+    for phrase in phrases[1:]:
+        if len(f"{line}, {phrase},") > out.width:
+            out.print(Text(f"{line},"), soft_wrap=True)
+            line = f"{' ' * len(label)}  {phrase}"
+        else:
+            line += f", {phrase}"
+    out.print(Text(line), soft_wrap=True)
+
+
+def print_wrapped(said: str, style: str = "") -> None:
+    """A sentence, broken between words where it is longer than a line; the rest indented.
+
+    Words joined by ``KEPT`` stay on one line.
+    """
+    from rich.text import Text
+
+    out = console()
+    broken = textwrap.wrap(
+        said, out.width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
+    )
+    for line in broken:
+        out.print(Text(line.replace(KEPT, " "), style=style), soft_wrap=True)
 
 
 @contextmanager
@@ -133,16 +168,16 @@ def add_batch(table: Table, run: Run) -> None:
 
 
 def print_failed(findings: Iterable[Finding], written: str, change: str) -> None:
-    """What failed, what was ``written`` all the same, and the two ways on."""
-    from rich.text import Text
+    """What failed, what was ``written`` all the same, and the two ways on.
 
+    What lies on disk cannot be waived: its design can.
+    """
     failed = sorted({finding.rule for finding in findings if finding.verdict == "fail"})
-    words = (
-        f"{written}: {', '.join(failed)} failed. Change the {change} (sbafab explain {failed[0]}), "
-        f"or waive by name: {' '.join(f'--waive {name}' for name in failed)}"
-    )
-    out = console()
-    out.print(Text(words, style="bold red"), soft_wrap=True)
+    explain = f"sbafab explain {failed[0]}".replace(" ", KEPT)
+    waive = " ".join(f"--waive{KEPT}{name}" for name in failed)
+    other = f"waive by name: {waive}" if change != FILES else "regenerate the folder"
+    words = f"{written}: {', '.join(failed)} failed. Change the {change} ({explain}), or {other}"
+    print_wrapped(words, "bold red")
 
 
 def _figure(value: float | None, unit: str) -> str:
@@ -175,7 +210,7 @@ def print_verdict(run: Run, change: str) -> None:
     out = console()
     groups = groups_of(run.checked, run.between)
     for group in groups:
-        print_open(group.findings, out.width)
+        print_open(group.findings)
     if run.failed:
         print_failed(run.findings, "No cut files were written", change)
         if run.kept:
@@ -199,7 +234,7 @@ def print_job(job: Run) -> None:
         if one.failed:
             out.print()
             out.print(Text(one.design.name, style="bold red"))
-            print_open(one.findings, out.width)
+            print_open(one.findings)
     if job.failed:
         every = (finding for one in job.checked for finding in one.findings)
         print_failed(every, f"Nothing was written; {job.folder} is as it was", "designs")

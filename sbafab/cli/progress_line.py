@@ -22,6 +22,8 @@ FIRST_LINE = 5.0
 EVERY = 10.0
 """Seconds between two plain lines."""
 EVERY_VERBOSE = 1.0
+APPEARS = 1.0
+"""Seconds after which a line appears on a terminal: what is done before needs none."""
 TELLING = 1.0
 """Seconds of a stage after which its pace says something of what is left."""
 
@@ -69,6 +71,11 @@ class Pace:
         if not 0 < self.done <= self.total or self.in_stage < TELLING:
             return None
         return self.in_stage * (self.total - self.done) / self.done
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether there is work enough for a line that comes and goes on a terminal."""
+        return self.gone >= APPEARS
 
     @property
     def said(self) -> str:
@@ -135,7 +142,10 @@ def live_line() -> Iterator[Progress]:
     spinner = Spinner("dots")
 
     def line() -> Any:
-        spinner.update(text=Text(stages.pace().said))
+        pace = stages.pace()
+        if not pace.is_shown:
+            return Text("")
+        spinner.update(text=Text(pace.said))
         return spinner
 
     # Drawn anew four times a second, so that the clock goes on while nothing is told.

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import click
 
-FORMATS = ("design", "checks", "manifest", "assembly", "error")
+FORMATS = (
+    *("design", "checks", "manifest", "job", "assembly"),
+    *("press", "predict", "find", "error"),
+)
 """As in ``sbafab.output.schemas``, whose imports would slow ``--help`` down."""
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from sbafab.cli.printing import COLOURS, console, findings_table
+from sbafab.cli.printing import COLOURS, console, findings_table, print_wrapped
 
 if TYPE_CHECKING:
     from sbafab.output.planned import Checked
@@ -31,7 +30,6 @@ def groups_of(
 def print_findings(groups: Sequence[Group], verbose: bool = False) -> None:
     """A line for every rule; for several groups, and below, what needs something done."""
     out = console()
-    width = out.width
     for group in groups:
         if len(groups) > 1:
             out.print(f"{group.name}: {counted(group.findings)}", style="bold", markup=False)
@@ -40,7 +38,7 @@ def print_findings(groups: Sequence[Group], verbose: bool = False) -> None:
             continue
         if len(groups) == 1:
             print_lines(group.findings)
-        print_open(group.findings, width)
+        print_open(group.findings)
 
 
 def print_lines(findings: Sequence[Finding]) -> None:
@@ -62,16 +60,11 @@ def print_lines(findings: Sequence[Finding]) -> None:
         out.print(line, soft_wrap=True)
 
 
-def print_open(findings: Sequence[Finding], width: int = 80) -> None:
+def print_open(findings: Sequence[Finding]) -> None:
     """What to do about each warning, and what is wrong in each failure."""
-    from rich.text import Text
-
-    out = console()
     # Bond and overhang may ask for the same.
     for said, verdict in dict.fromkeys(_told(findings)):
-        lines = textwrap.wrap(said, width, subsequent_indent="  ", break_on_hyphens=False)
-        for line in lines:
-            out.print(Text(line, style=COLOURS[verdict]), soft_wrap=True)
+        print_wrapped(said, COLOURS[verdict])
 
 
 def _told(findings: Sequence[Finding]) -> Iterator[tuple[str, Verdict]]:

@@ -55,7 +55,10 @@ class Measurement:
 
 
 class Value(NamedTuple):
-    """A value, its standard uncertainty and the half width of its 95 % interval."""
+    """A value, its standard uncertainty and the half width of its 95 % interval.
+
+    ``value``, ``uncertainty`` and ``half_width`` are mm of a kerf; a scale's are a ratio.
+    """
 
     value: float
     uncertainty: float
@@ -63,9 +66,11 @@ class Value(NamedTuple):
 
     @property
     def interval(self) -> tuple[float, float]:
+        """The 95 % interval, in the unit of the value."""
         return self.value - self.half_width, self.value + self.half_width
 
     def differs_from(self, other: float) -> bool:
+        """Whether the interval leaves ``other`` out."""
         return abs(self.value - other) > self.half_width
 
 
@@ -83,6 +88,7 @@ class Estimate:
 
     @property
     def is_scaled(self) -> bool:
+        """Whether the sizes show a scale other than 1."""
         return self.scale is not None and self.scale.differs_from(1.0)
 
     @property
@@ -111,6 +117,7 @@ class Calibration:
 
     @property
     def differs(self) -> bool:
+        """Whether the kerf along x is another one than along y."""
         return self.difference is not None and self.difference.differs_from(0.0)
 
 

@@ -236,7 +236,7 @@ class Region:
 
     @cached_property
     def bounds(self) -> Bounds:
-        """Least x, least y, largest x, largest y."""
+        """Least x, least y, largest x, largest y, mm."""
         return _join([contour.bounds for contour in self.contours])
 
     @property
@@ -245,10 +245,12 @@ class Region:
 
     @cached_property
     def outers(self) -> tuple[Contour, ...]:
+        """The outer contours, counter-clockwise."""
         return tuple(contour for contour in self.contours if not contour.is_hole)
 
     @cached_property
     def holes(self) -> tuple[Contour, ...]:
+        """The contours of holes, clockwise."""
         return tuple(contour for contour in self.contours if contour.is_hole)
 
     @cached_property
@@ -319,7 +321,7 @@ class Region:
         return sum(contour.winding(p) for contour in self.contours) > 0
 
     def distance_to_edge(self, p: Point) -> float:
-        """Least distance from ``p`` to any edge."""
+        """Least distance in mm from ``p`` to any edge."""
         if len(self.edges) < MANY:
             return min((distance_to(edge, p) for edge in self.edges), default=math.inf)
         return self.index.distance(p)
@@ -370,6 +372,7 @@ class Region:
         return Region(tuple(map(mapped_contour, self.contours)))
 
     def moved(self, dx: float, dy: float) -> Region:
+        """The region moved by so many mm along x and y."""
         return self.mapped(lambda p: (p[0] + dx, p[1] + dy), 1.0, False)
 
     def turned(self, degrees: float, about: Point = (0.0, 0.0)) -> Region:
@@ -406,7 +409,7 @@ class Region:
         return {"type": "MultiPolygon", "coordinates": rings}
 
     def polygons(self, sagitta: float = 0.001) -> list[list[list[Point]]]:
-        """Each piece as rings of points, outer first; chords within ``sagitta`` of the arcs."""
+        """Each piece as rings of points, outer first; chords within ``sagitta`` mm of the arcs."""
         return [
             [contour.polygon(sagitta) for contour in sorted(piece.contours, key=_outer_first)]
             for piece in self.pieces

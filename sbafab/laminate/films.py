@@ -13,8 +13,8 @@ FilmKind = Literal["structural", "mask"]
 FIRST: tuple[Material, ...] = ("TPE", "PTFE")
 """The films that every design knows; lists begin with them."""
 PTFE_WARNING = (
-    "Hot PTFE gives off toxic fumes (COF2, HF): cut it with a laser only on a machine whose owner "
-    "permits PTFE, or use a drag knife."
+    "Extract the fumes: hot PTFE gives off toxic COF2 and HF. Cut it with a laser only on a "
+    "machine whose owner permits PTFE, or use a drag knife."
 )
 
 
@@ -26,9 +26,9 @@ PAPER_TPE = (10.0, 0.2)
 class Film:
     """A film as it comes off the roll.
 
-    ``thickness`` mm, ``density`` kg/m3. ``softens_above`` is what the film bonds at (the melting
-    point of a TPE; None for one that stays solid and bonds to what melts on it), ``limit`` the
-    temperature it must not exceed; both in C. ``shade`` counts the films of a kind,
+    ``thickness`` mm, ``density`` kg/m3. ``softens_above`` is the temperature in C at which the film
+    bonds (the melting point of a TPE; None for one that stays solid and bonds to what melts on it),
+    ``limit`` the one in C that it must not exceed. ``shade`` counts the films of a kind,
     for colours; ``warning`` is what its cut files say; ``elastic`` are Young's modulus in MPa and
     Poisson's ratio, for simulators.
     """
@@ -46,6 +46,7 @@ class Film:
 
     @property
     def is_mask(self) -> bool:
+        """Whether nothing bonds to it."""
         return self.kind == "mask"
 
 

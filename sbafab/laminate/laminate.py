@@ -54,6 +54,7 @@ class Layer:
 
     @property
     def is_mask(self) -> bool:
+        """Whether nothing bonds to it."""
         return self.film.is_mask
 
     def _repr_html_(self) -> str:
@@ -64,7 +65,10 @@ class Layer:
 
 @dataclass(frozen=True)
 class Bore:
-    """A channel bore: the opening that joins the balloons of one chamber, held by a dowel pin."""
+    """A channel bore: the opening that joins the balloons of one chamber, held by a dowel pin.
+
+    ``centre`` (x, y) and ``diameter`` are mm.
+    """
 
     chamber: str
     centre: Point
@@ -75,8 +79,8 @@ class Bore:
 class Chamber:
     """A chamber: balloons that share one inlet.
 
-    ``centres`` holds a point inside the pocket of every stack the chamber feeds: one, or several
-    where pockets are joined by a manifold.
+    ``centres`` holds a point (x, y) in mm inside the pocket of every stack the chamber feeds: one,
+    or several where pockets are joined by a manifold.
     """
 
     name: str
@@ -104,7 +108,8 @@ class Inlet:
 class Pin:
     """A dowel pin of the press fixture; it holds every layer with an opening at its place.
 
-    ``clearance``: by how much the layers' hole for it is wider than the pin.
+    ``centre`` (x, y) and ``diameter`` are mm, like ``clearance``, by how much the layers' hole for
+    it is wider than the pin.
     """
 
     name: str
@@ -114,7 +119,7 @@ class Pin:
 
     @property
     def hole(self) -> float:
-        """Diameter of the layers' hole for the pin."""
+        """Diameter of the layers' hole for the pin, mm."""
         return self.diameter + self.clearance
 
 
@@ -125,7 +130,8 @@ class Laminate:
     ``outline`` is that of the films of all balloons laid over each other, without inlet tabs and
     ears; empty where only the layers are known. ``pins_in_full_bonds``: whether the pins of ears
     stay in while TPE melts. ``panel``: the registered sheets that it is made in, if it is.
-    ``tube``: outer diameter in mm of the tube that its sheet is wrapped round, if it is.
+    ``tube``: outer diameter in mm of the tube that its sheet is wrapped round, if it is; ``lumen``
+    that of the channel through all layers, mm.
     """
 
     name: str
@@ -194,6 +200,7 @@ class Laminate:
 
     @cached_property
     def bounds(self) -> Bounds:
+        """Least x, least y, largest x, largest y of all layers, mm."""
         boxes = [layers[0].profile.bounds for layers in self.patterns.values()]
         return (
             min(box[0] for box in boxes),

@@ -311,7 +311,7 @@ def _downhill(
 def _compressed(balloon: Balloon, r: Array, z: Array) -> Array:
     """Length in mm along the film, neck and rim apart, over which the smooth hoop is compressed."""
     strains = strain(balloon.film, r, z)
-    is_film = balloon.may_wrinkle & ~balloon.inextensible
+    is_film = balloon.may_wrinkle & (not balloon.inextensible)
     pressed = (strains.hoop + balloon.poisson * strains.meridian < 0) & is_film
     shortest = balloon.film.lengths.min()
     return np.asarray(np.maximum((pressed * balloon.film.lengths).sum(-1), shortest))

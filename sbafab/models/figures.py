@@ -32,7 +32,7 @@ class Model:
 
 @dataclass(frozen=True)
 class Figure:
-    """One predicted number; ``group`` gathers what belongs together in a table."""
+    """One predicted number: ``value`` in ``unit``; ``group`` gathers what belongs together."""
 
     group: str
     name: str
@@ -53,7 +53,10 @@ class Figure:
 
 @dataclass(frozen=True)
 class Trace:
-    """A predicted curve; without a model, what the paper measured along it."""
+    """A predicted curve; without a model, what the paper measured along it.
+
+    The unit of ``x`` and that of ``y`` stand in the labels of the relation.
+    """
 
     label: str
     x: Sequence[float]
@@ -63,7 +66,10 @@ class Trace:
 
 @dataclass(frozen=True)
 class Points:
-    """What the paper measured, each +- its error (0 where it gives none)."""
+    """What the paper measured, each +- its error (0 where it gives none).
+
+    The unit of ``x`` and that of ``y`` and its ``error`` stand in the labels of the relation.
+    """
 
     label: str
     x: Sequence[float]
@@ -166,7 +172,7 @@ class Prediction:
     left_out: tuple[LeftOut, ...]
 
     def value(self, name: str, model: str = "") -> float:
-        """The value of the figure with this name, by the model whose title begins so.
+        """The value, in its figure's unit, of this name by the model whose title begins so.
 
         Raises KeyError where there is none, or where several models give one and none is named.
         """

@@ -29,8 +29,10 @@ CLOSE = 1e-5
 class Motion:
     """A stack that moves: call ``step``, look at ``pose``, ``time`` and ``sources``.
 
-    Quasi-static: film and fluid have no inertia. ``load`` holds what ``Stack.pose`` takes beside
-    pressures. A gas that is pumped fills the line's dead volume and tube as well.
+    ``time`` is in s, ``sources`` the pressure in kPa at each chamber's valve or pump; ``line`` is
+    what feeds them. Quasi-static: film and fluid have no inertia. ``load`` holds what
+    ``Stack.pose`` takes beside pressures. A gas that is pumped fills the line's dead volume and
+    tube as well.
     """
 
     stack: Stack

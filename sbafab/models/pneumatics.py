@@ -21,7 +21,7 @@ TUBE_LENGTH = 150.0
 
 @dataclass(frozen=True)
 class Fluid:
-    """Viscosity in kPa s, density in kg/mm3 x 1e-9 (kg/m3), at 20 C, and whether it is a gas."""
+    """A fluid at 20 C: ``viscosity`` in kPa s, ``density`` in kg/m3, and whether it is a gas."""
 
     name: str
     viscosity: float
@@ -38,8 +38,9 @@ FLUIDS = {"water": WATER, "air": AIR}
 class Line:
     """The line to each chamber.
 
-    ``length`` and ``diameter`` of its tube; ``dead_volume`` ul between pump and tube (syringe,
-    valve, fittings), where a gas is squeezed before it flows; ``delay`` s until valve or pump act.
+    ``length`` and inner ``diameter`` of its tube in mm; ``dead_volume`` ul between pump and tube
+    (syringe, valve, fittings), where a gas is squeezed before it flows; ``delay`` s until valve or
+    pump act.
     """
 
     fluid: Fluid = AIR
@@ -76,7 +77,7 @@ class Line:
         return math.copysign(min(laminar, turbulent), drop)
 
     def source_pressure(self, flow: float, chamber: float) -> float:
-        """Pressure at the pump that drives a flow into a chamber."""
+        """Pressure in kPa at the pump that drives a flow (ul/s) into a chamber (kPa)."""
         low, high = chamber, chamber + 1.0
         while self.flow(high, chamber) < flow:
             high = chamber + 2 * (high - chamber)

@@ -53,8 +53,8 @@ def inflated_diameter(form: Form, laminate: Laminate) -> float | None:
     return form.wrap.tube_diameter + 2 * (height + laminate.thickness)
 
 
-def size_said(design: Design, laminate: Laminate) -> str:
-    """The size in one line: across with what stands out of it, without, flat, and its height."""
+def size_said(design: Design, laminate: Laminate) -> tuple[str, ...]:
+    """The size in phrases: across with what stands out of it, without, flat, and its height."""
     found = sizes(design, laminate)
     said = []
     if "overall_diameter" in found:
@@ -66,4 +66,4 @@ def size_said(design: Design, laminate: Laminate) -> str:
         said.append(f"{found['deflated_diameter']:.2f} mm round its tube")
     flat = "flat, " if design.form.wrap is not None else ""
     said.append(f"{flat}{found['width']:.2f} x {found['length']:.2f} mm")
-    return f"size: {', '.join(said)}, folded height {laminate.thickness:.3f} mm"
+    return (*said, f"folded height {laminate.thickness:.3f} mm")

@@ -67,17 +67,19 @@ class Plate:
 
     @classmethod
     def at(cls, height: float) -> Plate:
+        """A level plate so many mm above the base."""
         return cls((0.0, 0.0, height))
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """A stack in balance.
+    """A stack in balance at ``pressures`` (kPa, one a chamber).
 
-    ``freedoms`` (levels, 3) are rise in mm and tilt in rad of each level; ``gaps`` (levels,
-    chambers) by how many mm each balloon has risen at its own centre; ``volumes`` ul a chamber;
-    ``force`` N on the outer plate; ``energy`` uJ stored in the films. Where
-    it is not ``stable`` it stands as a straight column does that would rather buckle.
+    ``pitch`` is the height of a flat level in mm, ``freedoms`` (levels, 3) are rise in mm and tilt
+    in rad of each level; ``gaps`` (levels, chambers) by how many mm each balloon has risen at its
+    own centre; ``volumes`` ul a chamber; ``force`` N on the outer plate; ``energy`` uJ stored in
+    the films. Where it is not ``stable`` it stands as a straight column does that would rather
+    buckle.
     """
 
     pressures: tuple[float, ...]
@@ -140,6 +142,7 @@ class Stack:
 
     @property
     def chambers(self) -> int:
+        """How many chambers it has."""
         return len(self.axes)
 
     @property

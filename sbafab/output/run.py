@@ -91,14 +91,17 @@ class Run:
 
     @property
     def laminate(self) -> Laminate:
+        """The laminate, that of the first design of several."""
         return self.checked[0].laminate
 
     @property
     def schedule(self) -> Schedule | None:
+        """The press schedule, of the first design of several; None where nothing was written."""
         return self.batch.designs[0].pressing if self.batch is not None else None
 
     @property
     def conforming(self) -> ConformingMeshes | None:
+        """The volume and shell meshes, where they were asked for."""
         return self.batch.designs[0].conforming if self.batch is not None else None
 
     @property

@@ -10,6 +10,7 @@ from typing import Any
 from sbafab.pressing.dowels import PinSetting
 from sbafab.pressing.schedule import Schedule, named
 
+PRESS_SCHEMA = "sbafab/press@1"
 COLUMNS = (
     "step",
     "title",
@@ -37,6 +38,7 @@ COLUMNS = (
 def press_json(plan: Schedule) -> dict[str, Any]:
     """The schedule as ``press.json`` holds it."""
     return {
+        "schema": PRESS_SCHEMA,
         "steps": [_plain(asdict(step)) for step in plan.steps],
         "total_press_minutes": plan.total_press_minutes,
         "estimated_build_minutes": plan.estimated_build_minutes,

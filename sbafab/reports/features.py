@@ -18,7 +18,11 @@ MOST_RADII = 3
 
 @dataclass(frozen=True)
 class Circle:
-    """A circle or arc to point at, and the words for all of its kind."""
+    """A circle or arc to point at, and the words for all of its kind.
+
+    ``centre`` and ``radius`` are mm, like ``toward``, the point of an arc to point at; a
+    ``phantom`` is not an edge of the profile.
+    """
 
     words: str
     centre: Point
@@ -29,7 +33,7 @@ class Circle:
 
 @dataclass(frozen=True)
 class WidthDimension:
-    """A width to draw across, from ``start`` to ``end``."""
+    """A width to draw across, from ``start`` to ``end`` in mm, and its words."""
 
     words: str
     start: Point

@@ -97,6 +97,7 @@ class Record(LabResult):
     corrects: int | None = None
 
     def as_dict(self) -> dict[str, Any]:
+        """The record for JSON; units stand in the keys."""
         plain = {f.name: getattr(self, f.name) for f in fields(self)}
         return {**plain, "errors": {name: list(found) for name, found in self.errors.items()}}
 

@@ -45,9 +45,10 @@ class Success:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The mean of a quantity of a design against what was predicted; ``interval`` of the mean.
+    """The mean of a quantity of a design against what was predicted, all in ``unit``.
 
-    ``low``, ``high`` are None for a single measurement, ``predicted`` where no model gives it.
+    ``mean`` is that of ``count`` actuators in ``unit``; ``low`` and ``high``, its 95 % interval in
+    this unit, are None for a single measurement, ``predicted`` (same unit) where no model gives it.
     """
 
     design: str
@@ -67,6 +68,7 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
+        """Whether the prediction lies in the interval of the mean, in words."""
         if self.predicted is None:
             return "not predicted"
         if self.low is None or self.high is None:
@@ -78,7 +80,8 @@ class Comparison:
 class Tolerance:
     """Measured errors against the tolerance that designs built with a kit state.
 
-    ``operator`` whose hand it was; "" for the laser, which cuts alike for all.
+    ``stated`` is the design's key in ``unit``, ``found`` what was measured. ``operator`` whose hand
+    it was; "" for the laser, which cuts alike for all.
     """
 
     kit: str
@@ -91,6 +94,7 @@ class Tolerance:
 
     @property
     def verdict(self) -> str:
+        """Whether the stated tolerance holds, in words."""
         if self.found.largest > self.stated:
             return "too small"
         return "holds" if self.stated <= self.found.highest else "wider than needed"
@@ -98,7 +102,7 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Promise:
-    """Success of a design against its registration-yield, the share that keeps every limit."""
+    """Success of a design against the share ``promised`` (rule registration-yield)."""
 
     design: str
     success: Share
@@ -106,6 +110,7 @@ class Promise:
 
     @property
     def verdict(self) -> str:
+        """Whether success agrees with what the tolerances promise, in words."""
         low, high = self.success.interval
         if high < self.promised:
             return "fewer hold than the tolerances promise"
@@ -124,6 +129,7 @@ class Report:
     promises: tuple[Promise, ...]
 
     def as_dict(self) -> dict[str, Any]:
+        """The report for JSON; every value has its unit beside it or is a share."""
         return {
             "records": self.records,
             "actuators": self.items,

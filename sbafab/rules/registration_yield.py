@@ -41,10 +41,12 @@ class Share(NamedTuple):
 
     @property
     def value(self) -> float:
+        """The share of good builds."""
         return self.good / self.builds
 
     @property
     def interval(self) -> tuple[float, float]:
+        """Wilson's interval of 95 % of the share."""
         n, p, z = self.builds, self.value, Z95
         middle = (p + z * z / (2 * n)) / (1 + z * z / n)
         half = z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n)

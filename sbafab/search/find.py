@@ -66,7 +66,7 @@ class Binding:
 
 @dataclass(frozen=True)
 class Spare:
-    """A rule whose worst value keeps its limit with nothing to spare, and where that is."""
+    """A rule whose worst value, ``measured`` in ``unit``, has nothing to spare, and where."""
 
     rule: str
     measured: float
@@ -90,6 +90,7 @@ class FoundDesign:
 
     @property
     def holds(self) -> bool:
+        """Whether the best design meets all and every rule passes."""
         return self.best.holds
 
     @property
@@ -108,6 +109,7 @@ class FoundDesign:
 
     @property
     def missed(self) -> list[str]:
+        """What the best design breaks, a sentence each; empty where it holds."""
         return misses(self.wanted, self.best)
 
 

@@ -30,8 +30,10 @@ Steps = tuple[int, ...]
 class Trial:
     """A design with what was found of it. ``rules`` is None where they were not asked.
 
+    ``values`` are those of the free keys, ``figures`` by quantity in its unit: mm, N, g or a share.
     ``missed`` is by what share requirements and rules are missed, all together; 0 where none is.
-    ``refused`` says why no such design can be made.
+    ``cost``, in the unit of what is best, is the less the better. ``refused`` says why no such
+    design can be made.
     """
 
     values: Mapping[str, Any]
@@ -44,14 +46,16 @@ class Trial:
 
     @property
     def holds(self) -> bool:
+        """Whether nothing is missed and it can be made."""
         return self.missed == 0.0 and not self.refused
 
     @property
     def rank(self) -> tuple[float, float]:
-        """The less, the better."""
+        """What is missed as a share, then the cost; the less, the better."""
         return self.missed, self.cost
 
     def value(self, requirement: Requirement | Goal) -> float:
+        """The figure that a requirement or the goal is about, in its unit."""
         return self.figures[requirement.quantity.said]
 
 

@@ -49,9 +49,9 @@ class Wish:
 
 @dataclass(frozen=True)
 class Result:
-    """What a run found: label, value and unit to print; all of it; one sentence if it ended early.
+    """What a run found: ``rows`` to print of label, value and unit; ``figures`` holds all of it.
 
-    What it found until then holds.
+    ``stopped`` is one sentence if it ended early; what it found until then holds.
     """
 
     rows: tuple[tuple[str, float, str], ...]

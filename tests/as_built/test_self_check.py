@@ -19,7 +19,7 @@ from sbafab.cutting.dxf_write import Curves, dxf_text
 from sbafab.cutting.order import cutting_order
 from sbafab.errors import DefectError, OutputError
 from sbafab.geometry.region import Region
-from sbafab.models.figures import Asked
+from sbafab.models.figures import Asked, Factors
 from sbafab.models.prediction import predict
 from sbafab.nesting.bottom_left import bottom_left
 from sbafab.nesting.records import NestPart, Placement, Stock
@@ -114,7 +114,7 @@ def as_designed(folder: Path) -> list[str]:
 
 def test_a_prediction_is_asked_for_again(tmp_path: Path) -> None:
     design = load_design("1dof-5mm", FEW)
-    wish = Asked(volumes_ul=(5.0,))
+    wish = Asked(volumes_ul=(5.0,), calibration=Factors(0.9, 1.1, 0.1, 12.0))
     extras = Extras(also=with_prediction(design, predict(design, wish)))
     generate(design, tmp_path, ("cut",), extras=extras)
     doctor = Doctor(tmp_path / "1dof-5mm")

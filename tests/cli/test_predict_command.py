@@ -11,6 +11,7 @@ import pytest
 import sbafab
 from sbafab.cli import main
 from sbafab.output.run import generate
+from tests.site.formats import hold
 
 
 def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
@@ -26,12 +27,12 @@ def test_writes_figures_and_plots_that_the_manifest_lists(
     code, out, _ = run(["3dof-15mm", "-o", str(tmp_path), "--volume", "5"], capsys)
     assert code == 0
     assert "0.9353  s" in out
+    _table_reads_well(out)
     assert "geometric regime only" in " ".join(out.split())
     folder = tmp_path / "3dof-15mm"
     found = json.loads((folder / "predict.json").read_text(encoding="utf-8"))
-    assert found["schema"] == "sbafab/predict@1"
+    hold("predict", found)
     for figure in found["figures"]:
-        assert set(figure) == {"group", "name", "value", "unit", "model", "trust"}
         assert all(figure[key] for key in ("name", "unit", "model", "trust"))
     plots = {relation["plot"] for relation in found["relations"]}
     assert plots == {
@@ -42,6 +43,21 @@ def test_writes_figures_and_plots_that_the_manifest_lists(
     for path in (*plots, "predict.json"):
         digest = hashlib.sha256((folder / path).read_bytes()).hexdigest()
         assert manifest["files"][path] == digest
+
+
+def _table_reads_well(out: str) -> None:
+    """No line is longer than 80, each model's figures stand below its name, and none is doubled."""
+    lines = out.splitlines()
+    assert max(len(line) for line in lines if "written to" not in line) <= 80
+    heads = [place for place, line in enumerate(lines) if line.startswith("force: ")]
+    assert [lines[place] for place in heads] == [
+        "force: virtual work on Eq. 4 [10]",
+        "force: virtual work on Eqs. 1-3 [11]",
+        "force: elastic stack [12]",
+    ]
+    first, second = (" ".join(lines[heads[0] + row].split()) for row in (1, 2))
+    assert first == "blocked force at 10 kPa, flat 0.3927 N"
+    assert second.startswith("at 25 % of full stroke")
 
 
 def test_json_is_what_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

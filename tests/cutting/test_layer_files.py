@@ -91,6 +91,7 @@ def test_ptfe_carries_the_fume_warning(laminate: Laminate, tmp_path: Path) -> No
     base, mask, _ = written(laminate, tmp_path, SETTINGS)
     properties = read_profile(tmp_path / mask.path).properties
     assert properties["WAIVED"] == "none"
+    assert properties["WARNING"].startswith("Extract the fumes: ")
     for word in ("COF2", "HF", "permits", "drag knife"):
         assert word in properties["WARNING"]
     assert "safe" not in properties["WARNING"].lower()

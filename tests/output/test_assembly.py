@@ -20,6 +20,7 @@ from sbafab.cutting.dxf_read import read_profile
 from sbafab.output.assembly import generate_assembly
 from sbafab.output.manifest import file_hashes
 from sbafab.output.run import Run
+from tests.site.formats import hold
 
 SMALL = [f"parts.{name}.set.stack.balloons=2" for name in ("left", "right", "head")]
 BRACE = ["parts.arm.set.stack.balloons=2"]
@@ -75,7 +76,7 @@ def test_the_solid_has_a_node_a_part_at_true_size(brace: Run) -> None:
 
 def test_the_manifest_tells_parts_and_places(brace: Run) -> None:
     told = json.loads((brace.folder / "manifest.json").read_text(encoding="utf-8"))
-    assert told["schema"] == "sbafab/assembly@1"
+    hold("assembly", told)
     parts = {part["name"]: part for part in told["parts"]}
     assert parts["arm"]["shift"] == [0, 0, 40]
     assert parts["grip"]["bent_radius"] == 7.5

@@ -14,6 +14,7 @@ from sbafab.errors import DesignError
 from sbafab.output.job import generate_job
 from sbafab.output.manifest import file_hashes
 from sbafab.output.run import Run
+from tests.site.formats import hold
 
 
 def designs(*assignments: str) -> list[Design]:
@@ -58,7 +59,7 @@ def test_the_sheets_hold_every_layer_of_every_design_as_often_as_ordered(job: Ru
 
 def test_the_manifest_lists_designs_sheets_and_files(job: Run) -> None:
     told = json.loads((job.folder / "manifest.json").read_text(encoding="utf-8"))
-    assert told["schema"] == "sbafab/job@1"
+    hold("job", told)
     assert [(one["name"], one["copies"]) for one in told["designs"]] == [
         ("1dof-5mm", 2),
         ("3dof-15mm", 2),

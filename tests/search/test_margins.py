@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import sbafab
-from sbafab.rules.finding import Finding, Place
+from sbafab.rules.finding import Finding, Findings, Place
 from sbafab.rules.limits import TOLERANCE
 from sbafab.search.margins import margin_of, margins
 
@@ -18,7 +18,7 @@ FAULTY = (
 )
 
 
-def _findings(name: str, changes: dict[str, float]) -> sbafab.api.Findings:
+def _findings(name: str, changes: dict[str, float]) -> Findings:
     return sbafab.check(name, {"rules.yield_builds": 100, **changes})
 
 

@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-import json
 import re
 import runpy
 from pathlib import Path
 
-import jsonschema
 import pytest
 
 import sbafab
 from docs.scripts import reference_cli, reference_keys
 from docs.scripts.offline import complaints
 from docs.scripts.rule_pictures import CHOSEN, OTHERS, pair
-from sbafab.cli import COMMANDS, main
-from sbafab.output.schemas import SCHEMAS, schema_of
+from sbafab.cli import COMMANDS
 from sbafab.rules.deck import rule_names
 from tests.rules.test_deck import FAULTS
 
 ROOT = Path(__file__).parents[2]
 LINK = re.compile(r"\]\((?!https?://|#|mailto:)([^)#\s]+)")
-
-
-def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
-    with pytest.raises(SystemExit):
-        main(arguments)
-    return capsys.readouterr().out
 
 
 def test_the_page_of_commands_has_every_command_and_option() -> None:
@@ -58,36 +49,6 @@ def test_every_rule_has_its_picture() -> None:
         assert drawn.wrong.count("<circle") == 1
 
 
-@pytest.mark.parametrize("name", SCHEMAS)
-def test_a_schema_is_one_and_has_an_id(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    schema = json.loads(run(["schema", name], capsys))
-    assert schema == schema_of(name)
-    jsonschema.Draft202012Validator.check_schema(schema)
-    assert schema["$id"] == f"urn:{SCHEMAS[name][0].replace('/', ':')}"
-
-
-def test_what_is_printed_and_written_is_of_its_schema(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    one = ["1dof-5mm", "--set", "stack.balloons=1"]
-    made = sbafab.cut("1dof-5mm", "stack.balloons=1", out=tmp_path)
-    found = {
-        "checks": [
-            json.loads(run(["check", *one, "--json"], capsys)),
-            json.loads((made.folder / "checks.json").read_text()),
-        ],
-        "manifest": [json.loads((made.folder / "manifest.json").read_text())],
-        "error": [json.loads(run(["check", "nosuch", "--json"], capsys))],
-        "design": [made.design.model_dump(mode="json", exclude_none=True)],
-    }
-    for name, documents in found.items():
-        for document in documents:
-            jsonschema.validate(document, schema_of(name))
-    del found["checks"][0]["summary"]
-    with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(found["checks"][0], schema_of("checks"))
-
-
 def test_links_between_the_pages_of_the_source_lead_somewhere() -> None:
     pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "docs").glob("[lr]*/*.md")]
     assert len(pages) > 20
@@ -98,6 +59,11 @@ def test_links_between_the_pages_of_the_source_lead_somewhere() -> None:
         if "_made" not in path and not (page.parent / path).exists()
     ]
     assert lost == []
+
+
+def test_no_page_takes_the_name_of_one_that_sphinx_writes() -> None:
+    own = {"search", "genindex", "modindex", "py-modindex"}
+    assert not own & {page.stem for page in (ROOT / "docs").glob("*.md")}
 
 
 def test_a_site_that_asks_another_host_or_leads_nowhere_is_told(tmp_path: Path) -> None:

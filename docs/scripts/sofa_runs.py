@@ -1,6 +1,6 @@
 """Runs the scenes in SOFA and writes what they gave into docs/sofa.md.
 
-python docs/sofa_runs.py takes some ten minutes on a busy core; it needs runSofa and ccx on PATH.
+``python -m docs.scripts.sofa_runs`` takes some ten minutes on a busy core; it needs runSofa and ccx on PATH.
 A further model beside them is a further entry of ``OTHERS``.
 """
 
@@ -20,8 +20,8 @@ from sbafab.simulators.coarse.actuator import CoarseActuator
 from sbafab.simulators.sofa import files, shell
 from sbafab.simulators.sofa.run import SofaJob, SofaRun, simulate
 
-PAGE = Path(__file__).parent / "sofa.md"
-BEGIN, END = "<!-- written by docs/sofa_runs.py -->", "<!-- to here -->"
+PAGE = Path(__file__).parents[1] / "sofa.md"
+BEGIN, END = "<!-- written by docs.scripts.sofa_runs -->", "<!-- to here -->"
 NAME = "3dof-15mm"
 PRESSURES = (1.0, 2.0, 5.0, 10.0)
 CHAMBERS = ("chamber1", "chamber2", "chamber3")
