@@ -23,7 +23,7 @@ SHUT = 2e4
 """mN/mm with which a flat balloon resists being flattened further: no film gives way visibly."""
 WALL = 1e6
 """mN/mm of an outer plate."""
-WALLS = (1e3, 3e4)
+WALLS = (1e3, 1e5)
 """The same on the way there."""
 TOUCHES = 12
 """Points round the top's outline that may touch the outer plate."""
@@ -36,6 +36,11 @@ FARTHEST = np.array([0.4, 0.15, 0.15])
 """The most by which one step moves rise (mm) and tilt (rad)."""
 FINE = 1e-6
 """A step (mm, rad) that need not be made."""
+CLOSELY, LITTLE = 3e-5, 1e-7
+"""Largest last step (mm, rad) against an outer plate, and the energy (uJ) that it may gain: the
+plate's force is to be right as well."""
+ROUGH = 0.01
+"""The same on the way to an outer plate."""
 NEAR_STEPS = 12
 """Steps in which a pose nearby is found, or none is."""
 
@@ -168,25 +173,34 @@ def held(
     """Rise and tilt of each level (levels, 3) under a load, the force in mN on the plate, and
     whether the balance is stable.
 
-    A start that ``is_near`` is tried as it is first. Otherwise an outer plate stiffens by and by:
-    steps that do not see it yet would run far into it. Raises DesignError where no balance is
-    found.
+    An outer plate that is not met soon stiffens by and by, for steps that do not see it yet would
+    run far into it; ``is_near`` tells a start that may be met as it is. Raises DesignError where no
+    balance is found.
     """
     springs = kinds.of(levels)
     if load.point is None:
         found = _settled(springs, pitch, load, start, MOST_STEPS)
     else:
-        found = _settled(springs, pitch, load, start, NEAR_STEPS) if is_near else None
-        at: Array | None = _under(start, pitch, load, load.point)
-        for wall in WALLS:
-            if found is None and at is not None:
-                soft = _settled(springs, pitch, load._replace(wall=wall), at, MOST_STEPS)
-                at = None if soft is None else soft[0]
-        if found is None and at is not None:
-            found = _settled(springs, pitch, load, at, MOST_STEPS)
+        at = start if is_near else _under(start, pitch, load, load.point)
+        found = _settled(springs, pitch, load, at, NEAR_STEPS)
+        if found is None:
+            found = _met(springs, pitch, load, _under(start, pitch, load, load.point))
     if found is None:
         raise DesignError("the stack finds no balance under this load; try a smaller one")
     return found
+
+
+def _met(
+    springs: Springs, pitch: float, load: Load, start: Array
+) -> tuple[Array, float, bool] | None:
+    """What ``held`` gives against a plate that is soft at first."""
+    at = start
+    for wall in WALLS:
+        soft = _settled(springs, pitch, load._replace(wall=wall), at, MOST_STEPS, ROUGH)
+        if soft is None:
+            return None
+        at, _, _ = soft
+    return _settled(springs, pitch, load, at, MOST_STEPS)
 
 
 def _under(start: Array, pitch: float, load: Load, point: Array) -> Array:
@@ -196,14 +210,17 @@ def _under(start: Array, pitch: float, load: Load, point: Array) -> Array:
         # A little past it, so that it is met all round: what is alike on all sides stays so.
         room = max(point[2] / len(at) - pitch, 0.0)
         at[:, 0] = np.where(at[:, 0] > room, room + 1e-4, at[:, 0])
-        at[:, 1:] = np.where(np.abs(at[:, 1:]) < 1e-9, 0.0, at[:, 1:])
+        straight = load.sticks | (np.abs(at[:, 1:]) < 1e-9)
+        at[:, 1:] = np.where(straight, 0.0, at[:, 1:])
     return at
 
 
 def _settled(
-    springs: Springs, pitch: float, load: Load, start: Array, most: int
+    springs: Springs, pitch: float, load: Load, start: Array, most: int, enough: float = 0.0
 ) -> tuple[Array, float, bool] | None:
-    """What ``held`` gives, or None where so many steps do not get there."""
+    """What ``held`` gives, or None where so many steps do not get there. A step that is no larger
+    than ``enough`` ends it.
+    """
     at, before = start, 0.0
     value, gradient, matrix, push = _loaded(springs, pitch, load, at)
     for _ in range(most):
@@ -212,11 +229,12 @@ def _settled(
         flat, is_firm = _towards(gradient[None], matrix[None])
         move = flat.reshape(-1, 3)
         largest = float(np.abs(move).max())
-        if is_firm and _ends(largest, before):
+        slope = float((flat @ gradient)[0])
+        fits = load.point is None or (largest < CLOSELY and slope > -LITTLE)
+        if is_firm and (largest <= enough or (fits and _ends(largest, before))):
             at = at + move
             return at, _acting(chain(at, pitch), load).push, True
         share = float(_limited(move).min())
-        slope = float((flat @ gradient)[0])
         for _ in range(14):
             tried = _loaded(springs, pitch, load, at + share * move)
             if tried[0] <= value + 1e-4 * share * slope + 1e-11 * (1 + abs(value)):
@@ -325,4 +343,4 @@ def _loaded(
 def _nearer(count: int) -> Array:
     """1 where the row's level is nearer the base than the column's, half where it is the same."""
     level = np.repeat(np.arange(count), 3)
-    return np.heaviside(level[None, :] - level[:, None], 0.5)
+    return np.asarray(np.heaviside(level[None, :] - level[:, None], 0.5))
