@@ -41,8 +41,8 @@ CLOSELY, LITTLE = 3e-5, 1e-7
 plate's force is to be right as well."""
 ROUGH = 0.01
 """The same on the way to an outer plate."""
-NEAR_STEPS = 12
-"""Steps in which a pose nearby is found, or none is."""
+FEW_STEPS = 12
+"""Steps in which a start far away meets an outer plate, or never does."""
 
 
 class Load(NamedTuple):
@@ -182,9 +182,9 @@ def held(
         found = _settled(springs, pitch, load, start, MOST_STEPS)
     else:
         at = start if is_near else _under(start, pitch, load, load.point)
-        found = _settled(springs, pitch, load, at, NEAR_STEPS)
+        found = _settled(springs, pitch, load, at, MOST_STEPS if is_near else FEW_STEPS)
         if found is None:
-            found = _met(springs, pitch, load, _under(start, pitch, load, load.point))
+            found = _met(springs, pitch, load, at)
     if found is None:
         raise DesignError("the stack finds no balance under this load; try a smaller one")
     return found
