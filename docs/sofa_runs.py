@@ -1,6 +1,6 @@
 """Runs the scenes in SOFA and writes what they gave into docs/sofa.md.
 
-python docs/sofa_runs.py takes some ten minutes on a busy core; it needs runSofa and ccx on PATH.
+python docs/sofa_runs.py takes four minutes of processor time; it needs runSofa and ccx on PATH.
 A further model beside them is a further entry of ``OTHERS``.
 """
 

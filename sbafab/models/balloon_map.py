@@ -58,6 +58,8 @@ def _pieces() -> Array:
 
 PIECES = _pieces()
 SLOPES = np.stack([PIECES[:, k] * k for k in range(1, DEGREE + 1)], -1)
+WINDOWS = np.arange(HEIGHT_SPANS)[:, None] + np.arange(DEGREE + 1)
+"""The coefficients of each piece by height."""
 CURVES = np.stack([SLOPES[:, k] * k for k in range(1, DEGREE)], -1)
 
 
@@ -102,9 +104,8 @@ class BalloonMap:
         x, rate = self._scaled(p)
         first, weights = basis(x)
         slopes = basis(x, 1)[1] * -rate[..., None]
-        rows = self.coefficients[first[..., None] + np.arange(DEGREE + 1)]
-        found = np.stack([weights, slopes], -2) @ rows
-        return found[..., 0, :], found[..., 1, :]
+        rows = self.coefficients[WINDOWS[first]]
+        return (weights[..., None, :] @ rows)[..., 0, :], (slopes[..., None, :] @ rows)[..., 0, :]
 
     def _scaled(self, p: Array) -> tuple[Array, Array]:
         """Place among the pieces in pressure, and its rate by pressure."""
@@ -160,10 +161,8 @@ class Along(NamedTuple):
 
 
 def pieces(coefficients: Array) -> Array:
-    """Polynomials of splines: (..., coefficients) become (..., pieces, powers)."""
-    count = coefficients.shape[-1] - DEGREE
-    windows = np.arange(count)[:, None] + np.arange(DEGREE + 1)
-    return np.asarray(coefficients[..., windows] @ PIECES)
+    """Polynomials of splines by height: (..., coefficients) become (..., pieces, powers)."""
+    return np.asarray(coefficients[..., WINDOWS] @ PIECES)
 
 
 def derivatives(polynomials: Array) -> Array:

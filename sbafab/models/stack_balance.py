@@ -110,15 +110,15 @@ class Springs:
     def contents(self, freedoms: Array) -> tuple[Array, Array]:
         """Volume in ul of each balloon (rows, chambers), and the potential of each row."""
         gaps = (self.gap_of @ freedoms[..., None])[..., 0] * self.spans
-        both = np.stack([self.begins, self.begins + self.volumes])
+        both = self.begins + np.array([[[0]], [[self.volumes]]])
         stored, held = along(self.table, both, gaps).value
-        volumes = held.reshape(len(held), -1, self.ring).mean(-1)
+        volumes = held.reshape(len(held), -1, self.ring).sum(-1) / self.ring
         return volumes, stored.sum(-1) / self.ring
 
 
 def free(springs: Springs, start: Array) -> Array:
     """Rise and tilt of each row with nothing outside acting: (rows, 3). Raises DesignError."""
-    at, before = start, 0.0
+    at, before = start, FINE
     value, gradient, matrix = springs.energy(at)
     for _ in range(MOST_STEPS):
         if np.abs(gradient).max() < CLOSE:
@@ -221,7 +221,7 @@ def _settled(
     """What ``held`` gives, or None where so many steps do not get there. A step that is no larger
     than ``enough`` ends it.
     """
-    at, before = start, 0.0
+    at, before = start, FINE
     value, gradient, matrix, push = _loaded(springs, pitch, load, at)
     for _ in range(most):
         if np.abs(gradient).max() < CLOSE * (1 + 1e-3 * push):
@@ -233,7 +233,9 @@ def _settled(
         fits = load.point is None or (largest < CLOSELY and slope > -LITTLE)
         if is_firm and (largest <= enough or (fits and _ends(largest, before))):
             at = at + move
-            return at, _acting(chain(at, pitch), load).push, True
+            if load.point is not None:
+                push = _acting(chain(at, pitch), load).push
+            return at, push, True
         share = float(_limited(move).min())
         for _ in range(14):
             tried = _loaded(springs, pitch, load, at + share * move)

@@ -20,8 +20,8 @@ Forces of Eqs. 1-4 count their stroke from nothing, as the paper does; those of 
 count it from the flat height, so that flat and full height mean the same for force and bending.
 """
 
-CALIBRATED = """The pocket's radius is taken {loss:g} mm smaller than drawn, which makes the force of the flat
-1-DoF actuator right; the film's modulus stays the paper's 10 MPa. That one row is *fitted*, all
+CALIBRATED = """The pocket's radius is taken {loss:g} mm smaller than drawn, which makes the force
+of the flat 1-DoF actuator right; the modulus stays the paper's 10 MPa. That row is *fitted*, all
 others are *held out*. Flat is the state to fit: neither the film's modulus nor a column that
 buckles has a part in it. Molten TPE that creeps under the mask is the likely cause of the loss, and
 `sbafab predict --pocket-loss {loss:g}` takes it.
