@@ -18,8 +18,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sbafab import actuators
-from sbafab.design.reading import Change, template_names, template_text
+from sbafab.design.reading import Change
 from sbafab.design.records import Design
+from sbafab.design.templates import template_names, template_text
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
@@ -98,7 +99,7 @@ def check(source: Source | Assembly, *changes: Change, **tables: Any) -> Finding
     """What the rule deck finds in a design; of an assembly, also what is found between parts."""
     from sbafab.assemblies.records import Assembly
     from sbafab.output.assembly import check_assembly
-    from sbafab.output.run import check as run_check
+    from sbafab.output.checking import check as run_check
     from sbafab.rules.finding import Findings
 
     found = _loaded(source, changes, tables)

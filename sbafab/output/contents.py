@@ -13,12 +13,13 @@ from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.kits import FILE as KIT_FILE
 from sbafab.design.kits import kit_of
-from sbafab.design.reading import kit_names
 from sbafab.design.records import Design
+from sbafab.design.templates import kit_names
 from sbafab.design.writing import design_sha256, design_toml
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.files import MeshFile, write_meshes
-from sbafab.output.manifest import as_json, checks, file_hashes, manifest
+from sbafab.output.checking import checks
+from sbafab.output.manifest import as_json, file_hashes, manifest
 from sbafab.output.planned import Checked, Planned
 from sbafab.output.settings import GENERATOR, kerf_widths, limits
 from sbafab.output.shop import write_cut_files
