@@ -248,7 +248,7 @@ CALIBRATED_WHY = {
     "3-DoF": (
         "low: a chamber of the 3-DoF was measured to push 1.1 times as hard as the 1-DoF; likely "
         "its pockets lost 0.1 mm less",
-        "near",
+        "near: films touch the plates there over most of the pocket, which the model has",
         "high: the film is likely stiffer than 10 MPa where 100 kPa stretch it, and then bulges "
         "and touches less: films that do not stretch at all would push 2.1 N",
     ),
