@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from benchmarks import checking, copies, decks, outlines, scaling
+from benchmarks import checking, copies, decks, outlines, scaling, simulators
 from benchmarks import stacks as equilibria
 from benchmarks.timing import (
     HEAD,
@@ -148,14 +148,29 @@ def _told(what: str, times: Mapping[int, Sequence[float]], least: int = 1) -> No
 
 
 def poses(rounds: int) -> None:
-    """Equilibria of a whole actuator, one after the other along a motion."""
+    """Equilibria of a whole actuator, beside steps of it in two simulators."""
     print("\n3dof-15mm in balance, 15 balloons in each of three chambers")
-    rates = {loaded: [equilibria.pose_seconds(loaded) for _ in range(rounds)] for loaded in (0, 1)}
-    print(HEAD)
-    print(row("map of its balloon", [equilibria.map_seconds() for _ in range(rounds)]))
-    for loaded, taken in rates.items():
-        name = "pose with a load on the tip" if loaded else "pose"
-        print(row(name, taken, f"{1 / min(taken):.0f} a second"))
+    print(HEAD.replace("seconds", "milliseconds", 1))
+    told = [1000 * equilibria.map_seconds() for _ in range(rounds)]
+    print(row("map of its balloon", told))
+    for load in equilibria.LOADS:
+        for kind, is_dragged in (("along a path", True), ("at random", False)):
+            taken = [1000 * equilibria.pose_seconds(load, is_dragged) for _ in range(rounds)]
+            print(row(f"{load}, {kind}", taken, f"{1000 / min(taken):.0f} equilibria a second"))
+    rivals = {
+        "SOFA, shells": simulators.sofa,
+        "MuJoCo, flexes in rings of 8": lambda: simulators.mujoco(8),
+        "MuJoCo, flexes in rings of 16": lambda: simulators.mujoco(16),
+    }
+    for name, run in rivals.items():
+        # The slowest of all: once is enough.
+        found = run()
+        if found is None:
+            print(f"  {name}: skipped, not installed")
+            continue
+        rest = found.seconds * found.steps
+        said = f"{1 / found.seconds:.0f} steps a second, {rest:.1f} s to come to rest"
+        print(row(name, [1000 * found.seconds], said))
 
 
 def commands(rounds: int) -> None:

@@ -1,6 +1,7 @@
 """Runs the scenes in SOFA and writes what they gave into docs/sofa.md.
 
-``python -m docs.scripts.sofa_runs`` takes some ten minutes on a busy core; it needs runSofa and ccx on PATH.
+``python -m docs.scripts.sofa_runs`` takes four minutes of processor time; it needs runSofa and ccx on
+PATH.
 A further model beside them is a further entry of ``OTHERS``.
 """
 

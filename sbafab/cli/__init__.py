@@ -60,6 +60,7 @@ for _command in COMMANDS:
 
 
 EXTRAS = {
+    "control": ("gymnasium", "an environment of Gymnasium, from Python"),
     "dask": ("distributed", "sweep --dask"),
     "mesh": ("netgen", "sbafab mesh, simulate --with calculix"),
     "mujoco": ("mujoco", "simulate --with mujoco"),

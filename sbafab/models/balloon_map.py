@@ -30,6 +30,8 @@ PRESSURE_POINTS, HEIGHT_POINTS = 12, 12
 """Balloons computed each way."""
 P0 = 0.3
 """Pressure in kPa below which the spline's pieces are alike in pressure, above alike in ratio."""
+RISES = 65
+"""Pressures at which free heights are kept to begin with."""
 ABOVE = 1.15
 """How far the map goes on above the highest free balloon, as a share of it."""
 FLATTEST = 0.01
@@ -56,6 +58,8 @@ def _pieces() -> Array:
 
 PIECES = _pieces()
 SLOPES = np.stack([PIECES[:, k] * k for k in range(1, DEGREE + 1)], -1)
+WINDOWS = np.arange(HEIGHT_SPANS)[:, None] + np.arange(DEGREE + 1)
+"""The coefficients of each piece by height."""
 CURVES = np.stack([SLOPES[:, k] * k for k in range(1, DEGREE)], -1)
 
 
@@ -100,11 +104,8 @@ class BalloonMap:
         x, rate = self._scaled(p)
         first, weights = basis(x)
         slopes = basis(x, 1)[1] * -rate[..., None]
-        rows = self.coefficients[first[..., None] + np.arange(DEGREE + 1)]
-        return (
-            np.einsum("...i,...ij->...j", weights, rows),
-            np.einsum("...i,...ij->...j", slopes, rows),
-        )
+        rows = self.coefficients[WINDOWS[first]]
+        return (weights[..., None, :] @ rows)[..., 0, :], (slopes[..., None, :] @ rows)[..., 0, :]
 
     def _scaled(self, p: Array) -> tuple[Array, Array]:
         """Place among the pieces in pressure, and its rate by pressure."""
@@ -127,7 +128,9 @@ class BalloonMap:
     def _along(self, which: int, pressure: ArrayLike, height: ArrayLike) -> Along:
         p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
         found = pieces(self.pressed(p)[which]).reshape(-1, DEGREE + 1)
-        return along(found, HEIGHT_SPANS * np.arange(p.size).reshape(p.shape), h * self.spans)
+        return along(
+            derivatives(found), HEIGHT_SPANS * np.arange(p.size).reshape(p.shape), h * self.spans
+        )
 
     def free_height(self, pressure: ArrayLike) -> Array:
         """Mm to which it rises where nothing holds it."""
@@ -139,6 +142,15 @@ class BalloonMap:
             low, high = np.where(pushes, middle, low), np.where(pushes, high, middle)
         return np.asarray((low + high) / 2)
 
+    def rises(self, pressure: ArrayLike) -> Array:
+        """About its free height, at little cost: where to begin a search."""
+        return np.interp(np.arcsinh(np.asarray(pressure, float) / P0), *self._rises)
+
+    @cached_property
+    def _rises(self) -> tuple[Array, Array]:
+        x = np.linspace(0, math.asinh(self.most_pressure / P0), RISES)
+        return x, self.free_height(np.minimum(P0 * np.sinh(x), self.most_pressure))
+
 
 class Along(NamedTuple):
     """Value, first and second derivative of splines, by pieces."""
@@ -149,24 +161,36 @@ class Along(NamedTuple):
 
 
 def pieces(coefficients: Array) -> Array:
-    """Polynomials of splines: (..., coefficients) become (..., pieces, powers)."""
-    windows = np.lib.stride_tricks.sliding_window_view(coefficients, DEGREE + 1, axis=-1)
-    return np.asarray(windows @ PIECES)
+    """Polynomials of splines by height: (..., coefficients) become (..., pieces, powers)."""
+    return np.asarray(coefficients[..., WINDOWS] @ PIECES)
 
 
-def along(polynomials: Array, which: NDArray[np.int_], y: Array) -> Along:
+def derivatives(polynomials: Array) -> Array:
+    """Polynomials (rows, powers) with their first two derivatives: (powers, 3, rows)."""
+    found = np.zeros((DEGREE + 1, 3, len(polynomials)))
+    powers = np.arange(1.0, DEGREE + 1)[:, None]
+    found[:, 0] = polynomials.T
+    np.multiply(found[1:, 0], powers, out=found[:-1, 1])
+    np.multiply(found[1:-1, 1], powers[:-1], out=found[:-2, 2])
+    return found
+
+
+def along(table: Array, which: NDArray[np.int_], y: Array) -> Along:
     """Splines at places ``y``, in pieces.
 
-    ``polynomials`` (rows, powers) holds the pieces of all splines; ``which`` says at which row each
+    ``table`` are the ``derivatives`` of the pieces of all splines; ``which`` says at which row each
     one begins. Outside its ends it goes on with the second derivative that it has there.
     """
     inside = np.minimum(np.maximum(y, 0.0), HEIGHT_SPANS - 1e-9)
     first = inside.astype(np.int_)
     u = inside - first
-    c0, c1, c2, c3, c4, c5 = polynomials[which + first].T
-    value = c0.T + u * (c1.T + u * (c2.T + u * (c3.T + u * (c4.T + u * c5.T))))
-    slope = c1.T + u * (2 * c2.T + u * (3 * c3.T + u * (4 * c4.T + u * 5 * c5.T)))
-    curve = 2 * c2.T + u * (6 * c3.T + u * (12 * c4.T + u * 20 * c5.T))
+    powers = table.take(which + first, axis=2)
+    found = powers[DEGREE] * u
+    for power in powers[DEGREE - 1 : 0 : -1]:
+        found += power
+        found *= u
+    found += powers[0]
+    value, slope, curve = found
     beyond = y - inside
     if beyond.any():
         value, slope = value + beyond * (slope + beyond * curve / 2), slope + beyond * curve

@@ -12,19 +12,39 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from sbafab.models.film_elements import Array
 
 SMALL = 1e-8
-NEXT, AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])
+"""Square of the angle below which its functions are those at this one."""
+ACROSS, FLAT = np.array([1.0, -1.0]), np.eye(2)
+SIGNS = np.zeros((3, 3, 3))
+"""The Levi-Civita symbol."""
+SIGNS[[0, 1, 2], [1, 2, 0], [2, 0, 1]] = 1.0
+SIGNS[[0, 2, 1], [2, 1, 0], [1, 0, 2]] = -1.0
+CROSS = SIGNS.transpose(1, 2, 0).reshape(3, 9)
+
+
+def _felt() -> Array:
+    """Matrix (12, 24) behind ``felt``."""
+    found = np.zeros((12, 6, 4))
+    arms, forces = found[:9].reshape(3, 3, 6, 4), found[9:]
+    one = np.eye(3)
+    # (turn x x) x f is x (turn . f) less turn (x . f).
+    arms[:, :, :3, :3] = np.einsum("kc,lr->klrc", one, one) - np.einsum("kl,rc->klrc", one, one)
+    arms[:, :, :3, 3] = SIGNS.transpose(1, 2, 0)
+    forces[:, 3:, :3] = -SIGNS.transpose(1, 2, 0)
+    forces[:, 3:, 3] = one
+    return found.reshape(12, 24)
+
+
+FELT = _felt()
 
 
 class Chain(NamedTuple):
     """Plates of a chain, the base first: places (n + 1, 3) in mm and axes (n + 1, 3, 3), whose
     columns are the plates' x, y and z; ``rises`` (n, 3) are the levels' directions.
 
-    ``turns`` (n, 2, 3, 2) are what a unit of tilt turns plates by, before and after the rise.
+    ``turns`` (n, 2, 2, 3) are what a unit of each tilt turns plates by, before and after the rise.
     """
 
     places: Array
@@ -36,88 +56,72 @@ class Chain(NamedTuple):
 def chain(freedoms: Array, pitch: float) -> Chain:
     """The plates of levels with freedoms (n, 3), each ``pitch`` mm high when flat."""
     count = len(freedoms)
-    half = freedoms[:, 1:] / 2
-    turned, rates = _rotations(half)
-    lengths = (freedoms[:, 0] + pitch).tolist()
-    both = turned @ turned
+    turned, rates = _rotations(freedoms[:, 1:] / 2)
     axes = np.empty((count + 1, 3, 3))
     axes[0] = np.eye(3)
-    for i in range(count):
-        np.matmul(axes[i], both[i], out=axes[i + 1])
+    np.matmul(turned, turned, out=axes[1:])
+    reach = 1
+    while reach < count:
+        # Each is already the product of ``reach`` levels up to its own.
+        axes[reach + 1 :] = axes[1:-reach] @ axes[reach + 1 :]
+        reach *= 2
     middle = axes[:-1] @ turned
     rises = middle[:, :, 2]
     places = np.zeros((count + 1, 3))
-    np.cumsum(rises * np.asarray(lengths)[:, None], axis=0, out=places[1:])
-    turns = np.empty((count, 2, 3, 2))
-    turns[:, 0] = axes[:-1] @ rates / 2
-    turns[:, 1] = middle @ rates / 2
+    np.cumsum(rises * (freedoms[:, :1] + pitch), axis=0, out=places[1:])
+    turns = np.empty((count, 2, 2, 3))
+    np.matmul(rates, axes[:-1].transpose(0, 2, 1), out=turns[:, 0])
+    np.matmul(rates, middle.transpose(0, 2, 1), out=turns[:, 1])
     return Chain(places, axes, rises, turns)
 
 
 def _rotations(vectors: Array) -> tuple[Array, Array]:
-    """Rotations (n, 3, 3) by vectors (n, 2) in the xy plane, and the turn by a unit change of each
-    (n, 3, 2): Rodrigues' formula and the left Jacobian.
+    """Rotations (n, 3, 3) by vectors (n, 2) in the xy plane, and half the turn by a unit change of
+    each (n, 2, 3): Rodrigues' formula and the left Jacobian.
     """
-    x, y = vectors[:, 0], vectors[:, 1]
-    angle = np.sqrt(x * x + y * y)
-    safe = np.maximum(angle, SMALL)
-    sine = np.where(angle > SMALL, np.sin(safe) / safe, 1.0)
-    versine = np.where(angle > SMALL, (1 - np.cos(safe)) / safe**2, 0.5)
-    rest = np.where(angle > 1e-4, (1 - sine) / safe**2, 1 / 6)
-    found = np.empty((len(x), 3, 3))
-    found[:, 0, 0] = 1 - versine * y * y
-    found[:, 1, 1] = 1 - versine * x * x
-    found[:, 2, 2] = 1 - versine * angle**2
-    found[:, 0, 1] = found[:, 1, 0] = versine * x * y
-    found[:, 0, 2], found[:, 2, 0] = sine * y, -sine * y
-    found[:, 1, 2], found[:, 2, 1] = -sine * x, sine * x
-    rates = np.empty((len(x), 3, 2))
-    rates[:, 0, 0] = 1 - rest * y * y
-    rates[:, 1, 1] = 1 - rest * x * x
-    rates[:, 0, 1] = rates[:, 1, 0] = rest * x * y
-    rates[:, 2, 0], rates[:, 2, 1] = -versine * y, versine * x
+    across = vectors[:, ::-1] * ACROSS
+    squares = across[:, :, None] * across[:, None]
+    square = squares[:, 0, 0] + squares[:, 1, 1]
+    safe = np.maximum(square, SMALL)
+    angle = np.sqrt(safe)
+    sine = np.sin(angle) / angle
+    versine = (1 - np.cos(angle)) / safe
+    rest = (1 - sine) / safe
+    found = np.empty((len(vectors), 3, 3))
+    found[:, :2, :2] = FLAT - versine[:, None, None] * squares
+    found[:, :2, 2] = sine[:, None] * across
+    found[:, 2, :2] = -found[:, :2, 2]
+    found[:, 2, 2] = 1 - versine * square
+    rates = np.empty((len(vectors), 2, 3))
+    rates[:, :, :2] = (FLAT - rest[:, None, None] * squares) / 2
+    rates[:, :, 2] = versine[:, None] * across / -2
     return found, rates
 
 
-def _cross(a: Array, b: Array) -> Array:
-    """Vector products; numpy's own takes ten times as long for short rows."""
-    found = a[..., NEXT] * b[..., AFTER]
-    found -= a[..., AFTER] * b[..., NEXT]
-    return np.asarray(found)
+def crossing(vectors: Array) -> Array:
+    """Matrices (..., 3, 3) that make of a row its vector product, the vectors (..., 3) first."""
+    return np.asarray((vectors @ CROSS).reshape(*vectors.shape, 3))
 
 
-def moves(at: Chain, points: Array, plates: NDArray[np.int_]) -> Array:
-    """How points (k, 3) on plates (k) move with the freedoms: (k, 3, 3 n)."""
-    count = len(at.rises)
-    found = np.empty((len(points), 3, count, 3))
-    found[..., 0] = at.rises.T
-    for which, start in ((0, at.places[:-1]), (1, at.places[1:])):
-        arms = points[:, None] - start
-        by_turn = _cross(at.turns[None, :, which].transpose(0, 1, 3, 2), arms[:, :, None])
-        part = by_turn.transpose(0, 3, 1, 2)
-        if which == 0:
-            found[..., 1:] = part
-        else:
-            found[..., 1:] += part
-    if (plates < count).any():
-        found *= (np.arange(count) < plates[:, None])[:, None, :, None]
-    return found.reshape(len(points), 3, -1)
+def felt(arms: Array, forces: Array) -> Array:
+    """What movements as of ``twists`` do with forces f at points x: (n, 6, 4).
 
-
-def stiffening(at: Chain, moved: Array, forces: Array) -> Array:
-    """Second derivatives of the work of forces (k, 3) by the freedoms: what comes of their arms.
-
-    A joint nearer the base turns all movements beyond it. Of those within a joint its own tilts
-    are taken at their mean: enough to descend by.
+    Of the sum of x f (n, 3, 3) and of f (n, 3) over the points. The first three of the last axis
+    are the sum of (movement of x) x f, the fourth is that of (movement of x) . f.
     """
-    count = len(at.rises)
-    whole = at.turns.sum(1)
-    # sum over points of force . (turn_i x move_j) = turn_i . sum (move_j x force)
-    torque = _cross(moved.transpose(0, 2, 1), forces[:, None, :]).sum(0)
-    found = np.zeros((count, 3, 3 * count))
-    found[:, 1:] = np.einsum("idt,jd->itj", whole, torque)
-    matrix = found.reshape(3 * count, 3 * count)
-    level = np.repeat(np.arange(count), 3)
-    upper = np.where(level[:, None] < level[None, :], matrix, 0.0)
-    own = np.where(level[:, None] == level[None, :], matrix, 0.0)
-    return np.asarray(upper + upper.T + (own + own.T) / 2)
+    both = np.concatenate([arms.reshape(-1, 9), forces], axis=1)
+    return np.asarray((both @ FELT).reshape(-1, 6, 4))
+
+
+def twists(at: Chain) -> Array:
+    """What a unit of each freedom does to all plates beyond its level: (n, 3, 6).
+
+    The first three turn, the others move: a point x of these plates moves by turn x x + move.
+    """
+    found = np.zeros((len(at.rises), 3, 6))
+    found[:, 0, 3:] = at.rises
+    before, after = at.turns[:, 0], at.turns[:, 1]
+    found[:, 1:, :3] = before + after
+    arms = crossing(at.places)
+    found[:, 1:, 3:] = before @ arms[:-1] + after @ arms[1:]
+    return found

@@ -26,6 +26,7 @@ from sbafab.models.balloon_map import (
     HEIGHT_SPANS,
     BalloonMap,
     balloon_map,
+    derivatives,
     pieces,
 )
 from sbafab.models.chain import Chain, chain
@@ -157,6 +158,11 @@ class Stack:
         return np.stack([np.ones_like(x), y, -x])
 
     @cached_property
+    def _planes(self) -> Array:
+        """Rise and tilt of the plane nearest to gaps at the chambers' middles: (chambers, 3)."""
+        return np.asarray(np.linalg.pinv(self._centres))
+
+    @cached_property
     def _gap_of(self) -> Array:
         """Gap at each point of each balloon's ring, by rise and tilt: (chambers x points, 3)."""
         turn = np.arange(RING) * math.tau / RING
@@ -176,17 +182,20 @@ class Stack:
                 f"{len(asked)} pressures are given for {self.chambers} chambers; give one a chamber"
             )
         rows = [one.pressed(np.array(asked)) for one in self.maps]
-        found = pieces(np.array(rows).transpose(1, 0, 2, 3)).reshape(2, -1, DEGREE + 1)
-        return Springs(found[0], found[1], *self._rows)
+        found = pieces(np.array(rows).transpose(1, 0, 2, 3)).reshape(-1, DEGREE + 1)
+        return Springs(derivatives(found), *self._rows)
 
     @cached_property
-    def _rows(self) -> tuple[NDArray[np.int_], Array, Array, Array, int]:
+    def _rows(self) -> tuple[NDArray[np.int_], int, Array, Array, Array, Array, int]:
         """What springs hold beside their polynomials."""
         count = len(self.maps) * self.chambers
         begins = np.arange(count).reshape(len(self.maps), -1) * HEIGHT_SPANS
+        gap_of = self._gap_of
+        squares = (gap_of[..., :, None] * gap_of[..., None, :]).reshape(*gap_of.shape[:2], 9)
         spans = np.array([[one.spans] for one in self.maps])
         top = np.array([one.most_height for one in self.maps])
-        return np.repeat(begins, RING, axis=1), self._gap_of, spans, top, RING
+        each = np.repeat(begins, RING, axis=1)
+        return each, count * HEIGHT_SPANS, gap_of, squares, spans, top, RING
 
     def pose(
         self,
@@ -206,12 +215,21 @@ class Stack:
         springs = self.springs(pressures)
         load = self._load(tip_load, gravity, plate)
         if load is None:
-            start = None if near is None else near.freedoms[self._first]
+            start = self._risen(pressures) if near is None else near.freedoms[self._first]
             kinds = free(springs, start)
             return self._pose(pressures, springs, kinds[self.levels], kinds)
-        start = near.freedoms if near is not None else free(springs, None)[self.levels]
-        found, push, stable = held(springs, self.levels, self.pitch, load, start)
+        if near is not None:
+            start = near.freedoms
+        else:
+            start = free(springs, self._risen(pressures))[self.levels]
+        found, push, stable = held(springs, self.levels, self.pitch, load, start, near is not None)
         return self._pose(pressures, springs, found, None, push / 1000, stable)
+
+    def _risen(self, pressures: Sequence[float]) -> Array:
+        """Rise and tilt to begin with, a row a kind of balloon: the plane nearest to where each
+        balloon would rise to alone.
+        """
+        return np.stack([one.rises(pressures) for one in self.maps]) @ self._planes
 
     def motion(
         self, pressures: Sequence[float] | None = None, line: Line | None = None, **load: Any

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon_map import along
-from sbafab.models.chain import chain, moves, stiffening
+from sbafab.models.chain import chain, crossing, felt, twists
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,19 +23,32 @@ SHUT = 2e4
 """mN/mm with which a flat balloon resists being flattened further: no film gives way visibly."""
 WALL = 1e6
 """mN/mm of an outer plate."""
+WALLS = (1e3, 1e5)
+"""The same on the way there."""
 TOUCHES = 12
 """Points round the top's outline that may touch the outer plate."""
+TURN = np.arange(TOUCHES) * math.tau / TOUCHES
+RIM = np.stack([np.cos(TURN), np.sin(TURN), 0 * TURN], -1)
 MOST_STEPS = 300
 CLOSE = 1e-5
 """Out of balance in mN (or mN mm) that is none."""
 FARTHEST = np.array([0.4, 0.15, 0.15])
 """The most by which one step moves rise (mm) and tilt (rad)."""
+FINE = 1e-6
+"""A step (mm, rad) that need not be made."""
+CLOSELY, LITTLE = 3e-5, 1e-7
+"""Largest last step (mm, rad) against an outer plate, and the energy (uJ) that it may gain: the
+plate's force is to be right as well."""
+ROUGH = 0.01
+"""The same on the way to an outer plate."""
+FEW_STEPS = 12
+"""Steps in which a start far away meets an outer plate, or never does."""
 
 
 class Load(NamedTuple):
     """What acts from outside, in mN: force on the tip, weight of each level; and the outer plate:
-    the line (a point and the normal) on which the tip meets it, whether it sticks to that line, and
-    the radius of the top that meets it.
+    the line (a point and the normal) on which the tip meets it, whether it sticks to that line, the
+    radius of the top that meets it, and the plate's stiffness.
     """
 
     tip: Array
@@ -43,22 +57,26 @@ class Load(NamedTuple):
     normal: Array
     sticks: bool
     outline: float
+    wall: float = WALL
 
 
 @dataclass(frozen=True, eq=False)
 class Springs:
     """What levels do at given pressures: a row a level or a kind of balloon.
 
-    ``potentials`` and ``volumes`` (pieces of all splines, powers) are polynomials by height, and
-    ``begins`` (rows, chambers x points) where those of each point begin; ``gap_of`` (rows,
-    chambers x points, 3) are the gaps by rise and tilt, ``spans`` (rows, 1) pieces of the spline a
-    mm and ``top`` (rows) its end in mm; ``ring`` is the number of points a balloon.
+    ``table`` holds the ``derivatives`` of the potentials of all splines, then of their volumes.
+    ``begins`` (rows, chambers x points) is where the potential of each point begins in it,
+    ``volumes`` by how many rows later its volume does; ``gap_of`` (rows, chambers x points, 3) are
+    the gaps by rise and tilt, ``squares`` (rows, chambers x points, 9) their products, ``spans``
+    (rows, 1) pieces of the spline a mm and ``top`` (rows) its end in mm; ``ring`` is the number of
+    points a balloon.
     """
 
-    potentials: Array
-    volumes: Array
+    table: Array
     begins: NDArray[np.int_]
+    volumes: int
     gap_of: Array
+    squares: Array
     spans: Array
     top: Array
     ring: int
@@ -69,6 +87,7 @@ class Springs:
             self,
             begins=self.begins[levels],
             gap_of=self.gap_of[levels],
+            squares=self.squares[levels],
             spans=self.spans[levels],
             top=self.top[levels],
         )
@@ -76,39 +95,38 @@ class Springs:
     def energy(self, freedoms: Array) -> tuple[Array, Array, Array]:
         """Energy (rows) in uJ with its gradient (rows, 3) and second derivatives (rows, 3, 3)."""
         gaps = (self.gap_of @ freedoms[..., None])[..., 0]
-        found = along(self.potentials, self.begins, gaps * self.spans)
+        found = along(self.table, self.begins, gaps * self.spans)
         value, slope = found.value, found.first * self.spans
-        curve = found.second * self.spans**2
+        curve = found.second * (self.spans * self.spans)
         shut = np.minimum(gaps, 0.0)
         if shut.any():
             value = value + SHUT * shut**2 / 2
             slope = slope + SHUT * shut
             curve = curve + np.where(gaps < 0, SHUT, 0.0)
-        by_gap = self.gap_of.transpose(0, 2, 1) / self.ring
-        gradient = (by_gap @ slope[..., None])[..., 0]
-        matrix = (by_gap * curve[:, None]) @ self.gap_of
+        gradient = (slope[:, None] @ self.gap_of)[:, 0] / self.ring
+        matrix = (curve[:, None] @ self.squares).reshape(-1, 3, 3) / self.ring
         return value.sum(-1) / self.ring, gradient, matrix
 
     def contents(self, freedoms: Array) -> tuple[Array, Array]:
         """Volume in ul of each balloon (rows, chambers), and the potential of each row."""
         gaps = (self.gap_of @ freedoms[..., None])[..., 0] * self.spans
-        held = along(self.volumes, self.begins, gaps).value
-        stored = along(self.potentials, self.begins, gaps).value
-        volumes = held.reshape(len(held), -1, self.ring).mean(-1)
+        both = self.begins + np.array([[[0]], [[self.volumes]]])
+        stored, held = along(self.table, both, gaps).value
+        volumes = held.reshape(len(held), -1, self.ring).sum(-1) / self.ring
         return volumes, stored.sum(-1) / self.ring
 
 
-def free(springs: Springs, start: Array | None) -> Array:
+def free(springs: Springs, start: Array) -> Array:
     """Rise and tilt of each row with nothing outside acting: (rows, 3). Raises DesignError."""
-    rows = len(springs.spans)
-    at = np.zeros((rows, 3)) if start is None else start.copy()
-    if start is None:
-        at[:, 0] = 0.3 * springs.top
+    at, before = start, FINE
     value, gradient, matrix = springs.energy(at)
     for _ in range(MOST_STEPS):
         if np.abs(gradient).max() < CLOSE:
             return at
-        move = _towards(gradient, matrix)
+        move, is_firm = _towards(gradient, matrix)
+        largest = float(np.abs(move).max())
+        if is_firm and _ends(largest, before):
+            return at + move
         share = _limited(move)
         slope = (move * gradient).sum(-1)
         for _ in range(12):
@@ -118,22 +136,30 @@ def free(springs: Springs, start: Array | None) -> Array:
             if good.all():
                 break
             share = np.where(good, share, share / 2)
+        before = largest if (share == 1.0).all() else 0.0
         at = at + step
         value, gradient, matrix = tried
     raise DesignError("the stack finds no balance at these pressures; try others")
 
 
-def _towards(gradient: Array, matrix: Array) -> Array:
-    """Newton's step of each row, kept downhill where the energy curves the wrong way."""
-    try:
-        np.linalg.cholesky(matrix)
-    except np.linalg.LinAlgError:
+def _ends(largest: float, before: float) -> bool:
+    """Whether a step is the last: what would follow it, if steps go on to shrink as they did since
+    the whole step before, is none.
+    """
+    return largest * largest < FINE * before
+
+
+def _towards(gradient: Array, matrix: Array) -> tuple[Array, bool]:
+    """Newton's step of each row, kept downhill where the energy curves the wrong way, and whether
+    it curves the right way everywhere.
+    """
+    if not _is_firm(matrix):
         values, vectors = np.linalg.eigh(matrix)
         least = 1e-6 * np.abs(values).max(-1, keepdims=True) + 1e-9
         values = np.maximum(np.abs(values), least)
         within = (vectors.transpose(0, 2, 1) @ gradient[..., None])[..., 0]
-        return np.asarray(-(vectors @ (within / values)[..., None])[..., 0])
-    return np.asarray(-np.linalg.solve(matrix, gradient[..., None])[..., 0])
+        return np.asarray(-(vectors @ (within / values)[..., None])[..., 0]), False
+    return np.asarray(-np.linalg.solve(matrix, gradient[..., None])[..., 0]), True
 
 
 def _limited(move: Array) -> Array:
@@ -142,37 +168,86 @@ def _limited(move: Array) -> Array:
 
 
 def held(
-    kinds: Springs, levels: NDArray[np.int_], pitch: float, load: Load, start: Array
+    kinds: Springs, levels: NDArray[np.int_], pitch: float, load: Load, start: Array, is_near: bool
 ) -> tuple[Array, float, bool]:
     """Rise and tilt of each level (levels, 3) under a load, the force in mN on the plate, and
     whether the balance is stable.
 
-    Raises DesignError where no balance is found.
+    An outer plate that is not met soon stiffens by and by, for steps that do not see it yet would
+    run far into it; ``is_near`` tells a start that may be met as it is. Raises DesignError where no
+    balance is found.
     """
     springs = kinds.of(levels)
+    if load.point is None:
+        found = _settled(springs, pitch, load, start, MOST_STEPS)
+    else:
+        at = start if is_near else _under(start, pitch, load, load.point)
+        found = _settled(springs, pitch, load, at, MOST_STEPS if is_near else FEW_STEPS)
+        if found is None:
+            found = _met(springs, pitch, load, at)
+    if found is None:
+        raise DesignError("the stack finds no balance under this load; try a smaller one")
+    return found
+
+
+def _met(
+    springs: Springs, pitch: float, load: Load, start: Array
+) -> tuple[Array, float, bool] | None:
+    """What ``held`` gives against a plate that is soft at first."""
+    at = start
+    for wall in WALLS:
+        soft = _settled(springs, pitch, load._replace(wall=wall), at, MOST_STEPS, ROUGH)
+        if soft is None:
+            return None
+        at, _, _ = soft
+    return _settled(springs, pitch, load, at, MOST_STEPS)
+
+
+def _under(start: Array, pitch: float, load: Load, point: Array) -> Array:
+    """The same start below a level plate."""
     at = start.copy()
-    if load.point is not None and load.normal[2] > 0.999:
+    if load.normal[2] > 0.999:
         # A little past it, so that it is met all round: what is alike on all sides stays so.
-        room = max(load.point[2] / len(levels) - pitch, 0.0)
+        room = max(point[2] / len(at) - pitch, 0.0)
         at[:, 0] = np.where(at[:, 0] > room, room + 1e-4, at[:, 0])
-        at[:, 1:] = np.where(np.abs(at[:, 1:]) < 1e-9, 0.0, at[:, 1:])
+        straight = load.sticks | (np.abs(at[:, 1:]) < 1e-9)
+        at[:, 1:] = np.where(straight, 0.0, at[:, 1:])
+    return at
+
+
+def _settled(
+    springs: Springs, pitch: float, load: Load, start: Array, most: int, enough: float = 0.0
+) -> tuple[Array, float, bool] | None:
+    """What ``held`` gives, or None where so many steps do not get there. A step that is no larger
+    than ``enough`` ends it.
+    """
+    at, before = start, FINE
     value, gradient, matrix, push = _loaded(springs, pitch, load, at)
-    for _ in range(MOST_STEPS):
+    for _ in range(most):
         if np.abs(gradient).max() < CLOSE * (1 + 1e-3 * push):
             return at, push, _is_firm(matrix)
-        move = _towards(gradient[None], matrix[None]).reshape(-1, 3)
+        flat, is_firm = _towards(gradient[None], matrix[None])
+        move = flat.reshape(-1, 3)
+        largest = float(np.abs(move).max())
+        slope = float((flat @ gradient)[0])
+        fits = load.point is None or (largest < CLOSELY and slope > -LITTLE)
+        if is_firm and (largest <= enough or (fits and _ends(largest, before))):
+            at = at + move
+            if load.point is not None:
+                push = _acting(chain(at, pitch), load).push
+            return at, push, True
         share = float(_limited(move).min())
-        slope = float((move.ravel() * gradient).sum())
         for _ in range(14):
             tried = _loaded(springs, pitch, load, at + share * move)
             if tried[0] <= value + 1e-4 * share * slope + 1e-11 * (1 + abs(value)):
                 break
             share /= 2
+        before = largest if share == 1.0 else 0.0
         at = at + share * move
         value, gradient, matrix, push = tried
         if abs(slope) < 1e-11 * (1 + abs(value)):
             return at, push, _is_firm(matrix)
-    raise DesignError("the stack finds no balance under this load; try a smaller one")
+    return None
 
 
 def _is_firm(matrix: Array) -> bool:
@@ -185,79 +260,89 @@ def _is_firm(matrix: Array) -> bool:
 
 
 class _Acting(NamedTuple):
-    """Forces (k, 3) on points (k, 3) of plates (k), their energy, and of the outer plate each
-    point's stiffness (k, 3, 3); ``push`` is the plate's force.
+    """What acts on the plates: the sum of the forces f beyond each level (n, 3), that of x f over
+    the points x they act on (n, 3, 3), and their energy; n is 1 where all levels carry the same.
+
+    ``stiffness`` (6, 6) is the outer plate's, by turn and move of the tip as of ``twists``;
+    ``push`` is its force.
     """
 
-    points: Array
-    plates: NDArray[np.int_]
     forces: Array
-    stiffness: Array
+    arms: Array
     energy: float
-    push: float
+    stiffness: Array | None = None
+    push: float = 0.0
 
 
 def _acting(plates: Chain, load: Load) -> _Acting:
-    count = len(plates.rises)
     tip = plates.places[-1]
-    points, places = [tip[None]], [np.array([count])]
-    forces, stiffness = [load.tip[None]], [np.zeros((1, 3, 3))]
-    energy, push = -float(load.tip @ tip), 0.0
-    if load.weight.any():
-        points.append(plates.places[1:])
-        forces.append(np.tile(load.weight, (count, 1)))
-        places.append(np.arange(count) + 1)
-        stiffness.append(np.zeros((count, 3, 3)))
-        energy -= float((points[-1] @ load.weight).sum())
+    found = _Acting(load.tip[None], np.multiply.outer(tip, load.tip)[None], -float(load.tip @ tip))
     if load.point is not None:
-        turn = np.arange(TOUCHES) * math.tau / TOUCHES
-        rim = load.outline * np.stack([np.cos(turn), np.sin(turn), 0 * turn], -1)
-        touching = tip + rim @ plates.axes[-1].T
-        into = (touching - load.point) @ load.normal
-        each = np.where(into > 0, WALL / TOUCHES, 0.0)
-        through = np.outer(load.normal, load.normal)
-        points.append(touching)
-        forces.append(-(each * into)[:, None] * load.normal)
-        places.append(np.full(TOUCHES, count))
-        stiffness.append(each[:, None, None] * through)
-        energy += float((each * into**2).sum()) / 2
-        push = float((each * into).sum())
-        if load.sticks:
-            across = WALL * (np.eye(3) - through)
-            aside = across @ (tip - load.point)
-            forces[0] = forces[0] - aside
-            stiffness[0] = across[None]
-            energy += float(aside @ (tip - load.point)) / 2
-    return _Acting(
-        np.concatenate(points),
-        np.concatenate(places),
-        np.concatenate(forces),
-        np.concatenate(stiffness),
-        energy,
-        push,
-    )
+        found = _pressed(found, plates, load, load.point)
+    if load.weight.any():
+        above = plates.places[:0:-1].cumsum(0)[::-1]
+        number = np.arange(len(above), 0, -1)[:, None]
+        found = found._replace(
+            forces=found.forces + number * load.weight,
+            arms=found.arms + above[:, :, None] * load.weight,
+            energy=found.energy - float(above[0] @ load.weight),
+        )
+    return found
+
+
+def _pressed(found: _Acting, plates: Chain, load: Load, point: Array) -> _Acting:
+    """With what the outer plate does to the tip."""
+    tip, normal = plates.places[-1], load.normal
+    touching = tip + load.outline * RIM @ plates.axes[-1].T
+    into = np.maximum((touching - point) @ normal, 0.0)
+    each = load.wall / TOUCHES * into
+    push = float(each.sum())
+    lines = np.empty((TOUCHES, 6))
+    lines[:, :3] = -touching @ crossing(normal)
+    lines[:, 3:] = normal
+    touched = lines[into > 0]
+    stiffness = load.wall / TOUCHES * touched.T @ touched
+    force, arms = -push * normal, -np.multiply.outer(each @ touching, normal)
+    energy = float(each @ into) / 2
+    if load.sticks:
+        across = load.wall * (np.eye(3) - np.multiply.outer(normal, normal))
+        aside = across @ (tip - point)
+        follows = np.concatenate([-crossing(tip).T, np.eye(3)], axis=1)
+        stiffness += follows.T @ across @ follows
+        force = force - aside
+        arms -= np.multiply.outer(tip, aside)
+        energy += float(aside @ (tip - point)) / 2
+    return _Acting(found.forces + force, found.arms + arms, found.energy + energy, stiffness, push)
 
 
 def _loaded(
     springs: Springs, pitch: float, load: Load, at: Array
 ) -> tuple[float, Array, Array, float]:
-    """Energy with its gradient and second derivatives by all freedoms, and the plate's force."""
-    count = len(at)
+    """Energy with its gradient and second derivatives by all freedoms, and the plate's force.
+
+    A level nearer the base turns all movements beyond it. What the tilts of one level do to each
+    other is taken at their mean: enough to descend by.
+    """
+    size = at.size
     value, gradient, blocks = springs.energy(at)
     plates = chain(at, pitch)
     acting = _acting(plates, load)
-    sparse = np.zeros((count, 3, count, 3))
-    level = np.arange(count)
-    sparse[level, :, level] = blocks
-    matrix = sparse.reshape(3 * count, 3 * count)
-    does = (np.abs(acting.forces).max(-1) > 0) | acting.stiffness.any((1, 2))
-    total = float(value.sum()) + acting.energy
-    if not does.any():
-        return total, gradient.ravel(), matrix, acting.push
-    moved = moves(plates, acting.points[does], acting.plates[does])
-    slope = gradient.ravel() - np.einsum("kd,kdj->j", acting.forces[does], moved)
-    matrix -= stiffening(plates, moved, acting.forces[does])
-    if acting.stiffness.any():
-        flat = moved.reshape(-1, 3 * count)
-        matrix += flat.T @ (acting.stiffness[does] @ moved).reshape(-1, 3 * count)
-    return total, slope, matrix, acting.push
+    moved = twists(plates)
+    works = moved @ felt(acting.arms, acting.forces)
+    gradient = gradient - works[..., 3]
+    flat = moved.reshape(size, 6)
+    half = flat[:, :3] @ works[..., :3].reshape(size, 3).T
+    half *= _nearer(len(at))
+    matrix = -(half + half.T)
+    if acting.stiffness is not None:
+        matrix += flat @ acting.stiffness @ flat.T
+    diagonal = np.einsum("iaib->iab", matrix.reshape(len(at), 3, len(at), 3))
+    diagonal += blocks
+    return float(value.sum()) + acting.energy, gradient.ravel(), matrix, acting.push
+
+
+@lru_cache(maxsize=16)
+def _nearer(count: int) -> Array:
+    """1 where the row's level is nearer the base than the column's, half where it is the same."""
+    level = np.repeat(np.arange(count), 3)
+    return np.asarray(np.heaviside(level[None, :] - level[:, None], 0.5))

@@ -212,3 +212,41 @@ def test_wide_pockets_are_mapped_as_far_as_they_hold() -> None:
         wide.pose((110,))
     free = inflate(wide.maps[0].balloon, 1.0)
     assert wide.pose((1,)).gaps[0, 0] == pytest.approx(free.height[0], rel=0.03)
+
+
+def test_a_pushed_column_buckles_the_sooner_the_longer_and_the_freer_it_is() -> None:
+    """Flat, none does; at 25 % six balloons do where the tip may slide, ten where it may not."""
+    from sbafab.models.stack import stack
+    from sbafab.reproduction.mechanics import FITTED
+
+    def is_straight(balloons: int, share: float, sticks: bool) -> bool:
+        found = stack(sbafab.load("1dof-5mm", f"stack.balloons={balloons}"), factors=FITTED)
+        rise = share * (balloons * 17.5 / 15 - found.flat_height)
+        plate = Plate((0, 0, found.flat_height + rise), sticks=sticks)
+        return found.pose((100,), plate=plate).stable
+
+    assert is_straight(6, 0.02, sticks=False)
+    assert not is_straight(6, 0.25, sticks=False)
+    assert is_straight(6, 0.25, sticks=True)
+    assert not is_straight(10, 0.25, sticks=True)
+
+
+def test_a_plate_is_met_from_any_pressures(three: Stack) -> None:
+    """Unlike chambers below a level plate: what pushes on it is the sum of their balloons."""
+    for pressures in ((2.551, 4.954, 4.495), (7.623, 0.021, 4.454), (0.3, 0.2, 9.0)):
+        held = three.pose(pressures, plate=12.0)
+        rise = 12.0 / 15 - three.pitch
+        force = three.maps[0].force(pressures, np.full(3, rise)).sum() / 1000
+        assert held.stable
+        assert held.force == pytest.approx(force, rel=1e-3)
+        assert held.height == pytest.approx(12.0, abs=1e-3)
+
+
+def test_following_a_path_ends_where_a_fresh_start_does(three: Stack) -> None:
+    load = {"tip_load": (0.0, 0.005, -0.005), "gravity": True}
+    followed = three.pose((6, 3, 1), **load)  # type: ignore[arg-type]
+    for share in np.linspace(0, 1, 11):
+        followed = three.pose((6 - share, 3 + share, 1), near=followed, **load)  # type: ignore[arg-type]
+    fresh = three.pose((5, 4, 1), **load)  # type: ignore[arg-type]
+    assert followed.tip == pytest.approx(fresh.tip, abs=1e-4)
+    assert followed.volumes == pytest.approx(fresh.volumes, rel=1e-5)
