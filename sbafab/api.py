@@ -173,14 +173,19 @@ def cut(
     out: str | Path = "out",
     dxf_profile: DxfProfile = "bulges",
     chord_error: float = 0.005,
+    progress: Progress | None = None,
     **tables: Any,
 ) -> Run:
-    """Writes the cut files and film sheets; ``chord_error`` mm counts for the profile "chords"."""
+    """Writes the cut files and film sheets; ``chord_error`` mm counts for the profile "chords".
+
+    ``progress`` is told what is done, as in :func:`generate`.
+    """
     from sbafab.cutting.dxf_write import Curves
     from sbafab.output.run import generate as run_generate
 
     design = load(source, *changes, **tables)
-    return run_generate(design, Path(out), ("cut",), None, Curves(dxf_profile, chord_error))
+    curves = Curves(dxf_profile, chord_error)
+    return run_generate(design, Path(out), ("cut",), progress, curves)
 
 
 def press(source: Source, *changes: Change, out: str | Path = "out", **tables: Any) -> Run:

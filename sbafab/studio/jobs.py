@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from sbafab.design.records import Design
     from sbafab.laminate.laminate import Laminate
     from sbafab.models.stack import Stack
+    from sbafab.output.run import Run
 
 StudioJob = dict[str, Any]
 Answer = dict[str, Any]
@@ -44,14 +45,22 @@ def live(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     laminate = _laminate(text, job["folder"], job["path"])
     yield laminate_model(laminate, frozenset(job.get("has", ())), beat)
     beat()
-    for number, (rule, findings) in enumerate(api.checking(found, laminate), 1):
+    try:
+        for number, (rule, findings) in enumerate(api.checking(found, laminate), 1):
+            yield {
+                "kind": "rule",
+                "rule": rule,
+                "number": number,
+                "findings": [finding_model(finding) for finding in findings],
+            }
+            beat()
+    except ModuleNotFoundError as error:
+        # Without a server numpy may be missing; only the registration rules, the last ones, ask it.
         yield {
-            "kind": "rule",
-            "rule": rule,
-            "number": number,
-            "findings": [finding_model(finding) for finding in findings],
+            "kind": "unmeasured",
+            "message": f"The rules that need {error.name} were not measured: it is not in this "
+            "page. sbafab check measures them.",
         }
-        beat()
     yield {"kind": "checked"}
 
 
@@ -81,6 +90,18 @@ def elastic(job: StudioJob, beat: Beat) -> Iterator[Answer]:
 
 def generate(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     """Writes the folder of a design into ``out``; every step is told, the last answer names it."""
+    yield _made(api.generate(_loaded(_text(job), job), out=job["out"], progress=_told(job, beat)))
+
+
+def cut(job: StudioJob, beat: Beat) -> Iterator[Answer]:
+    """The same with cut files and film sheets alone, which a page can write without a server."""
+    design = _loaded(_text(job), job)
+    if design.family == "assembly":
+        raise DesignError(f"{design.name} is an assembly; cut it with sbafab generate")
+    yield _made(api.cut(design, out=job["out"], progress=_told(job, beat)))
+
+
+def _told(job: StudioJob, beat: Beat) -> Callable[[str, int, int], None]:
     steps: list[Answer] = []
     tell: Callable[[Answer], None] = job.get("tell", steps.append)
 
@@ -88,8 +109,11 @@ def generate(job: StudioJob, beat: Beat) -> Iterator[Answer]:
         beat()
         tell({"kind": "progress", "what": what, "done": done, "total": total})
 
-    run = api.generate(_loaded(_text(job), job), out=job["out"], progress=progress)
-    yield {
+    return progress
+
+
+def _made(run: Run) -> Answer:
+    return {
         "kind": "made",
         "name": run.folder.name,
         "failed": run.failed,
@@ -164,5 +188,6 @@ JOBS: dict[str, Callable[[StudioJob, Beat], Iterator[Answer]]] = {
     "predict": predict,
     "elastic": elastic,
     "generate": generate,
+    "cut": cut,
     "motion": motion,
 }

@@ -10,9 +10,9 @@ import pytest
 
 from sbafab import api
 from sbafab.errors import DesignError
+from sbafab.studio.answering import refusal
 from sbafab.studio.editing import edited
 from sbafab.studio.links import design_in, packed
-from sbafab.studio.worker import _place
 from tests.studio.worked import answers, job
 
 SMALL = api.template("1dof-5mm").replace("balloons = 6", "balloons = 2") + (
@@ -75,7 +75,7 @@ def test_an_error_has_the_command_line_s_words_and_its_field(
     with pytest.raises(DesignError) as theirs:
         api.loads(text)
     assert str(ours.value) == str(theirs.value)
-    assert _place(str(ours.value)) == {"field": key}
+    assert refusal(str(ours.value))["field"] == key
 
 
 @pytest.mark.parametrize(

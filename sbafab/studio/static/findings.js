@@ -27,6 +27,7 @@ export class Findings {
     const said = [["fail", "failed"], ["warn", "to heed"], ["waived", "waived"], ["pass", "hold"]].filter(([verdict]) => count(verdict)).map(([verdict, words]) => `${count(verdict)} ${words}`);
     this.sum.textContent = said.join(", ");
     this.list.replaceChildren(...sorted.map(({ finding, waiting }) => this.line(finding, waiting)));
+    if (studio.unmeasured) this.list.append(el("div", { role: "listitem", class: "unmeasured" }, studio.unmeasured));
   }
   line(finding, waiting) {
     const { measured, limit, unit } = finding;

@@ -1,6 +1,6 @@
 // The design being edited and what is known of it; views listen, none keeps a copy.
-import { ask, listen, tab } from "./server.js";
-import { recall, remember } from "./dom.js";
+import { ask, listen, tab, withoutServer } from "./server.js";
+import { recall, remember, uniqueName } from "./dom.js";
 
 const SETTLE = 500;
 const MOST_HISTORY = 200;
@@ -22,6 +22,7 @@ export class Studio {
     this.family = null;
     this.findings = [];
     this.running = [];
+    this.unmeasured = null;
     this.prediction = null;
     this.error = null;
     this.stale = { laminate: true, rules: true, figures: true };
@@ -148,6 +149,7 @@ export class Studio {
     const sent = [...this.pending];
     const flight = (this.flight = { abort: new AbortController(), shown: false, at: this.changedAt ?? performance.now() });
     this.running = [];
+    this.unmeasured = null;
     this.emit("busy", true);
     try {
       await listen("/api/live", this.body(), (answer) => this.heard(answer, flight, sent), flight.abort.signal);
@@ -186,6 +188,7 @@ export class Studio {
         this.emit("checked");
         this.emit("stale");
       },
+      unmeasured: () => { this.unmeasured = answer.message; },
       superseded: () => {},
     };
     (hears[answer.kind] ?? (() => this.fail(answer)))();
@@ -232,23 +235,29 @@ export class Studio {
     const at = this.changedAt ?? performance.now();
     this.figuresFlight = true;
     let good = null;
+    this.noFigures = null;
     try {
       await listen("/api/predict", this.body(), (answer) => { if (answer.kind === "prediction") good = answer; else if (answer.message) this.noFigures = answer.message; });
     } catch { /* the other request says what is wrong */ }
     this.figuresFlight = false;
     if (good) {
       this.prediction = good;
-      this.noFigures = null;
       this.stale.figures = this.figuresWanted;
       this.latency.figures.push(performance.now() - at);
       this.emit("figures");
       this.emit("stale");
       this.askElastic();
-    } else this.emit("figures");
+    } else if (this.noFigures) {
+      this.stale.figures = this.figuresWanted;
+      this.emit("figures");
+      this.emit("stale");
+    }
     if (this.figuresWanted) this.askFigures();
   }
-  // What takes seconds comes once the hand rests, and not while the actuator is being moved.
+  // What takes seconds comes once the hand rests, and not while the actuator is being moved. In the page it would
+  // take half a minute, and motion and cutting wait for it.
   askElastic() {
+    if (withoutServer) return;
     clearTimeout(this.elasticTimer);
     this.elastic?.abort();
     this.elasticTimer = setTimeout(async () => {
@@ -290,6 +299,13 @@ export class Studio {
     this.keep();
     this.emit("saved");
   }
+  // Where no server keeps files, the browser saves what was downloaded.
+  saved(name) {
+    this.commit();
+    Object.assign(this, { savedText: this.text });
+    this.keep();
+    this.emit("saved", name);
+  }
   async save(name, over = false) {
     this.commit();
     const same = name === this.name;
@@ -326,7 +342,7 @@ export const shapeKeys = (laminate) => [
 ];
 
 function freshTab() {
-  const id = crypto.randomUUID();
+  const id = uniqueName();
   sessionStorage.setItem("sbafab-tab", id);
   return id;
 }
