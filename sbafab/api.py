@@ -260,11 +260,13 @@ def predict(
     flow_ml_min: float = 35.0,
     volumes_ul: Sequence[float] = (),
     quick: bool = False,
+    laminate: Laminate | None = None,
     **asked: Any,
 ) -> Prediction:
     """What a design will do; each figure names its model and its trust.
 
-    ``quick`` leaves out the figures of the elastic stack, which take seconds. ``asked`` holds
+    ``quick`` leaves out the figures of the elastic stack, which take seconds; ``laminate`` is the
+    design's, where it is built already. ``asked`` holds
     fields of ``models.figures.Factors``, which are ``press_factor``, ``contact_factor``,
     ``pocket_loss`` mm and ``modulus_mpa``, beside tables of the design. Raises DesignError for what
     is out of every model's range.
@@ -274,7 +276,7 @@ def predict(
 
     factors, tables = _parted(asked, Factors)
     wish = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), Factors(**factors))
-    return model_predict(load(source, *changes, **tables), wish, quick=quick)
+    return model_predict(load(source, *changes, **tables), wish, laminate, quick)
 
 
 def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **asked: Any) -> Stack:

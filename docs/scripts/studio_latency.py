@@ -16,8 +16,9 @@ from sbafab import api
 from tests.studio.browsing import Watched, browser, served
 
 PARTS = {
-    "geometry": "layers, section and solid painted",
-    "figures": "prediction",
+    "geometry": "layers painted",
+    "section": "section painted",
+    "figures": "prediction by formulas",
     "deck": "rules but the yield",
     "all": "rules with the yield",
 }
@@ -33,16 +34,15 @@ def main(changes: int = 25) -> None:
             seen.ready()
             seen.page.click("#tab-layers")
             _warm(seen)
-            for number in range(changes):
-                seen.say(f"studio.edit([['chamber.diameter', '{5.05 + number / 50:.3f}']])")
-                seen.page.wait_for_timeout(50)
-                seen.ready()
+            _turned(seen, changes)
             print(f"load of the machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
             print("\n| from a change to | median ms | 95th percentile ms |\n|---|---|---|")
             for part, words in PARTS.items():
-                times = sorted(seen.say(f"studio.latency.{part}"))
-                late = times[min(len(times) - 1, round(0.95 * len(times)))]
-                print(f"| {words} | {statistics.median(times):.0f} | {late:.0f} |")
+                _row(words, seen.say(f"studio.latency.{part}"))
+            seen.page.click("#tab-solid")
+            _warm(seen)
+            _turned(seen, changes)
+            _row("solid painted, in place of layers", seen.say("studio.latency.geometry"))
             seen.page.click("#tab-motion")
             seen.until("Boolean(studio.motion.pose)")
             seen.say("studio.motion.set(() => 15)")
@@ -54,6 +54,19 @@ def main(changes: int = 25) -> None:
             costs = seen.say("studio.motion.costs.slice(-100)")
             each = statistics.median(costs)
             print(f"\nposes drawn a second: {rate:.0f}; drawing one: {each:.1f} ms")
+
+
+def _turned(seen: Watched, changes: int) -> None:
+    for number in range(changes):
+        seen.say(f"studio.edit([['chamber.diameter', '{5.05 + number / 50:.3f}']])")
+        seen.page.wait_for_timeout(50)
+        seen.ready()
+
+
+def _row(words: str, measured: list[float]) -> None:
+    times = sorted(measured)
+    late = times[min(len(times) - 1, round(0.95 * len(times)))]
+    print(f"| {words} | {statistics.median(times):.0f} | {late:.0f} |")
 
 
 def _warm(seen: Watched) -> None:

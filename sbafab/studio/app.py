@@ -45,7 +45,6 @@ class Studio:
     text: str | None = None
     """A design from a link, in place of a file."""
     live: Worker = field(default_factory=lambda: Worker(LIVE_SECONDS))
-    side: Worker = field(default_factory=lambda: Worker(LIVE_SECONDS))
     mover: Worker = field(default_factory=lambda: Worker(LIVE_SECONDS, warm=False))
     maker: Worker = field(default_factory=lambda: Worker(MAKE_SECONDS, warm=False))
     made: dict[str, Made] = field(default_factory=dict)
@@ -54,11 +53,10 @@ class Studio:
     @contextlib.asynccontextmanager
     async def lifespan(self, _: Starlette) -> AsyncIterator[None]:
         self.live.start()
-        self.side.start()
         try:
             yield
         finally:
-            for worker in (self.live, self.side, self.mover, self.maker):
+            for worker in (self.live, self.mover, self.maker):
                 worker.stop()
             shutil.rmtree(self.scratch, ignore_errors=True)
 
@@ -72,7 +70,6 @@ def app(studio: Studio) -> Starlette:
         Route("/api/save", save, methods=["POST"]),
         Route("/api/watch/{name}", watch),
         Route("/api/live", live, methods=["POST"]),
-        Route("/api/predict", predict, methods=["POST"]),
         Route("/api/elastic", elastic, methods=["POST"]),
         Route("/api/motion", motion, methods=["POST"]),
         Route("/api/generate", generate, methods=["POST"]),
@@ -147,10 +144,6 @@ async def watch(request: Request) -> Response:
 
 async def live(request: Request) -> Response:
     return await _worked(request, _studio(request).live, "live")
-
-
-async def predict(request: Request) -> Response:
-    return await _worked(request, _studio(request).side, "predict")
 
 
 async def elastic(request: Request) -> Response:

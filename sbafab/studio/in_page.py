@@ -25,7 +25,6 @@ FOLDER = Path("/studio")
 OUT = FOLDER / "out"
 JOBS = {
     "/api/live": "live",
-    "/api/predict": "predict",
     "/api/motion": "motion",
     "/api/generate": "cut",
 }

@@ -15,7 +15,7 @@ from sbafab import api
 from sbafab.errors import DesignError
 from sbafab.studio import places
 from sbafab.studio.editing import MOST_EDITS, edited
-from sbafab.studio.model import Beat, finding_model, laminate_model
+from sbafab.studio.model import Beat, bonds_model, finding_model, laminate_model
 from sbafab.studio.moving import Filling, poses, stack_model
 
 if TYPE_CHECKING:
@@ -32,18 +32,30 @@ MOST_FILLINGS = 8
 
 
 def live(job: StudioJob, beat: Beat) -> Iterator[Answer]:
-    """Text after the edits, resolved design, laminate, then rule by rule; the yield comes last."""
+    """Text after the edits and design, then what is seen, in the order in which it is known.
+
+    Laminate, bonds and prediction come before the rules; the yield is the last of those.
+    """
     text = _text(job)
     yield {"kind": "text", "text": text}
     found = _loaded(text, job)
     if found.family == "assembly":
         yield {"kind": "assembly", "name": found.name}
+        yield {
+            "kind": "unpredicted",
+            "message": f"{found.name} is an assembly; its actuators are predicted one by one",
+        }
         yield from _assembly_findings(found)
         return
     yield {"kind": "design", "name": found.name, "family": found.family, **_values(found)}
     beat()
     laminate = _laminate(text, job["folder"], job["path"])
-    yield laminate_model(laminate, frozenset(job.get("has", ())), beat)
+    shown = laminate_model(laminate, frozenset(job.get("has", ())))
+    yield shown
+    beat()
+    yield bonds_model(laminate, {*job.get("has", ()), *shown["shapes"]})
+    beat()
+    yield _prediction(found, laminate)
     beat()
     try:
         for number, (rule, findings) in enumerate(api.checking(found, laminate), 1):
@@ -74,11 +86,15 @@ def _assembly_findings(assembly: Any) -> Iterator[Answer]:
     yield {"kind": "checked"}
 
 
-def predict(job: StudioJob, beat: Beat) -> Iterator[Answer]:
-    """Figures and curves by closed formulas, at once."""
-    design = _loaded(_text(job), job)
-    beat()
-    yield {"kind": "prediction", **api.predict(design, quick=True).as_dict()}
+def _prediction(design: Design, laminate: Laminate) -> Answer:
+    """Figures and curves by closed formulas; why there are none, where that is so."""
+    try:
+        found = api.predict(design, quick=True, laminate=laminate)
+    except DesignError as error:
+        return {"kind": "unpredicted", "message": str(error)}
+    except ModuleNotFoundError as error:
+        return {"kind": "unpredicted", "message": f"This needs {error.name}, which is not here."}
+    return {"kind": "prediction", **found.as_dict()}
 
 
 def elastic(job: StudioJob, beat: Beat) -> Iterator[Answer]:
@@ -185,7 +201,6 @@ def _stack(text: str, folder: str, path: str) -> Stack:
 
 JOBS: dict[str, Callable[[StudioJob, Beat], Iterator[Answer]]] = {
     "live": live,
-    "predict": predict,
     "elastic": elastic,
     "generate": generate,
     "cut": cut,

@@ -34,8 +34,8 @@ COMPILED = {".pyc", ".so", ".pyd"}
 INDEX, LISTING = "index.html", "python/python.json"
 POLICY = (
     "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; "
-    "style-src 'self'; img-src 'self' blob: data:; connect-src 'self' blob:; frame-src blob:; base-uri 'none'; "
-    "form-action 'none'"
+    "style-src 'self'; img-src 'self' blob: data:; connect-src 'self' blob:; frame-src blob:; "
+    "base-uri 'none'; form-action 'none'"
 )
 HOW = "npm pack pyodide && tar xzf pyodide-*.tgz, then --pyodide package"
 
@@ -207,7 +207,7 @@ def _write_page(
 
 
 def _program() -> Iterator[tuple[str, bytes]]:
-    """The program's own code and templates, without what is compiled and what the page has beside it."""
+    """The program's own code and templates, without what is compiled or lies beside it."""
     root = Path(sbafab.__file__).parent
     templates = templates_folder()
     for path in sorted(root.rglob("*")):

@@ -193,16 +193,17 @@ function marks(section) {
       const words = $(".stale-mark", element);
       if (words) words.textContent = bad ? "Last good design" : element.classList.contains("section-block") ? "Updating" : "Updating";
     };
-    for (const view of [views.solid, views.layers, views.compare, section]) mark(view.element, studio.stale.laminate || bad);
+    for (const view of [views.solid, views.layers, views.compare]) mark(view.element, studio.stale.laminate || bad);
+    mark(section.element, studio.stale.bonds || bad);
     mark($("#panel-findings").children[0], studio.stale.rules || bad);
     mark($("#panel-findings").children[1], studio.stale.figures || bad);
   };
-  studio.on("stale failed laminate checked figures", stale);
+  studio.on("stale failed laminate bonds checked figures", stale);
   studio.on("hover", (words) => { $("#hover").textContent = words; });
   studio.on("busy", (on) => { $("#busy").textContent = on ? "working" : ""; });
   studio.on("timing", () => {
     const last = (what) => studio.latency[what].at(-1);
-    $("#timing").textContent = [["geometry", "views"], ["deck", "rules"], ["all", "with yield"]].filter(([what]) => last(what)).map(([what, words]) => `${words} ${Math.round(last(what))} ms`).join("  ");
+    $("#timing").textContent = [["geometry", "views"], ["section", "section"], ["figures", "prediction"], ["deck", "rules"], ["all", "with yield"]].filter(([what]) => last(what)).map(([what, words]) => `${words} ${Math.round(last(what))} ms`).join("  ");
   });
 }
 
@@ -256,7 +257,8 @@ function theme(name) {
 }
 export function notice(words, bad = false, choices = []) {
   const bar = $("#notice"), close = () => { bar.hidden = true; };
-  bar.dataset.kind = bad ? "bad" : "";
+  // What asks stays until it is answered; what only tells of a failure goes with it.
+  bar.dataset.kind = bad && !choices.length ? "bad" : "";
   bar.classList.toggle("bad", bad);
   bar.replaceChildren(el("span", {}, words), ...choices.map(([label, does]) => el("button", { onclick: () => { close(); does(); } }, label)), el("button", { id: "low", class: "quiet", "aria-label": "Close", onclick: close }, "×"));
   bar.hidden = false;

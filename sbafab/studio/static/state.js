@@ -25,15 +25,14 @@ export class Studio {
     this.unmeasured = null;
     this.prediction = null;
     this.error = null;
-    this.stale = { laminate: true, rules: true, figures: true };
+    this.stale = { laminate: true, bonds: true, rules: true, figures: true };
     this.picked = null;
     this.hovered = null;
     this.cut = null;
     this.reference = null;
-    this.latency = { geometry: [], deck: [], all: [], figures: [] };
+    this.latency = { geometry: [], section: [], figures: [], deck: [], all: [] };
     this.listeners = new Map();
     this.flight = null;
-    this.figuresFlight = null;
     this.draftKey = "sbafab-draft:" + (sessionStorage.getItem("sbafab-tab") ?? freshTab());
   }
 
@@ -142,7 +141,6 @@ export class Studio {
     if (this.flight && !this.flight.shown) return;
     this.flight?.abort.abort();
     this.send();
-    this.askFigures();
   }
   async send() {
     this.wanted = false;
@@ -172,10 +170,19 @@ export class Studio {
       },
       assembly: () => {
         Object.assign(this, { family: "assembly", designName: answer.name, laminate: null, error: null });
+        this.stale.laminate = this.stale.bonds = this.wanted;
         this.emit("design");
         this.emit("laminate");
       },
       laminate: () => this.heardLaminate(answer, flight),
+      bonds: () => this.heardBonds(answer, flight),
+      prediction: () => {
+        this.prediction = answer;
+        this.heardFigures(null);
+        this.time("figures", flight);
+        this.askElastic();
+      },
+      unpredicted: () => this.heardFigures(answer.message),
       rule: () => {
         this.running.push(answer);
         this.emit("rule", answer);
@@ -192,7 +199,7 @@ export class Studio {
       superseded: () => {},
     };
     (hears[answer.kind] ?? (() => this.fail(answer)))();
-    if (["laminate", "error", "defect", "crashed", "assembly"].includes(answer.kind)) {
+    if (["bonds", "error", "defect", "crashed", "assembly"].includes(answer.kind)) {
       flight.shown = true;
       if (this.wanted) this.ask();
     }
@@ -206,13 +213,28 @@ export class Studio {
   }
   heardLaminate(answer, flight) {
     for (const [key, shape] of Object.entries(answer.shapes)) this.shapes.set(key, shape);
-    this.laminate = answer;
-    this.drop();
+    this.laminate = { ...answer, bonds: [] };
     this.stale.laminate = this.wanted;
     if (!this.cut || !this.cut.moved) this.cut = firstCut(answer);
     this.emit("laminate");
     this.emit("stale");
     requestAnimationFrame(() => setTimeout(() => this.time("geometry", flight)));
+  }
+  // What of every interface bonds: the section waits for it.
+  heardBonds(answer, flight) {
+    for (const [key, shape] of Object.entries(answer.shapes)) this.shapes.set(key, shape);
+    this.laminate.bonds = answer.bonds;
+    this.drop();
+    this.stale.bonds = this.wanted;
+    this.emit("bonds");
+    this.emit("stale");
+    requestAnimationFrame(() => setTimeout(() => this.time("section", flight)));
+  }
+  heardFigures(refusal) {
+    this.noFigures = refusal;
+    this.stale.figures = this.wanted;
+    this.emit("figures");
+    this.emit("stale");
   }
   drop() {
     // Shapes of states long gone.
@@ -228,31 +250,6 @@ export class Studio {
     this.error = answer;
     this.emit("failed", answer);
     this.emit("stale");
-  }
-  async askFigures() {
-    if (this.figuresFlight) { this.figuresWanted = true; return; }
-    this.figuresWanted = false;
-    const at = this.changedAt ?? performance.now();
-    this.figuresFlight = true;
-    let good = null;
-    this.noFigures = null;
-    try {
-      await listen("/api/predict", this.body(), (answer) => { if (answer.kind === "prediction") good = answer; else if (answer.message) this.noFigures = answer.message; });
-    } catch { /* the other request says what is wrong */ }
-    this.figuresFlight = false;
-    if (good) {
-      this.prediction = good;
-      this.stale.figures = this.figuresWanted;
-      this.latency.figures.push(performance.now() - at);
-      this.emit("figures");
-      this.emit("stale");
-      this.askElastic();
-    } else if (this.noFigures) {
-      this.stale.figures = this.figuresWanted;
-      this.emit("figures");
-      this.emit("stale");
-    }
-    if (this.figuresWanted) this.askFigures();
   }
   // What takes seconds comes once the hand rests, and not while the actuator is being moved. In the page it would
   // take half a minute, and motion and cutting wait for it.
