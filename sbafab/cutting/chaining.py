@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
 from sbafab.geometry.boolean import LEAST_AREA, tidy
-from sbafab.geometry.copies import Copies
-from sbafab.geometry.edges import EPSILON, Edge, Point, edge_from_bulge
+from sbafab.geometry.copies import COPIED, Copies
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, edge_from_bulge
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
 from sbafab.geometry.region import Contour, Region, same_support
@@ -29,13 +29,23 @@ def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
     Raises OutputError at an end that has not exactly one other to go on with.
     """
     joints = _joints([p for edge in edges for p in (edge.start, edge.end)])
-    snapped = [_between(edge, joints[edge.start], joints[edge.end]) for edge in edges]
-    at: dict[Point, list[int]] = defaultdict(list)
+    # An edge shorter than ends may lie apart is part of a corner.
+    corners = [
+        joints[edge.start]
+        for edge in edges
+        if joints[edge.start] == joints[edge.end] and edge.length <= 2 * JOINED
+    ]
+    snapped = [
+        _between(edge, joints[edge.start], joints[edge.end])
+        for edge in edges
+        if joints[edge.start] != joints[edge.end] or edge.length > 2 * JOINED
+    ]
+    at: dict[Point, list[int]] = {corner: [] for corner in corners}
     for index, edge in enumerate(snapped):
-        at[edge.start].append(index)
-        at[edge.end].append(index)
+        at.setdefault(edge.start, []).append(index)
+        at.setdefault(edge.end, []).append(index)
     for (x, y), ends in at.items():
-        if len(ends) == 1:
+        if len(ends) < 2:
             raise OutputError(f"contour open at x {x:.3f}, y {y:.3f}; close it.")
         if len(ends) > 2:
             raise OutputError(
@@ -60,16 +70,29 @@ def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
 
 
 def _joints(ends: Sequence[Point]) -> dict[Point, Point]:
-    """The first known of the points within JOINED of each end."""
+    """Where each end is taken to lie.
+
+    Two ends that meet by themselves stay where they are, however near others lie; what is left
+    over is joined within JOINED.
+    """
+    joints = _nearest_known(ends, EPSILON)
+    meeting = Counter(joints[p] for p in ends)
+    apart = [joints[p] for p in ends if meeting[joints[p]] != 2]
+    moved = _nearest_known(apart, JOINED)
+    return {p: moved.get(joint, joint) for p, joint in joints.items()}
+
+
+def _nearest_known(points: Sequence[Point], within: float) -> dict[Point, Point]:
+    """For each point the nearest one known before it, if that is near enough, or itself."""
     cells: dict[tuple[int, int], list[Point]] = defaultdict(list)
     joints: dict[Point, Point] = {}
-    for p in ends:
+    for p in points:
         if p in joints:
             continue
-        x, y = math.floor(p[0] / JOINED), math.floor(p[1] / JOINED)
+        x, y = math.floor(p[0] / within), math.floor(p[1] / within)
         near = [q for i in (x - 1, x, x + 1) for j in (y - 1, y, y + 1) for q in cells[i, j]]
         joint = min(near, key=lambda q: math.dist(p, q), default=p)
-        joints[p] = joint if math.dist(p, joint) <= JOINED else p
+        joints[p] = joint if math.dist(p, joint) <= within else p
         if joints[p] is p:
             cells[x, y].append(p)
     return joints
@@ -183,18 +206,29 @@ def nested_region(inner: Sequence[Contour], outer: Sequence[Contour]) -> Region:
             turned.append(_whole(right, *right.circle))
             continue
         first = copies.first(right)
-        tidied = (tidy(right.edges) or right) if first is right else None
-        if tidied is not None:
-            turns[id(first)] = _turn(first.edges, tidied.edges)
-        turn = turns[id(first)]
-        turned.append(tidied or _from(right, turn) or tidy(right.edges) or right)
+        if first is right:
+            turns[id(first)] = _turn(first.edges, (tidy(right.edges) or right).edges)
+        turned.append(_from(right, turns[id(first)]) or tidy(right.edges) or right)
     return Region(tuple(turned))
 
 
 def _turn(edges: Sequence[Edge], others: Sequence[Edge]) -> int | None:
     """From which of the edges on the others are these; None where they are others."""
-    turn = next((i for i, edge in enumerate(edges) if edge == others[0]), 0)
-    return turn if (*edges[turn:], *edges[:turn]) == tuple(others) else None
+    turn = next((i for i, edge in enumerate(edges) if _alike(edge, others[0])), 0)
+    turned = (*edges[turn:], *edges[:turn])
+    is_same = len(turned) == len(others) and all(map(_alike, turned, others))
+    return turn if is_same else None
+
+
+def _alike(one: Edge, other: Edge) -> bool:
+    """Whether edges of two contours, each of which ends where the next one starts, run alike."""
+    if math.dist(one.start, other.start) > COPIED or type(one) is not type(other):
+        return False
+    return not (isinstance(one, Arc) and isinstance(other, Arc)) or (
+        math.dist(one.centre, other.centre) <= COPIED
+        and abs(one.radius - other.radius) <= COPIED
+        and one.ccw == other.ccw
+    )
 
 
 def _from(contour: Contour, turn: int | None) -> Contour | None:

@@ -18,7 +18,7 @@ from importlib import metadata
 from pathlib import Path
 
 import sbafab
-from sbafab.design.reading import templates_folder
+from sbafab.design.templates import templates_folder
 from sbafab.errors import DesignError, OutputError
 from sbafab.studio.made import packed
 
