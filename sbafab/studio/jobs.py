@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sbafab import api
-from sbafab.errors import DesignError
+from sbafab.errors import DesignError, SbafabError
 from sbafab.studio import places
 from sbafab.studio.editing import MOST_EDITS, edited
 from sbafab.studio.model import Beat, bonds_model, finding_model, laminate_model
@@ -90,7 +90,7 @@ def _prediction(design: Design, laminate: Laminate) -> Answer:
     """Figures and curves by closed formulas; why there are none, where that is so."""
     try:
         found = api.predict(design, quick=True, laminate=laminate)
-    except DesignError as error:
+    except SbafabError as error:
         return {"kind": "unpredicted", "message": str(error)}
     except ModuleNotFoundError as error:
         return {"kind": "unpredicted", "message": f"This needs {error.name}, which is not here."}
