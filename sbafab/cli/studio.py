@@ -37,8 +37,14 @@ def studio(
     The page is served on this machine only and asks for the token in its link. Ctrl-C ends it.
     """
     if static is not None:
+        if source is not None:
+            raise click.UsageError(
+                f"--static writes a page for any design; leave out {source}, and open it in there"
+            )
         _write(static, pyodide)
         return
+    if pyodide is not None:
+        raise click.UsageError("--pyodide goes with --static FOLDER")
     from sbafab.studio.serving import serve
 
     def announce(link: str) -> None:

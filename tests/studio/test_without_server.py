@@ -14,8 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
 from sbafab import api
+from sbafab.cli.studio import studio
 from sbafab.errors import DesignError, OutputError
 from sbafab.studio import in_page, without_server
 from sbafab.studio.app import Studio, app
@@ -247,6 +249,18 @@ def test_pydantic_of_the_distribution_is_taken_with_its_own_core(
     names = zipfile.ZipFile(own / "packages.zip").namelist()
     assert not [name for name in names if name.startswith("pydantic/")]
     assert "tomlkit/__init__.py" in names
+
+
+def test_the_command_says_what_was_written_and_what_it_goes_without(
+    pyodide: Path, tmp_path: Path
+) -> None:
+    site = str(tmp_path / "site")
+    done = CliRunner().invoke(studio, ["--static", site, "--pyodide", str(pyodide)])
+    assert done.exit_code == 0
+    assert f"python -m http.server --bind 127.0.0.1 --directory {site}" in done.output
+    assert "Without numpy it has no prediction" in done.output
+    for wrong in (["3dof-15mm", "--static", site], ["--pyodide", str(pyodide)]):
+        assert CliRunner().invoke(studio, wrong).exit_code == 2
 
 
 def test_a_folder_of_something_else_is_left_alone(pyodide: Path, tmp_path: Path) -> None:

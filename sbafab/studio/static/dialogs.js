@@ -59,7 +59,7 @@ export class Dialogs {
     const { studio } = this;
     const link = `${location.origin}${location.pathname}#design=${await packed(studio.text)}`;
     const field = el("input", { type: "text", readonly: true, value: link, "aria-label": "Link that holds the design", onfocus: (event) => event.target.select() });
-    const copy = el("button", { class: "primary", onclick: async () => { field.select(); await navigator.clipboard.writeText(link).then(() => { copy.textContent = "Copied"; }).catch(() => document.execCommand("copy")); } }, "Copy link");
+    const copy = el("button", { class: "primary", onclick: async () => { field.select(); await (navigator.clipboard?.writeText(link) ?? Promise.reject()).then(() => { copy.textContent = "Copied"; }).catch(() => document.execCommand("copy")); } }, "Copy link");
     const save = async (made) => { const { name, blob } = await made; download(`${studio.designName}-${name}`, blob); };
     this.show("Share", el("div", { class: "share" }, field, copy, el("p", {}, `The link holds the whole design (${(link.length / 1000).toFixed(1)} kB)${withoutServer ? ", which stays in this link: no server keeps it." : ` and no token. Who gets it opens it with: sbafab studio "LINK"`}`),
       el("span", {}, "Picture of the view above"), el("button", { onclick: () => save(this.picture()) }, "Picture"),
