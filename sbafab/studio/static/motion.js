@@ -135,6 +135,8 @@ export class Motion {
   // A pose is drawn in the next frame; while it is painted the one after it is worked out.
   arrived(pose) {
     const { stack } = this;
+    // Asked for of a design that has changed since.
+    if (!stack) return;
     if (pose.valves) this.settled = pose.valves.every((p, i) => Math.abs(p - pose.pressures[i]) < 0.01 + 0.002 * p);
     this.newest = pose;
     this.frame ??= requestAnimationFrame(() => {
@@ -163,6 +165,7 @@ export class Motion {
   tell() {
     const now = performance.now(), wait = READABLE - (now - (this.told ?? -READABLE));
     clearTimeout(this.telling);
+    if (!this.stack) return;
     if (wait > 0) { this.telling = setTimeout(() => this.tell(), wait); return; }
     this.told = now;
     this.read();
