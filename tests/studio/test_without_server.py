@@ -10,6 +10,7 @@ import subprocess
 import sys
 import zipfile
 from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -180,12 +181,11 @@ def test_python_in_the_folder_runs_by_itself(pyodide: Path, tmp_path: Path) -> N
     own = tmp_path / "packages"
     for name in ("sbafab.zip", "packages.zip"):
         zipfile.ZipFile(site / "python" / name).extractall(own)
-    import numpy
-    import pydantic_core
-
-    for module in (numpy, pydantic_core):
-        assert module.__file__ is not None
-        (own / module.__name__).symlink_to(Path(module.__file__).parent)
+    for name in ("numpy", "pydantic_core"):
+        found = find_spec(name)
+        assert found is not None
+        assert found.origin is not None
+        (own / name).symlink_to(Path(found.origin).parent)
     program = (
         f"import sys; sys.path.insert(0, {str(own)!r})\n"
         "from pathlib import Path\nimport json, sbafab\nfrom sbafab.studio import in_page\n"
