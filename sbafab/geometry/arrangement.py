@@ -194,7 +194,8 @@ class Arrangement:
         """A half with the plane outside its group on its left, and its leftmost point."""
         edge = self._drawn[number]
         p = min(edge.start, edge.end)
-        if isinstance(edge, Arc) and x < p[0]:
+        # Where an arc bulges by a rounding only, what it meets at its end may lie farther left.
+        if isinstance(edge, Arc) and x < p[0] - 2 * EPSILON:
             return 2 * number + int(edge.ccw), (x, edge.centre[1])
         # All leave to the right of it, so the last of those that leave upwards most.
         halves = self.rings[p] if len(self.rings[p]) > 2 else self._in_order(self.rings[p])
