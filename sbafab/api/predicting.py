@@ -11,6 +11,7 @@ from sbafab.api.sources import Source, parted
 from sbafab.design.reading import Change
 
 if TYPE_CHECKING:
+    from sbafab.laminate.laminate import Laminate
     from sbafab.models.figures import Prediction
     from sbafab.models.motion import Motion
     from sbafab.models.stack import Stack
@@ -25,14 +26,16 @@ def predict(
     flow_ml_min: float = 35.0,
     volumes_ul: Sequence[float] = (),
     quick: bool = False,
+    laminate: Laminate | None = None,
     **asked: Any,
 ) -> Prediction:
     """What a design will do; each figure has a unit and names its model and its trust.
 
     Forces and works are at ``pressures_kpa``, times at ``flow_ml_min`` into each chamber, strokes
     with ``volumes_ul`` in each balloon. ``quick`` leaves out the figures of the elastic stack,
-    which take seconds. ``asked`` holds fields of ``Factors``: ``press_factor``,
-    ``contact_factor``, ``pocket_loss`` mm and ``modulus_mpa``, beside tables of the design. Raises
+    which take seconds; ``laminate`` is the design's, where it is built already. ``asked`` holds
+    fields of ``Factors``: ``press_factor``, ``contact_factor``, ``pocket_loss`` mm and
+    ``modulus_mpa``, beside tables of the design. Raises
     DesignError for what is out of every model's range. Models: the paper's Eqs. 1-4 (Sec. 3), and
     elastic balloons of axisymmetric film in balance.
     """
@@ -41,7 +44,7 @@ def predict(
 
     factors, tables = parted(asked, Factors)
     wish = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), Factors(**factors))
-    return model_predict(load(source, *changes, **tables), wish, quick=quick)
+    return model_predict(load(source, *changes, **tables), wish, laminate, quick)
 
 
 def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **asked: Any) -> Stack:

@@ -20,9 +20,9 @@ from starlette.responses import FileResponse, JSONResponse, Response, StreamingR
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
-from sbafab import __version__, api
+from sbafab import api
 from sbafab.errors import SbafabError
-from sbafab.studio import forms, places
+from sbafab.studio import places, requested
 from sbafab.studio.guard import Guard, TooLongError
 from sbafab.studio.made import Made, zipped
 from sbafab.studio.workers import BusyError, Worker
@@ -45,7 +45,6 @@ class Studio:
     text: str | None = None
     """A design from a link, in place of a file."""
     live: Worker = field(default_factory=lambda: Worker(LIVE_SECONDS))
-    side: Worker = field(default_factory=lambda: Worker(LIVE_SECONDS))
     mover: Worker = field(default_factory=lambda: Worker(LIVE_SECONDS, warm=False))
     maker: Worker = field(default_factory=lambda: Worker(MAKE_SECONDS, warm=False))
     made: dict[str, Made] = field(default_factory=dict)
@@ -54,11 +53,10 @@ class Studio:
     @contextlib.asynccontextmanager
     async def lifespan(self, _: Starlette) -> AsyncIterator[None]:
         self.live.start()
-        self.side.start()
         try:
             yield
         finally:
-            for worker in (self.live, self.side, self.mover, self.maker):
+            for worker in (self.live, self.mover, self.maker):
                 worker.stop()
             shutil.rmtree(self.scratch, ignore_errors=True)
 
@@ -72,7 +70,6 @@ def app(studio: Studio) -> Starlette:
         Route("/api/save", save, methods=["POST"]),
         Route("/api/watch/{name}", watch),
         Route("/api/live", live, methods=["POST"]),
-        Route("/api/predict", predict, methods=["POST"]),
         Route("/api/elastic", elastic, methods=["POST"]),
         Route("/api/motion", motion, methods=["POST"]),
         Route("/api/generate", generate, methods=["POST"]),
@@ -109,17 +106,7 @@ async def _too_long(_: Request, __: Exception) -> Response:
 
 async def start(request: Request) -> Response:
     studio = _studio(request)
-    return JSONResponse(
-        {
-            "version": __version__,
-            "folder": str(studio.folder),
-            "opened": studio.opened,
-            "text": studio.text,
-            "files": places.listed(studio.folder),
-            "templates": api.templates(),
-            "families": forms.families(api.schema()),
-        }
-    )
+    return JSONResponse(requested.started(studio.folder, studio.opened, studio.text))
 
 
 async def template(request: Request) -> Response:
@@ -159,10 +146,6 @@ async def live(request: Request) -> Response:
     return await _worked(request, _studio(request).live, "live")
 
 
-async def predict(request: Request) -> Response:
-    return await _worked(request, _studio(request).side, "predict")
-
-
 async def elastic(request: Request) -> Response:
     return await _worked(request, _studio(request).mover, "elastic")
 
@@ -176,7 +159,7 @@ async def generate(request: Request) -> Response:
     studio, asked = _studio(request), await _asked(request)
     key = secrets.token_urlsafe(16)
     out = studio.folder / "out" if asked.get("keep") else studio.scratch / key
-    job = {**_job(studio, asked), "do": "generate", "out": str(out)}
+    job = {**requested.job(studio.folder, asked), "do": "generate", "out": str(out)}
 
     async def told() -> AsyncIterator[bytes]:
         async for line in studio.maker.answers((job["tab"], "generate"), job):
@@ -216,7 +199,7 @@ async def made_zip(request: Request) -> Response:
 
 async def _worked(request: Request, worker: Worker, do: str) -> Response:
     studio, asked = _studio(request), await _asked(request)
-    job = {**_job(studio, asked), "do": do}
+    job = {**requested.job(studio.folder, asked), "do": do}
 
     async def lines() -> AsyncIterator[bytes]:
         async for answer in worker.answers((job["tab"], do), job):
@@ -230,37 +213,4 @@ def _lines(content: AsyncIterator[bytes]) -> Response:
 
 
 async def _asked(request: Request) -> dict[str, Any]:
-    """The table that a request holds. Raises DesignError where it is none."""
-    try:
-        asked = json.loads(await request.body())
-    except (ValueError, RecursionError):
-        asked = None
-    if not isinstance(asked, dict):
-        raise SbafabError("the request is not a table in JSON")
-    return asked
-
-
-def _job(studio: Studio, asked: dict[str, Any]) -> dict[str, Any]:
-    """What a worker may be told: texts of the design, edits, and places the server chooses."""
-    edits = asked.get("edits") or []
-    good = isinstance(edits, list) and all(
-        isinstance(edit, list)
-        and len(edit) == 2
-        and isinstance(edit[0], str)
-        and (edit[1] is None or isinstance(edit[1], str))
-        for edit in edits
-    )
-    if not good or not isinstance(asked.get("text"), str):
-        raise SbafabError("a request holds a text, and edits as [key, value]")
-    name = asked.get("name")
-    path = name if isinstance(name, str) and name.endswith(".toml") and "/" not in name else None
-    has = asked.get("has") or []
-    return {
-        "tab": str(asked.get("tab", ""))[:40],
-        "text": asked["text"],
-        "edits": [(key, value) for key, value in edits],
-        "has": [key for key in has if isinstance(key, str)] if isinstance(has, list) else [],
-        "folder": str(studio.folder),
-        "path": path or "design.toml",
-        "pose": asked.get("pose"),
-    }
+    return requested.table(await request.body())

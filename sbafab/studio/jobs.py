@@ -12,16 +12,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sbafab import api
-from sbafab.errors import DesignError
+from sbafab.errors import DesignError, SbafabError
 from sbafab.studio import places
 from sbafab.studio.editing import MOST_EDITS, edited
-from sbafab.studio.model import Beat, finding_model, laminate_model
+from sbafab.studio.model import Beat, bonds_model, finding_model, laminate_model
 from sbafab.studio.moving import Filling, poses, stack_model
 
 if TYPE_CHECKING:
     from sbafab.design.records import Design
     from sbafab.laminate.laminate import Laminate
     from sbafab.models.stack import Stack
+    from sbafab.output.run import Run
 
 StudioJob = dict[str, Any]
 Answer = dict[str, Any]
@@ -31,27 +32,47 @@ MOST_FILLINGS = 8
 
 
 def live(job: StudioJob, beat: Beat) -> Iterator[Answer]:
-    """Text after the edits, resolved design, laminate, then rule by rule; the yield comes last."""
+    """Text after the edits and design, then what is seen, in the order in which it is known.
+
+    Laminate, bonds and prediction come before the rules; the yield is the last of those.
+    """
     text = _text(job)
     yield {"kind": "text", "text": text}
     found = _loaded(text, job)
     if found.family == "assembly":
         yield {"kind": "assembly", "name": found.name}
+        yield {
+            "kind": "unpredicted",
+            "message": f"{found.name} is an assembly; its actuators are predicted one by one",
+        }
         yield from _assembly_findings(found)
         return
     yield {"kind": "design", "name": found.name, "family": found.family, **_values(found)}
     beat()
     laminate = _laminate(text, job["folder"], job["path"])
-    yield laminate_model(laminate, frozenset(job.get("has", ())), beat)
+    shown = laminate_model(laminate, frozenset(job.get("has", ())))
+    yield shown
     beat()
-    for number, (rule, findings) in enumerate(api.checking(found, laminate), 1):
+    yield bonds_model(laminate, {*job.get("has", ()), *shown["shapes"]})
+    beat()
+    yield _prediction(found, laminate)
+    beat()
+    try:
+        for number, (rule, findings) in enumerate(api.checking(found, laminate), 1):
+            yield {
+                "kind": "rule",
+                "rule": rule,
+                "number": number,
+                "findings": [finding_model(finding) for finding in findings],
+            }
+            beat()
+    except ModuleNotFoundError as error:
+        # Without a server numpy may be missing; only the registration rules, the last ones, ask it.
         yield {
-            "kind": "rule",
-            "rule": rule,
-            "number": number,
-            "findings": [finding_model(finding) for finding in findings],
+            "kind": "unmeasured",
+            "message": f"The rules that need {error.name} were not measured: it is not in this "
+            "page. sbafab check measures them.",
         }
-        beat()
     yield {"kind": "checked"}
 
 
@@ -65,11 +86,15 @@ def _assembly_findings(assembly: Any) -> Iterator[Answer]:
     yield {"kind": "checked"}
 
 
-def predict(job: StudioJob, beat: Beat) -> Iterator[Answer]:
-    """Figures and curves by closed formulas, at once."""
-    design = _loaded(_text(job), job)
-    beat()
-    yield {"kind": "prediction", **api.predict(design, quick=True).as_dict()}
+def _prediction(design: Design, laminate: Laminate) -> Answer:
+    """Figures and curves by closed formulas; why there are none, where that is so."""
+    try:
+        found = api.predict(design, quick=True, laminate=laminate)
+    except SbafabError as error:
+        return {"kind": "unpredicted", "message": str(error)}
+    except ModuleNotFoundError as error:
+        return {"kind": "unpredicted", "message": f"This needs {error.name}, which is not here."}
+    return {"kind": "prediction", **found.as_dict()}
 
 
 def elastic(job: StudioJob, beat: Beat) -> Iterator[Answer]:
@@ -81,6 +106,18 @@ def elastic(job: StudioJob, beat: Beat) -> Iterator[Answer]:
 
 def generate(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     """Writes the folder of a design into ``out``; every step is told, the last answer names it."""
+    yield _made(api.generate(_loaded(_text(job), job), out=job["out"], progress=_told(job, beat)))
+
+
+def cut(job: StudioJob, beat: Beat) -> Iterator[Answer]:
+    """The same with cut files and film sheets alone, which a page can write without a server."""
+    design = _loaded(_text(job), job)
+    if design.family == "assembly":
+        raise DesignError(f"{design.name} is an assembly; cut it with sbafab generate")
+    yield _made(api.cut(design, out=job["out"], progress=_told(job, beat)))
+
+
+def _told(job: StudioJob, beat: Beat) -> Callable[[str, int, int], None]:
     steps: list[Answer] = []
     tell: Callable[[Answer], None] = job.get("tell", steps.append)
 
@@ -88,8 +125,11 @@ def generate(job: StudioJob, beat: Beat) -> Iterator[Answer]:
         beat()
         tell({"kind": "progress", "what": what, "done": done, "total": total})
 
-    run = api.generate(_loaded(_text(job), job), out=job["out"], progress=progress)
-    yield {
+    return progress
+
+
+def _made(run: Run) -> Answer:
+    return {
         "kind": "made",
         "name": run.folder.name,
         "failed": run.failed,
@@ -161,8 +201,8 @@ def _stack(text: str, folder: str, path: str) -> Stack:
 
 JOBS: dict[str, Callable[[StudioJob, Beat], Iterator[Answer]]] = {
     "live": live,
-    "predict": predict,
     "elastic": elastic,
     "generate": generate,
+    "cut": cut,
     "motion": motion,
 }

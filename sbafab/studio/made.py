@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,11 +28,19 @@ class Made:
 
 def zipped(made: Made) -> bytes:
     """The run's folder as a zip, its files byte for byte, in the order of their names."""
+    paths = sorted(path for path in made.folder.rglob("*") if path.is_file())
+    return packed(
+        (f"{made.name}/{path.relative_to(made.folder).as_posix()}", path.read_bytes())
+        for path in paths
+    )
+
+
+def packed(files: Iterable[tuple[str, bytes]]) -> bytes:
+    """Names and contents as a zip, in this order; equal files give equal bytes."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
-        for path in sorted(path for path in made.folder.rglob("*") if path.is_file()):
-            name = f"{made.name}/{path.relative_to(made.folder).as_posix()}"
+        for name, file in files:
             entry = zipfile.ZipInfo(name, DAY_ONE)
             entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
-            archive.writestr(entry, path.read_bytes())
+            archive.writestr(entry, file)
     return content.getvalue()

@@ -42,24 +42,11 @@ def _flat(vertices: Iterable[tuple[float, float, float]]) -> list[float]:
     return [round(number, 6) for vertex in vertices for number in vertex]
 
 
-def laminate_model(laminate: Laminate, has: Collection[str], beat: Beat) -> dict[str, Any]:
-    """Layers, patterns, bonds and what lies at which place, for every view."""
+def laminate_model(laminate: Laminate, has: Collection[str]) -> dict[str, Any]:
+    """Layers, patterns and what lies at which place, for plan and solid."""
     shapes = AnswerShapes(has)
     layers = [_layer(layer) for layer in laminate.layers]
     patterns = {name: _pattern(laminate, own, shapes) for name, own in laminate.patterns.items()}
-    beat()
-    bonds = [
-        {
-            "interface": interface.index,
-            "kind": interface.kind,
-            "layers": list(interface.layer_indices),
-            "z": interface.z,
-            "gap": interface.gap,
-            "shape": shapes.key(interface.bond),
-            "open": shapes.key(interface.unbonded),
-        }
-        for interface in laminate.interfaces
-    ]
     return {
         "kind": "laminate",
         "name": laminate.name,
@@ -72,13 +59,30 @@ def laminate_model(laminate: Laminate, has: Collection[str], beat: Beat) -> dict
         "notes": list(laminate.notes),
         "layers": layers,
         "patterns": patterns,
-        "bonds": bonds,
         "chambers": [asdict(chamber) for chamber in laminate.chambers],
         "bores": [asdict(bore) for bore in laminate.bores],
         "inlets": [asdict(inlet) for inlet in laminate.inlets],
         "pins": [asdict(pin) for pin in laminate.pins],
         "shapes": shapes.new,
     }
+
+
+def bonds_model(laminate: Laminate, has: Collection[str]) -> dict[str, Any]:
+    """What of every interface bonds and what stays open, for the section."""
+    shapes = AnswerShapes(has)
+    bonds = [
+        {
+            "interface": interface.index,
+            "kind": interface.kind,
+            "layers": list(interface.layer_indices),
+            "z": interface.z,
+            "gap": interface.gap,
+            "shape": shapes.key(interface.bond),
+            "open": shapes.key(interface.unbonded),
+        }
+        for interface in laminate.interfaces
+    ]
+    return {"kind": "bonds", "bonds": bonds, "shapes": shapes.new}
 
 
 def _layer(layer: Layer) -> dict[str, Any]:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import json
 import signal
-import sys
-import traceback
-from functools import lru_cache
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -19,18 +17,17 @@ END = b""
 FIRST_DESIGN = "1dof-5mm"
 
 
-class SupersededError(Exception):
-    """Nobody waits for this answer any more."""
-
-
 def serve(pipe: Connection, cancelled: Any, warm: bool) -> None:
     """Answers (number, job) with (number, JSON) until the pipe closes."""
     with contextlib.suppress(ValueError):
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+    from sbafab.studio.answering import SupersededError, answers
+
     if warm:
         _warm_up()
-    from sbafab.studio.jobs import JOBS
-
+    # What is imported stays; the collector need not look through it again at every change.
+    gc.collect()
+    gc.freeze()
     with contextlib.suppress(EOFError, OSError):
         while True:
             number, job = pipe.recv()
@@ -40,19 +37,8 @@ def serve(pipe: Connection, cancelled: Any, warm: bool) -> None:
                 if cancelled.value == own:
                     raise SupersededError
 
-            try:
-                for answer in JOBS[job["do"]]({**job, "tell": send}, beat):
-                    send(answer)
-                    beat()
-            except SupersededError:
-                send({"kind": "superseded"})
-            except SbafabError as error:
-                send({"kind": "error", "message": str(error), **_place(str(error))})
-            except MemoryError:
-                send({"kind": "error", "message": "the design takes more memory than there is"})
-            except Exception:
-                traceback.print_exc(file=sys.stderr)
-                send({"kind": "defect", "message": _defect()})
+            for answer in answers({**job, "tell": send}, beat):
+                send(answer)
             pipe.send((number, END))
 
 
@@ -63,32 +49,11 @@ def _sender(pipe: Connection, number: int) -> Any:
     return send
 
 
-def _defect() -> str:
-    kind, what = sys.exc_info()[:2]
-    name = kind.__name__ if kind else "error"
-    return (
-        f"this is a defect of sbafab ({name}: {' '.join(str(what).split())[:200]}); go back with "
-        "Undo, and report the design file"
-    )
-
-
-def _place(sentence: str) -> dict[str, str]:
-    """The first key of a design file that a sentence names, so that it can stand at its field."""
-    words = (word.strip(",;:()[]'\"") for word in sentence.split())
-    field = next((word for word in words if word in _keys()), None)
-    return {"field": field} if field else {}
-
-
-@lru_cache(maxsize=1)
-def _keys() -> frozenset[str]:
-    from sbafab.studio.forms import keys
-
-    return frozenset(keys(api.schema()))
-
-
 def _warm_up() -> None:
     """Has everything imported and one small design checked, so that the first answer is quick."""
+    from sbafab.studio.answering import design_keys
+
     with contextlib.suppress(SbafabError):
         design = api.load(FIRST_DESIGN, {"stack.balloons": 1})
         list(api.checking(design))
-        _keys()
+        design_keys()

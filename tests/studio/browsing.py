@@ -35,7 +35,7 @@ FLAGS = (
 )
 DESIGN = api.template("3dof-15mm")
 FILE = "gripper.toml"
-PATIENCE = 60.0
+PATIENCE = 120.0
 """Seconds: other work may share the machine."""
 
 

@@ -16,6 +16,7 @@ from sbafab import api
 from tests.studio.browsing import (
     DESIGN,
     FILE,
+    PATIENCE,
     Watched,
     chromium,
     colours,
@@ -112,7 +113,11 @@ def test_a_file_changed_on_disk_is_loaded_and_saved_only_when_asked(
     assert "balloons = 3" in (folder / FILE).read_text(encoding="utf-8")
     # Changed here and there: the page asks.
     (folder / FILE).write_text(DESIGN.replace("balloons = 15", "balloons = 8"), encoding="utf-8")
-    seen.page.get_by_role("button", name="Keep mine").click()
+    mine = seen.page.get_by_role("button", name="Keep mine")
+    mine.wait_for(timeout=1000 * PATIENCE)
+    # The question stays, though the rules of the last edit come in.
+    seen.say("studio.emit('laminate'), studio.emit('checked')")
+    mine.click()
     seen.page.keyboard.press("Control+s")
     seen.until("!studio.unsaved")
     assert "balloons = 5" in (folder / FILE).read_text(encoding="utf-8")

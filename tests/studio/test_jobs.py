@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,10 @@ import pytest
 
 from sbafab import api
 from sbafab.errors import DesignError
+from sbafab.studio.answering import refusal
 from sbafab.studio.editing import edited
+from sbafab.studio.jobs import JOBS
 from sbafab.studio.links import design_in, packed
-from sbafab.studio.worker import _place
 from tests.studio.worked import answers, job
 
 SMALL = api.template("1dof-5mm").replace("balloons = 6", "balloons = 2") + (
@@ -23,7 +25,7 @@ SMALL = api.template("1dof-5mm").replace("balloons = 6", "balloons = 2") + (
 def test_the_answers_come_in_the_order_a_person_waits_for_them(tmp_path: Path) -> None:
     got = answers(job(tmp_path, SMALL))
     kinds = [answer["kind"] for answer in got]
-    assert kinds[:3] == ["text", "design", "laminate"]
+    assert kinds[:5] == ["text", "design", "laminate", "bonds", "prediction"]
     assert kinds[-1] == "checked"
     assert got[-2]["rule"] == "registration-yield"
     found = [
@@ -36,14 +38,31 @@ def test_the_answers_come_in_the_order_a_person_waits_for_them(tmp_path: Path) -
 
 
 def test_a_shape_that_the_page_has_is_not_sent_again(tmp_path: Path) -> None:
-    first = next(a for a in answers(job(tmp_path, SMALL)) if a["kind"] == "laminate")
-    has = list(first["shapes"])
-    again = next(
-        a for a in answers({**job(tmp_path, SMALL), "has": has}) if a["kind"] == "laminate"
-    )
-    assert has
-    assert again["shapes"] == {}
+    first, bonds = seen(job(tmp_path, SMALL))
+    assert first["shapes"]
+    # Of bonds what no layer has.
+    assert bonds["shapes"]
+    assert not first["shapes"].keys() & bonds["shapes"].keys()
+    has = [*first["shapes"], *bonds["shapes"]]
+    again, bonds_again = seen({**job(tmp_path, SMALL), "has": has})
+    assert again["shapes"] == bonds_again["shapes"] == {}
     assert again["patterns"] == first["patterns"]
+    assert bonds_again["bonds"] == bonds["bonds"]
+
+
+def seen(asked: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The laminate and the bonds that a job answers."""
+    found = {answer["kind"]: answer for answer in answers(asked)}
+    return found["laminate"], found["bonds"]
+
+
+def test_the_prediction_is_that_of_the_command_or_says_why_there_is_none(tmp_path: Path) -> None:
+    told = {answer["kind"]: answer for answer in answers(job(tmp_path, SMALL))}
+    theirs = api.predict(api.loads(SMALL), quick=True).as_dict()
+    assert told["prediction"]["figures"] == theirs["figures"]
+    aperture = JOBS["live"](job(tmp_path, api.template("aperture")), lambda: None)
+    told = {answer["kind"]: answer for answer in islice(aperture, 3)}
+    assert "an assembly" in told["unpredicted"]["message"]
 
 
 def test_shapes_are_the_laminate_s_own(tmp_path: Path) -> None:
@@ -75,7 +94,7 @@ def test_an_error_has_the_command_line_s_words_and_its_field(
     with pytest.raises(DesignError) as theirs:
         api.loads(text)
     assert str(ours.value) == str(theirs.value)
-    assert _place(str(ours.value)) == {"field": key}
+    assert refusal(str(ours.value))["field"] == key
 
 
 @pytest.mark.parametrize(

@@ -37,6 +37,9 @@ export function download(name, content, type = "application/octet-stream") {
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 
+// A name that nobody else has; a page that came by http from another machine lacks randomUUID.
+export const uniqueName = () => crypto.randomUUID?.() ?? [...crypto.getRandomValues(new Uint32Array(4))].join("-");
+
 // A number as drawings give it: three decimals at most, no trailing zeros.
 export const plain = (value, digits = 3) => String(Number(value.toFixed(digits)));
 

@@ -12,7 +12,9 @@ export class Findings {
     this.figures = el("div", { class: "body" });
     this.figuresBlock = el("div", { class: "section-block" }, el("h2", {}, "Prediction", el("span", { class: "sum" }, "formulas, elastic stack")), this.figures, el("div", { class: "stale-mark" }, "Updating"));
     $("#panel-findings").append(this.block, this.figuresBlock);
-    studio.on("rule checked opened", () => this.draw());
+    // Rules that come in quick succession are shown together, once a frame.
+    studio.on("rule", () => { this.frame ??= requestAnimationFrame(() => { this.frame = null; this.draw(); }); });
+    studio.on("checked opened", () => this.draw());
     studio.on("figures reference", () => this.drawFigures());
     studio.on("failed", (answer) => { if (!answer.field) this.draw(); });
   }
@@ -27,6 +29,7 @@ export class Findings {
     const said = [["fail", "failed"], ["warn", "to heed"], ["waived", "waived"], ["pass", "hold"]].filter(([verdict]) => count(verdict)).map(([verdict, words]) => `${count(verdict)} ${words}`);
     this.sum.textContent = said.join(", ");
     this.list.replaceChildren(...sorted.map(({ finding, waiting }) => this.line(finding, waiting)));
+    if (studio.unmeasured) this.list.append(el("div", { role: "listitem", class: "unmeasured" }, studio.unmeasured));
   }
   line(finding, waiting) {
     const { measured, limit, unit } = finding;

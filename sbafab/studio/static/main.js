@@ -1,6 +1,6 @@
 // The page: puts form, views and findings together, keys and dialogs.
 import { $, css, download, el, icon, recall, remember } from "./dom.js";
-import { ask, linkedDesign } from "./server.js";
+import { ask, linkedDesign, withoutServer } from "./server.js";
 import { Studio } from "./state.js";
 import { Form } from "./form.js";
 import { Editor } from "./editor.js";
@@ -19,14 +19,17 @@ const upper = {};
 async function start() {
   theme(recall("sbafab-theme", matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"));
   let started;
+  if (withoutServer) notice("Python starts in this page; this takes some seconds.");
   try {
     started = await ask("/api/start");
   } catch (error) {
-    document.body.replaceChildren(el("main", { class: "fallback" }, el("h1", {}, "sbafab studio"), el("p", { role: "alert" }, error.status ? error.message : "The studio does not answer. Start it again: sbafab studio")));
+    document.body.replaceChildren(el("main", { class: "fallback" }, el("h1", {}, "sbafab studio"), el("p", { role: "alert" }, error.status ? error.message : withoutServer ? error.message : "The studio does not answer. Start it again: sbafab studio")));
     return;
   }
   studio = new Studio(started);
   window.studio = studio;
+  $("#notice").hidden = true;
+  if (withoutServer) alone(started.lacks);
 
   new Form(studio);
   new Editor(studio);
@@ -44,6 +47,13 @@ async function start() {
   phone();
   keys();
   begin();
+}
+
+// Without a server: what the page says otherwise, and what it was made without.
+function alone(lacks) {
+  $("#save").title = "Download the design file (Ctrl+S)";
+  $("#make").title = "Check and cut: DXF files and film sheets";
+  if (lacks.length) notice(`This page was made without ${lacks.join(" and ")}: layers, section, solid and all rules but those of registration work; prediction, motion and cut files take it.`);
 }
 
 // What is shown first: a link's design, a file, work that a reload interrupted, or the gallery.
@@ -183,16 +193,17 @@ function marks(section) {
       const words = $(".stale-mark", element);
       if (words) words.textContent = bad ? "Last good design" : element.classList.contains("section-block") ? "Updating" : "Updating";
     };
-    for (const view of [views.solid, views.layers, views.compare, section]) mark(view.element, studio.stale.laminate || bad);
+    for (const view of [views.solid, views.layers, views.compare]) mark(view.element, studio.stale.laminate || bad);
+    mark(section.element, studio.stale.bonds || bad);
     mark($("#panel-findings").children[0], studio.stale.rules || bad);
     mark($("#panel-findings").children[1], studio.stale.figures || bad);
   };
-  studio.on("stale failed laminate checked figures", stale);
+  studio.on("stale failed laminate bonds checked figures", stale);
   studio.on("hover", (words) => { $("#hover").textContent = words; });
   studio.on("busy", (on) => { $("#busy").textContent = on ? "working" : ""; });
   studio.on("timing", () => {
     const last = (what) => studio.latency[what].at(-1);
-    $("#timing").textContent = [["geometry", "views"], ["deck", "rules"], ["all", "with yield"]].filter(([what]) => last(what)).map(([what, words]) => `${words} ${Math.round(last(what))} ms`).join("  ");
+    $("#timing").textContent = [["geometry", "views"], ["section", "section"], ["figures", "prediction"], ["deck", "rules"], ["all", "with yield"]].filter(([what]) => last(what)).map(([what, words]) => `${words} ${Math.round(last(what))} ms`).join("  ");
   });
 }
 
@@ -246,7 +257,8 @@ function theme(name) {
 }
 export function notice(words, bad = false, choices = []) {
   const bar = $("#notice"), close = () => { bar.hidden = true; };
-  bar.dataset.kind = bad ? "bad" : "";
+  // What asks stays until it is answered; what only tells of a failure goes with it.
+  bar.dataset.kind = bad && !choices.length ? "bad" : "";
   bar.classList.toggle("bad", bad);
   bar.replaceChildren(el("span", {}, words), ...choices.map(([label, does]) => el("button", { onclick: () => { close(); does(); } }, label)), el("button", { id: "low", class: "quiet", "aria-label": "Close", onclick: close }, "×"));
   bar.hidden = false;

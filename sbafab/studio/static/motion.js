@@ -1,10 +1,12 @@
 // The actuator under pressure: poses from the fast stack, drawn as they come.
 import { css, el, plain } from "./dom.js";
+import { COARSE, FINE, chart, frame, meridian, meshOf } from "./motion_drawing.js";
 import { area, polygons } from "./shapes.js";
 import { listen, tab } from "./server.js";
 import { Stage3D, THREE } from "./stage3d.js";
 
-const TURN = 28, RINGS = 7;
+// ms between two readings: figures that change oftener cannot be read.
+const READABLE = 110;
 const PER_MM = 0.003;
 
 export class Motion {
@@ -22,6 +24,7 @@ export class Motion {
     try { this.stage = new Stage3D(this.surface, { up: 10 }); } catch {
       this.surface.append(el("p", { class: "fallback" }, "This view takes WebGL, which the browser does not offer here. The figures beside it are the same."));
     }
+    this.mesh = meshOf(this.stage?.software ? COARSE : FINE);
     if (this.stage) this.scene();
     studio.on("laminate", () => { this.stack = null; if (!this.element.hidden) this.load(); });
     studio.on("opened", () => { this.fitted = false; });
@@ -119,21 +122,34 @@ export class Motion {
     this.curves = false;
     try {
       await listen("/api/motion", { tab, text: this.text, edits: [], name: this.studio.name, pose }, (answer) => {
-        if (answer.kind === "pose") this.take(answer);
+        if (answer.kind === "pose") this.arrived(answer);
         else if (answer.kind === "curves") { this.way = answer; this.plots(); }
         else if (answer.kind === "error") this.say(answer.message, true);
         else if (answer.message) this.say(answer.message, true);
       });
     } catch (error) { this.say(error.message, true); }
     this.asking = false;
-    // Through a tube the chambers follow their valves until they are as full.
-    if (this.tubed && !this.settled && !this.element.hidden) this.wanted = true;
-    if (this.wanted) this.ask(); else this.stepped = null;
+    if (this.wanted) this.ask();
+    else if (!this.tubed || this.settled) this.stepped = null;
+  }
+  // A pose is drawn in the next frame; while it is painted the one after it is worked out.
+  arrived(pose) {
+    const { stack } = this;
+    // Asked for of a design that has changed since.
+    if (!stack) return;
+    if (pose.valves) this.settled = pose.valves.every((p, i) => Math.abs(p - pose.pressures[i]) < 0.01 + 0.002 * p);
+    this.newest = pose;
+    this.frame ??= requestAnimationFrame(() => {
+      this.frame = null;
+      if (this.stack !== stack) return;
+      // Through a tube the chambers follow their valves until they are as full.
+      if (this.tubed && !this.settled && !this.element.hidden) { this.wanted = true; if (!this.asking) this.ask(); }
+      this.take(this.newest);
+    });
   }
   fill(restart) { this.restart = restart; this.tubeRows.hidden = !this.tubed; this.stepped = null; this.want(); }
   take(pose) {
     this.pose = pose;
-    if (pose.valves) this.settled = pose.valves.every((p, i) => Math.abs(p - pose.pressures[i]) < 0.01 + 0.002 * p);
     if (pose.valves?.join() !== this.valves) { this.valves = pose.valves?.join(); this.valvesAt = pose.time; }
     this.times.push(performance.now());
     this.trace.push([performance.now() / 1000, pose.height, pose.bend, pose.volumes.reduce((sum, one) => sum + one, 0)]);
@@ -141,10 +157,19 @@ export class Motion {
     if (this.times.length > 240) this.times.shift();
     const before = performance.now();
     if (this.stage) this.draw();
-    this.read();
-    this.plots();
+    this.tell();
     this.costs.push(performance.now() - before);
     if (this.costs.length > 240) this.costs.shift();
+  }
+  // Figures and plots, no oftener than one can read them; the last ones always.
+  tell() {
+    const now = performance.now(), wait = READABLE - (now - (this.told ?? -READABLE));
+    clearTimeout(this.telling);
+    if (!this.stack) return;
+    if (wait > 0) { this.telling = setTimeout(() => this.tell(), wait); return; }
+    this.told = now;
+    this.read();
+    this.plots();
   }
   read() {
     const { pose, stack } = this;
@@ -196,16 +221,16 @@ export class Motion {
   }
   shape() {
     const { stack } = this, count = stack.levels.length * stack.axes.length;
-    const rows = 2 * RINGS + 2, each = rows * TURN;
+    const { turn, rings } = this.mesh, rows = 2 * rings + 2, each = rows * turn;
     this.points = new Float32Array(count * each * 3);
     const colours = new Float32Array(count * each * 3), index = [];
     const tones = ["--tpe", "--bond", "--waived", "--ptfe", "--pass", "--warn", "--tpe", "--bond"].map((name) => new THREE.Color(css(name)));
     for (let b = 0; b < count; b++) {
       const tone = tones[0].clone().lerp(tones[1], 0.22 * (b % stack.axes.length));
       for (let i = 0; i < each; i++) tone.toArray(colours, (b * each + i) * 3);
-      for (let row = 0; row < rows - 1; row++) for (let t = 0; t < TURN; t++) {
-        const a = b * each + row * TURN + t, c = b * each + row * TURN + ((t + 1) % TURN);
-        index.push(a, c, a + TURN, c, c + TURN, a + TURN);
+      for (let row = 0; row < rows - 1; row++) for (let t = 0; t < turn; t++) {
+        const a = b * each + row * turn + t, c = b * each + row * turn + ((t + 1) % turn);
+        index.push(a, c, a + turn, c, c + turn, a + turn);
       }
     }
     const geometry = this.body.geometry;
@@ -244,7 +269,7 @@ export class Motion {
       const y = new THREE.Vector3().crossVectors(z, x).normalize();
       // The rims draw the bonded films in as the balloons rise.
       const { pocket, neck } = stack.balloons[stack.levels[level]], rise = Math.max(...pose.gaps[level]) + stack.pitch;
-      const k = 1 - (pocket - meridian(rise, pocket - neck, neck)[RINGS][0]) / stack.outline;
+      const k = 1 - (pocket - meridian(rise, pocket - neck, neck, 1)[1][0]) / stack.outline;
       m.makeBasis(x.multiplyScalar(k), y.multiplyScalar(k), z).setPosition((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2);
       this.web.setMatrixAt(level, m);
     });
@@ -253,6 +278,7 @@ export class Motion {
   draw() {
     if (this.web) this.place();
     const { pose, stack, points } = this, chambers = stack.axes.length;
+    const { turn, rings, cos, sin } = this.mesh;
     let at = 0;
     const put = (x, y, z) => { points[at++] = x; points[at++] = y; points[at++] = z; };
     stack.levels.forEach((kind, level) => {
@@ -262,16 +288,16 @@ export class Motion {
         const [ax, ay] = stack.axes[c];
         const bottom = low(ax, ay, 0), top = high(ax, ay, 0);
         const h = Math.max(0.02, Math.hypot(top[0] - bottom[0], top[1] - bottom[1], top[2] - bottom[2]));
-        const wall = meridian(h, pocket - neck, neck);
+        const wall = meridian(h, pocket - neck, neck, rings);
         // From the lower neck out to the rim, along the bonded ring and back to the upper neck.
-        for (let half = 0; half < 2; half++) for (let k = 0; k <= RINGS; k++) {
-          const j = half ? RINGS - k : k;
-          const r = j === RINGS ? wall[RINGS][0] + ring * 0.55 : wall[j][0];
+        for (let half = 0; half < 2; half++) for (let k = 0; k <= rings; k++) {
+          const j = half ? rings - k : k;
+          const r = j === rings ? wall[rings][0] + ring * 0.55 : wall[j][0];
           const z = wall[j][1];
           // Between the two plates the frames are blended by height.
           const s = half ? 1 - z / h : z / h;
-          for (let t = 0; t < TURN; t++) {
-            const x = ax + r * COS[t], y = ay + r * SIN[t];
+          for (let t = 0; t < turn; t++) {
+            const x = ax + r * cos[t], y = ay + r * sin[t];
             const p = low(x, y, 0), q = high(x, y, 0);
             put(p[0] + (q[0] - p[0]) * s, p[1] + (q[1] - p[1]) * s, p[2] + (q[2] - p[2]) * s);
           }
@@ -353,32 +379,4 @@ export class Motion {
   // Poses drawn a second, over the last ones.
   rate() { const t = this.times; return t.length > 1 ? (1000 * (t.length - 1)) / (t.at(-1) - t[0]) : 0; }
   picture() { return this.stage.picture("motion.png"); }
-}
-
-const COS = Array.from({ length: TURN }, (_, t) => Math.cos((2 * Math.PI * t) / TURN));
-const SIN = Array.from({ length: TURN }, (_, t) => Math.sin((2 * Math.PI * t) / TURN));
-
-function frame(pose, i) {
-  const [ox, oy, oz] = pose.origins[i], a = pose.axes[i];
-  return (x, y, z) => [ox + a[0] * x + a[1] * y + a[2] * z, oy + a[3] * x + a[4] * y + a[5] * z, oz + a[6] * x + a[7] * y + a[8] * z];
-}
-
-// A wall as an arc of the film's length, level at the neck: radius and height above the lower plate.
-function meridian(h, length, neck) {
-  const ratio = Math.min(0.72, h / (2 * length));
-  let low = 1e-6, high = 2.33;
-  for (let i = 0; i < 30; i++) { const mid = (low + high) / 2; if ((1 - Math.cos(mid)) / mid < ratio) low = mid; else high = mid; }
-  const turn = low, bow = length / turn;
-  return Array.from({ length: RINGS + 1 }, (_, k) => { const t = (turn * k) / RINGS; return [neck + bow * Math.sin(t), Math.min(h / 2, bow * (1 - Math.cos(t)))]; });
-}
-
-function chart(xs, ys, x, y, words, unit = "kPa") {
-  const w = 268, h = 112, left = 34, low = 92, top = Math.max(...ys, y) || 1, far = Math.max(...xs, x) || 1;
-  const px = (value) => left + ((w - left - 8) * value) / far, py = (value) => low - ((low - 12) * value) / top;
-  const label = (text, ax, ay, anchor) => el("text", { x: ax, y: ay, "text-anchor": anchor, "font-size": 10.5, fill: "var(--soft)" }, text);
-  return el("svg", { viewBox: `0 0 ${w} ${h}`, class: "plot", role: "img", "aria-label": `${words}: ${y.toFixed(1)} at ${x.toFixed(1)} ${unit}` },
-    el("path", { d: `M${left} 8V${low}H${w - 6}`, stroke: "var(--strong)", fill: "none" }),
-    el("path", { d: xs.map((value, i) => `${i ? "L" : "M"}${px(value).toFixed(1)} ${py(ys[i]).toFixed(1)}`).join(""), stroke: "var(--accent)", "stroke-width": 1.8, fill: "none" }),
-    el("circle", { cx: px(x), cy: py(y), r: 4, fill: "var(--select)" }),
-    label(words, left + 6, 16, "start"), label(plain(top, 1), left - 4, 16, "end"), label("0", left - 4, low + 3, "end"), label(`${plain(far, 1)} ${unit}`, w - 6, low + 14, "end"));
 }

@@ -23,7 +23,8 @@ export class Section {
     this.surface.addEventListener("pointermove", (event) => this.point(event));
     this.surface.addEventListener("pointerleave", () => studio.hover(null));
     this.surface.addEventListener("click", (event) => { if (this.eye.dragged <= 3) { const found = this.under(event); if (found?.layer) studio.pick(found.layer); } });
-    studio.on("laminate cut", () => this.update());
+    studio.on("bonds cut", () => this.update());
+    studio.on("laminate", () => { if (!studio.laminate) this.update(); });
     studio.on("hover pick theme", () => this.draw());
     studio.on("opened", () => { this.eye.touched = false; this.mark = null; });
     new ResizeObserver(() => this.refit(true)).observe(this.surface);

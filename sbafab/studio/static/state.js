@@ -1,6 +1,6 @@
 // The design being edited and what is known of it; views listen, none keeps a copy.
-import { ask, listen, tab } from "./server.js";
-import { recall, remember } from "./dom.js";
+import { ask, listen, tab, withoutServer } from "./server.js";
+import { recall, remember, uniqueName } from "./dom.js";
 
 const SETTLE = 500;
 const MOST_HISTORY = 200;
@@ -22,17 +22,17 @@ export class Studio {
     this.family = null;
     this.findings = [];
     this.running = [];
+    this.unmeasured = null;
     this.prediction = null;
     this.error = null;
-    this.stale = { laminate: true, rules: true, figures: true };
+    this.stale = { laminate: true, bonds: true, rules: true, figures: true };
     this.picked = null;
     this.hovered = null;
     this.cut = null;
     this.reference = null;
-    this.latency = { geometry: [], deck: [], all: [], figures: [] };
+    this.latency = { geometry: [], section: [], figures: [], deck: [], all: [] };
     this.listeners = new Map();
     this.flight = null;
-    this.figuresFlight = null;
     this.draftKey = "sbafab-draft:" + (sessionStorage.getItem("sbafab-tab") ?? freshTab());
   }
 
@@ -141,13 +141,13 @@ export class Studio {
     if (this.flight && !this.flight.shown) return;
     this.flight?.abort.abort();
     this.send();
-    this.askFigures();
   }
   async send() {
     this.wanted = false;
     const sent = [...this.pending];
     const flight = (this.flight = { abort: new AbortController(), shown: false, at: this.changedAt ?? performance.now() });
     this.running = [];
+    this.unmeasured = null;
     this.emit("busy", true);
     try {
       await listen("/api/live", this.body(), (answer) => this.heard(answer, flight, sent), flight.abort.signal);
@@ -170,10 +170,19 @@ export class Studio {
       },
       assembly: () => {
         Object.assign(this, { family: "assembly", designName: answer.name, laminate: null, error: null });
+        this.stale.laminate = this.stale.bonds = this.wanted;
         this.emit("design");
         this.emit("laminate");
       },
       laminate: () => this.heardLaminate(answer, flight),
+      bonds: () => this.heardBonds(answer, flight),
+      prediction: () => {
+        this.prediction = answer;
+        this.heardFigures(null);
+        this.time("figures", flight);
+        this.askElastic();
+      },
+      unpredicted: () => this.heardFigures(answer.message),
       rule: () => {
         this.running.push(answer);
         this.emit("rule", answer);
@@ -186,10 +195,11 @@ export class Studio {
         this.emit("checked");
         this.emit("stale");
       },
+      unmeasured: () => { this.unmeasured = answer.message; },
       superseded: () => {},
     };
     (hears[answer.kind] ?? (() => this.fail(answer)))();
-    if (["laminate", "error", "defect", "crashed", "assembly"].includes(answer.kind)) {
+    if (["bonds", "error", "defect", "crashed", "assembly"].includes(answer.kind)) {
       flight.shown = true;
       if (this.wanted) this.ask();
     }
@@ -203,13 +213,28 @@ export class Studio {
   }
   heardLaminate(answer, flight) {
     for (const [key, shape] of Object.entries(answer.shapes)) this.shapes.set(key, shape);
-    this.laminate = answer;
-    this.drop();
+    this.laminate = { ...answer, bonds: [] };
     this.stale.laminate = this.wanted;
     if (!this.cut || !this.cut.moved) this.cut = firstCut(answer);
     this.emit("laminate");
     this.emit("stale");
     requestAnimationFrame(() => setTimeout(() => this.time("geometry", flight)));
+  }
+  // What of every interface bonds: the section waits for it.
+  heardBonds(answer, flight) {
+    for (const [key, shape] of Object.entries(answer.shapes)) this.shapes.set(key, shape);
+    this.laminate.bonds = answer.bonds;
+    this.drop();
+    this.stale.bonds = this.wanted;
+    this.emit("bonds");
+    this.emit("stale");
+    requestAnimationFrame(() => setTimeout(() => this.time("section", flight)));
+  }
+  heardFigures(refusal) {
+    this.noFigures = refusal;
+    this.stale.figures = this.wanted;
+    this.emit("figures");
+    this.emit("stale");
   }
   drop() {
     // Shapes of states long gone.
@@ -226,29 +251,10 @@ export class Studio {
     this.emit("failed", answer);
     this.emit("stale");
   }
-  async askFigures() {
-    if (this.figuresFlight) { this.figuresWanted = true; return; }
-    this.figuresWanted = false;
-    const at = this.changedAt ?? performance.now();
-    this.figuresFlight = true;
-    let good = null;
-    try {
-      await listen("/api/predict", this.body(), (answer) => { if (answer.kind === "prediction") good = answer; else if (answer.message) this.noFigures = answer.message; });
-    } catch { /* the other request says what is wrong */ }
-    this.figuresFlight = false;
-    if (good) {
-      this.prediction = good;
-      this.noFigures = null;
-      this.stale.figures = this.figuresWanted;
-      this.latency.figures.push(performance.now() - at);
-      this.emit("figures");
-      this.emit("stale");
-      this.askElastic();
-    } else this.emit("figures");
-    if (this.figuresWanted) this.askFigures();
-  }
-  // What takes seconds comes once the hand rests, and not while the actuator is being moved.
+  // What takes seconds comes once the hand rests, and not while the actuator is being moved. In the page it would
+  // take half a minute, and motion and cutting wait for it.
   askElastic() {
+    if (withoutServer) return;
     clearTimeout(this.elasticTimer);
     this.elastic?.abort();
     this.elasticTimer = setTimeout(async () => {
@@ -290,6 +296,13 @@ export class Studio {
     this.keep();
     this.emit("saved");
   }
+  // Where no server keeps files, the browser saves what was downloaded.
+  saved(name) {
+    this.commit();
+    Object.assign(this, { savedText: this.text });
+    this.keep();
+    this.emit("saved", name);
+  }
   async save(name, over = false) {
     this.commit();
     const same = name === this.name;
@@ -326,7 +339,7 @@ export const shapeKeys = (laminate) => [
 ];
 
 function freshTab() {
-  const id = crypto.randomUUID();
+  const id = uniqueName();
   sessionStorage.setItem("sbafab-tab", id);
   return id;
 }
