@@ -50,7 +50,7 @@ def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) ->
 
     A corner with an interior angle below ``sharp`` degrees has width 0.
     """
-    return _least(_Boundary(region.contours, sharp), below)
+    return _least(_boundary(region, sharp), below)
 
 
 @remembered
@@ -70,7 +70,7 @@ def facing_pairs(
     nearly alongside: where a layer turns, those may become the narrowest. ``least`` is the least
     width, where it is known.
     """
-    boundary = _Boundary(region.contours, sharp)
+    boundary = _boundary(region, sharp)
     least = least or _least(boundary, math.inf)
     if least is None or least.value == 0.0:
         return () if least is None else (least,)
@@ -184,6 +184,15 @@ class _Boundary:
         """What corner each side starts at, if any."""
         self.ends = [ends for contour in contours for ends in tapered_ends(contour, sharp)]
         self.pinch = _pinch(contours, self.corners, sharp)
+        self.is_clear: dict[tuple[Point, Point], bool] = {}
+        """Of segments that were asked: whether no edge crosses them."""
+
+
+def _made_ready(region: Region, sharp: float) -> _Boundary:
+    return _Boundary(region.contours, sharp)
+
+
+_boundary = remembered(_made_ready, most=16)
 
 
 class _Narrowest:
@@ -224,6 +233,12 @@ class _Narrowest:
                 yield number, side
 
     def _clear(self, p: Point, q: Point) -> bool:
+        known = self.boundary.is_clear
+        if (p, q) not in known:
+            known[p, q] = self._is_clear(p, q)
+        return known[p, q]
+
+    def _is_clear(self, p: Point, q: Point) -> bool:
         segment = Line(p, q)
         box = segment.bounds
         for edge in self.boundary.index.touching(widened(box, 10 * TOUCH)):
