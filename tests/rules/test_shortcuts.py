@@ -16,12 +16,13 @@ from sbafab.geometry.shapes import disc, rectangle
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import boundary, freedoms, margins
 from sbafab.rules.boundary import outward_reach
+from sbafab.rules.draws import CutContour, Draws, Error, numbers, rows_by_error
 from sbafab.rules.forms import linear_forms
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
 from sbafab.rules.margins import pushes
 from sbafab.rules.measures import Measures
-from sbafab.rules.random_builds import CutContour, Draws, Error, MarginRows, kept
+from sbafab.rules.random_builds import MarginRows, short
 from sbafab.rules.registration_worst_case import least_remaining
 from sbafab.rules.registration_yield import simulate
 from sbafab.rules.voids import _around
@@ -53,9 +54,12 @@ def rows(number: int, least: float, seed: int) -> MarginRows:
 @pytest.mark.parametrize("number", [1, 7, 8, 30])
 def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float) -> None:
     asked = rows(number, least, number)
-    draws = Draws(np.random.default_rng(5), BUILDS, 0.1)
+    first, count = rows_by_error(asked.errors)
+    draws = Draws(numbers(5, 0, count, BUILDS), first, 0.1)
     own: dict[Error, Error] = {error: error for error in asked.errors}
-    good = kept([asked], own, draws)
+    good = np.ones(BUILDS, dtype=bool)
+    for bad in short([asked], own, draws):
+        good[bad] = False
     levers = asked.moves[2][2]
     assert levers is not None
     (nx, ny), moved = asked.normal, draws.of(OTHER) - draws.of(SHIFT)
@@ -69,11 +73,11 @@ def test_forms_lose_what_their_pushes_cost(good: Good) -> None:
     laminate = good("3dof-15mm", "stack.balloons=2")
     measures = Measures(laminate, Limits())
     for group in measures.margins:
-        for form in linear_forms(group.margins, group.first, measures.moves):
+        for form in linear_forms(group, measures.moves):
             for number, whole, pinned in zip(
                 form.numbers, form.loss(), form.loss(by_hand=False), strict=True
             ):
-                found = pushes(group.margins[number], group.first, measures.moves)
+                found = pushes(group[number], group.first, measures.moves)
                 assert whole == pytest.approx(sum(push.cost for push in found))
                 held = [push.cost for push in found if not push.freedom.by_hand]
                 assert pinned == pytest.approx(sum(held))
