@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import click
 
-from sbafab.design.units import KILOPASCALS
+from sbafab.design.pressure_units import KILOPASCALS
 
 _WRITTEN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER
@@ -29,13 +29,23 @@ def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
     Raises OutputError at an end that has not exactly one other to go on with.
     """
     joints = _joints([p for edge in edges for p in (edge.start, edge.end)])
-    snapped = [_between(edge, joints[edge.start], joints[edge.end]) for edge in edges]
-    at: dict[Point, list[int]] = defaultdict(list)
+    # An edge shorter than ends may lie apart is part of a corner.
+    corners = [
+        joints[edge.start]
+        for edge in edges
+        if joints[edge.start] == joints[edge.end] and edge.length <= 2 * JOINED
+    ]
+    snapped = [
+        _between(edge, joints[edge.start], joints[edge.end])
+        for edge in edges
+        if joints[edge.start] != joints[edge.end] or edge.length > 2 * JOINED
+    ]
+    at: dict[Point, list[int]] = {corner: [] for corner in corners}
     for index, edge in enumerate(snapped):
-        at[edge.start].append(index)
-        at[edge.end].append(index)
+        at.setdefault(edge.start, []).append(index)
+        at.setdefault(edge.end, []).append(index)
     for (x, y), ends in at.items():
-        if len(ends) == 1:
+        if len(ends) < 2:
             raise OutputError(f"contour open at x {x:.3f}, y {y:.3f}; close it.")
         if len(ends) > 2:
             raise OutputError(
@@ -60,16 +70,29 @@ def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
 
 
 def _joints(ends: Sequence[Point]) -> dict[Point, Point]:
-    """The first known of the points within JOINED of each end."""
+    """Where each end is taken to lie.
+
+    Two ends that meet by themselves stay where they are, however near others lie; what is left
+    over is joined within JOINED.
+    """
+    joints = _nearest_known(ends, EPSILON)
+    meeting = Counter(joints[p] for p in ends)
+    apart = [joints[p] for p in ends if meeting[joints[p]] != 2]
+    moved = _nearest_known(apart, JOINED)
+    return {p: moved.get(joint, joint) for p, joint in joints.items()}
+
+
+def _nearest_known(points: Sequence[Point], within: float) -> dict[Point, Point]:
+    """For each point the nearest one known before it, if that is near enough, or itself."""
     cells: dict[tuple[int, int], list[Point]] = defaultdict(list)
     joints: dict[Point, Point] = {}
-    for p in ends:
+    for p in points:
         if p in joints:
             continue
-        x, y = math.floor(p[0] / JOINED), math.floor(p[1] / JOINED)
+        x, y = math.floor(p[0] / within), math.floor(p[1] / within)
         near = [q for i in (x - 1, x, x + 1) for j in (y - 1, y, y + 1) for q in cells[i, j]]
         joint = min(near, key=lambda q: math.dist(p, q), default=p)
-        joints[p] = joint if math.dist(p, joint) <= JOINED else p
+        joints[p] = joint if math.dist(p, joint) <= within else p
         if joints[p] is p:
             cells[x, y].append(p)
     return joints

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from sbafab.design.form import Slots
+from sbafab.design.pressure_units import KILOPASCALS
 from sbafab.design.reading import key_paths, listed, shown
 from sbafab.design.records import Design
-from sbafab.design.units import KILOPASCALS, millimetres
+from sbafab.design.units import millimetres
 from sbafab.design.writing import keys_of
 from sbafab.errors import DesignError
 from sbafab.laminate.extent import film_mass

@@ -161,18 +161,31 @@ def asked_kerf(asked: dict[str, Any], material: str) -> Kerf | None:
 
 
 def cut_with(path: BaseGeometry, kerf: Kerf | None) -> BaseGeometry:
-    """What is left of a film when a beam as wide as the kerf has gone along the path.
+    """What is left of a film when a beam as wide as the kerf has gone along the path."""
+    return _beside(path, kerf, -1)
 
-    The beam's section is an ellipse: scaled to a circle, the path is shrunk and scaled back.
+
+def closed_by(region: BaseGeometry, kerf: Kerf | None) -> BaseGeometry:
+    """The film left when a beam goes round a region as close as it can.
+
+    A beam enters no corner narrower than itself.
+    """
+    return cut_with(_beside(region, kerf, 1), kerf)
+
+
+def _beside(region: BaseGeometry, kerf: Kerf | None, side: int) -> BaseGeometry:
+    """The region grown (``side`` 1) or shrunk (-1) by half the beam.
+
+    The beam's section is an ellipse: scaled to a circle, the region is moved and scaled back.
     """
     if kerf is None or max(kerf) == 0:
-        return path
+        return region
     x, y = max(kerf[0], 1e-6), max(kerf[1], 1e-6)
     if x == y:
-        return path.buffer(-x / 2, quad_segs=ROUND).simplify(FINE)
-    scaled = affinity.scale(path, y / x, 1.0, origin=(0, 0))
-    left = scaled.buffer(-y / 2, quad_segs=ROUND)
-    return affinity.scale(left, x / y, 1.0, origin=(0, 0)).simplify(FINE)
+        return region.buffer(side * x / 2, quad_segs=ROUND).simplify(FINE)
+    scaled = affinity.scale(region, y / x, 1.0, origin=(0, 0))
+    moved = scaled.buffer(side * y / 2, quad_segs=ROUND)
+    return affinity.scale(moved, x / y, 1.0, origin=(0, 0)).simplify(FINE)
 
 
 def open_folder(path: Path, design: Path, chord_error: float = 0.0) -> Folder:
@@ -180,13 +193,11 @@ def open_folder(path: Path, design: Path, chord_error: float = 0.0) -> Folder:
     asked = tomllib.loads(design.read_text(encoding="utf-8"))
     manifest = json.loads((path / "manifest.json").read_text(encoding="utf-8"))
     shapes: dict[int, int] = {}
-    profiles: dict[tuple[int, Kerf | None], BaseGeometry] = {}
+    profiles: dict[tuple[bytes, Kerf | None], BaseGeometry] = {}
     layers = []
-    drawings = []  # held, so that no two of them have one id
     for entry in manifest["layers"]:
         drawing = read(path / entry["file"])
-        drawings.append(drawing)
-        key = (id(drawing), asked_kerf(asked, entry["material"]))
+        key = (drawing.region.wkb, asked_kerf(asked, entry["material"]))
         if key not in profiles:
             profiles[key] = cut_with(drawing.region, key[1])
         layers.append(

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import shapely
 from shapely import Polygon, affinity
 
-from tests.judge.folder import Disagreement, Folder, asked_kerf, pieces, place
+from tests.judge.folder import Disagreement, Folder, asked_kerf, closed_by, pieces, place
 
 OFF = 0.003
 """mm: the program's arcs stay within half a micrometre of a drawn curve."""
@@ -18,7 +18,7 @@ def judge_pockets(folder: Folder, drawn: Sequence[Polygon]) -> Iterator[Disagree
     """``drawn`` holds the pocket of every balloon, round (0, 0), bottom to top."""
     masks = [layer for layer in folder.layers if layer.role == "chamber-mask"]
     off = OFF + folder.chord_error + folder.slack
-    beam = max(asked_kerf(folder.asked, "ptfe") or (0.0, 0.0)) / 2
+    kerf = asked_kerf(folder.asked, "ptfe")
     for mask, pocket in zip(masks, drawn, strict=True):
         for part in pieces(mask.profile):
             filled = Polygon(part.exterior)
@@ -28,8 +28,7 @@ def judge_pockets(folder: Folder, drawn: Sequence[Polygon]) -> Iterator[Disagree
             turn = _turn(folder, home)
             meant = affinity.translate(affinity.rotate(pocket, turn, origin=(0, 0)), *home)
             missing = meant.buffer(-off).difference(filled)
-            # A beam goes into no corner narrower than itself.
-            cut = meant.buffer(beam).buffer(off - beam)
+            cut = closed_by(meant, kerf).buffer(off)
             more = filled.difference(cut) if mask is not masks[0] else Polygon()
             for what, region in (("lacks", missing), ("has more by", more)):
                 if not region.is_empty:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -12,7 +13,7 @@ import tomli_w
 from shapely import Point, Polygon, affinity, box
 from shapely.geometry.base import BaseGeometry
 
-from tests.judge import deck
+from tests.judge import deck, reading
 from tests.judge.bonds import judge_bonds
 from tests.judge.claims import judge_claims
 from tests.judge.doctoring import (
@@ -25,7 +26,7 @@ from tests.judge.doctoring import (
 )
 from tests.judge.drawings import svg_drawing
 from tests.judge.facing import judge_facing
-from tests.judge.folder import Disagreement, Folder
+from tests.judge.folder import Disagreement, Folder, closed_by
 from tests.judge.overhangs import judge_overhangs
 from tests.judge.pins import judge_pins
 from tests.judge.pockets import judge_pockets
@@ -89,6 +90,21 @@ def test_sound_folders_are_left_alone(sound: dict[str, Patient], name: str) -> N
     said = deck.judged(folder, drawn)
     # The traveller's circle of a stack of equal balloons is theirs.
     assert said == []
+
+
+def test_the_judge_counts_shapes_alike_when_it_forgets_drawings(
+    sound: dict[str, Patient], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shapes = [layer.shape for layer in sound["stack"].opened().layers]
+    monkeypatch.setattr(reading, "MOST_KEPT", 1)
+    monkeypatch.setattr(reading, "_READ", {})
+    assert [layer.shape for layer in sound["stack"].opened().layers] == shapes
+
+
+def test_a_beam_leaves_an_elliptic_fillet_in_a_corner() -> None:
+    notched = box(0, 0, 4, 4) - box(2, 2, 4, 4)
+    left = (closed_by(notched, (0.1, 0.2)) - notched).area
+    assert left == pytest.approx((1 - math.pi / 4) * 0.05 * 0.1, rel=0.02)
 
 
 Fault = tuple[str, Callable[[Patient], object], Callable[[Folder], Iterator[Disagreement]], str]

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from sbafab.design.pressure_units import KILOPASCALS
 from sbafab.laminate.laminate import Inlet
 from sbafab.reports.drawing import TIMES
 
 NEWTONS_PER_POUND = 4.4482216152605
-KILOPASCALS_PER_PSI = 6.894757293168
 ROUND = 10.0
 """Minutes above which tenths say nothing."""
 
@@ -30,7 +30,7 @@ def temperature(celsius: float) -> str:
 
 
 def pressure(kilopascals: float) -> str:
-    return f"{kilopascals:g} kPa ({kilopascals / KILOPASCALS_PER_PSI:.1f} psi)"
+    return f"{kilopascals:g} kPa ({kilopascals / KILOPASCALS['psi']:.1f} psi)"
 
 
 def force(newtons: float) -> str:
