@@ -88,39 +88,53 @@ def numbers(seed: int, first: int, rows: int, builds: int) -> Floats:
 
 
 class Draws:
-    """The errors of a batch of builds, whose numbers lie in ``rows`` by the ``first`` of each."""
+    """The errors of a batch of builds of interfaces that are alike.
 
-    def __init__(self, rows: Floats, first: Mapping[Error, int], cutting: float) -> None:
-        self.rows = rows
+    ``numbers`` has a row of builds for each error of the laminate, ``first`` the rows of each error
+    of the first interface and of those that stand in its place in the others.
+    """
+
+    def __init__(self, numbers: Floats, first: Mapping[Error, Indices], cutting: float) -> None:
+        self.numbers = numbers
         self.first = first
         self.cutting = cutting
 
-    def of(self, error: Error, builds: Indices | slice = slice(None)) -> Floats:
-        """X and y of a shift, or the one value of a cutting error or turn, for these builds."""
+    def of(self, error: Error, interfaces: Indices, builds: Indices) -> Floats:
+        """X and y of a shift, or the one value of a cutting error or turn, in builds of these."""
         import numpy as np
 
-        row = self.first[error]
+        rows = self.first[error][interfaces]
+        drawn = self.numbers[rows, builds]
         if is_shift(error):
             assert isinstance(error, Freedom)
             # Uniform over a disc: the radius goes with the root.
-            radius = error.most * np.sqrt(self.rows[row, builds])
-            angle = math.tau * self.rows[row + 1, builds]
-            return np.vstack([radius * np.cos(angle), radius * np.sin(angle)])
+            radius = error.most * np.sqrt(drawn)
+            angle = math.tau * self.numbers[rows + 1, builds]
+            return np.array([radius * np.cos(angle), radius * np.sin(angle)])
         most = error.most if isinstance(error, Freedom) else self.cutting
-        values: Floats = -most + (most + most) * self.rows[row : row + 1, builds]
+        values: Floats = -most + (most + most) * drawn[None, :]
         return values
 
-    def cut_below(self, contours: Sequence[tuple[Error, float]], least: float) -> Indices:
-        """The builds in which the cutting errors, by their signs, may add up to less."""
+    def cut_below(
+        self, contours: Sequence[tuple[Error, float]], least: float
+    ) -> tuple[Indices, Indices]:
+        """Interfaces and builds in which the cutting errors, by their signs, may add up to less."""
         import numpy as np
 
+        count = len(self.first[contours[0][0]])
         if self.cutting <= 0:
-            return np.arange(self.rows.shape[1] if least > -ROOM else 0)
-        total = np.zeros(1)
+            every = np.ones((count, self.numbers.shape[1]), dtype=bool)
+            return np.nonzero(every & (least > -ROOM))
         share = (least + ROOM) / (2 * self.cutting)
+        total: Floats | None = None
         for error, sign in contours:
-            row = self.rows[self.first[error]]
-            total = total + row if sign > 0 else total - row
+            # One row is looked at where it lies, several are copied.
+            rows = self.first[error]
+            own = self.numbers[rows[0] : rows[0] + 1] if count == 1 else self.numbers[rows]
             share += sign / 2
-        (builds,) = np.nonzero(np.broadcast_to(total < share, self.rows.shape[1:]))
-        return builds
+            if total is None:
+                total = own if sign > 0 else -own
+            else:
+                total = total + own if sign > 0 else total - own
+        assert total is not None
+        return np.nonzero(total < share)

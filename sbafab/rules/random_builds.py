@@ -10,7 +10,7 @@ not be done.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -151,26 +151,23 @@ def _parts(factors: Floats) -> Floats:
     return parts
 
 
-def short(rows: Iterable[MarginRows], own: Mapping[Error, Error], draws: Draws) -> list[Indices]:
-    """The builds in which an interface, with its own errors, comes short at a row.
-
-    A build may be named several times.
-    """
-    bad: list[Indices] = []
+def short(rows: Iterable[MarginRows], draws: Draws) -> list[tuple[Indices, Indices]]:
+    """Interfaces and builds of them that come short at a row; one may be named several times."""
+    bad: list[tuple[Indices, Indices]] = []
     for some in rows:
-        contours = [(own[error], sign) for error, sign in some.contours]
-        builds = draws.cut_below(contours, SURE - some.least_uncut)
+        interfaces, builds = draws.cut_below(some.contours, SURE - some.least_uncut)
         if not len(builds):
             continue
-        sums = _Sums.of(some, [draws.of(own[error], builds) for error in some.errors])
+        sums = _Sums.of(some, [draws.of(error, interfaces, builds) for error in some.errors])
         unsure = _picked(sums.least() < SURE)
         if not len(unsure):
             continue
-        builds, sums = builds[unsure], sums.at(unsure)
-        facing = sums.left(_looking(some, sums.shift), slice(None)) >= -TOLERANCE
-        bad.append(builds[~facing])
-        if facing.any():
-            bad.append(builds[facing][sums.at(facing).short()])
+        interfaces, builds, sums = interfaces[unsure], builds[unsure], sums.at(unsure)
+        missed = sums.left(_looking(some, sums.shift), slice(None)) < -TOLERANCE
+        unsure = _picked(~missed)
+        if len(unsure):
+            missed[unsure] = sums.at(unsure).short()
+        bad.append((interfaces[missed], builds[missed]))
     return bad
 
 

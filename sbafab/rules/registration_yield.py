@@ -71,6 +71,15 @@ class _Group:
     rows: dict[Quantity, tuple[MarginRows, ...]]
     own: dict[int, dict[Error, Error]]
 
+    def places(self, first: Mapping[Error, int]) -> dict[Error, Indices]:
+        """Where the numbers of each error begin, of all interfaces, from where those of one do."""
+        import numpy as np
+
+        errors = next(iter(self.own.values()))
+        return {
+            error: np.array([first[own[error]] for own in self.own.values()]) for error in errors
+        }
+
 
 def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
     """The share of good builds, against ``target_yield`` if one is asked for."""
@@ -179,21 +188,22 @@ def _counted(groups: Sequence[_Group], limits: Limits, seed: int) -> Yield:
     rows, count = rows_by_error(
         error for group in groups for own in group.own.values() for error in own.values()
     )
+    places = [(group, group.places(rows)) for group in groups]
     for first in range(0, wanted, BATCH):
         builds = min(BATCH, wanted - first)
         drawn = numbers(seed, first * count, count, builds)
-        draws = Draws(drawn, rows, limits.tolerances.cutting)
         bad_of = {quantity: np.zeros(builds, dtype=bool) for quantity in QUANTITIES}
-        for group in groups:
-            for index, own in group.own.items():
-                bad_at: list[Indices] = []
-                for quantity, asked in group.rows.items():
-                    bad = short(asked, own, draws)
-                    for some in bad:
-                        bad_of[quantity][some] = True
-                    bad_at += bad
-                if bad_at:
-                    interfaces[index] += len(np.unique(np.concatenate(bad_at)))
+        for group, own in places:
+            draws = Draws(drawn, own, limits.tolerances.cutting)
+            bad_at: list[Indices] = []
+            for quantity, asked in group.rows.items():
+                for interface, build in short(asked, draws):
+                    bad_of[quantity][build] = True
+                    bad_at.append(interface * builds + build)
+            if bad_at:
+                names = list(group.own)
+                for number in (np.unique(np.concatenate(bad_at)) // builds).tolist():
+                    interfaces[names[number]] += 1
         whole += int(np.logical_or.reduce(list(bad_of.values())).sum())
         quantities = {name: total + int(bad_of[name].sum()) for name, total in quantities.items()}
     return Yield(

@@ -16,7 +16,7 @@ from sbafab.geometry.shapes import disc, rectangle
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import boundary, freedoms, margins
 from sbafab.rules.boundary import outward_reach
-from sbafab.rules.draws import CutContour, Draws, Error, numbers, rows_by_error
+from sbafab.rules.draws import CutContour, Draws, numbers, rows_by_error
 from sbafab.rules.forms import linear_forms
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
@@ -55,18 +55,26 @@ def rows(number: int, least: float, seed: int) -> MarginRows:
 def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float) -> None:
     asked = rows(number, least, number)
     first, count = rows_by_error(asked.errors)
-    draws = Draws(numbers(5, 0, count, BUILDS), first, 0.1)
-    own: dict[Error, Error] = {error: error for error in asked.errors}
-    good = np.ones(BUILDS, dtype=bool)
-    for bad in short([asked], own, draws):
-        good[bad] = False
+    # Two interfaces, of which the second one's errors are drawn after the first one's.
+    places = {error: np.array([row, count + row]) for error, row in first.items()}
+    drawn = numbers(5, 0, 2 * count, BUILDS)
+    draws = Draws(drawn, places, 0.1)
+    good = np.ones((2, BUILDS), dtype=bool)
+    for interfaces, builds in short([asked], draws):
+        good[interfaces, builds] = False
     levers = asked.moves[2][2]
     assert levers is not None
-    (nx, ny), moved = asked.normal, draws.of(OTHER) - draws.of(SHIFT)
-    left = asked.room[:, None] + draws.of(CUT) - draws.of(AGAIN) + levers[:, None] * draws.of(TURN)
-    left = left + nx[:, None] * moved[0] + ny[:, None] * moved[1]
-    assert list(good) == list((left >= -TOLERANCE).all(axis=0))
-    assert 0 < good.sum() < BUILDS
+    every = np.arange(BUILDS)
+    for interface in (0, 1):
+        cut, again, turn, shift, other = (
+            draws.of(error, np.full(BUILDS, interface), every)
+            for error in (CUT, AGAIN, TURN, SHIFT, OTHER)
+        )
+        (nx, ny), moved = asked.normal, other - shift
+        left = asked.room[:, None] + cut - again + levers[:, None] * turn
+        left = left + nx[:, None] * moved[0] + ny[:, None] * moved[1]
+        assert list(good[interface]) == list((left >= -TOLERANCE).all(axis=0))
+    assert 0 < good.sum() < 2 * BUILDS
 
 
 def test_forms_lose_what_their_pushes_cost(good: Good) -> None:
