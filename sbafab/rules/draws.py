@@ -103,16 +103,27 @@ class Draws:
         """X and y of a shift, or the one value of a cutting error or turn, in builds of these."""
         import numpy as np
 
-        rows = self.first[error][interfaces]
-        drawn = self.numbers[rows, builds]
         if is_shift(error):
-            assert isinstance(error, Freedom)
-            # Uniform over a disc: the radius goes with the root.
-            radius = error.most * np.sqrt(drawn)
-            angle = math.tau * self.numbers[rows + 1, builds]
+            radius = self.reach(error, interfaces, builds)
+            rows = self.first[error][interfaces] + 1
+            angle = math.tau * self.numbers[rows, builds]
             return np.array([radius * np.cos(angle), radius * np.sin(angle)])
+        return self.value(error, interfaces, builds)[None, :]
+
+    def reach(self, shift: Error, interfaces: Indices, builds: Indices) -> Floats:
+        """How far a shift goes: uniform over a disc, so that the radius goes with the root."""
+        import numpy as np
+
+        assert isinstance(shift, Freedom)
+        drawn = self.numbers[self.first[shift][interfaces], builds]
+        far: Floats = shift.most * np.sqrt(drawn)
+        return far
+
+    def value(self, error: Error, interfaces: Indices, builds: Indices) -> Floats:
+        """The one value of a cutting error or a turn."""
         most = error.most if isinstance(error, Freedom) else self.cutting
-        values: Floats = -most + (most + most) * drawn[None, :]
+        drawn = self.numbers[self.first[error][interfaces], builds]
+        values: Floats = -most + (most + most) * drawn
         return values
 
     def cut_below(
@@ -121,20 +132,17 @@ class Draws:
         """Interfaces and builds in which the cutting errors, by their signs, may add up to less."""
         import numpy as np
 
-        count = len(self.first[contours[0][0]])
+        count, builds = len(self.first[contours[0][0]]), self.numbers.shape[1]
         if self.cutting <= 0:
-            every = np.ones((count, self.numbers.shape[1]), dtype=bool)
-            return np.nonzero(every & (least > -ROOM))
-        share = (least + ROOM) / (2 * self.cutting)
-        total: Floats | None = None
-        for error, sign in contours:
-            # One row is looked at where it lies, several are copied.
-            rows = self.first[error]
-            own = self.numbers[rows[0] : rows[0] + 1] if count == 1 else self.numbers[rows]
-            share += sign / 2
-            if total is None:
-                total = own if sign > 0 else -own
-            else:
-                total = total + own if sign > 0 else total - own
-        assert total is not None
-        return np.nonzero(total < share)
+            return np.nonzero(np.full((count, builds), least > -ROOM))
+        share = (least + ROOM) / (2 * self.cutting) + sum(sign for _, sign in contours) / 2
+        found: list[Indices] = []
+        # One interface after the other: rows of all at once would be copied first.
+        for number in range(count):
+            total = np.zeros(1)
+            for error, sign in contours:
+                row = self.numbers[self.first[error][number]]
+                total = total + row if sign > 0 else total - row
+            found.append((total < share).nonzero()[0])
+        interfaces = np.repeat(np.arange(count), [len(one) for one in found])
+        return interfaces, np.concatenate(found)

@@ -156,6 +156,8 @@ def short(rows: Iterable[MarginRows], draws: Draws) -> list[tuple[Indices, Indic
     bad: list[tuple[Indices, Indices]] = []
     for some in rows:
         interfaces, builds = draws.cut_below(some.contours, SURE - some.least_uncut)
+        roughly = _rough(some, draws, interfaces, builds) < SURE
+        interfaces, builds = interfaces[roughly], builds[roughly]
         if not len(builds):
             continue
         sums = _Sums.of(some, [draws.of(error, interfaces, builds) for error in some.errors])
@@ -169,6 +171,25 @@ def short(rows: Iterable[MarginRows], draws: Draws) -> list[tuple[Indices, Indic
             missed[unsure] = sums.at(unsure).short()
         bad.append((interfaces[missed], builds[missed]))
     return bad
+
+
+def _rough(rows: MarginRows, draws: Draws, interfaces: Indices, builds: Indices) -> Floats:
+    """No row leaves less than this, wherever the shifts go; a turn counts by the farthest lever."""
+    import numpy as np
+
+    low, high = rows.bounds
+    left = np.full(len(builds), low[0])
+    for contour, sign in rows.contours:
+        left += sign * draws.value(contour, interfaces, builds)
+    column = 3
+    for freedom, sign, levers in rows.moves:
+        if levers is None:
+            left -= draws.reach(freedom, interfaces, builds)
+        else:
+            turn = sign * draws.value(freedom, interfaces, builds)
+            left += np.minimum(low[column] * turn, high[column] * turn)
+            column += 1
+    return left
 
 
 class _Sums(NamedTuple):
