@@ -134,7 +134,8 @@ class Draws:
 
         count, builds = len(self.first[contours[0][0]]), self.numbers.shape[1]
         if self.cutting <= 0:
-            return np.nonzero(np.full((count, builds), least > -ROOM))
+            interfaces, every = np.nonzero(np.full((count, builds), least > -ROOM))
+            return interfaces, every
         share = (least + ROOM) / (2 * self.cutting) + sum(sign for _, sign in contours) / 2
         found: list[Indices] = []
         # One interface after the other: rows of all at once would be copied first.
