@@ -64,11 +64,16 @@ NONE = Places(np.zeros(0), np.zeros((2, 0)), np.zeros((2, 0)), np.zeros((2, 0)),
 
 def bond_places(interface: Interface, least: Width, slack: float) -> Places:
     """Where its bond is at most ``slack`` mm wider than at its narrowest."""
-    p, q, value = facing_places(interface.bond, slack, SHARP, least)
+    return _bond_places(interface.bond, least, slack, *_profiles(interface))
+
+
+@remembered
+def _bond_places(bond: Region, least: Width, slack: float, *profiles: Region) -> Places:
+    p, q, value = facing_places(bond, slack, SHARP, least)
     off = q - p
     length = np.sqrt(dot(off, off))
     normal = off / np.where(length > 0, length, 1.0)
-    every = _filed(interface, films=True, masks=True)
+    every = _filed(profiles, films=True, masks=True)
     return _owned(value, p, q, normal, (every.at(p, normal), every.at(q, normal)))
 
 
@@ -76,10 +81,17 @@ def overhang_places(
     interface: Interface, free: Sequence[tuple[Edge, Reach]], slack: float
 ) -> Places:
     """From film edges to the mask's, wherever it is at most ``slack`` farther than the nearest."""
+    return _overhang_places(interface.mask, tuple(free), slack, *_profiles(interface))
+
+
+@remembered
+def _overhang_places(
+    mask: Region, free: tuple[tuple[Edge, Reach], ...], slack: float, *profiles: Region
+) -> Places:
     within = min(reach.value for _, reach in free) + slack + ROOM
     near = [(edge, reach) for edge, reach in free if reach.value <= within]
     rays = Rays.of([edge for edge, _ in near])
-    ray, value, end = first_met(rays, _profile(interface.mask).table, within)
+    ray, value, end = first_met(rays, _profile(mask).table, within)
     # Each edge's own reach, then its samples.
     feet = [edge.nearest(reach.at) for edge, reach in near]
     outward = [left_normal(edge, p) for (edge, _), p in zip(near, feet, strict=True)]
@@ -89,7 +101,7 @@ def overhang_places(
     start = np.concatenate([np.array(feet).T, rays.start[:, ray]], axis=1)[:, order]
     ends = np.concatenate([np.array([reach.at for _, reach in near]).T, end], axis=1)[:, order]
     normal = np.concatenate([-np.array(outward).T, rays.outward[:, ray]], axis=1)[:, order]
-    films, masks = _filed(interface, films=True), _filed(interface, masks=True)
+    films, masks = _filed(profiles, films=True), _filed(profiles, masks=True)
     found = _owned(nominal, start, ends, normal, (films.at(start, normal), masks.at(ends, normal)))
     if not len(found.nominal):
         return found
@@ -165,14 +177,18 @@ def _profile(profile: Region) -> _Profile:
     )
 
 
-def _filed(interface: Interface, films: bool = False, masks: bool = False) -> _Filed:
-    layers = (interface.below, interface.above, *interface.masks)
+def _profiles(interface: Interface) -> list[Region]:
+    """Its layers' profiles by seat."""
+    return [one.profile for one in (interface.below, interface.above, *interface.masks)]
+
+
+def _filed(profiles: Sequence[Region], films: bool = False, masks: bool = False) -> _Filed:
     tables: list[EdgeTable] = []
     numbers: list[Indices] = []
     owners: list[Owner] = []
-    for seat, layer in enumerate(layers):
+    for seat, profile in enumerate(profiles):
         if films if seat < 2 else masks:
-            own = _profile(layer.profile)
+            own = _profile(profile)
             tables.append(own.table)
             numbers.append(own.contour + len(owners))
             owners += [Owner(seat, number, piece) for number, piece in enumerate(own.pieces)]
