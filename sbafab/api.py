@@ -18,8 +18,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sbafab import actuators
-from sbafab.design.reading import Change, template_names, template_text
+from sbafab.design.reading import Change
 from sbafab.design.records import Design
+from sbafab.design.templates import template_names, template_text
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing

@@ -8,8 +8,8 @@ from pathlib import Path
 import sbafab
 from sbafab.assemblies.reading import load
 from sbafab.assemblies.records import Assembly
-from sbafab.design.reading import template_names, templates_folder
 from sbafab.design.records import Design
+from sbafab.design.templates import template_names, templates_folder
 from sbafab.errors import DesignError
 from sbafab.models.figures import Prediction
 from sbafab.reports.assembly_png import assembly_png

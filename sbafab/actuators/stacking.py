@@ -14,7 +14,7 @@ from sbafab.actuators.ears import (
     with_mask_ears,
 )
 from sbafab.actuators.tails import Tail, with_tails
-from sbafab.design.reading import listed, shown
+from sbafab.design.messages import listed, shown
 from sbafab.design.records import Bore as BoreSection
 from sbafab.design.records import Design
 from sbafab.errors import DesignError

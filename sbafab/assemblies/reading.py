@@ -9,21 +9,20 @@ from typing import Any
 
 from sbafab.actuators import load_design, records
 from sbafab.assemblies.records import FAMILY, KINDS, AnyPart, Assembly, Sba
+from sbafab.design.messages import listed, shown
 from sbafab.design.reading import (
     Change,
     add_waivers,
     changed_keys,
     checked,
     design_path,
-    kit_names,
-    listed,
     override,
     read_toml,
-    shown,
     toml_tables,
     validated,
 )
 from sbafab.design.records import Design
+from sbafab.design.templates import kit_names
 from sbafab.errors import DesignError
 
 

@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Iterable, Mapping
 
 from sbafab.assemblies.records import AnyPart, Line, Seat
-from sbafab.design.reading import listed, shown
+from sbafab.design.messages import listed, shown
 from sbafab.errors import DesignError
 
 PLACES: Mapping[str, tuple[Seat, ...]] = {

@@ -39,7 +39,7 @@ class CheckRequest(NamedTuple):
 
     @property
     def is_folder(self) -> bool:
-        from sbafab.design.reading import template_names
+        from sbafab.design.templates import template_names
 
         return self.source not in template_names() and Path(self.source).is_dir()
 

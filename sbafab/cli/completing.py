@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def designs(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
     """Templates by name, and files."""
-    from sbafab.design.reading import template_summaries
+    from sbafab.design.templates import template_summaries
 
     found = [
         CompletionItem(name, help=said)
@@ -31,7 +31,7 @@ designs_or_folders = designs
 def templates(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
     """What ``sbafab new`` writes."""
     from sbafab.cli.new import COUPON, KIT
-    from sbafab.design.reading import template_summaries
+    from sbafab.design.templates import template_summaries
 
     others = {COUPON: "the kerf's calibration piece", KIT: "films, tubes, press, laser, limits"}
     return _beginning(typed, (template_summaries() | others).items())
@@ -59,7 +59,7 @@ def _beginning(typed: str, known: Iterable[tuple[str, str | None]]) -> list[Comp
 def _keys() -> dict[str, object]:
     """Every key that holds a value, of any family, with its annotation."""
     from sbafab.actuators import records
-    from sbafab.design.reading import key_paths
+    from sbafab.design.messages import key_paths
 
     found: dict[str, object] = {}
     for record in records().values():

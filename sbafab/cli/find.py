@@ -115,7 +115,7 @@ def _found(source: str | None, asked: dict[str, Any], tell: Progress) -> tuple[s
 
 def _one_of_each_family() -> list[str]:
     from sbafab.actuators import load_design
-    from sbafab.design.reading import template_names
+    from sbafab.design.templates import template_names
     from sbafab.errors import DesignError
 
     found: dict[type, str] = {}

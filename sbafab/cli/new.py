@@ -31,7 +31,7 @@ def new(template: str, file: Path | None) -> None:
     if template == KIT:
         _kit(file or Path("kit.toml"))
         return
-    from sbafab.design.reading import write_new
+    from sbafab.design.templates import write_new
 
     written = write_new(template, file)
     path = shlex.quote(str(written))

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
 from sbafab.geometry.boolean import LEAST_AREA, tidy
-from sbafab.geometry.copies import Copies
-from sbafab.geometry.edges import EPSILON, Edge, Point, edge_from_bulge
+from sbafab.geometry.copies import COPIED, Copies
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, edge_from_bulge
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
 from sbafab.geometry.region import Contour, Region, same_support
@@ -206,18 +206,29 @@ def nested_region(inner: Sequence[Contour], outer: Sequence[Contour]) -> Region:
             turned.append(_whole(right, *right.circle))
             continue
         first = copies.first(right)
-        tidied = (tidy(right.edges) or right) if first is right else None
-        if tidied is not None:
-            turns[id(first)] = _turn(first.edges, tidied.edges)
-        turn = turns[id(first)]
-        turned.append(tidied or _from(right, turn) or tidy(right.edges) or right)
+        if first is right:
+            turns[id(first)] = _turn(first.edges, (tidy(right.edges) or right).edges)
+        turned.append(_from(right, turns[id(first)]) or tidy(right.edges) or right)
     return Region(tuple(turned))
 
 
 def _turn(edges: Sequence[Edge], others: Sequence[Edge]) -> int | None:
     """From which of the edges on the others are these; None where they are others."""
-    turn = next((i for i, edge in enumerate(edges) if edge == others[0]), 0)
-    return turn if (*edges[turn:], *edges[:turn]) == tuple(others) else None
+    turn = next((i for i, edge in enumerate(edges) if _alike(edge, others[0])), 0)
+    turned = (*edges[turn:], *edges[:turn])
+    is_same = len(turned) == len(others) and all(map(_alike, turned, others))
+    return turn if is_same else None
+
+
+def _alike(one: Edge, other: Edge) -> bool:
+    """Whether edges of two contours, each of which ends where the next one starts, run alike."""
+    if math.dist(one.start, other.start) > COPIED or type(one) is not type(other):
+        return False
+    return not (isinstance(one, Arc) and isinstance(other, Arc)) or (
+        math.dist(one.centre, other.centre) <= COPIED
+        and abs(one.radius - other.radius) <= COPIED
+        and one.ccw == other.ccw
+    )
 
 
 def _from(contour: Contour, turn: int | None) -> Contour | None:

@@ -138,36 +138,23 @@ def _shape(serial: int, run: LaserRun, outlines: _Outlines) -> str:
         place = f"<XForm>1 0 0 1 {number(x)} {number(y)}</XForm>"
         return f'<Shape Type="Ellipse" CutIndex="{index}" {size}>{place}</Shape>'
     vertices, primitives = outlines.drawn(run)
+    x, y = run.edges[0].start
     return (
         f'<Shape Type="Path" CutIndex="{index}" VertID="{serial}" PrimID="{serial}">'
-        f"<XForm>1 0 0 1 0 0</XForm><VertList>{vertices}</VertList>"
+        f"<XForm>1 0 0 1 {number(x)} {number(y)}</XForm><VertList>{vertices}</VertList>"
         f"<PrimList>{primitives}</PrimList></Shape>"
     )
 
 
-class _Outline(NamedTuple):
-    """A path from its first vertex: text with a gap for each number, these numbers, primitives."""
-
-    form: str
-    numbers: list[float]
-    primitives: str
-
-
 class _Outlines:
-    """The paths of a sheet, each shape counted once and moved to its places."""
+    """The paths of a sheet, each shape written once: vertices from its first, and primitives."""
 
     def __init__(self) -> None:
         self._copies = Copies()
-        self._known: dict[int, _Outline] = {}
+        self._known: dict[int, tuple[str, str]] = {}
 
     def drawn(self, run: LaserRun) -> tuple[str, str]:
         """Vertices and primitives of a run."""
-        x, y = run.edges[0].start
-        own = self._outline(run)
-        placed = [n + (y if k % 2 else x) for k, n in enumerate(own.numbers)]
-        return own.form % tuple(map(number, placed)), own.primitives
-
-    def _outline(self, run: LaserRun) -> _Outline:
         if not run.closed:
             return _outline(Contour(run.edges), False)
         first = self._copies.first(Contour(run.edges))
@@ -176,29 +163,31 @@ class _Outlines:
         return self._known[id(first)]
 
 
-def _outline(contour: Contour, closed: bool) -> _Outline:
+def _outline(contour: Contour, closed: bool) -> tuple[str, str]:
     parts = [part for edge in contour.edges for part in parts_of(edge)]
     count = len(parts) + (not closed)
     leaving = [_handles(part) for part in parts]
-    form, places = [], []
+    x, y = contour.edges[0].start
+    vertices = []
     for k in range(count):
-        places.append(parts[k].start if k < len(parts) else parts[-1].end)
-        form.append("V%s %s")
+        u, v = parts[k].start if k < len(parts) else parts[-1].end
+        vertices.append(f"V{number(u - x)} {number(v - y)}")
         handles = (
             ("c0", leaving[k][0] if k < len(parts) else None),
             ("c1", leaving[k - 1][1] if closed or k else None),
         )
         for name, place in handles:
             # A control point that is not there is said by a 1.
-            form.append(f"{name}x%s{name}y%s" if place is not None else f"{name}x1")
-            places += [place] if place is not None else []
-    x, y = contour.edges[0].start
+            vertices.append(
+                f"{name}x{number(place[0] - x)}{name}y{number(place[1] - y)}"
+                if place is not None
+                else f"{name}x1"
+            )
     primitives = "".join(
         f"{'L' if isinstance(part, Line) else 'B'}{k} {(k + 1) % count}"
         for k, part in enumerate(parts)
     )
-    numbers = [n for px, py in places for n in (px - x, py - y)]
-    return _Outline("".join(form), numbers, primitives)
+    return "".join(vertices), primitives
 
 
 def _handles(part: Edge) -> tuple[Point, Point] | tuple[None, None]:

@@ -52,12 +52,14 @@ class Bezier(NamedTuple):
 class LaserShape:
     """Curves one after the other on the layer of an index; of a ``circle``, those of its eighths.
 
-    ``rows`` hold a path's curves as they stand: x and y of start, both handles and end; handles of
-    a line are at its thirds, and ``is_line`` tells which are lines.
+    ``rows`` hold a path's curves from ``place``: x and y of start, both handles and end; handles of
+    a line are at its thirds, and ``is_line`` tells which are lines. Shapes that are written alike
+    have the same rows.
     """
 
     index: int
     circle: tuple[Point, float] | None = None
+    place: Point = (0.0, 0.0)
     rows: tuple[tuple[float, ...], ...] = ()
     is_line: tuple[bool, ...] = ()
 
@@ -67,7 +69,7 @@ class LaserShape:
             (x, y), radius = self.circle
             return tuple(curve.moved(x, y, radius) for curve in unit_circle())
         return tuple(
-            Bezier((a, b), None if straight else ((c, d), (e, f)), (g, h))
+            Bezier((a, b), None if straight else ((c, d), (e, f)), (g, h)).moved(*self.place, 1.0)
             for (a, b, c, d, e, f, g, h), straight in zip(self.rows, self.is_line, strict=True)
         )
 
@@ -97,7 +99,8 @@ def read_project(path: Path) -> Project:
             {"type": item.get("type", ""), **{child.tag: child.get("Value", "") for child in item}}
             for item in root.iterfind("CutSetting")
         ]
-        shapes = tuple(_shape(item) for item in root.iterfind("Shape"))
+        paths = _Paths()
+        shapes = tuple(_shape(item, paths) for item in root.iterfind("Shape"))
         return Project({int(told["index"]): told for told in settings}, shapes)
     except OutputError as error:
         raise OutputError(f"{path.name}: {error}") from error
@@ -105,7 +108,7 @@ def read_project(path: Path) -> Project:
         raise OutputError(f"{path.name}: it is no sound project ({error})") from error
 
 
-def _shape(item: ElementTree.Element) -> LaserShape:
+def _shape(item: ElementTree.Element, paths: _Paths) -> LaserShape:
     kind, index = item.get("Type"), int(item.get("CutIndex", ""))
     place = _PLACE.fullmatch(item.findtext("XForm") or "")
     if place is None:
@@ -113,9 +116,10 @@ def _shape(item: ElementTree.Element) -> LaserShape:
     x, y = float(place[1]), float(place[2])
     if kind == "Ellipse" and item.get("Rx") == item.get("Ry"):
         return LaserShape(index, ((x, y), float(item.get("Rx", ""))))
-    if kind != "Path" or (x, y) != (0.0, 0.0):
+    if kind != "Path":
         raise OutputError(f"it holds a shape of the type {kind} that no sheet has")
-    return _path(index, item.findtext("VertList") or "", item.findtext("PrimList") or "")
+    rows, is_line = paths[item.findtext("VertList") or "", item.findtext("PrimList") or ""]
+    return LaserShape(index, None, (x, y), rows, is_line)
 
 
 @cache
@@ -131,7 +135,18 @@ def unit_circle() -> tuple[Bezier, ...]:
     return tuple(curves)
 
 
-def _path(index: int, vertices: str, primitives: str) -> LaserShape:
+_Rows = tuple[tuple[tuple[float, ...], ...], tuple[bool, ...]]
+
+
+class _Paths(dict[tuple[str, str], _Rows]):
+    """The rows of paths and which of them are lines, by vertices and primitives, read once each."""
+
+    def __missing__(self, written: tuple[str, str]) -> _Rows:
+        self[written] = _path(*written)
+        return self[written]
+
+
+def _path(vertices: str, primitives: str) -> _Rows:
     places = [
         (float(x), float(y), leaving, coming)
         for x, y, leaving, coming in _matches(_VERTEX, vertices)
@@ -151,7 +166,7 @@ def _path(index: int, vertices: str, primitives: str) -> LaserShape:
         is_line.append(kind == "L")
     if not rows:
         raise OutputError("a path has no line")
-    return LaserShape(index, None, tuple(rows), tuple(is_line))
+    return tuple(rows), tuple(is_line)
 
 
 def _handle(text: str) -> tuple[float, float]:

@@ -118,7 +118,10 @@ def _path_offs(pairs: Sequence[tuple[LaserShape, LaserRun]]) -> list[float]:
         step = np.arange(len(which)) - np.repeat(
             np.cumsum(counts[chosen]) - counts[chosen], counts[chosen]
         )
-        rows = np.array([row for shape in own for row in shape.rows])
+        known = {id(shape.rows): np.array(shape.rows) for shape in own}
+        rows = np.concatenate(
+            [known[id(shape.rows)] + np.tile(np.array(shape.place), 4) for shape in own]
+        )
         straight = np.array([flag for shape in own for flag in shape.is_line])
         share = np.array([step, step + 1]) / counts[which]
         off = _row_offs(rows, straight, edges[which], sweep[which], share)

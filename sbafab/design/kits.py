@@ -17,18 +17,11 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from sbafab.design.films import Films
-from sbafab.design.reading import (
-    KITS,
-    checked,
-    kit_names,
-    listed,
-    read_toml,
-    shown,
-    templates_folder,
-    write_copy,
-)
+from sbafab.design.messages import listed, shown
+from sbafab.design.reading import checked, read_toml
 from sbafab.design.records import NAME_PATTERN, Design, Laser, Press, Registration, Rules, Sheets
 from sbafab.design.section import Section, writable
+from sbafab.design.templates import KITS, kit_names, templates_folder, write_copy
 from sbafab.design.units import Length, millimetres
 from sbafab.design.writing import plain_tables, resolved
 from sbafab.errors import DesignError

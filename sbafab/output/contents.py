@@ -13,8 +13,8 @@ from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.kits import FILE as KIT_FILE
 from sbafab.design.kits import kit_of
-from sbafab.design.reading import kit_names
 from sbafab.design.records import Design
+from sbafab.design.templates import kit_names
 from sbafab.design.writing import design_sha256, design_toml
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.files import MeshFile, write_meshes

@@ -13,11 +13,11 @@ from sbafab.design.reading import (
     OUTLINE,
     changed_keys,
     design_path,
-    kit_names,
     override,
     read_toml,
     start_where_the_user_stands,
 )
+from sbafab.design.templates import kit_names
 from sbafab.errors import DesignError, OutputError
 from sbafab.search.find import FoundDesign
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from sbafab.design.form import Free
-from sbafab.design.reading import shown
+from sbafab.design.messages import shown
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.search.vary import read_varied, refuse_unknown

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from sbafab.design.form import Slots
+from sbafab.design.messages import key_paths, listed, shown
 from sbafab.design.pressure_units import KILOPASCALS
-from sbafab.design.reading import key_paths, listed, shown
 from sbafab.design.records import Design
 from sbafab.design.units import millimetres
 from sbafab.design.writing import keys_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sbafab.design.reading import shown
+from sbafab.design.messages import shown
 from sbafab.design.units import millimetres
 from sbafab.errors import DesignError
 from sbafab.search.quantities import AskedQuantity, named_pressure, read_quantity

@@ -13,8 +13,9 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
-from sbafab.design.reading import KIT, OUTLINE, kit_names
+from sbafab.design.reading import KIT, OUTLINE
 from sbafab.design.records import Design
+from sbafab.design.templates import kit_names
 from sbafab.design.writing import design_sha256, plain_tables
 from sbafab.errors import OutputError
 from sbafab.output.swap import MANIFEST

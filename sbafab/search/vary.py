@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-from sbafab.design.reading import key_paths, override, shown
+from sbafab.design.messages import key_paths, shown
+from sbafab.design.reading import override
 from sbafab.design.records import Design
 from sbafab.design.units import millimetres
 from sbafab.errors import DesignError

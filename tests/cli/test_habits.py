@@ -105,7 +105,7 @@ def test_every_rule_and_check_is_explained(capsys: pytest.CaptureFixture[str]) -
 def test_the_keys_that_are_named_are_keys(capsys: pytest.CaptureFixture[str]) -> None:
     from sbafab.actuators import records
     from sbafab.assemblies.records import Assembly
-    from sbafab.design.reading import key_paths
+    from sbafab.design.messages import key_paths
 
     known = set(key_paths(Assembly))
     for record in records().values():

@@ -12,8 +12,8 @@ import pytest
 from sbafab.actuators import load_design
 from sbafab.design.films import Films
 from sbafab.design.kits import citation, read_kit, write_kit
-from sbafab.design.reading import kit_names, templates_folder
 from sbafab.design.records import Design, Laser, Press, Registration, Rules, Sheets
+from sbafab.design.templates import kit_names, templates_folder
 from sbafab.design.writing import design_sha256, resolved
 from sbafab.errors import DesignError
 

@@ -19,8 +19,8 @@ from sbafab.assemblies.build import assemble
 from sbafab.assemblies.reading import load
 from sbafab.assemblies.records import Assembly
 from sbafab.assemblies.writing import assembly_toml
-from sbafab.design.reading import template_names, templates_folder
 from sbafab.design.records import Design
+from sbafab.design.templates import template_names, templates_folder
 from sbafab.design.writing import design_toml
 from sbafab.errors import SbafabError
 from sbafab.output.assembly import check_assembly

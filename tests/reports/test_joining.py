@@ -12,7 +12,8 @@ import pytest
 from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.reading import assembly_of
 from sbafab.assemblies.supply import runs
-from sbafab.design.reading import read_toml, templates_folder
+from sbafab.design.reading import read_toml
+from sbafab.design.templates import templates_folder
 from sbafab.reports.traveller.joining import join_pages
 
 
