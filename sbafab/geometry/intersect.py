@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sbafab.geometry.edges import EPSILON, SAME, Arc, Edge, Line, Point, distance_to
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, distance_to
 
 
 def meeting_points(a: Edge, b: Edge, tolerance: float = EPSILON) -> list[Point]:
@@ -13,8 +13,8 @@ def meeting_points(a: Edge, b: Edge, tolerance: float = EPSILON) -> list[Point]:
     Edges that run along each other give the ends of the shared stretch.
     """
     of_a, of_b = (a.start, a.end), (b.start, b.end)
-    found = [p for p in of_a if p in of_b or _holds(b, p, tolerance)]
-    found += [p for p in of_b if p not in of_a and _holds(a, p, tolerance)]
+    found = [p for p in of_a if p in of_b or distance_to(b, p) < tolerance]
+    found += [p for p in of_b if p not in of_a and distance_to(a, p) < tolerance]
     for p in _support_crossings(a, b, tolerance):
         # A known end wins over a computed point: at a touch the computed one is less exact.
         if any(math.dist(p, known) <= 2 * tolerance for known in found):
@@ -22,15 +22,6 @@ def meeting_points(a: Edge, b: Edge, tolerance: float = EPSILON) -> list[Point]:
         if distance_to(a, p) < tolerance and distance_to(b, p) < tolerance:
             found.append(p)
     return found
-
-
-def _holds(edge: Edge, p: Point, tolerance: float) -> bool:
-    """Whether ``p`` is nearer to an edge than the tolerance; most are not even near its circle."""
-    if isinstance(edge, Arc):
-        off = math.dist(p, edge.centre) - edge.radius
-        if abs(off) > tolerance + SAME:
-            return False
-    return distance_to(edge, p) < tolerance
 
 
 def _support_crossings(a: Edge, b: Edge, tolerance: float) -> list[Point]:
