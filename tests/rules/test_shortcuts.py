@@ -10,11 +10,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sbafab.geometry.boolean import union
+from sbafab.geometry.boolean import divided, union
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, rectangle
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules import boundary, freedoms, margins
+from sbafab.rules import boundary, draws, freedoms, margins
 from sbafab.rules.boundary import outward_reach
 from sbafab.rules.draws import CutContour, Draws, numbers, rows_by_error
 from sbafab.rules.forms import linear_forms
@@ -58,16 +58,16 @@ def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float
     # Two interfaces, of which the second one's errors are drawn after the first one's.
     places = {error: np.array([row, count + row]) for error, row in first.items()}
     drawn = numbers(5, 0, 2 * count, BUILDS)
-    draws = Draws(drawn, places, 0.1)
+    own = Draws(drawn, places, 0.1)
     good = np.ones((2, BUILDS), dtype=bool)
-    for interfaces, builds in short([asked], draws):
+    for interfaces, builds in short([asked], own):
         good[interfaces, builds] = False
     levers = asked.moves[2][2]
     assert levers is not None
     every = np.arange(BUILDS)
     for interface in (0, 1):
         cut, again, turn, shift, other = (
-            draws.of(error, np.full(BUILDS, interface), every)
+            own.of(error, np.full(BUILDS, interface), every)
             for error in (CUT, AGAIN, TURN, SHIFT, OTHER)
         )
         (nx, ny), moved = asked.normal, other - shift
@@ -75,6 +75,16 @@ def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float
         left = left + nx[:, None] * moved[0] + ny[:, None] * moved[1]
         assert list(good[interface]) == list((left >= -TOLERANCE).all(axis=0))
     assert 0 < good.sum() < 2 * BUILDS
+
+
+def test_numbers_are_those_of_one_stream_kept_or_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = np.random.default_rng(7).random(60)
+    monkeypatch.setattr(draws, "KEPT", 30)
+    draws._stream.cache_clear()
+    for first, rows, builds in ((0, 2, 5), (10, 2, 10), (20, 4, 10), (0, 3, 20)):
+        found = numbers(7, first, rows, builds)
+        assert found.tolist() == plain[first : first + rows * builds].reshape(rows, -1).tolist()
+    draws._stream.cache_clear()
 
 
 def test_forms_lose_what_their_pushes_cost(good: Good) -> None:
@@ -152,6 +162,13 @@ NOTCHED = rectangle((-4, -3), (4, 3)) - disc((0, 0), 1) - disc((4, 0), 1.5)
 )
 def test_what_is_round_a_region_is_what_a_boolean_leaves(region: Region) -> None:
     assert _around(region, FRAME).contours == (FRAME - region).contours
+
+
+@pytest.mark.parametrize("by", [Region(), disc((0, 0), 2), NOTCHED, disc((4, 0), 1.5), FRAME])
+def test_a_region_is_divided_as_two_booleans_would(by: Region) -> None:
+    outside, inside = divided(NOTCHED, by)
+    assert outside == NOTCHED - by
+    assert inside == NOTCHED & by
 
 
 @pytest.mark.parametrize("gap", [-3.0, -0.2, -0.01, -1e-4, 1e-4, 0.01, 3.0])
