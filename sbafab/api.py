@@ -99,7 +99,7 @@ def check(source: Source | Assembly, *changes: Change, **tables: Any) -> Finding
     """What the rule deck finds in a design; of an assembly, also what is found between parts."""
     from sbafab.assemblies.records import Assembly
     from sbafab.output.assembly import check_assembly
-    from sbafab.output.run import check as run_check
+    from sbafab.output.checking import check as run_check
     from sbafab.rules.finding import Findings
 
     found = _loaded(source, changes, tables)

@@ -102,7 +102,7 @@ def check(
 def _checked(asked: CheckRequest) -> bool:
     """Checks once and prints what was found; whether a rule failed."""
     from sbafab.cli.printing import print_json
-    from sbafab.output.manifest import checks
+    from sbafab.output.checking import checks
     from sbafab.rules.deck import has_failed
 
     told = _of_folder(asked) if asked.is_folder else _of_source(asked)
@@ -171,8 +171,8 @@ def _of_source(asked: CheckRequest) -> Told:
 
 def _of_design(design: Design, progress: Progress) -> Told:
     """The findings and notes; what press and sheets cannot do is refused, as a run would do."""
+    from sbafab.output.checking import check as run_check
     from sbafab.output.planned import Checked
-    from sbafab.output.run import check as run_check
 
     checked = Checked(design, *run_check(design, progress))
     return _of_checked(design.name, checked.findings, [checked])
@@ -195,7 +195,7 @@ def _of_checked(
     from sbafab.cli.printing import notes_of
     from sbafab.cli.verdicts import groups_of
     from sbafab.models.sizes import size_said, sizes
-    from sbafab.output.batch import refuse_undoable
+    from sbafab.output.checking import refuse_undoable
     from sbafab.rules.deck import has_failed
 
     if not has_failed(findings):

@@ -92,7 +92,7 @@ def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> N
     from sbafab.cli.printing import print_json, shown_progress
     from sbafab.cli.verdicts import Group, print_findings
     from sbafab.models.paper import BURST
-    from sbafab.output.manifest import checks
+    from sbafab.output.checking import checks
     from sbafab.output.simulating import simulate as run
     from sbafab.simulators.simulator import Wish
 

@@ -82,8 +82,11 @@ class Arrangement:
         """Where pieces leave in nearly one direction, so that rounding could order them wrongly;
         every point, where pieces were bent and may cross between their ends.
         """
-        self.rings = {p: self._in_order(halves) for p, halves in rings.items()}
-        """The halves that leave each point, counter-clockwise; the widest gap comes last."""
+        # Two follow each other either way.
+        self.rings = {
+            p: self._in_order(halves) if len(halves) > 2 else halves for p, halves in rings.items()
+        }
+        """The halves that leave each point, counter-clockwise."""
         if overlay.bent:
             self.tangled.update(self.rings)
         self.left = self._wound()
@@ -95,7 +98,8 @@ class Arrangement:
         turns = self.pieces[half >> 1].turns
         return -turns if half & 1 else turns
 
-    def _in_order(self, halves: list[int]) -> list[int]:
+    def _in_order(self, halves: Sequence[int]) -> list[int]:
+        """Halves that leave one point, counter-clockwise; the widest gap comes last."""
         found = sorted(
             (_leaving(half, self._drawn[half >> 1]) for half in halves),
             key=lambda leaving: leaving.heading,
@@ -190,10 +194,12 @@ class Arrangement:
         """A half with the plane outside its group on its left, and its leftmost point."""
         edge = self._drawn[number]
         p = min(edge.start, edge.end)
-        if isinstance(edge, Arc) and x < p[0]:
+        # Where an arc bulges by a rounding only, what it meets at its end may lie farther left.
+        if isinstance(edge, Arc) and x < p[0] - 2 * EPSILON:
             return 2 * number + int(edge.ccw), (x, edge.centre[1])
         # All leave to the right of it, so the last of those that leave upwards most.
-        ring = [_leaving(half, self._drawn[half >> 1]) for half in self.rings[p]]
+        halves = self.rings[p] if len(self.rings[p]) > 2 else self._in_order(self.rings[p])
+        ring = [_leaving(half, self._drawn[half >> 1]) for half in halves]
         upward = max(leaving.heading for leaving in ring) - NEAR
         return [leaving.half for leaving in ring if leaving.heading > upward][-1], p
 

@@ -153,10 +153,10 @@ class Arc(NamedTuple):
         (cx, cy), r = self.centre, self.radius
         (x0, y0), (x1, y1) = (self.start, self.end) if self.ccw else (self.end, self.start)
         return (
-            cx - r if y0 >= cy >= y1 else min(x0, x1),
-            cy - r if x0 <= cx <= x1 else min(y0, y1),
-            cx + r if y0 <= cy <= y1 else max(x0, x1),
-            cy + r if x0 >= cx >= x1 else max(y0, y1),
+            cx - r if y0 >= cy >= y1 else x1 if x1 < x0 else x0,
+            cy - r if x0 <= cx <= x1 else y1 if y1 < y0 else y0,
+            cx + r if y0 <= cy <= y1 else x1 if x1 > x0 else x0,
+            cy + r if x0 >= cx >= x1 else y1 if y1 > y0 else y0,
         )
 
     def reversed(self) -> Arc:

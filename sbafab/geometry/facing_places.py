@@ -26,6 +26,7 @@ from sbafab.geometry.width import (
     Boundary,
     Gathered,
     Width,
+    boundary_of,
     least_of,
     search,
 )
@@ -58,7 +59,7 @@ def facing_places(
     nearly alongside: where a layer turns, those may become the narrowest. ``least`` is the least
     width, where it is known.
     """
-    boundary = Boundary(region.contours, sharp)
+    boundary = boundary_of(region, sharp)
     least = least or least_of(boundary, math.inf)
     if least is None:
         return NOWHERE

@@ -4,24 +4,56 @@ from __future__ import annotations
 
 import math
 
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, distance_to
+from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, distance_to
+
+EVERYWHERE: Bounds = (-math.inf, -math.inf, math.inf, math.inf)
 
 
-def meeting_points(a: Edge, b: Edge, tolerance: float = EPSILON) -> list[Point]:
+def meeting_points(
+    a: Edge,
+    b: Edge,
+    tolerance: float = EPSILON,
+    boxes: tuple[Bounds, Bounds] = (EVERYWHERE, EVERYWHERE),
+) -> list[Point]:
     """Points that both edges hold, to within the tolerance.
 
-    Edges that run along each other give the ends of the shared stretch.
+    Edges that run along each other give the ends of the shared stretch. ``boxes`` hold all that
+    lies within the tolerance of either edge, where such are known: nothing is found outside them.
     """
+    one, two = boxes
+    left, low = max(one[0], two[0]), max(one[1], two[1])
+    right, high = min(one[2], two[2]), min(one[3], two[3])
     of_a, of_b = (a.start, a.end), (b.start, b.end)
-    found = [p for p in of_a if p in of_b or distance_to(b, p) < tolerance]
-    found += [p for p in of_b if p not in of_a and distance_to(a, p) < tolerance]
+    found = [
+        p
+        for p in of_a
+        if p in of_b
+        or (left <= p[0] <= right and low <= p[1] <= high and distance_to(b, p) < tolerance)
+    ]
+    found += [
+        p
+        for p in of_b
+        if left <= p[0] <= right
+        and low <= p[1] <= high
+        and p not in of_a
+        and distance_to(a, p) < tolerance
+    ]
+    if found and _holds(found[0], 2 * tolerance, left, low, right, high):
+        return found
     for p in _support_crossings(a, b, tolerance):
+        if not (left <= p[0] <= right and low <= p[1] <= high):
+            continue
         # A known end wins over a computed point: at a touch the computed one is less exact.
         if any(math.dist(p, known) <= 2 * tolerance for known in found):
             continue
         if distance_to(a, p) < tolerance and distance_to(b, p) < tolerance:
             found.append(p)
     return found
+
+
+def _holds(p: Point, reach: float, left: float, low: float, right: float, high: float) -> bool:
+    """Whether a whole box lies within ``reach`` of a point."""
+    return math.hypot(max(right - p[0], p[0] - left), max(high - p[1], p[1] - low)) <= reach
 
 
 def _support_crossings(a: Edge, b: Edge, tolerance: float) -> list[Point]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 
 from sbafab.geometry.edges import Bounds, Edge, Point, distance_to
@@ -104,6 +104,9 @@ class EdgeIndex:
         self._filed: dict[tuple[int, int], list[int]] = {}
         for number, box in enumerate(self._boxes):
             x0, y0, x1, y1 = self._places(box)
+            if x0 == x1 and y0 == y1:
+                self._filed.setdefault((x0, y0), []).append(number)
+                continue
             for x in range(x0, x1 + 1):
                 for y in range(y0, y1 + 1):
                     self._filed.setdefault((x, y), []).append(number)
@@ -124,13 +127,17 @@ class EdgeIndex:
     def numbers(self, box: Bounds) -> list[int]:
         """The same, by their place among the edges that were filed."""
         x0, y0, x1, y1 = self._places(box)
-        low_x, low_y, high_x, high_y = self._reach
-        columns = range(max(x0, low_x), min(x1, high_x) + 1)
-        rows = range(max(y0, low_y), min(y1, high_y) + 1)
         left, bottom, right, top = box
         filed, boxes = self._filed, self._boxes
-        cells = [filed[x, y] for x in columns for y in rows if (x, y) in filed]
-        near = dict.fromkeys(chain.from_iterable(cells)) if len(cells) > 1 else chain(*cells)
+        near: Iterable[int]
+        if x0 == x1 and y0 == y1:
+            near = filed.get((x0, y0), ())
+        else:
+            low_x, low_y, high_x, high_y = self._reach
+            columns = range(max(x0, low_x), min(x1, high_x) + 1)
+            rows = range(max(y0, low_y), min(y1, high_y) + 1)
+            cells = [filed[x, y] for x in columns for y in rows if (x, y) in filed]
+            near = dict.fromkeys(chain.from_iterable(cells)) if len(cells) > 1 else chain(*cells)
         return [
             number
             for number in near

@@ -8,7 +8,16 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-from sbafab.geometry.edges import BENT, EPSILON, Arc, Edge, Point, distance_to, from_end_to_end
+from sbafab.geometry.edges import (
+    BENT,
+    EPSILON,
+    Arc,
+    Bounds,
+    Edge,
+    Point,
+    distance_to,
+    from_end_to_end,
+)
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
 from sbafab.geometry.pool import PointPool
@@ -79,19 +88,26 @@ def split_edges(edges: Sequence[Edge], tolerance: float = EPSILON) -> Split:
     whole, edges = edges, [from_end_to_end(edge) for edge in edges]
     cuts: list[list[Point]] = [[] for _ in edges]
     meeting: list[tuple[int, int]] = []
-    for i, j in close_pairs([edge.bounds for edge in edges], tolerance):
-        points = meeting_points(edges[i], edges[j], tolerance)
+    bounds = [edge.bounds for edge in edges]
+    # An arc may leave the box of its ends by as much as these are off its circle.
+    near = [widened(box, tolerance + BENT) for box in bounds]
+    for i, j in close_pairs(bounds, tolerance):
+        if _only_follows(edges[i], edges[j], near[i], near[j], 2 * tolerance):
+            continue
+        points = meeting_points(edges[i], edges[j], tolerance, (near[i], near[j]))
         if points:
             cuts[i] += points
             cuts[j] += points
             meeting.append((i, j))
-    _share(edges, cuts, meeting, tolerance)
+    _share(edges, cuts, meeting, bounds, tolerance)
     ends = [p for edge in edges for p in (edge.start, edge.end)]
     pool = PointPool(ends, [p for points in cuts for p in points], 2 * tolerance)
     stops = [_stops(edge, points, pool) for edge, points in zip(edges, cuts, strict=True)]
     return Split(
         [
-            [edge.part(a, b) for a, b in pairwise(own) if a != b]
+            [edge]
+            if len(own) == 2 and own[0] is edge.start and own[1] is edge.end and own[0] != own[1]
+            else [edge.part(a, b) for a, b in pairwise(own) if a != b]
             for edge, own in zip(whole, stops, strict=True)
         ],
         any(
@@ -103,10 +119,29 @@ def split_edges(edges: Sequence[Edge], tolerance: float = EPSILON) -> Split:
     )
 
 
+def _only_follows(a: Edge, b: Edge, near_a: Bounds, near_b: Bounds, same: float) -> bool:
+    """Whether one edge starts where the other ends, and what else is near both is one with it.
+
+    Then neither is cut by the other.
+    """
+    if a.end == b.start:
+        x, y = a.end
+    elif a.start == b.end:
+        x, y = a.start
+    else:
+        return False
+    left, low, right, high = near_a
+    left_b, low_b, right_b, high_b = near_b
+    aside = max(min(right, right_b) - x, x - max(left, left_b))
+    above = max(min(high, high_b) - y, y - max(low, low_b))
+    return aside * aside + above * above < same * same
+
+
 def _share(
     edges: Sequence[Edge],
     cuts: Sequence[list[Point]],
     meeting: Sequence[tuple[int, int]],
+    bounds: Sequence[Bounds],
     tolerance: float,
 ) -> None:
     """Cuts edges that run along each other at the same points, those with a third edge too."""
@@ -119,7 +154,7 @@ def _share(
         found: dict[int, list[Point]] = defaultdict(list)
         for i, points in new.items():
             for j in partners[i]:
-                low_x, low_y, high_x, high_y = widened(edges[j].bounds, tolerance)
+                low_x, low_y, high_x, high_y = widened(bounds[j], tolerance)
                 for p in points:
                     if not (low_x <= p[0] <= high_x and low_y <= p[1] <= high_y):
                         continue
@@ -132,21 +167,34 @@ def _share(
 def _stops(edge: Edge, points: Sequence[Point], pool: PointPool) -> list[Point]:
     """Where the parts of an edge end, from its start to its end."""
     start, end = pool.snapped(edge.start), pool.snapped(edge.end)
-    if not points:
+    inner = dict.fromkeys(map(pool.snapped, points))
+    inner.pop(start, None)
+    inner.pop(end, None)
+    if not inner:
         return [start, end]
-    along = {stop: edge.parameter(stop) for stop in map(pool.snapped, points)}
-    inner = [stop for stop, t in along.items() if stop not in (start, end) and 0 < t < 1]
-    return [start, *sorted(inner, key=along.__getitem__), end]
+    along = {stop: edge.parameter(stop) for stop in inner}
+    within = [stop for stop, t in along.items() if 0 < t < 1]
+    return [start, *sorted(within, key=along.__getitem__), end]
 
 
 def _merged(edges: Iterable[tuple[Edge, int]], tolerance: float) -> list[Piece]:
     """Cut edges, those that coincide as one; none where the chains wind alike on both sides."""
-    between: dict[tuple[Point, Point], list[_Entry]] = defaultdict(list)
+    between: dict[tuple[Point, Point], list[tuple[int, Edge, int]]] = defaultdict(list)
     for number, (edge, turns) in enumerate(edges):
-        forward = edge.start < edge.end
-        a, b = (edge.start, edge.end) if forward else (edge.end, edge.start)
-        between[a, b].append((_offset(edge, a, b), number, edge, turns if forward else -turns))
-    return [piece for entries in between.values() for piece in _united(entries, 4 * tolerance)]
+        a, b = edge.start, edge.end
+        between[(a, b) if a < b else (b, a)].append((number, edge, turns))
+    pieces: list[Piece] = []
+    for (a, b), own in between.items():
+        if len(own) == 1:
+            _, edge, turns = own[0]
+            pieces.append(Piece(edge, turns))
+        else:
+            entries = [
+                (_offset(edge, a, b), number, edge, turns if edge.start == a else -turns)
+                for number, edge, turns in own
+            ]
+            pieces += _united(entries, 4 * tolerance)
+    return pieces
 
 
 def _offset(edge: Edge, a: Point, b: Point) -> float:

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
 
 from sbafab.geometry.edges import SAME, Point
 
 CELLS = 16
 """Cells of the grid are so many times as wide as points are pooled: most points touch one only."""
+
+
+ASLANT = 0.7548776662466927
+"""Slope of a line along which points of drawings hardly ever lie side by side."""
 
 
 class PointPool:
@@ -26,8 +31,25 @@ class PointPool:
         self._leader: dict[Point, Point] = {}
         self._cells: dict[tuple[int, int], list[Point]] = {}
         first = set(ends)
-        for p in (*sorted(first), *sorted(set(others) - first)):
+        rest = set(others) - first
+        near = self._maybe_near([*first, *rest])
+        self._leader.update((p, p) for group in (first, rest) for p in group if p not in near)
+        for p in (*sorted(first & near), *sorted(rest & near)):
             self._add(p)
+
+    def _maybe_near(self, points: Sequence[Point]) -> set[Point]:
+        """Those that may lie nearer to another than is told apart, and some more.
+
+        They are told by how far they lie along a line at an angle that drawings hardly have.
+        """
+        along = sorted([(p[0] + ASLANT * p[1], p) for p in points])
+        reach = 1.01 * math.hypot(1, ASLANT) * self._same
+        near: set[Point] = set()
+        for (t, p), (u, q) in pairwise(along):
+            if u - t < reach:
+                near.add(p)
+                near.add(q)
+        return near
 
     def snapped(self, p: Point) -> Point:
         """The point that stands for ``p``, one of those that were pooled."""

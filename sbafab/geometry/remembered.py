@@ -34,13 +34,13 @@ class _Exact:
         return mine is theirs or [own.edges for own in mine] == [one.edges for one in theirs]
 
 
-def remembered(ask: Callable[Asked, Found]) -> Callable[Asked, Found]:
+def remembered(ask: Callable[Asked, Found], most: int = MOST) -> Callable[Asked, Found]:
     """A function of regions and other values that hash, whose last answers are kept.
 
     What it returns is handed out again, and so must not be changed.
     """
 
-    @lru_cache(maxsize=MOST)
+    @lru_cache(maxsize=most)
     def known(*asked: Any, **named: Any) -> Found:
         return ask(*map(_own, asked), **named)
 

@@ -50,7 +50,7 @@ def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) ->
 
     A corner with an interior angle below ``sharp`` degrees has width 0.
     """
-    return least_of(Boundary(region.contours, sharp), below)
+    return least_of(boundary_of(region, sharp), below)
 
 
 @remembered
@@ -154,6 +154,15 @@ class Boundary:
         """What corner each side starts at, if any."""
         self.ends = [ends for contour in contours for ends in tapered_ends(contour, sharp)]
         self.pinch = _pinch(contours, self.corners, sharp)
+        self.known_clear: dict[tuple[Point, Point], bool] = {}
+        """Of segments that were asked: whether no edge crosses them."""
+
+
+def _made_ready(region: Region, sharp: float) -> Boundary:
+    return Boundary(region.contours, sharp)
+
+
+boundary_of = remembered(_made_ready, most=16)
 
 
 class _Narrowest:
@@ -194,6 +203,12 @@ class _Narrowest:
                 yield number, side
 
     def is_clear(self, p: Point, q: Point) -> bool:
+        known = self.boundary.known_clear
+        if (p, q) not in known:
+            known[p, q] = self._is_clear(p, q)
+        return known[p, q]
+
+    def _is_clear(self, p: Point, q: Point) -> bool:
         segment = Line(p, q)
         box = segment.bounds
         for edge in self.boundary.index.touching(widened(box, 10 * TOUCH)):

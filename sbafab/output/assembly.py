@@ -20,9 +20,10 @@ from sbafab.errors import DesignError
 from sbafab.geometry.boolean import GeometryError
 from sbafab.meshing.write_glb import Node, write_scene
 from sbafab.output.batch import Batch, plan_batch, refuse_other_film, write_batch
+from sbafab.output.checking import checks
 from sbafab.output.contents import TRAVELLER, order_of, write_findings, write_text
 from sbafab.output.earlier import would_replace
-from sbafab.output.manifest import as_json, checks
+from sbafab.output.manifest import as_json
 from sbafab.output.manifest_records import AssemblyManifest
 from sbafab.output.planned import EVERYTHING, PICTURES, Checked, plan
 from sbafab.output.run import Run, found_in, swapped_in

@@ -12,13 +12,11 @@ from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.nesting.nest import refuse_unfit
 from sbafab.nesting.records import Nest
 from sbafab.output.contents import close_folder, write_contents
 from sbafab.output.manifest import job_manifest
 from sbafab.output.manifest_records import Schema
-from sbafab.output.planned import Checked, Planned, plan
-from sbafab.output.settings import stocks
+from sbafab.output.planned import Planned
 from sbafab.output.shop import (
     find_nests,
     write_nested_sheets,
@@ -86,12 +84,6 @@ def plan_batch(
     if schema != SCHEMA:
         settings = _settings(name, designs, waived, lowered)
     return Batch(schema, name, tuple(designs), settings, nests)
-
-
-def refuse_undoable(checked: Sequence[Checked]) -> None:
-    """Raises DesignError where press, kerf or film sheets cannot do designs that hold."""
-    for one in checked:
-        refuse_unfit(plan(one, ("press", "cut")).parts, stocks(one.design))
 
 
 def _settings(

@@ -18,7 +18,8 @@ from sbafab.design.templates import kit_names
 from sbafab.design.writing import design_sha256, design_toml
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.files import MeshFile, write_meshes
-from sbafab.output.manifest import as_json, checks, file_hashes, manifest
+from sbafab.output.checking import checks
+from sbafab.output.manifest import as_json, file_hashes, manifest
 from sbafab.output.planned import Checked, Planned
 from sbafab.output.settings import GENERATOR, kerf_widths, limits
 from sbafab.output.shop import write_cut_files

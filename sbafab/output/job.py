@@ -10,8 +10,9 @@ from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.design.records import NAME_PATTERN, Design
 from sbafab.errors import DesignError
 from sbafab.output.batch import plan_batch, refuse_other_film, write_batch
+from sbafab.output.checking import check
 from sbafab.output.planned import EVERYTHING, Checked, plan
-from sbafab.output.run import Run, check, swapped_in
+from sbafab.output.run import Run, swapped_in
 from sbafab.output.swap import JOB_SCHEMA
 from sbafab.progress import Progress, unheard
 

@@ -53,32 +53,11 @@ from sbafab.output.settings import GENERATOR, kerf_widths, warnings
 from sbafab.output.shop import film_use
 from sbafab.output.swap import SCHEMA
 from sbafab.pressing.together import Runs, design_runs
-from sbafab.rules.finding import Finding, summary
 
 
 def as_json(value: object) -> str:
     """Text of a JSON file: readable, and the same for the same value."""
     return json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-CHECKS_SCHEMA = "sbafab/checks@1"
-
-
-def checks(
-    findings: Sequence[Finding], source: str, name: str, designs: Sequence[Design] = ()
-) -> dict[str, Any]:
-    """``checks.json``: of the design, assembly or folder called ``name``.
-
-    ``source`` is "design" or "as-built", ``designs`` are what was checked.
-    """
-    return {
-        "schema": CHECKS_SCHEMA,
-        "design": name,
-        "source": source,
-        "summary": summary(findings),
-        "kits": [{"design": design.name, **citation(design)} for design in designs],
-        "findings": [finding.as_dict() for finding in findings],
-    }
 
 
 def manifest(

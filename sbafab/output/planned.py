@@ -6,7 +6,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
-from sbafab.as_built.coarse import refuse_coarse
 from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.cutting.files import compensated_paths
 from sbafab.cutting.properties import CutSettings
@@ -89,6 +88,8 @@ def plan(checked: Checked, wanted: Collection[RunPart], curves: Curves = TRUE_AR
         )
     paths = compensated_paths(laminate, settings)
     if curves.in_chords:
+        from sbafab.as_built.coarse import refuse_coarse
+
         refuse_coarse(laminate, paths, settings, limits(design))
     parts = parts_of(laminate, paths, design.order.copies, design.order.spares)
     return replace(planned, paths=paths, parts=parts)

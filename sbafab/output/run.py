@@ -8,14 +8,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from sbafab.actuators import build
 from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.design.records import Design
-from sbafab.errors import DesignError
-from sbafab.geometry.boolean import GeometryError
 from sbafab.laminate.laminate import Laminate
 from sbafab.notebook import table_html
 from sbafab.output.batch import Batch, plan_batch, write_batch
+from sbafab.output.checking import check
 from sbafab.output.contents import close_folder
 from sbafab.output.earlier import (
     CUT,
@@ -29,11 +27,10 @@ from sbafab.output.earlier import (
 from sbafab.output.manifest import identity
 from sbafab.output.planned import EVERYTHING, PICTURES, Checked, RunPart, plan
 from sbafab.output.self_check import refuse_unlike
-from sbafab.output.settings import limits
 from sbafab.output.swap import SCHEMA, listed_files, replaced_folder
 from sbafab.pressing.schedule import Schedule
 from sbafab.progress import Progress, unheard
-from sbafab.rules.deck import has_failed, run_deck
+from sbafab.rules.deck import has_failed
 from sbafab.rules.finding import Finding, Findings
 
 if TYPE_CHECKING:
@@ -134,15 +131,6 @@ def found_in(checked: Sequence[Checked], between: Sequence[Finding]) -> tuple[Fi
         for finding in one.findings
     )
     return (*named, *between)
-
-
-def check(design: Design, progress: Progress | None = None) -> tuple[Laminate, tuple[Finding, ...]]:
-    """The laminate of a design and what the rule deck finds in it."""
-    try:
-        laminate = build(design)
-        return laminate, run_deck(laminate, limits(design), progress)
-    except GeometryError as error:
-        raise DesignError(f"design {design.name} cannot be resolved: {error}") from None
 
 
 def generate(

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, get_args
 
 from sbafab.errors import ERROR_SCHEMA
-from sbafab.output.manifest import CHECKS_SCHEMA
+from sbafab.output.checking import CHECKS_SCHEMA
 from sbafab.output.swap import ASSEMBLY_SCHEMA, SCHEMA
 from sbafab.rules.finding import Verdict
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from sbafab import __version__
 from sbafab.actuators.stacking import used_films
 from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.cutting.properties import CutSettings
-from sbafab.cutting.sheets import Machine
 from sbafab.design.films import KerfWidth, Sheet, material
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
@@ -17,6 +18,9 @@ from sbafab.pressing.build_up import Pad
 from sbafab.pressing.schedule import PressSettings
 from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.lowered import lowered
+
+if TYPE_CHECKING:
+    from sbafab.cutting.sheets import Machine
 
 GENERATOR = f"sbafab {__version__}"
 
@@ -104,6 +108,8 @@ def press_settings(design: Design) -> PressSettings:
 
 def machine(design: Design) -> Machine:
     laser = design.laser
+    from sbafab.cutting.sheets import Machine
+
     return Machine(
         cut_speed=laser.cut_speed,
         travel_speed=laser.travel_speed,

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sbafab.design.records import Design
+from sbafab.output.checking import check
 from sbafab.output.earlier import refuse_to_replace
 from sbafab.output.manifest import as_json, identity
 from sbafab.output.planned import Checked
-from sbafab.output.run import Extras, check, generate, with_folder
+from sbafab.output.run import Extras, generate, with_folder
 from sbafab.progress import Progress, unheard
 from sbafab.rules.finding import Finding
 from sbafab.simulators.simulator import Name, Result, Wish, simulator

@@ -16,9 +16,8 @@ from sbafab.design.writing import design_sha256, keys_of
 from sbafab.errors import SbafabError
 from sbafab.models.figures import Asked, Figure
 from sbafab.models.prediction import predict
-from sbafab.output.batch import refuse_undoable
+from sbafab.output.checking import check, refuse_undoable
 from sbafab.output.planned import Checked
-from sbafab.output.run import check
 from sbafab.search.margins import margins
 
 SweepOutcome = Literal["passes", "fails", "refused", "crashed", "too long"]

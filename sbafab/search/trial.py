@@ -11,7 +11,7 @@ from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import GeometryError
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.batch import refuse_undoable
+from sbafab.output.checking import refuse_undoable
 from sbafab.output.planned import Checked
 from sbafab.output.settings import limits
 from sbafab.rules.deck import run_deck

@@ -16,7 +16,7 @@ from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc
 from sbafab.laminate.assembly import assembly
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.output.run import check
+from sbafab.output.checking import check
 from sbafab.output.settings import press_settings
 from sbafab.pressing.schedule import schedule
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from sbafab.geometry import arrangement
@@ -76,3 +78,18 @@ def test_an_arc_that_starts_beside_its_circle_meets_what_crosses_it_there() -> N
     assert distance_to(bent, touched.start) > EPSILON
     cut = split_edges([bent, touched])
     assert [len(parts) for parts in cut.parts] == [2, 1]
+
+
+@pytest.mark.parametrize("left", [-18.1424, math.nextafter(-18.1424, -20.0)])
+def test_a_line_that_touches_a_circle_from_the_left_is_outside_of_it(left: float) -> None:
+    """By rounding the circle reaches farther left than the line that it only touches."""
+    (x, y), radius = (-11.807, -18.859), 6.3354
+    assert x - radius < -18.1424
+    angles = [math.pi / 4 + k * math.pi / 2 for k in range(4)]
+    corners = [(x + radius * math.cos(t), y + radius * math.sin(t)) for t in angles]
+    circle = [
+        Arc(start, end, (x, y), radius, ccw=True)
+        for start, end in zip(corners, [*corners[1:], corners[0]], strict=True)
+    ]
+    around = rectangle((left, y - radius), (x + radius, y + radius))
+    assert wound([*circle, *around.edges], 1).area == pytest.approx(math.pi * radius**2)

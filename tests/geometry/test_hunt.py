@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from random import Random
 
 import pytest
 
+from sbafab.geometry.edges import Line
+from sbafab.geometry.offset import grow
+from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.shapes import disc
+from tests.hunt import oracle
 from tests.hunt.__main__ import CHUNK, hunted
 
 SCALE = int(os.environ.get("SBAFAB_HUNT", "1"))
@@ -35,3 +42,34 @@ def test_offsets(chunk: int) -> None:
 )
 def test_found_before(what: str, seed: int, number: int) -> None:
     assert hunted(what, seed, number, count=1) == []
+
+
+def ring() -> tuple[Region, Region]:
+    return disc((0.0, 0.0), 3.25), disc((0.5, 0.0), 1.0)
+
+
+def with_a_chord(region: Region) -> Region:
+    first, *others = region.contours
+    arc, *edges = first.edges
+    return Region((Contour((Line(arc.start, arc.end), *edges)), *others))
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        lambda good: Region(good.contours[:1]),
+        lambda good: Region(),
+        with_a_chord,
+        lambda good: good.moved(0.01, 0.0),
+        lambda good: good.scaled(1.0001),
+    ],
+    ids=["a hole is missing", "nothing", "a chord for an arc", "moved", "scaled"],
+)
+def test_the_oracle_tells_a_fault(fault: Callable[[Region], Region]) -> None:
+    a, b = ring()
+    good = a - b
+    assert oracle.fault("minus", a, b, good, Random(1)) is None
+    assert oracle.fault("minus", a, b, fault(good), Random(1)) is not None
+    grown = grow(good, 0.1)
+    assert oracle.offset_fault(good, 0.1, grown, Random(1)) is None
+    assert oracle.offset_fault(good, 0.1, fault(grown), Random(1)) is not None

@@ -24,7 +24,7 @@ from sbafab.design.templates import template_names, templates_folder
 from sbafab.design.writing import design_toml
 from sbafab.errors import SbafabError
 from sbafab.output.assembly import check_assembly
-from sbafab.output.run import check
+from sbafab.output.checking import check
 
 COUNT = int(os.environ.get("SBAFAB_MUTATIONS", "120"))
 BATCHES = 8

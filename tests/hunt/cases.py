@@ -233,6 +233,21 @@ def holes(random: Random) -> Pair:
     return a.turned(turn), b.turned(turn)
 
 
+def chords(random: Random) -> Pair:
+    """A circle, and chords that stand for it, inside or outside, as a file of 9 digits has them."""
+    r, sides = random.choice([1.0, 3.25, random.uniform(0.1, 8)]), 4 * random.randint(1, 20)
+    step = math.tau / sides
+    reach = random.choice([r, r / math.cos(step / 2)])
+    turn = random.choice([0.0, step / 2, random.uniform(0, step)])
+    x, y = round(random.uniform(-20, 20), 3), round(random.uniform(-20, 20), 3)
+    angles = [turn + k * step for k in range(sides)]
+    corners = [
+        (round(x + reach * math.cos(t), 9), round(y + reach * math.sin(t), 9)) for t in angles
+    ]
+    round_one = disc((0, 0), r).turned(angle(random)).moved(x, y)
+    return random.choice([(polygon(corners), round_one), (round_one, polygon(corners))])
+
+
 def anyhow(random: Random) -> Pair:
     a, b = shape(random), shape(random)
     return a, b.moved(random.choice([0, 1, 2.5, random.uniform(-3, 3)]), random.uniform(-3, 3))
@@ -257,6 +272,7 @@ PAIRS: dict[str, Callable[[Random], Pair]] = {
         through_a_point,
         combs,
         holes,
+        chords,
         anyhow,
         ends_meet,
     )

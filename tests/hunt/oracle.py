@@ -10,14 +10,19 @@ import math
 from collections.abc import Iterator, Sequence
 from random import Random
 
+import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from sbafab.geometry.boolean import LEAST_AREA, GeometryError, difference, intersection, union
-from sbafab.geometry.edges import EPSILON, Edge, Point, left_normal
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, left_normal
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region
+
+Floats = NDArray[np.float64]
+Counts = NDArray[np.intp]
 
 SAGITTA = 1e-4
 """mm a chord may leave its arc."""
@@ -38,11 +43,43 @@ OPERATIONS = {
 
 def flat(region: Region, sagitta: float = SAGITTA) -> BaseGeometry:
     """The region with chords for arcs: what an odd number of its contours hold."""
+    if region.is_empty:
+        return Polygon()
+    edges = [edge for contour in region.contours for edge in contour.edges]
+    points, counts = chords(edges, sagitta)
+    owner = np.repeat(np.arange(len(region.contours)), [len(c.edges) for c in region.contours])
+    first = np.unique(owner, return_index=True)[1]
+    starts = (np.cumsum(counts) - counts)[first]
+    closed = np.insert(points, [*starts[1:], len(points)], points[starts], axis=0)
+    number = np.repeat(np.arange(len(starts)), np.diff([*starts, len(points)]) + 1)
+    rings = shapely.linearrings(closed, indices=number)
+    # Where no two rings cross, what lies within the widest and in no other is the same.
+    order = np.argsort([-shapely.Polygon(ring).area for ring in rings])
+    whole = shapely.Polygon(rings[order[0]], list(rings[order[1:]]))
+    if whole.is_valid:
+        return whole
     solid: BaseGeometry = Polygon()
-    for contour in region.contours:
-        ring = Polygon(contour.polygon(sagitta))
+    for ring in shapely.polygons(rings):
         solid = shapely.symmetric_difference(solid, shapely.make_valid(ring))
     return solid
+
+
+def chords(edges: Sequence[Edge], sagitta: float) -> tuple[Floats, Counts]:
+    """The points that stand for edges without their ends, and how many each of them has.
+
+    Worked out from the arcs alone, not by the program's own way of making chords.
+    """
+    radius = np.array([edge.radius if isinstance(edge, Arc) else 1.0 for edge in edges])
+    sweep = np.array([edge.sweep if isinstance(edge, Arc) else 0.0 for edge in edges])
+    centre = np.array([edge.centre if isinstance(edge, Arc) else (0.0, 0.0) for edge in edges])
+    start = np.array([edge.start for edge in edges])
+    step = 2 * np.sqrt(2 * np.minimum(1.0, sagitta / radius))
+    counts = np.where(sweep == 0, 1, np.maximum(2, np.ceil(np.abs(sweep) / step))).astype(int)
+    own = np.repeat(np.arange(len(edges)), counts)
+    part = np.arange(len(own)) - np.repeat(np.cumsum(counts) - counts, counts)
+    angle = np.arctan2(*(start - centre).T[::-1])[own] + sweep[own] * part / counts[own]
+    on_circle = centre[own] + radius[own, None] * np.array([np.cos(angle), np.sin(angle)]).T
+    return np.where((part == 0)[:, None], start[own], on_circle), counts
 
 
 def perimeter(*regions: Region) -> float:
@@ -56,21 +93,26 @@ def chord_area(region: Region) -> float:
 
 def complaint(what: str, a: Region, b: Region, random: Random) -> str | None:
     """What is wrong with a boolean of two regions, if anything."""
-    ours, logic, theirs = OPERATIONS[what]
     try:
-        result = ours(a, b)
+        result = OPERATIONS[what][0](a, b)
     except GeometryError as error:
         return f"refused: {error}"
+    return fault(what, a, b, result, random)
+
+
+def fault(what: str, a: Region, b: Region, result: Region, random: Random) -> str | None:
+    """What is wrong with the result of a boolean, if anything."""
+    _, logic, theirs = OPERATIONS[what]
     broken = unsound(result)
     if broken:
         return broken
-    for x, y in beside((*a.edges, *b.edges), random):
-        if min(a.distance_to_edge((x, y)), b.distance_to_edge((x, y))) < SNAPPED:
+    for p in beside((*a.edges, *b.edges), random):
+        if result.contains(p) == logic(a.contains(p), b.contains(p)):
             continue
-        if result.contains((x, y)) == logic(a.contains((x, y)), b.contains((x, y))):
+        if min(a.distance_to_edge(p), b.distance_to_edge(p)) < SNAPPED:
             continue
-        if not left_out(theirs(flat(a, FINE), flat(b, FINE)), result, (x, y)):
-            return f"wrong at {x:.7f}, {y:.7f}"
+        if not left_out(theirs(flat(a, FINE), flat(b, FINE)), result, p):
+            return f"wrong at {p[0]:.7f}, {p[1]:.7f}"
     expected = theirs(flat(a), flat(b)).area
     room = chord_area(a) + chord_area(b) + SNAPPED * perimeter(a, b) + DUST
     if abs(result.area - expected) > room:
@@ -112,6 +154,11 @@ def offset_complaint(region: Region, distance: float, random: Random) -> str | N
         result = grow(region, distance)
     except GeometryError as error:
         return f"refused: {error}"
+    return offset_fault(region, distance, result, random)
+
+
+def offset_fault(region: Region, distance: float, result: Region, random: Random) -> str | None:
+    """What is wrong with what a region grown by ``distance`` came out as, if anything."""
     broken = unsound(result)
     if broken:
         return broken
