@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from benchmarks import checking, copies, decks, outlines, scaling, simulators
+from benchmarks import checking, copies, decks, many, outlines, scaling, simulators
 from benchmarks import stacks as equilibria
 from benchmarks.timing import (
     HEAD,
@@ -37,6 +37,7 @@ def main() -> None:
     keep_to_one_core()
     plates(arguments.rivals, arguments.rounds)
     rule_decks(arguments.rounds)
+    many_designs(arguments.designs)
     stacks(arguments.rounds)
     lobes(arguments.rounds)
     drawn_outlines(arguments.rounds)
@@ -48,6 +49,9 @@ def main() -> None:
 def parsed() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--rounds", type=int, default=5, help="counted rounds (default: 5)")
+    parser.add_argument(
+        "--designs", type=int, default=400, help="in one process, one by one (default: 400)"
+    )
     parser.add_argument(
         "--rivals", type=Path, default=ROOT / ".benchmarks" / "venv", help="virtual environment"
     )
@@ -107,6 +111,19 @@ def rule_decks(rounds: int) -> None:
         decks.checked(template, -1)
         taken = [decks.checked(template, turn) for turn in range(3 * rounds)]
         print(row(template, taken, f"{len(taken) / sum(taken):.1f} designs a second"))
+
+
+def many_designs(designs: int) -> None:
+    """What is remembered is bounded, and so is the memory of a process however long it runs."""
+    print(f"\n{many.DESIGN} in other sizes and heights, in one process")
+    # In a process of its own, which has not done anything else.
+    program = f"from benchmarks.many import measured\nfor one in measured({designs}): print(*one)"
+    run = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, check=True, capture_output=True, text=True
+    )
+    for line in run.stdout.splitlines():
+        number, taken, memory = map(float, line.split())
+        print(row(f"{number:.0f} designs", [taken], f"{memory:.0f} MB"))
 
 
 def stacks(rounds: int) -> None:

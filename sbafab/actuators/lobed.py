@@ -29,6 +29,7 @@ from sbafab.design.units import Length
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point, unit
+from sbafab.geometry.nearby import boxes_meet
 from sbafab.geometry.offset import fillet, grow
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc
@@ -212,12 +213,16 @@ def _check_tabs(
     for i, (tab, _, inlet) in enumerate(inlets):
         free = grow(tab - outlines[i], room)
         for j, other in enumerate(outlines):
-            if j != i and not (free & (other | inlets[j][0])).is_empty:
+            if j != i and (_overlap(free, other) or _overlap(free, inlets[j][0])):
                 raise DesignError(
                     f"the inlet tab of {inlet.chamber} ({inlet.width + 2 * design.bond.width:g} "
                     f"wide) meets the lobe or tab of {inlets[j][2].chamber}; make inlet.width "
                     "smaller, chamber.axis_radius larger or chamber.count smaller"
                 )
+
+
+def _overlap(a: Region, b: Region) -> bool:
+    return boxes_meet(a.bounds, b.bounds) and not (a & b).is_empty
 
 
 def _ears(

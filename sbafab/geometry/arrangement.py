@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from functools import cached_property, cmp_to_key
 from typing import NamedTuple
 
@@ -237,6 +237,15 @@ class Arrangement:
             half
             for half, turns in enumerate(self.left)
             if turns > above >= turns - self.turns(half)
+        ]
+
+    def edging(self, wanted: Container[int]) -> list[int]:
+        """The halves round whose left the chains wind as wanted, and round whose right not so."""
+        left = self.left
+        return [
+            half
+            for half, turns in enumerate(left)
+            if turns in wanted and left[half ^ 1] not in wanted
         ]
 
     def loops(self, halves: Sequence[int]) -> Iterator[list[Edge]]:

@@ -14,7 +14,7 @@ from sbafab.errors import SbafabError
 from sbafab.geometry.arrangement import Arrangement, InconsistentError
 from sbafab.geometry.edges import EPSILON, Edge, Line, Point, quarter_arcs
 from sbafab.geometry.facets import run_sweep
-from sbafab.geometry.pieces import overlaid
+from sbafab.geometry.pieces import by_owner, overlaid
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.remembered import MOST
 from sbafab.geometry.shapes import circle
@@ -52,6 +52,27 @@ def difference(a: Region, b: Region) -> Region:
     return wound([*a.edges, *(edge.reversed() for edge in b.edges)], 0)
 
 
+def divided(region: Region, by: Region) -> tuple[Region, Region]:
+    """What of a region lies outside another, and what inside: ``region - by`` and ``region & by``.
+
+    Both come of one arrangement.
+    """
+    if region.is_empty or by.is_empty:
+        return region, Region()
+    return _divided(tuple(region.edges), tuple(by.edges))
+
+
+@lru_cache(maxsize=MOST)
+def _divided(edges: tuple[Edge, ...], by: tuple[Edge, ...]) -> tuple[Region, Region]:
+    def contours(found: Arrangement) -> tuple[Region, Region]:
+        winds = {turns: by_owner(turns, 2) for turns in set(found.left)}
+        outside = {turns for turns, (own, other) in winds.items() if own > 0 >= other}
+        inside = {turns for turns, (own, other) in winds.items() if own > 0 and other > 0}
+        return _enclosed(found, found.edging(outside)), _enclosed(found, found.edging(inside))
+
+    return arranged([edges, by], contours)
+
+
 def wound(edges: Sequence[Edge], above: int) -> Region:
     """The points that closed chains of edges wind round more than ``above`` times.
 
@@ -62,11 +83,12 @@ def wound(edges: Sequence[Edge], above: int) -> Region:
 
 @lru_cache(maxsize=MOST)
 def _wound(edges: tuple[Edge, ...], above: int) -> Region:
-    def contours(found: Arrangement) -> list[Contour]:
-        loops = found.loops(found.borders(above))
-        return [contour for contour in map(tidy, loops) if contour is not None]
+    return arranged([edges], lambda found: _enclosed(found, found.borders(above)))
 
-    return Region(tuple(sorted(arranged([edges], contours), key=_reading_order)))
+
+def _enclosed(found: Arrangement, borders: Sequence[int]) -> Region:
+    contours = [contour for contour in map(tidy, found.loops(borders)) if contour is not None]
+    return Region(tuple(sorted(contours, key=_reading_order)))
 
 
 def arranged(owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Found]) -> Found:

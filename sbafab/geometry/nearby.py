@@ -19,6 +19,11 @@ def widened(box: Bounds, margin: float) -> Bounds:
     return box[0] - margin, box[1] - margin, box[2] + margin, box[3] + margin
 
 
+def boxes_meet(a: Bounds, b: Bounds) -> bool:
+    """Whether two boxes have more in common than an edge."""
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
 def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
     """Numbers of the boxes that come within ``reach`` of each other, by a sweep along x.
 

@@ -50,44 +50,14 @@ def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) ->
 
     A corner with an interior angle below ``sharp`` degrees has width 0.
     """
-    return _least(_boundary(region, sharp), below)
+    return least_of(boundary_of(region, sharp), below)
 
 
 @remembered
 def least_gap(region: Region, sharp: float = 90.0, below: float = math.inf) -> Width | None:
     """The narrowest slot, hole or gap between pieces, likewise."""
     outside = [contour.reversed() for contour in region.contours]
-    return _least(_Boundary(outside, sharp), below)
-
-
-@remembered
-def facing_pairs(
-    region: Region, slack: float, sharp: float = 90.0, least: Width | None = None
-) -> tuple[Width, ...]:
-    """Facing places that are at most ``slack`` mm wider than the narrowest, each once.
-
-    Besides the places where edges are square on each other they hold samples along edges that run
-    nearly alongside: where a layer turns, those may become the narrowest. ``least`` is the least
-    width, where it is known.
-    """
-    boundary = _boundary(region, sharp)
-    least = least or _least(boundary, math.inf)
-    if least is None or least.value == 0.0:
-        return () if least is None else (least,)
-    gathered = _Gathered(boundary, least.value + slack)
-    _search(gathered)
-    for a in boundary.sides:
-        samples = [_Foot(p, left_normal(a.edge, p)) for p in spread(a.edge)]
-        for _, b in gathered.near(a, ASIDE):
-            if a is not b and b.may_hold_feet(a, gathered.value):
-                _from_samples(samples, b, gathered)
-    return tuple(gathered.found.values())
-
-
-def spread(edge: Edge) -> list[Point]:
-    """Both ends of an edge and points between them: the middle of a line, an arc every 15 deg."""
-    count = max(2, math.ceil(abs(edge.sweep) / STEP)) if isinstance(edge, Arc) else 2
-    return [edge.start, *(edge.at(i / count) for i in range(1, count)), edge.end]
+    return least_of(Boundary(outside, sharp), below)
 
 
 class _Foot(NamedTuple):
@@ -174,7 +144,7 @@ class _Corner(NamedTuple):
         return _left(self.arriving), _left(self.leaving)
 
 
-class _Boundary:
+class Boundary:
     """Contours with the material on their left, made ready for the search."""
 
     def __init__(self, contours: Sequence[Contour], sharp: float) -> None:
@@ -184,28 +154,28 @@ class _Boundary:
         """What corner each side starts at, if any."""
         self.ends = [ends for contour in contours for ends in tapered_ends(contour, sharp)]
         self.pinch = _pinch(contours, self.corners, sharp)
-        self.is_clear: dict[tuple[Point, Point], bool] = {}
+        self.known_clear: dict[tuple[Point, Point], bool] = {}
         """Of segments that were asked: whether no edge crosses them."""
 
 
-def _made_ready(region: Region, sharp: float) -> _Boundary:
-    return _Boundary(region.contours, sharp)
+def _made_ready(region: Region, sharp: float) -> Boundary:
+    return Boundary(region.contours, sharp)
 
 
-_boundary = remembered(_made_ready, most=16)
+boundary_of = remembered(_made_ready, most=16)
 
 
 class _Narrowest:
     """Keeps the shortest segment offered, if below a length, that no edge crosses."""
 
-    def __init__(self, boundary: _Boundary, below: float) -> None:
+    def __init__(self, boundary: Boundary, below: float) -> None:
         self.boundary = boundary
         self.best: Width | None = None
         self.value = below
 
     def offer(self, p: Point, q: Point) -> None:
         value = math.dist(p, q)
-        if value < self.value - 1e-9 and self._clear(p, q):
+        if value < self.value - 1e-9 and self.is_clear(p, q):
             self.value, self.best = value, Width(value, p, q)
 
     def offer_facing(self, a: _Foot, b: _Foot) -> None:
@@ -232,8 +202,8 @@ class _Narrowest:
             ):
                 yield number, side
 
-    def _clear(self, p: Point, q: Point) -> bool:
-        known = self.boundary.is_clear
+    def is_clear(self, p: Point, q: Point) -> bool:
+        known = self.boundary.known_clear
         if (p, q) not in known:
             known[p, q] = self._is_clear(p, q)
         return known[p, q]
@@ -248,48 +218,32 @@ class _Narrowest:
         return True
 
 
-class _Gathered(_Narrowest):
-    """Keeps every segment offered that is short enough, each once."""
+class Gathered(_Narrowest):
+    """Keeps the ends of every segment offered that is short enough, whatever crosses it."""
 
-    def __init__(self, boundary: _Boundary, below: float) -> None:
+    def __init__(self, boundary: Boundary, below: float) -> None:
         super().__init__(boundary, below)
-        self.found: dict[tuple[Point, Point], Width] = {}
+        self.offered: list[tuple[Point, Point]] = []
 
     def offer(self, p: Point, q: Point) -> None:
-        value = math.dist(p, q)
-        if value > self.value:
-            return
-        one, other = _rounded(p), _rounded(q)
-        key = (one, other) if one < other else (other, one)
-        if key not in self.found and self._clear(p, q):
-            self.found[key] = Width(value, p, q)
+        if math.dist(p, q) <= self.value:
+            self.offered.append((p, q))
 
 
-def _rounded(p: Point) -> Point:
-    return round(p[0], 5), round(p[1], 5)
-
-
-def _from_samples(samples: Iterable[_Foot], b: _Side, gathered: _Gathered) -> None:
-    for here in samples:
-        for foot in b.feet(here.point):
-            if _dot(here.normal, foot.normal) < -math.cos(ASIDE):
-                gathered.offer_facing(here, foot)
-
-
-def _least(boundary: _Boundary, below: float) -> Width | None:
+def least_of(boundary: Boundary, below: float) -> Width | None:
     if boundary.pinch is not None:
         return Width(0.0, boundary.pinch, boundary.pinch)
     # Most edges lie far apart: those are looked at only where no near ones face.
     reach, farthest = boundary.index.cell, min(below, 2 * boundary.index.across)
     while True:
         narrowest = _Narrowest(boundary, min(reach, farthest))
-        _search(narrowest)
+        search(narrowest)
         if narrowest.best is not None or reach >= farthest:
             return narrowest.best
         reach *= 4
 
 
-def _search(narrowest: _Narrowest) -> None:
+def search(narrowest: _Narrowest) -> None:
     """Offers every place where edges or corners face each other."""
     boundary = narrowest.boundary
     for i, a in enumerate(boundary.sides):

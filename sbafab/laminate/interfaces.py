@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from sbafab.geometry.boolean import union
+from sbafab.geometry.boolean import divided, union
 from sbafab.geometry.region import Region
 
 if TYPE_CHECKING:
@@ -76,5 +76,5 @@ def interface_regions(
 ) -> tuple[Region, Region, Region, Region]:
     """Mask, contact, bond and unbonded region of two TPE profiles with masks between."""
     mask = union(masks)
-    contact = below & above
-    return mask, contact, contact - mask, contact & mask
+    _, contact = (None, below) if below.contours == above.contours else divided(below, above)
+    return mask, contact, *divided(contact, mask)

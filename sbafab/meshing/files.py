@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal
@@ -82,8 +82,9 @@ def _meshes(laminate: Laminate, sagitta: float) -> Iterator[tuple[MeshFile, Surf
         "3mf": partial(write_3mf, material=films),
         "glb": partial(write_glb, material=films),
     }
+    told = _described("", "solid", None, surface)
     for suffix, write in {**SOLID_WRITERS, **named}.items():
-        yield _described(f"mesh/solid.{suffix}", "solid", None, surface), surface, write
+        yield replace(told, file=f"mesh/solid.{suffix}"), surface, write
         if around is not None:
             yield _described(f"mesh/solid_wrapped.{suffix}", "solid", None, around), around, write
     for chamber in laminate.chambers:

@@ -12,7 +12,6 @@ from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.pieces import by_owner, overlaid
 from sbafab.geometry.region import Region
 from sbafab.geometry.remembered import remembered
-from sbafab.geometry.width import spread
 
 END_ROOM = 1e-5
 """mm left out at both ends of an edge: what starts at a corner does not lie beside the edge."""
@@ -199,27 +198,3 @@ def _on_ray(origin: Point, unit: Point, edge: Edge) -> list[Point]:
         t = ((x - ox) * uy - (y - oy) * ux) / cross
         found = [(ox + t * unit[0], oy + t * unit[1])]
     return [p for p in found if -1e-12 <= edge.parameter(p) <= 1 + 1e-12]
-
-
-def outward_samples(
-    edge: Edge, others: EdgeIndex, within: float
-) -> Iterator[tuple[Point, Point, Reach]]:
-    """Points spread over ``edge``, the outward normal at each, the first other edge along it.
-
-    Edges farther off than ``within`` may be left out.
-    """
-    room = END_ROOM / edge.length
-    for p in spread(edge):
-        start = edge.at(min(1 - room, max(room, edge.parameter(p))))
-        nx, ny = left_normal(edge, start)
-        outward = (-nx, -ny)
-        end = (start[0] - nx * within, start[1] - ny * within)
-        best: Reach | None = None
-        for other in others.touching(widened(Line(start, end).bounds, END_ROOM)):
-            for q in _on_ray(start, outward, other):
-                height = (q[0] - start[0]) * outward[0] + (q[1] - start[1]) * outward[1]
-                is_first = best is None or height < best.value
-                if height > -EPSILON and is_first and not _runs_along(other, q, outward):
-                    best = Reach(max(0.0, height), q)
-        if best is not None:
-            yield start, outward, best

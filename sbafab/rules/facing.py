@@ -10,7 +10,7 @@ from __future__ import annotations
 from functools import cache
 from typing import NamedTuple
 
-from sbafab.geometry.boolean import union
+from sbafab.geometry.boolean import divided, union
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc
 from sbafab.laminate.interfaces import Interface
@@ -78,15 +78,18 @@ class _Shapes:
 
     def _laid(self, seen: Region, film: Region) -> tuple[Region, Region]:
         """What a film covers of a region, and what it leaves."""
-        shared = without_slivers(seen & film)
-        return shared, self.minus(seen, film) if shared.contours else seen
+        rest, shared = map(without_slivers, divided(seen, film))
+        return shared, rest if shared.contours else seen
 
     def left_by_next(self, index: int, below: Layer, above: Layer) -> Region:
         """What the film next to it leaves of a film; their contact is known."""
         if below.pattern == above.pattern:
             return Region()
         contact = without_slivers(self.laminate.interfaces[index - 1].contact)
-        return self.minus(below.profile, above.profile) if contact.contours else below.profile
+        if not contact.contours:
+            return below.profile
+        # Interfaces have asked for it as well.
+        return without_slivers(divided(below.profile, above.profile)[0])
 
     def _minus(self, region: Region, other: Region) -> Region:
         return without_slivers(region - other)

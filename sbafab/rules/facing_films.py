@@ -77,8 +77,17 @@ def _at_rims(laminate: Laminate) -> Iterator[_Weld]:
             continue
         rim = Region(tuple(c for c in gap.contact.contours if not _is_bore(c, laminate)))
         for piece in without_slivers(gap.bond).pieces:
-            if not _is_ear(piece, laminate) and edges_along(piece, rim):
+            if _is_apart(piece, rim) or _is_ear(piece, laminate):
+                continue
+            if edges_along(piece, rim):
                 yield _Weld(piece, gap, alike.number)
+
+
+def _is_apart(piece: Region, rim: Region) -> bool:
+    """Whether a circle round the piece lies so far from the rim that no edge of it can be one."""
+    low_x, low_y, high_x, high_y = piece.bounds
+    middle = (low_x + high_x) / 2, (low_y + high_y) / 2
+    return rim.distance_to_edge(middle) > math.dist(middle, (high_x, high_y)) + TOLERANCE
 
 
 def _is_bore(contour: Contour, laminate: Laminate) -> bool:

@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING
 
 from sbafab.laminate.interfaces import Interface
 from sbafab.rules.freedoms import Freedom, Freedoms
-from sbafab.rules.margins import Margin, Owner, Quantity, felt
+from sbafab.rules.margins import InterfaceMargins, Owner, Quantity, felt
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+    from sbafab.rules.narrow_places import Places
 
     Floats = NDArray[np.float64]
     Indices = NDArray[np.intp]
@@ -49,38 +51,38 @@ class LinearForm:
         return total
 
 
-def linear_forms(
-    margins: Sequence[Margin], interface: Interface, moves: Freedoms
-) -> tuple[LinearForm, ...]:
+def linear_forms(group: InterfaceMargins, moves: Freedoms) -> tuple[LinearForm, ...]:
     """The margins of an interface by quantity and owners, in the order of their first."""
-    groups: dict[tuple[Quantity, tuple[Owner, Owner]], list[int]] = {}
-    for number, margin in enumerate(margins):
-        groups.setdefault((margin.quantity, margin.owners), []).append(number)
-    return tuple(
-        _form(quantity, owners, numbers, margins, interface, moves)
-        for (quantity, owners), numbers in groups.items()
-    )
+    found: list[LinearForm] = []
+    before = 0
+    for quantity, places in group.places.items():
+        own: dict[tuple[Owner, Owner], list[int]] = {}
+        for number, owners in enumerate(places.owners):
+            own.setdefault(owners, []).append(number)
+        for owners, numbers in own.items():
+            found.append(_form(quantity, owners, numbers, before, places, group.first, moves))
+        before += len(places.owners)
+    return tuple(found)
 
 
 def _form(
     quantity: Quantity,
     owners: tuple[Owner, Owner],
     numbers: Sequence[int],
-    margins: Sequence[Margin],
+    before: int,
+    places: Places,
     interface: Interface,
     moves: Freedoms,
 ) -> LinearForm:
     import numpy as np
 
-    own = [margins[number] for number in numbers]
-    normal = np.array([margin.normal for margin in own]).T
-    start = np.array([margin.start for margin in own]).T
-    end = np.array([margin.end for margin in own]).T
+    own = np.array(numbers)
+    normal, start, end = places.normal[:, own], places.start[:, own], places.end[:, own]
     return LinearForm(
         quantity,
         owners,
-        np.array(numbers),
-        np.array([margin.nominal for margin in own]),
+        own + before,
+        places.nominal[own],
         normal,
         tuple(
             (freedom, at_end, _levers(freedom, end if at_end else start, normal))

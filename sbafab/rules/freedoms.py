@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from sbafab.geometry.centroid import centroid
 from sbafab.geometry.edges import Point
+from sbafab.geometry.nearby import boxes_meet
 from sbafab.geometry.region import Region
 from sbafab.laminate.assembly import AssemblyStep, assembly
 from sbafab.laminate.laminate import LOOSE, Laminate
@@ -208,7 +209,7 @@ class _Shapes:
         key = (self._pattern(a.layer), a.piece, self._pattern(b.layer), b.piece)
         if key not in self.overlaps:
             one, other = self._region(a), self._region(b)
-            self.overlaps[key] = _boxes_meet(one, other) and (
+            self.overlaps[key] = boxes_meet(one.bounds, other.bounds) and (
                 _plainly_meet(one, other) or not (one & other).is_empty
             )
         return self.overlaps[key]
@@ -271,9 +272,3 @@ def _plainly_meet(a: Region, b: Region) -> bool:
             if all(one.contains(p) and one.distance_to_edge(p) > INSIDE / 2 for one in (a, b)):
                 return True
     return False
-
-
-def _boxes_meet(a: Region, b: Region) -> bool:
-    ax0, ay0, ax1, ay1 = a.bounds
-    bx0, by0, bx1, by1 = b.bounds
-    return ax0 < bx1 and bx0 < ax1 and ay0 < by1 and by0 < ay1

@@ -7,34 +7,31 @@ change along the normal there, which is linear in every cutting error, shift and
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from sbafab.geometry.edges import Arc, Bounds, Edge, Point, distance_to, left_normal
-from sbafab.geometry.nearby import EdgeIndex, widened
+from sbafab.geometry.edges import Arc, Bounds, Edge, Point
 from sbafab.geometry.region import Region
-from sbafab.geometry.width import Width, facing_pairs
+from sbafab.geometry.width import Width
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate, Pin
-from sbafab.rules.boundary import Reach, outward_samples
+from sbafab.rules.boundary import Reach
 from sbafab.rules.facing import Facing
 from sbafab.rules.freedoms import Freedom, Freedoms, Part
 from sbafab.rules.limits import TOLERANCE, Limits, holds
 
+if TYPE_CHECKING:
+    from sbafab.rules.narrow_places import Places
+
 Quantity = Literal["bond", "overhang"]
 QUANTITIES: tuple[Quantity, ...] = ("bond", "overhang")
 
-ON_EDGE = 1e-5
-"""mm within which a point lies on an edge: booleans keep points to 4 nm, files to 1 nm."""
 SHARP = 30.0
 """Degrees: a sharper corner is a bond that tapers to nothing. Blunter ones are where a strip leaves
 its pocket aslant, between two edges of one void, and no way for a leak."""
 ROOM = 1e-6
 """mm: far more than the rounding of what is compared."""
-SQUARE = 0.9
-"""Cosine above which an edge counts as square to a direction (within 25 degrees)."""
 
 
 class Owner(NamedTuple):
@@ -78,14 +75,30 @@ class Push(NamedTuple):
 
 @dataclass(frozen=True)
 class InterfaceMargins:
-    """Interfaces of equal profiles and equal freedoms, the first of them, and its margins."""
+    """Interfaces of equal profiles and equal freedoms, the first of them, and its margins.
+
+    ``places`` are those of bonds, then those of overhangs.
+    """
 
     interfaces: tuple[Interface, ...]
-    margins: tuple[Margin, ...]
+    places: Mapping[Quantity, Places]
 
     @property
     def first(self) -> Interface:
         return self.interfaces[0]
+
+    def __len__(self) -> int:
+        return sum(len(found.owners) for found in self.places.values())
+
+    def __getitem__(self, number: int) -> Margin:
+        for quantity, found in self.places.items():
+            if number < len(found.owners):
+                (x, y), (u, v) = found.start[:, number].tolist(), found.end[:, number].tolist()
+                nx, ny = found.normal[:, number].tolist()
+                nominal = float(found.nominal[number])
+                return Margin(quantity, nominal, (x, y), (u, v), (nx, ny), found.owners[number])
+            number -= len(found.owners)
+        raise IndexError(number)
 
 
 def seated(interface: Interface) -> tuple[int, ...]:
@@ -218,19 +231,20 @@ def narrow_places(
     moves: Freedoms,
     bond: Width | None,
     reaches: Sequence[tuple[Edge, Reach]],
-) -> tuple[Margin, ...]:
+) -> dict[Quantity, Places]:
     """All margins that could become the least under the tolerances, or come short of a limit.
 
     ``bond`` is the least width of its bond, ``reaches`` how far its masks reach past film edges.
     """
+    from sbafab.rules.narrow_places import bond_places, overhang_places
+
     if interface.contact.is_empty:
-        return ()
-    owners = _Owners(interface)
+        return {}
     loss = _loss(interface, limits, moves)
-    found: list[Margin] = []
+    found: dict[Quantity, Places] = {}
     if bond is not None:
         slack = loss.slack(bond.value, limits.bond_width, limits.worst_bond_width)
-        found += _bond_margins(interface, bond, slack, owners)
+        found["bond"] = bond_places(interface, bond, slack)
     flush = limits.mask_overhang
     free = [
         (edge, reach)
@@ -240,8 +254,8 @@ def narrow_places(
     if free:
         least = min(reach.value for _, reach in free)
         slack = loss.slack(least, flush, limits.worst_mask_overhang)
-        found += _overhang_margins(interface.mask.index, free, slack, owners)
-    return tuple(found)
+        found["overhang"] = overhang_places(interface, free, slack)
+    return found
 
 
 def pin_at(edge: Edge, pins: tuple[Pin, ...]) -> Pin | None:
@@ -255,92 +269,3 @@ def pin_at(edge: Edge, pins: tuple[Pin, ...]) -> Pin | None:
         ):
             return pin
     return None
-
-
-def _bond_margins(
-    interface: Interface, least: Width, slack: float, owners: _Owners
-) -> Iterator[Margin]:
-    for width in facing_pairs(interface.bond, slack, SHARP, least):
-        p, q = width.start, width.end
-        normal = _unit(p, q)
-        for pair in product(_at(p, normal, owners.every), _at(q, normal, owners.every)):
-            yield Margin("bond", width.value, p, q, normal, pair)
-
-
-def _overhang_margins(
-    mask: EdgeIndex, free: Sequence[tuple[Edge, Reach]], slack: float, owners: _Owners
-) -> list[Margin]:
-    """From film edges to the mask's, wherever it is at most ``slack`` farther than the nearest."""
-    found: list[Margin] = []
-    within = min(reach.value for _, reach in free) + slack
-    for edge, least in free:
-        if least.value > within + ROOM:
-            continue
-        p = edge.nearest(least.at)
-        nx, ny = left_normal(edge, p)
-        places = [(p, (-nx, -ny), least), *outward_samples(edge, mask, within + ROOM)]
-        for start, outward, reach in places:
-            films = _at(start, outward, owners.films)
-            for pair in product(films, _at(reach.at, outward, owners.masks)):
-                found.append(Margin("overhang", reach.value, start, reach.at, outward, pair))
-    widest = min((margin.nominal for margin in found), default=0.0) + slack
-    return [margin for margin in found if margin.nominal <= widest]
-
-
-class _Owned(NamedTuple):
-    edge: Edge
-    owner: Owner
-
-    def squareness(self, p: Point, normal: Point) -> float:
-        """Cosine between the edge's own normal and the given one."""
-        nx, ny = left_normal(self.edge, p)
-        return abs(nx * normal[0] + ny * normal[1])
-
-
-class _Owners:
-    """The edges of all layers of an interface, and whose they are."""
-
-    def __init__(self, interface: Interface) -> None:
-        layers = (interface.below, interface.above, *interface.masks)
-        owned = [
-            _Owned(edge, Owner(seat, contour, piece))
-            for seat, layer in enumerate(layers)
-            for contour, piece, edges in _contours(layer.profile)
-            for edge in edges
-        ]
-        self.films = _Filed([one for one in owned if one.owner.is_film])
-        self.masks = _Filed([one for one in owned if not one.owner.is_film])
-        self.every = _Filed(owned)
-
-
-class _Filed:
-    """Owned edges, filed by place."""
-
-    def __init__(self, owned: Sequence[_Owned]) -> None:
-        self.owned = owned
-        self.index = EdgeIndex([one.edge for one in owned])
-
-    def through(self, p: Point) -> list[_Owned]:
-        near = (self.owned[number] for number in self.index.numbers(widened((*p, *p), ON_EDGE)))
-        return [one for one in near if distance_to(one.edge, p) < ON_EDGE]
-
-
-def _at(p: Point, normal: Point, edges: _Filed) -> list[Owner]:
-    """Whose edges run through ``p``: of those square to ``normal`` if any are, else of all."""
-    here = edges.through(p)
-    square = [owned for owned in here if owned.squareness(p, normal) > SQUARE]
-    return list(dict.fromkeys(owned.owner for owned in square or here))
-
-
-def _contours(profile: Region) -> Iterator[tuple[int, int, tuple[Edge, ...]]]:
-    """Contours of a profile, numbered, with the piece each belongs to."""
-    number = 0
-    for piece, region in enumerate(profile.pieces):
-        for contour in region.contours:
-            yield number, piece, contour.edges
-            number += 1
-
-
-def _unit(p: Point, q: Point) -> Point:
-    length = math.dist(p, q)
-    return ((q[0] - p[0]) / length, (q[1] - p[1]) / length) if length else (0.0, 0.0)

@@ -75,7 +75,7 @@ class Measures:
     @cached_property
     def forms(self) -> list[tuple[LinearForm, ...]]:
         """The same as linear forms."""
-        return [linear_forms(own.margins, own.first, self.moves) for own in self.margins]
+        return [linear_forms(own, self.moves) for own in self.margins]
 
 
 def _bond(bond: Region) -> Width | None:

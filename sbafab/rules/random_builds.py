@@ -1,19 +1,21 @@
 """Random builds: in which of them every margin of an interface keeps its limit.
 
 What is left at a margin beyond its limit is a row: its room and a sum over the errors drawn. Most
-builds are decided without that sum: by the length of all shifts together, which no normal can lose
-more than, and by the row that looks most against them. What rests is summed up, row by row, and
-what is summed decides: bounds only say where it need not be done.
+builds are decided without that sum: by the cuts alone where the films hardly move, by the length of
+all shifts together, which no normal can lose more than, and by the row that looks most against
+them. What rests is summed up, row by row, and what is summed decides: bounds only say where it need
+not be done.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
+from sbafab.rules.draws import CutContour, Draws, Error
 from sbafab.rules.forms import LinearForm
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import TOLERANCE
@@ -29,27 +31,17 @@ if TYPE_CHECKING:
 
 SURE = 1e-9 - TOLERANCE
 """mm: what is bounded to be left so far above what holds is so, however the sum is rounded."""
-CHUNK = 8
-"""Rows of nearly one normal that are bounded together."""
+AT_ONCE = 200_000
+"""Sums of rows in builds that are worked out at once, which bounds the memory."""
 UNITS = 1000
 """Factors that are equal to so many parts are one: rows that feel all errors alike."""
 
 
-class CutContour(NamedTuple):
-    """A cut contour: by how far its film reaches beyond the nominal edge."""
+class RowBounds(NamedTuple):
+    """Least and largest of room, normal's x and y, and levers, of all rows."""
 
-    layer: int
-    contour: int
-
-
-Error = CutContour | Freedom
-
-
-class DrawBounds(NamedTuple):
-    """Least and largest of the room, the normal's x and y and the levers, in chunks of rows."""
-
-    low: Floats
-    high: Floats
+    low: list[float]
+    high: list[float]
 
 
 @dataclass(frozen=True)
@@ -72,16 +64,25 @@ class MarginRows:
         return *(one for one, _ in self.contours), *(freedom for freedom, _, _ in self.moves)
 
     @cached_property
-    def bounds(self) -> DrawBounds:
-        import numpy as np
-
+    def bounds(self) -> RowBounds:
         levers = [levers for _, _, levers in self.moves if levers is not None]
-        columns = np.array([self.room, *self.normal, *levers])
-        starts = np.arange(0, len(self.room), CHUNK)
-        return DrawBounds(
-            np.minimum.reduceat(columns, starts, axis=1),
-            np.maximum.reduceat(columns, starts, axis=1),
+        columns = [self.room, *self.normal, *levers]
+        return RowBounds(
+            [float(column.min()) for column in columns], [float(column.max()) for column in columns]
         )
+
+    @cached_property
+    def least_uncut(self) -> float:
+        """No row leaves less than this, whatever moves, before what cutting adds or takes."""
+        low, high = self.bounds
+        left, turn = low[0], 3
+        for freedom, _, levers in self.moves:
+            farthest = 1.0
+            if levers is not None:
+                farthest = max(-low[turn], high[turn])
+                turn += 1
+            left -= freedom.most * farthest
+        return left
 
 
 def rows_of(
@@ -150,49 +151,45 @@ def _parts(factors: Floats) -> Floats:
     return parts
 
 
-class Draws:
-    """The errors of a batch of builds, each drawn when it is first asked for."""
-
-    def __init__(self, generator: np.random.Generator, builds: int, cutting: float) -> None:
-        self.generator = generator
-        self.builds = builds
-        self.cutting = cutting
-        self.drawn: dict[Error, Floats] = {}
-
-    def of(self, error: Error) -> Floats:
-        """X and y of a shift, or the one value of a cutting error or turn, for every build."""
-        if error not in self.drawn:
-            self.drawn[error] = self._draw(error)
-        return self.drawn[error]
-
-    def _draw(self, error: Error) -> Floats:
-        import numpy as np
-
-        if isinstance(error, Freedom) and error.centre is None:
-            # Uniform over a disc: the radius goes with the root.
-            radius = error.most * np.sqrt(self.generator.random(self.builds))
-            angle = math.tau * self.generator.random(self.builds)
-            return np.vstack([radius * np.cos(angle), radius * np.sin(angle)])
-        most = error.most if isinstance(error, Freedom) else self.cutting
-        return self.generator.uniform(-most, most, (1, self.builds))
+def short(rows: Iterable[MarginRows], draws: Draws) -> list[tuple[Indices, Indices]]:
+    """Interfaces and builds of them that come short at a row; one may be named several times."""
+    bad: list[tuple[Indices, Indices]] = []
+    for some in rows:
+        interfaces, builds = draws.cut_below(some.contours, SURE - some.least_uncut)
+        roughly = _rough(some, draws, interfaces, builds) < SURE
+        interfaces, builds = interfaces[roughly], builds[roughly]
+        if not len(builds):
+            continue
+        sums = _Sums.of(some, [draws.of(error, interfaces, builds) for error in some.errors])
+        unsure = _picked(sums.least() < SURE)
+        if not len(unsure):
+            continue
+        interfaces, builds, sums = interfaces[unsure], builds[unsure], sums.at(unsure)
+        missed = sums.left(_looking(some, sums.shift), slice(None)) < -TOLERANCE
+        unsure = _picked(~missed)
+        if len(unsure):
+            missed[unsure] = sums.at(unsure).short()
+        bad.append((interfaces[missed], builds[missed]))
+    return bad
 
 
-def kept(rows: Iterable[MarginRows], own: Mapping[Error, Error], draws: Draws) -> Bools:
-    """In which builds an interface, with its own errors, keeps room at all of the rows."""
+def _rough(rows: MarginRows, draws: Draws, interfaces: Indices, builds: Indices) -> Floats:
+    """No row leaves less than this, wherever the shifts go; a turn counts by the farthest lever."""
     import numpy as np
 
-    good = np.ones(draws.builds, dtype=bool)
-    for some in rows:
-        drawn = [draws.of(own[error]) for error in some.errors]
-        sums = _Sums.of(some, drawn)
-        builds = _picked(good & (sums.least() < SURE))
-        sums = sums.at(builds)
-        facing = sums.left(_looking(some, sums.shift), slice(None)) >= -TOLERANCE
-        good[builds[~facing]] = False
-        if facing.any():
-            builds = builds[facing]
-            good[builds[sums.at(facing).short()]] = False
-    return good
+    low, high = rows.bounds
+    left = np.full(len(builds), low[0])
+    for contour, sign in rows.contours:
+        left += sign * draws.value(contour, interfaces, builds)
+    column = 3
+    for freedom, sign, levers in rows.moves:
+        if levers is None:
+            left -= draws.reach(freedom, interfaces, builds)
+        else:
+            turn = sign * draws.value(freedom, interfaces, builds)
+            left += np.minimum(low[column] * turn, high[column] * turn)
+            column += 1
+    return left
 
 
 class _Sums(NamedTuple):
@@ -232,37 +229,29 @@ class _Sums(NamedTuple):
             [turn[builds] for turn in self.turns],
         )
 
-    def least(self, chunk: int | None = None) -> Floats:
-        """No row of a chunk leaves less than this, and no row at all where none is named.
+    def least(self) -> Floats:
+        """No row leaves less: all shifts together count by their length, as no normal loses more.
 
-        Then all shifts together count by their length: no normal loses more to them.
+        A turn counts by the farthest lever.
         """
         import numpy as np
 
-        bounds = self.rows.bounds
-        if chunk is None:
-            low, high = bounds.low.min(axis=1), bounds.high.max(axis=1)
-            left: Floats = low[0] + self.cut - np.hypot(*self.shift)
-        else:
-            low, high = bounds.low[:, chunk], bounds.high[:, chunk]
-            left = low[0] + self.cut
-            for column, along in enumerate(self.shift, 1):
-                left += np.minimum(low[column] * along, high[column] * along)
+        low, high = self.rows.bounds
+        left: Floats = low[0] + self.cut - np.hypot(*self.shift)
         for column, turn in enumerate(self.turns, 3):
             left += np.minimum(low[column] * turn, high[column] * turn)
         return left
 
     def short(self) -> Bools:
-        """In which builds a row comes short; looked for chunk by chunk."""
+        """In which builds a row comes short."""
         import numpy as np
 
         bad = np.zeros(len(self.cut), dtype=bool)
-        for chunk, first in enumerate(range(0, len(self.rows.room), CHUNK)):
-            unsure = _picked(self.least(chunk) < SURE)
-            if len(unsure):
-                own = np.arange(first, min(first + CHUNK, len(self.rows.room)))
-                left = self.left(own[:, None], unsure[None, :])
-                bad[unsure] |= (left < -TOLERANCE).any(axis=0)
+        every = np.arange(len(self.rows.room))[:, None]
+        count = max(1, AT_ONCE // len(every))
+        for first in range(0, len(bad), count):
+            builds = slice(first, first + count)
+            bad[builds] = (self.left(every, builds) < -TOLERANCE).any(axis=0)
         return bad
 
     def left(self, rows: Indices, builds: Indices | slice) -> Floats:

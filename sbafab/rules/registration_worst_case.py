@@ -87,7 +87,7 @@ def _least(
             for i in (worst <= worst.min() + SAME).nonzero()[0]
         ]
     _, number, value = min(places)
-    margin = group.margins[number]
+    margin = group[number]
     found = pushes(margin, group.first, moves)
     return Remaining(value, float(pinned), margin, group.interfaces, tuple(found))
 

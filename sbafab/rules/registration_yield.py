@@ -9,17 +9,21 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
+from sbafab.rules.draws import CutContour, Draws, Error, numbers, rows_by_error
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.forms import LinearForm
 from sbafab.rules.freedoms import Freedom, Freedoms
 from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.margins import QUANTITIES, Quantity, own_freedoms, seated
 from sbafab.rules.measures import Measures
-from sbafab.rules.random_builds import CutContour, Draws, Error, MarginRows, kept, rows_of
+from sbafab.rules.random_builds import MarginRows, rows_of, short
+
+if TYPE_CHECKING:
+    from sbafab.rules.draws import Indices
 
 NAME = "registration-yield"
 
@@ -68,6 +72,15 @@ class _Group:
 
     rows: dict[Quantity, tuple[MarginRows, ...]]
     own: dict[int, dict[Error, Error]]
+
+    def places(self, first: Mapping[Error, int]) -> dict[Error, Indices]:
+        """Where the numbers of each error begin, of all interfaces, from where those of one do."""
+        import numpy as np
+
+        errors = next(iter(self.own.values()))
+        return {
+            error: np.array([first[own[error]] for own in self.own.values()]) for error in errors
+        }
 
 
 def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
@@ -170,31 +183,35 @@ def _counted(groups: Sequence[_Group], limits: Limits, seed: int) -> Yield:
     """Draws the builds, in batches, and counts those in which all rows keep room."""
     import numpy as np
 
-    generator = np.random.default_rng(seed)
-    whole = 0
-    quantities = dict.fromkeys(QUANTITIES, 0)
     interfaces = dict.fromkeys(sorted(index for group in groups for index in group.own), 0)
     wanted = limits.yield_builds or _quick_number(len(interfaces))
+    whole = 0
+    quantities = dict.fromkeys(QUANTITIES, 0)
+    rows, count = rows_by_error(
+        error for group in groups for own in group.own.values() for error in own.values()
+    )
+    places = [(group, group.places(rows)) for group in groups]
     for first in range(0, wanted, BATCH):
         builds = min(BATCH, wanted - first)
-        draws = Draws(generator, builds, limits.tolerances.cutting)
-        good_of = {quantity: np.ones(builds, dtype=bool) for quantity in QUANTITIES}
-        good_at = {index: np.ones(builds, dtype=bool) for index in interfaces}
-        for group in groups:
-            for index, own in group.own.items():
-                for error in own.values():
-                    draws.of(error)
-                for quantity, rows in group.rows.items():
-                    good = kept(rows, own, draws)
-                    good_of[quantity] &= good
-                    good_at[index] &= good
-        whole += int(np.logical_and.reduce(list(good_of.values())).sum())
-        quantities = {name: total + int(good_of[name].sum()) for name, total in quantities.items()}
-        interfaces = {i: total + int(good_at[i].sum()) for i, total in interfaces.items()}
+        drawn = numbers(seed, first * count, count, builds)
+        bad_of = {quantity: np.zeros(builds, dtype=bool) for quantity in QUANTITIES}
+        for group, own in places:
+            draws = Draws(drawn, own, limits.tolerances.cutting)
+            bad_at: list[Indices] = []
+            for quantity, asked in group.rows.items():
+                for interface, build in short(asked, draws):
+                    bad_of[quantity][build] = True
+                    bad_at.append(interface * builds + build)
+            if bad_at:
+                names = list(group.own)
+                for number in (np.unique(np.concatenate(bad_at)) // builds).tolist():
+                    interfaces[names[number]] += 1
+        whole += int(np.logical_or.reduce(list(bad_of.values())).sum())
+        quantities = {name: total + int(bad_of[name].sum()) for name, total in quantities.items()}
     return Yield(
-        Share(whole, wanted),
-        {index: Share(good, wanted) for index, good in interfaces.items()},
-        {quantity: Share(good, wanted) for quantity, good in quantities.items()},
+        Share(wanted - whole, wanted),
+        {index: Share(wanted - bad, wanted) for index, bad in interfaces.items()},
+        {quantity: Share(wanted - bad, wanted) for quantity, bad in quantities.items()},
     )
 
 

@@ -12,7 +12,8 @@ import math
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Edge, Point
-from sbafab.geometry.nearby import EdgeIndex
+from sbafab.geometry.nearby import EdgeIndex, boxes_meet
+from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import strip
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Inlet, Laminate
@@ -98,7 +99,9 @@ def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits
     x, y = inlet.mouth
     dx, dy = inlet.direction
     inner = (x - dx * inlet.length, y - dy * inlet.length)
-    run = interface.unbonded & strip(inner, inlet.mouth, 2 * inlet.width)
+    beside = strip(inner, inlet.mouth, 2 * inlet.width)
+    near = [one for one in interface.unbonded.pieces if boxes_meet(one.bounds, beside.bounds)]
+    run = Region(tuple(contour for one in near for contour in one.contours)) & beside
     sides = [edge for edge in run.edges if _is_side(edge, inlet)]
     widths = [
         outward_reach(edge.reversed(), EdgeIndex([e for e in run.edges if e is not edge]))

@@ -112,11 +112,18 @@ def _gap(interface: Interface, frame: Region) -> _Gap:
     unbonded = interface.unbonded.pieces
     missing = _around(interface.contact, frame).pieces
     touching = []
-    for number, piece in enumerate(unbonded):
-        for edge in edges_along(piece, interface.contact):
-            home = _holding(missing, beside(edge, -INSET))
-            touching.append((number, home, edge.at(0.5)))
+    for edge in edges_along(interface.unbonded, interface.contact):
+        home = _holding(missing, beside(edge, -INSET))
+        touching.append((_bounded(unbonded, edge.at(0.5)), home, edge.at(0.5)))
+    touching.sort(key=lambda one: one[0])
     return _Gap(unbonded, missing, tuple(touching), _outside(missing, frame))
+
+
+def _bounded(pieces: tuple[Region, ...], p: Point) -> int:
+    """The number of the piece that has ``p`` on an edge."""
+    if len(pieces) == 1:
+        return 0
+    return min(range(len(pieces)), key=lambda number: pieces[number].distance_to_edge(p))
 
 
 def _around(region: Region, frame: Region) -> Region:

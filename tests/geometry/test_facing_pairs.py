@@ -6,11 +6,19 @@ import math
 
 import pytest
 
+from sbafab.geometry.facing_places import facing_places
+from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, rectangle
-from sbafab.geometry.width import facing_pairs, least_width
+from sbafab.geometry.width import Width, least_width
 
 RING = disc((0.0, 0.0), 3.0) - disc((0.0, 0.0), 2.0)
 FRAME = rectangle((0.0, 0.0), (10.0, 6.0)) - rectangle((1.0, 1.5), (9.0, 4.0))
+
+
+def facing_pairs(region: Region, slack: float) -> list[Width]:
+    found = facing_places(region, slack)
+    ends = zip(found.start.T.tolist(), found.end.T.tolist(), found.value.tolist(), strict=True)
+    return [Width(value, tuple(start), tuple(end)) for start, end, value in ends]
 
 
 def test_a_ring_is_narrow_in_every_direction() -> None:

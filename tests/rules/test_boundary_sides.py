@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import pytest
 
+from sbafab.geometry.edge_table import EdgeTable
 from sbafab.geometry.edges import Arc, Edge, Line, Point
 from sbafab.geometry.nearby import EdgeIndex
 from sbafab.geometry.shapes import disc, rectangle
-from sbafab.rules.boundary import beside, edges_along, outward_reach, outward_samples
+from sbafab.rules.boundary import beside, edges_along, outward_reach
+from sbafab.rules.narrow_places import Rays, first_met
 
 AXIS = (0.0, 0.0)
 UP = Line((1.0, 0.0), (1.0, 4.0))
@@ -59,24 +62,35 @@ def test_a_reach_is_found_however_far(far: float) -> None:
     assert reach.at[0] == pytest.approx(1.0 + far)
 
 
+Sample = tuple[Point, Point, float, Point]
+
+
+def samples(edge: Edge, others: Sequence[Edge], within: float) -> list[Sample]:
+    """Start, outward normal, distance and end of each ray that meets another edge."""
+    rays = Rays.of([edge])
+    ray, value, end = first_met(rays, EdgeTable.of(others), within)
+    columns = rays.start[:, ray], rays.outward[:, ray], value, end
+    return list(zip(*(column.T.tolist() for column in columns), strict=True))
+
+
 def test_samples_look_along_the_normal_to_the_first_edge() -> None:
     others = [Line((2.5, -9.0), (2.5, 9.0)), Line((4.0, -9.0), (4.0, 9.0))]
-    samples = list(outward_samples(UP, EdgeIndex(others), 5.0))
-    assert min(start[1] for start, _, _ in samples) == pytest.approx(0.0, abs=1e-4)
-    assert max(start[1] for start, _, _ in samples) == pytest.approx(4.0, abs=1e-4)
-    for start, outward, reach in samples:
+    found = samples(UP, others, 5.0)
+    assert min(start[1] for start, *_ in found) == pytest.approx(0.0, abs=1e-4)
+    assert max(start[1] for start, *_ in found) == pytest.approx(4.0, abs=1e-4)
+    for start, outward, value, end in found:
         assert outward == pytest.approx((1.0, 0.0))
-        assert reach.value == pytest.approx(1.5)
-        assert reach.at == pytest.approx((2.5, start[1]))
+        assert value == pytest.approx(1.5)
+        assert end == pytest.approx((2.5, start[1]))
 
 
 def test_samples_on_an_arc_look_away_from_its_centre() -> None:
-    samples = list(outward_samples(QUARTER, disc(AXIS, 2.75).index, 1.0))
-    assert len(samples) > 1
-    for start, outward, reach in samples:
+    found = samples(QUARTER, disc(AXIS, 2.75).edges, 1.0)
+    assert len(found) > 1
+    for start, outward, value, _ in found:
         assert outward == pytest.approx((start[0] / 2, start[1] / 2))
-        assert reach.value == pytest.approx(0.75)
+        assert value == pytest.approx(0.75)
 
 
 def test_edges_behind_give_no_sample() -> None:
-    assert list(outward_samples(UP, EdgeIndex([Line((0.0, -9.0), (0.0, 9.0))]), 5.0)) == []
+    assert samples(UP, [Line((0.0, -9.0), (0.0, 9.0))], 5.0) == []

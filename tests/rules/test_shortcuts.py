@@ -10,18 +10,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sbafab.geometry.boolean import union
+from sbafab.geometry.boolean import divided, union
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, rectangle
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules import boundary, freedoms, margins
+from sbafab.rules import boundary, draws, freedoms, margins
 from sbafab.rules.boundary import outward_reach
+from sbafab.rules.draws import CutContour, Draws, numbers, rows_by_error
 from sbafab.rules.forms import linear_forms
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
 from sbafab.rules.margins import pushes
 from sbafab.rules.measures import Measures
-from sbafab.rules.random_builds import CutContour, Draws, Error, MarginRows, kept
+from sbafab.rules.random_builds import MarginRows, short
 from sbafab.rules.registration_worst_case import least_remaining
 from sbafab.rules.registration_yield import simulate
 from sbafab.rules.voids import _around
@@ -53,27 +54,48 @@ def rows(number: int, least: float, seed: int) -> MarginRows:
 @pytest.mark.parametrize("number", [1, 7, 8, 30])
 def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float) -> None:
     asked = rows(number, least, number)
-    draws = Draws(np.random.default_rng(5), BUILDS, 0.1)
-    own: dict[Error, Error] = {error: error for error in asked.errors}
-    good = kept([asked], own, draws)
+    first, count = rows_by_error(asked.errors)
+    # Two interfaces, of which the second one's errors are drawn after the first one's.
+    places = {error: np.array([row, count + row]) for error, row in first.items()}
+    drawn = numbers(5, 0, 2 * count, BUILDS)
+    own = Draws(drawn, places, 0.1)
+    good = np.ones((2, BUILDS), dtype=bool)
+    for interfaces, builds in short([asked], own):
+        good[interfaces, builds] = False
     levers = asked.moves[2][2]
     assert levers is not None
-    (nx, ny), moved = asked.normal, draws.of(OTHER) - draws.of(SHIFT)
-    left = asked.room[:, None] + draws.of(CUT) - draws.of(AGAIN) + levers[:, None] * draws.of(TURN)
-    left = left + nx[:, None] * moved[0] + ny[:, None] * moved[1]
-    assert list(good) == list((left >= -TOLERANCE).all(axis=0))
-    assert 0 < good.sum() < BUILDS
+    every = np.arange(BUILDS)
+    for interface in (0, 1):
+        cut, again, turn, shift, other = (
+            own.of(error, np.full(BUILDS, interface), every)
+            for error in (CUT, AGAIN, TURN, SHIFT, OTHER)
+        )
+        (nx, ny), moved = asked.normal, other - shift
+        left = asked.room[:, None] + cut - again + levers[:, None] * turn
+        left = left + nx[:, None] * moved[0] + ny[:, None] * moved[1]
+        assert list(good[interface]) == list((left >= -TOLERANCE).all(axis=0))
+    assert 0 < good.sum() < 2 * BUILDS
+
+
+def test_numbers_are_those_of_one_stream_kept_or_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = np.random.default_rng(7).random(60)
+    monkeypatch.setattr(draws, "KEPT", 30)
+    draws._stream.cache_clear()
+    for first, rows, builds in ((0, 2, 5), (10, 2, 10), (20, 4, 10), (0, 3, 20)):
+        found = numbers(7, first, rows, builds)
+        assert found.tolist() == plain[first : first + rows * builds].reshape(rows, -1).tolist()
+    draws._stream.cache_clear()
 
 
 def test_forms_lose_what_their_pushes_cost(good: Good) -> None:
     laminate = good("3dof-15mm", "stack.balloons=2")
     measures = Measures(laminate, Limits())
     for group in measures.margins:
-        for form in linear_forms(group.margins, group.first, measures.moves):
+        for form in linear_forms(group, measures.moves):
             for number, whole, pinned in zip(
                 form.numbers, form.loss(), form.loss(by_hand=False), strict=True
             ):
-                found = pushes(group.margins[number], group.first, measures.moves)
+                found = pushes(group[number], group.first, measures.moves)
                 assert whole == pytest.approx(sum(push.cost for push in found))
                 held = [push.cost for push in found if not push.freedom.by_hand]
                 assert pinned == pytest.approx(sum(held))
@@ -140,6 +162,13 @@ NOTCHED = rectangle((-4, -3), (4, 3)) - disc((0, 0), 1) - disc((4, 0), 1.5)
 )
 def test_what_is_round_a_region_is_what_a_boolean_leaves(region: Region) -> None:
     assert _around(region, FRAME).contours == (FRAME - region).contours
+
+
+@pytest.mark.parametrize("by", [Region(), disc((0, 0), 2), NOTCHED, disc((4, 0), 1.5), FRAME])
+def test_a_region_is_divided_as_two_booleans_would(by: Region) -> None:
+    outside, inside = divided(NOTCHED, by)
+    assert outside == NOTCHED - by
+    assert inside == NOTCHED & by
 
 
 @pytest.mark.parametrize("gap", [-3.0, -0.2, -0.01, -1e-4, 1e-4, 0.01, 3.0])

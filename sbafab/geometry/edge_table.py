@@ -1,0 +1,170 @@
+"""Edges in arrays, a column each, for what is asked of many places at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sbafab.geometry.edges import EPSILON, Arc, Edge
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Indices = NDArray[np.intp]
+    Bools = NDArray[np.bool_]
+
+AT_ONCE = 400_000
+"""Pairs of boxes that are compared at once, which bounds the memory."""
+
+
+def dot(a: Floats, b: Floats) -> Floats:
+    """The products of vectors with a row a coordinate."""
+    found: Floats = a[0] * b[0] + a[1] * b[1]
+    return found
+
+
+@dataclass(frozen=True)
+class EdgeTable:
+    """Points and boxes have a row a coordinate; the centre of a line is its start.
+
+    ``turn`` is 1 for an arc that runs counter-clockwise, -1 for one that runs clockwise, 0 for a
+    line.
+    """
+
+    start: Floats
+    end: Floats
+    centre: Floats
+    radius: Floats
+    turn: Floats
+    box: Floats
+
+    @staticmethod
+    def of(edges: Sequence[Edge]) -> EdgeTable:
+        rows = [
+            (*e.start, *e.end, *e.centre, e.radius, 1.0 if e.ccw else -1.0, *e.bounds)
+            if isinstance(e, Arc)
+            else (*e.start, *e.end, *e.start, 0.0, 0.0, *e.bounds)
+            for e in edges
+        ]
+        c = np.array(rows, dtype=float).reshape(-1, 12).T.copy()
+        return EdgeTable(c[0:2], c[2:4], c[4:6], c[6], c[7], c[8:12])
+
+    @staticmethod
+    def joined(tables: Sequence[EdgeTable]) -> EdgeTable:
+        return EdgeTable(
+            *(
+                np.concatenate([getattr(table, name) for table in tables], axis=-1)
+                for name in EdgeTable.__dataclass_fields__
+            )
+        )
+
+    def at(self, numbers: Indices) -> EdgeTable:
+        """The edges with these numbers, in their order."""
+        return EdgeTable(
+            *(getattr(self, name)[..., numbers] for name in EdgeTable.__dataclass_fields__)
+        )
+
+    def normal(self, p: Floats) -> Floats:
+        """Unit normals to the left of travel, each edge's at its own point."""
+        chord = self.end - self.start
+        out = p - self.centre
+        x = np.where(self.turn == 0, -chord[1], -self.turn * out[0])
+        y = np.where(self.turn == 0, chord[0], -self.turn * out[1])
+        length = np.sqrt(x * x + y * y)
+        length[length == 0] = 1.0
+        return np.array([x / length, y / length])
+
+    def faces(self, p: Floats, room: float = 0.0) -> Bools:
+        """Whether each arc, seen from its centre, has its own point before it.
+
+        ``room`` is a share of the radius by which the point may lie past an end.
+        """
+        x, y = p - self.centre
+        ax, ay = self.start - self.centre
+        bx, by = self.end - self.centre
+        least = -room * self.radius * self.radius
+        ahead: Bools = self.turn * (ax * y - ay * x) >= least
+        ahead &= self.turn * (x * by - y * bx) >= least
+        return ahead
+
+    def distance(self, p: Floats) -> Floats:
+        """Least distance of each edge from its own point."""
+        chord, off = self.end - self.start, p - self.start
+        square = dot(chord, chord)
+        t = np.clip(dot(chord, off) / np.where(square == 0, 1.0, square), 0.0, 1.0)
+        along = off - t * chord
+        to_line = np.sqrt(dot(along, along))
+        out, beyond = p - self.centre, p - self.end
+        to_circle = np.abs(np.sqrt(dot(out, out)) - self.radius)
+        to_ends = np.sqrt(np.minimum(dot(off, off), dot(beyond, beyond)))
+        to_arc = np.where(self.faces(p), to_circle, to_ends)
+        found: Floats = np.where(self.turn == 0, to_line, to_arc)
+        return found
+
+
+class CellOrder:
+    """In which order an ``EdgeIndex`` of the same edges tells of those that a box touches."""
+
+    def __init__(self, box: Floats) -> None:
+        self.low = box[:2].min(axis=1)
+        high = box[2:].max(axis=1)
+        across = float((high - self.low).max())
+        self.cell = across / max(1.0, float(box.shape[1]) ** 0.5) or 1.0
+        self.own = self._cells(box[:2])
+
+    def _cells(self, corner: Floats) -> Floats:
+        cells: Floats = np.floor((corner - self.low[:, None]) / self.cell)
+        return cells
+
+    def sorted(self, asked: Floats, places: Indices, edges: Indices) -> Indices:
+        """Which of the pairs of places and edges comes when; ``asked`` are the places' boxes."""
+        first = np.maximum(self._cells(asked[:2])[:, places], self.own[:, edges])
+        return np.lexsort((edges, first[1], first[0], places))
+
+
+def touching(asked: Floats, boxes: Floats) -> tuple[Indices, Indices]:
+    """Numbers of the boxes asked for and of those that each of them touches, in order."""
+    count = max(1, AT_ONCE // max(1, boxes.shape[1]))
+    found = []
+    for first in range(0, asked.shape[1], count):
+        left, low, right, high = asked[:, first : first + count, None]
+        meets = (boxes[0] <= right) & (boxes[2] >= left) & (boxes[1] <= high) & (boxes[3] >= low)
+        own, other = np.nonzero(meets)
+        found.append((own + first, other))
+    if len(found) == 1:
+        return found[0]
+    return tuple(np.concatenate(one) for one in zip(*found, strict=True))  # type: ignore[return-value]
+
+
+def boxes_round(p: Floats, q: Floats, margin: float) -> Floats:
+    """Boxes of the segments from ``p`` to ``q``, with ``margin`` on every side."""
+    return np.concatenate([np.minimum(p, q) - margin, np.maximum(p, q) + margin])
+
+
+def crossings(
+    origin: Floats, unit: Floats, edges: EdgeTable, tolerance: float = EPSILON
+) -> tuple[Floats, Bools]:
+    """Distances along straight lines at which each meets the line or circle of its own edge.
+
+    Up to three each (the foot where it touches, and two), with which of them there are.
+    """
+    chord = edges.end - edges.start
+    off = edges.start - origin
+    cross = unit[0] * chord[1] - unit[1] * chord[0]
+    parallel = np.abs(cross) < 1e-12 * np.sqrt(dot(chord, chord))
+    t = (off[0] * chord[1] - off[1] * chord[0]) / np.where(parallel, 1.0, cross)
+    to_centre = edges.centre - origin
+    along = dot(to_centre, unit)
+    across = np.abs(to_centre[0] * unit[1] - to_centre[1] * unit[0])
+    room = edges.radius - across
+    half = np.sqrt(np.maximum(0.0, room * (edges.radius + across)))
+    straight = edges.turn == 0
+    touches = (room >= -tolerance) & ((half < tolerance) | (room < tolerance))
+    both = (room >= -tolerance) & (half >= tolerance)
+    found = np.array([np.where(straight, t, along), along - half, along + half])
+    there = np.array([np.where(straight, ~parallel, touches), both & ~straight, both & ~straight])
+    return found, there
