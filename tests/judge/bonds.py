@@ -12,13 +12,15 @@ from scipy.spatial import KDTree
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from tests.judge.folder import Disagreement, Folder, Interface, pieces, place
+from tests.judge.folder import Disagreement, Folder, Interface, asked_kerf, pieces, place
 
 THINNEST = 0.004
 """mm: narrower bonds are what flattened arcs make of edges that coincide."""
 TAPER = math.radians(30.0)
 """Edges at a wider angle to each other are a corner, no bond that tapers (docs/rules.md)."""
 SQUARE = math.cos(TAPER / 2 + 0.02)
+ROUNDED = 1 - math.cos(math.radians(20.0))
+"""Share of half a kerf by which a corner that the beam rounds seems narrower than the bond is."""
 NEAREST = 0.002
 """mm: points of one edge, or of both sides of a sharp corner's tip."""
 STEP = 0.05
@@ -37,13 +39,15 @@ def bond_of(interface: Interface) -> BaseGeometry:
 def judge_bonds(folder: Folder) -> Iterator[Disagreement]:
     """Every bond is as wide as the design's limit, and between balloons lies round a pin's hole."""
     seen = set()
+    kerfs = [asked_kerf(folder.asked, film) or (0.0, 0.0) for film in ("tpe", "ptfe")]
+    limit = folder.bond_limit - folder.slack - ROUNDED * max(map(max, kerfs)) / 2
     for interface in folder.interfaces:
         if interface.shape in seen:
             continue
         seen.add(interface.shape)
         bond = bond_of(interface)
         where = f"interface {interface.number}"
-        for width, x, y in narrow_places(bond, folder.bond_limit - folder.slack):
+        for width, x, y in narrow_places(bond, limit):
             yield Disagreement(
                 "bonds",
                 f"the bond of {where} is {width:.4f} wide at x {x:.3f}, y {y:.3f}, where "
