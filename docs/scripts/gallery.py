@@ -29,7 +29,7 @@ FIGURES = (
 
 HEAD = """# Gallery
 
-Designs that pass every rule, drawn and predicted by the build of this site. Each picture shows the flat actuator, heights
+Designs that no rule fails, drawn and predicted by the build of this site. Each picture shows the flat actuator, heights
 enlarged as it says; the file below it makes the actuator. Predictions are closed formulas with the trust that
 [prediction](../prediction.md) states: nobody has built the designs of the second part.
 

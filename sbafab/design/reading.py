@@ -33,6 +33,8 @@ DEEPEST = 8
 _PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*"""
 _TOO_DEEP = re.compile(rf"(?<![A-Za-z0-9_-])(?:{_PART}){{{DEEPEST}}}")
 _AT_LINE = re.compile(r"\(at line (\d+), column \d+\)")
+_UNQUOTED = re.compile(r"[^=#]*=\s*([-+.\d]+\s*[A-Za-z\u00b5\u03bc]+)\s*(?:#.*)?")
+"""A line whose value is a number and a unit without quotes."""
 
 
 def design_path(source: str | Path) -> Path:
@@ -54,13 +56,19 @@ def design_path(source: str | Path) -> Path:
 
 def _hint(missing: Path) -> str:
     """What may have been meant by a design that is not there."""
-    with suppress(OSError, ValueError):
-        beside = missing.with_name(f"{missing.name}.toml")
-        if beside.is_file():
-            return f"did you mean {beside}?"
     names = template_names()
+    with suppress(OSError, ValueError):
+        beside = [path.name for path in missing.parent.iterdir() if _may_be_a_design(path)]
+        exact = f"{missing.name}.toml"
+        near = [exact] if exact in beside else difflib.get_close_matches(missing.name, beside, 1)
+        if near:
+            return f"did you mean {missing.with_name(near[0])}?"
     near = difflib.get_close_matches(str(missing), names, 1)
     return f"did you mean {near[0]}?" if near else f"the templates are {', '.join(names)}"
+
+
+def _may_be_a_design(path: Path) -> bool:
+    return path.suffix == ".toml" or (path / "design.toml").is_file()
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -97,8 +105,11 @@ def toml_tables(text: str, path: str | Path) -> dict[str, Any]:
         # The parser names no key, but its line shows it.
         number = _AT_LINE.search(reason)
         line = text.split("\n")[int(number[1]) - 1] if number else text.rstrip().split("\n")[-1]
+        quotes = _UNQUOTED.fullmatch(line)
+        hint = f'; a value with a unit stands in quotes: "{quotes[1]}"' if quotes else ""
         raise DesignError(
-            f"{path} is not valid TOML: {reason[:1].lower()}{reason[1:]}, {shown(line.strip())}"
+            f"{path} is not valid TOML: {reason[:1].lower()}{reason[1:]}, "
+            f"{shown(line.strip())}{hint}"
         ) from None
 
 

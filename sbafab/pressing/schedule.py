@@ -201,7 +201,7 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
         f"{total:g} min in the press{_tacked(tacking)} and {HANDLING_MINUTES:g} min to cut, lay "
         "up, pin and fit the tubing; the latter is assumed the same for every design (paper: "
         "1.75 h in all)",
-        tuple(_warnings(laminate, press, steps)),
+        tuple(_warnings(laminate, press, parts, steps)),
     )
 
 
@@ -358,7 +358,12 @@ def _refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
         )
 
 
-def _warnings(laminate: Laminate, press: PressSettings, steps: Sequence[Step]) -> Iterator[str]:
+def _warnings(
+    laminate: Laminate,
+    press: PressSettings,
+    parts: Sequence[AssemblyStep],
+    steps: Sequence[Step],
+) -> Iterator[str]:
     if laminate.panel is not None:
         yield sheets.UNTRIED
     if press.temperature_c > HOTTEST_TRIED:
@@ -402,18 +407,23 @@ def _warnings(laminate: Laminate, press: PressSettings, steps: Sequence[Step]) -
             f"{_listed([f'{diameter:g}' for diameter in sorted(unsold)])}: change the diameter, or "
             "make the pins and give their lengths in registration.pin_lengths"
         )
-    for step in steps:
-        if step.bond == "flash":
-            held = {pin for pin in laminate.pins if pin.name in step.pins}
-            loose = [
-                layer.pattern
-                for layer in distinct_layers(laminate, step.layers)
-                if held.isdisjoint(laminate.pins_holding(layer))
-            ]
-            layers = [i for i in step.layers if laminate.layer(i).pattern in loose]
-            if layers:
-                which = named(layers) if len(layers) < 4 else _by_role(laminate, layers)
-                yield f"step {step.step}: no pin holds {which}; align by hand"
+    for step, part in zip(steps, parts, strict=True):
+        if step.bond == "flash" and (layers := _unpinned(laminate, part)):
+            which = named(layers) if len(layers) < 4 else _by_role(laminate, layers)
+            yield f"step {step.step}: no pin holds {which}; align by hand"
+
+
+def _unpinned(laminate: Laminate, part: AssemblyStep) -> list[int]:
+    """Layers that join in a step, or lie in a bonded stack, that none of its pins holds."""
+    held = {
+        layer.pattern
+        for layer in distinct_layers(laminate, part.layers)
+        if not set(part.pins).isdisjoint(laminate.pins_holding(layer))
+    }
+    bodies = [(index,) for index in part.adds]
+    bodies += [stack for stack in part.stacks if set(stack).isdisjoint(part.adds)]
+    loose = [b for b in bodies if held.isdisjoint(laminate.layer(i).pattern for i in b)]
+    return sorted(index for body in loose for index in body)
 
 
 def _by_role(laminate: Laminate, layers: Sequence[int]) -> str:

@@ -183,13 +183,13 @@ def _write_page(
     folder: Path, python: Pyodide, wheels: Sequence[Wheel], pure: Sequence[str]
 ) -> None:
     shutil.copytree(STATIC, folder, dirs_exist_ok=True)
-    index = (STATIC / INDEX).read_text("utf-8")
+    index = (STATIC / INDEX).read_text(encoding="utf-8")
     head = (
         '<meta name="sbafab-without-server">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
     )
     index = index.replace('<meta charset="utf-8">\n', f'<meta charset="utf-8">\n{head}')
-    (folder / INDEX).write_text(index, "utf-8")
+    (folder / INDEX).write_text(index, encoding="utf-8", newline="\n")
     own = folder / "python"
     own.mkdir()
     for name in (*NEEDED, *EITHER):
@@ -203,7 +203,7 @@ def _write_page(
         "archives": ["sbafab.zip", "packages.zip"],
         "wheels": [wheel.path.name for wheel in wheels],
     }
-    (folder / LISTING).write_text(json.dumps(listing, indent=1) + "\n", "utf-8")
+    (folder / LISTING).write_text(json.dumps(listing, indent=1) + "\n", encoding="utf-8", newline="\n")
 
 
 def _program() -> Iterator[tuple[str, bytes]]:

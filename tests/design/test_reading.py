@@ -97,6 +97,7 @@ def test_bad_values_are_one_sentence(assignments: list[str], says: str) -> None:
         (b"a = [", "is not valid TOML"),
         (b"[tab]\nlength = 5\nlength = 6", "(at end of document), 'length = 6'"),
         (b"length = 5\nlength = 6\n\n", "(at line 2, column 11), 'length = 6'"),
+        (b"[lumen]\ndiameter = 3 mm", 'a value with a unit stands in quotes: "3 mm"'),
         (b"\xff\xfe", "UTF-8"),
         (b"", "family is missing"),
         (b'family = "lobed"\nname = ""', "name = ''"),
@@ -118,6 +119,15 @@ def test_unknown_sources(tmp_path: Path) -> None:
         load_design(tmp_path)
     with pytest.raises(DesignError, match="neither a template nor a design file"):
         load_design("a\0b")
+
+
+def test_a_mistyped_file_or_folder_meets_the_one_beside_it(tmp_path: Path) -> None:
+    (tmp_path / "tip.toml").touch()
+    (tmp_path / "out" / "arm").mkdir(parents=True)
+    (tmp_path / "out" / "arm" / "design.toml").touch()
+    for typed, meant in (("tpi.toml", "tip.toml"), ("tip", "tip.toml"), ("out/amr", "out/arm")):
+        with pytest.raises(DesignError, match=re.escape(f"did you mean {tmp_path / meant}?")):
+            load_design(tmp_path / typed)
 
 
 @pytest.mark.parametrize("name", DESIGNS)

@@ -24,7 +24,7 @@ from sbafab.geometry.region import Region
 from sbafab.laminate import laminate
 from sbafab.laminate.interfaces import interface_regions
 from sbafab.laminate.laminate import Laminate, Layer, Role
-from sbafab.output import run
+from sbafab.output import checking
 from sbafab.output.manifest import manifest
 from sbafab.output.planned import Checked, Planned
 from sbafab.output.settings import cut_settings
@@ -117,7 +117,7 @@ def quick(parts: dict[str, CutPart]) -> Iterator[None]:
         patch.object(as_built, "RULES", rules),
         patch.object(as_built, "sheet_problems", lambda *_: []),
         patch.object(as_built, "design_problems_of", lambda *_: []),
-        patch.object(run, "run_deck", lambda *_: ()),
+        patch.object(checking, "run_deck", lambda *_: ()),
     ):
         yield
 
@@ -128,7 +128,7 @@ def unabridged() -> Iterator[None]:
     with (
         patch.object(as_built, "RULES", RULES),
         patch.object(as_built, "design_problems_of", design_problems_of),
-        patch.object(run, "run_deck", run_deck),
+        patch.object(checking, "run_deck", run_deck),
     ):
         yield
 

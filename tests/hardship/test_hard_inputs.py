@@ -13,7 +13,7 @@ from sbafab.actuators import load_design
 from sbafab.errors import SbafabError
 from sbafab.geometry.boolean import GeometryError, wound
 from sbafab.geometry.edges import Line
-from sbafab.output import run as run_module
+from sbafab.output import checking
 
 if TYPE_CHECKING:
     from conftest import Ended, Output, Runs
@@ -121,9 +121,9 @@ def test_what_the_geometry_cannot_resolve_names_the_design(monkeypatch: pytest.M
     def unresolved(*_: object) -> object:
         return wound([Line((1.0, 2.0), (3.0, 4.0))], 0)
 
-    monkeypatch.setattr(run_module, "build", unresolved)
+    monkeypatch.setattr(checking, "build", unresolved)
     with pytest.raises(SbafabError, match=r"design 1dof-5mm cannot be resolved: .*change a size"):
-        run_module.check(load_design("1dof-5mm"))
+        checking.check(load_design("1dof-5mm"))
 
 
 @pytest.mark.parametrize("before", ["", "import sys; sys.stdout.reconfigure(encoding='ascii')\n"])

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import pytest
 
+from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.schedule import PressSettings, schedule
@@ -141,6 +142,14 @@ def test_what_no_pin_holds_is_named(stack: Stack) -> None:
     assert schedule(stack(15), PAPER).warnings == (
         "step 3: no pin holds the 14 separator-masks; align by hand",
     )
+
+
+def test_masks_in_a_bonded_stack_are_held_by_its_films() -> None:
+    design = load_design("3dof-15mm", ["registration.method=ears"])
+    plan = schedule(build(design), PAPER)
+    assert [step.bond for step in plan.steps].count("flash") == 4
+    # No mask has the hole of an ear's pin, and no one lays what the step before has bonded.
+    assert not [warning for warning in plan.warnings if BY_HAND in warning]
 
 
 def test_the_tpe_must_melt(stack: Stack) -> None:

@@ -310,7 +310,7 @@ def test_warnings_are_all_there(sheet_files: Any) -> None:
     assert "sbafab new coupon" in said["TPE kerf uncalibrated"]
     assert "PTFE kerf uncalibrated" not in said
     # What the rules warn of is the designer's, on a page of its own.
-    assert "the rules warn 1 time" in said["For the designer"]
+    assert "1 rule warns. findings.html" in said["For the designer"]
     assert not any("too near the limit" in words for words in said.values())
     assert "bond-width" in said["Waived rules"]
     assert "too narrow" in said["Waived rules"]

@@ -18,12 +18,12 @@ def cautions(work: Work) -> list[tuple[str, str]]:
 
 def for_the_designer(findings: Iterable[Finding]) -> list[tuple[str, str]]:
     """Where the rules' warnings stand: nobody at the press can mend them; empty without any."""
-    warns = sum(finding.verdict == "warn" for finding in findings)
-    if not warns:
+    rules = {finding.rule for finding in findings if finding.verdict == "warn"}
+    if not rules:
         return []
     words = (
-        f"the rules warn {say.count(warns, 'time')}. findings.html says of what, and what helps; "
-        "at the press do as the steps say."
+        f"{say.count(len(rules), 'rule')} {'warns' if len(rules) == 1 else 'warn'}. findings.html "
+        "says of what, and what helps; at the press do as the steps say."
     )
     return [("For the designer", words)]
 
