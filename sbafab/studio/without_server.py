@@ -203,7 +203,9 @@ def _write_page(
         "archives": ["sbafab.zip", "packages.zip"],
         "wheels": [wheel.path.name for wheel in wheels],
     }
-    (folder / LISTING).write_text(json.dumps(listing, indent=1) + "\n", encoding="utf-8", newline="\n")
+    (folder / LISTING).write_text(
+        json.dumps(listing, indent=1) + "\n", encoding="utf-8", newline="\n"
+    )
 
 
 def _program() -> Iterator[tuple[str, bytes]]:
