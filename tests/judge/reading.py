@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import shapely
 from ezdxf.addons import iterdxf
+from scipy.spatial import KDTree
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -196,16 +197,22 @@ def _chains(pieces: Iterable[Points]) -> Iterator[Points]:
     Pieces may be shorter than JOIN, so each chain starts with the longest and takes what is
     nearest to its end.
     """
-    left = sorted(pieces, key=lambda piece: math.dist(piece[0], piece[-1]), reverse=True)
-    while left:
-        chain = list(left.pop(0))
-        while left:
-            ends = np.array([[piece[0], piece[-1]] for piece in left])
-            away = np.hypot(*(ends - chain[-1]).transpose(2, 0, 1))
-            number, side = np.unravel_index(away.argmin(), away.shape)
-            if away[number, side] > min(JOIN, math.dist(chain[0], chain[-1])):
+    longest = sorted(pieces, key=lambda piece: math.dist(piece[0], piece[-1]), reverse=True)
+    ends = np.array([end for piece in longest for end in (piece[0], piece[-1])])
+    tree = KDTree(ends)
+    free = dict.fromkeys(range(len(longest)))
+    while free:
+        first = next(iter(free))
+        del free[first]
+        chain = list(longest[first])
+        while True:
+            near = [k for k in tree.query_ball_point(chain[-1], JOIN) if k // 2 in free]
+            best = min(near, key=lambda k: math.dist(ends[k], chain[-1]), default=None)
+            back = math.dist(chain[0], chain[-1])
+            if best is None or math.dist(ends[best], chain[-1]) > back:
                 break
-            chain += left.pop(int(number))[:: -1 if side else 1][1:]
+            del free[best // 2]
+            chain += longest[best // 2][:: -1 if best % 2 else 1][1:]
         yield chain
 
 
