@@ -420,7 +420,7 @@ def _unpinned(laminate: Laminate, part: AssemblyStep) -> list[int]:
         for layer in distinct_layers(laminate, part.layers)
         if not set(part.pins).isdisjoint(laminate.pins_holding(layer))
     }
-    bodies = [(index,) for index in part.adds]
+    bodies: list[tuple[int, ...]] = [(index,) for index in part.adds]
     bodies += [stack for stack in part.stacks if set(stack).isdisjoint(part.adds)]
     loose = [b for b in bodies if held.isdisjoint(laminate.layer(i).pattern for i in b)]
     return sorted(index for body in loose for index in body)
