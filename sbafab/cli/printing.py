@@ -66,6 +66,20 @@ def print_listed(label: str, phrases: Sequence[str]) -> None:
     out.print(Text(line), soft_wrap=True)
 
 
+def wrapped(said: str, width: int, first: str = "", rest: str = "") -> list[str]:
+    """Lines of a sentence, broken between words; ``first`` stands before the first, ``rest`` before
+    the others.
+    """
+    return textwrap.wrap(
+        said,
+        width,
+        initial_indent=first,
+        subsequent_indent=rest,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
 def print_wrapped(said: str, style: str = "") -> None:
     """A sentence, broken between words where it is longer than a line; the rest indented.
 
@@ -74,10 +88,7 @@ def print_wrapped(said: str, style: str = "") -> None:
     from rich.text import Text
 
     out = console()
-    broken = textwrap.wrap(
-        said, out.width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
-    )
-    for line in broken:
+    for line in wrapped(said, out.width, rest="  "):
         out.print(Text(line.replace(KEPT, " "), style=style), soft_wrap=True)
 
 

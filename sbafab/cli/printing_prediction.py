@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from sbafab.cli.printing import console
+from sbafab.cli.printing import console, wrapped
 
 if TYPE_CHECKING:
     from sbafab.models.figures import Figure, Model, Prediction
@@ -34,7 +34,7 @@ def print_prediction(found: Prediction) -> None:
     part("Models and validity", _numbered(models, out.width))
     if found.left_out:
         left = (f"{one.name}: {one.reason}" for one in found.left_out)
-        part("Left out", (line for said in left for line in _hung("- ", said, out.width)))
+        part("Left out", (line for said in left for line in wrapped(said, out.width, "- ", "  ")))
     out.print()
 
 
@@ -64,16 +64,5 @@ def figure_lines(figures: Sequence[Figure], models: Sequence[Model], width: int)
 
 def _numbered(models: Sequence[Model], width: int) -> Iterator[str]:
     for number, model in enumerate(models, start=1):
-        yield from _hung(f"[{number}]".ljust(5), f"{model.title}: {model.trust}", width)
-
-
-def _hung(mark: str, said: str, width: int) -> list[str]:
-    """A paragraph that hangs on its mark."""
-    return textwrap.wrap(
-        said,
-        width,
-        initial_indent=mark,
-        subsequent_indent=" " * len(mark),
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
+        said = f"{model.title}: {model.trust}"
+        yield from wrapped(said, width, f"[{number}]".ljust(5), " " * 5)

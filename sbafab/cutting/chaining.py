@@ -29,18 +29,15 @@ def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
     Raises OutputError at an end that has not exactly one other to go on with.
     """
     joints = _joints([p for edge in edges for p in (edge.start, edge.end)])
-    # An edge shorter than ends may lie apart is part of a corner.
-    corners = [
-        joints[edge.start]
-        for edge in edges
-        if joints[edge.start] == joints[edge.end] and edge.length <= 2 * JOINED
-    ]
-    snapped = [
-        _between(edge, joints[edge.start], joints[edge.end])
-        for edge in edges
-        if joints[edge.start] != joints[edge.end] or edge.length > 2 * JOINED
-    ]
-    at: dict[Point, list[int]] = {corner: [] for corner in corners}
+    snapped: list[Edge] = []
+    at: dict[Point, list[int]] = {}
+    for edge in edges:
+        start, end = joints[edge.start], joints[edge.end]
+        if start == end and edge.length <= 2 * JOINED:
+            # Shorter than ends may lie apart: a part of the corner that others make.
+            at.setdefault(start, [])
+        else:
+            snapped.append(_between(edge, start, end))
     for index, edge in enumerate(snapped):
         at.setdefault(edge.start, []).append(index)
         at.setdefault(edge.end, []).append(index)

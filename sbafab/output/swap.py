@@ -52,7 +52,7 @@ def replaced_folder(target: Path) -> Iterator[Path]:
                 yield fresh
                 for path in _foreign_files(target):
                     _keep(target / path, fresh / path)
-                _swap(fresh, target)
+                put_in_place(fresh, target)
             finally:
                 shutil.rmtree(fresh, ignore_errors=True)
     except Timeout:
@@ -157,7 +157,7 @@ def read_manifest(folder: Path) -> dict[str, object] | None:
     return manifest if is_ours else None
 
 
-def _swap(fresh: Path, target: Path) -> None:
+def put_in_place(fresh: Path, target: Path) -> None:
     """Puts ``fresh`` in the place of ``target``; the old folder ends up where ``fresh`` was."""
     if not target.exists():
         fresh.rename(target)

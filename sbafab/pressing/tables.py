@@ -8,7 +8,8 @@ from dataclasses import asdict
 from typing import Any
 
 from sbafab.pressing.dowels import PinSetting
-from sbafab.pressing.schedule import Schedule, named
+from sbafab.pressing.schedule import Schedule
+from sbafab.pressing.words import named
 
 PRESS_SCHEMA = "sbafab/press@1"
 COLUMNS = (

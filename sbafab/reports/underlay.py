@@ -16,8 +16,8 @@ from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import disc
 from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers
 from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.pressing.words import listed
 from sbafab.reports.pdf import BLACK, PdfPage, Rgb, pdf
-from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.layup import Bed, beds
 
 NAME = "underlay.pdf"
@@ -76,10 +76,10 @@ class Guide:
 
     @property
     def words(self) -> str:
-        what = say.listed(self.films) + (", dashed" if self.is_mask else "")
+        what = listed(self.films) + (", dashed" if self.is_mask else "")
         return (
-            f"{say.listed(self.patterns)} ({what}): outer edge, press step"
-            f"{'s' if len(self.steps) > 1 else ''} {say.listed([str(n) for n in self.steps])}"
+            f"{listed(self.patterns)} ({what}): outer edge, press step"
+            f"{'s' if len(self.steps) > 1 else ''} {listed([str(n) for n in self.steps])}"
         )
 
 

@@ -20,6 +20,7 @@ from pathlib import Path
 import sbafab
 from sbafab.design.templates import templates_folder
 from sbafab.errors import DesignError, OutputError
+from sbafab.output.swap import BEGUN, put_in_place
 from sbafab.studio.made import packed
 
 STATIC = Path(__file__).parent / "static"
@@ -76,28 +77,51 @@ class WrittenPage:
 def write(folder: Path, pyodide: Path | None) -> WrittenPage:
     """Writes the page into the folder, which is new, empty or such a page already.
 
-    Raises DesignError for what is missing, with what adds it, and OutputError.
+    Raises DesignError for what is missing, with what adds it, and OutputError, also where files
+    that the page did not write would go.
     """
     python = _pyodide(pyodide or Path("node_modules/pyodide"))
     wheels, pure = _chosen(python)
-    if folder.exists() and not (folder / LISTING).is_file() and any(folder.iterdir()):
-        raise OutputError(f"{folder} holds other files; choose a new or empty folder")
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise OutputError(f"{folder} is a file or a link; choose a new or empty folder")
+    others = sorted(set(_files(folder)) - set(_listed(folder)))
+    if others:
+        raise OutputError(
+            f"{folder} holds {others[0]}, which the page did not write; move it away, or choose a "
+            "new folder"
+        )
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        fresh = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+        fresh = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=BEGUN, dir=folder.parent))
         try:
             fresh.chmod(0o755)
             _write_page(fresh, python, wheels, pure)
-            shutil.rmtree(folder, ignore_errors=True)
-            fresh.rename(folder)
-        except BaseException:
+            put_in_place(fresh, folder)
+        finally:
             shutil.rmtree(fresh, ignore_errors=True)
-            raise
     except OSError as error:
         raise OutputError(f"{folder} cannot be written: {error.strerror or error}") from None
-    size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+    size = sum((folder / path).stat().st_size for path in _files(folder))
     lacks = () if any(wheel.project == NUMPY for wheel in wheels) else (NUMPY,)
     return WrittenPage(folder, size, lacks)
+
+
+def _files(folder: Path) -> list[str]:
+    """All that lies in a folder, by its place there."""
+    return [
+        path.relative_to(folder).as_posix()
+        for path in folder.rglob("*")
+        if path.is_symlink() or not path.is_dir()
+    ]
+
+
+def _listed(folder: Path) -> list[str]:
+    """What a page that was written here consists of; nothing where there is none."""
+    try:
+        listing = json.loads((folder / LISTING).read_text(encoding="utf-8"))
+        return [str(name) for name in listing["files"]]
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
 
 
 def _pyodide(folder: Path) -> Pyodide:
@@ -175,7 +199,8 @@ def _requirements(wheel: Wheel) -> list[str]:
     ):
         name = next(n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
         lines = archive.read(name).decode("utf-8").splitlines()
-        return [line[15:] for line in lines if line.startswith("Requires-Dist: ")]
+        head = "Requires-Dist: "
+        return [line.removeprefix(head) for line in lines if line.startswith(head)]
     return []
 
 
@@ -202,6 +227,7 @@ def _write_page(
     listing = {
         "archives": ["sbafab.zip", "packages.zip"],
         "wheels": [wheel.path.name for wheel in wheels],
+        "files": sorted([*_files(folder), LISTING]),
     }
     (folder / LISTING).write_text(
         json.dumps(listing, indent=1) + "\n", encoding="utf-8", newline="\n"

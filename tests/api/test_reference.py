@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 import sbafab
+from sbafab import api
 
 PAGE = (Path(__file__).parents[2] / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
 FUNCTIONS = re.findall(r"^\.\. autofunction:: (\w+)$", PAGE, re.MULTILINE)
@@ -72,6 +73,7 @@ def shown_members(owner: type, members: str) -> Iterator[tuple[str, Any]]:
 
 def test_the_page_has_every_function_and_every_record_that_they_return() -> None:
     assert sorted(FUNCTIONS) == sorted(sbafab.__all__)
+    assert sorted(api.__all__) == sorted(["Source", *sbafab.__all__])
     names = {path.rpartition(".")[2] for path in RECORDS}
     others = {"Iterator", "Assembly", "Drawing", "Dimension", "Any"}
     for name in FUNCTIONS:

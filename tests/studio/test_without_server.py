@@ -207,7 +207,12 @@ def test_equal_input_gives_equal_bytes_and_the_folder_is_replaced(
         page = without_server.write(tmp_path / "site", pyodide)
         assert page.lacks == ()
         contents.append({p: p.read_bytes() for p in page.folder.rglob("*") if p.is_file()})
+        # What an earlier version wrote, and listed, goes.
         (page.folder / "left-over.js").write_text("", encoding="utf-8")
+        listing = page.folder / without_server.LISTING
+        listed = json.loads(listing.read_text(encoding="utf-8"))
+        listed["files"].append("left-over.js")
+        listing.write_text(json.dumps(listed), encoding="utf-8")
     assert contents[0] == contents[1]
 
 
@@ -266,6 +271,23 @@ def test_the_command_says_what_was_written_and_what_it_goes_without(
 def test_a_folder_of_something_else_is_left_alone(pyodide: Path, tmp_path: Path) -> None:
     (tmp_path / "site").mkdir()
     (tmp_path / "site" / "thesis.txt").write_text("x", encoding="utf-8")
-    with pytest.raises(OutputError, match="holds other files"):
+    with pytest.raises(OutputError, match=r"holds thesis\.txt, which the page did not write"):
         without_server.write(tmp_path / "site", pyodide)
     assert os.listdir(tmp_path / "site") == ["thesis.txt"]
+    file = tmp_path / "page"
+    file.write_text("x", encoding="utf-8")
+    with pytest.raises(OutputError, match="is a file or a link"):
+        without_server.write(file, pyodide)
+    assert file.read_text(encoding="utf-8") == "x"
+    assert sorted(os.listdir(tmp_path)) == ["page", "pyodide", "site"]
+
+
+def test_what_was_put_into_the_page_since_is_not_lost(pyodide: Path, tmp_path: Path) -> None:
+    site = tmp_path / "site"
+    without_server.write(site, pyodide)
+    own = site / ".git" / "config"
+    own.parent.mkdir()
+    own.write_text("x", encoding="utf-8")
+    with pytest.raises(OutputError, match=r"holds \.git/config, which the page did not write"):
+        without_server.write(site, pyodide)
+    assert own.read_text(encoding="utf-8") == "x"

@@ -14,6 +14,7 @@ from sbafab.assemblies.colours import colours
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
 from sbafab.pressing.together import Runs
+from sbafab.pressing.words import listed
 from sbafab.reports.traveller import base_plate, bench, bill, joining, notes, times
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.cautions import cautions, for_the_designer
@@ -244,8 +245,8 @@ def _not_together(job: AssemblyJob) -> str:
         return ""
     sizes = [f"{one.name} {say.millimetres(one.work.laminate.thickness)}" for one in job.works]
     return (
-        f"Not pressed together: {say.listed([one.name for one in job.works])}. Their stacks differ "
-        f"in height ({say.listed(sizes)}) and steps; the paper presses only like patterns at once, "
+        f"Not pressed together: {listed([one.name for one in job.works])}. Their stacks differ "
+        f"in height ({listed(sizes)}) and steps; the paper presses only like patterns at once, "
         "and glues these parts to each other."
     )
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from sbafab.cutting.fixture import plate_corner
 from sbafab.laminate.laminate import Pin
-from sbafab.pressing.build_up import pieces
-from sbafab.pressing.schedule import BASE_PLATE, LAMINATE, PAD, RELEASE, Schedule
+from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, RELEASE, pieces
+from sbafab.pressing.schedule import Schedule
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.job import Work
 

@@ -8,6 +8,7 @@ from sbafab.laminate.assembly import AssemblyStep, distinct_layers, laying_pins
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.schedule import Step
+from sbafab.pressing.words import listed
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
 from sbafab.reports.traveller.job import Work
@@ -30,7 +31,7 @@ def before_cutting(films: Iterable[Film]) -> list[Action]:
     masks = [film for film in films if film.is_mask]
     if masks:
         thin = say.millimetres(min(film.thickness for film in masks))
-        names = say.listed(list(dict.fromkeys(film.material for film in masks)))
+        names = listed(list(dict.fromkeys(film.material for film in masks)))
         actions.append(
             Action(
                 f"Lay {names} on a backing of card, smooth it flat, and hold it down all along its "
@@ -105,7 +106,7 @@ def underlay(work: Work, part: AssemblyStep) -> list[Action]:
     return [
         Action(
             f"Tape {work.job.underlay}, printed at 100 % and its bars measured, to the plate, "
-            f"{film}. It has the edges of {say.listed(patterns)}{eye}."
+            f"{film}. It has the edges of {listed(patterns)}{eye}."
         )
     ]
 
@@ -115,7 +116,7 @@ def on_the_lumen(laminate: Laminate, part: AssemblyStep) -> list[Action]:
     pins = laying_pins(laminate, part)
     if not pins:
         return []
-    names = say.listed([f"{pin.name} (⌀{say.millimetres(pin.diameter)})" for pin in pins])
+    names = listed([f"{pin.name} (⌀{say.millimetres(pin.diameter)})" for pin in pins])
     return [
         Action(
             f"Better than by eye alone: the pin of the {names} passes every film here. Lay up on "

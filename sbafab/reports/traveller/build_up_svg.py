@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from itertools import groupby
 
+from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD
 from sbafab.pressing.dowels import PinSetting
-from sbafab.pressing.schedule import BASE_PLATE, LAMINATE, PAD, Step
+from sbafab.pressing.schedule import Step
+from sbafab.pressing.words import listed
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.shapes import Picture
@@ -154,7 +156,7 @@ def pin_lines(step: Step) -> str:
         key=lambda pin: (pin.diameter_mm, pin.length_mm, pin.seat_mm, pin.stands_mm),
     )
     return "; ".join(
-        f"{say.listed([pin.pin for pin in pins])}: ⌀{diameter:g} {draw.TIMES} {length:g} mm, "
+        f"{listed([pin.pin for pin in pins])}: ⌀{diameter:g} {draw.TIMES} {length:g} mm, "
         f"{seat:.2f} mm in the plate, {stands:.2f} mm over it, {stands - step.top_mm:.2f} mm "
         "over the stack"
         for (diameter, length, seat, stands), pins in alike

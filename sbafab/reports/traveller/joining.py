@@ -10,6 +10,7 @@ from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Sba, Tube
 from sbafab.assemblies.supply import runs
 from sbafab.models.sizes import inflated_diameter
+from sbafab.pressing.words import listed
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
 from sbafab.reports.traveller.bill import Item
@@ -35,11 +36,11 @@ def join_pages(assembled: Assembled) -> list[JoinPage]:
         early = bool(lines) and other is not None
         actions = list(_ready(placed))
         if early:
-            actions = [Action(f"Take {placed.name} with {say.listed(lines)} in it.")]
+            actions = [Action(f"Take {placed.name} with {listed(lines)} in it.")]
         if other is not None:
             title += f", {_where(placed)} of {other.name}"
             if early and isinstance(other.part, Tube):
-                actions.append(Action(f"Lead {say.listed(lines)} through {other.name}."))
+                actions.append(Action(f"Lead {listed(lines)} through {other.name}."))
             actions += _fix(placed, other)
         actions += _supply(placed, other, assembled)
         if placed.part.note:
@@ -287,9 +288,9 @@ def _supply(placed: PlacedPart, other: PlacedPart | None, assembled: Assembled) 
     own = runs(placed, assembled)
     if other is not None and own:
         away = "start" if placed.part.at == "end" else "end"
-        over = say.listed(list(dict.fromkeys(name for run in own for name in run.over)))
+        over = listed(list(dict.fromkeys(name for run in own for name in run.over)))
         past = f"; where one crosses {over}, leave it slack" if over else ""
-        places = say.listed([f"{run.chamber} at {round(run.angle, 1) % 360:g}" for run in own])
+        places = listed([f"{run.chamber} at {round(run.angle, 1) % 360:g}" for run in own])
         yield Action(
             f"Fold each tab back over the rim, round its tube and not flat, and lead the tubes "
             f"along the outside of {other.name} toward its {away}: {places} degrees{past}; {tie}."
@@ -349,7 +350,7 @@ def bought(assembled: Assembled, copies: int) -> list[Item]:
     glues = dict.fromkeys(filter(None, map(_adhesive, assembled.parts)))
     for glue in glues:
         joints = [placed.name for placed in assembled.parts if _adhesive(placed) == glue]
-        items.append(Item("Adhesive", f"{glue}, for {say.listed(joints)}", "as needed"))
+        items.append(Item("Adhesive", f"{glue}, for {listed(joints)}", "as needed"))
     return items
 
 

@@ -23,6 +23,7 @@ from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.models.paper import BURST
 from sbafab.models.sizes import sizes
 from sbafab.pressing.schedule import Schedule
+from sbafab.pressing.words import listed
 from sbafab.reports.canvas import COLOURS, KEY
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.features import balloons, layer_numbers
@@ -237,7 +238,7 @@ class LayUpRow:
 def _lay_up(work: Work) -> list[LayUpRow]:
     """The layers bottom to top, rounds named once."""
     held = {
-        index: say.listed([pin.name for pin in pins]) if pins else BY_HAND
+        index: listed([pin.name for pin in pins]) if pins else BY_HAND
         for index, pins in pins_when_added(work.laminate).items()
     }
     return [row for turn in rounds(work.laminate.layers) for row in _round_rows(held, turn)]

@@ -14,6 +14,7 @@ from sbafab.laminate.inks import ink
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.laminate.panel import SheetPanel
 from sbafab.pressing.sheets import tackings
+from sbafab.pressing.words import listed
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller import bench, process
 from sbafab.reports.traveller import quantities as say
@@ -92,8 +93,7 @@ def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
     design, laminate = work.design, work.laminate
     pairs = [(film, masks) for film, masks in _pairs(laminate) if masks]
     ticks = tuple(
-        f"{say.listed([str(mask.index) for mask in masks])} on {film.index}"
-        for film, masks in pairs
+        f"{listed([str(mask.index) for mask in masks])} on {film.index}" for film, masks in pairs
     )
     tack = say.minutes(design.panel.tack_minutes)
     return [
@@ -154,7 +154,7 @@ def _pressing(laminate: Laminate, page: StepPage, last: bool) -> list[Action]:
     step = page.step
     films = [pair for pair in _pairs(laminate) if pair[0].index in step.adds]
     ticks = tuple(
-        f"{film.index} with {say.listed([str(mask.index) for mask in masks])}"
+        f"{film.index} with {listed([str(mask.index) for mask in masks])}"
         if masks
         else str(film.index)
         for film, masks in films

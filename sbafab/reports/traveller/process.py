@@ -10,6 +10,7 @@ from sbafab.laminate.assembly import AssemblyStep, assembly, stack_count
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.pressing.schedule import Step
 from sbafab.pressing.together import Runs
+from sbafab.pressing.words import listed
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
@@ -155,7 +156,7 @@ def _actions(
     yield closing(step, cycles if 1 < len(cycles) <= MOST_LINES else ())
     yield Action("Take it out: it is as hot as the platens. Let it cool flat before you touch it.")
     if part.pins:
-        names = say.listed([pin.name for pin in part.pins])
+        names = listed([pin.name for pin in part.pins])
         yield Action(f"Pins out, pushed from below through the plate: {names}.")
     yield Action(f"Take off the release films. You now hold {_product(laminate, part)}.")
 
@@ -250,7 +251,7 @@ def _tabs(laminate: Laminate, layers: Sequence[int]) -> str:
     there = inlets_in(laminate, layers)
     if not there:
         return ""
-    points = say.listed([f"{inlet.chamber} {say.toward(inlet)}" for inlet in there])
+    points = listed([f"{inlet.chamber} {say.toward(inlet)}" for inlet in there])
     return f"inlet tabs point as in the picture ({points}), "
 
 
@@ -334,7 +335,7 @@ def leak_test(work: Work) -> list[Action]:
     lumen = ["lumen"] if work.laminate.lumen else []
     alone = work.job.copies == 1
     where = "at the head of this traveller" if alone else "beside its serial number"
-    places = say.listed(["outline", "tab", "tube", "cap", *lumen])
+    places = listed(["outline", "tab", "tube", "cap", *lumen])
     several = (
         [
             Action(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from sbafab.design.pressure_units import KILOPASCALS
 from sbafab.laminate.laminate import Inlet
@@ -62,10 +61,6 @@ def count(number: int, noun: str, plural: str = "") -> str:
 def stacks(number: int) -> str:
     """After the definite article: the stack, the 3 stacks."""
     return "stack" if number == 1 else f"{number} stacks"
-
-
-def listed(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def toward(inlet: Inlet) -> str:
