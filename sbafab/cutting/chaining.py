@@ -13,7 +13,8 @@ from sbafab.geometry.copies import COPIED, Copies, between
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, edge_from_bulge
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
-from sbafab.geometry.region import Contour, Region, same_support
+from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.runs import same_support
 from sbafab.geometry.shapes import circle
 
 CLEAR = 10 * EPSILON

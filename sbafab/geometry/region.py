@@ -25,6 +25,7 @@ from sbafab.geometry.edges import (
     unit,
 )
 from sbafab.geometry.nearby import EdgeIndex, close_pairs
+from sbafab.geometry.runs import runs, same_support
 
 if TYPE_CHECKING:
     import shapely
@@ -115,14 +116,7 @@ class Contour:
     @cached_property
     def runs(self) -> tuple[tuple[Edge, ...], ...]:
         """The edges gathered by the line or circle they lie on, from the first corner on."""
-        edges = self.edges
-        breaks = [i for i in range(len(edges)) if not same_support(edges[i - 1], edges[i])]
-        if not breaks:
-            return (edges,)
-        return tuple(
-            edges[first:last] if first < last else edges[first:] + edges[:last]
-            for first, last in zip(breaks, [*breaks[1:], breaks[0]], strict=True)
-        )
+        return tuple(runs(self.edges))
 
     @property
     def vertices(self) -> tuple[tuple[float, float, float], ...]:
@@ -203,20 +197,6 @@ class Contour:
         from sbafab.geometry.facets import facets
 
         return facets(self, sagitta, keeps_area=False)
-
-
-def same_support(a: Edge, b: Edge) -> bool:
-    """Whether two edges lie on one circle, or are lines of one direction, and turn alike."""
-    if isinstance(a, Arc) and isinstance(b, Arc):
-        return (
-            a.ccw == b.ccw
-            and abs(a.radius - b.radius) < EPSILON
-            and math.dist(a.centre, b.centre) < EPSILON
-        )
-    if isinstance(a, Line) and isinstance(b, Line):
-        (ux, uy), (vx, vy) = a.direction(a.start), b.direction(b.start)
-        return ux * vx + uy * vy > 0 and abs(ux * vy - uy * vx) * (a.length + b.length) < EPSILON
-    return False
 
 
 def _same(a: Edge, b: Edge) -> bool:
