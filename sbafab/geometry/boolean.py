@@ -6,6 +6,7 @@ side of it only; the pieces that stay are chained into contours. Nothing is flat
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
 from typing import TypeVar
@@ -23,6 +24,7 @@ Found = TypeVar("Found")
 
 LEAST_AREA = 1e-7
 """Contours that enclose less, in mm2, are rounding dust; so are those thinner than 4 EPSILON."""
+QUARTER = math.pi / 2
 WAYS = (1, 4, 16, 64)
 """With how many EPSILON edges are cut where they meet, tried in turn; by the last, points within a
 quarter of a micrometre are one.
@@ -135,4 +137,6 @@ def _joined(run: Sequence[Edge]) -> Sequence[Edge]:
     head, end = run[0], run[-1].end
     if isinstance(head, Line):
         return [Line(head.start, end)]
+    if len(run) == 1 and 0 < (head.sweep if head.ccw else -head.sweep) < QUARTER:
+        return run
     return quarter_arcs(head.start, end, head.centre, head.radius, run_sweep(run))
