@@ -252,7 +252,7 @@ def search(narrowest: _Narrowest) -> None:
     """Offers every place where edges or corners face each other."""
     boundary = narrowest.boundary
     for i, a in enumerate(boundary.sides):
-        for j, b in narrowest.near(a, SQUARE, after=i):
+        for _, b in narrowest.near(a, SQUARE, after=i):
             if a.may_hold_feet(b, narrowest.value) or b.may_hold_feet(a, narrowest.value):
                 _between_edges(a, b, narrowest)
     _at_corners(boundary.corners, narrowest)

@@ -76,8 +76,8 @@ Freedoms = Mapping[Part, tuple[Freedom, ...]]
 class Laid(NamedTuple):
     """A body as it is laid in a step, with its play on the ``pins`` that hold it.
 
-    One that none holds is laid on the part ``under`` it. ``centre``: what it turns about. ``stays``:
-    no pin holds anything in this step, and it is the lowest.
+    One that none holds is laid on the part ``under`` it. ``centre``: what it turns about.
+    ``stays``: no pin holds anything in this step, and it is the lowest.
     """
 
     body: Sequence[Part]

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 def compiled_beside(folder: Path) -> BytecodeCache | None:
     """What reads and writes them in ``__pycache__``; None where Python must not write there.
 
-    Each is kept with its source's checksum and is made anew when that changed. A folder that
-    cannot be written to goes without.
+    Each is kept with its source's checksum and is made anew when that changed. Where the folder
+    cannot be read or written, nothing is kept.
     """
     from jinja2 import FileSystemBytecodeCache
     from jinja2.bccache import Bucket
@@ -24,6 +24,10 @@ def compiled_beside(folder: Path) -> BytecodeCache | None:
         return None
 
     class Compiled(FileSystemBytecodeCache):
+        def load_bytecode(self, bucket: Bucket) -> None:
+            with suppress(OSError):
+                super().load_bytecode(bucket)
+
         def dump_bytecode(self, bucket: Bucket) -> None:
             with suppress(OSError):
                 super().dump_bytecode(bucket)
