@@ -66,9 +66,9 @@ class LobedDesign(Design):
 
     family: Literal["lobed"]
     """Which kind of actuator this is."""
-    chamber: LobedChamber = LobedChamber()
-    fits: Fits = Fits()
-    lumen: Lumen = Lumen()
+    chamber: LobedChamber = LobedChamber.model_construct()
+    fits: Fits = Fits.model_construct()
+    lumen: Lumen = Lumen.model_construct()
 
     @property
     def form(self) -> Form:

@@ -34,8 +34,8 @@ class OneDofDesign(Design):
 
     family: Literal["1dof"]
     """Which kind of actuator this is."""
-    chamber: RoundChamber = RoundChamber()
-    fits: Fits = Fits()
+    chamber: RoundChamber = RoundChamber.model_construct()
+    fits: Fits = Fits.model_construct()
 
     @property
     def form(self) -> Form:

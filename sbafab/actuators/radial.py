@@ -104,12 +104,12 @@ class RadialDesign(Design):
 
     family: Literal["radial"]
     """Which kind of actuator this is."""
-    stack: RadialStack = RadialStack()
-    inlet: RadialInlet = RadialInlet()
-    chamber: OblongChamber = OblongChamber()
-    tube: Tube = Tube()
-    sheet: SheetSection = SheetSection()
-    window: Window = Window()
+    stack: RadialStack = RadialStack.model_construct()
+    inlet: RadialInlet = RadialInlet.model_construct()
+    chamber: OblongChamber = OblongChamber.model_construct()
+    tube: Tube = Tube.model_construct()
+    sheet: SheetSection = SheetSection.model_construct()
+    window: Window = Window.model_construct()
 
     @property
     def pitch(self) -> float:

@@ -216,9 +216,9 @@ class Assembly(Section):
         Field(min_length=1, max_length=60),
     ]
     """The parts by name; each but the root names what it is fixed on."""
-    deploy: Deploy = Deploy()
-    rules: AssemblyRules = AssemblyRules()
-    order: Order = Order()
+    deploy: Deploy = Deploy.model_construct()
+    rules: AssemblyRules = AssemblyRules.model_construct()
+    order: Order = Order.model_construct()
     kit: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
     """The kit of all parts' designs, in place of their own: a kit's name, or a file beside this."""
     sheets: Sheets | None = None

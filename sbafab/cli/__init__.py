@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import sys
 from importlib.util import find_spec
 from typing import Any
@@ -113,8 +112,6 @@ def app() -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Runs the command line; bad input ends in one sentence and exit code 2."""
-    # A run makes many small records and hardly a cycle: looking for them costs a tenth of its time.
-    gc.set_threshold(50_000, 20, 20)
     prepared_streams()
     if any("\0" in argument for argument in arguments or ()):
         say("an argument holds a NUL character; no path or value can")

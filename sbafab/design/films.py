@@ -124,7 +124,7 @@ class OtherFilm(Section):
     """What every cut file of it says, for instance of its fumes."""
     kerf: KerfWidth = UNCALIBRATED
     """Full kerf width in this film, as laser.kerf_tpe."""
-    sheet: Sheet = Sheet()
+    sheet: Sheet = Sheet.model_construct()
     """What it is cut from, as sheets.tpe."""
 
     @model_validator(mode="after")
@@ -142,8 +142,8 @@ class Films(Section):
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, OtherFilm] = Field(init=False)
 
-    tpe: TpeFilm = TpeFilm()
-    ptfe: PtfeFilm = PtfeFilm()
+    tpe: TpeFilm = TpeFilm.model_construct()
+    ptfe: PtfeFilm = PtfeFilm.model_construct()
 
     @model_validator(mode="after")
     def _names_can_be_written(self) -> Self:

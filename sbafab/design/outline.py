@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -44,24 +45,30 @@ def read_outline(path: Path) -> Region:
 def understood(path: Path) -> Outline:
     """The same with the size that was understood, in words. Raises DesignError."""
     try:
-        strands, scale = _traced(path)
-        region, moved = _on_its_axis(_checked(sealed(_one_loop(list(counted(strands))))))
+        return _understood(path, _content(path))
     except FitError as error:
         raise DesignError(f"outline {path} has a {error}; round it off") from None
     except DesignError as error:
         raise DesignError(f"outline {path} {error}") from None
+
+
+@lru_cache(maxsize=4)
+def _understood(path: Path, content: bytes) -> Outline:
+    """The outline of a file that holds this; a run asks for it more than once."""
+    strands, scale = _traced(path)
+    region, moved = _on_its_axis(_checked(sealed(_one_loop(list(counted(strands))))))
     low_x, low_y, high_x, high_y = region.bounds
     size = f"{high_x - low_x:.3f} x {high_y - low_y:.3f} mm"
     # Without the file's name: a design is the same wherever its drawing lies.
     return Outline(region, f"drawn outline: {size}, {scale}{moved}")
 
 
-def _traced(path: Path) -> Traced:
+def _content(path: Path) -> bytes:
+    """What the file holds, if it is no larger than an outline may be."""
     try:
         is_file = path.is_file()
         size = path.stat().st_size if is_file else 0
-        if is_file:
-            path.open("rb").close()
+        content = path.read_bytes() if is_file and size <= MOST_BYTES else b""
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise DesignError(f"cannot be read ({reason}); check its path") from None
@@ -69,6 +76,10 @@ def _traced(path: Path) -> Traced:
         raise DesignError("does not exist as a file; check its path")
     if size > MOST_BYTES:
         raise DesignError(f"has {size:,} bytes, where at most {MOST_BYTES:,} are allowed")
+    return content
+
+
+def _traced(path: Path) -> Traced:
     # Each reader brings its own library, loaded for the format at hand only.
     if path.suffix.lower() == ".dxf":
         from sbafab.design.outline_dxf import dxf_strands

@@ -223,8 +223,8 @@ class Laser(Section):
 class Sheets(Section):
     """The film sheets to cut from, and how parts are placed on them."""
 
-    tpe: Sheet = Sheet()
-    ptfe: Sheet = Sheet()
+    tpe: Sheet = Sheet.model_construct()
+    ptfe: Sheet = Sheet.model_construct()
     engine: Literal["bottom-left", "spyrrow"] = "bottom-left"
     """What looks for places; "spyrrow" (an extra) packs tighter and takes its time."""
     seconds: float = Field(default=20.0, gt=0, le=3600)
@@ -293,22 +293,22 @@ class Design(Section):
     kit: str = Field(default="paper", min_length=1, max_length=1000)
     """The lab's films, tubes, press, laser and limits: "paper", or a file beside the design. It
     gives every key of its sections that the design leaves out."""
-    stack: Stack = Stack()
-    bond: Bond = Bond()
-    mask: Mask = Mask()
-    bore: Bore = Bore()
-    fillet: Fillet = Fillet()
-    inlet: Inlet = Inlet()
-    films: Films = Films()
-    layup: LayerFilms = LayerFilms()
-    registration: Registration = Registration()
-    panel: PanelSection = PanelSection()
-    press: Press = Press()
-    laser: Laser = Laser()
-    sheets: Sheets = Sheets()
-    order: Order = Order()
-    rules: Rules = Rules()
-    chamber: Chamber = Chamber()
+    stack: Stack = Stack.model_construct()
+    bond: Bond = Bond.model_construct()
+    mask: Mask = Mask.model_construct()
+    bore: Bore = Bore.model_construct()
+    fillet: Fillet = Fillet.model_construct()
+    inlet: Inlet = Inlet.model_construct()
+    films: Films = Films.model_construct()
+    layup: LayerFilms = LayerFilms.model_construct()
+    registration: Registration = Registration.model_construct()
+    panel: PanelSection = PanelSection.model_construct()
+    press: Press = Press.model_construct()
+    laser: Laser = Laser.model_construct()
+    sheets: Sheets = Sheets.model_construct()
+    order: Order = Order.model_construct()
+    rules: Rules = Rules.model_construct()
+    chamber: Chamber = Chamber.model_construct()
 
     _folder: Path = PrivateAttr(default=Path())
     _is_solved: bool = PrivateAttr(default=False)

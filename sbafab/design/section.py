@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import re
+import textwrap
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, field_validator
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, field_validator
 
 _UNWRITABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 """Control characters but tab and line end, and what XML 1.0 does not allow at all."""
@@ -14,17 +20,43 @@ class Section(BaseModel):
     """A frozen table of a design file that knows all its keys.
 
     Texts stand in pictures, pages and tables, so they hold no character that cannot be written
-    there.
+    there. A validator is made when the first table is read, and what the source says of a key is
+    read when a schema is asked for: a command needs the tables of one family only. So a default
+    that is a table is made by ``model_construct()``, which needs no validator.
     """
 
     model_config = ConfigDict(
-        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, use_attribute_docstrings=True
+        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True
     )
 
     @field_validator("*")
     @classmethod
     def _can_be_written(cls, value: object) -> object:
         return writable(value)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> Any:
+        """With each key's docstring as its description."""
+        schema = handler(core)
+        keys = handler.resolve_ref_schema(schema).get("properties", {})
+        for record in (one for one in cls.__mro__ if one is not Section):
+            if issubclass(record, Section):
+                for name, said in _said(record):
+                    key = cls.model_fields[name].alias or name
+                    keys.get(key, {}).setdefault("description", said)
+        return schema
+
+
+def _said(record: type[Section]) -> Iterator[tuple[str, str]]:
+    """The keys of a record, those that it inherits aside, and their docstrings."""
+    (body,) = ast.parse(textwrap.dedent(inspect.getsource(record))).body
+    assert isinstance(body, ast.ClassDef)
+    for key, said in pairwise(body.body):
+        if isinstance(key, ast.AnnAssign) and isinstance(key.target, ast.Name):
+            match said:
+                case ast.Expr(value=ast.Constant(value=str(text))):
+                    if key.target.id in record.model_fields:
+                        yield key.target.id, inspect.cleandoc(text)
 
 
 def writable(value: object) -> object:

@@ -6,14 +6,16 @@ side of it only; the pieces that stay are chained into contours. Nothing is flat
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
 from typing import TypeVar
 
 from sbafab.errors import SbafabError
 from sbafab.geometry.arrangement import Arrangement, InconsistentError
-from sbafab.geometry.edges import EPSILON, Edge, Line, Point, quarter_arcs
+from sbafab.geometry.edges import EPSILON, SAME, Arc, Edge, Line, Point, quarter_arcs
 from sbafab.geometry.facets import run_sweep
+from sbafab.geometry.nearby import close_pairs
 from sbafab.geometry.pieces import by_owner, overlaid
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.remembered import MOST
@@ -23,6 +25,7 @@ Found = TypeVar("Found")
 
 LEAST_AREA = 1e-7
 """Contours that enclose less, in mm2, are rounding dust; so are those thinner than 4 EPSILON."""
+QUARTER = math.pi / 2
 WAYS = (1, 4, 16, 64)
 """With how many EPSILON edges are cut where they meet, tried in turn; by the last, points within a
 quarter of a micrometre are one.
@@ -37,7 +40,21 @@ def union(regions: Iterable[Region]) -> Region:
     solid = [region for region in regions if not region.is_empty]
     if len(solid) < 2:
         return solid[0] if solid else Region()
+    if _are_separate_discs(solid):
+        return _region([contour.edges for region in solid for contour in region.contours])
     return wound([edge for region in solid for edge in region.edges], 0)
+
+
+def _are_separate_discs(regions: Sequence[Region]) -> bool:
+    """Whether each is one whole circle, apart from all others: then nothing is to be cut."""
+    for region in regions:
+        if len(region.contours) > 1 or region.contours[0].circle is None or region.area <= 0:
+            return False
+        # Arcs that were read from a file may differ in their last digits.
+        if len({(edge.centre, edge.radius) for edge in region.edges if isinstance(edge, Arc)}) > 1:
+            return False
+    boxes = [region.bounds for region in regions]
+    return next(close_pairs(boxes, 2 * SAME), None) is None
 
 
 def intersection(a: Region, b: Region) -> Region:
@@ -87,7 +104,12 @@ def _wound(edges: tuple[Edge, ...], above: int) -> Region:
 
 
 def _enclosed(found: Arrangement, borders: Sequence[int]) -> Region:
-    contours = [contour for contour in map(tidy, found.loops(borders)) if contour is not None]
+    return _region(found.loops(borders))
+
+
+def _region(loops: Iterable[Sequence[Edge]]) -> Region:
+    """The region inside closed chains that meet nowhere."""
+    contours = [contour for contour in map(tidy, loops) if contour is not None]
     return Region(tuple(sorted(contours, key=_reading_order)))
 
 
@@ -135,4 +157,6 @@ def _joined(run: Sequence[Edge]) -> Sequence[Edge]:
     head, end = run[0], run[-1].end
     if isinstance(head, Line):
         return [Line(head.start, end)]
+    if len(run) == 1 and 0 < (head.sweep if head.ccw else -head.sweep) < QUARTER:
+        return run
     return quarter_arcs(head.start, end, head.centre, head.radius, run_sweep(run))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Arc, Edge, Point, left_turn
@@ -49,26 +48,29 @@ def tapered_ends(contour: Contour, sharp: float) -> Iterator[tuple[Point, Point]
     A rounded corner is an end where the corner itself would have less than ``sharp`` degrees.
     """
     runs = [_Run(own[0], own[-1], run_sweep(own)) for own in contour.runs]
+    corners = [runs[i - 1].corner(run) for i, run in enumerate(runs)]
     for i, run in enumerate(runs):
         before, after = runs[i - 1], runs[(i + 1) % len(runs)]
-        into, out = before.corner(run), run.corner(after)
+        into, out = corners[i], corners[(i + 1) % len(runs)]
         # A round end that turns further is wider than between its flanks.
         if abs(into) < SMOOTH and abs(out) < SMOOTH and run.sweep < math.pi + SMOOTH:
-            yield from _between_flanks(runs, i, i, min(TAPER, sharp - ROUNDED))
+            yield from _between_flanks(runs, corners, i, i, min(TAPER, sharp - ROUNDED))
         start = i - 1 if abs(into) < SMOOTH and before.is_fillet(run) else i
         stop = i + 1 if abs(out) < SMOOTH and after.is_fillet(run) else i
         if (start < i or into > SMOOTH) and (stop > i or out > SMOOTH):
-            yield from _between_flanks(runs, start, stop, TAPER)
+            yield from _between_flanks(runs, corners, start, stop, TAPER)
 
 
 def _between_flanks(
-    runs: Sequence[_Run], start: int, stop: int, taper: float
+    runs: Sequence[_Run], corners: Sequence[float], start: int, stop: int, taper: float
 ) -> Iterator[tuple[Point, Point]]:
-    """The ends of the path along runs ``start`` to ``stop``, if it turns back between flanks."""
+    """The ends of the path along runs ``start`` to ``stop``, if it turns back between flanks.
+
+    ``corners``: how far it turns into each run.
+    """
     if stop - start + 3 > len(runs):
         return
-    path = [runs[i % len(runs)] for i in range(start - 1, stop + 2)]
-    turn = sum(run.sweep for run in path[1:-1])
-    turn += sum(before.corner(after) for before, after in pairwise(path))
+    turn = sum(runs[i % len(runs)].sweep for i in range(start, stop + 1))
+    turn += sum(corners[i % len(runs)] for i in range(start, stop + 2))
     if abs(turn - math.pi) < math.radians(taper):
-        yield path[1].first.start, path[-2].last.end
+        yield runs[start % len(runs)].first.start, runs[stop % len(runs)].last.end

@@ -219,7 +219,8 @@ def _clear(p: Floats, q: Floats, table: EdgeTable, gathered: Gathered) -> Bools:
         aside = np.abs(to_end[0] * unit[1] - to_end[1] * unit[0])
         doubtful |= (aside < NEAR) & (ahead > NEAR / 2) & (ahead < length - NEAR / 2)
     clear = np.ones(p.shape[1], dtype=bool)
-    for asked in np.unique(segment[doubtful]):
+    # Not np.unique, which loads masked arrays.
+    for asked in sorted(set(segment[doubtful].tolist())):
         (px, py), (qx, qy) = p[:, asked].tolist(), q[:, asked].tolist()
         clear[asked] = gathered.is_clear((px, py), (qx, qy))
     return clear

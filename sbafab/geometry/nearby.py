@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 
-from sbafab.geometry.edges import Bounds, Edge, Point, distance_to
+from sbafab.geometry.edges import EPSILON, Bounds, Edge, Point, distance_to
 
 MANY_BOXES = 500
 """From which on comparing all at once is worth fetching numpy."""
@@ -159,10 +159,11 @@ class EdgeIndex:
 
     def distance(self, p: Point) -> float:
         """Least distance from ``p`` to any edge."""
-        margin = self.cell
+        # Many a point that is asked for lies on an edge.
+        margin = EPSILON
         while True:
             box = widened((*p, *p), margin)
             least = min((distance_to(edge, p) for edge in self.touching(box)), default=math.inf)
             if least <= margin or self.all_within(box):
                 return least
-            margin *= 2
+            margin = max(2 * margin, self.cell)

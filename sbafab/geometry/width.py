@@ -185,15 +185,20 @@ class _Narrowest:
         if dx * nx + dy * ny > TOUCH and dx * mx + dy * my < -TOUCH:
             self.offer((px, py), (qx, qy))
 
-    def near(self, a: _Side | _Corner, aside: float) -> Iterator[tuple[int, _Side]]:
+    def near(
+        self, a: _Side | _Corner, aside: float, after: int = -1
+    ) -> Iterator[tuple[int, _Side]]:
         """Numbered sides that a segment shorter than the best could join to ``a``.
 
-        Their normals are opposed somewhere, to within ``aside`` radians.
+        Their normals are opposed somewhere, to within ``aside`` radians, and their numbers come
+        ``after`` this one.
         """
         (nx, ny), turn = a.normal, a.half_turn + aside
         sides = self.boundary.sides
         straight = -math.cos(turn)
         for number in self.boundary.index.numbers(widened(a.box, self.value)):
+            if number <= after:
+                continue
             side = sides[number]
             mx, my = side.normal
             room = turn + side.half_turn
@@ -247,10 +252,8 @@ def search(narrowest: _Narrowest) -> None:
     """Offers every place where edges or corners face each other."""
     boundary = narrowest.boundary
     for i, a in enumerate(boundary.sides):
-        for j, b in narrowest.near(a, SQUARE):
-            if j > i and (
-                a.may_hold_feet(b, narrowest.value) or b.may_hold_feet(a, narrowest.value)
-            ):
+        for _, b in narrowest.near(a, SQUARE, after=i):
+            if a.may_hold_feet(b, narrowest.value) or b.may_hold_feet(a, narrowest.value):
                 _between_edges(a, b, narrowest)
     _at_corners(boundary.corners, narrowest)
     for p, q in boundary.ends:
@@ -301,7 +304,7 @@ def _pinch(
 
 def _between_edges(a: _Side, b: _Side, narrowest: _Narrowest) -> None:
     if isinstance(a.edge, Arc):
-        if _alongside(a.edge, b.edge):
+        if _alongside(a.edge, b.edge) and _may_face(a.edge, b.edge, narrowest.value):
             _along_each_other(a, b, narrowest)
         # The centre line of a line and an arc, or of two arcs, is square on both.
         origin = b.edge.centre if isinstance(b.edge, Arc) else None
@@ -327,6 +330,22 @@ def _alongside(a: Edge, b: Edge) -> bool:
     if isinstance(a, Line) and isinstance(b, Line):
         u, v = a.direction(a.start), b.direction(b.start)
         return _dot(u, v) < 0 and abs(u[0] * v[1] - u[1] * v[0]) < ALONGSIDE
+    return False
+
+
+def _may_face(a: Arc, b: Edge, within: float) -> bool:
+    """Whether two arcs of nearly one centre may face each other no farther off than ``within``.
+
+    Material lies across a disc or in a ring, and nowhere between the edges of two holes.
+    """
+    room = 2 * ALONGSIDE
+    if not isinstance(b, Arc) or min(a.radius, b.radius) < 10 * ALONGSIDE:
+        return True
+    if a.ccw and b.ccw:
+        return a.radius + b.radius <= within + room
+    if a.ccw or b.ccw:
+        ring = a.radius - b.radius if a.ccw else b.radius - a.radius
+        return -room <= ring <= within + room
     return False
 
 

@@ -27,7 +27,9 @@ Schema = Literal["sbafab/manifest@1"] | BatchSchema
 
 
 class _Claim(BaseModel):
-    model_config = ConfigDict(extra="ignore", frozen=True, strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        extra="ignore", frozen=True, strict=True, allow_inf_nan=False, defer_build=True
+    )
 
     def as_dict(self) -> dict[str, Any]:
         """What stands in the file: keys in the order of the fields, but for unset ones."""

@@ -73,32 +73,65 @@ class Freedom(NamedTuple):
 Freedoms = Mapping[Part, tuple[Freedom, ...]]
 
 
-def freedoms(laminate: Laminate, tolerances: Tolerances) -> Freedoms:
-    """All that each piece of each layer can do, from every step that it goes through.
+class Laid(NamedTuple):
+    """A body as it is laid in a step, with its play on the ``pins`` that hold it.
 
-    Two pieces lie off each other by what one of them does and the other does not.
+    One that none holds is laid on the part ``under`` it. ``centre``: what it turns about.
+    ``stays``: no pin holds anything in this step, and it is the lowest.
     """
+
+    body: Sequence[Part]
+    step: int
+    pins: Mapping[Point, float]
+    centre: Point
+    under: Part | None
+    stays: bool
+
+
+def lay_up(laminate: Laminate) -> list[Laid]:
+    """All bodies in the order in which they are laid, whatever the tolerances; none in sheets."""
     if laminate.panel is not None:
-        return _in_sheets(laminate, tolerances)
+        return []
     shapes = _Shapes(laminate)
     bodies = [[part] for layer in laminate.layers for part in shapes.parts(layer.index)]
-    found: dict[Part, tuple[Freedom, ...]] = {body[0]: () for body in bodies}
-    number = 0
+    found: list[Laid] = []
     for step in assembly(laminate):
         layers = frozenset(step.layers)
         present = sorted(body for body in bodies if body[0].layer in layers)
-        pinned = any(shapes.pins(body, step) for body in present)
-        for body in present:
-            number += 1
-            own = _own(body, number, shapes, step, tolerances)
-            if not shapes.pins(body, step):
-                under = shapes.under(body, present)
-                # The lowest body of a step without pins stays: the others are laid on it.
-                own = (*found[under], *own) if under else own if pinned else ()
-            for part in body:
-                found[part] += own
+        held = [shapes.pins(body, step) for body in present]
+        for body, pins in zip(present, held, strict=True):
+            under = None if pins else shapes.under(body, present)
+            # The lowest body of a step without pins stays: the others are laid on it.
+            stays = not pins and under is None and not any(held)
+            centre = next(iter(pins), None) or shapes.centre(body)
+            found.append(Laid(body, step.number, pins, centre, under, stays))
         bodies = [body for body in bodies if body[0].layer not in layers]
         bodies += shapes.joined(present)
+    return found
+
+
+def freedoms(
+    laminate: Laminate, tolerances: Tolerances, laid: Sequence[Laid] | None = None
+) -> Freedoms:
+    """All that each piece of each layer can do, from every step that it goes through.
+
+    Two pieces lie off each other by what one of them does and the other does not. ``laid`` is what
+    ``lay_up`` says, where it is known.
+    """
+    if laminate.panel is not None:
+        return _in_sheets(laminate, tolerances)
+    counts = {name: len(own[0].profile.pieces) for name, own in laminate.patterns.items()}
+    found: dict[Part, tuple[Freedom, ...]] = {
+        Part(layer.index, piece): ()
+        for layer in laminate.layers
+        for piece in range(counts[layer.pattern])
+    }
+    for number, one in enumerate(lay_up(laminate) if laid is None else laid, 1):
+        own = () if one.stays else _own(one, number, tolerances)
+        if one.under is not None:
+            own = (*found[one.under], *own)
+        for part in one.body:
+            found[part] += own
     return found
 
 
@@ -124,23 +157,20 @@ def _in_sheets(laminate: Laminate, tolerances: Tolerances) -> Freedoms:
     return found
 
 
-def _own(
-    body: Sequence[Part], number: int, shapes: _Shapes, step: AssemblyStep, tolerances: Tolerances
-) -> tuple[Freedom, ...]:
+def _own(laid: Laid, number: int, tolerances: Tolerances) -> tuple[Freedom, ...]:
     """What a body can do in a step by itself."""
-    pins = shapes.pins(body, step)
-    lowest, highest = min(body).layer, max(body).layer
+    pins = laid.pins
+    lowest, highest = min(laid.body).layer, max(laid.body).layer
 
     def freedom(most: float, centre: Point | None = None) -> Freedom:
-        return Freedom(step.number, number, lowest, highest, len(pins), most, centre)
+        return Freedom(laid.step, number, lowest, highest, len(pins), most, centre)
 
     loose = min(pins.values(), default=0.0)
     shift = freedom(tolerances.pin + loose if pins else tolerances.placement)
     if len(pins) >= 2:
         both = [shift, freedom(*_turn_on(pins))]
     else:
-        centre = next(iter(pins), None) or shapes.centre(body)
-        both = [shift, freedom(math.radians(tolerances.turn), centre)]
+        both = [shift, freedom(math.radians(tolerances.turn), laid.centre)]
     return tuple(one for one in both if one.most > 0)
 
 

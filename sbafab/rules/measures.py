@@ -13,7 +13,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.rules.boundary import Reach, edges_along, outward_reach
 from sbafab.rules.facing import Facing, facing_films
 from sbafab.rules.forms import LinearForm, linear_forms
-from sbafab.rules.freedoms import Freedoms, freedoms
+from sbafab.rules.freedoms import Freedoms, Laid, freedoms, lay_up
 from sbafab.rules.limits import Limits
 from sbafab.rules.margins import SHARP, InterfaceMargins, felt_alike, narrow_places
 
@@ -33,7 +33,7 @@ class Measures:
         Places that are narrow with the rougher hand hold all that are so with a steadier one.
         """
         other = Measures(self.laminate, limits)
-        other.margins = self.margins
+        other.margins, other.laid = self.margins, self.laid
         return other
 
     @cached_property
@@ -52,7 +52,12 @@ class Measures:
     @cached_property
     def moves(self) -> Freedoms:
         """What every piece of every layer can do."""
-        return freedoms(self.laminate, self.limits.tolerances)
+        return freedoms(self.laminate, self.limits.tolerances, self.laid)
+
+    @cached_property
+    def laid(self) -> list[Laid]:
+        """Every body in the order in which they are laid."""
+        return lay_up(self.laminate)
 
     @cached_property
     def margins(self) -> list[InterfaceMargins]:

@@ -121,8 +121,8 @@ def _distances(
     one: tuple[Contour, ...], other: tuple[Contour, ...]
 ) -> Iterator[tuple[float, Point]]:
     """How far the ends and middles of all edges of ``one`` lie from ``other``."""
-    outline = Region(other)
+    outline = Region(other).index
     for contour in one:
         for edge in contour.edges:
             for p in (edge.start, edge.at(0.5)):
-                yield outline.distance_to_edge(p), p
+                yield outline.distance(p), p

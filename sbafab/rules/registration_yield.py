@@ -204,7 +204,9 @@ def _counted(groups: Sequence[_Group], limits: Limits, seed: int) -> Yield:
                     bad_at.append(interface * builds + build)
             if bad_at:
                 names = list(group.own)
-                for number in (np.unique(np.concatenate(bad_at)) // builds).tolist():
+                # With the counts, or numpy would load its masked arrays.
+                every, _ = np.unique(np.concatenate(bad_at), return_counts=True)
+                for number in (every // builds).tolist():
                     interfaces[names[number]] += 1
         whole += int(np.logical_or.reduce(list(bad_of.values())).sum())
         quantities = {name: total + int(bad_of[name].sum()) for name, total in quantities.items()}

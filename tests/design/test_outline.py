@@ -100,6 +100,12 @@ def test_the_size_that_is_understood_is_said(tmp_path: Path, unit: int, said: st
         assert understood(path).said.startswith(f"drawn outline: {said}")
 
 
+def test_a_drawing_that_was_changed_is_read_again(tmp_path: Path) -> None:
+    for radius in (2, 3, 2):
+        path = dxf(tmp_path, lambda space, r=radius: space.add_circle((0, 0), r))
+        assert read_outline(path).area == pytest.approx(math.pi * radius**2)
+
+
 def test_a_circle_from_behind_lies_on_the_other_side(tmp_path: Path) -> None:
     back = {"extrusion": (0, 0, -1)}
     drawn = dxf(tmp_path, lambda m: m.add_circle((1, 0.5), 4, dxfattribs=back))

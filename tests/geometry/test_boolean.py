@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+import random
 
 import pytest
 
-from sbafab.geometry.boolean import union
+from sbafab.geometry.boolean import union, wound
 from sbafab.geometry.edges import Arc, Line
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, polygon, rectangle, stadium, strip
@@ -219,3 +220,20 @@ def test_operations_add_up_on_turned_lobed_plates() -> None:
         common = plate & other
         assert (plate | other).area + common.area == pytest.approx(total, abs=dust)
         assert (plate - other).area == pytest.approx(plate.area - common.area, abs=dust)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_discs_apart_are_what_laying_them_over_each_other_gives(seed: int) -> None:
+    draw = random.Random(seed)
+    for _ in range(20):
+        discs = [
+            disc((draw.uniform(-9, 9), draw.uniform(-9, 9)), draw.uniform(0.3, 2)).turned(33)
+            for _ in range(draw.randint(2, 5))
+        ]
+        laid_over = wound([edge for one in discs for edge in one.edges], 0)
+        assert union(discs).contours == laid_over.contours
+    for apart in (0.0, 1e-6, 3e-6, 7e-6, 9e-6, 1e-3):
+        pair = disc((0, 0), 1), disc((2 + apart, 0), 1)
+        assert (
+            union(pair).contours == wound([edge for one in pair for edge in one.edges], 0).contours
+        )

@@ -102,3 +102,13 @@ def test_close_pairs_are_those_whose_boxes_come_within_reach() -> None:
         found = list(close_pairs(boxes, reach))
         assert {frozenset(pair) for pair in found} == expected
         assert len(found) == len(expected)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_least_distance_is_that_of_all_edges_on_an_edge_and_off_it(seed: int) -> None:
+    edges = scattered(seed)
+    index, draw = EdgeIndex(edges), random.Random(seed)
+    places = [(draw.uniform(-30, 50), draw.uniform(-30, 40)) for _ in range(20)]
+    places += [edge.at(draw.random()) for edge in edges]
+    for p in places:
+        assert index.distance(p) == min(distance_to(edge, p) for edge in edges)

@@ -9,9 +9,18 @@ import pytest
 import shapely
 
 from sbafab.geometry.boolean import union
+from sbafab.geometry.edges import Arc
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import disc, polygon, rectangle, stadium, strip
-from sbafab.geometry.width import least_gap, least_width
+from sbafab.geometry.width import (
+    Boundary,
+    Gathered,
+    _along_each_other,
+    _may_face,
+    _side,
+    least_gap,
+    least_width,
+)
 
 AXIS = (0.0, 0.0)
 EXACT = 1e-9
@@ -201,3 +210,29 @@ def test_the_least_width_of_a_finely_drawn_ring_is_found_among_far_and_near_edge
     assert width.value == pytest.approx(flat, abs=EXACT)
     assert gap is not None
     assert gap.value == pytest.approx(10.0 * flat, abs=EXACT)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_arcs_of_nearly_one_centre_that_are_left_out_face_each_other_nowhere(seed: int) -> None:
+    draw = random.Random(seed)
+    left_out = 0
+    for _ in range(300):
+        within = draw.uniform(0.05, 8)
+        arcs = []
+        for _ in range(2):
+            (x, y), radius = (draw.uniform(-4e-4, 4e-4), draw.uniform(-4e-4, 4e-4)), 2.0
+            radius += draw.choice([0.0, 1e-4, -5e-4, draw.uniform(-1.9, 2)])
+            first, ccw = draw.uniform(0, math.tau), draw.random() < 0.5
+            last = first + draw.uniform(0.1, 3) * (1 if ccw else -1)
+            start, end = (
+                (x + radius * math.cos(turn), y + radius * math.sin(turn)) for turn in (first, last)
+            )
+            arcs.append(Arc(start, end, (x, y), radius, ccw))
+        a, b = arcs
+        if _may_face(a, b, within):
+            continue
+        left_out += 1
+        gathered = Gathered(Boundary([], 30.0), within)
+        _along_each_other(_side(a), _side(b), gathered)
+        assert gathered.offered == []
+    assert 50 < left_out < 250

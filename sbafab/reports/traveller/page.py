@@ -64,8 +64,11 @@ def environment() -> Environment:
     """The templates of this folder; what they are not given is an error."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+    from sbafab.reports.traveller.compiled import compiled_beside
+
     return Environment(
         loader=FileSystemLoader(HERE),
+        bytecode_cache=compiled_beside(HERE),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

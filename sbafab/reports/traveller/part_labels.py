@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
 from heapq import heapify, heappop, heappush
 from typing import NamedTuple
 
@@ -46,11 +47,13 @@ def labels(words: str, part: Region) -> Iterator[PlacedLabel]:
     width = OVER * (high_x - low_x)
     most = min(draw.SMALL * width / draw.text_width(words, draw.SMALL), draw.SMALL)
     holes = [hole.bounds for hole in part.holes]
+    em = draw.text_width(words, 1.0)
+    middles = list(_middles(part.bounds))
     waiting = [
-        (far + (1 - share), _label(words, middle, share * most), False)
+        (far + (1 - share), _label(em, middle, share * most), False)
         for share in SIZES
         if share * most >= LEGIBLE
-        for far, middle in _middles(part.bounds)
+        for far, middle in middles
     ]
     heapify(waiting)
     while waiting:
@@ -81,9 +84,10 @@ def first_free(
     )
 
 
-def _label(words: str, middle: Point, size: float) -> PlacedLabel:
+def _label(em: float, middle: Point, size: float) -> PlacedLabel:
+    """The label of words that are ``em`` sizes of their letters wide."""
     x, y = middle
-    wide, high = draw.text_width(words, size) / 2, HIGH * size / 2
+    wide, high = size * em / 2, HIGH * size / 2
     box = x - wide, y - high, x + wide, y + high
     return PlacedLabel((x, y + 0.35 * size), size, box)
 
@@ -92,11 +96,17 @@ def _middles(bounds: Bounds) -> Iterator[tuple[float, Point]]:
     """Points of a part's box and how far off its middle they are, from 0 to 1; nearest first."""
     low_x, low_y, high_x, high_y = bounds
     x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
+    for off, u, v in _grid():
+        yield off, (x + u * (high_x - low_x) / 2, y + v * (high_y - low_y) / 2)
+
+
+@cache
+def _grid() -> list[tuple[float, float, float]]:
+    """The same of a box from -1 to 1: how far off, and both shares."""
     steps = range(-STEPS, STEPS + 1)
     grid = [(i / (STEPS + 1), j / (STEPS + 1)) for i in steps for j in steps]
-    for u, v in sorted(grid, key=lambda p: (p[0] ** 2 + p[1] ** 2, p)):
-        off = ((u**2 + v**2) / 2) ** 0.5
-        yield off, (x + u * (high_x - low_x) / 2, y + v * (high_y - low_y) / 2)
+    nearest = sorted(grid, key=lambda p: (p[0] ** 2 + p[1] ** 2, p))
+    return [(((u**2 + v**2) / 2) ** 0.5, u, v) for u, v in nearest]
 
 
 def _sides(box: Bounds, holes: Sequence[Bounds]) -> list[Point]:
