@@ -181,7 +181,20 @@ def _predict() -> dict[str, Any]:
         pocket_loss={**_number(), "description": "mm"},
         modulus_mpa=_number("null"),
     )
-    figure = _table(group=TEXT, name=TEXT, value=_number(), unit=TEXT, model=TEXT, trust=TEXT)
+    design_with = {
+        "type": "boolean",
+        "description": "false where another model gives the same quantity, and that one is to "
+        "design with",
+    }
+    figure = _table(
+        group=TEXT,
+        name=TEXT,
+        value=_number(),
+        unit=TEXT,
+        model=TEXT,
+        trust=TEXT,
+        design_with=design_with,
+    )
     curve = {"label": TEXT, "x": _list(_number()), "y": _list(_number())}
     relation = _table(
         name=TEXT,
