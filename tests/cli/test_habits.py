@@ -80,6 +80,23 @@ def test_check_json_names_schema_design_and_summary(capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("registration", "did you mean registration-yield or registration-nominal"),
+        ("bond", "did you mean bond-width\n"),
+        ("zzz", "it may be bond-width, mask-overhang"),
+    ],
+)
+def test_an_unknown_waiver_is_told_in_the_words_it_was_given(
+    name: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, _, err = run(["check", "1dof-5mm", "--waive", name], capsys)
+    assert code == 2
+    assert err.startswith(f"sbafab: --waive '{name}': no rule has that name; ")
+    assert said in err
+
+
+@pytest.mark.parametrize(
     ("arguments", "kind", "exit_code"),
     [
         (["check", "nosuch", "--json"], "input", 2),
