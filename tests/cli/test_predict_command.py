@@ -36,7 +36,9 @@ def test_writes_figures_and_plots_that_the_manifest_lists(
         assert all(figure[key] for key in ("name", "unit", "model", "trust"))
     chosen = [figure["name"] for figure in found["figures"] if figure["design_with"]]
     assert len(chosen) == len(set(chosen)) < len(found["figures"])
-    assert {figure["name"] for figure in found["figures"] if "blocked" in figure["name"]} <= {*chosen}
+    assert {figure["name"] for figure in found["figures"] if "blocked" in figure["name"]} <= {
+        *chosen
+    }
     plots = {relation["plot"] for relation in found["relations"]}
     assert plots == {
         f"predict/{name}.svg" for name in ("stroke", "force", "bend", "bending", "workspace")
