@@ -205,8 +205,13 @@ class Prediction:
         head = ("", "", "unit", "model", "validity")
         first = sorted(self.figures, key=lambda figure: figure.other)
         rows = [
-            (f"{f.name} (other model)" if f.other else f.name, f.value, f.unit)
-            + (f.model.title, f.model.trust)
+            (
+                f"{f.name} (other model)" if f.other else f.name,
+                f.value,
+                f.unit,
+                f.model.title,
+                f.model.trust,
+            )
             for f in first
         ]
         left = [(left.name, None, "", "not predicted", left.reason) for left in self.left_out]
