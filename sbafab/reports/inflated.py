@@ -15,6 +15,7 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import union
+from sbafab.geometry.region import Region
 from sbafab.geometry.section import section
 from sbafab.geometry.shapes import disc, strip
 from sbafab.laminate.laminate import Inlet, Laminate
@@ -25,7 +26,6 @@ from sbafab.models.balloon import Balloon, inflate
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sbafab.geometry.region import Region
     from sbafab.models.stack import Pose, Stack
 
     Array = NDArray[np.float64]
@@ -230,6 +230,9 @@ def _tab(plate: Region, inlet: Inlet) -> Region:
     (x, y), (u, v) = inlet.mouth, inlet.direction
     end = x - INSIDE * u, y - INSIDE * v
     width = sum(high - low for low, high in section(plate, end, (-v, u)) if low < 0 < high)
+    if not width:
+        # Only the films of the bottom balloon have tabs.
+        return Region()
     length = math.hypot(x, y)
     return strip((x - length * u, y - length * v), inlet.mouth, width)
 
