@@ -224,7 +224,10 @@ def print_job(job: Run) -> None:
 
 def job_json(job: Run) -> dict[str, object]:
     """The result of a job for programs."""
+    from sbafab.output.printed import NESTED_SCHEMA
+
     return {
+        "schema": NESTED_SCHEMA,
         "folder": str(job.folder),
         "failed": job.failed,
         "designs": [
@@ -359,7 +362,10 @@ def film_said(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], copi
 
 def run_json(run: Run) -> dict[str, object]:
     """The result of a run for programs."""
+    from sbafab.output.printed import RUN_SCHEMA
+
     return {
+        "schema": RUN_SCHEMA,
         "folder": str(run.folder),
         "failed": run.failed,
         "findings": [finding.as_dict() for finding in run.findings],
