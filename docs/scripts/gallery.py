@@ -71,16 +71,21 @@ def _entry(source: str, target: Path) -> Iterator[str]:
     text = path.read_text(encoding="utf-8")
     yield f"\n### {found.name}\n"
     yield f"{_first_sentence(text)}\n"
-    yield f"![{found.name}, flat](gallery/{picture}){{width=440px}}\n"
+    yield f"![{found.name}, flat](gallery/{picture}){{width=600px}}\n"
     counts = summary(findings)
     held = f"{counts['pass']} rules pass" + (f", {counts['warn']} warn" if counts["warn"] else "")
     if isinstance(found, Design):
-        yield f"{', '.join(_figures(found))}; {held}.\n"
+        yield _told(f"{', '.join(_figures(found))}; {held}.")
     else:
-        yield f"An assembly of {', '.join(found.parts)}; {held}.\n"
+        yield _told(f"An assembly of {', '.join(found.parts)}; {held}.")
     argument = found.name if is_template else path.name
     yield f"    sbafab generate {argument}\n"
     yield _file(path.name, text)
+
+
+def _told(words: str) -> str:
+    """A paragraph in the style of key figures."""
+    return f"{{.key-figures}}\n{words}\n"
 
 
 def _file(name: str, text: str) -> str:

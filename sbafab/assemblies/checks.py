@@ -23,6 +23,11 @@ CHECKS: Mapping[CheckName, Callable[[Assembled], Iterator[Finding]]] = {
     "supply-tubes": supply.supply_tubes,
 }
 
+AT_MOST: frozenset[CheckName] = frozenset(
+    ("tube-match", "inlet-match", "collision", "aperture", "lumen-pass", "supply-tubes")
+)
+"""Checks whose limit is the most that may be measured; of all others it is the least."""
+
 
 def run_checks(assembled: Assembled) -> tuple[Finding, ...]:
     """What every check finds, in their order; failures that the assembly waives say so."""

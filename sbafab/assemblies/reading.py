@@ -5,10 +5,10 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from sbafab.actuators import load_design, records
-from sbafab.assemblies.records import FAMILY, KINDS, AnyPart, Assembly, Sba
+from sbafab.assemblies.records import FAMILY, KINDS, AnyPart, Assembly, CheckName, Sba
 from sbafab.design.messages import listed, shown
 from sbafab.design.reading import (
     Change,
@@ -21,7 +21,7 @@ from sbafab.design.reading import (
     toml_tables,
     validated,
 )
-from sbafab.design.records import Design
+from sbafab.design.records import Design, RuleName
 from sbafab.design.templates import kit_names
 from sbafab.errors import DesignError
 
@@ -36,7 +36,8 @@ def load(
     if data.get("family") != FAMILY:
         return load_design(source, changes, waivers)
     _start_where_the_user_stands(data, changes)
-    return assembly_of(add_waivers(data, waivers), path)
+    known = (*get_args(RuleName), *get_args(CheckName))
+    return assembly_of(add_waivers(data, waivers, known), path)
 
 
 def load_text(text: str, path: Path) -> Design | Assembly:

@@ -69,7 +69,8 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
 ) -> None:
     """Draw the actuator at given pressures or volumes, from the elastic stack.
 
-    Balloons are drawn as they stand between their plates; inlet tubes are left out. Elevation and
+    Balloons are drawn as they stand between their plates; ears are snipped off, and inlet tubes are
+    left out. Elevation and
     azimuth are degrees over the bench and round it.
     """
     from sbafab.actuators import build, load_design

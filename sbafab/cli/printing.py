@@ -109,28 +109,6 @@ def shown_progress(quiet: bool) -> Iterator[Progress]:
         yield plain_lines(asked_for(VERBOSE))
 
 
-def findings_table(findings: Sequence[Finding]) -> Table:
-    """The rule deck's findings, a row each."""
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("rule", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
-    table.add_column("measured", justify="right", no_wrap=True)
-    table.add_column("limit", justify="right", no_wrap=True)
-    table.add_column("", ratio=1)
-    for finding in findings:
-        table.add_row(
-            finding.rule,
-            Text(finding.verdict, style=COLOURS[finding.verdict]),
-            _figure(finding.measured, finding.unit),
-            _figure(finding.limit, finding.unit),
-            Text(finding.message),
-        )
-    return table
-
-
 def notes_of(checked: Iterable[Checked]) -> list[str]:
     """What is to be known of several designs: each sentence once, with the names it is true of."""
     names: dict[str, list[str]] = {}
@@ -191,13 +169,6 @@ def print_failed(findings: Iterable[Finding], written: str, change: str) -> None
     print_wrapped(words, "bold red")
 
 
-def _figure(value: float | None, unit: str) -> str:
-    if value is None:
-        return ""
-    digits = f"{value:.3f}" if unit == "mm" else f"{value:g}"
-    return f"{digits} {unit}".strip()
-
-
 def print_run(run: Run) -> None:
     """The closing table of a run: sizes, what was made, what the rules found."""
     from rich.text import Text
@@ -253,7 +224,10 @@ def print_job(job: Run) -> None:
 
 def job_json(job: Run) -> dict[str, object]:
     """The result of a job for programs."""
+    from sbafab.output.printed import NESTED_SCHEMA
+
     return {
+        "schema": NESTED_SCHEMA,
         "folder": str(job.folder),
         "failed": job.failed,
         "designs": [
@@ -388,7 +362,10 @@ def film_said(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], copi
 
 def run_json(run: Run) -> dict[str, object]:
     """The result of a run for programs."""
+    from sbafab.output.printed import RUN_SCHEMA
+
     return {
+        "schema": RUN_SCHEMA,
         "folder": str(run.folder),
         "failed": run.failed,
         "findings": [finding.as_dict() for finding in run.findings],

@@ -1,4 +1,7 @@
-"""What ``sbafab predict`` prints of a design: figures by group and model, and their validity."""
+"""What ``sbafab predict`` prints of a design: figures by group and model, and their validity.
+
+What to design with comes first, each quantity once; other models of the same follow.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,7 @@ if TYPE_CHECKING:
 
 NAME, VALUE = 56, 10
 """Columns of a name, at most, and of a value."""
+OTHERS = "Other models of the same: design with the figures above"
 
 
 def print_prediction(found: Prediction) -> None:
@@ -20,17 +24,22 @@ def print_prediction(found: Prediction) -> None:
     from rich.text import Text
 
     out = console()
-    models = list(dict.fromkeys(figure.model for figure in found.figures))
+    first = sorted(found.figures, key=lambda figure: figure.other)
+    models = list(dict.fromkeys(figure.model for figure in first))
+    others = [figure for figure in first if figure.other]
+    own = first[: len(first) - len(others)]
 
     def part(title: str, lines: Iterator[str]) -> None:
         if title:
             out.print(Text(f"\n{title}", style="bold"))
         for line in lines:
             # A heading starts at the margin.
-            is_head = not title and not line.startswith(" ")
+            is_head = title in ("", OTHERS) and not line.startswith(" ")
             out.print(Text(line, style="bold" if is_head else ""), soft_wrap=True)
 
-    part("", figure_lines(found.figures, models, out.width))
+    part("", figure_lines(own, models, out.width))
+    if others:
+        part(OTHERS, figure_lines(others, models, out.width))
     part("Models and validity", _numbered(models, out.width))
     if found.left_out:
         left = (f"{one.name}: {one.reason}" for one in found.left_out)

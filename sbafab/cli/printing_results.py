@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from sbafab.cli.printing import console, print_json
+from sbafab.output.printed import RECORDS_SCHEMA, REPORT_SCHEMA
 
 if TYPE_CHECKING:
     from sbafab.results.records import Build, Record
@@ -29,13 +30,12 @@ def print_records(
     """Records a line each, with what they correct and what corrects them."""
     newer = {record.corrects: record.id for record in every if record.corrects is not None}
     if as_json:
-        print_json(
-            [
-                {**record.as_dict(), "design": builds[record.design_sha256].name}
-                | {"corrected_by": newer.get(record.id)}
-                for record in shown
-            ]
-        )
+        told = [
+            {**record.as_dict(), "design": builds[record.design_sha256].name}
+            | {"corrected_by": newer.get(record.id)}
+            for record in shown
+        ]
+        print_json({"schema": RECORDS_SCHEMA, "records": told})
         return
     for record in shown:
         click.echo(_line(record, builds[record.design_sha256].name, newer.get(record.id)))
@@ -59,7 +59,7 @@ def _line(record: Record, design: str, newer: int | None) -> str:
 def print_report(report: Report, as_json: bool) -> None:
     """Success, measured against predicted, tolerances, and what to do about them."""
     if as_json:
-        print_json(report.as_dict())
+        print_json({"schema": REPORT_SCHEMA, **report.as_dict()})
         return
     click.echo(f"actuators: {report.items}, records: {report.records}")
     _print_table(

@@ -6,7 +6,7 @@ import click
 
 FORMATS = (
     *("design", "checks", "manifest", "job", "assembly"),
-    *("press", "predict", "find", "error"),
+    *("press", "predict", "find", "run", "nested", "records", "report", "error"),
 )
 """As in ``sbafab.output.schemas``, whose imports would slow ``--help`` down."""
 

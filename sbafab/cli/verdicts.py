@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from sbafab.cli.printing import COLOURS, console, findings_table, print_wrapped
+from sbafab.cli.printing import COLOURS, console, print_wrapped, wrapped
 
 if TYPE_CHECKING:
     from sbafab.output.planned import Checked
@@ -34,30 +34,32 @@ def print_findings(groups: Sequence[Group], verbose: bool = False) -> None:
         if len(groups) > 1:
             out.print(f"{group.name}: {counted(group.findings)}", style="bold", markup=False)
         if verbose:
-            out.print(findings_table(group.findings))
+            print_lines(group.findings, verbose)
             continue
         if len(groups) == 1:
             print_lines(group.findings)
         print_open(group.findings)
 
 
-def print_lines(findings: Sequence[Finding]) -> None:
-    """A line a rule: the finding that decides."""
+def print_lines(findings: Sequence[Finding], verbose: bool = False) -> None:
+    """A line a rule: the finding that decides; ``verbose`` all of them, each with what it says."""
     from rich.text import Text
 
     from sbafab.rules.finding import decisive
 
     out = console()
-    rules = decisive(findings)
-    wide = max(map(len, rules), default=0)
-    out.print(Text(f"{'rule':{wide}}  verdict  {'measured':>13}  {'limit':>11}", style="bold"))
-    for rule, one in rules.items():
-        line = Text(f"{rule:{wide}}  ")
+    shown = findings if verbose else list(decisive(findings).values())
+    wide = max((len(one.rule) for one in shown), default=0)
+    out.print(Text(f"{'rule':{wide}}  verdict  {'measured':>13}  {'limit':>14}", style="bold"))
+    for one in shown:
+        line = Text(f"{one.rule:{wide}}  ")
         line.append(f"{one.verdict:7}", style=COLOURS[one.verdict])
-        measured, limit = short_figure(one.measured, one.unit), short_figure(one.limit, one.unit)
-        line.append(f"  {measured:>13}  {limit:>11}")
+        measured = short_figure(one.measured, one.unit)
+        line.append(f"  {measured:>13}  {limit_said(one):>14}")
         line.rstrip()
         out.print(line, soft_wrap=True)
+        for said in wrapped(one.message, out.width, "    ", "    ") if verbose else ():
+            out.print(Text(said), soft_wrap=True)
 
 
 def print_open(findings: Sequence[Finding]) -> None:
@@ -92,6 +94,17 @@ def verdict_said(name: str, groups: Sequence[Group], more: str) -> str:
     if len(groups) == 1:
         return f"{name} holds: {counted(groups[0].findings)}. {more}"
     return f"{name} holds. {more}"
+
+
+def limit_said(finding: Finding) -> str:
+    """A limit with its sense: ">=" the least that may be measured, "<=" the most."""
+    from sbafab.assemblies.checks import AT_MOST as BETWEEN_PARTS
+    from sbafab.rules.deck import AT_MOST
+
+    if finding.limit is None:
+        return ""
+    is_most = finding.rule in AT_MOST or finding.rule in BETWEEN_PARTS
+    return f"{'<=' if is_most else '>='} {short_figure(finding.limit, finding.unit)}"
 
 
 def short_figure(value: float | None, unit: str) -> str:

@@ -8,12 +8,12 @@ import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from sbafab.design.messages import listed, sentence, shown
-from sbafab.design.records import Design
+from sbafab.design.records import Design, RuleName
 from sbafab.design.templates import kit_names, template_names, templates_folder
 from sbafab.design.writing import FITS, plain_tables
 from sbafab.errors import DesignError
@@ -202,8 +202,20 @@ def changed(design: AnyDesign, changes: Iterable[Change]) -> AnyDesign:
     return checked(family, data, {design.family: family}).placed(design.folder).fitted()
 
 
-def add_waivers(data: dict[str, Any], waivers: Sequence[str]) -> dict[str, Any]:
-    """``data`` with rule names added to ``rules.waive``."""
+def add_waivers(
+    data: dict[str, Any], waivers: Sequence[str], known: Sequence[str] = get_args(RuleName)
+) -> dict[str, Any]:
+    """``data`` with rule names added to ``rules.waive``.
+
+    Raises DesignError for a name that is not among the ``known``, in the command line's words.
+    """
+    for name in waivers:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 3) or [
+                rule for rule in known if rule.startswith(name)
+            ]
+            hint = f"did you mean {' or '.join(near)}" if near else f"it may be {', '.join(known)}"
+            raise DesignError(f"--waive {shown(name)}: no rule has that name; {hint}")
     rules = data.get("rules", {})
     if not waivers or not isinstance(rules, dict) or not isinstance(rules.get("waive", []), list):
         return data

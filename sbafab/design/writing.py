@@ -45,17 +45,18 @@ def _without_none(table: dict[str, Any]) -> dict[str, Any]:
 def keys_of(design: Design) -> list[tuple[str, object, object]]:
     """Dotted key, value and default of every key, the default only where the value differs."""
     plain = type(design).model_validate({"name": design.name, "family": design.family})
-    usual = dict(_dotted(resolved(plain)))
+    usual = dict(dotted(resolved(plain)))
     return [
         (key, value, usual.get(key) if usual.get(key) != value else None)
-        for key, value in _dotted(resolved(design))
+        for key, value in dotted(resolved(design))
     ]
 
 
-def _dotted(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, object]]:
+def dotted(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, object]]:
+    """Dotted key and value of every key of nested tables."""
     for key, value in table.items():
         if isinstance(value, dict):
-            yield from _dotted(value, f"{prefix}{key}.")
+            yield from dotted(value, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", value
 

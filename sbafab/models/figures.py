@@ -32,13 +32,17 @@ class Model:
 
 @dataclass(frozen=True)
 class Figure:
-    """One predicted number: ``value`` in ``unit``; ``group`` gathers what belongs together."""
+    """One predicted number: ``value`` in ``unit``; ``group`` gathers what belongs together.
+
+    ``other``: another model gives the same quantity, and that one is to design with.
+    """
 
     group: str
     name: str
     value: float
     unit: str
     model: Model
+    other: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         return {
@@ -48,6 +52,7 @@ class Figure:
             "unit": self.unit,
             "model": self.model.title,
             "trust": self.model.trust,
+            "design_with": not self.other,
         }
 
 
@@ -198,7 +203,17 @@ class Prediction:
 
     def _repr_html_(self) -> str:
         head = ("", "", "unit", "model", "validity")
-        rows = [(f.name, f.value, f.unit, f.model.title, f.model.trust) for f in self.figures]
+        first = sorted(self.figures, key=lambda figure: figure.other)
+        rows = [
+            (
+                f"{f.name} (other model)" if f.other else f.name,
+                f.value,
+                f.unit,
+                f.model.title,
+                f.model.trust,
+            )
+            for f in first
+        ]
         left = [(left.name, None, "", "not predicted", left.reason) for left in self.left_out]
         return table_html(head, [*rows, *left])
 

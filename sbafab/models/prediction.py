@@ -17,6 +17,7 @@ from sbafab.laminate.extent import film_mass
 from sbafab.laminate.laminate import Laminate
 from sbafab.models import axial, elastic, lobes, paper, stacked
 from sbafab.models.actuator import NO_OUTLINE, Actuator, actuator
+from sbafab.models.choice import chosen
 from sbafab.models.figures import (
     Asked,
     Figure,
@@ -69,7 +70,7 @@ def predict(
     found.sort(key=_place)
     return Prediction(
         wish,
-        tuple(item for item in found if isinstance(item, Figure)),
+        chosen(item for item in found if isinstance(item, Figure)),
         tuple(_relations(one, wish, together if isinstance(together, Stack) else None)),
         tuple(item for item in found if isinstance(item, LeftOut)),
     )

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import shutil
+import tomllib
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from sbafab.design.messages import shown
+from sbafab.design.records import Design
+from sbafab.design.writing import dotted, resolved
 from sbafab.errors import OutputError
-from sbafab.output.manifest import carried_over, file_hashes
+from sbafab.output.manifest import carried_over, file_hashes, identity
 from sbafab.output.swap import listed_files, read_manifest
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 
@@ -16,6 +20,8 @@ CUT = ("layers", "sheets", "traveller.html")
 PRESS = ("press.json", "press.csv", "underlay.pdf")
 MESH = ("mesh",)
 PREDICTION = ("predict", "predict.json")
+MOST_KEYS = 3
+"""Keys that a message names, at most."""
 RESULTS = "result.json"
 """Of a simulator's folder: what a run has found, not only what the simulator reads."""
 WORTH_KEEPING = {*CUT, *PRESS, *MESH, *PREDICTION, *SIMULATORS}
@@ -42,16 +48,42 @@ def removed_files(listed: Sequence[str], index: Mapping[str, Any]) -> tuple[str,
     return tuple(path for path in listed if path not in index["files"])
 
 
-def refuse_to_replace(target: Path, mine: Mapping[str, Any], own: Collection[str]) -> None:
+def refuse_to_replace(
+    target: Path, design: Design, waived: Sequence[str], own: Collection[str]
+) -> None:
     """Raises OutputError where a run that writes ``own`` would lose another design's files."""
+    mine = identity(design, waived)
     lost = would_replace(target, mine, own)
     if lost:
         names = dict.fromkeys(path.partition("/")[0] for path in lost)
         raise OutputError(
-            f"{target} holds {', '.join(names)} of a run with other settings or of another "
-            f"version of sbafab; take {target / 'design.toml'} for the design that was run there, "
-            "or give this one a folder of its own with --set name=NAME or -o"
+            f"{target} holds {', '.join(names)} {_unlike(target, design, mine)}; take "
+            f"{target / 'design.toml'} for the design that was run there, or give this one a "
+            "folder of its own with --set name=NAME or -o"
         )
+
+
+def _unlike(target: Path, design: Design, mine: Mapping[str, Any]) -> str:
+    """What another run's files in ``target`` differ in, so far as its design.toml can be read."""
+    old = read_manifest(target) or {}
+    try:
+        text = (target / "design.toml").read_text(encoding="utf-8")
+        there = dict(dotted(tomllib.loads(text)))
+    except (OSError, ValueError):
+        there = {}
+    here = dict(dotted(resolved(design)))
+    keys = [key for key in {**there, **here} if there.get(key) != here.get(key)]
+    if there and keys:
+        said = [f"{key} {_value(there, key)}, not {_value(here, key)}" for key in keys[:MOST_KEYS]]
+        more = len(keys) - len(said)
+        return f"with {'; '.join(said)}" + (f"; and {more} more keys" if more else "")
+    if old.get("generator") != mine["generator"]:
+        return f"of another version ({shown(old.get('generator'))}, not {mine['generator']})"
+    return "of a run with other settings"
+
+
+def _value(keys: Mapping[str, object], key: str) -> str:
+    return shown(keys[key]) if key in keys else "not set"
 
 
 def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:

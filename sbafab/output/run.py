@@ -162,7 +162,7 @@ def generate(
         wanted &= set(PICTURES)
     elif wanted < set(EVERYTHING):
         own = [name for part in wanted for name in OWN[part]]
-        refuse_to_replace(target, identity(design, checked.waived), (*own, *extras.own))
+        refuse_to_replace(target, design, checked.waived, (*own, *extras.own))
     # Schedule, nest and meshes are made before anything is written: they may refuse the design.
     planned = plan(checked, wanted, curves)
     batch = plan_batch(SCHEMA, design.name, [planned], target, tell)

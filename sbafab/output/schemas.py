@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, get_args
 
 from sbafab.errors import ERROR_SCHEMA
 from sbafab.output.checking import CHECKS_SCHEMA
 from sbafab.output.predicting import SCHEMA as PREDICT_SCHEMA
+from sbafab.output.printed import NESTED_SCHEMA, RECORDS_SCHEMA, REPORT_SCHEMA, RUN_SCHEMA
+from sbafab.output.schema_parts import COUNT, TEXT, and_perhaps, array, finding, number, table
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.pressing.tables import PRESS_SCHEMA
 from sbafab.rules.finding import Verdict
@@ -25,6 +27,10 @@ SCHEMAS: Mapping[str, tuple[str, str]] = {
     "press": (PRESS_SCHEMA, "`press.json`, the heat-press schedule"),
     "predict": (PREDICT_SCHEMA, "`predict.json`, and what `predict --json` prints of a design"),
     "find": (FIND_SCHEMA, "what `find --json` prints"),
+    "run": (RUN_SCHEMA, "what `generate`, `cut`, `press` and `mesh` print with `--json`"),
+    "nested": (NESTED_SCHEMA, "what `nest --json` prints"),
+    "records": (RECORDS_SCHEMA, "what `record --json` prints of records"),
+    "report": (REPORT_SCHEMA, "what `record --report --json` prints"),
     "error": (ERROR_SCHEMA, "what any command prints with `--json` when it ends in an error"),
 }
 """Formats by name: the id that stands in the files, and what it describes."""
@@ -68,78 +74,41 @@ def _of_batch(body: dict[str, Any], identity: str) -> dict[str, Any]:
     return body
 
 
-def _number(*more: str) -> dict[str, Any]:
-    return {"type": ["number", *more]}
-
-
-def _table(**properties: Any) -> dict[str, Any]:
-    """An object with all of these; further keys may be added."""
-    return {"type": "object", "required": list(properties), "properties": properties}
-
-
-def _and_perhaps(table: dict[str, Any], **properties: Any) -> dict[str, Any]:
-    """The same with keys that may be missing: what a command prints beside what is in the file."""
-    return {**table, "properties": {**table["properties"], **properties}}
-
-
-def _list(item: Mapping[str, Any]) -> dict[str, Any]:
-    return {"type": "array", "items": dict(item)}
-
-
-TEXT = {"type": "string"}
-COUNT = {"type": "integer", "minimum": 0}
-
-
 def _checks() -> dict[str, Any]:
-    where = _table(
-        interface={"type": ["integer", "null"], "description": "counted from 1, bottom to top"},
-        layers=_list(COUNT),
-        x={**_number("null"), "description": "mm"},
-        y={**_number("null"), "description": "mm"},
-    )
-    finding = _table(
-        rule=TEXT,
-        verdict={"enum": list(get_args(Verdict))},
-        limit=_number("null"),
-        measured=_number("null"),
-        unit=TEXT,
-        where=where,
-        message=TEXT,
-    )
     counts = dict.fromkeys(get_args(Verdict), COUNT)
-    advice = _table(
-        target_yield=_number(),
-        bond_width={**_number("null"), "description": "mm"},
-        mask_overhang={**_number("null"), "description": "mm"},
-        measured=_number("null"),
-        interval={"type": ["array", "null"], "items": _number()},
+    advice = table(
+        target_yield=number(),
+        bond_width={**number("null"), "description": "mm"},
+        mask_overhang={**number("null"), "description": "mm"},
+        measured=number("null"),
+        interval={"type": ["array", "null"], "items": number()},
         message=TEXT,
     )
-    sizes = {"type": "object", "additionalProperties": _number()}
+    sizes = {"type": "object", "additionalProperties": number()}
     printed = {
         "sizes": {
             "description": "mm by name, of each design by its name",
             "type": "object",
             "additionalProperties": sizes,
         },
-        "notes": _list(TEXT),
+        "notes": array(TEXT),
         "advice": {**advice, "description": "of --target-yield"},
     }
-    found = _table(
+    found = table(
         schema={"const": CHECKS_SCHEMA},
         design={**TEXT, "description": "name of the design or assembly, or the folder's path"},
         source={"enum": ["design", "as-built"]},
-        summary=_table(holds={"type": "boolean"}, **counts),
-        kits=_list({"type": "object"}),
-        findings=_list(finding),
+        summary=table(holds={"type": "boolean"}, **counts),
+        kits=array({"type": "object"}),
+        findings=array(finding()),
     )
-    return _and_perhaps(found, **printed)
+    return and_perhaps(found, **printed)
 
 
 def _error() -> dict[str, Any]:
     kinds = ["usage", "input", "too-large", "defect", "stopped", "memory", "files"]
-    error = _table(kind={"enum": kinds}, message=TEXT, exit_code={"type": "integer"})
-    return _table(schema={"const": ERROR_SCHEMA}, error=error)
+    error = table(kind={"enum": kinds}, message=TEXT, exit_code={"type": "integer"})
+    return table(schema={"const": ERROR_SCHEMA}, error=error)
 
 
 def _press() -> dict[str, Any]:
@@ -155,75 +124,97 @@ def _press() -> dict[str, Any]:
 
 
 def _batch() -> dict[str, Any]:
-    pattern = _table(pattern=TEXT, each=COUNT, cycles=_list(COUNT))
-    place = {**_list(_number()), "minItems": 2, "maxItems": 2}
+    pattern = table(pattern=TEXT, each=COUNT, cycles=array(COUNT))
+    place = {**array(number()), "minItems": 2, "maxItems": 2}
     times = ("press_minutes", "hands_minutes", "total_minutes")
-    return _table(
+    return table(
         copies=COUNT,
         at_once=COUNT,
         at_once_at_most=COUNT,
-        cycles={**_list(COUNT), "description": "copies pressed in each cycle"},
-        places_mm=_list(place),
-        **dict.fromkeys(times, _number()),
+        cycles={**array(COUNT), "description": "copies pressed in each cycle"},
+        places_mm=array(place),
+        **dict.fromkeys(times, number()),
         a_day_one_by_one=COUNT,
         a_day_in_batches=COUNT,
-        patterns=_list(pattern),
+        patterns=array(pattern),
     )
 
 
 def _predict() -> dict[str, Any]:
-    asked = _table(
-        pressures_kpa=_list(_number()),
-        flow_ml_min=_number(),
-        volumes_ul=_list(_number()),
-        press_factor=_number(),
-        contact_factor=_number(),
-        pocket_loss={**_number(), "description": "mm"},
-        modulus_mpa=_number("null"),
+    asked = table(
+        pressures_kpa=array(number()),
+        flow_ml_min=number(),
+        volumes_ul=array(number()),
+        press_factor=number(),
+        contact_factor=number(),
+        pocket_loss={**number(), "description": "mm"},
+        modulus_mpa=number("null"),
     )
-    figure = _table(group=TEXT, name=TEXT, value=_number(), unit=TEXT, model=TEXT, trust=TEXT)
-    curve = {"label": TEXT, "x": _list(_number()), "y": _list(_number())}
-    relation = _table(
+    design_with = {
+        "type": "boolean",
+        "description": "false where another model gives the same quantity, and that one is to "
+        "design with",
+    }
+    figure = table(
+        group=TEXT,
+        name=TEXT,
+        value=number(),
+        unit=TEXT,
+        model=TEXT,
+        trust=TEXT,
+        design_with=design_with,
+    )
+    curve = {"label": TEXT, "x": array(number()), "y": array(number())}
+    relation = table(
         name=TEXT,
         title=TEXT,
         x={**TEXT, "description": "label of the axis, with its unit"},
         y={**TEXT, "description": "label of the axis, with its unit"},
-        lines=_list(_table(**curve, model=TEXT, trust=TEXT)),
-        measured=_list(_table(**curve, error=_list(_number()))),
+        lines=array(table(**curve, model=TEXT, trust=TEXT)),
+        measured=array(table(**curve, error=array(number()))),
         plot={**TEXT, "description": "its file in the folder"},
     )
-    found = _table(
+    found = table(
         schema={"const": PREDICT_SCHEMA},
         name=TEXT,
         family=TEXT,
         design_sha256=TEXT,
         generator=TEXT,
         asked=asked,
-        figures=_list(figure),
-        left_out=_list(_table(name=TEXT, reason=TEXT)),
-        relations=_list(relation),
+        figures=array(figure),
+        left_out=array(table(name=TEXT, reason=TEXT)),
+        relations=array(relation),
     )
-    return _and_perhaps(found, failed=_list(TEXT), folder=TEXT)
+    return and_perhaps(found, failed=array(TEXT), folder=TEXT)
 
 
 def _find() -> dict[str, Any]:
-    figures = {"type": "object", "additionalProperties": _number()}
-    shown = _table(
+    figures = {"type": "object", "additionalProperties": number()}
+    shown = table(
         keys={"type": "object", "description": "keys of the design that were found"},
         figures={**figures, "description": "quantities in mm, N, g, kPa, ul, s or a share"},
     )
-    return _table(
+    return table(
         schema={"const": FIND_SCHEMA},
         holds={"type": "boolean"},
         file={"type": ["string", "null"], "description": "the design file, null where none holds"},
         started_from=TEXT,
         tries=COUNT,
         best=shown,
-        missed=_list(TEXT),
-        binds=_list(_table(key=TEXT, value={}, breaks=TEXT)),
-        without_room=_list(_table(rule=TEXT, measured=_number(), unit=TEXT, place=TEXT)),
-        front=_list(shown),
+        missed=array(TEXT),
+        binds=array(table(key=TEXT, value={}, breaks=TEXT)),
+        without_room=array(table(rule=TEXT, measured=number(), unit=TEXT, place=TEXT)),
+        front=array(shown),
     )
+
+
+def _printed(name: str) -> Callable[[], dict[str, Any]]:
+    def body() -> dict[str, Any]:
+        from sbafab.output.printed_schemas import BODIES
+
+        return BODIES[name]()
+
+    return body
 
 
 _BODIES = {
@@ -235,5 +226,6 @@ _BODIES = {
     "press": _press,
     "predict": _predict,
     "find": _find,
+    **{name: _printed(name) for name in ("run", "nested", "records", "report")},
     "error": _error,
 }

@@ -10,7 +10,7 @@ from pathlib import Path
 from sbafab.design.records import Design
 from sbafab.output.checking import check
 from sbafab.output.earlier import refuse_to_replace
-from sbafab.output.manifest import as_json, identity
+from sbafab.output.manifest import as_json
 from sbafab.output.planned import Checked
 from sbafab.output.run import Extras, generate, with_folder
 from sbafab.progress import Progress, unheard
@@ -64,7 +64,7 @@ def simulate(
         if checked.failed:
             return Simulated(checked.findings, None, found)
         # Said before a run of hours, not after it.
-        refuse_to_replace(out / design.name, identity(design, checked.waived), (name,))
+        refuse_to_replace(out / design.name, design, checked.waived, (name,))
         # A folder in the temporary one has the usual rights, the temporary one itself has not.
         folder = Path(place) / name
         if export:

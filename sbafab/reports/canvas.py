@@ -33,6 +33,8 @@ LEVELS = 60
 PAPER = (255, 255, 255)
 INK = (40, 44, 50)
 SHADOW = 70
+SMALLEST = 15
+"""Pixels of the words, at least: a picture on a page is often shown smaller than it is."""
 BLUR = 8
 
 
@@ -96,11 +98,19 @@ class Canvas:
         from PIL import ImageDraw, ImageFont
 
         width, height = self._size
-        size = max(10, round(height / 52))
+        size = max(SMALLEST, round(height / 52))
         font = ImageFont.load_default(size)
         draw = ImageDraw.Draw(picture)
         x, y = round(0.03 * width), height - 2 * size
-        draw.text((x, y - 1.7 * size), caption, fill=INK, font=font)
+        lines = [""]
+        for word in caption.split():
+            longer = f"{lines[-1]} {word}".strip()
+            if draw.textlength(longer, font=font) <= width - 2 * x:
+                lines[-1] = longer
+            else:
+                lines.append(word)
+        for above, line in enumerate(reversed(lines)):
+            draw.text((x, y - (1.7 + 1.3 * above) * size), line, fill=INK, font=font)
         for tone, said in KEY:
             words = films if tone == "film" else said
             draw.rectangle((x, y, x + 1.6 * size, y + size), fill=COLOURS[tone], outline=INK)

@@ -15,8 +15,10 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import union
-from sbafab.geometry.shapes import disc
-from sbafab.laminate.laminate import Laminate
+from sbafab.geometry.region import Region
+from sbafab.geometry.section import section
+from sbafab.geometry.shapes import disc, strip
+from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.meshing.prisms import Slab, fuse
 from sbafab.meshing.surface import Surface
 from sbafab.models.balloon import Balloon, inflate
@@ -24,7 +26,6 @@ from sbafab.models.balloon import Balloon, inflate
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sbafab.geometry.region import Region
     from sbafab.models.stack import Pose, Stack
 
     Array = NDArray[np.float64]
@@ -33,6 +34,8 @@ FINE, COARSE = 56, 28
 """Facets of a balloon round its axis."""
 SAGITTA = 0.02
 """mm by which a chord of the web may leave its arc."""
+INSIDE = 0.05
+"""mm from the end of a tab at which its width is taken."""
 HIDDEN = 0.3
 """mm by which the web reaches into a pocket, between its films."""
 REACH = 2.5
@@ -207,11 +210,31 @@ def _webs(
 
 
 def _web(laminate: Laminate, stack: Stack, i: int) -> Region:
-    """The plate of a level without its pockets; inlet tabs belong to the lowest."""
+    """The plate of a level without its pockets and ears; inlet tabs belong to the lowest."""
     lower, upper = laminate.tpe_layers[2 * i : 2 * i + 2]
     radius = stack.maps[stack.levels[i]].balloon.pocket - HIDDEN
     pockets = union(disc((float(x), float(y)), radius) for x, y in stack.axes)
-    return union([lower.profile, upper.profile]) - pockets
+    return _trimmed(laminate, union([lower.profile, upper.profile])) - pockets
+
+
+def _trimmed(laminate: Laminate, plate: Region) -> Region:
+    """The plate as it is when the ears are snipped off; its inlet tabs stay."""
+    if laminate.registration != "ears":
+        return plate
+    tabs = [plate & _tab(plate, inlet) for inlet in laminate.inlets]
+    return union([plate & laminate.outline, *tabs])
+
+
+def _tab(plate: Region, inlet: Inlet) -> Region:
+    """The straight strip from the axis to an inlet's mouth, as wide as the plate is there."""
+    (x, y), (u, v) = inlet.mouth, inlet.direction
+    end = x - INSIDE * u, y - INSIDE * v
+    width = sum(high - low for low, high in section(plate, end, (-v, u)) if low < 0 < high)
+    if not width:
+        # Only the films of the bottom balloon have tabs.
+        return Region()
+    length = math.hypot(x, y)
+    return strip((x - length * u, y - length * v), inlet.mouth, width)
 
 
 def _joined(surfaces: Sequence[Surface]) -> Surface:

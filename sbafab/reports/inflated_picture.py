@@ -214,10 +214,11 @@ def _colour(part: InflatedPart, pose: Pose, most: float) -> RGB:
 
 def _caption(laminate: Laminate, pose: Pose, moving: bool) -> str:
     pressures = ", ".join(f"{p:.3g}" for p in pose.pressures)
+    model = "elastic stack" + (", ears snipped off" if laminate.registration == "ears" else "")
     if moving:
-        return f"{laminate.name}, elastic stack"
+        return f"{laminate.name}, {model}"
     bent = f", bent {pose.bend:.0f} degrees" if pose.bend > 0.5 else f", {pose.height:.1f} mm high"
-    return f"{laminate.name} at {pressures} kPa{bent} (elastic stack)"
+    return f"{laminate.name} at {pressures} kPa{bent} ({model})"
 
 
 def _write(image: Image, caption: str, pixels_per_mm: float) -> None:

@@ -46,6 +46,8 @@ def _message(value: float, width: Width | None, alike: Alike, limits: Limits) ->
     if holds(value, limits.bond_width):
         return narrowest
     remedy = (
-        "move the edges on either side apart there" if value else "round the sharp corner there"
+        "raise bond.width, or move the edges on either side apart there"
+        if value
+        else "round the sharp corner there"
     )
     return f"{narrowest}; it needs {limits.bond_width:g}: {remedy}"

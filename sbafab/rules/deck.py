@@ -76,6 +76,9 @@ RULES = (
     Rule(registration_yield.NAME, _sharing(registration_yield.check)),
 )
 
+AT_MOST = frozenset(rule.name for rule in RULES if rule.at_most)
+"""Rules whose limit is the most that may be measured."""
+
 
 def run_deck(
     laminate: Laminate, limits: Limits, progress: Progress | None = None
@@ -127,4 +130,4 @@ def _waived(finding: Finding) -> Finding:
     return replace(finding, verdict="waived", by_user=True, message=message)
 
 
-__all__ = ["RULES", "Limits", "Rule", "has_failed", "rule_names", "run_deck", "run_rule"]
+__all__ = ["AT_MOST", "RULES", "Limits", "Rule", "has_failed", "rule_names", "run_deck", "run_rule"]

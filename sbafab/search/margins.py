@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from sbafab.rules.deck import RULES
+from sbafab.rules.deck import AT_MOST
 from sbafab.rules.finding import Finding, Place, Verdict
 
-AT_MOST = frozenset(rule.name for rule in RULES if rule.at_most)
 ORDER: tuple[Verdict, ...] = ("fail", "waived", "warn", "pass")
 
 

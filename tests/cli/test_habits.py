@@ -12,9 +12,11 @@ from click.shell_completion import ShellComplete
 
 from sbafab.assemblies.checks import CHECKS
 from sbafab.cli import app, main
+from sbafab.cli.verdicts import limit_said
 from sbafab.cli.watching import repeated, stamps
 from sbafab.rules.deck import rule_names
 from sbafab.rules.explained import AS_BUILT, BETWEEN_PARTS, DECK, EXPLAINED
+from sbafab.rules.finding import Finding, Place
 
 
 def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
@@ -40,7 +42,31 @@ def test_check_fits_a_screen_and_sums_up_last(
     _, out, _ = run(["check", "3dof-15mm", "--set", "mask.overhang=0.3"], capsys)
     assert max(map(len, out.splitlines())) <= 80
     _, said, _ = run(["check", "3dof-15mm", "-v"], capsys)
-    assert "largest contribution" in said
+    assert "largest contribution" in " ".join(said.split())
+    assert max(map(len, said.splitlines())) <= 80
+
+
+def test_limits_say_whether_they_are_the_least_or_the_most(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    faulty = ["--set", "mask.overhang=0.3", "--set", "press.platen_width=19"]
+    senses: dict[tuple[str, str], bool] = {}
+    for source, *more in (("3dof-15mm",), ("3dof-15mm", *faulty), ("brace",)):
+        _, out, _ = run(["check", source, *more, "--json"], capsys)
+        for one in json.loads(out)["findings"]:
+            if one["verdict"] not in ("pass", "fail") or None in (one["limit"], one["measured"]):
+                continue
+            assert one["rule"] in {*rule_names(), *CHECKS}
+            finding = Finding(one["rule"], "pass", one["limit"], None, "", Place(), "")
+            is_most = limit_said(finding).startswith("<= ")
+            good = one["verdict"] == "pass"
+            off = one["measured"] - one["limit"]
+            assert abs(off) <= 1e-3 or (off < 0) == (good == is_most), one
+            senses[one["rule"], one["verdict"]] = is_most
+    # Both senses, held and broken.
+    assert senses["mask-overhang", "fail"] is False
+    assert senses["press-fit", "fail"] is True
+    assert {sense for (_, verdict), sense in senses.items() if verdict == "pass"} == {False, True}
 
 
 def test_check_json_names_schema_design_and_summary(capsys: pytest.CaptureFixture[str]) -> None:
@@ -51,6 +77,23 @@ def test_check_json_names_schema_design_and_summary(capsys: pytest.CaptureFixtur
     assert (found["schema"], found["design"]) == ("sbafab/checks@1", "1dof-5mm")
     failed = {f["rule"] for f in found["findings"] if f["verdict"] == "fail"}
     assert (found["summary"]["holds"], found["summary"]["fail"]) == (False, len(failed))
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("registration", "did you mean registration-yield or registration-nominal"),
+        ("bond", "did you mean bond-width\n"),
+        ("zzz", "it may be bond-width, mask-overhang"),
+    ],
+)
+def test_an_unknown_waiver_is_told_in_the_words_it_was_given(
+    name: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, _, err = run(["check", "1dof-5mm", "--waive", name], capsys)
+    assert code == 2
+    assert err.startswith(f"sbafab: --waive '{name}': no rule has that name; ")
+    assert said in err
 
 
 @pytest.mark.parametrize(

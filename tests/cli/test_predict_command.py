@@ -34,6 +34,11 @@ def test_writes_figures_and_plots_that_the_manifest_lists(
     hold("predict", found)
     for figure in found["figures"]:
         assert all(figure[key] for key in ("name", "unit", "model", "trust"))
+    chosen = [figure["name"] for figure in found["figures"] if figure["design_with"]]
+    assert len(chosen) == len(set(chosen)) < len(found["figures"])
+    assert {figure["name"] for figure in found["figures"] if "blocked" in figure["name"]} <= {
+        *chosen
+    }
     plots = {relation["plot"] for relation in found["relations"]}
     assert plots == {
         f"predict/{name}.svg" for name in ("stroke", "force", "bend", "bending", "workspace")
@@ -50,14 +55,21 @@ def _table_reads_well(out: str) -> None:
     lines = out.splitlines()
     assert max(len(line) for line in lines if "written to" not in line) <= 80
     heads = [place for place, line in enumerate(lines) if line.startswith("force: ")]
-    assert [lines[place] for place in heads] == [
-        "force: virtual work on Eq. 4 [10]",
-        "force: virtual work on Eqs. 1-3 [11]",
-        "force: elastic stack [12]",
+    assert [lines[place].partition(" [")[0] for place in heads] == [
+        "force: virtual work on Eq. 4",
+        "force: elastic stack",
+        "force: elastic stack",
+        "force: virtual work on Eqs. 1-3",
     ]
     first, second = (" ".join(lines[heads[0] + row].split()) for row in (1, 2))
     assert first == "blocked force at 10 kPa, flat 0.3927 N"
     assert second.startswith("at 25 % of full stroke")
+    # Above the heading of other models each quantity stands once.
+    others = lines.index("Other models of the same: design with the figures above")
+    assert heads[1] < others < heads[2]
+    above = [line[:58] for line in lines[:others] if line.startswith("  ")]
+    assert sum("10 kPa, flat" in line for line in above) == 1
+    assert "constant curvature" not in "".join(lines[:others])
 
 
 def test_json_is_what_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from sbafab.cli import main
 from sbafab.reports.traveller.code import record_text
+from tests.site.formats import hold
 
 FLAT = 12 * 0.038 + 11 * 0.025
 """mm: twelve films and eleven masks between them."""
@@ -52,7 +53,8 @@ def test_from_the_first_record_to_the_report(
     )
     assert run(["record", "1dof-5mm", "--table", "batch.csv"], capsys)[0] == 0
     code, out, _ = run(["record", "--correct", "2", "--leak", "pass", "--json"], capsys)
-    [new] = json.loads(out)
+    hold("records", json.loads(out))
+    [new] = json.loads(out)["records"]
     assert (code, new["corrects"], new["leak"], new["numbers"]) == (
         0,
         2,
@@ -72,6 +74,7 @@ def test_from_the_first_record_to_the_report(
     monkeypatch.setenv("SBAFAB_LAB", str(Path("lab.sqlite").resolve()))
     _, out, _ = run(["record", "--report", "--json"], capsys)
     said = json.loads(out)
+    hold("report", said)
     assert (said["records"], said["actuators"]) == (4, 3)
     shares = {(s["by"], s["name"]): (s["passed"], s["tested"]) for s in said["success"]}
     assert shares["design", "1dof-5mm"] == (3, 3)
@@ -92,7 +95,7 @@ def test_a_folder_is_recorded_as_the_design_that_it_was_built_from(
     arguments = ["press", "1dof-5mm", "--set", "stack.balloons=2", "--set", "name=two"]
     assert run(arguments, capsys)[0] == 0
     _, out, _ = run(["record", "out/two", "--serial", "1", "--leak", "pass", "--json"], capsys)
-    [record] = json.loads(out)
+    [record] = json.loads(out)["records"]
     manifest = json.loads(Path("out/two/manifest.json").read_text())
     assert record["design_sha256"] == manifest["design_sha256"]
 

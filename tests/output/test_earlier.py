@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -61,7 +62,8 @@ def test_a_part_alone_does_not_put_away_another_designs_files(
 ) -> None:
     good = generate(load_design("1dof-5mm", SMALL), tmp_path)
     before = file_hashes(good.folder)
-    with pytest.raises(OutputError, match="--set name=NAME"):
+    key = re.escape("with press.temperature_c 135.0, not 140.0; take")
+    with pytest.raises(OutputError, match=f"{key}.* --set name=NAME"):
         generate(load_design("1dof-5mm", OTHER), tmp_path, (part,))
     assert file_hashes(good.folder) == before
 

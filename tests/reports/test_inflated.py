@@ -16,6 +16,7 @@ from PIL import Image
 import sbafab
 from sbafab.cli import app
 from sbafab.errors import DesignError
+from sbafab.laminate.extent import outline_diameter
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.stack import Stack
 from sbafab.reports.inflated import InflatedPart, inflated, pressed
@@ -53,6 +54,22 @@ def test_drawn_balloons_hold_the_air_of_their_pose(
         # Between its plates a balloon takes its films and masks along: pitch over the pocket.
         films = stack.pitch * math.pi * 2.3**2 * 4
         assert body.volume - films == pytest.approx(pose.volumes[part.chamber], abs=7.0)
+
+
+def test_ears_are_snipped_off_and_tabs_stay() -> None:
+    changes = (*CHANGES, "registration.method=ears")
+    eared = sbafab.build("3dof-15mm", *changes)
+    own = sbafab.stack("3dof-15mm", *changes)
+    parts = inflated(eared, own, own.pose((5.0, 5.0, 5.0)))
+    points = np.concatenate([part.surface.points for part in parts])
+    # Above the bottom balloon nothing stands out of the circle that the films fit.
+    above = points[points[:, 2] > 0.5 * points[:, 2].max()]
+    assert np.hypot(*above[:, :2].T).max() <= outline_diameter(eared) / 2 + 0.1
+    # Ears would reach beyond the tabs, whose ends are where the inlets' mouths are.
+    mouth = max(math.hypot(*inlet.mouth) for inlet in eared.inlets)
+    half = max(inlet.width for inlet in eared.inlets)
+    farthest = np.hypot(*points[:, :2].T).max()
+    assert mouth - 0.1 <= farthest <= math.hypot(mouth, half) + 0.1
 
 
 def test_it_stands_on_its_base_and_ends_at_the_tip(laminate: Laminate, stack: Stack) -> None:

@@ -36,7 +36,8 @@ def test_bond_width_of_a_narrow_ring(good: Good, spoil: Spoil) -> None:
             "mm",
             Place(5, (9, 10, 11), 2.925, 0.0),
             "the narrowest bond is 0.650 mm, at chamber interface 5 (layers 9 and 11), x 2.925, "
-            "y 0.000; it needs 0.75: move the edges on either side apart there",
+            "y 0.000; it needs 0.75: raise bond.width, or move the edges on either side apart "
+            "there",
         ),
     )
 

@@ -64,6 +64,16 @@ def test_what_is_printed_is_of_its_schema(
     hold("predict", prediction_json(design, sbafab.predict(design, quick=True)))
 
 
+def test_what_runs_print_is_of_its_schema(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = ["--set", ONE, "-o", str(tmp_path), "--json"]
+    hold("run", json.loads(run(["press", "1dof-5mm", *out], capsys)))
+    failing = ["press", "1dof-5mm", "--set", "mask.overhang=0.3", "--set", "name=bad", *out]
+    hold("run", json.loads(run(failing, capsys)))
+    hold("nested", json.loads(run(["nest", "1dof-5mm", *out], capsys)))
+
+
 def test_a_format_that_says_another_thing_is_told() -> None:
     found = prediction_json(
         design := sbafab.load("1dof-5mm", ONE), sbafab.predict(design, quick=True)

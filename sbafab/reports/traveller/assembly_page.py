@@ -19,6 +19,7 @@ from sbafab.reports.traveller import base_plate, bench, bill, joining, notes, ti
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.cautions import cautions, for_the_designer
 from sbafab.reports.traveller.code import code_svg, record_text
+from sbafab.reports.traveller.day import before_the_day, tools
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.page import context, environment, frame, sheet_rows
 from sbafab.reports.traveller.page import films as page_films
@@ -88,6 +89,8 @@ def assembly_html(job: AssemblyJob) -> str:
             tested=[name for made in job.assembled.designs for name in made.parts],
             cautions=_cautions(job),
             bill=_bill(job),
+            before_the_day=before_the_day(works),
+            tools=tools(works),
             before_cutting=bench.before_cutting(f for w in works for f in page_films(w.laminate)),
             after_cutting=bench.after_cutting(works),
             sheet_rows=sheet_rows(works[0].design, job.sheets, _marks(job)),

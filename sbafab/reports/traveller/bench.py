@@ -142,7 +142,8 @@ def closing(step: Step, cycles: tuple[str, ...] = ()) -> Action:
     """When the timer starts, as the plate goes in cold; a box for each of the ``cycles``."""
     return Action(
         f"Close the press. The plate goes in cold: start the timer, {say.minutes(step.minutes)}, "
-        f"when a thermocouple at its edge reads {step.temperature_c - WARM:g} °C, not before.",
+        f"when a thermocouple at its edge reads {step.temperature_c - WARM:g} °C, not before. How "
+        "long it warms is not known: measure it.",
         (),
         cycles,
     )

@@ -32,6 +32,7 @@ from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.batch import batch_page
 from sbafab.reports.traveller.cautions import cautions, for_the_designer
 from sbafab.reports.traveller.code import code_svg, record_text
+from sbafab.reports.traveller.day import before_the_day, tools
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.layup import Round, rounds
 from sbafab.reports.traveller.shapes import definitions, pattern_regions
@@ -102,6 +103,8 @@ def context(work: Work) -> dict[str, Any]:
         "before_cutting": bench.before_cutting(films(laminate)),
         "after_cutting": bench.after_cutting([work]),
         "bill": bill.bill(work),
+        "before_the_day": before_the_day([work]),
+        "tools": tools([work]),
         "others": others,
         "sheet_rows": sheet_rows(work.design, work.sheets, {work.design.name: "", **others}),
         "cuts": bill.cut_list(work),

@@ -14,16 +14,18 @@ from sbafab.laminate.assembly import AssemblyStep, distinct_layers
 from sbafab.laminate.laminate import Inlet, Laminate, Pin
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller.layup import Bed, inlets_in
-from sbafab.reports.traveller.shapes import Picture, flat, label, pattern_id
+from sbafab.reports.traveller.named_places import Name, named
+from sbafab.reports.traveller.shapes import Picture, flat, pattern_id
 
-WIDEST, TALLEST = 64.0, 34.0
+WIDEST, TALLEST = 64.0, 44.0
 NARROWEST = 66.0
 """mm: room for the words under the picture."""
 EDGE, HEAD, FOOT = 5.0, 5.0, 9.0
+NAMES = 2.0
+"""Height of the names of pins and chambers, mm."""
 FREE = 6.0
 """mm of air round a laminate that has no base plate."""
 PLATE = "#f1f1ef"
-BESIDE = 2.2
 AT_DATUM = 1e-3
 """mm from the datum within which a pin hides it."""
 
@@ -77,10 +79,22 @@ def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: s
     inlets = inlets_in(laminate, step.layers)
     # An arrow at its tab names the pin of a chamber, too.
     told = {inlet.chamber for inlet in inlets}
+    names, taken = [], []
     for pin in laminate.pins:
-        picture.add(*_pin(pin, pin in step.pins, view, pin.name not in told))
+        at, r = view.at(pin.centre), _radius(pin, view)
+        picture.add(_pin(at, r, pin in step.pins))
+        taken.append((at[0] - r, at[1] - r, at[0] + r, at[1] + r))
+        if pin in step.pins and pin.name not in told:
+            names.append(Name(pin.name, at, r + 0.6, _outward(pin)))
+    arrows = []
     for inlet in inlets:
-        picture.add(*_inlet(inlet, _reach(laminate, inlet), view))
+        start, tip = _arrow(inlet, _reach(laminate, inlet), view)
+        (u, v), xs, ys = inlet.direction, (start[0], tip[0]), (start[1], tip[1])
+        picture.add(draw.line([start, tip], width=0.35), draw.arrow(tip, (u, -v)))
+        taken.append((min(xs) - 0.7, min(ys) - 0.7, max(xs) + 0.7, max(ys) + 0.7))
+        arrows.append(Name(inlet.chamber, tip, 0.9, (u, -v)))
+    room = 0.5, HEAD + 0.3, view.width - 0.5, view.height - FOOT + 1.0
+    picture.add(*named([*arrows, *names], NAMES, room, taken))
     at_datum = next((pin.name for pin in step.pins if math.hypot(*pin.centre) < AT_DATUM), None)
     if at_datum is None:
         picture.add(*_datum(view))
@@ -104,20 +118,24 @@ def _widened(bounds: Bounds) -> Bounds:
     return low_x - FREE, low_y - FREE, high_x + FREE, high_y + FREE
 
 
-def _pin(pin: Pin, is_in: bool, view: _View, is_named: bool) -> list[str]:
-    """A pin that is in: filled, with its name on the side away from the middle; out: hollow."""
-    (x, y), r = view.at(pin.centre), max(pin.diameter * view.scale / 2, 0.7)
+def _radius(pin: Pin, view: _View) -> float:
+    return max(pin.diameter * view.scale / 2, 0.7)
+
+
+def _outward(pin: Pin) -> Point:
+    """On the page, from the datum to the pin; upward for the pin that stands there."""
+    far = math.hypot(*pin.centre)
+    return (pin.centre[0] / far, -pin.centre[1] / far) if far > AT_DATUM else (0.0, -1.0)
+
+
+def _pin(at: Point, r: float, is_in: bool) -> str:
+    """A pin that is in: filled; out: hollow."""
+    x, y = at
     fill = draw.DARK if is_in else "#ffffff"
-    circle = (
+    return (
         f'<circle cx="{number(x)}" cy="{number(y)}" r="{number(r)}" fill="{fill}" '
         f'stroke="{draw.DARK}" stroke-width="0.3"/>'
     )
-    if not (is_in and is_named):
-        return [circle]
-    far = math.hypot(*pin.centre)
-    u, v = (pin.centre[0] / far, pin.centre[1] / far) if far > AT_DATUM else (0.0, -1.0)
-    aside = r + 0.8 + draw.text_width(pin.name, 1.9) / 2
-    return [circle, label((x + aside * u, y - (r + 1.6) * v + 0.7), pin.name, 1.9)]
 
 
 def _reach(laminate: Laminate, inlet: Inlet) -> float:
@@ -127,20 +145,11 @@ def _reach(laminate: Laminate, inlet: Inlet) -> float:
     return max((end for _, end in spans), default=0.0)
 
 
-def _inlet(inlet: Inlet, reach: float, view: _View) -> list[str]:
-    """An arrow outward from the end of the tab and its strip, and the chamber's name at its end."""
+def _arrow(inlet: Inlet, reach: float, view: _View) -> tuple[Point, Point]:
+    """Start and tip of an arrow outward from the end of the tab and its strip."""
     u, v = inlet.direction
     (x, y), v = view.at((inlet.mouth[0] + reach * u, inlet.mouth[1] + reach * v)), -v
-    start, tip = (x + 0.8 * u, y + 0.8 * v), (x + 4.0 * u, y + 4.0 * v)
-    half = draw.text_width(inlet.chamber, 2.2) / 2
-    # Sideways the words need room for their width, up and down for their height.
-    middle = tip[0] + (half + 0.8) * u, tip[1] + BESIDE * v + 0.8
-    middle = min(max(middle[0], half + 0.5), view.width - half - 0.5), middle[1]
-    return [
-        draw.line([start, tip], width=0.35),
-        draw.arrow(tip, (u, v)),
-        label(middle, inlet.chamber, 2.2),
-    ]
+    return (x + 0.8 * u, y + 0.8 * v), (x + 4.0 * u, y + 4.0 * v)
 
 
 def _datum(view: _View) -> list[str]:
