@@ -61,7 +61,7 @@ def test_the_prediction_is_that_of_the_command_or_says_why_there_is_none(tmp_pat
     theirs = api.predict(api.loads(SMALL), quick=True).as_dict()
     assert told["prediction"]["figures"] == theirs["figures"]
     aperture = JOBS["live"](job(tmp_path, api.template("aperture")), lambda: None)
-    told = {answer["kind"]: answer for answer in islice(aperture, 3)}
+    told = {answer["kind"]: answer for answer in islice(aperture, 4)}
     assert "an assembly" in told["unpredicted"]["message"]
 
 

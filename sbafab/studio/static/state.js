@@ -18,6 +18,10 @@ export class Studio {
     this.place = -1;
     this.shapes = new Map();
     this.laminate = null;
+    this.parts = null;
+    this.surfaces = new Map();
+    this.pickedParts = [];
+    this.back = null;
     this.values = null;
     this.family = null;
     this.findings = [];
@@ -47,8 +51,9 @@ export class Studio {
   }
 
   // What is opened: a text with the file it came from (or none) and what lies on disk.
-  open(text, { name = null, seen = null, saved = text } = {}) {
-    Object.assign(this, { text, name, seen, savedText: saved, picked: null, cut: null });
+  open(text, { name = null, seen = null, saved = text, back = null } = {}) {
+    Object.assign(this, { text, name, seen, savedText: saved, back, picked: null, pickedParts: [], cut: null });
+    this.keepBack();
     this.pending.clear();
     this.history = [text];
     this.place = 0;
@@ -116,6 +121,12 @@ export class Studio {
     remember(this.draftKey, { name, text, savedText, seen, folder, at: Date.now() });
     this.emit("kept");
   }
+  // What a part was opened from waits in the store as well, as long as it has work that is not saved.
+  keepBack() {
+    const { back, folder } = this, key = this.draftKey + ":back";
+    if (back && back.text !== back.savedText) remember(key, { ...back, folder, at: Date.now() });
+    else localStorage.removeItem(key);
+  }
   draft() {
     const own = recall(this.draftKey, null);
     return own && own.folder === this.folder ? own : null;
@@ -132,7 +143,7 @@ export class Studio {
   }
 
   body() {
-    return { tab, text: this.text, edits: [...this.pending], name: this.name, has: [...this.shapes.keys()] };
+    return { tab, text: this.text, edits: [...this.pending], name: this.name, has: [...this.shapes.keys(), ...this.surfaces.keys()] };
   }
 
   // One request at a time: a drag shows every state it can, and never waits for the rules.
@@ -164,16 +175,17 @@ export class Studio {
     const hears = {
       text: () => this.heardText(answer.text, sent),
       design: () => {
-        Object.assign(this, { values: answer.values, family: answer.family, designName: answer.name });
+        Object.assign(this, { values: answer.values, family: answer.family, designName: answer.name, parts: null });
         this.error = null;
         this.emit("design");
       },
       assembly: () => {
-        Object.assign(this, { family: "assembly", designName: answer.name, laminate: null, error: null });
-        this.stale.laminate = this.stale.bonds = this.wanted;
+        const seen = this.laminate !== null;
+        Object.assign(this, { values: answer.values, family: "assembly", designName: answer.name, laminate: null, error: null });
         this.emit("design");
-        this.emit("laminate");
+        if (seen) this.emit("laminate");
       },
+      parts: () => this.heardParts(answer, flight),
       laminate: () => this.heardLaminate(answer, flight),
       bonds: () => this.heardBonds(answer, flight),
       prediction: () => {
@@ -199,7 +211,7 @@ export class Studio {
       superseded: () => {},
     };
     (hears[answer.kind] ?? (() => this.fail(answer)))();
-    if (["bonds", "error", "defect", "crashed", "assembly"].includes(answer.kind)) {
+    if (["bonds", "error", "defect", "crashed", "parts"].includes(answer.kind)) {
       flight.shown = true;
       if (this.wanted) this.ask();
     }
@@ -217,6 +229,17 @@ export class Studio {
     this.stale.laminate = this.wanted;
     if (!this.cut || !this.cut.moved) this.cut = firstCut(answer);
     this.emit("laminate");
+    this.emit("stale");
+    requestAnimationFrame(() => setTimeout(() => this.time("geometry", flight)));
+  }
+  // An assembly's parts and their places; a surface comes once.
+  heardParts(answer, flight) {
+    for (const [key, surface] of Object.entries(answer.surfaces)) this.surfaces.set(key, surface);
+    this.parts = answer.parts;
+    if (this.surfaces.size > 60) for (const key of this.surfaces.keys()) if (!answer.parts.some(({ surface }) => surface === key)) this.surfaces.delete(key);
+    this.pickedParts = this.pickedParts.filter((name) => answer.parts.some((part) => part.name === name));
+    this.stale.laminate = this.stale.bonds = this.wanted;
+    this.emit("parts");
     this.emit("stale");
     requestAnimationFrame(() => setTimeout(() => this.time("geometry", flight)));
   }
@@ -321,6 +344,7 @@ export class Studio {
     this.emit("reference");
   }
   layer(index) { return this.laminate?.layers[index - 1]; }
+  pickParts(names) { this.pickedParts = names; this.emit("part"); }
   pick(layer) { this.picked = layer; this.emit("pick"); }
   hover(layer, words = "") {
     if (layer === this.hovered && words === this.hoverWords) return;
