@@ -28,6 +28,9 @@ def edited(text: str, edits: Iterable[Edit]) -> str:
         if value is None:
             _take_out(document, parts)
             continue
+        if _has_table(document, parts):
+            _put(document, parts, _value(key, value))
+            continue
         before = tomlkit.dumps(document)
         _put(document, parts, _value(key, value))
         if not _holds(document, parts):
@@ -37,6 +40,13 @@ def edited(text: str, edits: Iterable[Edit]) -> str:
             if not _holds(document, parts):
                 raise DesignError(f"{key} cannot be put in here; change it in the text")
     return tomlkit.dumps(document)
+
+
+def _has_table(table: Any, parts: list[str]) -> bool:
+    """Whether the table that the key goes into is there already."""
+    for part in parts[:-1]:
+        table = table.get(part) if isinstance(table, MutableMapping) else None
+    return isinstance(table, MutableMapping)
 
 
 def _holds(document: tomlkit.TOMLDocument, parts: list[str]) -> bool:

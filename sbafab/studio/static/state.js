@@ -309,7 +309,7 @@ export class Studio {
     if (sha === this.seen || sha === "") return;
     const found = await ask(`/api/file/${encodeURIComponent(this.name)}`).catch(() => null);
     if (!found || found.sha === this.seen) return;
-    if (this.unsaved && found.text !== this.text) { this.emit("conflict", found); return; }
+    if ((this.unsaved || this.pending.size) && found.text !== this.text) { this.emit("conflict", found); return; }
     this.take(found);
   }
   take(found) {
