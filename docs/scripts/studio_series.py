@@ -13,6 +13,7 @@ from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont
 
+from docs.scripts.studio_pictures import without_timing
 from sbafab import api
 from tests.studio.browsing import Watched, browser, served
 
@@ -33,18 +34,22 @@ def main() -> None:
         with served(folder, "gripper.toml") as link:
             seen = Watched(chromium, link, viewport=PAGE)
             seen.ready()
+            without_timing(seen)
             frames = [*_knob(seen), *_finding(seen), *_motion(seen)]
             seen.close()
     pictures = [picture for picture, _ in frames]
+    out = io.BytesIO()
     pictures[0].save(
-        PICTURE,
+        out,
+        "WEBP",
         save_all=True,
         append_images=pictures[1:],
         duration=[duration for _, duration in frames],
         loop=0,
         quality=QUALITY,
-        method=6,
+        method=4,
     )
+    PICTURE.write_bytes(out.getvalue())
 
 
 def _knob(seen: Watched) -> list[Frame]:

@@ -48,7 +48,7 @@ def free_strokes(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
     for row, pressure in enumerate(asked.pressures_kpa):
         at = f"at {pressure:g} kPa"
         try:
-            stroke, volume, stored = _risen(kinds, pressure, together and together[row])
+            stroke, volume, stored = _risen(kinds, pressure, together[row] if together else None)
         except DesignError as error:
             yield LeftOut(f"free stroke {at}, elastic balloon", str(error))
             continue

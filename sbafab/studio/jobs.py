@@ -15,7 +15,7 @@ from sbafab import api
 from sbafab.errors import DesignError, SbafabError
 from sbafab.studio import places
 from sbafab.studio.editing import MOST_EDITS, edited
-from sbafab.studio.model import Beat, bonds_model, finding_model, laminate_model
+from sbafab.studio.model import Beat, finding_model, laminate_model
 from sbafab.studio.moving import Filling, poses, stack_model
 from sbafab.studio.parts import parts_model
 
@@ -36,7 +36,7 @@ MOST_FILLINGS = 8
 def live(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     """Text after the edits and design, then what is seen, in the order in which it is known.
 
-    Laminate, bonds and prediction come before the rules; the yield is the last of those.
+    Laminate and prediction come before the rules; the yield is the last of those.
     """
     text = _text(job)
     yield {"kind": "text", "text": text}
@@ -47,10 +47,7 @@ def live(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     yield {"kind": "design", "name": found.name, "family": found.family, **_values(found)}
     beat()
     laminate = _laminate(text, job["folder"], job["path"])
-    shown = laminate_model(laminate, frozenset(job.get("has", ())))
-    yield shown
-    beat()
-    yield bonds_model(laminate, {*job.get("has", ()), *shown["shapes"]})
+    yield laminate_model(laminate, frozenset(job.get("has", ())))
     beat()
     yield _prediction(found, laminate)
     beat()

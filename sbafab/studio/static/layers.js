@@ -159,7 +159,8 @@ export class Layers {
     if (onCut) return this.studio.hover(null, "Section: drag to move, with Shift to turn");
     const shape = this.studio.shape(pattern.shape);
     const inside = contains(shape, x, y);
-    const bond = inside && this.studio.laminate.bonds.find((bond) => bond.layers.includes(layer.index) && contains(this.studio.shape(bond.shape), x, y));
+    const there = (index) => contains(this.studio.shape(this.studio.laminate.patterns[this.studio.layer(index).pattern].shape), x, y);
+    const bond = inside && !layer.mask && this.studio.laminate.bonds.find(({ layers }) => (layers[0] === layer.index || layers.at(-1) === layer.index) && there(layers[0]) && there(layers.at(-1)) && !layers.slice(1, -1).some(there));
     this.studio.hover(inside ? layer : null, inside ? `${layerWords(layer)} · ${plain(nearest(shape, x, y), 2)} mm to its edge${bond ? ` · bonds ${bond.layers.map(String).join("–")}` : ""} · ${where}` : where);
   }
   goto(layer, x, y) {

@@ -221,16 +221,16 @@ function marks(section) {
       if (words) words.textContent = bad ? "Last good design" : element.classList.contains("section-block") ? "Updating" : "Updating";
     };
     for (const view of [views.solid, views.layers, views.compare, views.parts, views.plan]) mark(view.element, studio.stale.laminate || bad);
-    mark(section.element, studio.stale.bonds || bad);
+    mark(section.element, studio.stale.laminate || bad);
     mark($("#panel-findings").children[0], studio.stale.rules || bad);
     mark($("#panel-findings").children[1], studio.stale.figures || bad);
   };
-  studio.on("stale failed laminate bonds parts checked figures", stale);
+  studio.on("stale failed laminate parts checked figures", stale);
   studio.on("hover", (words) => { $("#hover").textContent = words; });
   studio.on("busy", (on) => { $("#busy").textContent = on ? "working" : ""; });
   studio.on("timing", () => {
     const last = (what) => studio.latency[what].at(-1);
-    $("#timing").textContent = [["geometry", "views"], ["section", "section"], ["figures", "prediction"], ["deck", "rules"], ["all", "with yield"]].filter(([what]) => last(what)).map(([what, words]) => `${words} ${Math.round(last(what))} ms`).join("  ");
+    $("#timing").textContent = [["geometry", "views"], ["figures", "prediction"], ["deck", "rules"], ["all", "with yield"]].filter(([what]) => last(what)).map(([what, words]) => `${words} ${Math.round(last(what))} ms`).join("  ");
   });
 }
 

@@ -29,12 +29,12 @@ export class Studio {
     this.unmeasured = null;
     this.prediction = null;
     this.error = null;
-    this.stale = { laminate: true, bonds: true, rules: true, figures: true };
+    this.stale = { laminate: true, rules: true, figures: true };
     this.picked = null;
     this.hovered = null;
     this.cut = null;
     this.reference = null;
-    this.latency = { geometry: [], section: [], figures: [], deck: [], all: [] };
+    this.latency = { geometry: [], figures: [], deck: [], all: [] };
     this.listeners = new Map();
     this.flight = null;
     this.draftKey = "sbafab-draft:" + (sessionStorage.getItem("sbafab-tab") ?? freshTab());
@@ -187,7 +187,6 @@ export class Studio {
       },
       parts: () => this.heardParts(answer, flight),
       laminate: () => this.heardLaminate(answer, flight),
-      bonds: () => this.heardBonds(answer, flight),
       prediction: () => {
         this.prediction = answer;
         this.heardFigures(null);
@@ -211,7 +210,7 @@ export class Studio {
       superseded: () => {},
     };
     (hears[answer.kind] ?? (() => this.fail(answer)))();
-    if (["bonds", "error", "defect", "crashed", "parts"].includes(answer.kind)) {
+    if (["laminate", "error", "defect", "crashed", "parts"].includes(answer.kind)) {
       flight.shown = true;
       if (this.wanted) this.ask();
     }
@@ -225,7 +224,8 @@ export class Studio {
   }
   heardLaminate(answer, flight) {
     for (const [key, shape] of Object.entries(answer.shapes)) this.shapes.set(key, shape);
-    this.laminate = { ...answer, bonds: [] };
+    this.laminate = { ...answer, bonds: interfaces(answer.layers) };
+    this.drop();
     this.stale.laminate = this.wanted;
     if (!this.cut || !this.cut.moved) this.cut = firstCut(answer);
     this.emit("laminate");
@@ -238,20 +238,10 @@ export class Studio {
     this.parts = answer.parts;
     if (this.surfaces.size > 60) for (const key of this.surfaces.keys()) if (!answer.parts.some(({ surface }) => surface === key)) this.surfaces.delete(key);
     this.pickedParts = this.pickedParts.filter((name) => answer.parts.some((part) => part.name === name));
-    this.stale.laminate = this.stale.bonds = this.wanted;
+    this.stale.laminate = this.wanted;
     this.emit("parts");
     this.emit("stale");
     requestAnimationFrame(() => setTimeout(() => this.time("geometry", flight)));
-  }
-  // What of every interface bonds: the section waits for it.
-  heardBonds(answer, flight) {
-    for (const [key, shape] of Object.entries(answer.shapes)) this.shapes.set(key, shape);
-    this.laminate.bonds = answer.bonds;
-    this.drop();
-    this.stale.bonds = this.wanted;
-    this.emit("bonds");
-    this.emit("stale");
-    requestAnimationFrame(() => setTimeout(() => this.time("section", flight)));
   }
   heardFigures(refusal) {
     this.noFigures = refusal;
@@ -357,10 +347,20 @@ export class Studio {
   shape(key) { return this.shapes.get(key) ?? []; }
 }
 
-export const shapeKeys = (laminate) => [
-  ...Object.values(laminate.patterns).map((pattern) => pattern.shape),
-  ...laminate.bonds.flatMap((bond) => [bond.shape, bond.open]),
-];
+export const shapeKeys = (laminate) => Object.values(laminate.patterns).map((pattern) => pattern.shape);
+
+// Between every two films that follow each other, bottom to top: which layers meet there, masks between them included.
+function interfaces(layers) {
+  const found = [];
+  let met = [];
+  for (const layer of layers) {
+    met.push(layer);
+    if (layer.mask) continue;
+    if (met.length > 1 && !met[0].mask) found.push({ interface: found.length + 1, layers: met.map(({ index }) => index), z: met[0].z + met[0].thickness, gap: layer.z - met[0].z - met[0].thickness });
+    met = [layer];
+  }
+  return found;
+}
 
 function freshTab() {
   const id = uniqueName();
