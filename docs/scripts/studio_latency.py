@@ -20,16 +20,14 @@ from sbafab.studio.jobs import JOBS
 from tests.studio.browsing import Watched, browser, served
 
 PARTS = {
-    "geometry": "layers painted",
-    "section": "section painted",
+    "geometry": "layers and section painted",
     "figures": "prediction by formulas",
     "deck": "rules but the yield",
     "all": "rules with the yield",
 }
 
 ANSWERS = {
-    "laminate": "layers and solid",
-    "bonds": "section",
+    "laminate": "layers, section and solid",
     "prediction": "prediction by formulas",
     "registration-worst-case": "rules but the yield",
     "checked": "rules with the yield",
@@ -56,7 +54,7 @@ def main(changes: int = 25) -> None:
             seen.page.click("#tab-solid")
             _warm(seen)
             _turned(seen, changes)
-            _row("solid painted, in place of layers", seen.say("studio.latency.geometry"))
+            _row("solid and section painted", seen.say("studio.latency.geometry"))
             seen.page.click("#tab-motion")
             seen.until("Boolean(studio.motion.pose)")
             seen.say("studio.motion.set(() => 15)")

@@ -15,7 +15,7 @@ from sbafab.design.templates import template_names, template_text
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
 
-    from sbafab.assemblies.build import Assembled
+    from sbafab.assemblies.build import Assembled, PlacedPart
     from sbafab.assemblies.records import Assembly
     from sbafab.laminate.laminate import Laminate, Layer
     from sbafab.meshing.surface import Surface
@@ -59,11 +59,12 @@ def loads(text: str, path: str | Path = "design.toml") -> Design | Assembly:
     return load_text(text, Path(path))
 
 
-def resolved(design: Design) -> dict[str, Any]:
-    """The design's tables with every default written out; lengths are mm."""
+def resolved(design: Design | Assembly) -> dict[str, Any]:
+    """The tables of a design or an assembly with every default written out; lengths are mm."""
+    from sbafab.assemblies.writing import plain_tables
     from sbafab.design.writing import resolved as written_out
 
-    return written_out(design)
+    return written_out(design) if isinstance(design, Design) else plain_tables(design)
 
 
 def build(source: Source, *changes: Change, **tables: Any) -> Laminate:
@@ -75,15 +76,18 @@ def build(source: Source, *changes: Change, **tables: Any) -> Laminate:
     return actuators.build(load(source, *changes, **tables))
 
 
-def assemble(source: str | Path, *changes: Change, **tables: Any) -> Assembled:
-    """An assembly from a template's name or a TOML file: its parts with designs and places.
+def assemble(source: str | Path | Assembly, *changes: Change, **tables: Any) -> Assembled:
+    """An assembly from a template's name, a TOML file or its record: parts, designs and places.
 
     Places are mm and degrees in the frame of the part that stands on nothing. Raises DesignError
     where a part cannot sit where it should. The templates are the paper's (Sec. 2.1).
     """
     from sbafab.assemblies.build import assemble as put_together
     from sbafab.assemblies.reading import load_assembly
+    from sbafab.assemblies.records import Assembly
 
+    if isinstance(source, Assembly):
+        return put_together(source)
     return put_together(load_assembly(source, [*changes, tables]))
 
 
@@ -134,14 +138,20 @@ def check_folder(folder: str | Path) -> Findings:
     return Findings(read_and_check(Path(folder)))
 
 
-def solid(source: Source | Laminate, *changes: Change, **tables: Any) -> Surface:
+def solid(source: Source | Laminate | PlacedPart, *changes: Change, **tables: Any) -> Surface:
     """The closed surface of the flat actuator in mm, for example for ``solid(...).trimesh()``.
 
-    Films have their nominal thickness, pockets that of their mask. Raises DesignError.
+    Films have their nominal thickness, pockets that of their mask. Of an assembly's part it is the
+    outside, in the part's own frame and bent round its tube; ``part.pose`` places it. Raises
+    DesignError.
     """
+    from sbafab.assemblies.build import PlacedPart
+    from sbafab.assemblies.shapes import bent_surface
     from sbafab.laminate.laminate import Laminate
     from sbafab.meshing.solid import solid as surface_of
 
+    if isinstance(source, PlacedPart):
+        return bent_surface(source, filled=True)
     flat = source if isinstance(source, Laminate) else build(source, *changes, **tables)
     return surface_of(flat)
 

@@ -26,11 +26,15 @@ AROUND = 48
 
 def placed_surface(placed: PlacedPart, filled: bool = False) -> Surface:
     """The closed surface of a part in place; ``filled`` leaves out what films enclose."""
+    own = bent_surface(placed, filled)
+    return Surface(placed.pose.points(own.points), own.faces)
+
+
+def bent_surface(placed: PlacedPart, filled: bool = False) -> Surface:
+    """The same before its pose: turned about its own axis and bent round its tube."""
     own = own_surface(placed, filled)
     turned = Surface(placed.turned(own.points), own.faces)
-    if placed.radius is not None:
-        turned = bent(turned, placed.radius)
-    return Surface(placed.pose.points(turned.points), turned.faces)
+    return turned if placed.radius is None else bent(turned, placed.radius)
 
 
 def own_surface(placed: PlacedPart, filled: bool = False) -> Surface:

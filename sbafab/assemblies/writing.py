@@ -7,9 +7,15 @@ import json
 from typing import Any
 
 from sbafab.assemblies.build import Assembled, PlacedPart
+from sbafab.assemblies.records import Assembly
 from sbafab.design.writing import design_sha256
 
 DESIGN_FILE = "design.toml"
+
+
+def plain_tables(assembly: Assembly) -> dict[str, Any]:
+    """The assembly's own keys as tables, with every default written out."""
+    return _without_none(assembly.model_dump(mode="json"))
 
 
 def resolved(assembled: Assembled) -> dict[str, Any]:

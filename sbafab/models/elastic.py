@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from sbafab.errors import DesignError
 from sbafab.models.actuator import Actuator
-from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.balloon import Balloon, Shapes, inflate
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.figures import Asked, Factors, Figure, LeftOut, Model
 
+Inflated = Mapping[Balloon, Shapes]
 ELASTIC = Model(
     "elastic balloon",
     "membrane of revolution, the film's modulus",
@@ -43,10 +44,11 @@ def free_strokes(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
         yield LeftOut("free stroke, elastic balloon", str(error))
         return
     model = calibrated(ELASTIC, asked.calibration)
-    for pressure in asked.pressures_kpa:
+    together = _inflated(kinds, asked.pressures_kpa)
+    for row, pressure in enumerate(asked.pressures_kpa):
         at = f"at {pressure:g} kPa"
         try:
-            stroke, volume, stored = _risen(kinds, pressure)
+            stroke, volume, stored = _risen(kinds, pressure, together[row] if together else None)
         except DesignError as error:
             yield LeftOut(f"free stroke {at}, elastic balloon", str(error))
             continue
@@ -57,11 +59,25 @@ def free_strokes(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
         yield Figure("actuation", f"pneumatic input work {at}, free", work, "mJ", model)
 
 
-def _risen(kinds: Counter[Balloon], pressure: float) -> tuple[float, float, float]:
+def _inflated(kinds: Iterable[Balloon], pressures: Sequence[float]) -> list[Inflated] | None:
+    """The balloons at each pressure, all in one go; None where one finds no balance."""
+    try:
+        found = {kind: inflate(kind, pressures) for kind in kinds}
+    except DesignError:
+        return None
+    return [
+        {kind: Shapes(*(values[row : row + 1] for values in found[kind])) for kind in found}
+        for row in range(len(pressures))
+    ]
+
+
+def _risen(
+    kinds: Counter[Balloon], pressure: float, known: Inflated | None
+) -> tuple[float, float, float]:
     """Stroke in mm, air in ul and energy in uJ (that is the integral of p dV) of one stack."""
     stroke = volume = stored = 0.0
     for kind, count in kinds.items():
-        shape = inflate(kind, pressure)
+        shape = known[kind] if known else inflate(kind, pressure)
         longer = float(stretch(kind, shape)[0])
         if longer > MOST_STRETCH:
             raise DesignError(

@@ -43,8 +43,12 @@ def answers(job: StudioJob, beat: Beat) -> Iterator[Answer]:
 def refusal(sentence: str) -> Answer:
     """The answer that refuses, with the key of a design file that the sentence names first."""
     words = (word.strip(",;:()[]'\"") for word in sentence.split())
-    field = next((word for word in words if word in design_keys()), None)
+    field = next((word for word in words if _is_key(word)), None)
     return {"kind": "error", "message": sentence, **({"field": field} if field else {})}
+
+
+def _is_key(word: str) -> bool:
+    return word.startswith("parts.") or word in design_keys()
 
 
 @lru_cache(maxsize=1)

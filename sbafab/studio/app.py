@@ -28,7 +28,7 @@ from sbafab.studio.made import Made, zipped
 from sbafab.studio.workers import BusyError, Worker
 
 STATIC = Path(__file__).parent / "static"
-LIVE_SECONDS, MAKE_SECONDS = 20.0, 900.0
+LIVE_SECONDS, MAKE_SECONDS = 60.0, 900.0
 LOOK_EVERY = 0.4
 """Seconds between two looks at the file on disk."""
 MOST_MADE = 6

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterable, MutableMapping
 from typing import Any
 
 import tomlkit
+import tomlkit.items
 from tomlkit.exceptions import TOMLKitError
 
 from sbafab.errors import DesignError
@@ -25,9 +27,38 @@ def edited(text: str, edits: Iterable[Edit]) -> str:
         parts = key.split(".")
         if value is None:
             _take_out(document, parts)
-        else:
+            continue
+        if _has_table(document, parts):
             _put(document, parts, _value(key, value))
+            continue
+        before = tomlkit.dumps(document)
+        _put(document, parts, _value(key, value))
+        if not _holds(document, parts):
+            # A table of dotted keys takes no header within it; it takes another dotted key.
+            document = tomlkit.parse(before)
+            _put(document, parts, _value(key, value), dotted=True)
+            if not _holds(document, parts):
+                raise DesignError(f"{key} cannot be put in here; change it in the text")
     return tomlkit.dumps(document)
+
+
+def _has_table(table: Any, parts: list[str]) -> bool:
+    """Whether the table that the key goes into is there already."""
+    for part in parts[:-1]:
+        table = table.get(part) if isinstance(table, MutableMapping) else None
+    return isinstance(table, MutableMapping)
+
+
+def _holds(document: tomlkit.TOMLDocument, parts: list[str]) -> bool:
+    """Whether the text that the document writes says what the document does at the key."""
+    try:
+        written: Any = tomllib.loads(tomlkit.dumps(document))
+        meant: Any = document.unwrap()
+        for part in parts:
+            written, meant = written[part], meant[part]
+    except (tomllib.TOMLDecodeError, KeyError, TypeError):
+        return False
+    return bool(written == meant)
 
 
 def _value(key: str, text: str) -> Any:
@@ -37,10 +68,15 @@ def _value(key: str, text: str) -> Any:
         raise DesignError(f"{key} = {text[:60]} is no value; write a number or a text") from None
 
 
-def _put(table: MutableMapping[str, Any], parts: list[str], value: Any) -> None:
+def _put(
+    table: MutableMapping[str, Any], parts: list[str], value: Any, dotted: bool = False
+) -> None:
     *above, last = parts
-    for part in above:
+    for depth, part in enumerate(above):
         inner = table.get(part)
+        if inner is None and dotted and isinstance(table, tomlkit.items.Table):
+            table.append(tomlkit.key(parts[depth:]), value)
+            return
         if inner is None:
             table[part] = tomlkit.table()
             inner = table[part]

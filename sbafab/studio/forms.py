@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+PLACING = ("on", "at", "angle", "turn", "along", "offset", "glue", "note")
+"""Keys of a part that say where it sits; its form ends with them."""
 JsonSchema = Mapping[str, Any]
 Field = dict[str, Any]
 # key: least, most, step of the slider that spares typing; what it cannot reach is typed.
@@ -33,14 +35,14 @@ UNITS = (
     (re.compile(r"minutes$"), "min"),
     (re.compile(r"seconds$"), "s"),
     (re.compile(r"density$"), "kg/m\u00b3"),
-    (re.compile(r"hand_turn$"), "\u00b0"),
+    (re.compile(r"(^|[._])(turn|angle)$"), "\u00b0"),
     (re.compile(r"_speed$"), "mm/s"),
     (re.compile(r"pad_hardness$"), "Shore A"),
 )
 
 
 def families(schema: JsonSchema) -> dict[str, list[Field]]:
-    """The fields of every family of single designs; an assembly's parts take a text."""
+    """The fields of every family of single designs."""
     found = {}
     for record in schema["oneOf"]:
         table = _named(record["$ref"], schema)
@@ -53,9 +55,28 @@ def families(schema: JsonSchema) -> dict[str, list[Field]]:
     return found
 
 
+def assembly(schema: JsonSchema) -> dict[str, Any]:
+    """The fields of an assembly, and by kind those of a part, whose keys start at its table."""
+    table = _named("Assembly", schema)
+    own = sorted(_fields(table, schema, ""), key=_rank)
+    (parts,) = table["properties"]["parts"]["patternProperties"].values()
+    kinds = {}
+    for kind, reference in parts["discriminator"]["mapping"].items():
+        part = _named(reference, schema)
+        fields = [field for field in _fields(part, schema, "") if field["key"] != "kind"]
+        needed = set(part.get("required", ()))
+        kinds[kind] = {
+            "meaning": part["properties"]["kind"].get("description", ""),
+            "fields": sorted(fields, key=lambda field: field["key"] in PLACING),
+            "needs": [field["key"] for field in fields if field["key"] in needed],
+        }
+    return {"fields": own, "kinds": kinds}
+
+
 def keys(schema: JsonSchema) -> set[str]:
-    """Every dotted key of any family."""
-    return {field["key"] for fields in families(schema).values() for field in fields}
+    """Every dotted key of any family, and those of an assembly itself."""
+    fields = [field for own in families(schema).values() for field in own]
+    return {field["key"] for field in [*fields, *assembly(schema)["fields"]]}
 
 
 def _rank(field: Field) -> int:
@@ -67,7 +88,7 @@ def _rank(field: Field) -> int:
 
 def _fields(table: JsonSchema, schema: JsonSchema, prefix: str) -> Iterator[Field]:
     for name, own in table["properties"].items():
-        reference = own.get("$ref") or _single(own)
+        reference = own.get("$ref") or _single(own) or _optional(own)
         if reference is not None:
             inner = _named(reference, schema)
             if "properties" in inner:
@@ -124,6 +145,12 @@ def _unit(key: str) -> str:
 def _single(own: JsonSchema) -> str | None:
     """The reference of a key that is one table, whatever stands beside it."""
     ways = own.get("allOf") or []
+    return ways[0].get("$ref") if len(ways) == 1 else None
+
+
+def _optional(own: JsonSchema) -> str | None:
+    """The reference of a table that may be left out whole."""
+    ways = [way for way in own.get("anyOf") or [] if way.get("type") != "null"]
     return ways[0].get("$ref") if len(ways) == 1 else None
 
 

@@ -15,10 +15,12 @@ from sbafab import api
 from sbafab.errors import DesignError, SbafabError
 from sbafab.studio import places
 from sbafab.studio.editing import MOST_EDITS, edited
-from sbafab.studio.model import Beat, bonds_model, finding_model, laminate_model
+from sbafab.studio.model import Beat, finding_model, laminate_model
 from sbafab.studio.moving import Filling, poses, stack_model
+from sbafab.studio.parts import parts_model
 
 if TYPE_CHECKING:
+    from sbafab.assemblies.records import Assembly
     from sbafab.design.records import Design
     from sbafab.laminate.laminate import Laminate
     from sbafab.models.stack import Stack
@@ -34,26 +36,18 @@ MOST_FILLINGS = 8
 def live(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     """Text after the edits and design, then what is seen, in the order in which it is known.
 
-    Laminate, bonds and prediction come before the rules; the yield is the last of those.
+    Laminate and prediction come before the rules; the yield is the last of those.
     """
     text = _text(job)
     yield {"kind": "text", "text": text}
     found = _loaded(text, job)
     if found.family == "assembly":
-        yield {"kind": "assembly", "name": found.name}
-        yield {
-            "kind": "unpredicted",
-            "message": f"{found.name} is an assembly; its actuators are predicted one by one",
-        }
-        yield from _assembly_findings(found)
+        yield from _assembly(found, job, beat)
         return
     yield {"kind": "design", "name": found.name, "family": found.family, **_values(found)}
     beat()
     laminate = _laminate(text, job["folder"], job["path"])
-    shown = laminate_model(laminate, frozenset(job.get("has", ())))
-    yield shown
-    beat()
-    yield bonds_model(laminate, {*job.get("has", ()), *shown["shapes"]})
+    yield laminate_model(laminate, frozenset(job.get("has", ())))
     beat()
     yield _prediction(found, laminate)
     beat()
@@ -76,12 +70,28 @@ def live(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     yield {"kind": "checked"}
 
 
-def _values(design: Design) -> Answer:
+def _values(design: Design | Assembly) -> Answer:
     return {"values": api.resolved(design)}
 
 
-def _assembly_findings(assembly: Any) -> Iterator[Answer]:
+def _assembly(assembly: Assembly, job: StudioJob, beat: Beat) -> Iterator[Answer]:
+    """An assembly's keys, its parts in place, and what the rules find in and between them."""
+    yield {"kind": "assembly", "name": assembly.name, **_values(assembly)}
+    beat()
+    assembled = api.assemble(assembly)
+    yield parts_model(assembled, frozenset(job.get("has", ())))
+    beat()
+    yield {
+        "kind": "unpredicted",
+        "message": f"{assembly.name} is an assembly. Open one of its parts to have its actuator "
+        f"predicted; sbafab predict says what the whole does inflated.",
+    }
+    designs = {made.design.name for made in assembled.designs}
     findings = [finding_model(finding) for finding in api.check(assembly)]
+    for finding in findings:
+        of, _, rest = finding["message"].partition(": ")
+        if of in designs:
+            finding |= {"design": of, "message": rest}
     yield {"kind": "rule", "rule": "assembly", "number": 1, "findings": findings}
     yield {"kind": "checked"}
 

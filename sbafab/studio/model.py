@@ -43,7 +43,7 @@ def _flat(vertices: Iterable[tuple[float, float, float]]) -> list[float]:
 
 
 def laminate_model(laminate: Laminate, has: Collection[str]) -> dict[str, Any]:
-    """Layers, patterns and what lies at which place, for plan and solid."""
+    """Layers, patterns and what lies at which place; plan, section and solid are drawn from it."""
     shapes = AnswerShapes(has)
     layers = [_layer(layer) for layer in laminate.layers]
     patterns = {name: _pattern(laminate, own, shapes) for name, own in laminate.patterns.items()}
@@ -65,24 +65,6 @@ def laminate_model(laminate: Laminate, has: Collection[str]) -> dict[str, Any]:
         "pins": [asdict(pin) for pin in laminate.pins],
         "shapes": shapes.new,
     }
-
-
-def bonds_model(laminate: Laminate, has: Collection[str]) -> dict[str, Any]:
-    """What of every interface bonds and what stays open, for the section."""
-    shapes = AnswerShapes(has)
-    bonds = [
-        {
-            "interface": interface.index,
-            "kind": interface.kind,
-            "layers": list(interface.layer_indices),
-            "z": interface.z,
-            "gap": interface.gap,
-            "shape": shapes.key(interface.bond),
-            "open": shapes.key(interface.unbonded),
-        }
-        for interface in laminate.interfaces
-    ]
-    return {"kind": "bonds", "bonds": bonds, "shapes": shapes.new}
 
 
 def _layer(layer: Layer) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from sbafab.studio import forms, places
 
 def started(folder: Path | None, opened: str | None = None, text: str | None = None) -> Any:
     """What the page begins with; no ``folder`` where it has no disk to read from."""
+    schema = api.schema()
     return {
         "version": __version__,
         "folder": str(folder or ""),
@@ -20,7 +21,8 @@ def started(folder: Path | None, opened: str | None = None, text: str | None = N
         "text": text,
         "files": places.listed(folder) if folder else [],
         "templates": api.templates(),
-        "families": forms.families(api.schema()),
+        "families": forms.families(schema),
+        "assembly": forms.assembly(schema),
     }
 
 

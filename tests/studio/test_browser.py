@@ -176,7 +176,7 @@ def test_hovering_names_layer_role_and_width(seen: Watched) -> None:
 def test_the_solid_comes_apart_is_cut_and_picked(seen: Watched) -> None:
     whole = picture(seen, "#view-solid .surface")
     assert colours(whole) > 6
-    seen.page.get_by_label("Explode").fill("90")
+    seen.page.locator("#view-solid").get_by_label("Explode").fill("90")
     apart = picture(seen, "#view-solid .surface")
     assert share_changed(whole, apart) > 0.05
     seen.page.get_by_role("button", name="Cut", exact=True).click()
@@ -210,6 +210,21 @@ def test_the_section_is_the_laminate_s(seen: Watched) -> None:
         for name, layers in laminate.patterns.items():
             exact = section(layers[0].profile, origin, direction)
             assert [end for span in found[name] for end in span] == pytest.approx(
+                [end for span in exact for end in span], abs=2e-5
+            )
+        # What bonds the page finds along the plane from the layers.
+        drawn = seen.page.evaluate(
+            """([x, y, u, v]) => Promise.all([import('/section.js'), import('/shapes.js')]).then(
+            ([{bonded}, {spans}]) => studio.laminate.bonds.map(({layers, z, gap}) => [z, gap,
+              bonded(layers, i => spans(studio.shape(
+                studio.laminate.patterns[studio.layer(i).pattern].shape), x, y, u, v))]))""",
+            [*origin, *direction],
+        )
+        assert len(drawn) == len(laminate.interfaces)
+        for (z, gap, ours), interface in zip(drawn, laminate.interfaces, strict=True):
+            exact = section(interface.bond, origin, direction)
+            assert (z, gap) == pytest.approx((interface.z, interface.gap), abs=1e-9)
+            assert [end for span in ours for end in span] == pytest.approx(
                 [end for span in exact for end in span], abs=2e-5
             )
 

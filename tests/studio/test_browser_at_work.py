@@ -19,6 +19,7 @@ from sbafab import api
 from tests.studio.browsing import (
     DESIGN,
     FILE,
+    PATIENCE,
     Watched,
     chromium,
     colours,
@@ -214,6 +215,36 @@ def test_two_tabs_do_not_disturb_each_other(seen: Watched, chrome: Any, link: st
     seen.ready()
     assert (seen.say("studio.laminate.balloons"), other.say("studio.laminate.balloons")) == (11, 4)
     assert other.complaints == []
+    other.close()
+
+
+def test_no_tab_saves_over_what_the_other_has_saved(
+    seen: Watched, chrome: Any, link: str, folder: Path
+) -> None:
+    other = Watched(chrome, link)
+    other.ready()
+    seen.say("studio.edit([['stack.balloons', '4']])")
+    other.say("studio.edit([['stack.balloons', '11']])")
+    seen.until("studio.text.includes('balloons = 4')")
+    other.until("studio.text.includes('balloons = 11')")
+    seen.page.keyboard.press("Control+s")
+    seen.until("!studio.unsaved")
+    # The other is told, and its own saving is refused until it has said that it means it.
+    other.page.get_by_role("button", name="Load the file").wait_for(timeout=1000 * PATIENCE)
+    asked: list[str] = []
+    other.page.on("dialog", lambda dialog: (asked.append(dialog.message), dialog.dismiss()))
+    other.page.keyboard.press("Control+s")
+    other.page.wait_for_timeout(1000)
+    assert asked == [f"{FILE} lies there already with other content. Save over it?"]
+    assert "balloons = 4" in (folder / FILE).read_text(encoding="utf-8")
+    assert other.say("studio.unsaved") is True
+    # A tab without changes of its own follows.
+    other.page.get_by_role("button", name="Load the file").click()
+    other.until("studio.text.includes('balloons = 4') && !studio.unsaved")
+    other.say("studio.edit([['stack.balloons', '5']])")
+    other.until("studio.text.includes('balloons = 5')")
+    other.page.keyboard.press("Control+s")
+    seen.until("studio.text.includes('balloons = 5') && !studio.unsaved")
     other.close()
 
 

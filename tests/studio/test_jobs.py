@@ -25,7 +25,7 @@ SMALL = api.template("1dof-5mm").replace("balloons = 6", "balloons = 2") + (
 def test_the_answers_come_in_the_order_a_person_waits_for_them(tmp_path: Path) -> None:
     got = answers(job(tmp_path, SMALL))
     kinds = [answer["kind"] for answer in got]
-    assert kinds[:5] == ["text", "design", "laminate", "bonds", "prediction"]
+    assert kinds[:4] == ["text", "design", "laminate", "prediction"]
     assert kinds[-1] == "checked"
     assert got[-2]["rule"] == "registration-yield"
     found = [
@@ -38,22 +38,16 @@ def test_the_answers_come_in_the_order_a_person_waits_for_them(tmp_path: Path) -
 
 
 def test_a_shape_that_the_page_has_is_not_sent_again(tmp_path: Path) -> None:
-    first, bonds = seen(job(tmp_path, SMALL))
+    first = seen(job(tmp_path, SMALL))
     assert first["shapes"]
-    # Of bonds what no layer has.
-    assert bonds["shapes"]
-    assert not first["shapes"].keys() & bonds["shapes"].keys()
-    has = [*first["shapes"], *bonds["shapes"]]
-    again, bonds_again = seen({**job(tmp_path, SMALL), "has": has})
-    assert again["shapes"] == bonds_again["shapes"] == {}
+    again = seen({**job(tmp_path, SMALL), "has": list(first["shapes"])})
+    assert again["shapes"] == {}
     assert again["patterns"] == first["patterns"]
-    assert bonds_again["bonds"] == bonds["bonds"]
 
 
-def seen(asked: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The laminate and the bonds that a job answers."""
-    found = {answer["kind"]: answer for answer in answers(asked)}
-    return found["laminate"], found["bonds"]
+def seen(asked: dict[str, Any]) -> dict[str, Any]:
+    """The laminate that a job answers."""
+    return next(a for a in JOBS["live"](asked, lambda: None) if a["kind"] == "laminate")
 
 
 def test_the_prediction_is_that_of_the_command_or_says_why_there_is_none(tmp_path: Path) -> None:
@@ -61,7 +55,7 @@ def test_the_prediction_is_that_of_the_command_or_says_why_there_is_none(tmp_pat
     theirs = api.predict(api.loads(SMALL), quick=True).as_dict()
     assert told["prediction"]["figures"] == theirs["figures"]
     aperture = JOBS["live"](job(tmp_path, api.template("aperture")), lambda: None)
-    told = {answer["kind"]: answer for answer in islice(aperture, 3)}
+    told = {answer["kind"]: answer for answer in islice(aperture, 4)}
     assert "an assembly" in told["unpredicted"]["message"]
 
 

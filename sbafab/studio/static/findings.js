@@ -33,9 +33,9 @@ export class Findings {
   }
   line(finding, waiting) {
     const { measured, limit, unit } = finding;
-    const size = measured === null ? "" : `${plain(measured, 3)}${limit === null ? "" : ` / ${plain(limit, 3)}`} ${unit.replace("mm2", "mm²")}`;
-    return el("div", { role: "listitem" }, el("button", { class: "finding" + (waiting ? " waiting" : ""), "data-verdict": finding.verdict, "data-rule": finding.rule, "aria-label": `${finding.rule}: ${finding.verdict}. ${finding.message}`, onclick: (event) => this.open(finding, event.currentTarget) },
-      el("span", { class: "dot" }), el("span", { class: "rule" }, finding.rule), el("span", { class: "measured", title: "measured / limit" }, size), el("span", { class: "why" }, finding.message)));
+    const size = measured === null ? "" : `${plain(measured, 3)}${limit === null ? "" : ` / ${plain(limit, 3)}`} ${unit.replace("mm2", "mm²").replace("mm3", "mm³")}`;
+    return el("div", { role: "listitem" }, el("button", { class: "finding" + (waiting ? " waiting" : ""), "data-verdict": finding.verdict, "data-rule": finding.rule, "aria-label": `${finding.rule}${finding.design ? ` of ${finding.design}` : ""}: ${finding.verdict}. ${finding.message}`, onclick: (event) => this.open(finding, event.currentTarget) },
+      el("span", { class: "dot" }), el("span", { class: "rule" }, finding.rule, finding.design ? el("small", {}, finding.design) : null), el("span", { class: "measured", title: "measured / limit" }, size), el("span", { class: "why" }, finding.message)));
   }
   open(finding, button) {
     for (const other of this.list.querySelectorAll("[aria-current]")) other.removeAttribute("aria-current");

@@ -1,6 +1,7 @@
 // The form from the schema: every key with unit, meaning, default and range; errors at the field.
 import { $, el, plain } from "./dom.js";
 import { pathOf } from "./shapes.js";
+import { assemblySections, assemblyShape } from "./assembly_form.js";
 
 const TITLES = { "": "Design", tpe: "TPE", ptfe: "PTFE" };
 const title = (word) => TITLES[word] ?? word.replaceAll("_", " ").replace(/^./, (c) => c.toUpperCase());
@@ -21,20 +22,22 @@ export class Form {
     $("#filter").addEventListener("input", () => this.filter());
     studio.on("design", () => { this.build(); this.fill(); this.mark(null); });
     studio.on("text", (from) => { if (from === "opened") this.family = undefined; });
+    studio.on("parts", () => { if (this.build()) this.fill(); });
     studio.on("failed", (answer) => { this.build(); this.mark(answer); });
     studio.on("opened", () => this.mark(null));
     this.explain(null);
   }
 
   build() {
-    const family = this.studio.family;
-    if (family === this.family) return;
+    const { family, text } = this.studio;
+    if (family === "assembly") return this.buildAssembly(keysIn(text));
+    if (family === this.family) return false;
     this.family = family;
     this.rows.clear();
     const fields = this.studio.families[family];
     if (!fields) {
-      this.form.replaceChildren(el("p", { class: "fallback" }, family === "assembly" ? "An assembly joins several designs. Edit it as TOML; rules and Make work as for a design." : "Choose a template, or write family = \"lobed\" in the text."));
-      return;
+      this.form.replaceChildren(el("p", { class: "fallback" }, "Choose a template, or write family = \"lobed\" in the text."));
+      return false;
     }
     const sections = new Map();
     for (const field of fields) {
@@ -42,15 +45,31 @@ export class Form {
       if (!sections.has(table)) sections.set(table, []);
       sections.get(table).push(field);
     }
-    const parts = [this.families()];
-    for (const [table, own] of sections) {
-      const words = table ? table.split(".").map(title).join(" / ") : "Design";
-      const details = el("details", { open: !table || OPEN.includes(table) }, el("summary", {}, words, el("span", { class: "count" })), ...own.map((field) => this.row(field)));
-      details.dataset.table = table;
-      parts.push(details);
-    }
-    this.form.replaceChildren(...parts);
+    this.form.replaceChildren(this.families(), ...[...sections].map(([table, own]) => this.section({ table, fields: own, open: !table || OPEN.includes(table) })));
     this.filter();
+    return true;
+  }
+  // Parts come and go, and so do their sections; those that were opened or shut stay so.
+  buildAssembly(present) {
+    const shape = assemblyShape(this.studio, present);
+    if (shape === this.family) return false;
+    // A part that is new stands open; of another design nothing is known yet.
+    const known = typeof this.family === "string" && this.family.startsWith("[");
+    const before = new Map([...(known ? this.form : el("div")).querySelectorAll("details")].map((details) => [details.dataset.table, details.open]));
+    const focused = document.activeElement?.name, { scrollTop } = this.form;
+    this.family = shape;
+    this.rows.clear();
+    this.form.replaceChildren(...assemblySections(this.studio, present).map((one) => one.add ?? this.section({ ...one, open: before.get(one.table) ?? (before.size > 0 || one.open) })));
+    if (focused && this.rows.has(focused)) this.rows.get(focused).control.focus();
+    this.form.scrollTop = scrollTop;
+    this.filter();
+    return true;
+  }
+  section({ table, words, small, fields, head, open }) {
+    const said = words ?? (table ? table.split(".").map(title).join(" / ") : "Design");
+    const details = el("details", { open }, el("summary", {}, said, small ? el("small", {}, small) : null, el("span", { class: "count" })), head, ...fields.map((field) => this.row(field)));
+    details.dataset.table = table;
+    return details;
   }
 
   families() {
@@ -74,7 +93,7 @@ export class Form {
     const id = "f-" + field.key.replaceAll(".", "-");
     const name = field.key.split(".").at(-1);
     const control = this.control(field, id);
-    const label = el("label", { for: id, title: field.key }, title(name));
+    const label = el("label", { for: id, title: field.key }, field.label ?? title(name));
     const reset = el("button", { type: "button", class: "reset", title: "Back to the default", "aria-label": `${field.key} back to its default`, onclick: () => this.send(field, null) }, "×");
     const holder = el("div", { class: "field" + (field.unit ? " unit" : "") + (field.kind === "text" ? " text" : "") }, control, field.unit ? el("span", { class: "u" + (field.optional ? " auto" : ""), "aria-hidden": "true" }, field.unit) : null);
     if (field.unit) holder.style.setProperty("--unit", `${field.unit.length}ch`);
@@ -93,8 +112,8 @@ export class Form {
       return el("div", { class: "set", role: "group", "aria-label": field.key }, ...field.choices.map((choice) => el("label", {}, el("input", { type: "checkbox", value: choice, onchange: () => this.sendSet(field) }), choice)));
     }
     if (field.kind === "choice" || field.kind === "switch") {
-      const choices = field.kind === "switch" ? ["true", "false"] : field.choices;
-      return el("select", { ...described, onchange: (event) => this.send(field, field.kind === "switch" ? event.target.value : JSON.stringify(event.target.value)) }, ...choices.map((choice) => el("option", { value: choice }, field.kind === "switch" ? (choice === "true" ? "yes" : "no") : choice)));
+      const choices = field.kind === "switch" ? ["true", "false"] : [...(field.optional ? [""] : []), ...field.choices];
+      return el("select", { ...described, onchange: (event) => this.send(field, field.kind === "switch" || !event.target.value ? event.target.value || null : JSON.stringify(event.target.value)) }, ...choices.map((choice) => el("option", { value: choice }, field.kind === "switch" ? (choice === "true" ? "yes" : "no") : choice || "none")));
     }
     const input = el("input", { ...described, type: "text", spellcheck: "false", inputmode: ["number", "whole"].includes(field.kind) ? "decimal" : "text" });
     input.addEventListener("change", () => this.send(field, literal(field, input.value)));
@@ -190,8 +209,16 @@ export class Form {
       $(".why", row)?.remove();
       control.removeAttribute("aria-invalid");
     }
+    $(".part-why", this.form)?.remove();
     const found = answer?.field && this.rows.get(answer.field);
-    if (!found) return;
+    if (!found) {
+      // What is wrong with a part as a whole stands at its head.
+      const details = answer?.field && this.form.querySelector(`details[data-table="${CSS.escape(answer.field.split(".").slice(0, 2).join("."))}"]`);
+      if (!details) return;
+      details.open = true;
+      $("summary", details).after(el("div", { class: "why part-why", role: "alert" }, answer.message));
+      return;
+    }
     const { row, control } = found;
     const written = valueIn(this.studio.text, answer.field);
     if (written !== null && control.tagName === "INPUT" && document.activeElement !== control) control.value = written;

@@ -159,7 +159,8 @@ export class Layers {
     if (onCut) return this.studio.hover(null, "Section: drag to move, with Shift to turn");
     const shape = this.studio.shape(pattern.shape);
     const inside = contains(shape, x, y);
-    const bond = inside && this.studio.laminate.bonds.find((bond) => bond.layers.includes(layer.index) && contains(this.studio.shape(bond.shape), x, y));
+    const there = (index) => contains(this.studio.shape(this.studio.laminate.patterns[this.studio.layer(index).pattern].shape), x, y);
+    const bond = inside && !layer.mask && this.studio.laminate.bonds.find(({ layers }) => (layers[0] === layer.index || layers.at(-1) === layer.index) && there(layers[0]) && there(layers.at(-1)) && !layers.slice(1, -1).some(there));
     this.studio.hover(inside ? layer : null, inside ? `${layerWords(layer)} · ${plain(nearest(shape, x, y), 2)} mm to its edge${bond ? ` · bonds ${bond.layers.map(String).join("–")}` : ""} · ${where}` : where);
   }
   goto(layer, x, y) {
@@ -178,7 +179,7 @@ export function check(words, on, changed) {
   box.checked = on;
   return { box, label: el("label", {}, box, words) };
 }
-function along(a, b, from, to, words) {
+export function along(a, b, from, to, words) {
   const flat = a[1] === b[1];
   const tick = (p) => `M${p[0] - 3} ${p[1] + 3}L${p[0] + 3} ${p[1] - 3}`;
   const label = text(words, (a[0] + b[0]) / 2, (a[1] + b[1]) / 2 + (flat ? -4 : 0), "middle");
@@ -186,7 +187,7 @@ function along(a, b, from, to, words) {
   const ends = flat ? `M${from[0]} ${from[1] + 5}V${a[1] + 5}M${to[0]} ${to[1] + 5}V${b[1] + 5}` : `M${from[0] - 5} ${from[1]}H${a[0] - 5}M${to[0] - 5} ${to[1]}H${b[0] - 5}`;
   return [el("path", { d: `M${a.join(" ")}L${b.join(" ")}${ends}${tick(a)}${tick(b)}`, stroke: "var(--faint)", fill: "none" }), label];
 }
-function spread(wanted, gap, low, high) {
+export function spread(wanted, gap, low, high) {
   const rows = [...wanted];
   for (let i = 0; i < rows.length; i++) rows[i] = Math.max(rows[i], i ? rows[i - 1] + gap : low);
   let most = high;

@@ -11,6 +11,9 @@ import { Findings } from "./findings.js";
 import { Make } from "./make.js";
 import { Motion } from "./motion.js";
 import { Compare } from "./compare.js";
+import { PartsSolid } from "./parts_solid.js";
+import { PartsPlan } from "./parts_plan.js";
+import { goBack } from "./assembly_form.js";
 import { Dialogs } from "./dialogs.js";
 
 let studio, views, dialogs;
@@ -33,7 +36,7 @@ async function start() {
 
   new Form(studio);
   new Editor(studio);
-  views = { solid: new Solid(studio), layers: new Layers(studio), motion: new Motion(studio), make: new Make(studio), compare: new Compare(studio) };
+  views = { solid: new Solid(studio), layers: new Layers(studio), motion: new Motion(studio), parts: new PartsSolid(studio), plan: new PartsPlan(studio), make: new Make(studio), compare: new Compare(studio) };
   studio.motion = views.motion;
   studio.moving = () => !views.motion.element.hidden;
   const section = new Section(studio);
@@ -106,6 +109,8 @@ function tabs() {
   });
   const compareTab = $("#tab-compare");
   compareTab.hidden = true;
+  studio.on("design", suitTabs);
+  suitTabs();
   studio.on("reference", () => {
     compareTab.hidden = !studio.reference;
     $("#pin").setAttribute("aria-pressed", String(Boolean(studio.reference)));
@@ -122,8 +127,17 @@ function tabs() {
   for (const name of Object.keys(panels)) $(`#tab-${name}`).addEventListener("click", () => side(name));
   side(recall("sbafab-side", "form"));
 }
+// An assembly has views of its own; what stands in their place goes with a single design.
+const INSTEAD = { solid: "parts", layers: "plan", motion: "parts", compare: "plan" };
+function suitTabs() {
+  const whole = studio.family === "assembly", hidden = (name) => (whole ? name in INSTEAD : Object.values(INSTEAD).includes(name));
+  for (const name of Object.keys(views)) if (name !== "compare" || whole) $(`#tab-${name}`).hidden = hidden(name);
+  $("#pin").disabled = whole;
+  if (hidden(upper.shown)) show(upper.shown);
+}
 function show(name) {
   if (name === "compare" && !studio.reference) name = "layers";
+  name = studio.family === "assembly" ? INSTEAD[name] ?? name : { parts: "solid", plan: "layers" }[name] ?? name;
   upper.shown = name;
   for (const [own, view] of Object.entries(views)) {
     view.element.hidden = own !== name;
@@ -133,7 +147,7 @@ function show(name) {
     if (own !== name) view.hide?.();
   }
   // What needs the room takes the section's as well.
-  $("#views").classList.toggle("whole", ["motion", "make", "compare"].includes(name));
+  $("#views").classList.toggle("whole", ["motion", "make", "compare", "parts", "plan"].includes(name));
   $("#low").hidden = $("#views").classList.contains("whole");
   views[name].show?.();
   if (name !== "compare") remember("sbafab-view", name);
@@ -141,6 +155,7 @@ function show(name) {
 
 // A finding shows its place in the plan, in the section and in space.
 function goto(finding, section) {
+  if (studio.family === "assembly") return gotoParts(finding);
   const { layers, x, y, interface: number } = finding.where;
   const bond = studio.laminate?.bonds[number - 1];
   const own = layers.length ? layers : bond?.layers ?? [];
@@ -156,6 +171,14 @@ function goto(finding, section) {
   views.solid.goto([inside], x, y);
 }
 
+// Of an assembly the parts that a finding is about are picked out.
+function gotoParts({ design, message }) {
+  const named = (part) => (design ? part.design?.name === design : new RegExp(`(^|[^\\w-])${part.name}([^\\w-]|$)`).test(message));
+  phonePanel("views");
+  if (!["parts", "plan"].includes(upper.shown)) show("parts");
+  studio.pickParts((studio.parts ?? []).filter(named).map(({ name }) => name));
+}
+
 function bar() {
   $("#undo").append(icon("undo"));
   $("#redo").append(icon("redo"));
@@ -168,7 +191,11 @@ function bar() {
   $("#save").addEventListener("click", () => dialogs.save());
   $("#pin").addEventListener("click", () => studio.pin());
   $("#make").addEventListener("click", () => { phonePanel("views"); show("make"); });
+  $("#back").addEventListener("click", () => goBack(studio));
+  studio.on("told", (words) => notice(words));
   const state = () => {
+    $("#back").hidden = !studio.back;
+    if (studio.back) { $("#back").textContent = `‹ ${studio.back.title}`; $("#back").setAttribute("aria-label", `Back to ${studio.back.title}`); }
     $("#undo").disabled = studio.place <= 0 && studio.history[studio.place] === studio.text;
     $("#redo").disabled = studio.place >= studio.history.length - 1;
     $("#doc-name").textContent = studio.name ?? studio.designName ?? "New design";
@@ -193,17 +220,17 @@ function marks(section) {
       const words = $(".stale-mark", element);
       if (words) words.textContent = bad ? "Last good design" : element.classList.contains("section-block") ? "Updating" : "Updating";
     };
-    for (const view of [views.solid, views.layers, views.compare]) mark(view.element, studio.stale.laminate || bad);
-    mark(section.element, studio.stale.bonds || bad);
+    for (const view of [views.solid, views.layers, views.compare, views.parts, views.plan]) mark(view.element, studio.stale.laminate || bad);
+    mark(section.element, studio.stale.laminate || bad);
     mark($("#panel-findings").children[0], studio.stale.rules || bad);
     mark($("#panel-findings").children[1], studio.stale.figures || bad);
   };
-  studio.on("stale failed laminate bonds checked figures", stale);
+  studio.on("stale failed laminate parts checked figures", stale);
   studio.on("hover", (words) => { $("#hover").textContent = words; });
   studio.on("busy", (on) => { $("#busy").textContent = on ? "working" : ""; });
   studio.on("timing", () => {
     const last = (what) => studio.latency[what].at(-1);
-    $("#timing").textContent = [["geometry", "views"], ["section", "section"], ["figures", "prediction"], ["deck", "rules"], ["all", "with yield"]].filter(([what]) => last(what)).map(([what, words]) => `${words} ${Math.round(last(what))} ms`).join("  ");
+    $("#timing").textContent = [["geometry", "views"], ["figures", "prediction"], ["deck", "rules"], ["all", "with yield"]].filter(([what]) => last(what)).map(([what, words]) => `${words} ${Math.round(last(what))} ms`).join("  ");
   });
 }
 

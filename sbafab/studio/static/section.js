@@ -1,7 +1,7 @@
 // The laminate cut by the plane of the section, to scale or with its height exaggerated.
 import { css, el, plain } from "./dom.js";
 import { PanZoom, niceBar } from "./panzoom.js";
-import { spans } from "./shapes.js";
+import { shared, spans, without } from "./shapes.js";
 import { layerWords, roleWords } from "./state.js";
 
 export class Section {
@@ -23,8 +23,7 @@ export class Section {
     this.surface.addEventListener("pointermove", (event) => this.point(event));
     this.surface.addEventListener("pointerleave", () => studio.hover(null));
     this.surface.addEventListener("click", (event) => { if (this.eye.dragged <= 3) { const found = this.under(event); if (found?.layer) studio.pick(found.layer); } });
-    studio.on("bonds cut", () => this.update());
-    studio.on("laminate", () => { if (!studio.laminate) this.update(); });
+    studio.on("laminate cut", () => this.update());
     studio.on("hover pick theme", () => this.draw());
     studio.on("opened", () => { this.eye.touched = false; this.mark = null; });
     new ResizeObserver(() => this.refit(true)).observe(this.surface);
@@ -39,8 +38,9 @@ export class Section {
       if (!known.has(key)) known.set(key, spans(this.studio.shape(key), cut.x, cut.y, cut.u, cut.v));
       return known.get(key);
     };
-    this.rows = laminate.layers.map((layer) => ({ layer, spans: of(laminate.patterns[layer.pattern].shape) }));
-    this.bonds = laminate.bonds.map((bond) => ({ bond, spans: of(bond.shape) }));
+    const across = (index) => of(laminate.patterns[laminate.layers[index - 1].pattern].shape);
+    this.rows = laminate.layers.map((layer) => ({ layer, spans: across(layer.index) }));
+    this.bonds = laminate.bonds.map((bond) => ({ bond, spans: bonded(bond.layers, across) }));
     const ends = this.rows.flatMap((row) => row.spans.flat());
     this.low = ends.length ? Math.min(...ends) : -1;
     this.high = ends.length ? Math.max(...ends) : 1;
@@ -150,4 +150,10 @@ export class Section {
     this.eye.goto(0, (z0 + z1) / 2, Math.max(1.5, (z1 - z0) * this.stretch * 2));
   }
   async picture() { return { name: "section.png", blob: await new Promise((done) => this.canvas.toBlob(done)) }; }
+}
+
+// Along the plane two films bond where both are and no mask lies between them.
+export function bonded([below, ...rest], across) {
+  const above = rest.at(-1);
+  return rest.slice(0, -1).reduce((left, mask) => without(left, across(mask)), shared(across(below), across(above)));
 }

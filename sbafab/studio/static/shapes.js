@@ -91,6 +91,18 @@ export function spans(shape, x, y, u, v) {
   return found;
 }
 
+// What two lists of stretches share, and what the first has beside the second.
+export function shared(own, other) {
+  const found = [];
+  for (const [a, b] of own) for (const [c, d] of other) if (Math.min(b, d) - Math.max(a, c) > 1e-9) found.push([Math.max(a, c), Math.min(b, d)]);
+  return found;
+}
+export function without(own, other) {
+  let rest = own;
+  for (const [c, d] of other) rest = rest.flatMap(([a, b]) => [[a, Math.min(b, c)], [Math.max(a, d), b]].filter(([from, to]) => to - from > 1e-9));
+  return rest;
+}
+
 export function contains(shape, x, y) {
   return spans(shape, x, y, 1, 0).some(([a, b]) => a <= 0 && b >= 0);
 }

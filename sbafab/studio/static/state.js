@@ -18,6 +18,10 @@ export class Studio {
     this.place = -1;
     this.shapes = new Map();
     this.laminate = null;
+    this.parts = null;
+    this.surfaces = new Map();
+    this.pickedParts = [];
+    this.back = null;
     this.values = null;
     this.family = null;
     this.findings = [];
@@ -25,12 +29,12 @@ export class Studio {
     this.unmeasured = null;
     this.prediction = null;
     this.error = null;
-    this.stale = { laminate: true, bonds: true, rules: true, figures: true };
+    this.stale = { laminate: true, rules: true, figures: true };
     this.picked = null;
     this.hovered = null;
     this.cut = null;
     this.reference = null;
-    this.latency = { geometry: [], section: [], figures: [], deck: [], all: [] };
+    this.latency = { geometry: [], figures: [], deck: [], all: [] };
     this.listeners = new Map();
     this.flight = null;
     this.draftKey = "sbafab-draft:" + (sessionStorage.getItem("sbafab-tab") ?? freshTab());
@@ -47,8 +51,9 @@ export class Studio {
   }
 
   // What is opened: a text with the file it came from (or none) and what lies on disk.
-  open(text, { name = null, seen = null, saved = text } = {}) {
-    Object.assign(this, { text, name, seen, savedText: saved, picked: null, cut: null });
+  open(text, { name = null, seen = null, saved = text, back = null } = {}) {
+    Object.assign(this, { text, name, seen, savedText: saved, back, picked: null, pickedParts: [], cut: null });
+    this.keepBack();
     this.pending.clear();
     this.history = [text];
     this.place = 0;
@@ -116,6 +121,12 @@ export class Studio {
     remember(this.draftKey, { name, text, savedText, seen, folder, at: Date.now() });
     this.emit("kept");
   }
+  // What a part was opened from waits in the store as well, as long as it has work that is not saved.
+  keepBack() {
+    const { back, folder } = this, key = this.draftKey + ":back";
+    if (back && back.text !== back.savedText) remember(key, { ...back, folder, at: Date.now() });
+    else localStorage.removeItem(key);
+  }
   draft() {
     const own = recall(this.draftKey, null);
     return own && own.folder === this.folder ? own : null;
@@ -132,7 +143,7 @@ export class Studio {
   }
 
   body() {
-    return { tab, text: this.text, edits: [...this.pending], name: this.name, has: [...this.shapes.keys()] };
+    return { tab, text: this.text, edits: [...this.pending], name: this.name, has: [...this.shapes.keys(), ...this.surfaces.keys()] };
   }
 
   // One request at a time: a drag shows every state it can, and never waits for the rules.
@@ -164,18 +175,18 @@ export class Studio {
     const hears = {
       text: () => this.heardText(answer.text, sent),
       design: () => {
-        Object.assign(this, { values: answer.values, family: answer.family, designName: answer.name });
+        Object.assign(this, { values: answer.values, family: answer.family, designName: answer.name, parts: null });
         this.error = null;
         this.emit("design");
       },
       assembly: () => {
-        Object.assign(this, { family: "assembly", designName: answer.name, laminate: null, error: null });
-        this.stale.laminate = this.stale.bonds = this.wanted;
+        const seen = this.laminate !== null;
+        Object.assign(this, { values: answer.values, family: "assembly", designName: answer.name, laminate: null, error: null });
         this.emit("design");
-        this.emit("laminate");
+        if (seen) this.emit("laminate");
       },
+      parts: () => this.heardParts(answer, flight),
       laminate: () => this.heardLaminate(answer, flight),
-      bonds: () => this.heardBonds(answer, flight),
       prediction: () => {
         this.prediction = answer;
         this.heardFigures(null);
@@ -199,7 +210,7 @@ export class Studio {
       superseded: () => {},
     };
     (hears[answer.kind] ?? (() => this.fail(answer)))();
-    if (["bonds", "error", "defect", "crashed", "assembly"].includes(answer.kind)) {
+    if (["laminate", "error", "defect", "crashed", "parts"].includes(answer.kind)) {
       flight.shown = true;
       if (this.wanted) this.ask();
     }
@@ -213,22 +224,24 @@ export class Studio {
   }
   heardLaminate(answer, flight) {
     for (const [key, shape] of Object.entries(answer.shapes)) this.shapes.set(key, shape);
-    this.laminate = { ...answer, bonds: [] };
+    this.laminate = { ...answer, bonds: interfaces(answer.layers) };
+    this.drop();
     this.stale.laminate = this.wanted;
     if (!this.cut || !this.cut.moved) this.cut = firstCut(answer);
     this.emit("laminate");
     this.emit("stale");
     requestAnimationFrame(() => setTimeout(() => this.time("geometry", flight)));
   }
-  // What of every interface bonds: the section waits for it.
-  heardBonds(answer, flight) {
-    for (const [key, shape] of Object.entries(answer.shapes)) this.shapes.set(key, shape);
-    this.laminate.bonds = answer.bonds;
-    this.drop();
-    this.stale.bonds = this.wanted;
-    this.emit("bonds");
+  // An assembly's parts and their places; a surface comes once.
+  heardParts(answer, flight) {
+    for (const [key, surface] of Object.entries(answer.surfaces)) this.surfaces.set(key, surface);
+    this.parts = answer.parts;
+    if (this.surfaces.size > 60) for (const key of this.surfaces.keys()) if (!answer.parts.some(({ surface }) => surface === key)) this.surfaces.delete(key);
+    this.pickedParts = this.pickedParts.filter((name) => answer.parts.some((part) => part.name === name));
+    this.stale.laminate = this.wanted;
+    this.emit("parts");
     this.emit("stale");
-    requestAnimationFrame(() => setTimeout(() => this.time("section", flight)));
+    requestAnimationFrame(() => setTimeout(() => this.time("geometry", flight)));
   }
   heardFigures(refusal) {
     this.noFigures = refusal;
@@ -286,7 +299,7 @@ export class Studio {
     if (sha === this.seen || sha === "") return;
     const found = await ask(`/api/file/${encodeURIComponent(this.name)}`).catch(() => null);
     if (!found || found.sha === this.seen) return;
-    if (this.unsaved && found.text !== this.text) { this.emit("conflict", found); return; }
+    if ((this.unsaved || this.pending.size) && found.text !== this.text) { this.emit("conflict", found); return; }
     this.take(found);
   }
   take(found) {
@@ -321,6 +334,7 @@ export class Studio {
     this.emit("reference");
   }
   layer(index) { return this.laminate?.layers[index - 1]; }
+  pickParts(names) { this.pickedParts = names; this.emit("part"); }
   pick(layer) { this.picked = layer; this.emit("pick"); }
   hover(layer, words = "") {
     if (layer === this.hovered && words === this.hoverWords) return;
@@ -333,10 +347,20 @@ export class Studio {
   shape(key) { return this.shapes.get(key) ?? []; }
 }
 
-export const shapeKeys = (laminate) => [
-  ...Object.values(laminate.patterns).map((pattern) => pattern.shape),
-  ...laminate.bonds.flatMap((bond) => [bond.shape, bond.open]),
-];
+export const shapeKeys = (laminate) => Object.values(laminate.patterns).map((pattern) => pattern.shape);
+
+// Between every two films that follow each other, bottom to top: which layers meet there, masks between them included.
+function interfaces(layers) {
+  const found = [];
+  let met = [];
+  for (const layer of layers) {
+    met.push(layer);
+    if (layer.mask) continue;
+    if (met.length > 1 && !met[0].mask) found.push({ interface: found.length + 1, layers: met.map(({ index }) => index), z: met[0].z + met[0].thickness, gap: layer.z - met[0].z - met[0].thickness });
+    met = [layer];
+  }
+  return found;
+}
 
 function freshTab() {
   const id = uniqueName();

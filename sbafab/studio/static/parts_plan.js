@@ -1,0 +1,155 @@
+// An assembly in plan and elevation, drawn to scale: parts named and dimensioned, no perspective.
+import { el, plain } from "./dom.js";
+import { PanZoom, niceBar } from "./panzoom.js";
+import { along, check, spread, text } from "./layers.js";
+import { PartMeshes, THREE, partWords } from "./parts_scene.js";
+import { partsList, sizeWords } from "./parts_solid.js";
+import { css } from "./dom.js";
+
+// Which axes lie across and up, from where one looks, and along which axis.
+const WAYS = {
+  Top: { across: "x", up: "y", from: [0, 0, 1], head: [0, 1, 0] },
+  Front: { across: "x", up: "z", from: [0, -1, 0], head: [0, 0, 1] },
+  Side: { across: "y", up: "z", from: [1, 0, 0], head: [0, 0, 1] },
+};
+
+export class PartsPlan {
+  title = "Plan";
+  constructor(studio) {
+    this.studio = studio;
+    this.way = "Top";
+    this.list = partsList(studio);
+    this.svg = el("svg", { role: "img", "aria-label": "Assembly in plan" });
+    this.surface = el("div", { class: "surface" });
+    this.sizes = check("Dimensions", true, () => this.draw());
+    this.buttons = Object.keys(WAYS).map((way) => el("button", { "aria-pressed": String(way === this.way), onclick: () => this.turn(way) }, way));
+    this.element = el("div", { class: "view layers parts" }, this.list.element, this.surface,
+      el("div", { class: "tools" }, this.sizes.label, el("button", { onclick: () => { this.eye.touched = false; this.eye.fit(); } }, "Fit")),
+      el("div", { class: "tools right-top", role: "group", "aria-label": "Seen from" }, ...this.buttons),
+      el("div", { class: "stale-mark" }, "Updating"));
+    try { this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true }); } catch {
+      this.surface.append(el("p", { class: "fallback" }, "This view takes WebGL, which the browser does not offer here."));
+      return;
+    }
+    this.canvas = this.renderer.domElement;
+    this.canvas.setAttribute("aria-hidden", "true");
+    this.surface.append(this.canvas, this.svg);
+    this.scene = new THREE.Scene();
+    this.meshes = new PartMeshes(studio);
+    this.camera = new THREE.OrthographicCamera();
+    this.light = new THREE.DirectionalLight(0xffffff, 1.6);
+    this.scene.add(this.meshes.group, new THREE.HemisphereLight(0xffffff, 0xc8ced6, 1.9), this.light);
+    this.eye = new PanZoom(this.surface, () => this.draw());
+    this.surface.addEventListener("pointermove", (event) => { if (!event.buttons) this.point(event); });
+    this.surface.addEventListener("pointerleave", () => studio.hover(null));
+    this.surface.addEventListener("click", (event) => { if (this.eye.dragged <= 3) { const part = this.under(event); studio.pickParts(part ? [part.name] : []); } });
+    studio.on("parts", () => this.update());
+    studio.on("part theme", () => { this.meshes.paint(); this.draw(); });
+    studio.on("opened", () => { this.eye.touched = false; });
+  }
+  show() {
+    if (!this.renderer) return;
+    if (this.behind) this.update();
+    this.eye.touched ? this.draw() : this.eye.fit();
+  }
+  turn(way) {
+    this.way = way;
+    for (const button of this.buttons) button.setAttribute("aria-pressed", String(button.textContent === way));
+    this.eye.touched = false;
+    this.frame();
+  }
+  update() {
+    if (!this.renderer) return;
+    this.behind = this.element.hidden;
+    if (this.behind) return;
+    this.meshes.update();
+    this.frame();
+  }
+  frame() {
+    const { across, up } = WAYS[this.way], box = (this.box = this.meshes.box());
+    if (box.isEmpty()) { this.draw(); return; }
+    this.aim();
+    this.anchors = this.meshes.group.children.map((holder) => this.anchor(holder));
+    this.eye.bounds([box.min[across], box.min[up], box.max[across], box.max[up]], [56, 150, 92, 70]);
+    this.draw();
+  }
+  // A place at which a part is seen, from its right end on; its middle where others hide it.
+  anchor(holder) {
+    const { across, up } = WAYS[this.way], { part } = holder.userData, box = this.meshes.boxOf(holder), ray = new THREE.Raycaster();
+    const at = (s, t) => [box.min[across] + s * (box.max[across] - box.min[across]), box.min[up] + t * (box.max[up] - box.min[up])];
+    for (const s of [0.94, 0.8, 0.6]) for (const t of [0.5, 0.86, 0.14]) {
+      const [u, v] = at(s, t), from = new THREE.Vector3(...WAYS[this.way].from);
+      const origin = from.clone().multiplyScalar(1500);
+      origin[across] = u;
+      origin[up] = v;
+      ray.set(origin, from.negate());
+      if (this.meshes.under(ray) === part) return { part, place: [u, v], hidden: false };
+    }
+    return { part, place: at(0.5, 0.5), hidden: true };
+  }
+  // The camera where the eye is.
+  aim() {
+    const { eye, camera } = this, { across, up, from, head } = WAYS[this.way];
+    const middle = this.box.isEmpty() ? new THREE.Vector3() : this.box.getCenter(new THREE.Vector3());
+    middle[across] = eye.x;
+    middle[up] = eye.y;
+    const w = eye.width / eye.scale / 2, h = eye.height / eye.scale / 2;
+    Object.assign(camera, { left: -w, right: w, top: h, bottom: -h, near: 1, far: 3000 });
+    camera.up.set(...head);
+    camera.position.set(...from).multiplyScalar(1500).add(middle);
+    camera.lookAt(middle);
+    camera.updateProjectionMatrix();
+    camera.updateMatrixWorld();
+  }
+  draw() {
+    const { eye, canvas, studio } = this, width = eye.width, height = eye.height;
+    if (!width || !height || !this.box) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio || 1, 2));
+    this.renderer.setSize(width, height, false);
+    Object.assign(canvas.style, { width: "100%", height: "100%" });
+    this.renderer.setClearColor(css("--canvas"));
+    const { from, head } = WAYS[this.way];
+    this.aim();
+    // The light comes over the left shoulder, so that faces that lean are told from flat ones.
+    this.light.position.set(...from).multiplyScalar(2).add(new THREE.Vector3(...head)).addScaledVector(new THREE.Vector3(...head).cross(new THREE.Vector3(...from)), -0.7);
+    this.renderer.render(this.scene, this.camera);
+    this.svg.replaceChildren(...(studio.parts && this.sizes.box.checked ? [...this.overall(), ...this.names()] : []), ...this.scale());
+    this.svg.setAttribute("aria-label", this.words());
+  }
+  words() {
+    const { across, up } = WAYS[this.way], size = this.box.isEmpty() ? null : this.box.getSize(new THREE.Vector3());
+    return `Assembly of ${this.studio.parts?.length ?? 0} parts from the ${this.way.toLowerCase()}${size ? `, ${plain(size[across], 2)} by ${plain(size[up], 2)} mm` : ""}`;
+  }
+  overall() {
+    const { eye, box } = this, { across, up } = WAYS[this.way];
+    const [left, bottom] = eye.px(box.min[across], box.min[up]), [right, top] = eye.px(box.max[across], box.max[up]);
+    return [...along([left, bottom + 24], [right, bottom + 24], [left, bottom], [right, bottom], plain(box.max[across] - box.min[across], 2)),
+      ...along([left - 24, bottom], [left - 24, top], [left, bottom], [left, top], plain(box.max[up] - box.min[up], 2))];
+  }
+  // Names at the right, each with a leader to its part.
+  names() {
+    const { eye, box } = this, column = eye.px(box.max[WAYS[this.way].across], 0)[0] + 26;
+    const marks = this.anchors.map(({ part, place, hidden }) => ({ part, hidden, to: eye.px(...place) })).sort((a, b) => a.to[1] - b.to[1]);
+    const rows = spread(marks.map(({ to }) => to[1]), 18, 18, eye.height - 18);
+    return marks.flatMap(({ part, hidden, to }, i) => [el("path", { d: `M${to.join(" ")}L${column - 12} ${rows[i]}H${column - 4}`, stroke: "var(--faint)", "stroke-dasharray": hidden && "3 3", fill: "none" }), el("circle", { cx: to[0], cy: to[1], r: 2, fill: "var(--soft)" }), text(part.name, column, rows[i] + 4)]);
+  }
+  scale() {
+    const step = niceBar(this.eye.scale), w = step * this.eye.scale, x = this.eye.width - w - 14, y = this.eye.height - 16;
+    return [el("path", { d: `M${x} ${y - 5}V${y}H${x + w}V${y - 5}`, fill: "none", stroke: "var(--soft)" }), text(`${step} mm`, x + w / 2, y - 7, "middle")];
+  }
+  under(event) {
+    const box = this.surface.getBoundingClientRect(), ray = new THREE.Raycaster();
+    ray.setFromCamera(new THREE.Vector2(((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2), this.camera);
+    return this.meshes.under(ray);
+  }
+  point(event) {
+    if (!this.studio.parts) return;
+    const box = this.surface.getBoundingClientRect(), [u, v] = this.eye.at(event.clientX - box.left, event.clientY - box.top);
+    const { across, up } = WAYS[this.way], part = this.under(event), where = `${across} ${plain(u, 2)}, ${up} ${plain(v, 2)} mm`;
+    this.studio.hover(null, part ? `${partWords(part)} · ${sizeWords(this.meshes, part)} · ${where}` : where);
+  }
+  async picture() {
+    this.draw();
+    return { name: "plan.png", blob: await new Promise((done) => this.canvas.toBlob(done)) };
+  }
+}

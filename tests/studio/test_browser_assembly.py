@@ -1,0 +1,154 @@
+"""The studio in Chromium with an assembly: its form, its views, its parts and the way to each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sbafab import api
+from sbafab.assemblies.shapes import placed_surface
+from tests.studio.browsing import Watched, chromium, colours, picture, served, share_changed
+
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(chromium() is None, reason="no Chromium"),
+]
+BRACE = api.template("brace")
+
+
+@pytest.fixture(scope="module")
+def served_brace(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
+    folder = tmp_path_factory.mktemp("assembly")
+    (folder / "brace.toml").write_text(BRACE, encoding="utf-8")
+    with served(folder, "brace.toml") as link:
+        yield link, folder
+
+
+@pytest.fixture
+def brace(chrome: Any, served_brace: tuple[str, Path]) -> Iterator[Watched]:
+    watched = Watched(chrome, served_brace[0])
+    current(watched)
+    yield watched
+    assert watched.complaints == []
+    assert len(watched.hosts) == 1
+    watched.close()
+
+
+def current(seen: Watched) -> None:
+    """Waits until an assembly is shown and checked."""
+    seen.until("Boolean(window.studio?.parts) && !Object.values(studio.stale).some(Boolean)")
+
+
+def test_the_form_of_an_assembly_changes_its_text_and_its_views(brace: Watched) -> None:
+    page = brace.page
+    before = picture(brace, "#view-parts .surface")
+    assert colours(before) > 8
+    field = page.get_by_label("parts.grip.along, mm")
+    assert field.input_value() == "18"
+    field.fill("24")
+    field.press("Enter")
+    brace.until("studio.parts?.[1].shift[2] === 24")
+    assert "along = 24                # from the tube's start" in brace.say("studio.text")
+    assert share_changed(before, picture(brace, "#view-parts .surface")) > 0.01
+    # Only its place came: no surface is new.
+    assert brace.say("studio.surfaces.size") == 5
+    page.get_by_label("Set a key of the design of arm").select_option("stack.balloons")
+    balloons = page.get_by_label("parts.arm.set.stack.balloons", exact=True)
+    balloons.wait_for()
+    assert balloons.input_value() == "15"
+    balloons.fill("5")
+    balloons.press("Enter")
+    brace.until("studio.surfaces.size === 6")
+    assert api.loads(brace.say("studio.text")).parts["arm"].set == {"stack": {"balloons": 5}}  # type: ignore[union-attr]
+
+
+def test_the_plan_has_the_parts_and_sizes_of_the_assembly(brace: Watched) -> None:
+    page = brace.page
+    page.get_by_role("tab", name="Plan").click()
+    assembled = api.assemble("brace")
+    points = np.concatenate([placed_surface(one, filled=True).points for one in assembled.parts])
+    size = points.max(0) - points.min(0)
+    words = page.locator("#view-plan svg[role=img] text").all_text_contents()
+    assert {f"{size[0]:.2f}", f"{size[1]:.2f}", "tube", "grip", "arm", "cup", "vacuum"} <= {*words}
+    top = picture(brace, "#view-plan .surface")
+    assert colours(top) > 6
+    page.get_by_role("group", name="Seen from").get_by_role("button", name="Front").click()
+    assert share_changed(top, picture(brace, "#view-plan .surface")) > 0.1
+    words = page.locator("#view-plan svg[role=img] text").all_text_contents()
+    assert {f"{size[0]:.2f}", f"{size[2]:.2f}"} <= {*words}
+    label = page.locator("#view-plan svg[role=img]").get_attribute("aria-label")
+    assert label == f"Assembly of 5 parts from the front, {size[0]:g} by {size[2]:.2f} mm".replace(
+        f"{size[0]:g}", f"{size[0]:.2f}"
+    )
+
+
+def test_the_solid_comes_apart_and_is_cut_and_a_finding_picks_its_parts(brace: Watched) -> None:
+    page = brace.page
+    view = page.locator("#view-parts")
+    whole = picture(brace, "#view-parts .surface")
+    view.get_by_label("Explode").fill("60")
+    apart = picture(brace, "#view-parts .surface")
+    assert share_changed(whole, apart) > 0.03
+    view.get_by_label("Explode").fill("0")
+    view.get_by_role("button", name="Cut", exact=True).click()
+    assert share_changed(whole, picture(brace, "#view-parts .surface")) > 0.02
+    page.locator(".finding[data-rule=line-clearance]").click()
+    assert brace.say("studio.pickedParts") == ["arm", "vacuum"]
+    label = view.locator("canvas").get_attribute("aria-label")
+    assert label == "Assembly, arm, vacuum picked"
+    pressed = view.locator(".patterns button[aria-pressed=true] span").all_text_contents()
+    assert [words[:3] for words in pressed] == ["arm", "vac"]
+
+
+def test_an_error_stands_at_the_part_it_is_about(brace: Watched) -> None:
+    field = brace.page.get_by_label("parts.arm.turn, °")
+    field.fill("500")
+    field.press("Enter")
+    alert = brace.page.locator(".row.bad .why")
+    alert.wait_for()
+    assert "parts.arm.turn" in alert.inner_text()
+    assert field.get_attribute("aria-invalid") == "true"
+    mark = brace.page.locator("#view-parts.stale.bad .stale-mark")
+    assert mark.inner_text() == "Last good design"
+    brace.page.keyboard.press("Control+z")
+    current(brace)
+    assert brace.page.locator(".row.bad").count() == 0
+
+
+def test_a_part_is_opened_saved_and_put_back(
+    brace: Watched, served_brace: tuple[str, Path]
+) -> None:
+    page = brace.page
+    brace.say("studio.edit([['parts.arm.set.stack.balloons', '4']])")
+    current(brace)
+    page.get_by_role("button", name="Open 3dof-15mm, the design of arm").click()
+    brace.until("studio.laminate?.balloons === 4")
+    assert page.get_by_role("tab", name="Layers").is_visible()
+    # The assembly waits with what was not saved, also through a reload.
+    kept = "Object.keys(localStorage).filter(key => key.endsWith(':back')).length"
+    assert brace.say(kept) == 1
+    brace.say("studio.save('arm.toml')")
+    brace.until("studio.name === 'arm.toml'")
+    page.get_by_role("button", name="Back to brace.toml").click()
+    brace.until("studio.values?.parts?.arm?.design === 'arm.toml'")
+    current(brace)
+    assert brace.say("studio.values.parts.arm.set") in ({}, None)
+    assert brace.say(kept) == 0
+    found = api.loads(brace.say("studio.text"), served_brace[1] / "brace.toml")
+    arm = api.assemble(found)["arm"].made  # type: ignore[arg-type]
+    assert arm is not None
+    assert arm.laminate.balloons == 4
+    page.get_by_role("button", name="Open arm.toml, the design of arm").click()
+    brace.until("studio.name === 'arm.toml' && studio.laminate?.balloons === 4")
+    page.get_by_role("button", name="Back to brace.toml").click()
+    current(brace)
+    page.get_by_label("Kind of the new part").select_option("magnet")
+    page.get_by_role("button", name="Add a part").click()
+    brace.until("studio.parts?.some(part => part.name === 'magnet')")
+    current(brace)
+    page.get_by_role("button", name="Take magnet out").click()
+    brace.until("studio.parts?.every(part => part.name !== 'magnet')")
