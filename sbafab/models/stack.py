@@ -383,7 +383,10 @@ def stack(
 
 def _gripped(one: Balloon) -> Balloon:
     """The same with something that plates hold it by, where it has no neck."""
-    return one if one.neck else replace(one, neck=GRIP * one.pocket)
+    if one.neck:
+        return one
+    mate = None if one.mate is None else replace(one.mate, neck=GRIP * one.pocket)
+    return replace(one, neck=GRIP * one.pocket, mate=mate)
 
 
 def _mapped(kind: Balloon, most_pressure: float) -> BalloonMap:
