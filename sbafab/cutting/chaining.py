@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
 from sbafab.geometry.boolean import LEAST_AREA, tidy
-from sbafab.geometry.copies import COPIED, Copies
+from sbafab.geometry.copies import COPIED, Copies, between
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, edge_from_bulge
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
@@ -103,16 +103,27 @@ def _between(edge: Edge, start: Point, end: Point) -> Edge:
     return edge_from_bulge(start, end, edge.bulge)
 
 
-def check_clear(contours: Sequence[Contour]) -> None:
-    """Raises OutputError where an edge is drawn twice or contours touch or cross."""
+def check_clear(contours: Sequence[Contour], copies: Copies | None = None) -> None:
+    """Raises OutputError where an edge is drawn twice or contours touch or cross.
+
+    ``copies``: where what is known of their shapes is kept.
+    """
     rounds = [_full_circle(contour) for contour in contours]
-    copies = Copies()
+    copies = copies or Copies()
     for contour, circled in zip(contours, rounds, strict=True):
         if circled is None and copies.first(contour) is contour:
             _check_own(contour)
+    lying = [copies.lying(contour) for contour in contours]
+    # Pairs of copies that lie to each other as an earlier pair does are as clear as that one.
+    clear = set()
     for i, j in close_pairs([contour.bounds for contour in contours], EPSILON):
-        if not _are_clear(rounds[i], rounds[j]):
+        if _are_clear(rounds[i], rounds[j]):
+            continue
+        (one, here), (other, there) = lying[i], lying[j]
+        pair = one, other, between(here, there)
+        if pair not in clear:
             _check_two(contours[i], contours[j])
+            clear.add(pair)
 
 
 def _full_circle(contour: Contour) -> tuple[Point, float] | None:
@@ -178,16 +189,18 @@ def _check_edges(a: Edge, b: Edge, neighbours: bool) -> None:
         raise OutputError(f"contours touch or cross at x {x:.3f}, y {y:.3f}; part them.")
 
 
-def nested_region(inner: Sequence[Contour], outer: Sequence[Contour]) -> Region:
+def nested_region(
+    inner: Sequence[Contour], outer: Sequence[Contour], copies: Copies | None = None
+) -> Region:
     """The region with these holes and outlines, in whichever sense they were drawn.
 
     Raises OutputError for a contour whose nesting is not what its layer says.
     """
     drawn = [*inner, *outer]
-    copies = Copies()
+    copies = copies or Copies()
     turns: dict[int, int | None] = {}
     turned = []
-    for index, (contour, depth) in enumerate(zip(drawn, _depths(drawn), strict=True)):
+    for index, (contour, depth) in enumerate(zip(drawn, _depths(drawn, copies), strict=True)):
         is_hole = index < len(inner)
         x, y = contour.edges[0].start
         if (depth % 2 == 1) != is_hole:
@@ -247,14 +260,19 @@ def _whole(contour: Contour, centre: Point, radius: float) -> Contour:
     return whole.reversed() if is_hole else whole
 
 
-def _depths(contours: Sequence[Contour]) -> list[int]:
+def _depths(contours: Sequence[Contour], copies: Copies) -> list[int]:
     """How many of the others hold each contour."""
     count = len(contours)
     places = [contour.edges[0].at(0.5) for contour in contours]
     depths = [0] * count
     boxes = [*(contour.bounds for contour in contours), *((*p, *p) for p in places)]
+    known: dict[tuple[int, tuple[int, int]], bool] = {}
     for pair in close_pairs(boxes, 0.0):
         holder, held = min(pair), max(pair) - count
         if holder < count and held >= 0 and held != holder:
-            depths[held] += contours[holder].winding(places[held]) != 0
+            shape, here = copies.lying(contours[holder])
+            place = shape, between(here, places[held])
+            if place not in known:
+                known[place] = contours[holder].winding(places[held]) != 0
+            depths[held] += known[place]
     return depths

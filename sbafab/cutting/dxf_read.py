@@ -20,6 +20,7 @@ from sbafab.cutting.cut_layers import COLOURS, CUT_INNER, CUT_OUTER
 from sbafab.cutting.dxf_own import as_written
 from sbafab.cutting.dxf_shapes import DrawnEntity, arc, of_polyline, polyline
 from sbafab.errors import OutputError
+from sbafab.geometry.copies import Copies
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import circle
@@ -155,8 +156,9 @@ def _put_together(
     if document is not None:
         check_appearance(document)
     contours = {layer: [*closed[layer], *closed_loops(loose[layer])] for layer in closed}
-    check_clear([*contours[CUT_INNER], *contours[CUT_OUTER]])
-    region = nested_region(contours[CUT_INNER], contours[CUT_OUTER])
+    copies = Copies()
+    check_clear([*contours[CUT_INNER], *contours[CUT_OUTER]], copies)
+    region = nested_region(contours[CUT_INNER], contours[CUT_OUTER], copies)
     return ReadBack(region, properties, units, tuple(layers), tuple(other), tuple(strokes))
 
 

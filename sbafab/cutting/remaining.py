@@ -47,9 +47,12 @@ class PointsLeft:
         (last_x, last_y), cell = self._last, self._cell
         ring = max(0, -x, -y, x - last_x, y - last_y)
         best, found, home = math.inf, -1, (0, 0)
+        points, cells = self._points, self._cells
         while best > (ring - 1) * cell - SLACK:
             for place in self._ring(x, y, ring):
-                for number in self._cells.get(place, ()):
+                for number in cells.get(place, ()):
+                    if math.dist(p, points[number]) > best + SLACK:
+                        continue
                     value = measure(number)
                     if value < best or (value == best and number < found):
                         best, found, home = value, number, place
@@ -61,6 +64,9 @@ class PointsLeft:
     def _ring(self, x: int, y: int, ring: int) -> Iterator[tuple[int, int]]:
         """The cells a number of cells away, as far as there are any."""
         last_x, last_y = self._last
+        if ring == 0:
+            yield x, y
+            return
         left, right = max(0, x - ring), min(last_x, x + ring)
         for row in {y - ring, y + ring}:
             if 0 <= row <= last_y:

@@ -187,10 +187,10 @@ def _same(contour: Contour, other: Contour) -> bool:
     if len(ours) != len(theirs):
         return False
     start = ours[0].start
-    first = min(range(len(theirs)), key=lambda i: math.dist(theirs[i].start, start))
-    return all(
-        _same_edge(a, b) for a, b in zip(ours, (*theirs[first:], *theirs[:first]), strict=True)
-    )
+    if math.dist(theirs[0].start, start) > ROUNDING:
+        first = min(range(len(theirs)), key=lambda i: math.dist(theirs[i].start, start))
+        theirs = (*theirs[first:], *theirs[:first])
+    return all(map(_same_edge, ours, theirs))
 
 
 def _same_edge(a: Edge, b: Edge) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from operator import sub
 
-from sbafab.geometry.edges import Arc
+from sbafab.geometry.edges import Arc, Point
 from sbafab.geometry.region import Contour
 
 COPIED = 1e-8
@@ -17,12 +17,18 @@ class Copies:
 
     def __init__(self) -> None:
         self._known: dict[tuple[int, ...], list[tuple[list[float], Contour]]] = defaultdict(list)
+        self._firsts: dict[int, tuple[Contour, Contour]] = {}
 
     def first(self, contour: Contour) -> Contour:
         """The first contour that this one is a copy of, edge by edge, moved: itself if none is.
 
         Ends, centres and radii agree within ``COPIED``.
         """
+        if id(contour) not in self._firsts:
+            self._firsts[id(contour)] = contour, self._found(contour)
+        return self._firsts[id(contour)][1]
+
+    def _found(self, contour: Contour) -> Contour:
         ox, oy = contour.edges[0].start
         numbers: list[float] = []
         for edge in contour.edges:
@@ -40,3 +46,15 @@ class Copies:
                 return first
         filed.append((numbers, contour))
         return contour
+
+    def lying(self, contour: Contour) -> tuple[int, Point]:
+        """A number of the contour's shape, and where it lies: its centre, or where it starts."""
+        if contour.circle is not None:
+            centre, radius = contour.circle
+            return -round(radius / COPIED), centre
+        return id(self.first(contour)), contour.edges[0].start
+
+
+def between(a: Point, b: Point) -> tuple[int, int]:
+    """How the second of two points lies to the first, in ``COPIED``."""
+    return round((b[0] - a[0]) / COPIED), round((b[1] - a[1]) / COPIED)

@@ -6,9 +6,11 @@ from itertools import pairwise
 
 import pytest
 
-from sbafab.cutting.chaining import JOINED, closed_loops
+from sbafab.cutting.chaining import JOINED, check_clear, closed_loops, nested_region
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Line, Point
+from sbafab.geometry.region import Contour
+from sbafab.geometry.shapes import disc, rectangle, stadium
 
 # A square of 1 mm whose last corner is cut off by three edges of half a micrometre each.
 TINY = 0.0005
@@ -44,3 +46,33 @@ def test_an_edge_drawn_twice_is_refused() -> None:
     edges = square()
     with pytest.raises(OutputError, match="3 edges end at x"):
         closed_loops([*edges, edges[0].reversed()])
+
+
+def row(last: Point = (0.0, 0.0), slit: float = 0.5) -> tuple[list[Contour], list[Contour]]:
+    """Slots and discs in ten plates of 4 mm, the slot and disc of the last one moved."""
+    holes: list[Contour] = []
+    plates: list[Contour] = []
+    for number in range(10):
+        x = 5.0 * number
+        dx, dy = last if number == 9 else (0.0, 0.0)
+        plates += rectangle((x, 0.0), (x + 4.0, 4.0)).contours
+        for part in (stadium((x + 1.0 + dx, 2.0 + dy), slit, 2.0), disc((x + 3.0 + dx, 2.0), 0.5)):
+            holes += (contour.reversed() for contour in part.contours)
+    return holes, plates
+
+
+def test_what_holds_for_one_copy_is_not_said_of_one_that_lies_otherwise() -> None:
+    holes, plates = row()
+    check_clear([*holes, *plates])
+    assert len(nested_region(holes, plates).contours) == 30
+    for moved in ((-0.76, 0.0), (0.51, 0.0), (0.0, 1.01), (-0.75 - 1e-7, 0.0)):
+        holes, plates = row(moved)
+        with pytest.raises(OutputError, match=r"contours touch or cross at x 4[5-9]\."):
+            check_clear([*holes, *plates])
+
+
+def test_a_copy_outside_its_plate_is_no_hole() -> None:
+    holes, plates = row((20.0, 0.0))
+    check_clear([*holes, *plates])
+    with pytest.raises(OutputError, match="is an outline but on"):
+        nested_region(holes, plates)
