@@ -15,7 +15,7 @@ method for many pressures and heights at once. Lengths mm, pressures kPa, volume
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -70,6 +70,8 @@ class Balloon:
     wrinkles: bool = True
     inextensible: bool = False
     order: int = 2
+    mate: Balloon | None = None
+    """The other film, where it is unlike: of the same sizes, and without a mate."""
 
     @cached_property
     def nodes(self) -> Array:
@@ -100,6 +102,11 @@ class Balloon:
     def widths(self) -> Array:
         """Area in mm2 that belongs to each node."""
         return np.asarray(math.tau * self.nodes * np.gradient(self.nodes))
+
+    @property
+    def rigid(self) -> float:
+        """Modulus times thickness, N/m: how hard the film resists being stretched."""
+        return self.modulus * self.thickness
 
     @property
     def rigidity(self) -> float:
@@ -150,7 +157,7 @@ class Shapes(NamedTuple):
     z: Array
 
 
-class _Load(NamedTuple):
+class Load(NamedTuple):
     """Pressure, half the height between the plates, and the stress that wrinkles carry."""
 
     pressure: Array
@@ -158,8 +165,8 @@ class _Load(NamedTuple):
     cap: Array
     tied: bool
 
-    def rows(self, these: NDArray[np.int_]) -> _Load:
-        return _Load(self.pressure[these], self.half[these], self.cap[these], self.tied)
+    def rows(self, these: NDArray[np.int_]) -> Load:
+        return Load(self.pressure[these], self.half[these], self.cap[these], self.tied)
 
 
 def inflate(
@@ -179,21 +186,25 @@ def inflate(
         raise DesignError("pressure and height of a balloon must be above 0 kPa and 0 mm")
     elements = len(balloon.nodes) - 1
     smooth = np.where(balloon.may_wrinkle & balloon.inextensible, 0.0, math.inf)
-    load = _Load(p, high / 2, np.broadcast_to(smooth, (len(p), elements)), tied)
+    load = Load(p, high / 2, np.broadcast_to(smooth, (len(p), elements)), tied)
+    if balloon.mate is not None:
+        from sbafab.models import two_films
+
+        return two_films.inflate((replace(balloon, mate=None), balloon.mate), load)
     # Where no balance is found, elements may shrink to nothing on the way; that is said in the end.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        r, z = _settled(balloon, load, *_start(balloon, load))
+        r, z = _settled(balloon, load, *start(balloon, load))
         if balloon.wrinkles and not balloon.inextensible:
-            zone = _compressed(balloon, r, z)
+            zone = compressed(balloon, r, z)
             for _ in range(ROUNDS):
-                load = load._replace(cap=_wrinkling(balloon, r, z, zone))
+                load = load._replace(cap=wrinkling(balloon, r, z, zone))
                 r, z = _settled(balloon, load, r, z)
-    term, force = _total(balloon, load, r, z)
+    term, force = total(balloon, load, r, z)
     held = air(balloon.film, balloon.edge, r, z).energy
     return Shapes(p, 2 * z[:, 0], 2 * held, force, 2 * (term.energy + p * held), r, z)
 
 
-def _start(balloon: Balloon, load: _Load) -> tuple[Array, Array]:
+def start(balloon: Balloon, load: Load) -> tuple[Array, Array]:
     """Bulged films to begin with, as high as their pressure may lift them."""
     flat, free = balloon.nodes, balloon.pocket - balloon.neck
     rise = 0.3 * free * np.cbrt(load.pressure * balloon.pocket / (balloon.modulus * 0.0025))
@@ -204,8 +215,8 @@ def _start(balloon: Balloon, load: _Load) -> tuple[Array, Array]:
     return np.tile(flat, (len(rise), 1)), rise[:, None] * shape
 
 
-def _total(
-    balloon: Balloon, load: _Load, r: Array, z: Array, slopes: bool = True
+def total(
+    balloon: Balloon, load: Load, r: Array, z: Array, slopes: bool = True
 ) -> tuple[Term, Array]:
     """Energy of films and plates less the work of the air, by coordinate, and the plates' force."""
     film, edge = balloon.film, balloon.edge
@@ -236,7 +247,7 @@ def _total(
     return total._replace(energy=energy), pressed.sum(-1)
 
 
-def _settled(balloon: Balloon, load: _Load, r: Array, z: Array) -> tuple[Array, Array]:
+def _settled(balloon: Balloon, load: Load, r: Array, z: Array) -> tuple[Array, Array]:
     """The shapes of least energy downhill of these: Newton's method, damped where it climbs.
 
     Raises DesignError where it does not end.
@@ -248,7 +259,7 @@ def _settled(balloon: Balloon, load: _Load, r: Array, z: Array) -> tuple[Array, 
     diagonal = np.arange(len(freedoms))
     for _ in range(MOST_STEPS):
         part, at = load.rows(live), (r[live], z[live])
-        term, _ = _total(balloon, part, *at)
+        term, _ = total(balloon, part, *at)
         for height in range(1, balloon.level, 2):
             term.gradient[:, balloon.level] += term.gradient[:, height]
             term.hessian[:, balloon.level] += term.hessian[:, height]
@@ -284,7 +295,7 @@ def _settled(balloon: Balloon, load: _Load, r: Array, z: Array) -> tuple[Array, 
 
 def _downhill(
     balloon: Balloon,
-    load: _Load,
+    load: Load,
     at: tuple[Array, Array],
     ahead: Array,
     energy: Array,
@@ -300,7 +311,7 @@ def _downhill(
     for _ in range(HALVINGS):
         step = share[:, None] * ahead
         to = at[0] + step[:, ::2], at[1] + step[:, 1::2]
-        tried = _total(balloon, load, *to, slopes=False)[0].energy
+        tried = total(balloon, load, *to, slopes=False)[0].energy
         good = tried <= energy + 1e-4 * share * slope + room
         if good.all():
             return share
@@ -308,7 +319,7 @@ def _downhill(
     return np.where(good, share, 0.0)
 
 
-def _compressed(balloon: Balloon, r: Array, z: Array) -> Array:
+def compressed(balloon: Balloon, r: Array, z: Array) -> Array:
     """Length in mm along the film, neck and rim apart, over which the smooth hoop is compressed."""
     strains = strain(balloon.film, r, z)
     is_film = balloon.may_wrinkle & (not balloon.inextensible)
@@ -317,7 +328,7 @@ def _compressed(balloon: Balloon, r: Array, z: Array) -> Array:
     return np.asarray(np.maximum((pressed * balloon.film.lengths).sum(-1), shortest))
 
 
-def _wrinkling(balloon: Balloon, r: Array, z: Array, zone: Array) -> Array:
+def wrinkling(balloon: Balloon, r: Array, z: Array, zone: Array) -> Array:
     """The hoop stress in kPa that wrinkles over a zone carry, for each element's tension."""
     tension = balloon.modulus * balloon.thickness * strain(balloon.film, r, z).meridian
     force = math.tau / zone[:, None] * np.sqrt(balloon.rigidity * np.maximum(tension, 0.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sbafab.design.form import Discs
@@ -10,7 +11,6 @@ from sbafab.models.balloon import Balloon
 
 if TYPE_CHECKING:
     from sbafab.design.records import Design
-    from sbafab.laminate.films import Film
     from sbafab.laminate.laminate import Laminate
     from sbafab.models.figures import Factors
 
@@ -30,10 +30,7 @@ def balloons_of(
             "model: simulate the design instead"
         )
     loss = 0.0 if factors is None else factors.pocket_loss
-    film = _film(laminate)
-    modulus, poisson = film.elastic or (0.0, 0.0)
-    if factors is not None and factors.modulus_mpa is not None:
-        modulus = factors.modulus_mpa
+    pairs = _films(laminate, factors)
     radii = [diameter / 2 - loss for diameter in form.pockets.diameters]
     bore = design.bore.diameter / 2 if len(radii) > 1 else 0.0
     neck = bore + design.bond.width if len(radii) > 1 else 0.0
@@ -43,14 +40,15 @@ def balloons_of(
             f"than the neck of {neck:g} mm; give less"
         )
     ring = design.bond.width + loss
-    return [
-        Balloon(radius, ring, neck, bore, film.thickness, 1000 * modulus, poisson)
-        for radius in radii
-    ]
+    found = []
+    for radius, films in zip(radii, pairs, strict=True):
+        lower, upper = (Balloon(radius, ring, neck, bore, *film) for film in films)
+        found.append(lower if lower == upper else replace(lower, mate=upper))
+    return found
 
 
-def _film(laminate: Laminate) -> Film:
-    """The one film that balloons are made of."""
+def _films(laminate: Laminate, factors: Factors | None) -> list[list[tuple[float, float, float]]]:
+    """Thickness in mm, modulus in kPa and Poisson's ratio of each balloon's two films."""
     films = {layer.film for layer in laminate.layers if not layer.is_mask}
     unknown = {film.material for film in films if film.elastic is None}
     if unknown:
@@ -58,9 +56,15 @@ def _film(laminate: Laminate) -> Film:
             f"no modulus of {min(unknown)} is known; add films.{min(unknown).lower()}.modulus, in "
             "MPa, and poisson, its ratio"
         )
-    if len(films) > 1:
+    measured = None if factors is None else factors.modulus_mpa
+    if measured is not None and len(films) > 1:
         raise DesignError(
-            "the balloons' films are unlike, and the elastic model takes both for one; simulate "
-            "the design instead"
+            "one modulus is given for unlike films; leave it out, and set films.<name>.modulus of "
+            "each instead"
         )
-    return films.pop()
+    known = {}
+    for film in films:
+        modulus, poisson = film.elastic or (0.0, 0.0)
+        known[film] = film.thickness, 1000 * (modulus if measured is None else measured), poisson
+    row = [known[layer.film] for layer in laminate.tpe_layers]
+    return [row[i : i + 2] for i in range(0, len(row), 2)]

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 MOST_ROUNDS = 40
 HALVINGS = 8
+DAMPED, LEAST_DAMPING = 10.0, 0.05
+"""By what steps are damped more where they do not help, and what is none."""
 SOFTEST = 0.01
 """Pressure in kPa below which volumes are nearly straight in pressure, above in its logarithm."""
 FARTHEST = 1.0
@@ -103,6 +105,7 @@ class Motion:
         pose = self._at(x)
         wrong = missed(pose)
         close = CLOSE * np.maximum(np.abs(scale), 1.0)
+        damping = 0.0
         for _ in range(MOST_ROUNDS):
             counts = ~((x <= 0) & (wrong >= 0))
             if (np.abs(wrong) <= close)[counts].all():
@@ -110,6 +113,8 @@ class Motion:
             if (counts & (x >= most) & (wrong < 0)).any():
                 break
             slopes = self._slopes(missed, x, wrong)[np.ix_(counts, counts)]
+            # Below some 0.05 kPa maps may give a chamber less for more pressure.
+            slopes += damping * np.diag(np.abs(slopes).sum(-1))
             move = np.zeros_like(x)
             move[counts] = np.clip(-np.linalg.solve(slopes, wrong[counts]), -FARTHEST, FARTHEST)
             for _ in range(HALVINGS):
@@ -118,9 +123,12 @@ class Motion:
                 left = missed(tried)
                 still = ~((tried_x <= 0) & (left >= 0))
                 if np.abs(left / close)[still].max(initial=0) < np.abs(wrong / close)[counts].max():
+                    x, pose, wrong, damping = tried_x, tried, left, damping / DAMPED
                     break
                 move = move / 2
-            x, pose, wrong = tried_x, tried, left
+            else:
+                damping = max(DAMPED * damping, 1.0)
+            damping = damping if damping > LEAST_DAMPING else 0.0
         raise DesignError(
             f"the chambers would need more than {self.stack.most_pressure:g} kPa; ask for less, or "
             "make the stack with a larger most_pressure"

@@ -4,7 +4,8 @@ Plates are the planes between balloons. Two neighbours are joined by one balloon
 lengthens and tilts, and carries no shear ("a 2-DoF spring joint", paper, Sec. 4.4). A tilted
 balloon is taken to push at six points of a ring, each as hard as the axisymmetric balloon does at
 the gap there; between rigid plates that touch the film in a disc the ring's radius would be the
-disc's, and it is taken midway between neck and pocket. Flat balloons do not sink into each other.
+disc's, and it is taken midway between neck and pocket. Flat balloons do not sink into each other,
+nor do rims where levels lean: contact by a stiff penalty, without friction.
 Balance is the least of one energy, found by Newton's method. Levels of alike balloons without a
 load are alike and found once. Lengths mm, pressures kPa, volumes ul; forces mN inside, N outside.
 """
@@ -44,6 +45,8 @@ if TYPE_CHECKING:
 
 RING = 6
 """Points of each balloon at which its gap is looked at."""
+AROUND = 24
+"""Points round a level's outline, or a few more, where its rims may meet the next level's."""
 MOST_PRESSURE = 110.0
 """kPa to which maps are made unless more is asked for."""
 GRAVITY = 9.80665
@@ -174,6 +177,26 @@ class Stack:
             found.append(np.stack([np.ones_like(x), y, -x], -1))
         return np.stack(found)
 
+    @cached_property
+    def rims(self) -> Array:
+        """Gap at points round each kind's outline, by rise and tilt: (kinds, points, 3).
+
+        The outline is the convex hull of the films' rims: whatever way plates lean, what meets
+        first lies on it.
+        """
+        # An even number a chamber, from the first one's axis on, and half a step off it: no way
+        # points between two chambers, where one would stand for both.
+        around = 2 * self.chambers * math.ceil(AROUND / 2 / self.chambers)
+        first = math.atan2(*self.axes[0, ::-1])
+        turn = first + (np.arange(around) + 0.5) * math.tau / around
+        ways = np.stack([np.cos(turn), np.sin(turn)], -1)
+        farthest = self.axes[np.argmax(ways @ self.axes.T, axis=1)]
+        found = []
+        for one in self.maps:
+            x, y = (farthest + (one.balloon.pocket + one.balloon.ring) * ways).T
+            found.append(np.stack([np.ones_like(x), y, -x], -1))
+        return np.stack(found)
+
     def springs(self, pressures: Sequence[float]) -> Springs:
         """What the levels do at pressures, one a chamber. Raises DesignError."""
         asked = tuple(float(p) for p in pressures)
@@ -186,7 +209,7 @@ class Stack:
         return Springs(derivatives(found), *self._rows)
 
     @cached_property
-    def _rows(self) -> tuple[NDArray[np.int_], int, Array, Array, Array, Array, int]:
+    def _rows(self) -> tuple[NDArray[np.int_], int, Array, Array, Array, Array, int, Array]:
         """What springs hold beside their polynomials."""
         count = len(self.maps) * self.chambers
         begins = np.arange(count).reshape(len(self.maps), -1) * HEIGHT_SPANS
@@ -195,7 +218,7 @@ class Stack:
         spans = np.array([[one.spans] for one in self.maps])
         top = np.array([one.most_height for one in self.maps])
         each = np.repeat(begins, RING, axis=1)
-        return each, count * HEIGHT_SPANS, gap_of, squares, spans, top, RING
+        return each, count * HEIGHT_SPANS, gap_of, squares, spans, top, RING, self.rims
 
     def pose(
         self,
@@ -360,7 +383,10 @@ def stack(
 
 def _gripped(one: Balloon) -> Balloon:
     """The same with something that plates hold it by, where it has no neck."""
-    return one if one.neck else replace(one, neck=GRIP * one.pocket)
+    if one.neck:
+        return one
+    mate = None if one.mate is None else replace(one.mate, neck=GRIP * one.pocket)
+    return replace(one, neck=GRIP * one.pocket, mate=mate)
 
 
 def _mapped(kind: Balloon, most_pressure: float) -> BalloonMap:

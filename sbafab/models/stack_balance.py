@@ -41,6 +41,8 @@ CLOSELY, LITTLE = 3e-5, 1e-7
 plate's force is to be right as well."""
 ROUGH = 0.01
 """The same on the way to an outer plate."""
+ROUNDS = 2
+"""How often a step is held off by rims that it would meet."""
 FEW_STEPS = 12
 """Steps in which a start far away meets an outer plate, or never does."""
 
@@ -69,7 +71,7 @@ class Springs:
     ``volumes`` by how many rows later its volume does; ``gap_of`` (rows, chambers x points, 3) are
     the gaps by rise and tilt, ``squares`` (rows, chambers x points, 9) their products, ``spans``
     (rows, 1) pieces of the spline a mm and ``top`` (rows) its end in mm; ``ring`` is the number of
-    points a balloon.
+    points a balloon. ``rims`` (rows, points, 3) are the gaps by rise and tilt round the outline.
     """
 
     table: Array
@@ -80,6 +82,7 @@ class Springs:
     spans: Array
     top: Array
     ring: int
+    rims: Array
 
     def of(self, levels: NDArray[np.int_]) -> Springs:
         """A row for each of these."""
@@ -90,6 +93,7 @@ class Springs:
             squares=self.squares[levels],
             spans=self.spans[levels],
             top=self.top[levels],
+            rims=self.rims[levels],
         )
 
     def energy(self, freedoms: Array) -> tuple[Array, Array, Array]:
@@ -103,9 +107,17 @@ class Springs:
             value = value + SHUT * shut**2 / 2
             slope = slope + SHUT * shut
             curve = curve + np.where(gaps < 0, SHUT, 0.0)
-        gradient = (slope[:, None] @ self.gap_of)[:, 0] / self.ring
-        matrix = (curve[:, None] @ self.squares).reshape(-1, 3, 3) / self.ring
-        return value.sum(-1) / self.ring, gradient, matrix
+        value = value.sum(-1)
+        gradient = (slope[:, None] @ self.gap_of)[:, 0]
+        matrix = (curve[:, None] @ self.squares).reshape(-1, 3, 3)
+        rims = (self.rims @ freedoms[..., None])[..., 0]
+        if rims.min() < 0:
+            shut = np.minimum(rims, 0.0)
+            value = value + SHUT * (shut**2).sum(-1) / 2
+            gradient = gradient + SHUT * (shut[:, None] @ self.rims)[:, 0]
+            touch = np.where(rims < 0, SHUT, 0.0)[..., None] * self.rims
+            matrix = matrix + touch.transpose(0, 2, 1) @ self.rims
+        return value / self.ring, gradient / self.ring, matrix / self.ring
 
     def contents(self, freedoms: Array) -> tuple[Array, Array]:
         """Volume in ul of each balloon (rows, chambers), and the potential of each row."""
@@ -227,6 +239,7 @@ def _settled(
         if np.abs(gradient).max() < CLOSE * (1 + 1e-3 * push):
             return at, push, _is_firm(matrix)
         flat, is_firm = _towards(gradient[None], matrix[None])
+        flat = _held_off(springs, at, flat, gradient, matrix)
         move = flat.reshape(-1, 3)
         largest = float(np.abs(move).max())
         slope = float((flat @ gradient)[0])
@@ -248,6 +261,29 @@ def _settled(
         if abs(slope) < 1e-11 * (1 + abs(value)):
             return at, push, _is_firm(matrix)
     return None
+
+
+def _held_off(springs: Springs, at: Array, flat: Array, gradient: Array, matrix: Array) -> Array:
+    """The step to where rims just touch which it would drive into each other.
+
+    A step that does not see them yet would run far past them (a primal-dual active set).
+    """
+    rims = (springs.rims @ at[..., None])[..., 0]
+    for _ in range(ROUNDS):
+        ahead = rims + (springs.rims @ flat.reshape(-1, 3, 1))[..., 0]
+        met = (ahead < 0) & (rims >= 0)
+        if not met.any():
+            break
+        each = springs.rims * met[..., None]
+        push = SHUT / springs.ring * (rims[:, None] @ each)[:, 0]
+        stiffer = matrix.copy()
+        diagonal = np.einsum("iaib->iab", stiffer.reshape(len(at), 3, len(at), 3))
+        diagonal += SHUT / springs.ring * (each.transpose(0, 2, 1) @ each)
+        tried, _ = _towards((gradient + push.ravel())[None], stiffer[None])
+        if float((tried @ gradient)[0]) >= 0:
+            break  # it would lead uphill
+        flat = tried
+    return flat
 
 
 def _is_firm(matrix: Array) -> bool:

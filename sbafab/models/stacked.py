@@ -11,6 +11,7 @@ import numpy as np
 from sbafab.errors import DesignError
 from sbafab.models import paper
 from sbafab.models.actuator import Actuator
+from sbafab.models.contact import chamber_gap, rim_gap
 from sbafab.models.elastic import calibrated
 from sbafab.models.figures import Asked, Figure, LeftOut, Model, Relation, Trace
 from sbafab.models.motion import Motion
@@ -36,9 +37,15 @@ FORCE = Model(
 BEND = Model(
     "elastic stack",
     SOURCE,
-    "rigid plates that tilt, balloons that push by the gap at their ring. The 3-DoF at 5 kPa has "
-    "80 deg with two chambers, 109 with one, where shells in SOFA have 81 to 92 and 96 to 117; the "
-    "paper's largest is 81 +- 6 at a pressure that it does not give",
+    "rigid plates that tilt, balloons that push by the gap at their ring, rims that touch on the "
+    "inner side. The 3-DoF at 5 kPa has 80 deg with two chambers, 102 with one, where shells in "
+    "SOFA have 81 to 92 and 96 to 117; the paper's largest is 81 +- 6 at a pressure that it does "
+    "not give",
+)
+CONTACT = Model(
+    "elastic stack",
+    SOURCE,
+    "films as wide as their meridians in balance; 0 is touching, which the stack then allows for",
 )
 TIME = Model(
     "elastic stack in time",
@@ -118,8 +125,18 @@ def _bends(asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
                 yield LeftOut(name, str(error))
                 continue
             yield Figure("bending", name, pose.bend, "deg", model)
+            yield from _rooms(name.replace("bend at ", "", 1), asked, found, pose)
             aside = float(np.hypot(*pose.tip[:2]))
             yield Figure("bending", name.replace("bend", "tip aside", 1), aside, "mm", model)
+
+
+def _rooms(where: str, asked: Asked, found: Stack, pose: Pose) -> Iterator[Figure]:
+    """How near a bent stack comes to itself."""
+    model = calibrated(CONTACT, asked.calibration)
+    room = rim_gap(found, pose)
+    yield Figure("bending", f"room between rims on the inner side, {where}", room, "mm", model)
+    room = chamber_gap(found, pose)
+    yield Figure("bending", f"clearance between chambers, {where}", room, "mm", model)
 
 
 def bent(found: Stack, chambers: int, angle: float) -> Pose | None:

@@ -13,13 +13,13 @@ from sbafab.assemblies.shapes import placed_surface
 from sbafab.design.form import Discs, Slots
 from sbafab.models.lens import fullest, rate
 from sbafab.models.stack import Stack, stack
-from sbafab.reports.inflated import COARSE, inflated
+from sbafab.reports.bent_arms import BentTouch, Clearance, bent_arms
+from sbafab.reports.inflated_parts import carried, in_place, lifted, manifold, solids
 
 if TYPE_CHECKING:
-    import manifold3d
     from numpy.typing import NDArray
 
-    from sbafab.meshing.surface import Surface
+    from sbafab.reports.inflated_parts import Solids
 
 GRAVITY = 9.80665
 MARBLE_G = 1.2
@@ -53,8 +53,8 @@ class Touch(NamedTuple):
 
 
 class AssemblyPrediction(NamedTuple):
-    """Figures at ``pressure_kpa``; ``touches`` are parts in each other's way; ``left_out`` says
-    what no model reaches.
+    """Figures at ``pressure_kpa``; ``touches`` are parts in each other's way when all stand up
+    straight, ``bent_touches`` what arms meet when bent; ``left_out`` says what no model reaches.
     """
 
     name: str
@@ -63,6 +63,7 @@ class AssemblyPrediction(NamedTuple):
     figures: tuple[AssemblyFigure, ...]
     touches: tuple[Touch, ...]
     left_out: tuple[str, ...]
+    bent_touches: tuple[BentTouch, ...] = ()
 
 
 def predict_assembly(
@@ -75,6 +76,7 @@ def predict_assembly(
     figures: list[AssemblyFigure] = []
     touches: list[Touch] = []
     left_out: list[str] = []
+    bent: list[BentTouch] = []
     stacks = _stacks(assembled)
     rises = {name: _rise(assembled[name], one, pressure_kpa) for name, one in stacks.items()}
     for placed in assembled.parts:
@@ -86,6 +88,12 @@ def predict_assembly(
         elif isinstance(pockets, Discs):
             figures += _arm(placed, stacks[placed.name], pressure_kpa, load_g)
             touches += _touches(assembled, placed, stacks, rises, pressure_kpa)
+            for met in bent_arms(assembled, placed, stacks, rises, pressure_kpa):
+                if isinstance(met, Clearance):
+                    what = f"clearance to {met.other}, bent by {met.chambers}"
+                    figures.append(AssemblyFigure(placed.name, what, met.gap, "mm", ELASTIC))
+                else:
+                    bent.append(met)
         else:
             left_out.append(f"{placed.name}: no model knows the form of a drawn pocket outline")
     if assembled.assembly.name not in PAPERS:
@@ -97,6 +105,7 @@ def predict_assembly(
         tuple(figures),
         tuple(touches),
         tuple(left_out),
+        tuple(bent),
     )
 
 
@@ -106,6 +115,7 @@ def as_json(found: AssemblyPrediction) -> dict[str, object]:
         **found._asdict(),
         "figures": [figure._asdict() for figure in found.figures],
         "touches": [touch._asdict() for touch in found.touches],
+        "bent_touches": [touch._asdict() for touch in found.bent_touches],
     }
 
 
@@ -194,7 +204,7 @@ def _rise(placed: PlacedPart, found: Stack, pressure: float) -> NDArray[np.float
     """By what (3,) in mm an actuator lifts what stands on its top."""
     free = found.pose((pressure,) * found.chambers)
     ends = np.array([[0.0, 0.0, found.flat_height], [0.0, 0.0, free.height]])
-    low, high = _in_place(placed, ends)
+    low, high = in_place(placed, ends)
     lift: NDArray[np.float64] = high - low
     return lift
 
@@ -208,69 +218,24 @@ def _touches(
 ) -> Iterator[Touch]:
     """Other parts that an actuator meets when all stand up straight."""
     names = [part.name for part in assembled.parts]
-    own = _solids(placed, stacks[placed.name], pressure, _lifted(assembled, placed, rises))
-    moved = _carried(assembled, placed.name)
+    own = _upright(placed, stacks[placed.name], pressure, lifted(assembled, placed, rises))
+    moved = carried(assembled, placed.name)
     for other in assembled.parts:
         # What stands on it moves along, and what it stands on it touches as it does flat.
         if other.name in moved or other.name == placed.part.on or other.part.kind == "line":
             continue
-        lift = _lifted(assembled, other, rises)
+        lift = lifted(assembled, other, rises)
         if isinstance(other, PlacedSba) and other.name in stacks:
             if names.index(other.name) < names.index(placed.name):
                 continue  # each pair once
-            theirs = _solids(other, stacks[other.name], pressure, lift)
+            theirs = _upright(other, stacks[other.name], pressure, lift)
         else:
             surface = placed_surface(other, filled=True)
-            theirs = [_manifold(surface._replace(points=surface.points + lift))]
+            theirs = [manifold(surface._replace(points=surface.points + lift))]
         shared = sum(float((a ^ b).volume()) for a in own for b in theirs)
         if shared > TOUCHING:
             yield Touch(placed.name, other.name, shared)
 
 
-def _lifted(
-    assembled: Assembled, placed: PlacedPart, rises: Mapping[str, NDArray[np.float64]]
-) -> NDArray[np.float64]:
-    """By what (3,) in mm a part is lifted by the actuators under it."""
-    lift = np.zeros(3)
-    while placed.part.on is not None:
-        if placed.part.at == "top":
-            lift = lift + rises.get(placed.part.on, 0.0)
-        placed = assembled[placed.part.on]
-    return lift
-
-
-def _carried(assembled: Assembled, name: str) -> set[str]:
-    """A part and all that hangs on it."""
-    found = {name}
-    for part in assembled.parts:
-        if part.part.on in found:
-            found.add(part.name)
-    return found
-
-
-def _solids(
-    placed: PlacedSba, found: Stack, pressure: float, lift: NDArray[np.float64]
-) -> list[manifold3d.Manifold]:
-    """An inflated actuator's balloons and webs, in place."""
-    pose = found.pose((pressure,) * found.chambers)
-    pieces = []
-    for part in inflated(placed.made.laminate, found, pose, COARSE):
-        points = _in_place(placed, part.surface.points) + lift
-        pieces += _manifold(part.surface._replace(points=points)).decompose()
-    return pieces
-
-
-def _in_place(placed: PlacedPart, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points of a part's own frame in the assembly; on a tube it stands on the tangent."""
-    turned = placed.turned(points)
-    if placed.radius is not None:
-        x, y, z = turned.T
-        turned = np.column_stack([placed.radius + z, x, y])
-    return placed.pose.points(turned)
-
-
-def _manifold(surface: Surface) -> manifold3d.Manifold:
-    import manifold3d
-
-    faces = np.ascontiguousarray(surface.faces.astype(np.uint64))
-    return manifold3d.Manifold(manifold3d.Mesh64(np.ascontiguousarray(surface.points), faces))
+def _upright(placed: PlacedSba, found: Stack, pressure: float, lift: NDArray[np.float64]) -> Solids:
+    return solids(placed, found, found.pose((pressure,) * found.chambers), lift)

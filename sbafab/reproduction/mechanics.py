@@ -187,8 +187,8 @@ def _bends(three: Prediction, whole: Stack) -> Iterator[Row]:
     _, found = filled(whole, paper.WATER_FLOW, paper.FULL_KPA)
     full = found.pressures[0]
     for count, why in (
-        (1, "high: the films' webs, taken for rigid here, likely fold; or the pressure was less"),
-        (2, "low: as above; the paper does not say which chambers, nor at which pressure"),
+        (1, "near: rims that touch on the inner side hold it back, by 10 degrees"),
+        (2, "low: the paper does not say which chambers, nor at which pressure"),
     ):
         pose = whole.pose((full,) * count + (0.0,) * (3 - count))
         what = "one chamber" if count == 1 else "2 chambers"
@@ -286,7 +286,7 @@ def _calibrated_bent(found: Prediction) -> Iterator[Row]:
         30: "low: the paper does not say which chambers push, nor how the sensor holds the tip; "
         "with one chamber it is half of this",
         60: "high: as at 30 degrees; with one chamber it is half of this",
-        90: "low: as at 30 degrees; with one chamber it is twice this",
+        90: "near, as the paper does not say which chambers push: with one it is 1.5 times this",
     }
     for angle, value in paper.FORCE_BENT:
         yield Row(
@@ -328,8 +328,8 @@ def _calibrated_motion(three: Stack) -> Iterator[Row]:
         (
             1,
             "one chamber",
-            "high: plates' rims pass through each other on the inner side, as they do in SOFA; "
-            "contact, which is not in it, would hold them",
+            "high, though rims that touch on the inner side take 6 degrees off; the paper does not "
+            "say which chambers, nor at which pressure",
         ),
     ):
         bend = three.pose((full,) * chambers + (0.0,) * (3 - chambers)).bend

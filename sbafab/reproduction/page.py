@@ -27,10 +27,10 @@ buckles has a part in it. Molten TPE that creeps under the mask is the likely ca
 `sbafab predict --pocket-loss {loss:g}` takes it.
 
 What we aimed at, 10 % in force, 5 % in height, 6 degrees in bend and 0.08 s in the water's time, is
-reached by the 3-DoF's force when flat and at 25 %, its height and its time. Its force at 75 %, its
-forces when bent and its bend are not; nor is the 1-DoF's force above flat. Fitting the modulus as
-well, to all three forces of the 1-DoF (0.3 mm, 50 MPa), serves none of the held-out rows: 13 to
-21 % low in force, 39 % in height and in bend.
+reached by the 3-DoF's force when flat, at 25 % and bent by 90 degrees, its height and its time. Its
+force at 75 %, those when bent by 30 and 60 degrees and its bend are not; nor is the 1-DoF's force
+above flat. Fitting the modulus as well, to all three forces of the 1-DoF (0.3 mm, 50 MPa), serves
+none of the held-out rows: 13 to 21 % low in force, 39 % in height and in bend.
 """
 
 FACTORS = """## What a calibration would take

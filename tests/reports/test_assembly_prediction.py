@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 import math
+import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 import sbafab
+from sbafab.assemblies.build import assemble
+from sbafab.assemblies.reading import assembly_of
 from sbafab.cli import app
 from sbafab.reports.assembly_prediction import AssemblyPrediction, predict_assembly
 
@@ -94,3 +98,91 @@ def test_parts_that_meet_only_when_inflated_are_named(
     assert [(touch["part"], touch["other"]) for touch in touches] == (
         [("one", "shelf")] if meets else []
     )
+
+
+POST = """
+name = "post"
+family = "assembly"
+[parts.plate]
+kind = "base"
+width = 60
+length = 40
+thickness = 2
+material = "acrylic"
+[parts.arm]
+kind = "sba"
+design = "3dof-15mm"
+on = "plate"
+at = "top"
+[parts.post]
+kind = "tube"
+outer_diameter = 4
+inner_diameter = 2
+length = 30
+material = "steel"
+on = "plate"
+at = "top"
+offset = [OFF, 0]
+"""
+
+
+ROD = """
+[parts.rod]
+kind = "tube"
+outer_diameter = 2
+inner_diameter = 1
+length = 14
+material = "steel"
+on = "arm"
+at = "top"
+offset = [4.25, 0]
+"""
+
+
+def reach(pressure: float) -> float:
+    """Mm from the axis to the outermost point when the first chamber bends the arm into an arc of
+    a circle: of its lobe's rims, 7.5 out, the last ones midway in their level, or of the neck on
+    its top, 4.25 + 1.27 out.
+    """
+    pose = sbafab.stack("3dof-15mm").pose((pressure, 0, 0))
+    angle = math.radians(pose.bend)
+    radius = (pose.freedoms[:, 0] + pose.pitch).sum() / angle
+    rims = radius - (radius + 7.5) * np.cos(np.linspace(0, angle * (1 - 1 / 30), 500))
+    top = radius - (radius + 4.25 + 1.27) * math.cos(angle)
+    return max(float(rims.max()), top)
+
+
+@pytest.mark.parametrize(
+    ("room", "meets"), [pytest.param(10.5, False, marks=pytest.mark.long), (8.0, True)]
+)
+def test_a_bent_arm_is_held_against_what_stands_beside_it(room: float, meets: bool) -> None:
+    """The first chamber lies at x > 0 and bends the arm towards x < 0, where a post stands."""
+    made = assemble(assembly_of(tomllib.loads(POST.replace("OFF", f"{-room - 2}")), Path("post")))
+    found = predict_assembly(made, 5.0)
+    assert found.touches == ()  # 0.5 mm and more beside the straight arm
+    assert 8.0 < reach(5.0) < 10.5
+    if not meets:
+        assert not [touch for touch in found.bent_touches if touch.other == "post"]
+        left = value(found, "arm", "clearance to post, bent by chamber1")
+        assert left == pytest.approx(room - reach(5.0), abs=0.15)
+        return
+    (met,) = [touch for touch in found.bent_touches if touch.other == "post"]
+    assert (met.part, met.chambers) == ("arm", "chamber1")
+    assert met.volume > 0.05
+    # It meets the post as soon as it reaches so far.
+    assert reach(0.8 * met.from_kpa) < room < reach(1.2 * met.from_kpa)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("height", "meets"), [(6, False), (9, True)])
+def test_what_stands_on_a_bent_arm_goes_along_with_its_tip(height: int, meets: bool) -> None:
+    """A rod on the arm's top sweeps over a low post that the arm alone stays clear of."""
+    rod = POST.replace("length = 30", f"length = {height}").replace("OFF", "-20")
+    made = assemble(assembly_of(tomllib.loads(rod + ROD), Path("post")))
+    pose = sbafab.stack("3dof-15mm").pose((5, 0, 0))
+    x, z = pose.frames[1][-1][:, 0], pose.frames[1][-1][:, 2]
+    rod_axis = pose.tip + 4.25 * x + np.linspace(0, 14, 200)[:, None] * z
+    over = rod_axis[abs(rod_axis[:, 0] + 20) < 2, 2]
+    assert (over.min() - 1 < height) == (over.max() + 1 < height + 2) == meets
+    touches = predict_assembly(made, 5.0).bent_touches
+    assert [touch.chambers for touch in touches if touch.other == "post"] == ["chamber1"] * meets
