@@ -38,6 +38,11 @@ def test_offsets(chunk: int) -> None:
         ("booleans", 31, 14210),
         # A corner on an arc's circle, beside the arc that was bent off it.
         ("booleans", 31, 12555),
+        # A sliver's tip on a circle: tiny edges beside it were joined round its corner.
+        ("booleans", 2026, 475111),
+        ("booleans", 2026, 667622),
+        # A step along a side that shapely drops before it shrinks.
+        ("offsets", 2026, 189961),
     ],
 )
 def test_found_before(what: str, seed: int, number: int) -> None:
