@@ -14,9 +14,10 @@ from itertools import pairwise
 from typing import Literal, NamedTuple
 
 from sbafab.geometry.biarc import biarc, ellipse
-from sbafab.geometry.boolean import GeometryError
+from sbafab.geometry.boolean import GeometryError, wound
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, distance_to, left_turn
-from sbafab.geometry.nearby import EdgeIndex, widened
+from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.tracks import TOLERANCE, Track, arcs_along, crossing
@@ -91,7 +92,7 @@ def beam_path(region: Region, kerf: Kerf) -> BeamPath:
     contours = []
     for contour in grown.contours:
         tracks = [_track(edge, sources) for edge in contour.edges]
-        contours.append(_drawn(contour.edges, tracks, (sx, sy)))
+        contours.append(_untangled(_drawn(contour.edges, tracks, (sx, sy))))
     return BeamPath(Region(tuple(contours)), lost)
 
 
@@ -224,6 +225,21 @@ def _drawn(edges: Sequence[Edge], tracks: Sequence[Track], scale: tuple[float, f
             if any(tracks[i].runs_on(s + share * (t - s)) for share in (0.0, 0.5, 1.0))
         ]
     return Contour(tuple(_joined(spans)))
+
+
+def _untangled(contour: Contour) -> Contour:
+    """The contour without loops of less than a micrometre, where tracks cross once too often."""
+    edges, count = contour.edges, len(contour.edges)
+    if not any(
+        (i - j) % count not in (1, count - 1) and meeting_points(edges[i], edges[j])
+        for i, j in close_pairs(contour.boxes, EPSILON)
+    ):
+        return contour
+    whole = wound((contour.reversed() if contour.is_hole else contour).edges, 0).contours
+    # A larger loop is no rounding: it stays, and is found when the file is read.
+    if len(whole) != 1 or abs(whole[0].area - abs(contour.area)) > EPSILON * contour.length:
+        return contour
+    return whole[0].reversed() if contour.is_hole else whole[0]
 
 
 def _cut_where_wide(track: Track, t0: float, t1: float) -> list[float]:

@@ -16,6 +16,9 @@ import pytest
 import shapely
 from shapely.affinity import scale
 
+from sbafab.actuators import load_design
+from sbafab.api import build
+from sbafab.cutting.chaining import check_clear
 from sbafab.cutting.kerf import compensate
 from sbafab.geometry.biarc import bezier, fit_arcs
 from sbafab.geometry.boolean import union
@@ -133,3 +136,22 @@ def test_a_hollow_narrower_than_the_beam_leaves_no_loop() -> None:
         assert shapely.LinearRing(points).is_simple
         assert_sum(path, region, (0.05, 0.2))
         assert any(isinstance(edge, Arc) for edge in hole.edges)
+
+
+def test_a_loop_under_a_micrometre_where_tracks_cross_twice_is_taken_out() -> None:
+    """Seven tapered chambers with ears: an edge of a separator's path went back by 0.2 um."""
+    keys = {
+        "stack.balloons": 3,
+        "registration.method": "ears",
+        "bond.width": 1.48,
+        "mask.overhang": 0.889,
+        "fillet.radius": 1.0,
+        "chamber.count": 7,
+        "chamber.diameter": "[7.675,7.941,7.941]",
+        "lumen.diameter": 4.254,
+    }
+    design = load_design("3dof-15mm", [f"{key}={value}" for key, value in keys.items()])
+    separator = build(design).layers[3].profile
+    path = compensate(separator, (0.169, 0.064))
+    check_clear(path.contours)
+    assert_sum(path, separator, (0.169, 0.064))
