@@ -152,11 +152,14 @@ class Arc(NamedTuple):
     def bounds(self) -> Bounds:
         (cx, cy), r = self.centre, self.radius
         (x0, y0), (x1, y1) = (self.start, self.end) if self.ccw else (self.end, self.start)
+        left, right = (x0, x1) if x0 < x1 else (x1, x0)
+        low, high = (y0, y1) if y0 < y1 else (y1, y0)
+        # The ends may lie off the circle by a rounding: they are within the box, too.
         return (
-            cx - r if y0 >= cy >= y1 else x1 if x1 < x0 else x0,
-            cy - r if x0 <= cx <= x1 else y1 if y1 < y0 else y0,
-            cx + r if y0 <= cy <= y1 else x1 if x1 > x0 else x0,
-            cy + r if x0 >= cx >= x1 else y1 if y1 > y0 else y0,
+            cx - r if y0 >= cy >= y1 and cx - r < left else left,
+            cy - r if x0 <= cx <= x1 and cy - r < low else low,
+            cx + r if y0 <= cy <= y1 and cx + r > right else right,
+            cy + r if x0 >= cx >= x1 and cy + r > high else high,
         )
 
     def reversed(self) -> Arc:

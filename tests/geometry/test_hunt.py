@@ -41,6 +41,8 @@ def test_offsets(chunk: int) -> None:
         # A sliver's tip on a circle: tiny edges beside it were joined round its corner.
         ("booleans", 2026, 475111),
         ("booleans", 2026, 667622),
+        # An arc's end below the lowest point of its circle by a rounding: out of its box.
+        ("booleans", 2027, 7688),
         # A step along a side that shapely drops before it shrinks.
         ("offsets", 2026, 189961),
     ],
