@@ -7,12 +7,12 @@ from collections.abc import Iterator
 
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line
 
-Run = tuple[Edge, ...]
+_Run = tuple[Edge, ...]
 DRIFT = 4 * EPSILON
 """mm that edges which follow each other along one line or circle may leave it by, together."""
 
 
-def runs(edges: Run) -> Iterator[Run]:
+def runs(edges: _Run) -> Iterator[_Run]:
     """The edges gathered by the line or circle they lie on, from the first corner on."""
     breaks = [i for i in range(len(edges)) if not same_support(edges[i - 1], edges[i])]
     if not breaks:
@@ -36,7 +36,7 @@ def same_support(a: Edge, b: Edge) -> bool:
     return False
 
 
-def _parted(run: Run) -> Iterator[Run]:
+def _parted(run: _Run) -> Iterator[_Run]:
     """The run, in parts that each keep to one line or circle.
 
     Edges may turn by so little from one to the next that each two look straight, and yet round a

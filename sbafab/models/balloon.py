@@ -157,7 +157,7 @@ class Shapes(NamedTuple):
     z: Array
 
 
-class Load(NamedTuple):
+class BalloonLoad(NamedTuple):
     """Pressure, half the height between the plates, and the stress that wrinkles carry."""
 
     pressure: Array
@@ -165,8 +165,8 @@ class Load(NamedTuple):
     cap: Array
     tied: bool
 
-    def rows(self, these: NDArray[np.int_]) -> Load:
-        return Load(self.pressure[these], self.half[these], self.cap[these], self.tied)
+    def rows(self, these: NDArray[np.int_]) -> BalloonLoad:
+        return BalloonLoad(self.pressure[these], self.half[these], self.cap[these], self.tied)
 
 
 def inflate(
@@ -186,7 +186,7 @@ def inflate(
         raise DesignError("pressure and height of a balloon must be above 0 kPa and 0 mm")
     elements = len(balloon.nodes) - 1
     smooth = np.where(balloon.may_wrinkle & balloon.inextensible, 0.0, math.inf)
-    load = Load(p, high / 2, np.broadcast_to(smooth, (len(p), elements)), tied)
+    load = BalloonLoad(p, high / 2, np.broadcast_to(smooth, (len(p), elements)), tied)
     if balloon.mate is not None:
         from sbafab.models import two_films
 
@@ -204,7 +204,7 @@ def inflate(
     return Shapes(p, 2 * z[:, 0], 2 * held, force, 2 * (term.energy + p * held), r, z)
 
 
-def start(balloon: Balloon, load: Load) -> tuple[Array, Array]:
+def start(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
     """Bulged films to begin with, as high as their pressure may lift them."""
     flat, free = balloon.nodes, balloon.pocket - balloon.neck
     rise = 0.3 * free * np.cbrt(load.pressure * balloon.pocket / (balloon.modulus * 0.0025))
@@ -216,7 +216,7 @@ def start(balloon: Balloon, load: Load) -> tuple[Array, Array]:
 
 
 def total(
-    balloon: Balloon, load: Load, r: Array, z: Array, slopes: bool = True
+    balloon: Balloon, load: BalloonLoad, r: Array, z: Array, slopes: bool = True
 ) -> tuple[Term, Array]:
     """Energy of films and plates less the work of the air, by coordinate, and the plates' force."""
     film, edge = balloon.film, balloon.edge
@@ -247,7 +247,7 @@ def total(
     return total._replace(energy=energy), pressed.sum(-1)
 
 
-def _settled(balloon: Balloon, load: Load, r: Array, z: Array) -> tuple[Array, Array]:
+def _settled(balloon: Balloon, load: BalloonLoad, r: Array, z: Array) -> tuple[Array, Array]:
     """The shapes of least energy downhill of these: Newton's method, damped where it climbs.
 
     Raises DesignError where it does not end.
@@ -295,7 +295,7 @@ def _settled(balloon: Balloon, load: Load, r: Array, z: Array) -> tuple[Array, A
 
 def _downhill(
     balloon: Balloon,
-    load: Load,
+    load: BalloonLoad,
     at: tuple[Array, Array],
     ahead: Array,
     energy: Array,

@@ -16,14 +16,14 @@ from sbafab.models import balloon as single
 from sbafab.models.film_elements import air
 
 if TYPE_CHECKING:
-    from sbafab.models.balloon import Balloon, Load, Shapes
+    from sbafab.models.balloon import Balloon, BalloonLoad, Shapes
     from sbafab.models.film_elements import Array
 
-Films = tuple["Balloon", "Balloon"]
-Loads = tuple["Load", "Load"]
+TwoFilms = tuple["Balloon", "Balloon"]
+Loads = tuple["BalloonLoad", "BalloonLoad"]
 
 
-def inflate(films: Films, load: Load) -> Shapes:
+def inflate(films: TwoFilms, load: BalloonLoad) -> Shapes:
     """The shapes under a load; ``r`` and ``z`` are those of the film that stretches more easily.
 
     Raises DesignError where no balance is found.
@@ -59,7 +59,7 @@ def inflate(films: Films, load: Load) -> Shapes:
     return single.Shapes(load.pressure, height, volume, force, energy, *softer)
 
 
-def _wringing(films: Films) -> Array:
+def _wringing(films: TwoFilms) -> Array:
     """What coordinates make of the square root of twice the energy of wringing the rim.
 
     A ring of both films bonded turns round its middle line: hoops are bent.
@@ -114,7 +114,7 @@ def _basis(one: Balloon, is_free: bool) -> Array:
     return np.stack(columns, -1)
 
 
-def _settled(films: Films, loads: Loads, basis: Array, both: Array) -> Array:
+def _settled(films: TwoFilms, loads: Loads, basis: Array, both: Array) -> Array:
     """The shapes of least energy: Newton's method, damped where it climbs."""
     both, damping = both.copy(), np.zeros(len(both))
     pressure, diagonal = loads[0].pressure, np.arange(basis.shape[1])
@@ -140,7 +140,7 @@ def _settled(films: Films, loads: Loads, basis: Array, both: Array) -> Array:
     )
 
 
-def _total(films: Films, loads: Loads, basis: Array, both: Array) -> tuple[Array, Array, Array]:
+def _total(films: TwoFilms, loads: Loads, basis: Array, both: Array) -> tuple[Array, Array, Array]:
     """Energy with its slopes by the freedoms."""
     size = both.shape[1] // 2
     wrings = _wringing(films)
@@ -158,7 +158,7 @@ def _total(films: Films, loads: Loads, basis: Array, both: Array) -> tuple[Array
 
 
 def _downhill(
-    films: Films, loads: Loads, both: Array, ahead: Array, energy: Array, slope: Array
+    films: TwoFilms, loads: Loads, both: Array, ahead: Array, energy: Array, slope: Array
 ) -> Array:
     """The share of each step that lowers the energy; 0 where none does."""
     change = np.zeros(len(both))

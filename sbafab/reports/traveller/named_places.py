@@ -18,7 +18,7 @@ ASIDE, FAR = 0.4, 0.25
 """What a name out of its direction costs, and a mm of distance, in mm2 of covering."""
 
 
-class Name(NamedTuple):
+class PlanName(NamedTuple):
     """A name to be put beside ``at``, a place ``clear`` mm round, best in the direction ``out``."""
 
     words: str
@@ -27,7 +27,7 @@ class Name(NamedTuple):
     out: Point
 
 
-def named(names: list[Name], size: float, room: Bounds, taken: list[Bounds]) -> list[str]:
+def named(names: list[PlanName], size: float, room: Bounds, taken: list[Bounds]) -> list[str]:
     """The names as SVG, each where it covers least of ``taken`` and of those before it."""
     taken, drawn = list(taken), []
     for name in names:
@@ -41,7 +41,7 @@ def named(names: list[Name], size: float, room: Bounds, taken: list[Bounds]) -> 
     return drawn
 
 
-def _places(name: Name, size: float) -> list[tuple[Point, float]]:
+def _places(name: PlanName, size: float) -> list[tuple[Point, float]]:
     """Middles of the name, each with how far it stands off."""
     half = draw.text_width(name.words, size) / 2
     found = []
@@ -62,14 +62,14 @@ def _places(name: Name, size: float) -> list[tuple[Point, float]]:
     return found
 
 
-def _box(name: Name, middle: Point, size: float) -> Bounds:
+def _box(name: PlanName, middle: Point, size: float) -> Bounds:
     half = draw.text_width(name.words, size) / 2
     x, y = middle
     return x - half, y - size / 2, x + half, y + size / 2
 
 
 def _cost(
-    name: Name, place: tuple[Point, float], size: float, room: Bounds, taken: list[Bounds]
+    name: PlanName, place: tuple[Point, float], size: float, room: Bounds, taken: list[Bounds]
 ) -> float:
     middle, away = place
     box = _box(name, middle, size)

@@ -14,7 +14,7 @@ from sbafab.laminate.assembly import AssemblyStep, distinct_layers
 from sbafab.laminate.laminate import Inlet, Laminate, Pin
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller.layup import Bed, inlets_in
-from sbafab.reports.traveller.named_places import Name, named
+from sbafab.reports.traveller.named_places import PlanName, named
 from sbafab.reports.traveller.shapes import Picture, flat, pattern_id
 
 WIDEST, TALLEST = 64.0, 44.0
@@ -85,14 +85,14 @@ def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: s
         picture.add(_pin(at, r, pin in step.pins))
         taken.append((at[0] - r, at[1] - r, at[0] + r, at[1] + r))
         if pin in step.pins and pin.name not in told:
-            names.append(Name(pin.name, at, r + 0.6, _outward(pin)))
+            names.append(PlanName(pin.name, at, r + 0.6, _outward(pin)))
     arrows = []
     for inlet in inlets:
         start, tip = _arrow(inlet, _reach(laminate, inlet), view)
         (u, v), xs, ys = inlet.direction, (start[0], tip[0]), (start[1], tip[1])
         picture.add(draw.line([start, tip], width=0.35), draw.arrow(tip, (u, -v)))
         taken.append((min(xs) - 0.7, min(ys) - 0.7, max(xs) + 0.7, max(ys) + 0.7))
-        arrows.append(Name(inlet.chamber, tip, 0.9, (u, -v)))
+        arrows.append(PlanName(inlet.chamber, tip, 0.9, (u, -v)))
     room = 0.5, HEAD + 0.3, view.width - 0.5, view.height - FOOT + 1.0
     picture.add(*named([*arrows, *names], NAMES, room, taken))
     at_datum = next((pin.name for pin in step.pins if math.hypot(*pin.centre) < AT_DATUM), None)
