@@ -43,6 +43,8 @@ def test_offsets(chunk: int) -> None:
         ("booleans", 2026, 667622),
         # An arc's end below the lowest point of its circle by a rounding: out of its box.
         ("booleans", 2027, 7688),
+        # A sliver of a few nm, and at its end 0.6 um by 20 um that went as dust with it.
+        ("booleans", 2027, 294305),
         # A step along a side that shapely drops before it shrinks.
         ("offsets", 2026, 189961),
     ],

@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 
 from sbafab.geometry.boolean import tidy
-from sbafab.geometry.edges import Arc, Edge, Line, Point, unit
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, unit
 from sbafab.geometry.region import Contour
 from sbafab.geometry.runs import runs, same_support
 from sbafab.geometry.shapes import circle
@@ -69,3 +69,16 @@ def test_straight_edges_and_a_circle_are_one_run_each() -> None:
     square = closed([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)])
     assert [len(run) for run in runs(square)] == [3, 1, 1, 1]
     assert len(Contour(circle((0.0, 0.0), 1.0).edges).runs) == 1
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+def test_a_sliver_does_not_take_its_lobe_with_it(turn: int) -> None:
+    """5 mm of 4 nm, on average under what is dust, and a lobe at its end."""
+    sliver = [(0.0, 0.0), (5.0, 0.0), (5.0, 4e-6), (0.0, 4e-6)]
+    assert tidy(closed(sliver) if turn > 0 else closed(sliver[::-1])) is None
+    for high, wide in ((0.0006, 0.02), (0.002, 0.01)):
+        lobed = [*sliver[:2], (5.0, high), (5.0 - wide, high), (5.0 - wide, 4e-6), sliver[3]]
+        contour = tidy(closed(lobed) if turn > 0 else closed(lobed[::-1]))
+        assert abs(shoelace(lobed)) < 2 * EPSILON * 10
+        assert contour is not None
+        assert contour.area == pytest.approx(turn * shoelace(lobed), rel=1e-6)
