@@ -29,6 +29,8 @@ from sbafab.errors import DesignError
 DEFAULT = "paper"
 SCHEMA = "sbafab/kit@1"
 FILE = "kit.toml"
+OTHER_TUBE = "tubing of your choice"
+"""What a tube is called whose name stands for another size in the kit."""
 """A kit's copy in the output folder of a design."""
 VALUE, SOURCE = "value", "source"
 SECTIONS = ("films", "registration", "press", "laser", "sheets", "rules")
@@ -276,6 +278,14 @@ def departures(design: Design) -> list[str]:
     if kit.adhesives and design.inlet.adhesive not in kit.adhesives:
         found.append("inlet.adhesive")
     return found
+
+
+def tube_name(design: Design) -> str:
+    """The tubing to take: the design's, unless a tube of that name has another size in the kit."""
+    tube = kit_of(design).tubes.get(design.inlet.tube)
+    if tube is not None and tube.outer_diameter != design.inlet.tube_outer_diameter:
+        return OTHER_TUBE
+    return design.inlet.tube
 
 
 def _values(kit: Kit) -> Iterator[tuple[str, object]]:

@@ -11,7 +11,7 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.design.films import Films
-from sbafab.design.kits import citation, read_kit, write_kit
+from sbafab.design.kits import OTHER_TUBE, citation, read_kit, tube_name, write_kit
 from sbafab.design.records import Design, Laser, Press, Registration, Rules, Sheets
 from sbafab.design.templates import kit_names, templates_folder
 from sbafab.design.writing import design_sha256, resolved
@@ -117,6 +117,18 @@ def test_a_tube_of_the_kit_is_known_by_its_name(lab: Path) -> None:
     assert found.inlet.tube_outer_diameter == 1.016
     with pytest.raises(DesignError, match=r"inlet.tube = 'hose' is not in kit lab \(\"Fine tube\""):
         validated({**bare, "inlet": {"tube": "hose"}}, records(), Path())
+
+
+def test_a_tube_of_another_size_does_not_keep_the_name_of_the_kits(lab: Path) -> None:
+    for changes, name in (
+        (["inlet.tube_outer_diameter=2"], "tubing of your choice"),
+        (["inlet.tube_outer_diameter=1.016"], "Braintree RPT040"),
+        (["inlet.tube_outer_diameter=2", "inlet.tube=My hose"], "My hose"),
+        ([f"kit={lab}"], "Braintree RPT040"),
+        ([f"kit={lab}", "inlet.tube=Fine tube", "inlet.tube_outer_diameter=0.8"], "Fine tube"),
+        ([f"kit={lab}", "inlet.tube=Fine tube", "inlet.tube_outer_diameter=1"], OTHER_TUBE),
+    ):
+        assert tube_name(load_design("1dof-5mm", changes)) == name
 
 
 def test_another_kit_takes_the_place_of_the_first_one(lab: Path) -> None:

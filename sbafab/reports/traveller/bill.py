@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from sbafab.design.kits import tube_name
 from sbafab.laminate.laminate import Layer
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import base_plate
@@ -32,7 +33,7 @@ def bill(work: Work) -> list[Item]:
     if laminate.inlets:
         number = len(laminate.inlets) * job.copies
         diameter = say.millimetres(laminate.inlets[0].tube_diameter)
-        tube = work.design.inlet.tube
+        tube = tube_name(work.design)
         items.append(Item("Tube", f"{tube}, outer diameter {diameter}", say.count(number, "piece")))
         drops = say.count(number, "small drop")
         items.append(Item("Adhesive", work.design.inlet.adhesive, drops))

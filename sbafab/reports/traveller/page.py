@@ -15,7 +15,7 @@ from string import ascii_uppercase
 from typing import TYPE_CHECKING, Any
 
 from sbafab.cutting.sheets import SheetFile
-from sbafab.design.kits import cited, departures
+from sbafab.design.kits import cited, departures, tube_name
 from sbafab.design.records import Design
 from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.films import Film, Material
@@ -189,7 +189,7 @@ def _facts(work: Work) -> list[tuple[str, str]]:
             for name, value in sizes(work.design, laminate).items()
         ),
         ("Inlets", str(len(laminate.inlets))),
-        ("Tube", work.design.inlet.tube),
+        ("Tube", tube_name(work.design)),
     ]
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
+from sbafab.design.kits import tube_name
 from sbafab.laminate.assembly import AssemblyStep, assembly, stack_count
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.pressing.schedule import Step
@@ -292,7 +293,7 @@ def tubing(work: Work) -> list[Action]:
             f"Mark {first} with a pen, on the side that lay up in the press: the base is below."
         ),
         Action(
-            f"Cut {say.count(len(inlets), 'piece')} of {work.design.inlet.tube}, outer diameter "
+            f"Cut {say.count(len(inlets), 'piece')} of {tube_name(work.design)}, outer diameter "
             f"{diameter}, square and without burr, as long as your rig needs."
         ),
         Action(
