@@ -70,8 +70,7 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
     """Draw the actuator at given pressures or volumes, from the elastic stack.
 
     Balloons are drawn as they stand between their plates; ears are snipped off, and inlet tubes are
-    left out. Elevation and
-    azimuth are degrees over the bench and round it.
+    left out. Elevation and azimuth are degrees over the bench and round it.
     """
     from sbafab.actuators import build, load_design
     from sbafab.cli.printing import shown_progress

@@ -29,9 +29,9 @@ from sbafab.errors import DesignError
 DEFAULT = "paper"
 SCHEMA = "sbafab/kit@1"
 FILE = "kit.toml"
+"""A kit's copy in the output folder of a design."""
 OTHER_TUBE = "tubing of your choice"
 """What a tube is called whose name stands for another size in the kit."""
-"""A kit's copy in the output folder of a design."""
 VALUE, SOURCE = "value", "source"
 SECTIONS = ("films", "registration", "press", "laser", "sheets", "rules")
 """Sections of a design that a kit fills in."""

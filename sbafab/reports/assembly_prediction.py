@@ -9,12 +9,19 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
-from sbafab.assemblies.shapes import placed_surface
 from sbafab.design.form import Discs, Slots
 from sbafab.models.lens import fullest, rate
 from sbafab.models.stack import Stack, stack
 from sbafab.reports.bent_arms import BentTouch, Clearance, bent_arms
-from sbafab.reports.inflated_parts import carried, in_place, lifted, manifold, solids
+from sbafab.reports.inflated_parts import (
+    TOUCHING,
+    as_it_is,
+    carried,
+    in_place,
+    lifted,
+    shared,
+    solids,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,8 +34,6 @@ MARBLE_G = 1.2
 ELASTIC = "elastic stack"
 LENS = "lens of two arcs, virtual work p dV/dh"
 STATIC = "statics"
-TOUCHING = 0.05
-"""mm3 that two parts may share: touching, as in the check of the deflated assembly."""
 PAPERS = ("aperture", "brace", "standing")
 """The assemblies that the paper built: figures of others stand beside nothing."""
 
@@ -230,11 +235,10 @@ def _touches(
                 continue  # each pair once
             theirs = _upright(other, stacks[other.name], pressure, lift)
         else:
-            surface = placed_surface(other, filled=True)
-            theirs = [manifold(surface._replace(points=surface.points + lift))]
-        shared = sum(float((a ^ b).volume()) for a in own for b in theirs)
-        if shared > TOUCHING:
-            yield Touch(placed.name, other.name, shared)
+            theirs = as_it_is(other, lift)
+        volume = shared(own, theirs)
+        if volume > TOUCHING:
+            yield Touch(placed.name, other.name, volume)
 
 
 def _upright(placed: PlacedSba, found: Stack, pressure: float, lift: NDArray[np.float64]) -> Solids:

@@ -13,17 +13,23 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
-from sbafab.reports.inflated_parts import as_it_is, carried, in_place, lifted, solids
+from sbafab.reports.inflated_parts import (
+    TOUCHING,
+    apart,
+    as_it_is,
+    carried,
+    in_place,
+    lifted,
+    shared,
+    solids,
+)
 
 if TYPE_CHECKING:
-    import manifold3d
     from numpy.typing import NDArray
 
     from sbafab.models.stack import Pose, Stack
     from sbafab.reports.inflated_parts import Solids
 
-TOUCHING = 0.05
-"""mm3 that two parts may share: touching, as in the check of the deflated assembly."""
 FARTHEST = 10.0
 """mm up to which clearances are looked for."""
 SLIGHTEST = 0.1
@@ -87,7 +93,7 @@ def bent_arms(
         names = " and ".join(placed.made.laminate.chambers[i].name for i in pressed)
         own = _moved(around, _bent(found, pressed, pressure))
         for other, theirs in around.others.items():
-            volume = _shared(own.beyond(other, placed), theirs)
+            volume = shared(own.beyond(other, placed), theirs)
             if volume > TOUCHING:
                 met.add(other)
                 first = _first(around, other, pressed, pressure)
@@ -183,16 +189,12 @@ def _frame(placed: PlacedPart) -> NDArray[np.float64]:
     return found
 
 
-def _shared(own: Solids, theirs: Solids) -> float:
-    return sum(float((a ^ b).volume()) for b in theirs for a in own if _apart(a, b) <= 0)
-
-
 def _gap(own: Solids, theirs: Solids) -> float:
     """Mm between the nearest two, at most ``FARTHEST``."""
     least = FARTHEST
-    pairs = ((_apart(a, b), a, b) for a in own for b in theirs)
-    for apart, a, b in sorted(pairs, key=lambda pair: pair[0]):
-        if apart >= least:
+    pairs = ((apart(a, b), a, b) for a in own for b in theirs)
+    for boxes, a, b in sorted(pairs, key=lambda pair: pair[0]):
+        if boxes >= least:
             break
         least = min(least, float(a.min_gap(b, least)))
     return least
@@ -206,14 +208,8 @@ def _first(around: _Around, other: str, pressed: Sequence[int], pressure: float)
         middle = math.sqrt(low * high)
         tried = _bent(around.found, pressed, middle)
         own = _moved(around, tried).beyond(other, around.placed)
-        if _shared(own, around.others[other]) > TOUCHING:
+        if shared(own, around.others[other]) > TOUCHING:
             high, pose = middle, tried
         else:
             low = middle
     return pose
-
-
-def _apart(a: manifold3d.Manifold, b: manifold3d.Manifold) -> float:
-    """Mm between the boxes of two solids; 0 or less where they meet."""
-    one, other = (np.array(solid.bounding_box()).reshape(2, 3) for solid in (a, b))
-    return float(np.maximum(one[0] - other[1], other[0] - one[1]).max())

@@ -22,6 +22,21 @@ if TYPE_CHECKING:
     Solids = list[manifold3d.Manifold]
 
 
+TOUCHING = 0.05
+"""mm3 that two parts may share: touching, as in the check of the deflated assembly."""
+
+
+def shared(own: Solids, theirs: Solids) -> float:
+    """Mm3 that lie in both."""
+    return sum(float((a ^ b).volume()) for a in own for b in theirs if apart(a, b) <= 0)
+
+
+def apart(a: manifold3d.Manifold, b: manifold3d.Manifold) -> float:
+    """Mm between the boxes of two solids; 0 or less where they meet."""
+    one, other = (np.array(solid.bounding_box()).reshape(2, 3) for solid in (a, b))
+    return float(np.maximum(one[0] - other[1], other[0] - one[1]).max())
+
+
 def lifted(
     assembled: Assembled, placed: PlacedPart, rises: Mapping[str, NDArray[np.float64]]
 ) -> NDArray[np.float64]:
