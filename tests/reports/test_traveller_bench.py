@@ -2,67 +2,35 @@
 
 from __future__ import annotations
 
-import hashlib
-import itertools
 import math
 import re
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import pytest
 import shapely
 from lxml import html as lxml_html
 
-from sbafab.actuators import build, load_design
 from sbafab.cutting.sheets import SheetFile
-from sbafab.design.records import Design
-from sbafab.laminate.assembly import assembly
 from sbafab.laminate.films import Film
-from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.records import Nest
 from sbafab.output.settings import limits, press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.pressing.together import design_runs
-from sbafab.reports.drawing import TIMES, text_width
+from sbafab.reports.drawing import TIMES
 from sbafab.reports.traveller.bill import cut_list
 from sbafab.reports.traveller.job import Job, Work
-from sbafab.reports.traveller.layup import beds
 from sbafab.reports.traveller.page import traveller_html
-from sbafab.reports.traveller.plan import plan
 from sbafab.reports.traveller.sheet_map import sheet_map
 from sbafab.rules.deck import run_deck
+from tests.reports.bench_pages import EARS, SHA, built, page, words_of
 
-EARS = 'registration.method="ears"'
-SHA = hashlib.sha256(b"design").hexdigest()
 TPE, PTFE, BOND, OVERHANG = 0.038, 0.025, 0.75, 0.5
 
 
 def film_of(sheet: SheetFile) -> Film:
     films = built("1dof-5mm")[0].films.stock
     return films[sheet.material.lower()]
-
-
-@cache
-def built(template: str, *assignments: str) -> tuple[Design, Laminate]:
-    design = load_design(template, assignments)
-    return design, build(design)
-
-
-def page(sheet_files: Any, template: str, *assignments: str) -> Any:
-    design, laminate = built(template, *assignments)
-    plan = schedule(laminate, press_settings(design))
-    fixture = "sheets/fixture.dxf" if laminate.pins else None
-    job = Job(SHA, "sbafab 1.0.0", fixture=fixture)
-    work = Work(design, laminate, plan, sheet_files(laminate), job)
-    return lxml_html.fromstring(traveller_html(*(getattr(work, name) for name in FIELDS)))
-
-
-FIELDS = ("design", "laminate", "schedule", "sheets", "job")
-
-
-def words_of(node: Any) -> str:
-    return " ".join(node.text_content().split())
 
 
 def steps(tree: Any) -> list[str]:
@@ -408,57 +376,3 @@ def test_the_places_of_a_full_plate_are_said_as_a_grid() -> None:
         [p for place in places for p in place], abs=2e-2
     )
     assert "place 2 by" not in words
-
-
-@pytest.mark.parametrize("assignments", [(), (EARS,)])
-def test_what_must_be_ready_before_the_day(sheet_files: Any, assignments: tuple[str, ...]) -> None:
-    tree = page(sheet_files, "3dof-15mm", *assignments)
-    section = words_of(tree.get_element_by_id("before").getparent())
-    # Two release films a step; the reamers are those of the hole table.
-    steps_made = 6 if assignments else 4
-    assert f"{2 * steps_made} release films" in section
-    assert f"each of the {steps_made} press steps" in section
-    assert ("reamers H7 ⌀1 mm and ⌀1.5 mm" in section) == bool(assignments)
-    # The paper has no time for warming or cooling: nothing is made up.
-    assert section.count("not known, the paper gives no time") == 3
-    assert not re.search(r"\d+ min", section)
-    assert "130 °C (266 °F)" in section
-    assert ("ears" in section) == bool(assignments)
-
-
-def test_a_part_without_pins_needs_no_reamer(sheet_files: Any) -> None:
-    radial = words_of(page(sheet_files, "radial-15mm").get_element_by_id("before").getparent())
-    assert "reamer" not in radial
-    assert "every pin" not in radial
-
-
-@pytest.mark.parametrize(
-    "design",
-    [
-        ("3dof-15mm", EARS),
-        ("1dof-5mm", EARS),
-        ("radial-15mm", EARS),
-        ("3dof-15mm", EARS, "chamber.count=4", "chamber.diameter=6.5", "lumen.diameter=3"),
-        ("3dof-15mm",),
-    ],
-)
-def test_names_in_the_top_view_are_apart(design: tuple[str, ...]) -> None:
-    _, laminate = built(*design)
-    parts = assembly(laminate)
-    known = {thing.name for thing in (*laminate.pins, *laminate.chambers)}
-    for part in parts:
-        drawn = plan(laminate, part, beds(parts, part), "plan")
-        found = re.findall(
-            r'<text x="([-\d.]+)" y="([-\d.]+)" font-size="([\d.]+)"[^>]*>(.*?)<', drawn
-        )
-        boxes = []
-        for x, y, size, words in found:
-            wide, low = text_width(words, float(size)), float(y) - 0.85 * float(size)
-            left = float(x) - wide / 2
-            if words in known:
-                boxes.append((words, shapely.box(left, low, left + wide, low + float(size))))
-        names = {words for words, _ in boxes}
-        assert {pin.name for pin in part.pins} <= names
-        for (a, one), (b, other) in itertools.combinations(boxes, 2):
-            shared = one.intersection(other).area
-            assert shared <= 0.1 * min(one.area, other.area), (part.number, a, b)

@@ -1,0 +1,42 @@
+"""Travellers of templates, read as pages: what the tests of the bench ask."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cache
+from typing import Any
+
+from lxml import html as lxml_html
+
+from sbafab.actuators import build, load_design
+from sbafab.design.records import Design
+from sbafab.laminate.laminate import Laminate
+from sbafab.output.settings import press_settings
+from sbafab.pressing.schedule import schedule
+from sbafab.reports.traveller.job import Job, Work
+from sbafab.reports.traveller.page import traveller_html
+
+EARS = 'registration.method="ears"'
+SHA = hashlib.sha256(b"design").hexdigest()
+
+
+@cache
+def built(template: str, *assignments: str) -> tuple[Design, Laminate]:
+    design = load_design(template, assignments)
+    return design, build(design)
+
+
+def page(sheet_files: Any, template: str, *assignments: str) -> Any:
+    design, laminate = built(template, *assignments)
+    plan = schedule(laminate, press_settings(design))
+    fixture = "sheets/fixture.dxf" if laminate.pins else None
+    job = Job(SHA, "sbafab 1.0.0", fixture=fixture)
+    work = Work(design, laminate, plan, sheet_files(laminate), job)
+    return lxml_html.fromstring(traveller_html(*(getattr(work, name) for name in FIELDS)))
+
+
+FIELDS = ("design", "laminate", "schedule", "sheets", "job")
+
+
+def words_of(node: Any) -> str:
+    return " ".join(node.text_content().split())
