@@ -57,9 +57,12 @@ def _pieces() -> Array:
 
 
 PIECES = _pieces()
+POWERS = np.arange(DEGREE + 1.0)
 SLOPES = np.stack([PIECES[:, k] * k for k in range(1, DEGREE + 1)], -1)
 WINDOWS = np.arange(HEIGHT_SPANS)[:, None] + np.arange(DEGREE + 1)
 """The coefficients of each piece by height."""
+PIECES_IN_ALL = HEIGHT_SPANS + 2
+"""Those of a spline by height, and what it goes on with at either end."""
 CURVES = np.stack([SLOPES[:, k] * k for k in range(1, DEGREE)], -1)
 
 
@@ -72,6 +75,19 @@ def basis(x: Array, order: int = 0) -> tuple[NDArray[np.int_], Array]:
     u = x - first
     powers = u[..., None] ** np.arange(table.shape[1])
     return first, powers @ table.T
+
+
+def _shifted(by: float, count: int) -> Array:
+    """What the first three powers of a polynomial are about a place ``by`` further: (3, count)."""
+    found = np.zeros((3, count))
+    for k in range(count):
+        for j in range(min(k, 2) + 1):
+            found[j, k] = math.comb(k, j) * by ** (k - j)
+    return found
+
+
+ENDS = _shifted(-1.0, 3), _shifted(1.0, DEGREE + 1)
+"""What goes on below the first piece, and above the last one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,22 +106,33 @@ class BalloonMap:
         """Pieces of the spline a mm of height."""
         return HEIGHT_SPANS / self.most_height
 
-    def pressed(self, pressure: ArrayLike) -> tuple[Array, Array]:
-        """Coefficients by height of W and of -dW/dp (the volume) at pressures, a row each.
+    @cached_property
+    def _polynomials(self) -> Array:
+        """By powers of both places: (pieces in pressure, powers, pieces by height x powers)."""
+        by_height = pieces(self.coefficients).reshape(len(self.coefficients), -1)
+        rows = by_height[np.arange(PRESSURE_SPANS)[:, None] + np.arange(DEGREE + 1)]
+        return np.asarray(PIECES.T @ rows)
+
+    def pressed(self, pressure: ArrayLike) -> Array:
+        """Polynomials by height, of W and of -dW/dp (the volume), at pressures: (..., 2, pieces,
+        powers).
 
         Raises DesignError for a pressure outside the map.
         """
         p = np.asarray(pressure, dtype=float)
-        if not ((p >= 0) & (p <= self.most_pressure)).all():
+        if not (p.min() >= 0 and p.max() <= self.most_pressure):
             raise DesignError(
                 f"a pressure of {float(p.max()):g} kPa is outside the balloon's map; give 0 to "
                 f"{self.most_pressure:g} kPa"
             )
         x, rate = self._scaled(p)
-        first, weights = basis(x)
-        slopes = basis(x, 1)[1] * -rate[..., None]
-        rows = self.coefficients[WINDOWS[first]]
-        return (weights[..., None, :] @ rows)[..., 0, :], (slopes[..., None, :] @ rows)[..., 0, :]
+        first = x.astype(np.int_)
+        powers = np.empty((*p.shape, 2, DEGREE + 1))
+        powers[..., 0, :] = (x - first)[..., None] ** POWERS
+        powers[..., 1, 0] = 0.0
+        powers[..., 1, 1:] = powers[..., 0, :-1] * POWERS[1:] * -rate[..., None]
+        found = powers @ self._polynomials[first]
+        return found.reshape(*p.shape, 2, PIECES_IN_ALL, DEGREE + 1)
 
     def _scaled(self, p: Array) -> tuple[Array, Array]:
         """Place among the pieces in pressure, and its rate by pressure."""
@@ -127,9 +154,9 @@ class BalloonMap:
 
     def _along(self, which: int, pressure: ArrayLike, height: ArrayLike) -> Along:
         p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
-        found = pieces(self.pressed(p)[which]).reshape(-1, DEGREE + 1)
+        found = self.pressed(p)[..., which, :, :].reshape(-1, DEGREE + 1)
         return along(
-            derivatives(found), HEIGHT_SPANS * np.arange(p.size).reshape(p.shape), h * self.spans
+            derivatives(found), PIECES_IN_ALL * np.arange(p.size).reshape(p.shape), h * self.spans
         )
 
     def free_height(self, pressure: ArrayLike) -> Array:
@@ -161,8 +188,16 @@ class Along(NamedTuple):
 
 
 def pieces(coefficients: Array) -> Array:
-    """Polynomials of splines by height: (..., coefficients) become (..., pieces, powers)."""
-    return np.asarray(coefficients[..., WINDOWS] @ PIECES)
+    """Polynomials of splines by height: (..., coefficients) become (..., PIECES_IN_ALL, powers).
+
+    The first goes on below the spline and the last above it, with the second derivative there.
+    """
+    inner = coefficients[..., WINDOWS] @ PIECES
+    found = np.zeros((*inner.shape[:-2], PIECES_IN_ALL, DEGREE + 1))
+    found[..., 1:-1, :] = inner
+    found[..., 0, :3] = inner[..., 0, :3] @ ENDS[0].T
+    found[..., -1, :3] = inner[..., -1, :] @ ENDS[1].T
+    return found
 
 
 def derivatives(polynomials: Array) -> Array:
@@ -179,22 +214,23 @@ def along(table: Array, which: NDArray[np.int_], y: Array) -> Along:
     """Splines at places ``y``, in pieces.
 
     ``table`` are the ``derivatives`` of the pieces of all splines; ``which`` says at which row each
-    one begins. Outside its ends it goes on with the second derivative that it has there.
+    one begins.
     """
-    inside = np.minimum(np.maximum(y, 0.0), HEIGHT_SPANS - 1e-9)
-    first = inside.astype(np.int_)
-    u = inside - first
-    powers = table.take(which + first, axis=2)
+    found = horner(table, which, y)
+    return Along(*found)
+
+
+def horner(table: Array, which: NDArray[np.int_], y: Array) -> Array:
+    """Polynomials (powers, ..., rows) of splines at places ``y``, in pieces."""
+    first = np.clip(np.floor(y), -1.0, HEIGHT_SPANS)
+    u = y - first
+    powers = table.take(which + 1 + first.astype(np.int_), axis=-1)
     found = powers[DEGREE] * u
     for power in powers[DEGREE - 1 : 0 : -1]:
         found += power
         found *= u
     found += powers[0]
-    value, slope, curve = found
-    beyond = y - inside
-    if beyond.any():
-        value, slope = value + beyond * (slope + beyond * curve / 2), slope + beyond * curve
-    return Along(value, slope, curve)
+    return np.asarray(found)
 
 
 @lru_cache(maxsize=64)
