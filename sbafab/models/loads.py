@@ -37,6 +37,11 @@ class Load(NamedTuple):
     outline: float
     wall: float = WALL
 
+    @property
+    def is_level(self) -> bool:
+        """Whether the outer plate is."""
+        return float(self.normal[2]) > 0.999
+
 
 class _Acting(NamedTuple):
     """What acts on the plates: the sum of the forces f beyond each level (n, 3), that of x f over

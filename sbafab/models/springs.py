@@ -84,10 +84,6 @@ class Springs:
         rows = found.transpose(2, 0, 1, 3, 4).reshape(-1, DEGREE + 1) / RING
         return cls(derivatives(rows), places)
 
-    def shut(self, freedoms: Array) -> NDArray[np.bool_]:
-        """Which of the points that may meet do: (rows, points)."""
-        return np.asarray((self.places.meet @ freedoms[..., None])[..., 0] < 0)
-
     def meeting(self, freedoms: Array, move: Array) -> tuple[Array, Array] | None:
         """What rims would do, by gradient (rows, 3) and second derivatives (rows, 3, 3), if those
         which a move closes were shut from where they are; None where it closes none.

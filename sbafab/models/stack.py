@@ -26,7 +26,7 @@ from sbafab.models.balloon_map import BalloonMap, balloon_map
 from sbafab.models.chain import Chain, chain
 from sbafab.models.loads import Load
 from sbafab.models.springs import RING, Places, Springs
-from sbafab.models.stack_balance import ENOUGH, free, held
+from sbafab.models.stack_balance import free, held
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -237,7 +237,10 @@ class Stack:
         if near is not None:
             start = near.freedoms
         else:
-            start = free(springs, self._risen(pressures), ENOUGH)[self.levels]
+            start = self._risen(pressures)
+            if load.point is not None and not (load.is_level and load.sticks):
+                start = free(springs, start)
+            start = start[self.levels]
         found, push, stable = held(self.each(springs), self.pitch, load, start, near is not None)
         return self._pose(pressures, springs, found, None, push / 1000, stable)
 

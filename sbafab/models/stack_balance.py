@@ -11,12 +11,8 @@ from sbafab.errors import DesignError
 from sbafab.models.loads import Load, Loaded, loaded, pushed, with_blocks
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from sbafab.models.film_elements import Array
     from sbafab.models.springs import Springs
-
-    Step = Callable[[Springs, Array, Array, Loaded, Array], Array]
 
 WALLS = (1e3, 1e5)
 """The same on the way there."""
@@ -27,20 +23,20 @@ FARTHEST = np.array([0.4, 0.15, 0.15])
 """The most by which one step moves rise (mm) and tilt (rad)."""
 FINE = 1e-6
 """A step (mm, rad) that need not be made."""
+FINEST = 5e-8
+"""The same under a load, where small tilts of all levels add up."""
 CLOSELY, LITTLE = 3e-5, 1e-7
 """Largest last step (mm, rad) against an outer plate, and the energy (uJ) that it may gain: the
 plate's force is to be right as well."""
 ROUGH = 0.01
 """The same on the way to an outer plate."""
-ENOUGH = 0.05
-"""The same where a load is yet to move all levels."""
 TRIES = 2
 """How often a step is held off by rims that it would meet."""
 ROUNDS, NEARLY = 16, 0.2
 """How often a step is bettered by the springs at its end, and the share of it that is little."""
 STRAIGHT = 6e-3
 """A step (mm, rad) along which springs are straight enough."""
-SMALL, ALIKE = 2e-3, 3e-9
+SMALL, ALIKE = 2e-3, 1e-9
 """A step with whose matrix another one may be made, and what the product of both must be below for
 that one to be the last.
 """
@@ -48,11 +44,8 @@ FEW_STEPS = 12
 """Steps in which a start far away meets an outer plate, or never does."""
 
 
-def free(springs: Springs, start: Array, enough: float = 0.0) -> Array:
-    """Rise and tilt of each row with nothing outside acting: (rows, 3). Raises DesignError.
-
-    A step that is no larger than ``enough`` ends it.
-    """
+def free(springs: Springs, start: Array) -> Array:
+    """Rise and tilt of each row with nothing outside acting: (rows, 3). Raises DesignError."""
     at, before = start, FINE
     value, gradient, matrix = springs.energy(at)
     for _ in range(MOST_STEPS):
@@ -60,7 +53,7 @@ def free(springs: Springs, start: Array, enough: float = 0.0) -> Array:
             return at
         move, is_firm = _towards(gradient, matrix)
         largest = float(np.abs(move).max())
-        if is_firm and (largest <= enough or _ends(largest, before)):
+        if is_firm and _ends(largest, before):
             return at + move
         share = _limited(move)
         slope = (move * gradient).sum(-1)
@@ -77,11 +70,11 @@ def free(springs: Springs, start: Array, enough: float = 0.0) -> Array:
     raise DesignError("the stack finds no balance at these pressures; try others")
 
 
-def _ends(largest: float, before: float) -> bool:
+def _ends(largest: float, before: float, fine: float = FINE) -> bool:
     """Whether a step is the last: what would follow it, if steps go on to shrink as they did since
     the whole step before, is none.
     """
-    return largest * largest < FINE * before
+    return largest * largest < fine * before
 
 
 def _towards(gradient: Array, matrix: Array) -> tuple[Array, bool]:
@@ -113,7 +106,7 @@ def held(
     balance is found.
     """
     if load.point is None:
-        found = _settled(springs, pitch, load, start, FEW_STEPS, step=_bettered)
+        found = _settled(springs, pitch, load, start, FEW_STEPS, is_quick=True)
         if found is None:
             found = _settled(springs, pitch, load, start, MOST_STEPS)
     else:
@@ -140,21 +133,22 @@ def _met(
 
 
 def _under(springs: Springs, start: Array, pitch: float, load: Load, point: Array) -> Array:
-    """The same start below a level plate."""
+    """The same start below a level plate, a little past it, so that it is met all round: what is
+    alike on all sides stays so.
+    """
     at = start.copy()
-    if load.normal[2] > 0.999:
+    if load.is_level:
         room = max(point[2] / len(at) - pitch, 0.0)
         is_high = at[:, 0] > room
         straight = load.sticks | (np.abs(at[:, 1:]) < 1e-9)
         at[:, 1:] = np.where(straight, 0.0, at[:, 1:])
         at[:, 0] = np.where(is_high, room, at[:, 0])
-        if is_high.all():
-            # As far past it as it gives way to them, so that it is met all round: what is alike
-            # on all sides stays so.
-            push = max(float(-springs.energy(at)[1][:, 0].mean()), 0.0)
-            at[:, 0] += push / load.wall / len(at) + 1e-9
-        else:
-            at[:, 0] += np.where(is_high, 1e-4, 0.0)
+        past = 1e-4
+        if load.sticks and is_high.all():
+            # As far as the plate gives way to them.
+            push = float(-springs.energy(at)[1][:, 0].mean())
+            past = max(push, 0.0) / load.wall / len(at) + 1e-9
+        at[:, 0] += np.where(is_high, past, 0.0)
     return at
 
 
@@ -165,30 +159,34 @@ def _settled(
     start: Array,
     most: int,
     enough: float = 0.0,
-    step: Step | None = None,
+    is_quick: bool = False,
 ) -> tuple[Array, float, bool] | None:
     """What ``held`` gives, or None where so many steps do not get there. A step that is no larger
-    than ``enough`` ends it; ``step`` mends those that Newton's method would make.
+    than ``enough`` ends it; ``is_quick`` makes fewer and larger ones.
     """
-    at, before, last = start, FINE, None
+    finest = FINEST if is_quick else FINE
+    at, before, last = start, finest, None
     now = loaded(springs, pitch, load, at)
     for _ in range(most):
         if np.abs(now.gradient).max() < CLOSE * (1 + 1e-3 * now.push):
             return at, now.push, _is_firm(with_blocks(now.rest(), now.blocks))
         if last is not None:
             # The matrix of a step so small is still good enough for the last one.
-            flat = -np.linalg.solve(last, now.gradient)
-            if np.abs(flat).max() * before < ALIKE:
+            matrix, blocks = last
+            flat = -np.linalg.solve(matrix, now.gradient)
+            if np.abs(flat).max() * before < ALIKE and _are_alike(blocks, now.blocks):
                 return at + flat.reshape(-1, 3), now.push, True
         rest = now.rest()
         matrix = with_blocks(rest, now.blocks)
         found, is_firm = _towards(now.gradient[None], matrix[None])
-        flat = (step or _held_off)(springs, at, found[0], now, rest)
+        flat = _held_off(springs, at, found[0], now.gradient, rest, now.blocks)
+        if is_quick and np.abs(flat).max() > STRAIGHT:
+            flat = _bettered(springs, at, flat, now, rest)
         move = flat.reshape(-1, 3)
         largest = float(np.abs(move).max())
         slope = float(flat @ now.gradient)
         fits = load.point is None or (largest < CLOSELY and slope > -LITTLE)
-        if is_firm and (largest <= enough or (fits and _ends(largest, before))):
+        if is_firm and (largest <= enough or (fits and _ends(largest, before, finest))):
             at = at + move
             return at, 0.0 if load.point is None else pushed(at, pitch, load), True
         share = float(_limited(move).min())
@@ -198,7 +196,8 @@ def _settled(
                 break
             share /= 2
         before = largest if share == 1.0 else 0.0
-        last = matrix if load.point is None and is_firm and 0 < before < SMALL else None
+        may_last = load.point is None and is_firm and 0 < before < SMALL
+        last = (matrix, now.blocks) if may_last else None
         at = at + share * move
         now = tried
         if abs(slope) < 1e-11 * (1 + abs(now.value)):
@@ -206,7 +205,14 @@ def _settled(
     return None
 
 
-def _held_off(springs: Springs, at: Array, flat: Array, now: Loaded, rest: Array) -> Array:
+def _are_alike(one: Array, other: Array) -> bool:
+    """Whether the springs of two places are: where rims meet or part they are not."""
+    return float(np.abs(one - other).max()) < NEARLY * float(np.abs(one).max())
+
+
+def _held_off(
+    springs: Springs, at: Array, flat: Array, gradient: Array, rest: Array, blocks: Array
+) -> Array:
     """The step to where rims just touch which it would drive into each other.
 
     A step that does not see them yet would run far past them (a primal-dual active set).
@@ -216,9 +222,9 @@ def _held_off(springs: Springs, at: Array, flat: Array, now: Loaded, rest: Array
         if met is None:
             break
         push, stiffer = met
-        matrix = with_blocks(rest, now.blocks + stiffer)
-        tried, _ = _towards((now.gradient + push.ravel())[None], matrix[None])
-        if float((tried @ now.gradient)[0]) >= 0:
+        matrix = with_blocks(rest, blocks + stiffer)
+        tried, _ = _towards((gradient + push.ravel())[None], matrix[None])
+        if float((tried @ gradient)[0]) >= 0:
             break  # it would lead uphill
         flat = tried[0]
     return flat
@@ -229,8 +235,6 @@ def _bettered(springs: Springs, at: Array, flat: Array, now: Loaded, rest: Array
 
     Films, and rims that meet on the way, are most of what a step does not see.
     """
-    if np.abs(flat).max() < STRAIGHT:
-        return flat
     outside = now.gradient - now.own.ravel()
     best, least = flat, math.inf
     for _ in range(ROUNDS):
@@ -241,12 +245,12 @@ def _bettered(springs: Springs, at: Array, flat: Array, now: Loaded, rest: Array
             flat = (best + flat) / 2
             continue
         best, least = flat, total
-        more = np.linalg.solve(with_blocks(rest, blocks), follows + own.ravel())
-        flat = best - more
+        gradient = follows + own.ravel()
+        more = -np.linalg.solve(with_blocks(rest, blocks), gradient)
+        more = _held_off(springs, at + best.reshape(-1, 3), more, gradient, rest, blocks)
+        flat = best + more
         if np.abs(more).max() < NEARLY * np.abs(best).max():
-            met = springs.shut(at + flat.reshape(-1, 3)) > springs.shut(at + best.reshape(-1, 3))
-            if not met.any():
-                return flat
+            return flat
     return best
 
 
@@ -257,5 +261,3 @@ def _is_firm(matrix: Array) -> bool:
     except np.linalg.LinAlgError:
         return False
     return True
-
-
