@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
 
 DEGREE = 5
-PRESSURE_SPANS, HEIGHT_SPANS = 9, 9
+PRESSURE_SPANS, HEIGHT_SPANS = 12, 12
 """Pieces of the spline each way."""
-PRESSURE_POINTS, HEIGHT_POINTS = 12, 12
+PRESSURE_POINTS, HEIGHT_POINTS = 16, 16
 """Balloons computed each way."""
-P0 = 0.3
+P0 = 0.1
 """Pressure in kPa below which the spline's pieces are alike in pressure, above alike in ratio."""
 RISES = 65
 """Pressures at which free heights are kept to begin with."""
@@ -36,6 +36,8 @@ ABOVE = 1.15
 """How far the map goes on above the highest free balloon, as a share of it."""
 FLATTEST = 0.01
 """Least height in mm that is computed; what lies below is carried on."""
+NEARLY_FLAT = 0.1
+"""Height in mm above which volumes are fitted by their share of what they are, below all alike."""
 MOST_STRETCH = 0.15
 """Share by which films may stretch; one modulus is unlikely to hold beyond."""
 
@@ -238,7 +240,9 @@ def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
     """The map of a balloon from 0 to a pressure in kPa, and somewhat higher than it may rise."""
     top = ABOVE * highest(balloon, most_pressure)
     p = P0 * np.sinh(_spread(PRESSURE_POINTS) * math.asinh(most_pressure / P0))
-    h = FLATTEST + (top - FLATTEST) * _spread(HEIGHT_POINTS)
+    # A film that is slack comes taut at a pressure that is the lower the flatter it lies.
+    even = _spread(HEIGHT_POINTS)
+    h = FLATTEST + (top - FLATTEST) * (even + even**2) / 2
     pressures, heights = (grid.ravel() for grid in np.meshgrid(p, h))
     found = inflate(balloon, pressures, heights, tied=True)
     return BalloonMap(
@@ -273,7 +277,9 @@ def _fitted(p: Array, h: Array, found: Shapes, most: float, top: float) -> Array
 
     area = found.r[:, -1].max() ** 2 * math.pi
     push = 1 / (area * (p + 0.5) + 3 * np.abs(found.force))
-    room = 2 / (area * top + 3 * np.abs(found.force) / (p + 1.0))
+    room = 2 / (
+        area * np.minimum(h + NEARLY_FLAT, top) + 3 * np.abs(found.force) / (p + 1.0)
+    )
     potential = found.energy - p * found.volume
     scale = push / top
     matrix = np.concatenate(
