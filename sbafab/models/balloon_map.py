@@ -34,7 +34,7 @@ RISES = 65
 """Pressures at which free heights are kept to begin with."""
 ABOVE = 1.15
 """How far the map goes on above the highest free balloon, as a share of it."""
-FLATTEST = 0.01
+FLATTEST = 0.002
 """Least height in mm that is computed; what lies below is carried on."""
 NEARLY_FLAT = 0.1
 """Height in mm above which volumes are fitted by their share of what they are, below all alike."""
