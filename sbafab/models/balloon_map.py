@@ -34,8 +34,10 @@ RISES = 65
 """Pressures at which free heights are kept to begin with."""
 ABOVE = 1.15
 """How far the map goes on above the highest free balloon, as a share of it."""
-FLATTEST = 0.002
+FLATTEST = 0.01
 """Least height in mm that is computed; what lies below is carried on."""
+FLAT = 0.2
+"""Weight of balloons that are pressed flat and hold nothing."""
 NEARLY_FLAT = 0.1
 """Height in mm above which volumes are fitted by their share of what they are, below all alike."""
 MOST_STRETCH = 0.15
@@ -272,8 +274,11 @@ def _fitted(p: Array, h: Array, found: Shapes, most: float, top: float) -> Array
     by_p = [_rows(x, order, blank.shape[0]) for order in (0, 1)]
     by_h = [_rows(y, order, blank.shape[1]) for order in (0, 1)]
 
-    def equations(i: int, j: int, scale: Array) -> Array:
-        return np.asarray((by_p[i][:, :, None] * by_h[j][:, None, :]).reshape(len(p), -1) * scale)
+    flat, lowest = _rows(0 * y, 0, blank.shape[1]), h == h.min()
+
+    def equations(i: int, j: int, scale: Array, by_height: Array | None = None) -> Array:
+        rows = by_h[j] if by_height is None else by_height
+        return np.asarray((by_p[i][:, :, None] * rows[:, None, :]).reshape(len(p), -1) * scale)
 
     area = found.r[:, -1].max() ** 2 * math.pi
     push = 1 / (area * (p + 0.5) + 3 * np.abs(found.force))
@@ -287,9 +292,13 @@ def _fitted(p: Array, h: Array, found: Shapes, most: float, top: float) -> Array
             equations(0, 0, scale[:, None]),
             equations(0, 1, (-push * HEIGHT_SPANS / top)[:, None]),
             equations(1, 0, (-rate * room)[:, None]),
+            # Pressed flat, it holds nothing.
+            equations(1, 0, (-FLAT * rate * room)[:, None], flat)[lowest],
         ]
     )
-    wanted = np.concatenate([potential * scale, found.force * push, found.volume * room])
+    wanted = np.concatenate(
+        [potential * scale, found.force * push, found.volume * room, np.zeros(lowest.sum())]
+    )
     best = np.linalg.lstsq(matrix, wanted, rcond=None)[0]
     return np.asarray(best.reshape(blank.shape))
 

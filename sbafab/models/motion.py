@@ -28,7 +28,8 @@ SOFTEST = 0.01
 """Pressure in kPa below which volumes are nearly straight in pressure, above in its logarithm."""
 FARTHEST = 2.0
 CLOSE = 1e-5
-"""Share of a chamber's content by which it may be missed."""
+LITTLE = 10.0
+"""Share of a chamber's content by which it may be missed; in ul, the content that is least."""
 
 
 class _Tried(NamedTuple):
@@ -120,8 +121,9 @@ class Motion:
         as long as it leads downhill.
         """
         most = math.asinh(self.stack.most_pressure / SOFTEST)
-        close = CLOSE * np.maximum(np.abs(scale), 1.0)
-        now = self._tried(np.arcsinh(np.asarray(self.pose.pressures) / SOFTEST), missed)
+        close = CLOSE * np.maximum(np.abs(scale), LITTLE)
+        start = np.arcsinh(np.asarray(self.pose.pressures) / SOFTEST)
+        now = self._tried(start, missed, self.pose)
         for _ in range(MOST_ROUNDS):
             lacks = (now.x >= most) & (now.wrong < 0)
             counts = ~((now.x <= 0) & (now.wrong >= 0)) & ~lacks
@@ -147,7 +149,7 @@ class Motion:
         for _ in range(HALVINGS):
             x = np.clip(now.x + share * ahead, 0.0, most)
             try:
-                tried = self._tried(x, missed)
+                tried = self._tried(x, missed, now.pose)
             except DesignError:
                 share /= 2
                 continue
@@ -158,8 +160,9 @@ class Motion:
             share *= min(max(steep / (steep - slope), 0.1), 0.7)
         return tried
 
-    def _tried(self, x: Array, missed: Callable[[Pose], Array]) -> _Tried:
-        pose = self._at(x)
+    def _tried(self, x: Array, missed: Callable[[Pose], Array], near: Pose) -> _Tried:
+        pressures = np.minimum(SOFTEST * np.sinh(x), self.stack.most_pressure)
+        pose = self.stack.pose(tuple(pressures.tolist()), near=near, **self.load)
         return _Tried(x, pose, missed(pose) / self._dense(pose), SOFTEST * np.cosh(x))
 
     def _dense(self, pose: Pose) -> Array:
@@ -174,14 +177,10 @@ class Motion:
         for chamber in np.flatnonzero(counts):
             moved = now.x.copy()
             moved[chamber] += STEP if moved[chamber] < 1 else -STEP
-            tried = self._tried(moved, missed)
+            tried = self._tried(moved, missed, now.pose)
             found.append((tried.wrong - now.wrong)[counts] / (tried.x - now.x)[chamber])
         rates = now.rates[counts]
         slopes = np.array(found).T / rates
         values, vectors = np.linalg.eigh((slopes + slopes.T) / 2)
         values = np.maximum(np.abs(values), 1e-9 * np.abs(values).max() + 1e-12)
         return np.asarray(-(vectors @ ((vectors.T @ now.wrong[counts]) / values)) / rates)
-
-    def _at(self, x: Array) -> Pose:
-        pressures = np.minimum(SOFTEST * np.sinh(x), self.stack.most_pressure)
-        return self.stack.pose(tuple(pressures.tolist()), near=self.pose, **self.load)
