@@ -282,9 +282,7 @@ def _fitted(p: Array, h: Array, found: Shapes, most: float, top: float) -> Array
 
     area = found.r[:, -1].max() ** 2 * math.pi
     push = 1 / (area * (p + 0.5) + 3 * np.abs(found.force))
-    room = 2 / (
-        area * np.minimum(h + NEARLY_FLAT, top) + 3 * np.abs(found.force) / (p + 1.0)
-    )
+    room = 2 / (area * np.minimum(h + NEARLY_FLAT, top) + 3 * np.abs(found.force) / (p + 1.0))
     potential = found.energy - p * found.volume
     scale = push / top
     matrix = np.concatenate(

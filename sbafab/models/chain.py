@@ -41,7 +41,7 @@ FELT = _felt()
 
 
 def _turned() -> Array:
-    """Matrix (13, 15) behind ``_rotations``: of 1, x, y, twice the products xx, xy, yx, yy, x, y."""
+    """Matrix (13, 15) behind ``_rotations``: of 1, x, y, twice xx, xy, yx, yy, then x, y."""
     found = np.zeros((13, 15))
     turn, rate = found[:, :9].reshape(13, 3, 3), found[:, 9:].reshape(13, 2, 3)
     turn[0] = BASE

@@ -131,9 +131,8 @@ class Motion:
                 if lacks.any():
                     break
                 return now.pose
-            ahead = np.zeros_like(now.x)
-            ahead[counts] = self._ahead(missed, now, counts)
-            ahead *= min(1.0, FARTHEST / float(np.abs(ahead).max()))
+            ahead = self._ahead(missed, now, counts)
+            ahead *= min(1.0, FARTHEST / max(float(np.abs(ahead).max()), 1e-12))
             now = self._downhill(missed, now, ahead, most)
         raise DesignError(
             f"the chambers would need more than {self.stack.most_pressure:g} kPa; ask for less, or "
@@ -172,15 +171,27 @@ class Motion:
     def _ahead(
         self, missed: Callable[[Pose], Array], now: _Tried, counts: NDArray[np.bool_]
     ) -> Array:
-        """Newton's step of the chambers that count, kept downhill where maps bend the wrong way."""
+        """Newton's step by x of the chambers that count; 0 of the others."""
         found = []
         for chamber in np.flatnonzero(counts):
             moved = now.x.copy()
             moved[chamber] += STEP if moved[chamber] < 1 else -STEP
             tried = self._tried(moved, missed, now.pose)
             found.append((tried.wrong - now.wrong)[counts] / (tried.x - now.x)[chamber])
-        rates = now.rates[counts]
-        slopes = np.array(found).T / rates
-        values, vectors = np.linalg.eigh((slopes + slopes.T) / 2)
-        values = np.maximum(np.abs(values), 1e-9 * np.abs(values).max() + 1e-12)
-        return np.asarray(-(vectors @ ((vectors.T @ now.wrong[counts]) / values)) / rates)
+        which, slopes = np.flatnonzero(counts), np.array(found).T
+        while True:
+            ahead = np.zeros_like(now.x)
+            ahead[which] = _newton(slopes, now.wrong[which], now.rates[which])
+            may = (now.x[which] > 0) | (ahead[which] >= 0)
+            if may.all():
+                return ahead
+            # What has no pressure cannot have less: the others move alone.
+            which, slopes = which[may], slopes[np.ix_(may, may)]
+
+
+def _newton(slopes: Array, wrong: Array, rates: Array) -> Array:
+    """The step by x, its matrix made symmetric and firm by pressure, as that of a least is."""
+    matrix = slopes / rates
+    values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
+    values = np.maximum(np.abs(values), 1e-9 * np.abs(values).max(initial=0.0) + 1e-12)
+    return np.asarray(-(vectors @ ((vectors.T @ wrong) / values)) / rates)

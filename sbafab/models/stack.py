@@ -322,7 +322,7 @@ class Stack:
         if highest > 0:
             raise DesignError(
                 "a balloon would rise higher than its films can be stretched "
-                f"({highest:.2g} mm above {float(self._top.min()):.3g} mm); give less pressure or load"
+                f"({highest:.2g} mm above {self._top.min():.3g} mm); give less pressure or load"
             )
         if kinds is None:
             volumes, energies = self.each(springs).contents(found)
