@@ -28,7 +28,7 @@ SOFTEST = 0.01
 """Pressure in kPa below which volumes are nearly straight in pressure, above in its logarithm."""
 FARTHEST = 2.0
 CLOSE = 1e-5
-LITTLE = 10.0
+LITTLE = 20.0
 """Share of a chamber's content by which it may be missed; in ul, the content that is least."""
 
 
@@ -129,15 +129,15 @@ class Motion:
             counts = ~((now.x <= 0) & (now.wrong >= 0)) & ~lacks
             if (np.abs(now.wrong) <= close)[counts].all():
                 if lacks.any():
-                    break
+                    raise DesignError(
+                        f"the chambers would need more than {self.stack.most_pressure:g} kPa; ask "
+                        "for less, or make the stack with a larger most_pressure"
+                    )
                 return now.pose
             ahead = self._ahead(missed, now, counts)
             ahead *= min(1.0, FARTHEST / max(float(np.abs(ahead).max()), 1e-12))
             now = self._downhill(missed, now, ahead, most)
-        raise DesignError(
-            f"the chambers would need more than {self.stack.most_pressure:g} kPa; ask for less, or "
-            "make the stack with a larger most_pressure"
-        )
+        raise DesignError("the stack finds no balance at the end of this step; try a shorter one")
 
     def _downhill(
         self, missed: Callable[[Pose], Array], now: _Tried, ahead: Array, most: float

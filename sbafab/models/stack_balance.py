@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 WALLS = (1e3, 1e5)
 """The same on the way there."""
 MOST_STEPS = 300
-CLOSE = 1e-5
+CLOSE = 1e-7
 """Out of balance in mN (or mN mm) that is none."""
 FARTHEST = np.array([0.4, 0.15, 0.15])
 """The most by which one step moves rise (mm) and tilt (rad)."""
 FINE = 1e-6
 """A step (mm, rad) that need not be made."""
 FINEST = 5e-8
-"""The same under a load, where small tilts of all levels add up."""
+"""The same where what all levels do adds up: tilts under a load, volumes without."""
 CLOSELY, LITTLE = 3e-5, 1e-7
 """Largest last step (mm, rad) against an outer plate, and the energy (uJ) that it may gain: the
 plate's force is to be right as well."""
@@ -53,7 +53,7 @@ def free(springs: Springs, start: Array) -> Array:
             return at
         move, is_firm = _towards(gradient, matrix)
         largest = float(np.abs(move).max())
-        if is_firm and _ends(largest, before):
+        if is_firm and _ends(largest, before, FINEST):
             return at + move
         share = _limited(move)
         slope = (move * gradient).sum(-1)
