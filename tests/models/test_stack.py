@@ -48,6 +48,17 @@ def test_a_map_is_the_balloon_that_it_was_made_from(balloon: BalloonMap) -> None
     assert balloon.free_height([1.0, 5.0, 20.0]) == pytest.approx(free.height, rel=0.01)
 
 
+def test_a_map_holds_where_films_are_slack_and_pressures_low(balloon: BalloonMap) -> None:
+    """Straight from the films, and more pressure never makes a balloon smaller."""
+    p, h = (g.ravel() for g in np.meshgrid([0.005, 0.02, 0.05, 0.2], [0.01, 0.02, 0.05, 0.1, 0.4]))
+    found = inflate(balloon.balloon, p, h, tied=True)
+    assert balloon.volume(p, h) == pytest.approx(found.volume, rel=0.05)
+    assert balloon.force(p, h) == pytest.approx(found.force, rel=0.02, abs=0.05)
+    rising = balloon.volume(np.geomspace(0.001, 100, 60)[:, None], np.array([0.05, 0.1, 0.4, 0.8]))
+    assert (np.diff(rising, axis=0) > -1e-3).all()
+    assert balloon.volume([0.0, 0.1, 10.0], np.zeros(3)) == pytest.approx(0.0, abs=0.05)
+
+
 def test_a_map_keeps_energy(balloon: BalloonMap) -> None:
     """Force and volume are slopes of one potential, so what goes in on a way round comes out."""
     p, h = np.meshgrid(np.linspace(1.0, 9.0, 41), np.linspace(0.2, 1.4, 41))
