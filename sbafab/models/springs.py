@@ -63,7 +63,8 @@ class Places(NamedTuple):
         """A row for each of these; one row for all where they are alike."""
         if len(self.begins) == 1:
             return self
-        return Places(*(part[levels] for part in self))
+        begins, ring, squares, meet, stiff = self
+        return Places(begins[levels], ring[levels], squares[levels], meet[levels], stiff[levels])
 
 
 @dataclass(frozen=True, eq=False)

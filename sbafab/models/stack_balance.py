@@ -246,7 +246,7 @@ def _bettered(springs: Springs, at: Array, flat: Array, now: Loaded, rest: Array
             continue
         best, least = flat, total
         gradient = follows + own.ravel()
-        more = -np.linalg.solve(with_blocks(rest, blocks), gradient)
+        more = np.asarray(-np.linalg.solve(with_blocks(rest, blocks), gradient))
         more = _held_off(springs, at + best.reshape(-1, 3), more, gradient, rest, blocks)
         flat = best + more
         if np.abs(more).max() < NEARLY * np.abs(best).max():
