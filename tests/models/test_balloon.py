@@ -11,7 +11,7 @@ import pytest
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
-from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_strokes
+from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_states
 
 TPE = Balloon()
 IDEAL = Balloon(thickness=1e-4, modulus=1e11, inextensible=True)
@@ -50,12 +50,17 @@ def test_without_plates_it_is_a_mylar_balloon() -> None:
 
 
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
-@pytest.mark.parametrize(("pocket", "neck"), [(5.0, 0.0), (5.0, 2.5), (10.0, 0.0)])
-def test_smooth_strokes_are_those_of_an_axisymmetric_mesh(pocket: float, neck: float) -> None:
+@pytest.mark.parametrize("pocket", [5.0, 10.0])
+@pytest.mark.parametrize(("neck", "bore"), [(0.0, 0.0), (2.5, 1.0)], ids=["alone", "in a stack"])
+def test_smooth_strokes_and_volumes_are_those_of_an_axisymmetric_mesh(
+    pocket: float, neck: float, bore: float
+) -> None:
     pressures = [0.5, 2.0, 10.0]
-    mesh = axisymmetric_strokes(pressures, MeridianSection(pocket=pocket, neck=neck))
-    own = inflate(replace(TPE, pocket=pocket / 2, neck=neck / 2, wrinkles=False), pressures)
-    assert own.height == pytest.approx(mesh, rel=0.015)
+    mesh = axisymmetric_states(pressures, MeridianSection(pocket=pocket, neck=neck, bore=bore))
+    smooth = replace(TPE, pocket=pocket / 2, neck=neck / 2, bore=bore / 2, wrinkles=False)
+    own = inflate(smooth, pressures)
+    assert own.height == pytest.approx([state.stroke for state in mesh], rel=0.015)
+    assert own.volume == pytest.approx([state.volume for state in mesh], rel=0.015)
 
 
 def test_with_wrinkles_it_agrees_with_a_solid_mesh_in_three_dimensions() -> None:
