@@ -209,6 +209,27 @@ def test_tapered_stack_is_the_sum_of_its_balloons() -> None:
         assert float(k.rate(stroke)) == pytest.approx(slope, rel=1e-6)
 
 
+def test_unlike_balloons_carry_one_force_by_the_equations_too() -> None:
+    """Flat, a stack pushes as its smallest balloon; farther out strokes at one force add up."""
+    radii = (6.0, 3.0, 2.9)
+    for k, rate in zip(round_stack(radii), (printed.rate, parabola.balloon_rate), strict=True):
+        assert float(k.push(0.0)) == pytest.approx(float(rate(0.0, 2.9)))
+    by_eqs_1_to_3 = round_stack(radii)[1]
+    small = 1.5
+    force = float(parabola.balloon_rate(small, 2.9))
+    stroke = small
+    for radius in radii[:2]:
+        low, high = 0.0, 2 * parabola.fullest(radius).height
+        for _ in range(60):
+            middle = (low + high) / 2
+            is_more = float(parabola.balloon_rate(middle, radius)) > force
+            low, high = (middle, high) if is_more else (low, middle)
+        stroke += low
+    assert float(by_eqs_1_to_3.push(stroke)) == pytest.approx(force, rel=1e-3)
+    (alike,) = {float(k.push(1.0) / k.rate(1.0)) for k in round_stack((2.5, 2.5))}
+    assert alike == 1
+
+
 def test_stack_of_slots_is_as_many_times_one() -> None:
     (one,), (four,) = slot_stack(10.0, 8.5, 1), slot_stack(10.0, 8.5, 4)
     assert float(four.stroke(100.0)) == pytest.approx(4 * float(one.stroke(100.0)))
