@@ -74,7 +74,7 @@ def _inflated(kinds: Iterable[Balloon], pressures: Sequence[float]) -> list[Infl
 def _risen(
     kinds: Counter[Balloon], pressure: float, known: Inflated | None
 ) -> tuple[float, float, float]:
-    """Stroke in mm, air in ul and energy in uJ (that is the integral of p dV) of one stack."""
+    """Stroke in mm, air in ul and energy in uJ (to 3 % the integral of p dV) of one stack."""
     stroke = volume = stored = 0.0
     for kind, count in kinds.items():
         shape = known[kind] if known else inflate(kind, pressure)
