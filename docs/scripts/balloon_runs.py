@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -28,34 +27,50 @@ from sbafab.simulators.calculix.settings import deck_settings
 PAGE = Path(__file__).parents[1] / "prediction.md"
 BEGIN, END = "<!-- written by docs.scripts.balloon_runs -->", "<!-- to here -->"
 PRESSURES = (0.5, 2.0, 6.0, 10.0)
+"""kPa."""
 HOUR = 3600.0
 SMOOTH, FREE = "held smooth", "free to wrinkle"
 Found = tuple["np.ndarray", "np.ndarray"]
 """Strokes in mm and air in ul at the pressures."""
 
 
-class Case(NamedTuple):
-    """A row: the balloon of a template, alone or an inner one of a stack, and how it is run.
+class Run(NamedTuple):
+    """A solid mesh in time: what pressures (kPa) it is for, and how many s it takes to the last.
 
-    ``h`` mm is the solid mesh's, ``ramp`` s its time to 10 kPa: inertia counts the more the wider
-    the pocket. 0 for a section through the axis.
+    The slower, the less inertia counts and the more steps ripples take: below 1 kPa columns and wide
+    pockets need it slow.
+    """
+
+    pressures: tuple[float, ...]
+    ramp: float
+
+
+class Case(NamedTuple):
+    """A row: the balloon of a template, alone or an inner one of a stack.
+
+    ``h`` mm is the solid mesh's; without ``runs`` it is a section through the axis.
     """
 
     template: str
     alone: bool
     h: float = 0.0
-    ramp: float = 0.0
+    runs: tuple[Run, ...] = ()
+
+    @property
+    def pressures(self) -> tuple[float, ...]:
+        found = tuple(pressure for run in self.runs for pressure in run.pressures)
+        return found or PRESSURES
 
     @property
     def name(self) -> str:
         size = self.template.removeprefix("1dof-").removesuffix("mm")
         where = "alone" if self.alone else "in a stack"
-        return f"d = {size}, {where}, {FREE if self.h else SMOOTH}"
+        return f"d = {size}, {where}, {FREE if self.runs else SMOOTH}"
 
     @property
     def balloon(self) -> Balloon:
         design = load_design(self.template, (f"stack.balloons={1 if self.alone else 3}",))
-        return replace(balloons_of(design, sbafab.build(design))[0], wrinkles=bool(self.h))
+        return replace(balloons_of(design, sbafab.build(design))[0], wrinkles=bool(self.runs))
 
 
 CASES = (
@@ -63,40 +78,45 @@ CASES = (
     Case("1dof-5mm", alone=False),
     Case("1dof-10mm", alone=True),
     Case("1dof-10mm", alone=False),
-    Case("1dof-5mm", alone=True, h=0.35, ramp=0.05),
-    Case("1dof-5mm", alone=False, h=0.35, ramp=0.05),
-    Case("1dof-10mm", alone=True, h=0.7, ramp=0.2),
+    Case("1dof-5mm", True, 0.22, (Run((0.5, 2.0, 6.0), 0.05),)),
+    Case("1dof-5mm", False, 0.35, (Run((0.5,), 1.0), Run((2.0, 6.0, 10.0), 0.05))),
+    Case("1dof-10mm", True, 0.7, (Run((0.15,), 0.12), Run((0.5, 0.85), 0.29))),
 )
-"""An inner balloon of d = 10 that may wrinkle would be hours of a processor."""
+"""Wrinkles of an inner balloon of d = 10, and of a lone one beyond 0.85 kPa, would be hours."""
 
 
 def elastic(case: Case) -> Found:
     """What the elastic balloon says."""
-    found = inflate(case.balloon, PRESSURES)
+    found = inflate(case.balloon, case.pressures)
     return found.height, found.volume
 
 
 def measured(case: Case) -> Found:
     """What CalculiX says."""
-    if not case.h:
+    if not case.runs:
         one = case.balloon
         section = MeridianSection(
             2 * one.pocket, one.ring, one.thickness, 2 * one.neck, 2 * one.bore
         )
-        states = axisymmetric_states(PRESSURES, section)
+        states = axisymmetric_states(case.pressures, section)
         return np.array([s.stroke for s in states]), np.array([s.volume for s in states])
+    found = [_alone_or_inner(case, run) for run in case.runs]
+    return np.concatenate([one[0] for one in found]), np.concatenate([one[1] for one in found])
+
+
+def _alone_or_inner(case: Case, run: Run) -> Found:
     if case.alone:
-        return solid(case, 1)
+        return solid(case, run, 1)
     # The bottom and the top balloon are in both; what is left is an inner one.
-    three, two = solid(case, 3), solid(case, 2)
+    three, two = solid(case, run, 3), solid(case, run, 2)
     return three[0] - two[0], three[1] - two[1]
 
 
-def solid(case: Case, balloons: int) -> Found:
+def solid(case: Case, run: Run, balloons: int) -> Found:
     """Quarter of a stack of wedges, in time; what its air holds beyond the flat one."""
     laminate = sbafab.build(case.template, f"stack.balloons={balloons}")
     settings = replace(
-        deck_settings(laminate), pressures={"chamber1": max(PRESSURES)}, ramp=case.ramp
+        deck_settings(laminate), pressures={"chamber1": max(run.pressures)}, ramp=run.ramp
     )
     mesh = MeshSettings(h=case.h, symmetry="quarter")
     with tempfile.TemporaryDirectory() as place:
@@ -106,9 +126,10 @@ def solid(case: Case, balloons: int) -> Found:
     states = found.states
     # Strokes grow about as the cube root of the pressure: nearly straight between outputs.
     at = np.cbrt([state.pressures["chamber1"] for state in states])
-    strokes = np.interp(np.cbrt(PRESSURES), at, [state.stroke for state in states])
+    wanted = np.cbrt(run.pressures)
+    strokes = np.interp(wanted, at, [state.stroke for state in states])
     air = [state.volumes["chamber1"] - states[0].volumes["chamber1"] for state in states]
-    return strokes, np.interp(np.cbrt(PRESSURES), at, air)
+    return strokes, np.interp(wanted, at, air)
 
 
 def apart(own: np.ndarray, other: np.ndarray) -> str:
@@ -118,7 +139,14 @@ def apart(own: np.ndarray, other: np.ndarray) -> str:
 def row(case: Case) -> str:
     """The row of a case."""
     (stroke, air), (mesh_stroke, mesh_air) = elastic(case), measured(case)
-    cells = [case.name, listed(stroke, 3), listed(mesh_stroke, 3), apart(stroke, mesh_stroke)]
+    kilopascals = ", ".join(f"{pressure:g}" for pressure in case.pressures)
+    cells = [
+        case.name,
+        kilopascals,
+        listed(stroke, 3),
+        listed(mesh_stroke, 3),
+        apart(stroke, mesh_stroke),
+    ]
     cells += [listed(air, 2), listed(mesh_air, 2), apart(air, mesh_air)]
     return "| " + " | ".join(cells) + " |"
 
@@ -133,27 +161,26 @@ def known(text: str) -> dict[str, str]:
     return {line.split("|")[1].strip(): line for line in rows}
 
 
-def lines(before: dict[str, str], asked: Sequence[str]) -> Iterator[str]:
-    """The table: rows that are asked for are run, others are as before."""
-    yield (
-        "| balloon | stroke, mm: elastic | CalculiX | apart, % | air, ul: elastic | CalculiX "
-        "| apart, % |\n|---|---|---|---|---|---|---|"
-    )
-    for case in CASES:
-        is_asked = any(part in case.name for part in asked) or not asked
-        found = row(case) if is_asked else before.get(case.name)
-        if found is not None:
-            print(found, flush=True)
-            yield found
-
-
 def main() -> None:
-    text = PAGE.read_text(encoding="utf-8")
-    head, _, rest = text.partition(BEGIN)
+    asked = sys.argv[1:]
+    run = {}
+    for case in CASES:
+        if not asked or any(part in case.name for part in asked):
+            run[case.name] = row(case)
+            print(run[case.name], flush=True)
+    head, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
     body, _, tail = rest.partition(END)
-    found = "\n".join(lines(known(body), sys.argv[1:]))
-    PAGE.write_text(f"{head}{BEGIN}\n\n{found}\n\n{END}{tail}", encoding="utf-8", newline="\n")
+    found = known(body) | run
+    rows = [found[case.name] for case in CASES if case.name in found]
+    text = "\n".join([*HEADS, *rows])
+    PAGE.write_text(f"{head}{BEGIN}\n\n{text}\n\n{END}{tail}", encoding="utf-8", newline="\n")
 
+
+HEADS = (
+    "| balloon | kPa | stroke, mm: elastic | CalculiX | apart, % | air, ul: elastic | CalculiX "
+    "| apart, % |",
+    "|---|---|---|---|---|---|---|---|",
+)
 
 if __name__ == "__main__":
     main()

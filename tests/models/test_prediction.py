@@ -297,7 +297,7 @@ def test_a_stack_that_bends_says_how_hard_it_pushes_bent(three: Prediction) -> N
 def test_the_work_of_the_air_is_its_integral_over_the_volume() -> None:
     """Not pressure times volume, which is four times as much (paper, Sec. 4.1).
 
-    It is told by what films store, which wrinkles, whose stress follows the tension, put off by 3 %.
+    It is told by what films store; wrinkles, whose stress follows the tension, put that off by 3 %.
     """
     found = sbafab.predict("1dof-10mm", pressures_kpa=(1.0,))
     design = sbafab.load("1dof-10mm")
