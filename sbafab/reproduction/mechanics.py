@@ -241,8 +241,9 @@ CALIBRATED_WHY = {
         "the one figure that is fitted: no column buckles when flat, and the film's modulus hardly "
         "counts",
         "high: a column of six balloons is not stable here at 25 and 75 % where its tip may slide "
-        "on the sensor, one of ten not even where it sticks; the paper says that the 3-DoF is less "
-        "likely to buckle, and gives no number of balloons",
+        "on the sensor, one of ten not even where it sticks; but one that has slid away keeps a "
+        "tenth, so that it likely gave way in part. The paper says that the 3-DoF is less likely "
+        "to buckle, and gives no number of balloons",
         "high: as at 25 %, and as the 3-DoF",
     ),
     "3-DoF": (
