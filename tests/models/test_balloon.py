@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from sbafab.errors import DesignError
+from sbafab.models import balloon
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_states
 
@@ -40,6 +41,18 @@ def test_a_film_that_cannot_stretch_between_plates_is_the_closed_limit() -> None
     found = inflate(IDEAL, 100.0, limits[:, 0])
     assert found.volume == pytest.approx(limits[:, 1], rel=1e-3)
     assert found.force == pytest.approx(100 * math.pi * discs**2, rel=3e-3)
+
+
+@pytest.mark.long
+def test_force_too_is_the_closed_limit_to_a_thousandth_with_more_elements(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(balloon, "FILM_ELEMENTS", 96)
+    discs = np.array([0.5, 1.5])
+    limits = np.array([pressed_ideal(disc, 2.5) for disc in discs])
+    found = inflate(replace(IDEAL), 100.0, limits[:, 0])
+    assert found.volume == pytest.approx(limits[:, 1], rel=1e-3)
+    assert found.force == pytest.approx(100 * math.pi * discs**2, rel=1e-3)
 
 
 def test_without_plates_it_is_a_mylar_balloon() -> None:
