@@ -11,8 +11,8 @@ from docs.scripts.balloon_runs import CASES, PAGE, PRESSURES, Case, Run, elastic
 
 LIMITS = {"held smooth": 1.5, "free to wrinkle": 3.0}
 """Per cent in stroke and air."""
-RIPPLED = {"d = 10, alone, free to wrinkle": 0.2}
-"""kPa from which the rim ripples, which the model leaves out."""
+MISSED = {"d = 10, alone, free to wrinkle": 8.0}
+"""Rows that do not keep their limit, and by how much they miss it at most; the page says why."""
 
 
 def cells(name: str) -> list[list[float]]:
@@ -29,9 +29,9 @@ def test_the_table_says_what_the_model_says_and_how_far_it_is_off(case: Case) ->
     assert own_air == pytest.approx(air, abs=6e-3)
     for own, other, told in ((own_stroke, mesh_stroke, off), (own_air, mesh_air, air_off)):
         assert 100 * (own / np.array(other) - 1) == pytest.approx(told, abs=0.16)
-    holds = np.array(pressures) < RIPPLED.get(case.name, np.inf)
-    limit = next(limit for word, limit in LIMITS.items() if word in case.name)
-    assert np.abs(np.array([off, air_off]))[:, holds].max() <= limit
+    (limit,) = (limit for word, limit in LIMITS.items() if word in case.name)
+    limit = MISSED.get(case.name, limit)
+    assert np.abs([off, air_off]).max() <= limit
 
 
 @pytest.mark.long
