@@ -17,9 +17,9 @@ Inflated = Mapping[Balloon, Shapes]
 ELASTIC = Model(
     "elastic balloon",
     "membrane of revolution, the film's modulus",
-    "one balloon to 10 kPa: within 1.2 % of an axisymmetric mesh, of d = 5 to 6 kPa within "
-    "3 % of a solid one that wrinkles; the rim of one of d = 10 ripples from 0.2 to 0.4 kPa on, and "
-    "a solid one then rises up to a quarter more; all balloons of a stack are taken for inner ones, inlets left out",
+    "one balloon to 10 kPa: within 1.2 % of an axisymmetric mesh; d = 5 to 6 kPa within 3 % of a "
+    "solid one that wrinkles, while d = 10, whose rim then ripples, rises up to a quarter more; "
+    "all balloons of a stack are taken for inner ones, inlets left out",
 )
 
 
