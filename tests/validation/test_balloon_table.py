@@ -38,9 +38,8 @@ def test_the_table_says_what_the_model_says_and_how_far_it_is_off(case: Case) ->
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
 def test_a_balloon_that_wrinkles_in_calculix() -> None:
     pytest.importorskip("netgen")
-    pressures = PRESSURES[:3]
-    case = Case("1dof-5mm", True, 0.35, (Run(pressures, 0.05),))
+    # A mesh coarser than the table's, which holds too little air below 2 kPa.
+    case = Case("1dof-5mm", True, 0.35, (Run(PRESSURES[1:3], 0.05),))
     (own_stroke, own_air), (stroke, air) = elastic(case), measured(case)
     assert own_stroke == pytest.approx(stroke, rel=0.03)
-    # The mesh is coarser than the table's, and holds up to 3 % less.
-    assert own_air == pytest.approx(air, rel=0.05)
+    assert own_air == pytest.approx(air, rel=0.03)
