@@ -30,6 +30,8 @@ def main() -> None:
         # Where it is ignored (nohup), it stays so.
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, stop_at_once)
+        # Plugins of pydantic, which have no part in this, are looked for in every package there is.
+        os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
         gc.set_threshold(YOUNG, *gc.get_threshold()[1:])
         from sbafab.cli import main as run
     except KeyboardInterrupt:
