@@ -156,8 +156,12 @@ def _first_of_each(p: Floats, q: Floats) -> Indices:
     ends = np.rint(np.concatenate([p, q]) * 1e5)
     turned = (ends[0] > ends[2]) | ((ends[0] == ends[2]) & (ends[1] > ends[3]))
     ends[:, turned] = ends[:, turned][[2, 3, 0, 1]]
-    _, first = np.unique(ends, axis=1, return_index=True)
-    return np.sort(first)
+    # A stable order, so that the first of those that are alike comes first.
+    order = np.lexsort(ends)
+    ends = ends[:, order]
+    is_new = np.ones(len(order), dtype=bool)
+    is_new[1:] = (ends[:, 1:] != ends[:, :-1]).any(axis=0)
+    return np.sort(order[is_new])
 
 
 def _clear(p: Floats, q: Floats, table: EdgeTable, gathered: Gathered) -> Bools:

@@ -42,10 +42,12 @@ class SideTable:
     def later(self, aside: float, within: float) -> list[list[int]]:
         """For each side the later ones that it may face square no farther off, and few others."""
         _, a, b = self._near(within)
+        a, b = a[a < b], b[a < b]
+        opposed = self._opposed(a, b, aside)
+        a, b = a[opposed], b[opposed]
         feet = self._may_hold_feet(a, b, within) | self._may_hold_feet(b, a, within)
-        chosen = self._opposed(a, b, aside) & feet & (a < b)
         found: list[list[int]] = [[] for _ in self.edges]
-        for one, other in zip(a[chosen].tolist(), b[chosen].tolist(), strict=True):
+        for one, other in zip(a[feet].tolist(), b[feet].tolist(), strict=True):
             found[one].append(other)
         return found
 
