@@ -16,6 +16,7 @@ from tests.judge.pockets import judge_pockets
 from tests.judge.pressing import judge_press
 from tests.judge.reading import UnreadableError
 from tests.judge.sheets import judge_sheets
+from tests.judge.traveller import judge_traveller
 from tests.judge.voids import judge_voids
 
 Judge = Callable[[Folder], Iterator[Disagreement]]
@@ -27,6 +28,7 @@ JUDGES: tuple[Judge, ...] = (
     judge_pins,
     judge_press,
     judge_claims,
+    judge_traveller,
 )
 
 
