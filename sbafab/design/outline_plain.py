@@ -45,15 +45,15 @@ _Y = frozenset(code + 10 for code in _X)
 _Z = frozenset(code + 20 for code in _X) - {38}
 """Codes of coordinates, which have to follow each other; 38 is an elevation."""
 
-Tag = tuple[int, str]
-Record = list[Tag]
+DxfTag = tuple[int, str]
+DxfRecord = list[DxfTag]
 
 
 class PlainDrawing(NamedTuple):
     """Its $INSUNITS, 0 where none is said, and its entities."""
 
     unit: int
-    entities: list[Record]
+    entities: list[DxfRecord]
 
     def strands(self, factor: float) -> Iterator[Strand]:
         """What is drawn, at ``factor`` mm a unit. Raises DesignError."""
@@ -90,7 +90,7 @@ def _require(holds: object) -> None:
         raise _NotPlainError
 
 
-def _records(text: str) -> list[Record]:
+def _records(text: str) -> list[DxfRecord]:
     """All tags but comments, parted before each of code 0; every value is of its code's type."""
     lines = text.removesuffix("\n").split("\n")
     found = [*zip(map(int, lines[::2]), lines[1::2], strict=True)]
@@ -129,7 +129,7 @@ _TYPES: dict[Callable[[str], object], Sequence[tuple[int, int]]] = {
 }
 
 
-def _drawing(records: list[Record]) -> PlainDrawing:
+def _drawing(records: list[DxfRecord]) -> PlainDrawing:
     sections = _sections(records)
     header = _header(sections["HEADER"][0])
     _require(header["$ACADVER"][1] in VERSIONS)
@@ -155,11 +155,11 @@ def _drawing(records: list[Record]) -> PlainDrawing:
     return PlainDrawing(int(header.get("$INSUNITS", (70, "0"))[1]), entities)
 
 
-def _sections(records: list[Record]) -> dict[str, list[Record]]:
+def _sections(records: list[DxfRecord]) -> dict[str, list[DxfRecord]]:
     """By name, with the record that opens it."""
     *content, end = records
     _require(end == [(0, "EOF")])
-    found: dict[str, list[Record]] = {}
+    found: dict[str, list[DxfRecord]] = {}
     name = ""
     for record in content:
         kind = record[0][1]
@@ -178,9 +178,9 @@ def _sections(records: list[Record]) -> dict[str, list[Record]]:
     return found
 
 
-def _header(head: Record) -> dict[str, Tag]:
+def _header(head: DxfRecord) -> dict[str, DxfTag]:
     """The variables: each a name and one value, of a point its x."""
-    found: dict[str, Tag] = {}
+    found: dict[str, DxfTag] = {}
     tags = head[2:]
     starts = [place for place, (code, _) in enumerate(tags) if code == 9]
     _require(not tags or starts[:1] == [0])
@@ -195,7 +195,7 @@ def _header(head: Record) -> dict[str, Tag]:
     return found
 
 
-def _refuse_broken(record: Record) -> None:
+def _refuse_broken(record: DxfRecord) -> None:
     """Its parts are marked, each once, what is opened is closed, extended data stand last."""
     marks = [place for place, (code, _) in enumerate(record) if code == 100]
     _require(len({record[place] for place in marks}) == len(marks))
@@ -208,7 +208,7 @@ def _refuse_broken(record: Record) -> None:
         _require(record[extended[0]][0] == 1001 and len(record) - extended[0] == len(extended))
 
 
-def _model_space(tables: list[Record]) -> str:
+def _model_space(tables: list[DxfRecord]) -> str:
     """The handle of its block record. Every layer has to be shown."""
     spaces = []
     table = ""
@@ -233,7 +233,7 @@ def _model_space(tables: list[Record]) -> str:
     return spaces[0]
 
 
-def _refuse_layouts(objects: list[Record], space: str) -> None:
+def _refuse_layouts(objects: list[DxfRecord], space: str) -> None:
     """The layout Model has to be that of the model space."""
     _require(objects and objects[0][0] == (0, "DICTIONARY"))
     models = [
@@ -247,7 +247,7 @@ def _refuse_layouts(objects: list[Record], space: str) -> None:
     _require([one[330] for one in layouts if one[5] == models[0][1]] == [space])
 
 
-def _refuse_unusual(entity: Record, space: str) -> None:
+def _refuse_unusual(entity: DxfRecord, space: str) -> None:
     """An entity has its parts in their order, each code once but for vertices."""
     kind = entity[0][1]
     _require(kind in KINDS)
@@ -271,7 +271,7 @@ def _refuse_unusual(entity: Record, space: str) -> None:
             _require(code in own or code in LOOKS)
 
 
-def _vertices(entity: Record) -> list[tuple[float, float, float]]:
+def _vertices(entity: DxfRecord) -> list[tuple[float, float, float]]:
     """x, y and bulge."""
     found: list[list[float]] = []
     for code, value in entity:
@@ -282,5 +282,5 @@ def _vertices(entity: Record) -> list[tuple[float, float, float]]:
     return [(x, y, bulge) for x, y, bulge in found]
 
 
-def _is_closed(entity: Mapping[int, str] | Record) -> bool:
+def _is_closed(entity: Mapping[int, str] | DxfRecord) -> bool:
     return bool(int(dict(entity).get(70, "0")) & 1)

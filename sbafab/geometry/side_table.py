@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sbafab.geometry.edge_table import CellOrder, EdgeTable, dot, touching
-from sbafab.geometry.width import BESIDE, Side
+from sbafab.geometry.width import BESIDE, BoundarySide
 
 if TYPE_CHECKING:
     from sbafab.geometry.edge_table import Bools, Floats, Indices
@@ -21,7 +21,7 @@ ROOM = 1e-9
 class SideTable:
     """What the search knows of a boundary's sides."""
 
-    def __init__(self, sides: Sequence[Side]) -> None:
+    def __init__(self, sides: Sequence[BoundarySide]) -> None:
         self.edges = [side.edge for side in sides]
         self.table = EdgeTable.of(self.edges)
         rows = [

@@ -72,7 +72,7 @@ class _Foot(NamedTuple):
     normal: Point
 
 
-class Side(NamedTuple):
+class BoundarySide(NamedTuple):
     """An edge with what the search asks of it again and again.
 
     ``half`` is how far its ends lie from its middle, ``lean`` the sine of its half turn.
@@ -86,7 +86,7 @@ class Side(NamedTuple):
     half: float
     lean: float
 
-    def may_hold_feet(self, other: Side, within: float) -> bool:
+    def may_hold_feet(self, other: BoundarySide, within: float) -> bool:
         """Whether a normal of this edge may meet the other no farther off than ``within``."""
         (x, y), (nx, ny) = self.middle, self.normal
         aside = abs((other.middle[0] - x) * ny - (other.middle[1] - y) * nx)
@@ -171,8 +171,12 @@ class _Narrowest:
             self.offer((px, py), (qx, qy))
 
     def near(
-        self, a: Side | Corner, aside: float, after: int = -1, among: Sequence[int] | None = None
-    ) -> Iterator[tuple[int, Side]]:
+        self,
+        a: BoundarySide | Corner,
+        aside: float,
+        after: int = -1,
+        among: Sequence[int] | None = None,
+    ) -> Iterator[tuple[int, BoundarySide]]:
         """Numbered sides that a segment shorter than the best could join to ``a``.
 
         Their normals are opposed somewhere, to within ``aside`` radians, and their numbers come
@@ -250,12 +254,12 @@ def search(narrowest: _Narrowest) -> None:
         narrowest.offer(p, q)
 
 
-def _side(edge: Edge) -> Side:
+def _side(edge: Edge) -> BoundarySide:
     middle = edge.at(0.5)
     half_turn = abs(edge.sweep) / 2 if isinstance(edge, Arc) else 0.0
     half = max(math.dist(middle, edge.start), math.dist(middle, edge.end))
     lean = math.sin(min(half_turn, math.pi / 2))
-    return Side(edge, edge.bounds, middle, left_normal(edge, middle), half_turn, half, lean)
+    return BoundarySide(edge, edge.bounds, middle, left_normal(edge, middle), half_turn, half, lean)
 
 
 def _pinch(
@@ -274,7 +278,7 @@ def _pinch(
     return None
 
 
-def _between_edges(a: Side, b: Side, narrowest: _Narrowest) -> None:
+def _between_edges(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> None:
     if isinstance(a.edge, Arc):
         if _alongside(a.edge, b.edge) and _may_face(a.edge, b.edge, narrowest.value):
             _along_each_other(a, b, narrowest)
@@ -321,7 +325,7 @@ def _may_face(a: Arc, b: Edge, within: float) -> bool:
     return False
 
 
-def _along_each_other(a: Side, b: Side, narrowest: _Narrowest) -> None:
+def _along_each_other(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> None:
     for one, other in ((a, b), (b, a)):
         for p in (one.middle, one.edge.start, one.edge.end):
             here = _Foot(p, left_normal(one.edge, p))
@@ -349,7 +353,7 @@ def _between_corners(a: Corner, b: Corner, narrowest: _Narrowest) -> None:
         narrowest.offer(a.point, b.point)
 
 
-def _corner_to_edge(corner: Corner, side: Side, foot: _Foot, narrowest: _Narrowest) -> None:
+def _corner_to_edge(corner: Corner, side: BoundarySide, foot: _Foot, narrowest: _Narrowest) -> None:
     d = (foot.point[0] - corner.point[0], foot.point[1] - corner.point[1])
     if _dot(d, foot.normal) > -TOUCH:
         return
