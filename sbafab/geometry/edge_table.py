@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sbafab.geometry.edges import EPSILON, Arc, Edge
+from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -45,12 +45,14 @@ class EdgeTable:
     box: Floats
 
     @staticmethod
-    def of(edges: Sequence[Edge]) -> EdgeTable:
+    def of(edges: Sequence[Edge], boxes: Sequence[Bounds] | None = None) -> EdgeTable:
+        """``boxes``: the bounds of the edges, where they are known."""
+        known = boxes if boxes is not None else [edge.bounds for edge in edges]
         rows = [
-            (*e.start, *e.end, *e.centre, e.radius, 1.0 if e.ccw else -1.0, *e.bounds)
+            (*e.start, *e.end, *e.centre, e.radius, 1.0 if e.ccw else -1.0, *box)
             if isinstance(e, Arc)
-            else (*e.start, *e.end, *e.start, 0.0, 0.0, *e.bounds)
-            for e in edges
+            else (*e.start, *e.end, *e.start, 0.0, 0.0, *box)
+            for e, box in zip(edges, known, strict=True)
         ]
         c = np.array(rows, dtype=float).reshape(-1, 12).T.copy()
         return EdgeTable(c[0:2], c[2:4], c[4:6], c[6], c[7], c[8:12])

@@ -23,7 +23,7 @@ class SideTable:
 
     def __init__(self, sides: Sequence[BoundarySide]) -> None:
         self.edges = [side.edge for side in sides]
-        self.table = EdgeTable.of(self.edges)
+        self.table = EdgeTable.of(self.edges, [side.box for side in sides])
         rows = [
             (*side.middle, *side.normal, side.half_turn, side.half, side.lean) for side in sides
         ]

@@ -124,7 +124,11 @@ class Boundary:
     """Contours with the material on their left, made ready for the search."""
 
     def __init__(self, contours: Sequence[Contour], sharp: float) -> None:
-        self.sides = [_side(edge) for contour in contours for edge in contour.edges]
+        self.sides = [
+            _side(edge, box)
+            for contour in contours
+            for edge, box in zip(contour.edges, contour.boxes, strict=True)
+        ]
         self.corners = [corner for contour in contours for corner in corners_of(contour)]
         """What corner each side starts at, if any."""
         self.ends = [ends for contour in contours for ends in tapered_ends(contour, sharp)]
@@ -254,12 +258,16 @@ def search(narrowest: _Narrowest) -> None:
         narrowest.offer(p, q)
 
 
-def _side(edge: Edge) -> BoundarySide:
-    middle = edge.at(0.5)
-    half_turn = abs(edge.sweep) / 2 if isinstance(edge, Arc) else 0.0
+def _side(edge: Edge, box: Bounds) -> BoundarySide:
+    if isinstance(edge, Arc):
+        # As ``at`` says, which would work out the sweep once more.
+        sweep = edge.sweep
+        middle, half_turn = edge.on_circle(edge.start_angle + 0.5 * sweep), abs(sweep) / 2
+    else:
+        middle, half_turn = edge.at(0.5), 0.0
     half = max(math.dist(middle, edge.start), math.dist(middle, edge.end))
     lean = math.sin(min(half_turn, math.pi / 2))
-    return BoundarySide(edge, edge.bounds, middle, left_normal(edge, middle), half_turn, half, lean)
+    return BoundarySide(edge, box, middle, left_normal(edge, middle), half_turn, half, lean)
 
 
 def _pinch(
