@@ -106,7 +106,8 @@ def held(
     balance is found.
     """
     if load.point is None:
-        found = _settled(springs, pitch, load, start, FEW_STEPS, is_quick=True)
+        fine = FINE if is_near else FINEST
+        found = _settled(springs, pitch, load, start, FEW_STEPS, quick=fine)
         if found is None:
             found = _settled(springs, pitch, load, start, MOST_STEPS)
     else:
@@ -159,13 +160,13 @@ def _settled(
     start: Array,
     most: int,
     enough: float = 0.0,
-    is_quick: bool = False,
+    quick: float = 0.0,
 ) -> tuple[Array, float, bool] | None:
     """What ``held`` gives, or None where so many steps do not get there. A step that is no larger
-    than ``enough`` ends it; ``is_quick`` makes fewer and larger ones.
+    than ``enough`` ends it. ``quick`` makes fewer and larger ones, until less than it is left.
     """
-    finest = FINEST if is_quick else FINE
-    at, before, last = start, finest, None
+    fine = quick or FINE
+    at, before, last = start, fine, None
     now = loaded(springs, pitch, load, at)
     for _ in range(most):
         if np.abs(now.gradient).max() < CLOSE * (1 + 1e-3 * now.push):
@@ -180,13 +181,13 @@ def _settled(
         matrix = with_blocks(rest, now.blocks)
         found, is_firm = _towards(now.gradient[None], matrix[None])
         flat = _held_off(springs, at, found[0], now.gradient, rest, now.blocks)
-        if is_quick and np.abs(flat).max() > STRAIGHT:
+        if quick and np.abs(flat).max() > STRAIGHT:
             flat = _bettered(springs, at, flat, now, rest)
         move = flat.reshape(-1, 3)
         largest = float(np.abs(move).max())
         slope = float(flat @ now.gradient)
         fits = load.point is None or (largest < CLOSELY and slope > -LITTLE)
-        if is_firm and (largest <= enough or (fits and _ends(largest, before, finest))):
+        if is_firm and (largest <= enough or (fits and _ends(largest, before, fine))):
             at = at + move
             return at, 0.0 if load.point is None else pushed(at, pitch, load), True
         share = float(_limited(move).min())
