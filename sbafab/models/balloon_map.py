@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 DEGREE = 5
 PRESSURE_SPANS, HEIGHT_SPANS = 12, 12
 """Pieces of the spline each way."""
-PRESSURE_POINTS, HEIGHT_POINTS = 16, 16
+PRESSURE_POINTS, HEIGHT_POINTS = 16, 18
 """Balloons computed each way."""
 P0 = 0.1
 """Pressure in kPa below which the spline's pieces are alike in pressure, above alike in ratio."""
@@ -36,9 +36,9 @@ ABOVE = 1.15
 """How far the map goes on above the highest free balloon, as a share of it."""
 FLATTEST = 0.01
 """Least height in mm that is computed; what lies below is carried on."""
-FLAT = 0.2
+FLAT = 0.1
 """Weight of balloons that are pressed flat and hold nothing."""
-NEARLY_FLAT = 0.1
+NEARLY_FLAT = 0.2
 """Height in mm above which volumes are fitted by their share of what they are, below all alike."""
 MOST_STRETCH = 0.15
 """Share by which films may stretch; one modulus is unlikely to hold beyond."""
