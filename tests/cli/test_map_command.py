@@ -13,6 +13,7 @@ import pytest
 import sbafab
 from sbafab.cli import main
 from sbafab.models.balloon_map import BalloonMap
+from tests.site.formats import hold
 
 
 def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
@@ -111,6 +112,7 @@ def test_reproduce_writes_every_figure_with_the_papers_error_bars(
     code, out, _ = run(["reproduce", "-o", str(tmp_path), "--json"], capsys)
     assert code == 0
     folder = tmp_path / "reproduction"
+    hold("reproduction", json.loads(out))
     rows = json.loads(out)["rows"]
     assert rows == json.loads((folder / "reproduction.json").read_text())["rows"]
     roles = {row["figure"].split("(")[-1] for row in rows if row["section"].startswith("Calib")}
