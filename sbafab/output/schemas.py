@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any, get_args
 
 from sbafab.errors import ERROR_SCHEMA
+from sbafab.output import printed
 from sbafab.output.checking import CHECKS_SCHEMA
 from sbafab.output.predicting import SCHEMA as PREDICT_SCHEMA
-from sbafab.output import printed
 from sbafab.output.schema_parts import COUNT, TEXT, and_perhaps, array, finding, number, table
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.pressing.tables import PRESS_SCHEMA
