@@ -70,6 +70,11 @@ def test_limits_say_whether_they_are_the_least_or_the_most(
     assert {sense for (_, verdict), sense in senses.items() if verdict == "pass"} == {False, True}
 
 
+def test_help_says_what_every_command_does_in_a_line(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = run(["--help"], capsys)
+    assert "..." not in out.partition("Commands:")[2]
+
+
 def test_shares_say_what_they_are_of(capsys: pytest.CaptureFixture[str]) -> None:
     few = ["1dof-5mm", "--set", "stack.balloons=1", "--set", "rules.yield_builds=100"]
     few += ["--set", "registration.method=ears"]
