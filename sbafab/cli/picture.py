@@ -69,10 +69,10 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
 ) -> None:
     """Draw the inflated actuator, still or moving.
 
-    It stands as the elastic stack says at the given pressures or volumes. Balloons are drawn as they
-    are between their plates; ears are snipped off, and inlet tubes are left out. Elevation and
-    azimuth are degrees over the bench and round it. Drawn or oblong pockets have no such model: they
-    are drawn flat.
+    It stands as the elastic stack says at the given pressures or volumes. Balloons are drawn as
+    they are between their plates; ears are snipped off, and inlet tubes are left out. Elevation and
+    azimuth are degrees over the bench and round it. Drawn or oblong pockets have no such model:
+    they are drawn flat.
     """
     from sbafab.actuators import build, load_design
     from sbafab.cli.printing import shown_progress
