@@ -8,7 +8,7 @@ FORMATS = (
     *("design", "checks", "manifest", "job", "assembly"),
     *("press", "predict", "find", "run", "nested", "records", "report"),
     *("sweep", "simulate", "assembly-predict", "reproduction"),
-    *("kerf", "explain", "explained", "templates", "error"),
+    *("balloon-map", "kerf", "explain", "explained", "templates", "error"),
 )
 """As in ``sbafab.output.schemas``, whose imports would slow ``--help`` down."""
 

@@ -1,10 +1,11 @@
-"""The ids of what commands print with ``--json``, beside those of files."""
+"""The ids of what commands print with ``--json``, and of what ``map`` writes (as in models)."""
 
 RUN_SCHEMA = "sbafab/run@1"
 NESTED_SCHEMA = "sbafab/nested@1"
 RECORDS_SCHEMA = "sbafab/records@1"
 REPORT_SCHEMA = "sbafab/report@1"
 SWEEP_SCHEMA = "sbafab/sweep@1"
+MAP_SCHEMA = "sbafab/balloon-map@1"
 KERF_SCHEMA = "sbafab/kerf@1"
 EXPLAIN_SCHEMA = "sbafab/explain@1"
 EXPLAINED_SCHEMA = "sbafab/explained@1"

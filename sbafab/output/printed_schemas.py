@@ -9,6 +9,7 @@ from sbafab.output.printed import (
     EXPLAIN_SCHEMA,
     EXPLAINED_SCHEMA,
     KERF_SCHEMA,
+    MAP_SCHEMA,
     NESTED_SCHEMA,
     RECORDS_SCHEMA,
     REPORT_SCHEMA,
@@ -190,6 +191,29 @@ def _assembly_predict() -> dict[str, Any]:
     )
 
 
+def _balloon_map() -> dict[str, Any]:
+    rows = array(array(number()))
+    grid = {**rows, "description": "a row a pressure, a column a height"}
+    sizes = ("pocket_radius_mm", "neck_radius_mm", "bore_radius_mm", "film_mm", "modulus_kpa")
+    balloon = table(
+        **dict.fromkeys((*sizes, "poisson"), number()),
+        pressure=array(number()),
+        height=array(number()),
+        force=grid,
+        volume=grid,
+        potential=grid,
+    )
+    return table(
+        schema={"const": MAP_SCHEMA},
+        design=TEXT,
+        units={"type": "object", "additionalProperties": TEXT},
+        levels={**array(COUNT), "description": "which of the balloons stands there, from 1"},
+        flat_level_mm=number(),
+        chamber_axes_mm=rows,
+        balloons=array(balloon),
+    )
+
+
 def _reproduction() -> dict[str, Any]:
     row = table(
         section=TEXT,
@@ -215,6 +239,7 @@ BODIES = {
     "simulate": _simulate,
     "assembly-predict": _assembly_predict,
     "reproduction": _reproduction,
+    "balloon-map": _balloon_map,
     "kerf": _kerf,
     "explain": _explain,
     "explained": _explained,

@@ -44,6 +44,7 @@ SCHEMAS: Mapping[str, tuple[str, str]] = {
         printed.REPRODUCTION_SCHEMA,
         "`reproduction.json`, and what `reproduce --json` prints",
     ),
+    "balloon-map": (printed.MAP_SCHEMA, "what `map --to FILE.json` writes"),
     "kerf": (printed.KERF_SCHEMA, "what `kerf --json` prints"),
     "explain": (printed.EXPLAIN_SCHEMA, "what `explain RULE --json` prints"),
     "explained": (printed.EXPLAINED_SCHEMA, "what `explain --json` prints of all rules"),
