@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -108,11 +108,14 @@ def check(source: Source | Assembly, *changes: Change, **tables: Any) -> Finding
     return Findings(run_check(found)[1])
 
 
-def checking(source: Source, laminate: Laminate | None = None) -> Iterator[tuple[str, Findings]]:
+def checking(
+    source: Source, laminate: Laminate | None = None, pause: Callable[[], None] | None = None
+) -> Iterator[tuple[str, Findings]]:
     """Every rule's name and what it finds in a design, one after the other, as they are measured.
 
     Who stops asking stops the deck; registration-yield, which draws builds, comes last.
-    ``laminate`` is the design's, where it is built already. Raises DesignError.
+    ``laminate`` is the design's, where it is built already; ``pause`` is called between parts of
+    long rules, and what it raises ends the deck. Raises DesignError.
     """
     from sbafab.output.settings import limits
     from sbafab.rules.deck import RULES, run_rule
@@ -120,7 +123,7 @@ def checking(source: Source, laminate: Laminate | None = None) -> Iterator[tuple
     from sbafab.rules.measures import Measures
 
     design = load(source)
-    measures = Measures(laminate or build(design), limits(design))
+    measures = Measures(laminate or build(design), limits(design), pause or (lambda: None))
     for rule in RULES:
         found = run_rule(rule, measures.laminate, measures.limits, measures)
         yield rule.name, Findings(found)

@@ -32,8 +32,8 @@ def predict(
     """What a design will do; each figure has a unit and names its model and its trust.
 
     Forces and works are at ``pressures_kpa``, times at ``flow_ml_min`` into each chamber, strokes
-    with ``volumes_ul`` in each balloon. ``quick`` leaves out the figures of the elastic stack,
-    which take seconds; ``laminate`` is the design's, where it is built already. ``asked`` holds
+    with ``volumes_ul`` in each balloon. ``quick`` leaves out the curves and the figures of the
+    elastic stack, which take seconds; ``laminate`` is the design's, where it is built already. ``asked`` holds
     fields of ``Factors``: ``press_factor``, ``contact_factor``, ``pocket_loss`` mm and
     ``modulus_mpa``, beside tables of the design. Raises
     DesignError for what is out of every model's range. Models: the paper's Eqs. 1-4 (Sec. 3), and

@@ -52,7 +52,7 @@ def live(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     yield _prediction(found, laminate)
     beat()
     try:
-        for number, (rule, findings) in enumerate(api.checking(found, laminate), 1):
+        for number, (rule, findings) in enumerate(api.checking(found, laminate, beat), 1):
             yield {
                 "kind": "rule",
                 "rule": rule,
@@ -97,14 +97,14 @@ def _assembly(assembly: Assembly, job: StudioJob, beat: Beat) -> Iterator[Answer
 
 
 def _prediction(design: Design, laminate: Laminate) -> Answer:
-    """Figures and curves by closed formulas; why there are none, where that is so."""
+    """Figures by closed formulas; why there are none, where that is so."""
     try:
         found = api.predict(design, quick=True, laminate=laminate)
     except SbafabError as error:
         return {"kind": "unpredicted", "message": str(error)}
     except ModuleNotFoundError as error:
         return {"kind": "unpredicted", "message": f"This needs {error.name}, which is not here."}
-    return {"kind": "prediction", **found.as_dict()}
+    return {"kind": "prediction", "quick": True, **found.as_dict()}
 
 
 def elastic(job: StudioJob, beat: Beat) -> Iterator[Answer]:

@@ -3,7 +3,7 @@ import { el, plain } from "./dom.js";
 import { PanZoom } from "./panzoom.js";
 import { pathOf } from "./shapes.js";
 import { inkOf } from "./layers.js";
-import { significant } from "./findings.js";
+import { named, significant } from "./findings.js";
 
 export class Compare {
   title = "Compare";
@@ -72,10 +72,10 @@ export class Compare {
     const other = [...now.keys()].filter((rule) => before.has(rule) && before.get(rule) !== now.get(rule));
     if (other.length) head("Rules");
     for (const rule of other) row(rule, before.get(rule), now.get(rule));
-    const figures = new Map((reference.prediction?.figures ?? []).map((figure) => [figure.group + figure.name + figure.model, figure]));
-    const moved = (prediction?.figures ?? []).filter((figure) => { const was = figures.get(figure.group + figure.name + figure.model); return was && was.value !== figure.value; });
+    const figures = new Map((reference.prediction?.figures ?? []).map((figure) => [named(figure), figure]));
+    const moved = (prediction?.figures ?? []).filter((figure) => { const was = figures.get(named(figure)); return figure.design_with && was && was.value !== figure.value; });
     if (moved.length) head("Prediction");
-    for (const figure of moved) row(`${figure.name}, ${figure.unit}`, significant(figures.get(figure.group + figure.name + figure.model).value), significant(figure.value));
+    for (const figure of moved) row(`${figure.name}, ${figure.unit}`, significant(figures.get(named(figure)).value), significant(figure.value));
     this.diffs.replaceChildren(el("table", { class: "figures" }, el("tbody", {}, ...rows)));
   }
 }

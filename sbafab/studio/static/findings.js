@@ -1,6 +1,9 @@
 // What the rules found, as they are measured, and what the models predict.
 import { $, el, plain } from "./dom.js";
+import { withoutServer } from "./server.js";
 
+// ms between two looks at a deck that runs; laying the list out oftener takes the time of what is measured.
+const READABLE = 110;
 const RANK = { fail: 0, warn: 1, waived: 2, pass: 3 };
 
 export class Findings {
@@ -10,15 +13,18 @@ export class Findings {
     this.sum = el("span", { class: "sum" });
     this.block = el("div", { class: "section-block" }, el("h2", {}, "Rules", this.sum), this.list, el("div", { class: "stale-mark" }, "Checking"));
     this.figures = el("div", { class: "body" });
-    this.figuresBlock = el("div", { class: "section-block" }, el("h2", {}, "Prediction", el("span", { class: "sum" }, "formulas, elastic stack")), this.figures, el("div", { class: "stale-mark" }, "Updating"));
+    this.unfolded = new Set();
+    this.figuresBlock = el("div", { class: "section-block" }, el("h2", {}, "Prediction", el("span", { class: "sum", title: "Each quantity once, by the model to design with" }, "by the model to design with")), this.figures, el("div", { class: "stale-mark" }, "Updating"));
     $("#panel-findings").append(this.block, this.figuresBlock);
-    // Rules that come in quick succession are shown together, once a frame.
-    studio.on("rule", () => { this.frame ??= requestAnimationFrame(() => { this.frame = null; this.draw(); }); });
+    // Rules that come in quick succession are shown together.
+    studio.on("rule", () => { this.soon ??= setTimeout(() => this.draw(), READABLE); });
     studio.on("checked opened", () => this.draw());
     studio.on("figures reference", () => this.drawFigures());
     studio.on("failed", (answer) => { if (!answer.field) this.draw(); });
   }
   draw() {
+    clearTimeout(this.soon);
+    this.soon = null;
     const { studio } = this;
     // While the deck runs, a rule that was not measured again keeps its old line, pale.
     const fresh = new Map(studio.running.map((answer) => [answer.rule, answer.findings]));
@@ -47,18 +53,31 @@ export class Findings {
     const { prediction, reference, noFigures } = this.studio;
     if (noFigures) { this.figures.replaceChildren(el("p", { class: "fallback" }, noFigures)); return; }
     if (!prediction) return;
-    const before = new Map((reference?.prediction?.figures ?? []).map((figure) => [figure.group + figure.name + figure.model, figure.value]));
-    const rows = [];
-    let group = null;
-    for (const figure of prediction.figures) {
-      if (figure.group !== group) { group = figure.group; rows.push(el("tr", {}, el("th", { colspan: 4, scope: "rowgroup" }, group))); }
-      const was = before.get(figure.group + figure.name + figure.model);
+    const before = new Map((reference?.prediction?.figures ?? []).map((figure) => [named(figure), figure.value]));
+    const row = (figure) => {
+      const was = before.get(named(figure));
       const change = was === undefined || was === figure.value ? "" : `${figure.value > was ? "+" : "−"}${significant(Math.abs(figure.value - was))}`;
-      rows.push(el("tr", { title: `${figure.model}. ${figure.trust}` }, el("td", {}, figure.name), el("td", { class: "v" }, significant(figure.value)), el("td", { class: "n" }, figure.unit), reference ? el("td", { class: "d" }, change) : null));
-    }
-    this.figures.replaceChildren(el("table", { class: "figures" }, el("tbody", {}, ...rows)));
+      return el("tr", { title: `${figure.model}. ${figure.trust}` }, el("td", {}, figure.name), el("td", { class: "v" }, significant(figure.value)), el("td", { class: "n" }, figure.unit), reference ? el("td", { class: "d" }, change) : null);
+    };
+    const table = (figures) => {
+      const groups = [...new Set(figures.map(({ group }) => group))];
+      return el("table", { class: "figures" }, el("tbody", {}, ...groups.flatMap((group) => [el("tr", {}, el("th", { colspan: 4, scope: "rowgroup" }, group)), ...figures.filter((figure) => figure.group === group).map(row)])));
+    };
+    const { figures, left_out: left, quick } = prediction, others = figures.filter((figure) => !figure.design_with);
+    this.figures.replaceChildren(table(figures.filter((figure) => figure.design_with)),
+      quick ? el("p", { class: "more" }, withoutServer ? "Without the elastic stack's figures; sbafab predict has them." : "The elastic stack's figures follow once the design rests.") : "",
+      this.fold("others", `Other models of the same (${others.length})`, others.length, () => table(others)),
+      this.fold("left", `Left out (${left.length})`, left.length, () => el("dl", { class: "left-out" }, ...left.flatMap(({ name, reason }) => [el("dt", {}, name), el("dd", {}, reason)]))));
+  }
+  // What is shown on demand; it stays open when the figures change.
+  fold(name, words, count, content) {
+    if (!count) return "";
+    const details = el("details", { class: "more", open: this.unfolded.has(name), ontoggle: () => { this.unfolded[details.open ? "add" : "delete"](name); if (details.open && details.children.length < 2) details.append(content()); } }, el("summary", {}, words));
+    if (this.unfolded.has(name)) details.append(content());
+    return details;
   }
 }
+export const named = (figure) => figure.group + figure.name + figure.model;
 export function significant(value) {
   if (value === 0) return "0";
   const digits = Math.max(0, 2 - Math.floor(Math.log10(Math.abs(value))));
