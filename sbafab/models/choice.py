@@ -22,9 +22,9 @@ FREE = ", free"
 def chosen(figures: Iterable[Figure], to_come: tuple[str, ...] = ()) -> tuple[Figure, ...]:
     """The same figures, those marked as ``other`` that are not to be designed with.
 
-    ``to_come`` are beginnings of models whose figures are left out for now. Of one name the first is chosen: the paper's Eq. 4, whose force is nearest to the six that the
-    paper measured at 100 kPa (0.76 to 1.24 times it; 0.74 to 1.65 times Eqs. 1-3, 0.47 to 0.86
-    times the elastic stack).
+    ``to_come`` are beginnings of models whose figures are left out for now. Of one name the first
+    is chosen: the paper's Eq. 4, whose force is nearest to the six that the paper measured at 100
+    kPa (0.76 to 1.24 times it; 0.74 to 1.65 times Eqs. 1-3, 0.47 to 0.86 times the elastic stack).
     """
     found = tuple(figures)
     return tuple(replace(one, other=_is_other(one, found, to_come)) for one in found)

@@ -51,13 +51,15 @@ def seen(asked: dict[str, Any]) -> dict[str, Any]:
     return next(a for a in JOBS["live"](asked, lambda: None) if a["kind"] == "laminate")
 
 
-def test_the_prediction_is_that_of_the_command_or_says_why_there_is_none(tmp_path: Path) -> None:
+def test_the_prediction_is_that_of_the_command(tmp_path: Path) -> None:
     told = {answer["kind"]: answer for answer in answers(job(tmp_path, SMALL))}
     theirs = api.predict(api.loads(SMALL), quick=True).as_dict()
     assert told["prediction"]["figures"] == theirs["figures"]
+    # What an assembly does takes seconds; it is asked for when the hand rests.
     aperture = JOBS["live"](job(tmp_path, api.template("aperture")), lambda: None)
     told = {answer["kind"]: answer for answer in islice(aperture, 4)}
-    assert "an assembly" in told["unpredicted"]["message"]
+    assert told["prediction"]["quick"]
+    assert told["prediction"]["figures"] == []
 
 
 @pytest.mark.long
@@ -67,7 +69,9 @@ def test_what_to_design_with_stays_when_the_elastic_stack_s_figures_come(tmp_pat
     quick = next(answer for answer in shown if answer["kind"] == "prediction")
     (full,) = answers({**job(tmp_path, text), "do": "elastic"})
     own = {key(figure): figure["design_with"] for figure in full["figures"]}
-    assert {key(figure): figure["design_with"] for figure in quick["figures"]}.items() <= own.items()
+    assert {
+        key(figure): figure["design_with"] for figure in quick["figures"]
+    }.items() <= own.items()
     # The upper bound is hidden from the start.
     assert not own["bending", "maximum lateral tip displacement", "constant curvature"]
 

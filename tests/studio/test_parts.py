@@ -44,7 +44,7 @@ offset = [-10, 0]
 def seen(folder: Path, text: str, has: tuple[str, ...] = ()) -> dict[str, Any]:
     """The answers before those of the rules, by kind."""
     live = JOBS["live"]({**job(folder, text), "has": list(has)}, lambda: None)
-    return {a["kind"]: a for a in takewhile(lambda a: a["kind"] != "unpredicted", live)}
+    return {a["kind"]: a for a in takewhile(lambda a: a["kind"] != "prediction", live)}
 
 
 def points(answer: dict[str, Any], name: str) -> Any:
