@@ -40,7 +40,7 @@ export class Compare {
     this.eyes.forEach((eye) => eye.bounds(box, [34, 20, 20, 20]));
     this.halves[0].name.textContent = `Before: ${reference.name}`;
     this.halves[1].name.textContent = `Now: ${this.studio.designName}`;
-    this.list();
+    this.diffs.replaceChildren(differences(this.studio));
     this.draw();
   }
   draw() {
@@ -57,26 +57,6 @@ export class Compare {
         el("path", { d: paths[1 - i], fill: "none", stroke: "var(--ghost)", "stroke-width": 1, "stroke-dasharray": "4 3", ...line })));
       svg.setAttribute("aria-label", `${i ? "Now" : "Before"}, ${this.role.value}`);
     });
-  }
-  list() {
-    const { reference, values, findings, prediction, laminate } = this.studio, rows = [];
-    const head = (words) => rows.push(el("tr", {}, el("th", { colspan: 4, scope: "rowgroup" }, words)));
-    const row = (name, a, b) => rows.push(el("tr", {}, el("td", {}, name), el("td", { class: "v" }, a), el("td", { class: "n" }, "→"), el("td", { class: "v" }, b)));
-    const a = flat(reference.values), b = flat(values);
-    const keys = [...new Set([...a.keys(), ...b.keys()])].filter((key) => a.get(key) !== b.get(key));
-    head(keys.length ? "Keys" : "No key differs");
-    for (const key of keys) row(key, a.get(key) ?? "–", b.get(key) ?? "–");
-    if (laminate.thickness !== reference.laminate.thickness) row("thickness, mm", plain(reference.laminate.thickness), plain(laminate.thickness));
-    const verdicts = (list) => new Map(list.map((finding) => [finding.rule, `${finding.verdict} ${finding.measured ?? ""}`]));
-    const before = verdicts(reference.findings), now = verdicts(findings);
-    const other = [...now.keys()].filter((rule) => before.has(rule) && before.get(rule) !== now.get(rule));
-    if (other.length) head("Rules");
-    for (const rule of other) row(rule, before.get(rule), now.get(rule));
-    const figures = new Map((reference.prediction?.figures ?? []).map((figure) => [named(figure), figure]));
-    const moved = (prediction?.figures ?? []).filter((figure) => { const was = figures.get(named(figure)); return figure.design_with && was && was.value !== figure.value; });
-    if (moved.length) head("Prediction");
-    for (const figure of moved) row(`${figure.name}, ${figure.unit}`, significant(figures.get(named(figure)).value), significant(figure.value));
-    this.diffs.replaceChildren(el("table", { class: "figures" }, el("tbody", {}, ...rows)));
   }
 }
 // The first layer of each kind, as both designs have it.
@@ -95,4 +75,25 @@ function flat(table, prefix = "", found = new Map()) {
     else found.set(prefix + key, typeof value === "object" ? JSON.stringify(value) : String(value));
   }
   return found;
+}
+// What differs from the state that is kept: keys, rules, figures.
+export function differences(studio) {
+  const { reference, values, findings, prediction, laminate } = studio, rows = [];
+  const head = (words) => rows.push(el("tr", {}, el("th", { colspan: 4, scope: "rowgroup" }, words)));
+  const row = (name, a, b) => rows.push(el("tr", {}, el("td", {}, name), el("td", { class: "v" }, a), el("td", { class: "n" }, "→"), el("td", { class: "v" }, b)));
+  const a = flat(reference.values), b = flat(values);
+  const keys = [...new Set([...a.keys(), ...b.keys()])].filter((key) => a.get(key) !== b.get(key));
+  head(keys.length ? "Keys" : "No key differs");
+  for (const key of keys) row(key, a.get(key) ?? "–", b.get(key) ?? "–");
+  if (laminate && laminate.thickness !== reference.laminate.thickness) row("thickness, mm", plain(reference.laminate.thickness), plain(laminate.thickness));
+  const verdicts = (list) => new Map(list.map((finding) => [finding.rule + (finding.design ? ` of ${finding.design}` : ""), `${finding.verdict} ${finding.measured ?? ""}`]));
+  const before = verdicts(reference.findings), now = verdicts(findings);
+  const other = [...now.keys()].filter((rule) => before.has(rule) && before.get(rule) !== now.get(rule));
+  if (other.length) head("Rules");
+  for (const rule of other) row(rule, before.get(rule), now.get(rule));
+  const figures = new Map((reference.prediction?.figures ?? []).map((figure) => [named(figure), figure]));
+  const moved = (prediction?.figures ?? []).filter((figure) => { const was = figures.get(named(figure)); return figure.design_with && was && was.value !== figure.value; });
+  if (moved.length) head("Prediction");
+  for (const figure of moved) row(`${studio.family === "assembly" ? `${figure.group}: ` : ""}${figure.name}, ${figure.unit}`, significant(figures.get(named(figure)).value), significant(figure.value));
+  return el("table", { class: "figures" }, el("tbody", {}, ...rows));
 }

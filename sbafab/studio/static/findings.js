@@ -15,12 +15,20 @@ export class Findings {
     this.figures = el("div", { class: "body" });
     this.unfolded = new Set();
     this.figuresBlock = el("div", { class: "section-block" }, el("h2", {}, "Prediction", el("span", { class: "sum", title: "Each quantity once, by the model to design with" }, "by the model to design with")), this.figures, el("div", { class: "stale-mark" }, "Updating"));
+    this.figures.before(this.whole());
     $("#panel-findings").append(this.block, this.figuresBlock);
     // Rules that come in quick succession are shown together.
     studio.on("rule", () => { this.soon ??= setTimeout(() => this.draw(), READABLE); });
     studio.on("checked opened", () => this.draw());
     studio.on("figures reference", () => this.drawFigures());
+    studio.on("design", () => { this.asked.hidden = studio.family !== "assembly"; });
     studio.on("failed", (answer) => { if (!answer.field) this.draw(); });
+  }
+  // What an assembly is asked for: one pressure in all its actuators, and a mass at the tips.
+  whole() {
+    const { studio } = this;
+    const field = (name, label, unit) => el("label", {}, label, el("input", { type: "text", inputmode: "decimal", value: studio.inflated[name], "aria-label": `${label}, ${unit}`, onchange: (event) => studio.inflate({ [name]: Number(event.target.value.replace(",", ".") || NaN) }) }), unit);
+    return (this.asked = el("div", { class: "whole-asked", hidden: true }, field("pressure_kpa", "All at", "kPa"), field("load_g", "Mass at the tips", "g")));
   }
   draw() {
     clearTimeout(this.soon);
@@ -50,7 +58,7 @@ export class Findings {
   }
 
   drawFigures() {
-    const { prediction, reference, noFigures } = this.studio;
+    const { studio } = this, { prediction, reference, noFigures } = studio;
     if (noFigures) { this.figures.replaceChildren(el("p", { class: "fallback" }, noFigures)); return; }
     if (!prediction) return;
     const before = new Map((reference?.prediction?.figures ?? []).map((figure) => [named(figure), figure.value]));
@@ -63,9 +71,10 @@ export class Findings {
       const groups = [...new Set(figures.map(({ group }) => group))];
       return el("table", { class: "figures" }, el("tbody", {}, ...groups.flatMap((group) => [el("tr", {}, el("th", { colspan: 4, scope: "rowgroup" }, group)), ...figures.filter((figure) => figure.group === group).map(row)])));
     };
-    const { figures, left_out: left, quick } = prediction, others = figures.filter((figure) => !figure.design_with);
+    const { figures, left_out: left, quick, met = [], meets, refused } = prediction, whole = studio.family === "assembly", others = figures.filter((figure) => !figure.design_with);
     this.figures.replaceChildren(table(figures.filter((figure) => figure.design_with)),
-      quick ? el("p", { class: "more" }, withoutServer ? "Without the elastic stack's figures; sbafab predict has them." : "The elastic stack's figures follow once the design rests.") : "",
+      ...met.map((words) => el("p", { class: `met${meets ? " beyond" : ""}` }, words)),
+      refused ? el("p", { class: "met beyond" }, refused) : quick ? el("p", { class: "more" }, later(whole)) : "",
       this.fold("others", `Other models of the same (${others.length})`, others.length, () => table(others)),
       this.fold("left", `Left out (${left.length})`, left.length, () => el("dl", { class: "left-out" }, ...left.flatMap(({ name, reason }) => [el("dt", {}, name), el("dd", {}, reason)]))));
   }
@@ -76,6 +85,10 @@ export class Findings {
     if (this.unfolded.has(name)) details.append(content());
     return details;
   }
+}
+function later(whole) {
+  if (withoutServer) return whole ? "What the whole does inflated is left out here; sbafab predict has it." : "Without the elastic stack's figures; sbafab predict has them.";
+  return whole ? "What the whole does inflated follows once the design rests." : "The elastic stack's figures follow once the design rests.";
 }
 export const named = (figure) => figure.group + figure.name + figure.model;
 export function significant(value) {
