@@ -92,7 +92,7 @@ export function differences(studio) {
   if (other.length) head("Rules");
   for (const rule of other) row(rule, before.get(rule), now.get(rule));
   const figures = new Map((reference.prediction?.figures ?? []).map((figure) => [named(figure), figure]));
-  const moved = (prediction?.figures ?? []).filter((figure) => { const was = figures.get(named(figure)); return figure.design_with && was && was.value !== figure.value; });
+  const moved = (prediction?.figures ?? []).filter((figure) => { const was = figures.get(named(figure)); return figure.design_with && was && significant(was.value) !== significant(figure.value); });
   if (moved.length) head("Prediction");
   for (const figure of moved) row(`${studio.family === "assembly" ? `${figure.group}: ` : ""}${figure.name}, ${figure.unit}`, significant(figures.get(named(figure)).value), significant(figure.value));
   return el("table", { class: "figures" }, el("tbody", {}, ...rows));

@@ -10,7 +10,11 @@ import { Stage3D } from "./stage3d.js";
 const READABLE = 110;
 // kPa at which a part stands when it is first shown, and the most that a grip is given.
 const FIRST = 5, FIRST_GRIP = 10, MOST_GRIP = 110;
-const TRUST = "Each actuator by its own elastic stack, no calibration on a built one; what it carries moves with its tip and weighs nothing. Grips are lenses of film that does not stretch, as high at any pressure. Contact between parts is not felt here: where they meet, and what hangs on the tips, stands under Prediction. Supply tubes, and lines through an arm that moves, are left out.";
+const TRUST = {
+  stack: "Each actuator by its own elastic stack, no calibration on a built one; what it carries moves with its tip and weighs nothing.",
+  grip: "Grips are lenses of film that does not stretch, equally high at any pressure.",
+  all: "Contact between parts is not felt here: where they meet, and what hangs on the tips, stands under Prediction. Supply tubes, and lines through an arm that moves, are left out.",
+};
 
 export class PartsMotion {
   title = "Motion";
@@ -125,8 +129,13 @@ export class PartsMotion {
     this.told = now;
     this.values.replaceChildren(...[...this.movers.values()].flatMap((mover) => [el("h4", {}, mover.part), el("dl", { class: "reading" }, ...rows(mover, this.pressures(mover)).flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)]))]));
     const leaning = [...this.movers.values()].find(({ pose }) => pose && !pose.stable);
-    this.say(leaning ? `${leaning.part} stands as a straight column that would rather buckle` : TRUST, Boolean(leaning));
+    this.say(leaning ? `${leaning.part} stands as a straight column that would rather buckle` : this.trusted(), Boolean(leaning));
     this.surface.firstChild?.setAttribute("aria-label", `Assembly in motion: ${[...this.movers.values()].flatMap((mover) => rows(mover, this.pressures(mover)).slice(0, 2).map(([name, value]) => `${mover.part} ${name.toLowerCase()} ${value}`)).join(", ")}`);
+  }
+
+  trusted() {
+    const kinds = new Set([...this.movers.values()].map((mover) => mover.is));
+    return Object.entries(TRUST).filter(([kind]) => kind === "all" || kinds.has(kind)).map(([, words]) => words).join(" ");
   }
 
   // What is drawn of each mover: balloons that a pose shapes, or a grip's, and the lumen round it.
