@@ -8,6 +8,8 @@ import { Stage3D } from "./stage3d.js";
 
 // ms between two readings: figures that change oftener cannot be read.
 const READABLE = 110;
+// ms after which parts that no hand moves are at rest.
+const RESTS = 2500;
 // kPa at which a part stands when it is first shown, and the most that a grip is given.
 const FIRST = 5, FIRST_GRIP = 10, MOST_GRIP = 110;
 const TRUST = {
@@ -39,7 +41,9 @@ export class PartsMotion {
     studio.on("part", () => { if (this.stage && this.text) { this.meshes.paint(); this.stage.draw(); } });
     studio.on("theme", () => { if (this.stage) { this.stage.repaint(); if (this.text) { this.meshes.paint(); this.shape(); this.draw(); } } });
   }
-  show() { this.stage?.resize(); if (this.studio.prediction?.quick) this.studio.askElastic(); if (!this.text) this.load(); }
+  // Whether a hand moves it, so that what takes seconds waits.
+  get moving() { return !this.element.hidden && performance.now() - (this.moved ?? -RESTS) < RESTS; }
+  show() { this.stage?.resize(); if (!this.text) this.load(); }
   hide() { this.stop(); }
 
   build() {
@@ -91,6 +95,9 @@ export class PartsMotion {
   // The newest wish goes out as soon as the last one is answered.
   want() {
     this.wanted = true;
+    this.moved = performance.now();
+    // What takes seconds gives way to the hand.
+    if (this.studio.prediction?.quick) this.studio.askElastic();
     if (!this.asking) this.ask();
   }
   async ask() {

@@ -83,14 +83,14 @@ export class PartsPlan {
     if (this.isCut) this.open(true);
     else this.frame();
   }
-  // The section square to the way one looks: through the axis of what stands alone, where that lies inside.
+  // The section square to the way one looks: through the axis of what stands alone, where that lies about the middle.
   open(on) {
     this.isCut = on;
     this.opened.setAttribute("aria-pressed", String(on));
     this.depth.disabled = !on;
     if (on && this.box && !this.box.isEmpty()) {
       const { near, far } = this.range(), share = (0 - near) / (far - near);
-      this.depth.value = share > 0.02 && share < 0.98 ? 100 * share : 50;
+      this.depth.value = share > 0.25 && share < 0.75 ? 100 * share : 50;
     }
     this.cut();
   }
@@ -179,7 +179,7 @@ export class PartsPlan {
     return marks.flatMap(({ part, hidden, to }, i) => [el("path", { d: `M${to.join(" ")}L${column - 12} ${rows[i]}H${column - 4}`, stroke: "var(--faint)", "stroke-dasharray": hidden && "3 3", fill: "none" }), el("circle", { cx: to[0], cy: to[1], r: 2, fill: "var(--soft)" }), text(part.name, column, rows[i] + 4)]);
   }
   scale() {
-    const step = niceBar(this.eye.scale), w = step * this.eye.scale, x = this.eye.width - w - 14, y = this.eye.height - 16;
+    const step = niceBar(this.eye.scale), w = step * this.eye.scale, x = this.eye.width - w - 14, y = this.eye.height - (this.eye.width < 560 ? 66 : 16);
     return [el("path", { d: `M${x} ${y - 5}V${y}H${x + w}V${y - 5}`, fill: "none", stroke: "var(--soft)" }), text(`${step} mm`, x + w / 2, y - 7, "middle")];
   }
   under(event) {
