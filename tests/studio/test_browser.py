@@ -277,6 +277,13 @@ def test_two_designs_side_by_side(seen: Watched) -> None:
     seen.ready()
     told = seen.page.locator("#view-compare .diffs").inner_text()
     assert "lumen.diameter" in told
+    # A rule that measures two things is listed for both where both differ.
+    rules = [(f["rule"], f["measured"]) for f in seen.say("studio.findings")]
+    was = [(f.rule, f.measured) for f in api.check(api.loads(DESIGN))]
+    changed = [ours[0] for ours, theirs in zip(rules, was, strict=True) if ours != theirs]
+    assert [line.split(",")[0] for line in told.split("\n") if ", limit" in line] == [
+        rule for rule in changed if rule != "registration-yield"
+    ]
     assert "Prediction" in told
     # What differs is painted in a colour that nothing else has.
     drawn = picture(seen, ".half >> nth=0")

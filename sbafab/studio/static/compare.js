@@ -86,14 +86,24 @@ export function differences(studio) {
   head(keys.length ? "Keys" : "No key differs");
   for (const key of keys) row(key, a.get(key) ?? "–", b.get(key) ?? "–");
   if (laminate && laminate.thickness !== reference.laminate.thickness) row("thickness, mm", plain(reference.laminate.thickness), plain(laminate.thickness));
-  const verdicts = (list) => new Map(list.map((finding) => [finding.rule + (finding.design ? ` of ${finding.design}` : ""), `${finding.verdict} ${finding.measured ?? ""}`]));
   const before = verdicts(reference.findings), now = verdicts(findings);
-  const other = [...now.keys()].filter((rule) => before.has(rule) && before.get(rule) !== now.get(rule));
+  const other = [...now.keys()].filter((name) => before.has(name) && before.get(name).words !== now.get(name).words);
   if (other.length) head("Rules");
-  for (const rule of other) row(rule, before.get(rule), now.get(rule));
+  for (const name of other) row(now.get(name).label, before.get(name).words, now.get(name).words);
   const figures = new Map((reference.prediction?.figures ?? []).map((figure) => [named(figure), figure]));
   const moved = (prediction?.figures ?? []).filter((figure) => { const was = figures.get(named(figure)); return figure.design_with && was && significant(was.value) !== significant(figure.value); });
   if (moved.length) head("Prediction");
   for (const figure of moved) row(`${studio.family === "assembly" ? `${figure.group}: ` : ""}${figure.name}, ${figure.unit}`, significant(figures.get(named(figure)).value), significant(figure.value));
   return el("table", { class: "figures" }, el("tbody", {}, ...rows));
+}
+// What each rule measured; one that measures several things, in their order.
+function verdicts(findings) {
+  const found = new Map();
+  for (const { rule, design, verdict, measured, limit, unit } of findings) {
+    const label = `${rule}${design ? ` of ${design}` : ""}${limit === null ? "" : `, limit ${plain(limit)} ${unit}`}`;
+    let name = label;
+    for (let i = 2; found.has(name); i++) name = `${label} ${i}`;
+    found.set(name, { label, words: `${verdict} ${measured === null ? "" : plain(measured)}` });
+  }
+  return found;
 }

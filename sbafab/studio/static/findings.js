@@ -21,7 +21,7 @@ export class Findings {
     studio.on("rule", () => { this.soon ??= setTimeout(() => this.draw(), READABLE); });
     studio.on("checked opened", () => this.draw());
     studio.on("figures reference", () => this.drawFigures());
-    studio.on("design", () => { this.asked.hidden = studio.family !== "assembly"; });
+    studio.on("design", () => { this.asked.hidden = studio.family !== "assembly" || withoutServer; });
     studio.on("failed", (answer) => { if (!answer.field) this.draw(); });
   }
   // What an assembly is asked for: one pressure in all its actuators, and a mass at the tips.
