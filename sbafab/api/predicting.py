@@ -77,12 +77,17 @@ def grip(assembled: Assembled, part: str) -> tuple[Grip, Surface] | None:
     """How a radial part of an assembly holds, and its inflated balloons; None for other parts.
 
     The surface is in mm in the part's own frame, as high as the lumen leaves room, free without
-    one: lenses of two arcs of film that does not stretch (as for the paper's Sec. 5).
+    one: lenses of two arcs of film that does not stretch (as for the paper's Sec. 5). Raises
+    DesignError where the assembly has no such part.
     """
     from sbafab.assemblies.build import PlacedSba
+    from sbafab.errors import DesignError
     from sbafab.reports.assembly_prediction import grip as grip_of
     from sbafab.reports.gripping import gripping
 
+    names = [placed.name for placed in assembled.parts]
+    if part not in names:
+        raise DesignError(f"no part is named {part!r}; there are {', '.join(names)}")
     placed = assembled[part]
     found = grip_of(assembled, placed) if isinstance(placed, PlacedSba) else None
     if found is None or not isinstance(placed, PlacedSba):

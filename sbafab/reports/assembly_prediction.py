@@ -38,7 +38,7 @@ PAPERS = ("aperture", "brace", "standing")
 
 
 class AssemblyFigure(NamedTuple):
-    """One figure of a part: its value, the model it is of, and what the paper says, if it does."""
+    """One figure of a part: value in ``unit``, model, and what the paper says, if it does."""
 
     part: str
     name: str
@@ -89,10 +89,10 @@ class AssemblyPrediction(NamedTuple):
 
 
 class Grip(NamedTuple):
-    """A radial actuator inflated: diameters round its tube in mm, ``deflated`` and ``free``.
+    """A radial actuator inflated: diameters ``deflated`` and ``free``, out of any lumen, in mm.
 
-    In the assembly's lumen a balloon is ``room`` mm high and each stack pushes on the wall with
-    ``push`` N a kPa; both are None without a lumen that it reaches.
+    In the assembly's lumen a balloon is ``room`` mm high; each stack pushes on the wall with
+    ``push`` N a kPa. Both are None without a lumen that it reaches.
     """
 
     part: str

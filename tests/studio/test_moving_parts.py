@@ -43,6 +43,8 @@ def test_a_grip_in_its_lumen_touches_the_wall_and_free_is_as_wide_as_the_paper_s
     across = np.hypot(free[1].points[:, 0], free[1].points[:, 1])
     assert 2 * across.max() == pytest.approx(held.free, abs=1e-6)
     assert api.grip(brace, "arm") is None
+    with pytest.raises(DesignError, match="there are tube, grip, arm"):
+        api.grip(brace, "hand")
 
 
 def test_a_prediction_of_the_whole_ends_where_nobody_waits_for_it(tmp_path: Path) -> None:
