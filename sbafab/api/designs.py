@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
     from sbafab.laminate.laminate import Laminate, Layer
     from sbafab.meshing.surface import Surface
+    from sbafab.progress import Progress
     from sbafab.reports.features import Dimension
     from sbafab.rules.finding import Findings
 
@@ -91,11 +92,17 @@ def assemble(source: str | Path | Assembly, *changes: Change, **tables: Any) -> 
     return put_together(load_assembly(source, [*changes, tables]))
 
 
-def check(source: Source | Assembly, *changes: Change, **tables: Any) -> Findings:
+def check(
+    source: Source | Assembly,
+    *changes: Change,
+    progress: Progress | None = None,
+    **tables: Any,
+) -> Findings:
     """What the rule deck finds in a design; of an assembly, also what is found between parts.
 
-    Each finding has its limit and worst measured value in its own ``unit``. Raises DesignError for
-    what cannot be built. Limits are the paper's (Sec. 2) where it gives one, else ours.
+    Each finding has its limit and worst measured value in its own ``unit``. ``progress`` is told
+    each rule; what it raises ends the check. Raises DesignError for what cannot be built. Limits
+    are the paper's (Sec. 2) where it gives one, else ours.
     """
     from sbafab.assemblies.records import Assembly
     from sbafab.output.assembly import check_assembly
@@ -104,8 +111,8 @@ def check(source: Source | Assembly, *changes: Change, **tables: Any) -> Finding
 
     found = either_of(source, changes, tables)
     if isinstance(found, Assembly):
-        return Findings(check_assembly(found).findings)
-    return Findings(run_check(found)[1])
+        return Findings(check_assembly(found, progress).findings)
+    return Findings(run_check(found, progress)[1])
 
 
 def checking(

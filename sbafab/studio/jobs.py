@@ -87,7 +87,8 @@ def _assembly(known: _Known, job: StudioJob, beat: Beat) -> Iterator[Answer]:
     # What the whole does takes seconds, and is asked for when the hand rests.
     yield {"kind": "prediction", "quick": True, "figures": [], "left_out": []}
     designs = {made.design.name for made in assembled.designs}
-    findings = [finding_model(finding) for finding in api.check(assembly)]
+    checked = api.check(assembly, progress=lambda *_: beat())
+    findings = [finding_model(finding) for finding in checked]
     for finding in findings:
         of, _, rest = finding["message"].partition(": ")
         if of in designs:
