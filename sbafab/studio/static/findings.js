@@ -71,10 +71,11 @@ export class Findings {
       const groups = [...new Set(figures.map(({ group }) => group))];
       return el("table", { class: "figures" }, el("tbody", {}, ...groups.flatMap((group) => [el("tr", {}, el("th", { colspan: 4, scope: "rowgroup" }, group)), ...figures.filter((figure) => figure.group === group).map(row)])));
     };
-    const { figures, left_out: left, quick, met = [], meets, refused } = prediction, whole = studio.family === "assembly", others = figures.filter((figure) => !figure.design_with);
+    const { figures, left_out: left, quick, met = [], meets, refused, before: old } = prediction, whole = studio.family === "assembly", others = figures.filter((figure) => !figure.design_with);
     this.figures.replaceChildren(table(figures.filter((figure) => figure.design_with)),
+      old?.figures.length ? el("div", { class: "of-before", role: "group", "aria-label": "Figures of the state before" }, table(old.figures)) : "",
       ...met.map((words) => el("p", { class: `met${meets ? " beyond" : ""}` }, words)),
-      refused ? el("p", { class: "met beyond" }, refused) : quick ? el("p", { class: "more" }, later(whole)) : "",
+      refused ? el("p", { class: "met beyond" }, refused) : quick ? el("p", { class: "more" }, `${old?.figures.length ? "Figures of the state before. " : ""}${later(whole)}`) : "",
       this.fold("others", `Other models of the same (${others.length})`, others.length, () => table(others)),
       this.fold("left", `Left out (${left.length})`, left.length, () => el("dl", { class: "left-out" }, ...left.flatMap(({ name, reason }) => [el("dt", {}, name), el("dd", {}, reason)]))));
   }

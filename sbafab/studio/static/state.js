@@ -53,7 +53,7 @@ export class Studio {
 
   // What is opened: a text with the file it came from (or none) and what lies on disk.
   open(text, { name = null, seen = null, saved = text, back = null } = {}) {
-    Object.assign(this, { text, name, seen, savedText: saved, back, picked: null, pickedParts: [], cut: null });
+    Object.assign(this, { text, name, seen, savedText: saved, back, prediction: null, picked: null, pickedParts: [], cut: null });
     this.keepBack();
     this.pending.clear();
     this.history = [text];
@@ -189,7 +189,9 @@ export class Studio {
       parts: () => this.heardParts(answer, flight),
       laminate: () => this.heardLaminate(answer, flight),
       prediction: () => {
-        this.prediction = answer;
+        // What an assembly does takes seconds; until then the figures before are shown as such.
+        const old = this.prediction;
+        this.prediction = answer.figures.length ? answer : { ...answer, before: old?.before ?? old };
         this.heardFigures(null);
         this.time("figures", flight);
         this.askElastic();
