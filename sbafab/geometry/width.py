@@ -9,14 +9,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
+from sbafab.geometry.corners import Corner, corners_of
 from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, left_normal
-from sbafab.geometry.ends import ROUNDED, SMOOTH, tapered_ends
+from sbafab.geometry.ends import ROUNDED, tapered_ends
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.remembered import remembered
+
+if TYPE_CHECKING:
+    from sbafab.geometry.side_table import SideTable
 
 ALONGSIDE = 1e-3
 """Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
@@ -30,6 +35,8 @@ ASIDE = math.acos(0.9)
 """Radians (25 degrees) that the normals of samples which still face each other may turn aside."""
 SQUARE = 0.05
 """The same for edges square on each other: room for rounding, and for those alongside."""
+MANY_SIDES = 100
+"""From which on looking at all pairs in arrays is worth it."""
 
 
 class Width(NamedTuple):
@@ -65,7 +72,7 @@ class _Foot(NamedTuple):
     normal: Point
 
 
-class _Side(NamedTuple):
+class BoundarySide(NamedTuple):
     """An edge with what the search asks of it again and again.
 
     ``half`` is how far its ends lie from its middle, ``lean`` the sine of its half turn.
@@ -79,7 +86,7 @@ class _Side(NamedTuple):
     half: float
     lean: float
 
-    def may_hold_feet(self, other: _Side, within: float) -> bool:
+    def may_hold_feet(self, other: BoundarySide, within: float) -> bool:
         """Whether a normal of this edge may meet the other no farther off than ``within``."""
         (x, y), (nx, ny) = self.middle, self.normal
         aside = abs((other.middle[0] - x) * ny - (other.middle[1] - y) * nx)
@@ -113,49 +120,31 @@ class _Side(NamedTuple):
         return found
 
 
-class _Corner(NamedTuple):
-    """A vertex with the directions of travel into and out of it; ``turn`` > 0 is convex."""
-
-    point: Point
-    arriving: Point
-    leaving: Point
-    turn: float
-
-    @property
-    def box(self) -> Bounds:
-        return (*self.point, *self.point)
-
-    @property
-    def normal(self) -> Point:
-        """The unit vector halfway between the normals of the two edges."""
-        (ux, uy), half = self.arriving, self.turn / 2
-        return -ux * math.sin(half) - uy * math.cos(half), ux * math.cos(half) - uy * math.sin(half)
-
-    @property
-    def half_turn(self) -> float:
-        return abs(self.turn) / 2
-
-    def squarely(self, d: Point) -> bool:
-        """Whether a reflex corner lies nearest, among its neighbours, to what ``d`` points at."""
-        room = 1e-9 * math.hypot(*d)
-        return _dot(d, self.arriving) >= -room and _dot(d, self.leaving) <= room
-
-    def normals(self) -> tuple[Point, Point]:
-        return _left(self.arriving), _left(self.leaving)
-
-
 class Boundary:
     """Contours with the material on their left, made ready for the search."""
 
     def __init__(self, contours: Sequence[Contour], sharp: float) -> None:
-        self.sides = [_side(edge) for contour in contours for edge in contour.edges]
-        self.index = EdgeIndex([side.edge for side in self.sides])
-        self.corners = [corner for contour in contours for corner in _corners(contour)]
+        self.sides = [
+            _side(edge, box)
+            for contour in contours
+            for edge, box in zip(contour.edges, contour.boxes, strict=True)
+        ]
+        self.corners = [corner for contour in contours for corner in corners_of(contour)]
         """What corner each side starts at, if any."""
         self.ends = [ends for contour in contours for ends in tapered_ends(contour, sharp)]
         self.pinch = _pinch(contours, self.corners, sharp)
+        self.index = EdgeIndex(
+            [side.edge for side in self.sides], [side.box for side in self.sides]
+        )
         self.known_clear: dict[tuple[Point, Point], bool] = {}
         """Of segments that were asked: whether no edge crosses them."""
+
+    @cached_property
+    def table(self) -> SideTable:
+        """The sides in arrays."""
+        from sbafab.geometry.side_table import SideTable
+
+        return SideTable(self.sides)
 
 
 def _made_ready(region: Region, sharp: float) -> Boundary:
@@ -186,17 +175,21 @@ class _Narrowest:
             self.offer((px, py), (qx, qy))
 
     def near(
-        self, a: _Side | _Corner, aside: float, after: int = -1
-    ) -> Iterator[tuple[int, _Side]]:
+        self,
+        a: BoundarySide | Corner,
+        aside: float,
+        after: int = -1,
+        among: Sequence[int] | None = None,
+    ) -> Iterator[tuple[int, BoundarySide]]:
         """Numbered sides that a segment shorter than the best could join to ``a``.
 
         Their normals are opposed somewhere, to within ``aside`` radians, and their numbers come
-        ``after`` this one.
+        ``after`` this one. ``among``: no others come into question.
         """
         (nx, ny), turn = a.normal, a.half_turn + aside
         sides = self.boundary.sides
         straight = -math.cos(turn)
-        for number in self.boundary.index.numbers(widened(a.box, self.value)):
+        for number in self.boundary.index.numbers(widened(a.box, self.value), among):
             if number <= after:
                 continue
             side = sides[number]
@@ -251,8 +244,13 @@ def least_of(boundary: Boundary, below: float) -> Width | None:
 def search(narrowest: _Narrowest) -> None:
     """Offers every place where edges or corners face each other."""
     boundary = narrowest.boundary
-    for i, a in enumerate(boundary.sides):
-        for _, b in narrowest.near(a, SQUARE, after=i):
+    later: Sequence[Sequence[int] | None] = [None] * len(boundary.sides)
+    if len(boundary.sides) >= MANY_SIDES:
+        later = boundary.table.later(SQUARE, narrowest.value)
+    for i, (a, among) in enumerate(zip(boundary.sides, later, strict=True)):
+        if among == []:
+            continue
+        for _, b in narrowest.near(a, SQUARE, i, among):
             if a.may_hold_feet(b, narrowest.value) or b.may_hold_feet(a, narrowest.value):
                 _between_edges(a, b, narrowest)
     _at_corners(boundary.corners, narrowest)
@@ -260,34 +258,20 @@ def search(narrowest: _Narrowest) -> None:
         narrowest.offer(p, q)
 
 
-def _side(edge: Edge) -> _Side:
-    middle = edge.at(0.5)
-    half_turn = abs(edge.sweep) / 2 if isinstance(edge, Arc) else 0.0
+def _side(edge: Edge, box: Bounds) -> BoundarySide:
+    if isinstance(edge, Arc):
+        # As ``at`` says, which would work out the sweep once more.
+        sweep = edge.sweep
+        middle, half_turn = edge.on_circle(edge.start_angle + 0.5 * sweep), abs(sweep) / 2
+    else:
+        middle, half_turn = edge.at(0.5), 0.0
     half = max(math.dist(middle, edge.start), math.dist(middle, edge.end))
     lean = math.sin(min(half_turn, math.pi / 2))
-    return _Side(edge, edge.bounds, middle, left_normal(edge, middle), half_turn, half, lean)
-
-
-def _corners(contour: Contour) -> Iterator[_Corner | None]:
-    """The corner that each edge starts at; None where the path is smooth."""
-    edges = contour.edges
-    for before, after in zip((edges[-1], *edges), edges, strict=False):
-        u, v = before.direction(after.start), after.direction(after.start)
-        turn = math.atan2(u[0] * v[1] - u[1] * v[0], _dot(u, v))
-        if abs(turn) > math.pi - SMOOTH:
-            # At a cusp only the curvatures tell which side the material is on.
-            turn = math.pi if _curvature(before) + _curvature(after) < 0 else -math.pi
-        yield _Corner(after.start, u, v, turn) if abs(turn) > SMOOTH else None
-
-
-def _curvature(edge: Edge) -> float:
-    if isinstance(edge, Line):
-        return 0.0
-    return (1.0 if edge.ccw else -1.0) / edge.radius
+    return BoundarySide(edge, box, middle, left_normal(edge, middle), half_turn, half, lean)
 
 
 def _pinch(
-    contours: Iterable[Contour], corners: Iterable[_Corner | None], sharp: float
+    contours: Iterable[Contour], corners: Iterable[Corner | None], sharp: float
 ) -> Point | None:
     """A corner sharper than allowed, or a point where the boundary meets itself."""
     for corner in corners:
@@ -302,7 +286,7 @@ def _pinch(
     return None
 
 
-def _between_edges(a: _Side, b: _Side, narrowest: _Narrowest) -> None:
+def _between_edges(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> None:
     if isinstance(a.edge, Arc):
         if _alongside(a.edge, b.edge) and _may_face(a.edge, b.edge, narrowest.value):
             _along_each_other(a, b, narrowest)
@@ -349,7 +333,7 @@ def _may_face(a: Arc, b: Edge, within: float) -> bool:
     return False
 
 
-def _along_each_other(a: _Side, b: _Side, narrowest: _Narrowest) -> None:
+def _along_each_other(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> None:
     for one, other in ((a, b), (b, a)):
         for p in (one.middle, one.edge.start, one.edge.end):
             here = _Foot(p, left_normal(one.edge, p))
@@ -357,7 +341,7 @@ def _along_each_other(a: _Side, b: _Side, narrowest: _Narrowest) -> None:
                 narrowest.offer_facing(here, foot)
 
 
-def _at_corners(corners: Sequence[_Corner | None], narrowest: _Narrowest) -> None:
+def _at_corners(corners: Sequence[Corner | None], narrowest: _Narrowest) -> None:
     for i, corner in enumerate(corners):
         if corner is None:
             continue
@@ -371,13 +355,13 @@ def _at_corners(corners: Sequence[_Corner | None], narrowest: _Narrowest) -> Non
                 _between_corners(corner, other, narrowest)
 
 
-def _between_corners(a: _Corner, b: _Corner, narrowest: _Narrowest) -> None:
+def _between_corners(a: Corner, b: Corner, narrowest: _Narrowest) -> None:
     d = (b.point[0] - a.point[0], b.point[1] - a.point[1])
     if a.squarely(d) and b.squarely((-d[0], -d[1])):
         narrowest.offer(a.point, b.point)
 
 
-def _corner_to_edge(corner: _Corner, side: _Side, foot: _Foot, narrowest: _Narrowest) -> None:
+def _corner_to_edge(corner: Corner, side: BoundarySide, foot: _Foot, narrowest: _Narrowest) -> None:
     d = (foot.point[0] - corner.point[0], foot.point[1] - corner.point[1])
     if _dot(d, foot.normal) > -TOUCH:
         return
@@ -394,7 +378,3 @@ def _corner_to_edge(corner: _Corner, side: _Side, foot: _Foot, narrowest: _Narro
 
 def _dot(a: Point, b: Point) -> float:
     return a[0] * b[0] + a[1] * b[1]
-
-
-def _left(u: Point) -> Point:
-    return -u[1], u[0]

@@ -233,6 +233,6 @@ def test_arcs_of_nearly_one_centre_that_are_left_out_face_each_other_nowhere(see
             continue
         left_out += 1
         gathered = Gathered(Boundary([], 30.0), within)
-        _along_each_other(_side(a), _side(b), gathered)
+        _along_each_other(_side(a, a.bounds), _side(b, b.bounds), gathered)
         assert gathered.offered == []
     assert 50 < left_out < 250
