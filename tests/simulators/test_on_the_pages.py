@@ -22,7 +22,7 @@ def test_calculix_finds_the_pages_strokes_of_one_balloon() -> None:
     table = record("calculix").tables["one"]
     for kpa in ("0.95", "6"):
         section = float(table.cell(kpa, "section through the axis, CAX8R"))
-        assert calculix_runs.section_at(float(kpa)) == pytest.approx(section, abs=0.001)
+        assert calculix_runs.section_at(float(kpa)) == pytest.approx(section, abs=0.002)
         quarter = float(table.cell(kpa, "quarter, default"))
         assert calculix_runs.stroke_at(states, float(kpa)) == pytest.approx(quarter, rel=0.01)
 
