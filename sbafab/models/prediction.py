@@ -17,7 +17,8 @@ from sbafab.laminate.extent import film_mass
 from sbafab.laminate.laminate import Laminate
 from sbafab.models import axial, elastic, lobes, paper, stacked
 from sbafab.models.actuator import NO_OUTLINE, Actuator, actuator
-from sbafab.models.choice import chosen
+from sbafab.models.choice import STACK, chosen
+from sbafab.models.drawn import flat_forces
 from sbafab.models.figures import (
     Asked,
     Figure,
@@ -49,7 +50,7 @@ def predict(
     laminate: Laminate | None = None,
     quick: bool = False,
 ) -> Prediction:
-    """Figures and curves of a design of any family; ``quick`` leaves out the elastic stack's.
+    """Figures and curves of a design of any family; ``quick`` gives no curves and no elastic stack.
 
     Raises DesignError where the design cannot be built, or for pressures, a flow or volumes that
     are out of range.
@@ -68,10 +69,12 @@ def predict(
     elif together is not None:
         found += stacked.figures(one, wish, together)
     found.sort(key=_place)
+    known = together if isinstance(together, Stack) else None
+    to_come = (STACK,) if quick and one.radii else ()
     return Prediction(
         wish,
-        chosen(item for item in found if isinstance(item, Figure)),
-        tuple(_relations(one, wish, together if isinstance(together, Stack) else None)),
+        chosen((item for item in found if isinstance(item, Figure)), to_come),
+        () if quick else tuple(_relations(one, wish, known)),
         tuple(item for item in found if isinstance(item, LeftOut)),
     )
 
@@ -84,7 +87,10 @@ def _all(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
     yield Figure("size", "mass", mass.value, mass.unit, mass.model)
     yield from _tubes(one)
     if not one.kinematics:
-        for what in ("stroke", "force", "actuation", "bending", "folded diameter"):
+        pushed = list(flat_forces(one, asked))
+        yield from pushed
+        force = "force once the plates part" if pushed else "force"
+        for what in ("stroke", force, "actuation", "bending", "folded diameter"):
             yield LeftOut(what, NO_OUTLINE)
         return
     yield from axial.strokes(one, asked)

@@ -7,7 +7,7 @@ assumed: every cutting error and turn uniform within its most, every shift unifo
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -98,10 +98,12 @@ def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) 
         f"(95 % interval {low:.2%} to {high:.2%}){_by_interface(found)}; errors are assumed spread "
         f"evenly, up to {_by_hand(laminate, limits)}"
     )
+    if target is None:
+        message += "; no least share is asked for (rules.target_yield)"
+    else:
+        message += f"; the lower end of the interval must be {100 * target:.10g}% at least"
     if verdict == "fail":
-        message += (
-            f"; the interval must lie above {target:.10g}: `sbafab check --target-yield` advises"
-        )
+        message += ": `sbafab check --target-yield` advises"
     remedy = _remedy(laminate) if verdict == "warn" else ""
     if remedy:
         message = f"{remedy}: {message}"
@@ -154,7 +156,7 @@ def simulate(
             for interface in alike.interfaces
         }
         groups.append(_Group(rows, own))
-    return _counted(groups, limits, seed)
+    return _counted(groups, limits, seed, measures.pause)
 
 
 def _rows(
@@ -179,7 +181,9 @@ def _in_order(rows: Mapping[Quantity, Iterable[MarginRows]]) -> list[Error]:
     )
 
 
-def _counted(groups: Sequence[_Group], limits: Limits, seed: int) -> Yield:
+def _counted(
+    groups: Sequence[_Group], limits: Limits, seed: int, pause: Callable[[], None]
+) -> Yield:
     """Draws the builds, in batches, and counts those in which all rows keep room."""
     import numpy as np
 
@@ -192,6 +196,7 @@ def _counted(groups: Sequence[_Group], limits: Limits, seed: int) -> Yield:
     )
     places = [(group, group.places(rows)) for group in groups]
     for first in range(0, wanted, BATCH):
+        pause()
         builds = min(BATCH, wanted - first)
         drawn = numbers(seed, first * count, count, builds)
         bad_of = {quantity: np.zeros(builds, dtype=bool) for quantity in QUANTITIES}
