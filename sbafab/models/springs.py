@@ -26,7 +26,7 @@ SHUT = 2e4
 """mN/mm with which a flat balloon resists being flattened further: no film gives way visibly."""
 
 
-class Places(NamedTuple):
+class GapPlaces(NamedTuple):
     """Where levels are looked at, whatever the pressures.
 
     ``begins`` (rows, chambers x points) is where the potential of each point begins in the table of
@@ -43,7 +43,7 @@ class Places(NamedTuple):
     stiff: Array
 
     @classmethod
-    def of(cls, maps: Sequence[BalloonMap], gaps: Array, rims: Array) -> Places:
+    def of(cls, maps: Sequence[BalloonMap], gaps: Array, rims: Array) -> GapPlaces:
         """A row a kind of balloon, with gaps at its ring and round its rim, in mm."""
         count = gaps.shape[1]
         begins = np.arange(len(maps) * count // RING).reshape(len(maps), -1) * PIECES_IN_ALL
@@ -59,12 +59,12 @@ class Places(NamedTuple):
             stiff,
         )
 
-    def at(self, levels: NDArray[np.int_]) -> Places:
+    def at(self, levels: NDArray[np.int_]) -> GapPlaces:
         """A row for each of these; one row for all where they are alike."""
         if len(self.begins) == 1:
             return self
         begins, ring, squares, meet, stiff = self
-        return Places(begins[levels], ring[levels], squares[levels], meet[levels], stiff[levels])
+        return GapPlaces(begins[levels], ring[levels], squares[levels], meet[levels], stiff[levels])
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,10 +75,10 @@ class Springs:
     """
 
     table: Array
-    places: Places
+    places: GapPlaces
 
     @classmethod
-    def pressed(cls, maps: Sequence[BalloonMap], pressures: Array, places: Places) -> Springs:
+    def pressed(cls, maps: Sequence[BalloonMap], pressures: Array, places: GapPlaces) -> Springs:
         """Those of kinds of balloons at pressures, one a chamber."""
         found = np.stack([one.pressed(pressures) for one in maps])
         # Each point has its share of its balloon.

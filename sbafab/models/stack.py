@@ -25,7 +25,7 @@ from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import BalloonMap, balloon_map
 from sbafab.models.chain import Chain, chain
 from sbafab.models.loads import Load
-from sbafab.models.springs import RING, Places, Springs
+from sbafab.models.springs import RING, GapPlaces, Springs
 from sbafab.models.stack_balance import free, held
 
 if TYPE_CHECKING:
@@ -191,12 +191,12 @@ class Stack:
         return np.stack(found)
 
     @cached_property
-    def _places(self) -> Places:
+    def _places(self) -> GapPlaces:
         """Where kinds of balloons are looked at."""
-        return Places.of(self.maps, self._gap_of, self.rims)
+        return GapPlaces.of(self.maps, self._gap_of, self.rims)
 
     @cached_property
-    def _level_places(self) -> Places:
+    def _level_places(self) -> GapPlaces:
         """Where levels are."""
         return self._places.at(self.levels)
 
