@@ -52,9 +52,23 @@ def overlaid(owners: Sequence[Iterable[Edge]], tolerance: float = EPSILON) -> Ov
     What was bent to meet another edge is cut over again, for it may have come to meet a third.
     """
     entries = [(edge, 1 << DIGIT * i) for i, edges in enumerate(owners) for edge in edges]
+    return overlay(entries, tolerance)
+
+
+def overlay(
+    entries: Sequence[tuple[Edge, int]],
+    tolerance: float = EPSILON,
+    chain: Sequence[int] | None = None,
+) -> Overlay:
+    """The same for edges that each count so many turns.
+
+    ``chain`` numbers the closed chain of each edge where it is known to stay clear of itself; of
+    others it is negative.
+    """
     bent = True
     for _ in range(ROUNDS):
-        split, bent = split_edges([edge for edge, _ in entries], tolerance)
+        split, bent = split_edges([edge for edge, _ in entries], tolerance, chain)
+        chain = None
         entries = [
             (part, turns)
             for parts, (_, turns) in zip(split, entries, strict=True)
@@ -79,7 +93,9 @@ class Split(NamedTuple):
     bent: bool
 
 
-def split_edges(edges: Sequence[Edge], tolerance: float = EPSILON) -> Split:
+def split_edges(
+    edges: Sequence[Edge], tolerance: float = EPSILON, chain: Sequence[int] | None = None
+) -> Split:
     """Each edge cut where it meets another; points nearer than 2 ``tolerance`` become one.
 
     The order of the edges has no part in where they are cut. What meets an arc is looked for along
@@ -92,6 +108,8 @@ def split_edges(edges: Sequence[Edge], tolerance: float = EPSILON) -> Split:
     # An arc may leave the box of its ends by as much as these are off its circle.
     near = [widened(box, tolerance + BENT) for box in bounds]
     for i, j in close_pairs(bounds, tolerance):
+        if chain is not None and chain[i] == chain[j] >= 0:
+            continue
         if _only_follows(edges[i], edges[j], near[i], near[j], 2 * tolerance):
             continue
         points = meeting_points(edges[i], edges[j], tolerance, (near[i], near[j]))

@@ -12,10 +12,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
-from sbafab.geometry.boolean import tidy
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import rectangle
+from sbafab.geometry.tidy import tidy
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.rules.boundary import beside, edges_along
