@@ -25,7 +25,7 @@ def back(region: Region) -> Region:
 
 
 def some(draw: random.Random) -> Region:
-    """A shape on a coarse grid, so that twins, shapes in each other and shapes that meet come up."""
+    """A shape on a coarse grid, so that many are twins, lie in each other or meet."""
     centre = (3.0 * draw.randint(0, 2), 3.0 * draw.randint(0, 1))
     size = draw.choice([0.5, 1.0, 1.4, 1.8, 4.0])
     kind = draw.choice(["disc", "disc", "ring", "stadium", "turned"])
