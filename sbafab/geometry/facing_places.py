@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -18,9 +19,9 @@ from sbafab.geometry.edge_table import (
 from sbafab.geometry.edges import Arc, Edge, Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.remembered import remembered
+from sbafab.geometry.sides import BESIDE
 from sbafab.geometry.width import (
     ASIDE,
-    BESIDE,
     STEP,
     TOUCH,
     Boundary,
@@ -68,7 +69,7 @@ def facing_places(
     gathered = Gathered(boundary, least.value + slack)
     search(gathered)
     found = np.array([(*p, *q) for p, q in gathered.offered]).reshape(-1, 4).T
-    sides = _Sides(boundary)
+    sides = _sides_in_arrays(boundary)
     p, q = (
         np.concatenate(both, axis=1)
         for both in zip((found[:2], found[2:]), _from_samples(sides, gathered.value), strict=True)
@@ -101,6 +102,26 @@ def places_along(edge: Edge, shares: list[float]) -> list[Point]:
     return found
 
 
+class _Samples(NamedTuple):
+    """Points spread over sides, side by side, and the normals there; how many a side has, and which
+    is its first.
+    """
+
+    p: Floats
+    normal: Floats
+    counts: Indices
+    first: Indices
+
+
+def _sides_in_arrays(boundary: Boundary) -> _Sides:
+    """They are asked for with several slacks."""
+    known = boundary.__dict__
+    if "in_arrays" not in known:
+        known["in_arrays"] = _Sides(boundary)
+    found: _Sides = known["in_arrays"]
+    return found
+
+
 class _Sides:
     """What the search knows of a boundary's sides, in arrays."""
 
@@ -114,6 +135,16 @@ class _Sides:
         columns = np.array(rows).T
         self.middle, self.normal = columns[0:2], columns[2:4]
         self.half_turn, self.half, self.lean = columns[4:7]
+
+    @cached_property
+    def samples(self) -> _Samples:
+        """Points spread over all of them."""
+        shares = [spread_along(edge) for edge in self.edges]
+        count = np.array([len(own) for own in shares])
+        points = [places_along(edge, own) for edge, own in zip(self.edges, shares, strict=True)]
+        p = np.array([p for own in points for p in own]).T
+        owner = np.repeat(np.arange(len(count)), count)
+        return _Samples(p, self.table.at(owner).normal(p), count, np.cumsum(count) - count)
 
     def pairs(self, aside: float, within: float) -> tuple[Indices, Indices]:
         """Sides and those that their normals may meet no farther off, as ``near`` tells them."""
@@ -135,16 +166,9 @@ class _Sides:
 def _from_samples(sides: _Sides, within: float) -> tuple[Floats, Floats]:
     """Samples of each side and the feet of their normals on the sides they face."""
     a, b = sides.pairs(ASIDE, within)
-    shares = [spread_along(edge) for edge in sides.edges]
-    counts = np.array([len(own) for own in shares])
-    samples = np.array(
-        [p for edge, own in zip(sides.edges, shares, strict=True) for p in places_along(edge, own)]
-    ).T
-    owner = np.repeat(np.arange(len(counts)), counts)
-    normals = sides.table.at(owner).normal(samples)
+    samples, normals, counts, firsts = sides.samples
     # Each pair has a row a sample of its first side.
-    own = counts[a]
-    starts = (np.cumsum(counts) - counts)[a]
+    own, starts = counts[a], firsts[a]
     row = np.arange(own.sum()) - np.repeat(np.cumsum(own) - own, own) + np.repeat(starts, own)
     p, n = samples[:, row], normals[:, row]
     other = np.repeat(b, own)

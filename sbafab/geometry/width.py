@@ -11,17 +11,24 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, left_normal
-from sbafab.geometry.ends import ROUNDED, SMOOTH, tapered_ends
+from sbafab.geometry.edges import Arc, Edge, Line, Point, left_normal
+from sbafab.geometry.ends import ROUNDED, tapered_ends
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.remembered import remembered
+from sbafab.geometry.sides import (
+    Corner,
+    Foot,
+    Side,
+    corners_of,
+    dot,
+    from_outside,
+    sides_of,
+)
 
 ALONGSIDE = 1e-3
 """Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
-BESIDE = 1e-5
-"""mm that an edge may miss another's normals by, for rounding."""
 TOUCH = 1e-6
 """mm within which two points are one."""
 STEP = math.radians(15)
@@ -56,101 +63,19 @@ def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) ->
 @remembered
 def least_gap(region: Region, sharp: float = 90.0, below: float = math.inf) -> Width | None:
     """The narrowest slot, hole or gap between pieces, likewise."""
-    outside = [contour.reversed() for contour in region.contours]
+    outside = [from_outside(contour) for contour in region.contours]
     return least_of(Boundary(outside, sharp), below)
-
-
-class _Foot(NamedTuple):
-    point: Point
-    normal: Point
-
-
-class _Side(NamedTuple):
-    """An edge with what the search asks of it again and again.
-
-    ``half`` is how far its ends lie from its middle, ``lean`` the sine of its half turn.
-    """
-
-    edge: Edge
-    box: Bounds
-    middle: Point
-    normal: Point
-    half_turn: float
-    half: float
-    lean: float
-
-    def may_hold_feet(self, other: _Side, within: float) -> bool:
-        """Whether a normal of this edge may meet the other no farther off than ``within``."""
-        (x, y), (nx, ny) = self.middle, self.normal
-        aside = abs((other.middle[0] - x) * ny - (other.middle[1] - y) * nx)
-        return aside <= self.half + other.half + within * self.lean + BESIDE
-
-    def feet(self, p: Point) -> list[_Foot]:
-        """Points of the edge where its normal passes through ``p``."""
-        edge = self.edge
-        if isinstance(edge, Line):
-            (x0, y0), (x1, y1) = edge
-            dx, dy = x1 - x0, y1 - y0
-            square = dx * dx + dy * dy
-            t = ((p[0] - x0) * dx + (p[1] - y0) * dy) / square
-            if not -1e-9 <= t <= 1 + 1e-9:
-                return []
-            length = math.sqrt(square)
-            return [_Foot((x0 + t * dx, y0 + t * dy), (-dy / length, dx / length))]
-        (cx, cy), r = edge.centre, edge.radius
-        ux, uy = p[0] - cx, p[1] - cy
-        distance = math.hypot(ux, uy)
-        if distance < 1e-12:
-            return [_Foot(self.middle, left_normal(edge, self.middle))]
-        inward = -1.0 if edge.ccw else 1.0
-        mx, my = self.middle[0] - cx, self.middle[1] - cy
-        least = r * (math.cos(self.half_turn) - 1e-9)
-        found = []
-        for sign in (1.0, -1.0):
-            vx, vy = sign * ux / distance, sign * uy / distance
-            if vx * mx + vy * my >= least:
-                found.append(_Foot((cx + r * vx, cy + r * vy), (inward * vx, inward * vy)))
-        return found
-
-
-class _Corner(NamedTuple):
-    """A vertex with the directions of travel into and out of it; ``turn`` > 0 is convex."""
-
-    point: Point
-    arriving: Point
-    leaving: Point
-    turn: float
-
-    @property
-    def box(self) -> Bounds:
-        return (*self.point, *self.point)
-
-    @property
-    def normal(self) -> Point:
-        """The unit vector halfway between the normals of the two edges."""
-        (ux, uy), half = self.arriving, self.turn / 2
-        return -ux * math.sin(half) - uy * math.cos(half), ux * math.cos(half) - uy * math.sin(half)
-
-    @property
-    def half_turn(self) -> float:
-        return abs(self.turn) / 2
-
-    def squarely(self, d: Point) -> bool:
-        """Whether a reflex corner lies nearest, among its neighbours, to what ``d`` points at."""
-        room = 1e-9 * math.hypot(*d)
-        return _dot(d, self.arriving) >= -room and _dot(d, self.leaving) <= room
-
-    def normals(self) -> tuple[Point, Point]:
-        return _left(self.arriving), _left(self.leaving)
 
 
 class Boundary:
     """Contours with the material on their left, made ready for the search."""
 
     def __init__(self, contours: Sequence[Contour], sharp: float) -> None:
-        self.sides = [_side(edge) for contour in contours for edge in contour.edges]
-        self.index = EdgeIndex([side.edge for side in self.sides])
-        self.corners = [corner for contour in contours for corner in _corners(contour)]
+        self.sides = [side for contour in contours for side in sides_of(contour)]
+        self.index = EdgeIndex(
+            [side.edge for side in self.sides], [side.box for side in self.sides]
+        )
+        self.corners = [corner for contour in contours for corner in corners_of(contour)]
         """What corner each side starts at, if any."""
         self.ends = [ends for contour in contours for ends in tapered_ends(contour, sharp)]
         self.pinch = _pinch(contours, self.corners, sharp)
@@ -178,16 +103,14 @@ class _Narrowest:
         if value < self.value - 1e-9 and self.is_clear(p, q):
             self.value, self.best = value, Width(value, p, q)
 
-    def offer_facing(self, a: _Foot, b: _Foot) -> None:
+    def offer_facing(self, a: Foot, b: Foot) -> None:
         (px, py), (nx, ny) = a
         (qx, qy), (mx, my) = b
         dx, dy = qx - px, qy - py
         if dx * nx + dy * ny > TOUCH and dx * mx + dy * my < -TOUCH:
             self.offer((px, py), (qx, qy))
 
-    def near(
-        self, a: _Side | _Corner, aside: float, after: int = -1
-    ) -> Iterator[tuple[int, _Side]]:
+    def near(self, a: Side | Corner, aside: float, after: int = -1) -> Iterator[tuple[int, Side]]:
         """Numbered sides that a segment shorter than the best could join to ``a``.
 
         Their normals are opposed somewhere, to within ``aside`` radians, and their numbers come
@@ -260,34 +183,8 @@ def search(narrowest: _Narrowest) -> None:
         narrowest.offer(p, q)
 
 
-def _side(edge: Edge) -> _Side:
-    middle = edge.at(0.5)
-    half_turn = abs(edge.sweep) / 2 if isinstance(edge, Arc) else 0.0
-    half = max(math.dist(middle, edge.start), math.dist(middle, edge.end))
-    lean = math.sin(min(half_turn, math.pi / 2))
-    return _Side(edge, edge.bounds, middle, left_normal(edge, middle), half_turn, half, lean)
-
-
-def _corners(contour: Contour) -> Iterator[_Corner | None]:
-    """The corner that each edge starts at; None where the path is smooth."""
-    edges = contour.edges
-    for before, after in zip((edges[-1], *edges), edges, strict=False):
-        u, v = before.direction(after.start), after.direction(after.start)
-        turn = math.atan2(u[0] * v[1] - u[1] * v[0], _dot(u, v))
-        if abs(turn) > math.pi - SMOOTH:
-            # At a cusp only the curvatures tell which side the material is on.
-            turn = math.pi if _curvature(before) + _curvature(after) < 0 else -math.pi
-        yield _Corner(after.start, u, v, turn) if abs(turn) > SMOOTH else None
-
-
-def _curvature(edge: Edge) -> float:
-    if isinstance(edge, Line):
-        return 0.0
-    return (1.0 if edge.ccw else -1.0) / edge.radius
-
-
 def _pinch(
-    contours: Iterable[Contour], corners: Iterable[_Corner | None], sharp: float
+    contours: Iterable[Contour], corners: Iterable[Corner | None], sharp: float
 ) -> Point | None:
     """A corner sharper than allowed, or a point where the boundary meets itself."""
     for corner in corners:
@@ -302,7 +199,7 @@ def _pinch(
     return None
 
 
-def _between_edges(a: _Side, b: _Side, narrowest: _Narrowest) -> None:
+def _between_edges(a: Side, b: Side, narrowest: _Narrowest) -> None:
     if isinstance(a.edge, Arc):
         if _alongside(a.edge, b.edge) and _may_face(a.edge, b.edge, narrowest.value):
             _along_each_other(a, b, narrowest)
@@ -329,7 +226,7 @@ def _alongside(a: Edge, b: Edge) -> bool:
         return math.dist(a.centre, b.centre) < ALONGSIDE
     if isinstance(a, Line) and isinstance(b, Line):
         u, v = a.direction(a.start), b.direction(b.start)
-        return _dot(u, v) < 0 and abs(u[0] * v[1] - u[1] * v[0]) < ALONGSIDE
+        return dot(u, v) < 0 and abs(u[0] * v[1] - u[1] * v[0]) < ALONGSIDE
     return False
 
 
@@ -349,15 +246,15 @@ def _may_face(a: Arc, b: Edge, within: float) -> bool:
     return False
 
 
-def _along_each_other(a: _Side, b: _Side, narrowest: _Narrowest) -> None:
+def _along_each_other(a: Side, b: Side, narrowest: _Narrowest) -> None:
     for one, other in ((a, b), (b, a)):
         for p in (one.middle, one.edge.start, one.edge.end):
-            here = _Foot(p, left_normal(one.edge, p))
+            here = Foot(p, left_normal(one.edge, p))
             for foot in other.feet(p):
                 narrowest.offer_facing(here, foot)
 
 
-def _at_corners(corners: Sequence[_Corner | None], narrowest: _Narrowest) -> None:
+def _at_corners(corners: Sequence[Corner | None], narrowest: _Narrowest) -> None:
     for i, corner in enumerate(corners):
         if corner is None:
             continue
@@ -371,15 +268,15 @@ def _at_corners(corners: Sequence[_Corner | None], narrowest: _Narrowest) -> Non
                 _between_corners(corner, other, narrowest)
 
 
-def _between_corners(a: _Corner, b: _Corner, narrowest: _Narrowest) -> None:
+def _between_corners(a: Corner, b: Corner, narrowest: _Narrowest) -> None:
     d = (b.point[0] - a.point[0], b.point[1] - a.point[1])
     if a.squarely(d) and b.squarely((-d[0], -d[1])):
         narrowest.offer(a.point, b.point)
 
 
-def _corner_to_edge(corner: _Corner, side: _Side, foot: _Foot, narrowest: _Narrowest) -> None:
+def _corner_to_edge(corner: Corner, side: Side, foot: Foot, narrowest: _Narrowest) -> None:
     d = (foot.point[0] - corner.point[0], foot.point[1] - corner.point[1])
-    if _dot(d, foot.normal) > -TOUCH:
+    if dot(d, foot.normal) > -TOUCH:
         return
     if corner.turn < 0:
         if corner.squarely(d):
@@ -387,14 +284,6 @@ def _corner_to_edge(corner: _Corner, side: _Side, foot: _Foot, narrowest: _Narro
         return
     ends = math.dist(foot.point, side.edge.start), math.dist(foot.point, side.edge.end)
     if min(ends) > 10 * TOUCH and any(
-        _dot(normal, foot.normal) < 0 < _dot(normal, d) for normal in corner.normals()
+        dot(normal, foot.normal) < 0 < dot(normal, d) for normal in corner.normals()
     ):
         narrowest.offer(corner.point, foot.point)
-
-
-def _dot(a: Point, b: Point) -> float:
-    return a[0] * b[0] + a[1] * b[1]
-
-
-def _left(u: Point) -> Point:
-    return -u[1], u[0]
