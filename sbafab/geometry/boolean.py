@@ -8,6 +8,7 @@ it only; the pieces that stay are chained into contours. Those that meet no othe
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 from typing import TypeVar
 
 from sbafab.errors import SbafabError
@@ -24,7 +25,7 @@ from sbafab.geometry.arrangement import Arrangement, InconsistentError
 from sbafab.geometry.edges import EPSILON, Edge, Point
 from sbafab.geometry.pieces import DIGIT, by_owner, overlaid, overlay
 from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.remembered import remembered
+from sbafab.geometry.remembered import MOST, remembered
 from sbafab.geometry.tidy import tidy
 
 Found = TypeVar("Found")
@@ -89,17 +90,23 @@ def divided(region: Region, by: Region) -> tuple[Region, Region]:
 
 @remembered
 def _divided(region: Region, by: Region) -> tuple[Region, Region]:
-    def is_outside(turns: int) -> bool:
-        own, other = by_owner(turns, 2)
-        return own > 0 >= other
-
-    def is_inside(turns: int) -> bool:
-        own, other = by_owner(turns, 2)
-        return own > 0 and other > 0
-
     own, other = ((c, 1) for c in region.contours), ((c, 1 << DIGIT) for c in by.contours)
-    outside, inside = _enclosed([*own, *other], [is_outside, is_inside])
+    outside, inside = _enclosed([*own, *other], [_is_outside, _is_inside])
     return outside, inside
+
+
+@lru_cache(maxsize=MOST)
+def _is_outside(turns: int) -> bool:
+    """Whether the first of two regions is there alone."""
+    own, other = by_owner(turns, 2)
+    return own > 0 >= other
+
+
+@lru_cache(maxsize=MOST)
+def _is_inside(turns: int) -> bool:
+    """Whether both of two regions are there."""
+    own, other = by_owner(turns, 2)
+    return own > 0 and other > 0
 
 
 def wound(edges: Sequence[Edge], above: int) -> Region:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from sbafab.geometry.apart import FAR, alone
+from sbafab.geometry.apart import FAR, alone, meets_itself
 from sbafab.geometry.boolean import enclosed
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, left_turn
 from sbafab.geometry.region import Contour, Region
@@ -50,7 +50,11 @@ def _chain(contour: Contour, distance: float) -> Contour:
         radius += -distance if contour.is_hole else distance
         if radius > FAR:
             return circle(centre, radius).reversed() if contour.is_hole else circle(centre, radius)
-    return Contour(tuple(_joined_up(list(_moved(contour, distance)))))
+    moved = list(_moved(contour, distance))
+    chain = Contour(tuple(_joined_up(moved)))
+    corners = {edge.start for edge in contour.edges}
+    # Where it goes by way of a corner, it meets itself.
+    return meets_itself(chain) if any(edge.end in corners for edge in moved) else chain
 
 
 def _joined_up(edges: Sequence[Edge]) -> Iterator[Edge]:

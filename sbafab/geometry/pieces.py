@@ -110,7 +110,9 @@ def split_edges(
     for i, j in close_pairs(bounds, tolerance):
         if chain is not None and chain[i] == chain[j] >= 0:
             continue
-        if _only_follows(edges[i], edges[j], near[i], near[j], 2 * tolerance):
+        if _stay_apart(edges[i], edges[j], tolerance) or _only_follows(
+            edges[i], edges[j], near[i], near[j], 2 * tolerance
+        ):
             continue
         points = meeting_points(edges[i], edges[j], tolerance, (near[i], near[j]))
         if points:
@@ -135,6 +137,15 @@ def split_edges(
             for p in own
         ),
     )
+
+
+def _stay_apart(a: Edge, b: Edge, tolerance: float) -> bool:
+    """Whether two arcs lie on circles that come nowhere near each other."""
+    if not (isinstance(a, Arc) and isinstance(b, Arc)):
+        return False
+    gap, r, s = math.dist(a.centre, b.centre), a.radius, b.radius
+    # Their ends may be as much as BENT off their circles.
+    return max(gap - r - s, abs(r - s) - gap) > tolerance + 2 * BENT
 
 
 def _only_follows(a: Edge, b: Edge, near_a: Bounds, near_b: Bounds, same: float) -> bool:
@@ -185,6 +196,8 @@ def _share(
 def _stops(edge: Edge, points: Sequence[Point], pool: PointPool) -> list[Point]:
     """Where the parts of an edge end, from its start to its end."""
     start, end = pool.snapped(edge.start), pool.snapped(edge.end)
+    if not points:
+        return [start, end]
     inner = dict.fromkeys(map(pool.snapped, points))
     inner.pop(start, None)
     inner.pop(end, None)

@@ -15,6 +15,8 @@ from sbafab.geometry.region import Contour
 
 BESIDE = 1e-5
 """mm that an edge may miss another's normals by, for rounding."""
+ROUNDING = 1e-12
+"""mm: more than what distances are rounded by."""
 
 
 class Foot(NamedTuple):
@@ -25,7 +27,8 @@ class Foot(NamedTuple):
 class Side(NamedTuple):
     """An edge with what the search asks of it again and again.
 
-    ``half`` is how far its ends lie from its middle, ``lean`` the sine of its half turn.
+    ``half`` is how far its ends lie from its middle, ``lean`` the sine of its half turn, ``off``
+    how far its ends may be off its circle.
     """
 
     edge: Edge
@@ -35,6 +38,15 @@ class Side(NamedTuple):
     half_turn: float
     half: float
     lean: float
+    off: float
+
+    def lies_farther(self, other: Side, than: float) -> bool:
+        """Whether two arcs surely lie farther apart than so many mm, for their circles do."""
+        a, b = self.edge, other.edge
+        if not (isinstance(a, Arc) and isinstance(b, Arc)):
+            return False
+        gap, r, s = math.dist(a.centre, b.centre), a.radius, b.radius
+        return max(gap - r - s, abs(r - s) - gap) - self.off - other.off > than
 
     def may_hold_feet(self, other: Side, within: float) -> bool:
         """Whether a normal of this edge may meet the other no farther off than ``within``."""
@@ -115,7 +127,10 @@ def _side(edge: Edge) -> Side:
     half_turn = abs(edge.sweep) / 2 if isinstance(edge, Arc) else 0.0
     half = max(math.dist(middle, edge.start), math.dist(middle, edge.end))
     lean = math.sin(min(half_turn, math.pi / 2))
-    return Side(edge, edge.bounds, middle, left_normal(edge, middle), half_turn, half, lean)
+    off = ROUNDING
+    if isinstance(edge, Arc):
+        off += max(abs(math.dist(p, edge.centre) - edge.radius) for p in (edge.start, edge.end))
+    return Side(edge, edge.bounds, middle, left_normal(edge, middle), half_turn, half, lean, off)
 
 
 def corners_of(contour: Contour) -> list[Corner | None]:

@@ -29,6 +29,8 @@ from sbafab.geometry.sides import (
 
 ALONGSIDE = 1e-3
 """Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
+SHORTER = 1e-9
+"""mm by which a segment must be shorter than another to be the narrowest."""
 TOUCH = 1e-6
 """mm within which two points are one."""
 STEP = math.radians(15)
@@ -98,9 +100,14 @@ class _Narrowest:
         self.best: Width | None = None
         self.value = below
 
+    @property
+    def most(self) -> float:
+        """Longer ones are not kept, mm."""
+        return self.value - SHORTER
+
     def offer(self, p: Point, q: Point) -> None:
         value = math.dist(p, q)
-        if value < self.value - 1e-9 and self.is_clear(p, q):
+        if value < self.value - SHORTER and self.is_clear(p, q):
             self.value, self.best = value, Width(value, p, q)
 
     def offer_facing(self, a: Foot, b: Foot) -> None:
@@ -153,6 +160,10 @@ class Gathered(_Narrowest):
         super().__init__(boundary, below)
         self.offered: list[tuple[Point, Point]] = []
 
+    @property
+    def most(self) -> float:
+        return self.value
+
     def offer(self, p: Point, q: Point) -> None:
         if math.dist(p, q) <= self.value:
             self.offered.append((p, q))
@@ -200,6 +211,8 @@ def _pinch(
 
 
 def _between_edges(a: Side, b: Side, narrowest: _Narrowest) -> None:
+    if a.lies_farther(b, narrowest.most):
+        return
     if isinstance(a.edge, Arc):
         if _alongside(a.edge, b.edge) and _may_face(a.edge, b.edge, narrowest.value):
             _along_each_other(a, b, narrowest)

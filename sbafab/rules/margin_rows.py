@@ -112,8 +112,8 @@ def _least_alike(form: LinearForm, room: Floats, short: Indices) -> list[int]:
         columns += list(form.normal)
     columns += [levers for _, _, levers in form.felt if levers is not None]
     # Where nothing but cutting is felt there is no column, and all are alike.
-    keys = np.array([_parts(column[short]) for column in columns], dtype=np.int64)
-    keys = keys.reshape(len(columns), len(short))
+    every = np.array(columns).reshape(len(columns), len(form.nominal))
+    keys = _parts(every[:, short]).astype(np.int64)
     found: dict[bytes, int] = {}
     left = room[short].tolist()
     for place, key in enumerate(np.ascontiguousarray(keys.T)):
@@ -130,6 +130,7 @@ def _parts(factors: Floats) -> Floats:
 
     scaled = factors * UNITS
     parts = np.rint(scaled)
-    for doubtful in np.nonzero(np.abs(scaled - np.floor(scaled) - 0.5) < 1e-6)[0]:
-        parts[doubtful] = round(round(float(factors[doubtful]), 3) * UNITS)
+    doubtful = np.abs(scaled - np.floor(scaled) - 0.5) < 1e-6
+    if doubtful.any():
+        parts[doubtful] = [round(round(one, 3) * UNITS) for one in factors[doubtful].tolist()]
     return parts
