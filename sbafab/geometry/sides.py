@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, left_normal
-from sbafab.geometry.ends import SMOOTH
+from sbafab.geometry.ends import SMOOTH, tapered_ends
 from sbafab.geometry.region import Contour
 
 BESIDE = 1e-5
@@ -117,12 +117,12 @@ def sides_of(contour: Contour) -> list[Side]:
     """The sides of a contour, which several regions may have: bores, outlines."""
     known = contour.__dict__
     if "sides" not in known:
-        known["sides"] = [_side(edge) for edge in contour.edges]
+        known["sides"] = [side_of(edge) for edge in contour.edges]
     found: list[Side] = known["sides"]
     return found
 
 
-def _side(edge: Edge) -> Side:
+def side_of(edge: Edge) -> Side:
     middle = edge.at(0.5)
     half_turn = abs(edge.sweep) / 2 if isinstance(edge, Arc) else 0.0
     half = max(math.dist(middle, edge.start), math.dist(middle, edge.end))
@@ -140,6 +140,14 @@ def corners_of(contour: Contour) -> list[Corner | None]:
         known["corners"] = list(_looked_at(contour.edges))
     found: list[Corner | None] = known["corners"]
     return found
+
+
+def ends_of(contour: Contour, sharp: float) -> list[tuple[Point, Point]]:
+    """Where the flanks of every end of an arm stop (``tapered_ends``)."""
+    known: dict[float, list[tuple[Point, Point]]] = contour.__dict__.setdefault("ends", {})
+    if sharp not in known:
+        known[sharp] = list(tapered_ends(contour, sharp))
+    return known[sharp]
 
 
 def _looked_at(edges: Sequence[Edge]) -> Iterator[Corner | None]:

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Arc, Edge, Line, Point, left_normal
-from sbafab.geometry.ends import ROUNDED, tapered_ends
+from sbafab.geometry.ends import ROUNDED
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Contour, Region
@@ -23,6 +23,7 @@ from sbafab.geometry.sides import (
     Side,
     corners_of,
     dot,
+    ends_of,
     from_outside,
     sides_of,
 )
@@ -79,7 +80,7 @@ class Boundary:
         )
         self.corners = [corner for contour in contours for corner in corners_of(contour)]
         """What corner each side starts at, if any."""
-        self.ends = [ends for contour in contours for ends in tapered_ends(contour, sharp)]
+        self.ends = [ends for contour in contours for ends in ends_of(contour, sharp)]
         self.pinch = _pinch(contours, self.corners, sharp)
         self.known_clear: dict[tuple[Point, Point], bool] = {}
         """Of segments that were asked: whether no edge crosses them."""
