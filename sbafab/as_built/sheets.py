@@ -12,7 +12,7 @@ from sbafab.as_built.cut_files import check_sequence, inside, sound_digest
 from sbafab.as_built.measures import SHARE
 from sbafab.as_built.pieces import CutSheet, Lot, piece_problems
 from sbafab.as_built.records import INTEGRITY, Problem
-from sbafab.cutting.cut_layers import ENGRAVE
+from sbafab.cutting.cut_layers import CUT_SHEET, ENGRAVE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import Surroundings
 from sbafab.cutting.lightburn import ENDING
@@ -85,7 +85,7 @@ def sheet_problems(folder: Path, order: SheetOrder) -> list[Problem]:
         else:
             bare.append(found)
         problems += _layout_problems(told, found, stock_of[told.material])
-        problems += _number_problems(sheets[-1])
+        problems += _number_problems(sheets[-1], found)
     if bare:
         of = "the files of " + (f"{len(bare)} film sheets" if len(bare) > 1 else "a film sheet")
         problems.append(bare_problem(of, all(found.units for found in bare)))
@@ -272,10 +272,11 @@ def _in_waste(edge: Edge, found: ReadBack, told: SheetClaim) -> bool:
     return not crossed and not found.region.contains(edge.start)
 
 
-def _number_problems(sheet: CutSheet) -> list[Problem]:
+def _number_problems(sheet: CutSheet, found: ReadBack) -> list[Problem]:
     """Areas, contours and lengths that the manifest claims of a sheet."""
     told, region = sheet.told, sheet.path
-    length = sum(contour.length for contour in region.contours)
+    parting = [edge for layer, edges in found.strokes if layer == CUT_SHEET for edge in edges]
+    length = sum(c.length for c in region.contours) + sum(edge.length for edge in parting)
     area_room = SHARE * region.area + ROUNDED + TOLERANCE * length
     length_room = SHARE * length + ROUNDED
     agree: list[tuple[str, float, float, float]] = [

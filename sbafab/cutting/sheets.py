@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from sbafab.cutting.svg_write import sheet_svg
 from sbafab.cutting.verify import check_surroundings, verify_file
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
 from sbafab.nesting.records import Nest, Placement
 from sbafab.progress import Counted
@@ -49,6 +50,7 @@ class SheetFile:
     says how many parts of each design and pattern lie on it: (design, pattern, count).
     ``unsorted_travel`` is what the head would travel in the nest's own order. ``label`` says
     whether the sheet's label is engraved, or found no room in the border, or was not asked for.
+    ``cut_length`` has the cut that frees a roll's sheet in it; ``contours`` are those of the parts.
     """
 
     path: str
@@ -129,7 +131,8 @@ def _write_sheet(
     picture.write_text(
         sheet_svg(contours, around, width, length, title), encoding="utf-8", newline="\n"
     )
-    cut_length = sum(contour.length for contour in contours)
+    partings = [math.dist(*ends) for ends in around.parting]
+    cut_length = sum(contour.length for contour in contours) + sum(partings)
     moved = travel(contours)
     return SheetFile(
         path=f"{FOLDER}/{path.name}",
@@ -146,18 +149,17 @@ def _write_sheet(
         cut_length=cut_length,
         travel=moved,
         unsorted_travel=travel((*region.holes, *region.outers)),
-        minutes=_minutes(contours, cut_length, moved, machine),
+        minutes=_minutes(len(contours) + len(partings), cut_length, moved, machine),
         label="engraved" if around.engraved else "no room" if labelled else "off",
     )
 
 
-def _minutes(
-    contours: Sequence[Contour], cut_length: float, moved: float, machine: Machine
-) -> float:
+def _minutes(cuts: int, cut_length: float, moved: float, machine: Machine) -> float:
+    """Of all cuts; engraving and the way to the cut that frees a roll's sheet are left out."""
     seconds = (
         cut_length / machine.cut_speed
         + moved / machine.travel_speed
-        + len(contours) * machine.pierce_seconds
+        + cuts * machine.pierce_seconds
     )
     return seconds / 60
 

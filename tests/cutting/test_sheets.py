@@ -141,6 +141,14 @@ def test_a_roll_is_cut_off_one_border_past_its_parts(tmp_path: Path) -> None:
     )
 
 
+def test_the_cut_that_frees_a_roll_takes_its_time(tmp_path: Path) -> None:
+    (sheet,) = write_sheets([ring_nest(3, replace(STOCK, roll=True))], tmp_path, SETTINGS, MACHINE)
+    length = 3 * 2 * math.pi * (5 + 2) + STOCK.width
+    assert sheet.cut_length == pytest.approx(length)
+    assert sheet.minutes * 60 == pytest.approx(length / 10 + sheet.travel / 100 + 7 * 0.5)
+    assert sheet.contours == 6
+
+
 def test_the_picture_has_the_sheets_size_and_colours(tmp_path: Path) -> None:
     (sheet,) = write_sheets([ring_nest(2)], tmp_path, SETTINGS, MACHINE)
     picture = (tmp_path / sheet.picture).read_text(encoding="utf-8")

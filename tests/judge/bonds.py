@@ -65,7 +65,7 @@ def _stray(folder: Folder, bond: BaseGeometry, where: str) -> Iterator[Disagreem
     An ear is as wide as its pin and two bonds, and ends as far from the pin.
     """
     width = float(folder.wish("bond", "width", 0.75))
-    back = float(folder.wish("mask", "overhang", 0.5)) if folder.method == "ears" else 0.0
+    back = float(folder.wish("mask", "overhang", 0.5)) if folder.method != "channel-pin" else 0.0
     meant = shapely.union_all(
         [
             shapely.Point(hole.x, hole.y).buffer(math.sqrt(2) * (hole.radius + width) + back + 0.01)

@@ -11,11 +11,13 @@ from tests.judge.claims import judge_claims
 from tests.judge.facing import judge_facing
 from tests.judge.folder import Disagreement, Folder
 from tests.judge.overhangs import judge_overhangs
+from tests.judge.panels import judge_panel
 from tests.judge.pins import judge_pins
 from tests.judge.pockets import judge_pockets
 from tests.judge.pressing import judge_press
 from tests.judge.reading import UnreadableError
 from tests.judge.sheets import judge_sheets
+from tests.judge.traveller import judge_traveller
 from tests.judge.voids import judge_voids
 
 Judge = Callable[[Folder], Iterator[Disagreement]]
@@ -27,11 +29,14 @@ JUDGES: tuple[Judge, ...] = (
     judge_pins,
     judge_press,
     judge_claims,
+    judge_traveller,
 )
 
 
 def judged(folder: Folder, drawn: Sequence[Polygon] | None = None) -> list[Disagreement]:
     """What all judges say of one design's folder, its sheets included if it has its own."""
+    if folder.manifest.get("panel"):
+        return _heard(lambda: judge_panel(folder))
     found = [said for judge in JUDGES for said in _heard(lambda judge=judge: judge(folder))]
     if folder.manifest.get("sheets"):
         found += _heard(lambda: judge_sheets([folder], folder.path, folder.manifest["sheets"]))

@@ -118,8 +118,8 @@ def _region(outers: Sequence[Any], holes: Sequence[Any], name: str) -> BaseGeome
     for plate in plates:
         shapely.prepare(plate)
     for points in holes:
-        middle = Polygon(points).representative_point()
-        home = next((i for i, plate in enumerate(plates) if plate.contains(middle)), None)
+        hole = Polygon(points)
+        home = next((i for i, plate in enumerate(plates) if plate.contains(hole)), None)
         if home is None:
             raise UnreadableError(f"{name} cuts a hole outside every part, near {points[0]}")
         inner[home].append(points)

@@ -121,9 +121,27 @@ def _cut(work: Work, layers: tuple[Layer, ...]) -> Cut:
         len(layers) * work.job.copies,
         _spares(work, layers),
         len(profile.pieces),
-        sum(contour.length for contour in profile.contours),
+        _cut_length(work, first),
         ", ".join(holding),
     )
+
+
+def _cut_length(work: Work, layer: Layer) -> float:
+    """Length of the beam's path round a layer, mm; of its edges where it is on no sheet.
+
+    Pieces that are alike are one part of a nest, cut as many times more.
+    """
+    profile = layer.profile
+    parts = {
+        part.piece: part
+        for sheet in work.sheets
+        for part in sheet.nest.parts
+        if (part.design, part.pattern) == (work.design.name, layer.pattern)
+    }.values()
+    if not parts:
+        return sum(contour.length for contour in profile.contours)
+    layers = sum(part.count for part in parts) / len(profile.pieces)
+    return sum(c.length * part.count for part in parts for c in part.region.contours) / layers
 
 
 def _spares(work: Work, layers: Sequence[Layer]) -> int:

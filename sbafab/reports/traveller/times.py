@@ -31,7 +31,7 @@ def laser_basis(work: Work) -> str:
     return (
         f"{cut / 1000:.2f} m of cut at {laser.cut_speed:g} mm/s, {travel / 1000:.2f} m of travel "
         f"at {laser.travel_speed:g} mm/s, {say.count(contours, 'contour')} with "
-        f"{laser.pierce_seconds:g} s each to begin; no setting of your machine"
+        f"{laser.pierce_seconds:g} s each to begin, labels left out; no setting of your machine"
     )
 
 
