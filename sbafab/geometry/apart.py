@@ -23,7 +23,7 @@ Wound = tuple[Contour, int]
 """A closed chain of edges, and how often it counts."""
 
 
-class Chain:
+class ClosedChain:
     """A closed chain, and how often it and its twins count together.
 
     ``drawn`` is the first of them; ``contour`` is what a boolean leaves of it where nothing meets
@@ -41,7 +41,7 @@ class Chain:
         self.turns = turns
         self.start: Point = self.contour.edges[0].start
 
-    def turns_round(self, other: Chain) -> int:
+    def turns_round(self, other: ClosedChain) -> int:
         """How often its contour winds round another chain that it stays clear of."""
         if self.circle is None:
             return self.contour.winding(other.start)
@@ -51,16 +51,16 @@ class Chain:
         return -1 if self.contour.is_hole else 1
 
 
-def chains_of(wound: Iterable[Wound]) -> list[Chain]:
+def chains_of(wound: Iterable[Wound]) -> list[ClosedChain]:
     """Chains in the order of their first, those that run along the same edges as one.
 
     What cancels out is left out.
     """
-    found: list[Chain] = []
-    circles: dict[tuple[Point, float], Chain] = {}
-    others: dict[Edge, list[Chain]] = {}
+    found: list[ClosedChain] = []
+    circles: dict[tuple[Point, float], ClosedChain] = {}
+    others: dict[Edge, list[ClosedChain]] = {}
     for contour, turns in wound:
-        chain = Chain(contour, turns)
+        chain = ClosedChain(contour, turns)
         if chain.circle is not None:
             twin = circles.setdefault(chain.circle, chain)
             if twin is not chain:
@@ -79,7 +79,7 @@ def chains_of(wound: Iterable[Wound]) -> list[Chain]:
     return [chain for chain in found if chain.turns]
 
 
-class Group:
+class ChainGroup:
     """Chains that meet, or one that stays clear of all others.
 
     The chains of all other groups wind round it ``outside`` times.
@@ -87,7 +87,7 @@ class Group:
 
     __slots__ = ("chains", "outside")
 
-    def __init__(self, chains: list[Chain], outside: int) -> None:
+    def __init__(self, chains: list[ClosedChain], outside: int) -> None:
         self.chains = chains
         self.outside = outside
 
@@ -111,7 +111,7 @@ class Group:
         ]
 
 
-def grouped(chains: Sequence[Chain]) -> list[Group]:
+def grouped(chains: Sequence[ClosedChain]) -> list[ChainGroup]:
     """Chains by groups that stay clear of each other."""
     count = len(chains)
     home = list(range(count))
@@ -135,7 +135,7 @@ def grouped(chains: Sequence[Chain]) -> list[Group]:
     members: dict[int, list[int]] = {}
     for i in range(count):
         members.setdefault(_first(home, i), []).append(i)
-    groups: list[Group] = []
+    groups: list[ChainGroup] = []
     for leader, together in members.items():
         outside = {
             sum(
@@ -147,8 +147,8 @@ def grouped(chains: Sequence[Chain]) -> list[Group]:
         }
         if len(outside) > 1:
             # One that meets none of them winds round some of a group only.
-            return [Group(list(chains), 0)]
-        groups.append(Group([chains[one] for one in together], outside.pop()))
+            return [ChainGroup(list(chains), 0)]
+        groups.append(ChainGroup([chains[one] for one in together], outside.pop()))
     return groups
 
 
@@ -158,7 +158,7 @@ def _first(home: list[int], number: int) -> int:
     return number
 
 
-def _meet(a: Chain, b: Chain) -> bool:
+def _meet(a: ClosedChain, b: ClosedChain) -> bool:
     """Whether two chains may come within FAR of each other."""
     if a.circle is not None and b.circle is not None:
         (one, r), (other, s) = a.circle, b.circle

@@ -13,8 +13,8 @@ from typing import TypeVar
 
 from sbafab.errors import SbafabError
 from sbafab.geometry.apart import (
-    Chain,
-    Group,
+    ChainGroup,
+    ClosedChain,
     Wound,
     chains_of,
     grouped,
@@ -29,7 +29,7 @@ from sbafab.geometry.remembered import MOST, remembered
 from sbafab.geometry.tidy import tidy
 
 Found = TypeVar("Found")
-Wanted = Callable[[int], bool]
+WantedTurns = Callable[[int], bool]
 """Whether a place belongs to a region, from how often chains wind round it."""
 
 WAYS = (1, 4, 16, 64)
@@ -126,7 +126,7 @@ def enclosed(contours: Iterable[Contour], above: int = 0) -> Region:
     return found
 
 
-def _enclosed(chains: Iterable[Wound], wanted: Sequence[Wanted]) -> list[Region]:
+def _enclosed(chains: Iterable[Wound], wanted: Sequence[WantedTurns]) -> list[Region]:
     """The regions of the places that are wanted, from how often chains wind round them."""
     found: list[list[Contour]] = [[] for _ in wanted]
     for group in grouped(chains_of(chains)):
@@ -139,7 +139,7 @@ def _enclosed(chains: Iterable[Wound], wanted: Sequence[Wanted]) -> list[Region]
     return [Region(tuple(sorted(contours, key=_reading_order))) for contours in found]
 
 
-def _whole(chain: Chain, outside: int, wanted: Wanted) -> list[Contour]:
+def _whole(chain: ClosedChain, outside: int, wanted: WantedTurns) -> list[Contour]:
     """A chain that nothing meets, with the material on its left; nothing if it bounds none."""
     contour = chain.contour
     inside = outside + (-chain.turns if contour.is_hole else chain.turns)
@@ -148,7 +148,7 @@ def _whole(chain: Chain, outside: int, wanted: Wanted) -> list[Contour]:
     return [contour if wanted(outside) == contour.is_hole else turned_round(contour)]
 
 
-def _cut(group: Group, wanted: Sequence[Wanted]) -> list[list[Contour]]:
+def _cut(group: ChainGroup, wanted: Sequence[WantedTurns]) -> list[list[Contour]]:
     """The contours of each region, where chains meet each other."""
 
     def read(found: Arrangement) -> list[list[Contour]]:
@@ -158,7 +158,7 @@ def _cut(group: Group, wanted: Sequence[Wanted]) -> list[list[Contour]]:
     return _in_some_way(lambda tolerance: read(Arrangement(overlay(edges, tolerance, clear))))
 
 
-def _loops(found: Arrangement, wanted: Wanted, outside: int = 0) -> Iterable[Sequence[Edge]]:
+def _loops(found: Arrangement, wanted: WantedTurns, outside: int = 0) -> Iterable[Sequence[Edge]]:
     """Loops round what is wanted, where other chains wind so often round all of it."""
     return found.loops(
         found.edging({turns for turns in set(found.left) if wanted(turns + outside)})

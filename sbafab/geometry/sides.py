@@ -24,7 +24,7 @@ class Foot(NamedTuple):
     normal: Point
 
 
-class Side(NamedTuple):
+class BoundarySide(NamedTuple):
     """An edge with what the search asks of it again and again.
 
     ``half`` is how far its ends lie from its middle, ``lean`` the sine of its half turn, ``off``
@@ -40,7 +40,7 @@ class Side(NamedTuple):
     lean: float
     off: float
 
-    def lies_farther(self, other: Side, than: float) -> bool:
+    def lies_farther(self, other: BoundarySide, than: float) -> bool:
         """Whether two arcs surely lie farther apart than so many mm, for their circles do."""
         a, b = self.edge, other.edge
         if not (isinstance(a, Arc) and isinstance(b, Arc)):
@@ -48,7 +48,7 @@ class Side(NamedTuple):
         gap, r, s = math.dist(a.centre, b.centre), a.radius, b.radius
         return max(gap - r - s, abs(r - s) - gap) - self.off - other.off > than
 
-    def may_hold_feet(self, other: Side, within: float) -> bool:
+    def may_hold_feet(self, other: BoundarySide, within: float) -> bool:
         """Whether a normal of this edge may meet the other no farther off than ``within``."""
         (x, y), (nx, ny) = self.middle, self.normal
         aside = abs((other.middle[0] - x) * ny - (other.middle[1] - y) * nx)
@@ -113,16 +113,16 @@ class Corner(NamedTuple):
         return left_of(self.arriving), left_of(self.leaving)
 
 
-def sides_of(contour: Contour) -> list[Side]:
+def sides_of(contour: Contour) -> list[BoundarySide]:
     """The sides of a contour, which several regions may have: bores, outlines."""
     known = contour.__dict__
     if "sides" not in known:
         known["sides"] = [side_of(edge) for edge in contour.edges]
-    found: list[Side] = known["sides"]
+    found: list[BoundarySide] = known["sides"]
     return found
 
 
-def side_of(edge: Edge) -> Side:
+def side_of(edge: Edge) -> BoundarySide:
     middle = edge.at(0.5)
     half_turn = abs(edge.sweep) / 2 if isinstance(edge, Arc) else 0.0
     half = max(math.dist(middle, edge.start), math.dist(middle, edge.end))
@@ -130,7 +130,9 @@ def side_of(edge: Edge) -> Side:
     off = ROUNDING
     if isinstance(edge, Arc):
         off += max(abs(math.dist(p, edge.centre) - edge.radius) for p in (edge.start, edge.end))
-    return Side(edge, edge.bounds, middle, left_normal(edge, middle), half_turn, half, lean, off)
+    return BoundarySide(
+        edge, edge.bounds, middle, left_normal(edge, middle), half_turn, half, lean, off
+    )
 
 
 def corners_of(contour: Contour) -> list[Corner | None]:

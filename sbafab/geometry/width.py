@@ -18,9 +18,9 @@ from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.remembered import remembered
 from sbafab.geometry.sides import (
+    BoundarySide,
     Corner,
     Foot,
-    Side,
     corners_of,
     dot,
     ends_of,
@@ -118,7 +118,9 @@ class _Narrowest:
         if dx * nx + dy * ny > TOUCH and dx * mx + dy * my < -TOUCH:
             self.offer((px, py), (qx, qy))
 
-    def near(self, a: Side | Corner, aside: float, after: int = -1) -> Iterator[tuple[int, Side]]:
+    def near(
+        self, a: BoundarySide | Corner, aside: float, after: int = -1
+    ) -> Iterator[tuple[int, BoundarySide]]:
         """Numbered sides that a segment shorter than the best could join to ``a``.
 
         Their normals are opposed somewhere, to within ``aside`` radians, and their numbers come
@@ -211,7 +213,7 @@ def _pinch(
     return None
 
 
-def _between_edges(a: Side, b: Side, narrowest: _Narrowest) -> None:
+def _between_edges(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> None:
     if a.lies_farther(b, narrowest.most):
         return
     if isinstance(a.edge, Arc):
@@ -260,7 +262,7 @@ def _may_face(a: Arc, b: Edge, within: float) -> bool:
     return False
 
 
-def _along_each_other(a: Side, b: Side, narrowest: _Narrowest) -> None:
+def _along_each_other(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> None:
     for one, other in ((a, b), (b, a)):
         for p in (one.middle, one.edge.start, one.edge.end):
             here = Foot(p, left_normal(one.edge, p))
@@ -288,7 +290,7 @@ def _between_corners(a: Corner, b: Corner, narrowest: _Narrowest) -> None:
         narrowest.offer(a.point, b.point)
 
 
-def _corner_to_edge(corner: Corner, side: Side, foot: Foot, narrowest: _Narrowest) -> None:
+def _corner_to_edge(corner: Corner, side: BoundarySide, foot: Foot, narrowest: _Narrowest) -> None:
     d = (foot.point[0] - corner.point[0], foot.point[1] - corner.point[1])
     if dot(d, foot.normal) > -TOUCH:
         return

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from sbafab.geometry.apart import Group, chains_of, grouped
+from sbafab.geometry.apart import ChainGroup, chains_of, grouped
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal
 from sbafab.geometry.intersect import line_circle
 from sbafab.geometry.nearby import EdgeIndex, widened
@@ -36,7 +36,7 @@ def edges_along(region: Region, other: Region) -> tuple[Edge, ...]:
     return tuple(along)
 
 
-def _pieces(group: Group) -> Iterable[Piece]:
+def _pieces(group: ChainGroup) -> Iterable[Piece]:
     """What the chains of a group are cut into."""
     if group.is_alone:
         return (Piece(edge, turns) for edge, turns in group.edges)

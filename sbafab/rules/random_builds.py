@@ -35,7 +35,7 @@ AT_ONCE = 200_000
 """Sums of rows in builds that are worked out at once, which bounds the memory."""
 
 
-class Asked(NamedTuple):
+class RowsAsked(NamedTuple):
     """Rows of an interface, and where the numbers of each of its errors begin, as ``rows.errors``
     names them.
     """
@@ -166,7 +166,7 @@ class _Drawn(NamedTuple):
 class RandomBuilds:
     """Tells in which builds the rows of interfaces come short, of all interfaces at once."""
 
-    def __init__(self, asked: Sequence[Asked], cutting: float) -> None:
+    def __init__(self, asked: Sequence[RowsAsked], cutting: float) -> None:
         import numpy as np
 
         kinds = {id(one.rows): one.rows for one in asked}

@@ -21,7 +21,7 @@ from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.margin_rows import MarginRows, rows_of
 from sbafab.rules.margins import QUANTITIES, Quantity, own_freedoms, seated
 from sbafab.rules.measures import Measures
-from sbafab.rules.random_builds import Asked, RandomBuilds
+from sbafab.rules.random_builds import RandomBuilds, RowsAsked
 
 if TYPE_CHECKING:
     from sbafab.rules.random_builds import Indices
@@ -183,7 +183,7 @@ def _counted(groups: Sequence[_Group], limits: Limits, seed: int) -> Yield:
         error for group in groups for own in group.own.values() for error in own.values()
     )
     told = [
-        (quantity, index, Asked(some, tuple(rows[own[error]] for error in some.errors)))
+        (quantity, index, RowsAsked(some, tuple(rows[own[error]] for error in some.errors)))
         for group in groups
         for quantity, asked in group.rows.items()
         for some in asked

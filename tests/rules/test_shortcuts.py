@@ -23,7 +23,7 @@ from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
 from sbafab.rules.margin_rows import MarginRows
 from sbafab.rules.margins import pushes
 from sbafab.rules.measures import Measures
-from sbafab.rules.random_builds import Asked, RandomBuilds
+from sbafab.rules.random_builds import RandomBuilds, RowsAsked
 from sbafab.rules.registration_worst_case import least_remaining
 from sbafab.rules.registration_yield import simulate
 from sbafab.rules.voids import _around
@@ -58,7 +58,7 @@ def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float
     # Two interfaces, of which the second one's errors are drawn after the first one's.
     drawn = numbers(5, 0, 2 * count, BUILDS)
     both = [
-        Asked(asked, tuple(count * interface + first[error] for error in asked.errors))
+        RowsAsked(asked, tuple(count * interface + first[error] for error in asked.errors))
         for interface in (0, 1)
     ]
     good = np.ones((2, BUILDS), dtype=bool)
