@@ -26,8 +26,6 @@ BEGIN, END = "<!-- written by docs.scripts.sofa_runs -->", "<!-- to here -->"
 NAME = "3dof-15mm"
 PRESSURES = (1.0, 2.0, 5.0, 10.0)
 CHAMBERS = ("chamber1", "chamber2", "chamber3")
-FILMS = 30 * 0.038
-"""mm that mid-surfaces leave out of the height of 15 balloons."""
 INNER = MeridianSection(neck=2.5, bore=1.0)
 SECONDS = {"shell": 10.0, "frames": 4.0, "volume": 5.0, "beam": 6.0}
 CALCULIX = {1.0: 2.17, 2.0: 2.77, 5.0: 3.73, 10.0: 4.59}
@@ -52,9 +50,10 @@ def fast_stack() -> Posed | None:
     def pose(pressures: Sequence[float]) -> tuple[float, float]:
         found = stack.pose(tuple(pressures))
         turn = math.radians(found.bend)
-        # Bent into an arc, the films stand on each other the less upright the higher they are.
+        # Its height has films and masks in it, that of mid-surfaces neither. Bent into an arc, they
+        # stand on each other the less upright the higher they are.
         upright = math.sin(turn) / turn if turn > 1e-6 else 1.0
-        return float(found.tip[2]) - FILMS * upright, float(found.bend)
+        return float(found.tip[2]) - stack.flat_height * upright, float(found.bend)
 
     return pose
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from docs.scripts import sensitivity
 from sbafab.reproduction.page import page
 
 PATH = Path(__file__).parent.parent / "validation.md"
@@ -11,7 +12,7 @@ PATH = Path(__file__).parent.parent / "validation.md"
 
 def validation() -> str:
     """The text of docs/validation.md."""
-    return page()
+    return page() + sensitivity.section()
 
 
 if __name__ == "__main__":

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from pydantic import BaseModel
 
@@ -27,6 +27,8 @@ from sbafab.design.writing import FITS
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 
+Found = TypeVar("Found")
+
 
 class Family(NamedTuple):
     """A family's design record, and the function that builds the laminate of a design."""
@@ -44,8 +46,25 @@ PLUGINS = "sbafab.families"
 """Entry points by which an installed package adds families, each a ``Family``."""
 
 
+class _AsAsked(Mapping[str, Found]):
+    """What is here by name; the rest is looked for when another name is asked for, or all are."""
+
+    def __init__(self, here: Mapping[str, Found], every: Callable[[], Mapping[str, Found]]) -> None:
+        self.here = here
+        self.every = every
+
+    def __getitem__(self, name: str) -> Found:
+        return self.here[name] if name in self.here else self.every()[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.every())
+
+    def __len__(self) -> int:
+        return len(self.every())
+
+
 @cache
-def families() -> Mapping[str, Family]:
+def _every() -> Mapping[str, Family]:
     """All families by name: those here, then those of installed packages.
 
     Raises DesignError where a package's family cannot be loaded or takes a name that is in use.
@@ -69,9 +88,17 @@ def families() -> Mapping[str, Family]:
     return found
 
 
-def records() -> dict[str, type[Design]]:
-    """The design record of every family."""
-    return {name: family.record for name, family in families().items()}
+def families() -> Mapping[str, Family]:
+    """All families by name. Installed packages are looked through when one that is not here, or
+    all of them, are asked for: that may raise DesignError.
+    """
+    return _AsAsked(FAMILIES, _every)
+
+
+def records() -> Mapping[str, type[Design]]:
+    """The design record of every family, likewise."""
+    here = {name: family.record for name, family in FAMILIES.items()}
+    return _AsAsked(here, lambda: {name: family.record for name, family in _every().items()})
 
 
 def load_design(

@@ -98,13 +98,20 @@ def verdict_said(name: str, groups: Sequence[Group], more: str) -> str:
 
 def limit_said(finding: Finding) -> str:
     """A limit with its sense: ">=" the least that may be measured, "<=" the most."""
-    from sbafab.assemblies.checks import AT_MOST as BETWEEN_PARTS
-    from sbafab.rules.deck import AT_MOST
-
     if finding.limit is None:
         return ""
-    is_most = finding.rule in AT_MOST or finding.rule in BETWEEN_PARTS
-    return f"{'<=' if is_most else '>='} {short_figure(finding.limit, finding.unit)}"
+    sense = "<=" if _is_most(finding.rule) else ">="
+    return f"{sense} {short_figure(finding.limit, finding.unit)}"
+
+
+def _is_most(rule: str) -> bool:
+    from sbafab.rules.deck import AT_MOST, rule_names
+
+    if rule in rule_names():
+        return rule in AT_MOST
+    from sbafab.assemblies.checks import AT_MOST as BETWEEN_PARTS
+
+    return rule in BETWEEN_PARTS
 
 
 def short_figure(value: float | None, unit: str) -> str:

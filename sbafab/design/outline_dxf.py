@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sbafab.design.strands import Strand, Traced, place, polyline, refuse_more_than_limit
+from sbafab.design.outline_plain import as_plain
+from sbafab.design.strands import Strand, Traced, line, place, refuse_more_than_limit, through, turn
 from sbafab.errors import DesignError
 from sbafab.geometry.biarc import FitError, elliptical_arc, fit_arcs
-from sbafab.geometry.edges import EPSILON, Edge, Line, Point
+from sbafab.geometry.edges import Edge, Point
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
@@ -53,6 +54,14 @@ def dxf_strands(path: Path) -> Traced:
     """
     content = path.read_bytes()
     _refuse_excess(content)
+    plain = as_plain(content)
+    if plain is not None and plain.unit in MM_PER_UNIT:
+        return Traced(plain.strands(MM_PER_UNIT[plain.unit]), SCALES[plain.unit])
+    return strands_by_ezdxf(path, content)
+
+
+def strands_by_ezdxf(path: Path, content: bytes) -> Traced:
+    """The same as ezdxf says, of any file. Raises DesignError."""
     drawing, space = _drawing(path)
     _refuse_compensated(drawing)
     # Where a file has no header at all, the reader makes one up that says metres.
@@ -90,6 +99,8 @@ def _strands(drawing: Drawing, space: Modelspace, factor: float) -> Iterator[Str
 
 def _is_shown(entity: Any, drawing: Drawing) -> bool:
     """Whether a program shows the entity: it is visible, and its layer on and thawed."""
+    if not (entity.dxf.is_supported("layer") and entity.dxf.is_supported("invisible")):
+        return True
     name = str(entity.dxf.get("layer", "0"))
     if entity.dxf.get("invisible", 0) or name not in drawing.layers:
         return not entity.dxf.get("invisible", 0)
@@ -181,33 +192,26 @@ def _side(entity: Any) -> float:
 
 def _line(entity: Any, factor: float) -> Strand:
     start, end = entity.dxf.start, entity.dxf.end
-    edge = Line(place(start.x * factor, start.y * factor), place(end.x * factor, end.y * factor))
-    return (edge,) if edge.length > EPSILON else ()
+    return line((start.x, start.y), (end.x, end.y), factor)
 
 
 def _arc(entity: Any, factor: float) -> Strand:
-    first = math.radians(entity.dxf.get("start_angle", 0.0))
-    last = math.radians(entity.dxf.get("end_angle", 360.0))
-    place(first, last)
-    turn = (last - first) % math.tau or math.tau
-    return _turn(entity, factor, first, first + turn)
+    angles = entity.dxf.get("start_angle", 0.0), entity.dxf.get("end_angle", 360.0)
+    return _turn(entity, angles, factor)
 
 
 def _circle(entity: Any, factor: float) -> Strand:
-    return _turn(entity, factor, 0.0, math.tau)
+    return _turn(entity, (), factor)
 
 
-def _turn(entity: Any, factor: float, first: float, last: float) -> Strand:
-    side, radius = _side(entity), entity.dxf.radius * factor
-    place(radius, 0.0)
-    if radius <= 0:
-        raise DesignError(f"holds a {entity.dxftype()} of radius {radius:g}; delete it")
-    centre = place(side * entity.dxf.center.x * factor, entity.dxf.center.y * factor)
-    return elliptical_arc(centre, (side * radius, 0.0), (0.0, radius), first, last)
+def _turn(entity: Any, angles: Sequence[float], factor: float) -> Strand:
+    centre = entity.dxf.center
+    side = _side(entity)
+    return turn(entity.dxftype(), (centre.x, centre.y), entity.dxf.radius, angles, side, factor)
 
 
 def _light_polyline(entity: Any, factor: float) -> Strand:
-    return _through(entity.get_points("xyb"), _side(entity), factor, entity.closed)
+    return through(entity.get_points("xyb"), _side(entity), factor, entity.closed)
 
 
 def _heavy_polyline(entity: Any, factor: float) -> Strand:
@@ -220,16 +224,7 @@ def _heavy_polyline(entity: Any, factor: float) -> Strand:
         if not vertex.dxf.flags & 16
     ]
     side = _side(entity) if entity.is_2d_polyline else 1.0
-    return _through(points, side, factor, entity.is_closed)
-
-
-def _through(points: Any, side: float, factor: float, closed: bool) -> Strand:
-    vertices = []
-    for x, y, bulge in (map(float, point) for point in points):
-        place(bulge, 0.0)
-        vertices.append((*place(side * x * factor, y * factor), side * bulge))
-    refuse_more_than_limit(len(vertices))
-    return polyline(vertices, closed)
+    return through(points, side, factor, entity.is_closed)
 
 
 def _ellipse(entity: Any, factor: float) -> Strand:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import re
-from importlib import resources
 from pathlib import Path
 
 from sbafab.design.messages import shown
@@ -16,7 +15,7 @@ KITS = "kits"
 
 def templates_folder() -> Path:
     """The designs that ship: in the installed package, or beside it in a source checkout."""
-    packaged = Path(str(resources.files("sbafab"))) / "templates"
+    packaged = Path(__file__).parents[1] / "templates"
     return packaged if packaged.is_dir() else packaged.parents[1] / "templates"
 
 

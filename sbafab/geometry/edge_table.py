@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sbafab.geometry.edges import EPSILON, Arc, Edge
+from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -16,8 +16,10 @@ if TYPE_CHECKING:
     Indices = NDArray[np.intp]
     Bools = NDArray[np.bool_]
 
-AT_ONCE = 400_000
-"""Pairs of boxes that are compared at once, which bounds the memory."""
+FEW = 20_000
+"""Pairs of boxes up to which all are compared at once."""
+TOGETHER = 64
+"""Boxes that are compared together with those about them, where there are more."""
 
 
 def dot(a: Floats, b: Floats) -> Floats:
@@ -45,12 +47,14 @@ class EdgeTable:
         self.box: Floats = columns[8:12]
 
     @staticmethod
-    def of(edges: Sequence[Edge]) -> EdgeTable:
+    def of(edges: Sequence[Edge], boxes: Sequence[Bounds] | None = None) -> EdgeTable:
+        """``boxes``: the bounds of the edges, where they are known."""
+        known = boxes if boxes is not None else [edge.bounds for edge in edges]
         rows = [
-            (*e.start, *e.end, *e.centre, e.radius, 1.0 if e.ccw else -1.0, *e.bounds)
+            (*e.start, *e.end, *e.centre, e.radius, 1.0 if e.ccw else -1.0, *box)
             if isinstance(e, Arc)
-            else (*e.start, *e.end, *e.start, 0.0, 0.0, *e.bounds)
-            for e in edges
+            else (*e.start, *e.end, *e.start, 0.0, 0.0, *box)
+            for e, box in zip(edges, known, strict=True)
         ]
         return EdgeTable(np.array(rows, dtype=float).reshape(-1, 12).T.copy())
 
@@ -122,16 +126,30 @@ class CellOrder:
 
 def touching(asked: Floats, boxes: Floats) -> tuple[Indices, Indices]:
     """Numbers of the boxes asked for and of those that each of them touches, in order."""
-    count = max(1, AT_ONCE // max(1, boxes.shape[1]))
+    if asked.shape[1] * boxes.shape[1] <= FEW:
+        return _touching(asked, boxes)
     found = []
-    for first in range(0, asked.shape[1], count):
-        left, low, right, high = asked[:, first : first + count, None]
-        meets = (boxes[0] <= right) & (boxes[2] >= left) & (boxes[1] <= high) & (boxes[3] >= low)
-        own, other = np.nonzero(meets)
-        found.append((own + first, other))
-    if len(found) == 1:
-        return found[0]
+    # Boxes asked for one after the other mostly lie side by side.
+    for first in range(0, asked.shape[1], TOGETHER):
+        some = asked[:, first : first + TOGETHER]
+        near = np.flatnonzero(
+            (boxes[0] <= some[2].max())
+            & (boxes[2] >= some[0].min())
+            & (boxes[1] <= some[3].max())
+            & (boxes[3] >= some[1].min())
+        )
+        own, other = _touching(some, boxes[:, near])
+        found.append((own + first, near[other]))
     return tuple(np.concatenate(one) for one in zip(*found, strict=True))  # type: ignore[return-value]
+
+
+def _touching(asked: Floats, boxes: Floats) -> tuple[Indices, Indices]:
+    """The same, every box with every other."""
+    left, low, right, high = asked[:, :, None]
+    meets = (boxes[0] <= right) & (boxes[2] >= left) & (boxes[1] <= high) & (boxes[3] >= low)
+    # Of a flat array the few that are true are found sooner.
+    own, other = np.divmod(np.flatnonzero(meets), boxes.shape[1] or 1)
+    return own, other
 
 
 def boxes_round(p: Floats, q: Floats, margin: float) -> Floats:

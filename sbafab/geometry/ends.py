@@ -18,6 +18,7 @@ SMOOTH = 1e-4
 """Corners that turn by less, in radians, are none."""
 TAPER = 30.0
 """Degrees; flanks at a wider angle are two sides of a corner, not of an arm."""
+LEAST_TURN = math.pi - math.radians(TAPER + 1)
 ROUNDED = 0.1
 """Degrees a corner may miss its angle by: coordinates read from a file are rounded."""
 
@@ -49,7 +50,13 @@ def tapered_ends(contour: Contour, sharp: float) -> Iterator[tuple[Point, Point]
     """
     runs = [_Run(own[0], own[-1], run_sweep(own)) for own in contour.runs]
     corners = [runs[i - 1].corner(run) for i, run in enumerate(runs)]
+    # No end where the path can not turn far enough from the run before to the one after.
+    most = [abs(run.sweep) + abs(corner) for run, corner in zip(runs, corners, strict=True)]
+    ahead = [*range(1, len(runs)), 0]
     for i, run in enumerate(runs):
+        turns = most[i - 1] + most[i] + most[ahead[i]] + abs(corners[ahead[ahead[i]]])
+        if turns < LEAST_TURN:
+            continue
         before, after = runs[i - 1], runs[(i + 1) % len(runs)]
         into, out = corners[i], corners[(i + 1) % len(runs)]
         # A round end that turns further is wider than between its flanks.

@@ -3,28 +3,19 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sbafab.geometry.edge_table import (
-    CellOrder,
-    EdgeTable,
-    boxes_round,
-    crossings,
-    dot,
-    touching,
-)
+from sbafab.geometry.edge_table import EdgeTable, boxes_round, crossings, dot, touching
 from sbafab.geometry.edges import Arc, Edge, Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.remembered import remembered
-from sbafab.geometry.sides import BESIDE
+from sbafab.geometry.side_table import SideTable
 from sbafab.geometry.width import (
     ASIDE,
     STEP,
     TOUCH,
-    Boundary,
     Gathered,
     Width,
     boundary_of,
@@ -69,7 +60,7 @@ def facing_places(
     gathered = Gathered(boundary, least.value + slack)
     search(gathered)
     found = np.array([(*p, *q) for p, q in gathered.offered]).reshape(-1, 4).T
-    sides = _sides_in_arrays(boundary)
+    sides = boundary.table
     p, q = (
         np.concatenate(both, axis=1)
         for both in zip((found[:2], found[2:]), _from_samples(sides, gathered.value), strict=True)
@@ -102,73 +93,19 @@ def places_along(edge: Edge, shares: list[float]) -> list[Point]:
     return found
 
 
-class _Samples(NamedTuple):
-    """Points spread over sides, side by side, and the normals there; how many a side has, and which
-    is its first.
-    """
-
-    p: Floats
-    normal: Floats
-    counts: Indices
-    first: Indices
-
-
-def _sides_in_arrays(boundary: Boundary) -> _Sides:
-    """They are asked for with several slacks."""
-    known = boundary.__dict__
-    if "in_arrays" not in known:
-        known["in_arrays"] = _Sides(boundary)
-    found: _Sides = known["in_arrays"]
-    return found
-
-
-class _Sides:
-    """What the search knows of a boundary's sides, in arrays."""
-
-    def __init__(self, boundary: Boundary) -> None:
-        sides = boundary.sides
-        self.edges = [side.edge for side in sides]
-        self.table = EdgeTable.of(self.edges)
-        rows = [
-            (*side.middle, *side.normal, side.half_turn, side.half, side.lean) for side in sides
-        ]
-        columns = np.array(rows).T
-        self.middle, self.normal = columns[0:2], columns[2:4]
-        self.half_turn, self.half, self.lean = columns[4:7]
-
-    @cached_property
-    def samples(self) -> _Samples:
-        """Points spread over all of them."""
-        shares = [spread_along(edge) for edge in self.edges]
-        count = np.array([len(own) for own in shares])
-        points = [places_along(edge, own) for edge, own in zip(self.edges, shares, strict=True)]
-        p = np.array([p for own in points for p in own]).T
-        owner = np.repeat(np.arange(len(count)), count)
-        return _Samples(p, self.table.at(owner).normal(p), count, np.cumsum(count) - count)
-
-    def pairs(self, aside: float, within: float) -> tuple[Indices, Indices]:
-        """Sides and those that their normals may meet no farther off, as ``near`` tells them."""
-        asked, box = self.table.box.copy(), self.table.box
-        asked[:2] -= within
-        asked[2:] += within
-        a, b = touching(asked, box)
-        room = self.half_turn[a] + aside + self.half_turn[b]
-        opposed = dot(self.normal[:, a], self.normal[:, b]) < -np.cos(room)
-        off, normal = self.middle[:, a] - self.middle[:, b], self.normal[:, b]
-        missed = np.abs(off[0] * normal[1] - off[1] * normal[0])
-        holds = missed <= self.half[b] + self.half[a] + within * self.lean[b] + BESIDE
-        chosen = (opposed | (room > math.pi)) & holds & (a != b)
-        a, b = a[chosen], b[chosen]
-        order = CellOrder(box).sorted(asked, a, b)
-        return a[order], b[order]
-
-
-def _from_samples(sides: _Sides, within: float) -> tuple[Floats, Floats]:
+def _from_samples(sides: SideTable, within: float) -> tuple[Floats, Floats]:
     """Samples of each side and the feet of their normals on the sides they face."""
     a, b = sides.pairs(ASIDE, within)
-    samples, normals, counts, firsts = sides.samples
+    shares = [spread_along(edge) for edge in sides.edges]
+    counts = np.array([len(own) for own in shares])
+    samples = np.array(
+        [p for edge, own in zip(sides.edges, shares, strict=True) for p in places_along(edge, own)]
+    ).T
+    owner = np.repeat(np.arange(len(counts)), counts)
+    normals = sides.table.at(owner).normal(samples)
     # Each pair has a row a sample of its first side.
-    own, starts = counts[a], firsts[a]
+    own = counts[a]
+    starts = (np.cumsum(counts) - counts)[a]
     row = np.arange(own.sum()) - np.repeat(np.cumsum(own) - own, own) + np.repeat(starts, own)
     p, n = samples[:, row], normals[:, row]
     other = np.repeat(b, own)
@@ -182,7 +119,7 @@ def _from_samples(sides: _Sides, within: float) -> tuple[Floats, Floats]:
     return np.broadcast_to(p, feet.shape)[:, kept], feet[:, kept]
 
 
-def _feet(p: Floats, sides: _Sides, numbers: Indices) -> tuple[Floats, Floats, Bools]:
+def _feet(p: Floats, sides: SideTable, numbers: Indices) -> tuple[Floats, Floats, Bools]:
     """Points of sides where their normal passes through points, up to two each; and the normals."""
     edges = sides.table.at(numbers)
     chord, off = edges.end - edges.start, p - edges.start
@@ -219,8 +156,12 @@ def _first_of_each(p: Floats, q: Floats) -> Indices:
     ends = np.rint(np.concatenate([p, q]) * 1e5)
     turned = (ends[0] > ends[2]) | ((ends[0] == ends[2]) & (ends[1] > ends[3]))
     ends[:, turned] = ends[:, turned][[2, 3, 0, 1]]
-    _, first = np.unique(ends, axis=1, return_index=True)
-    return np.sort(first)
+    # A stable order, so that the first of those that are alike comes first.
+    order = np.lexsort(ends)
+    ends = ends[:, order]
+    is_new = np.ones(len(order), dtype=bool)
+    is_new[1:] = (ends[:, 1:] != ends[:, :-1]).any(axis=0)
+    return np.sort(order[is_new])
 
 
 def _clear(p: Floats, q: Floats, table: EdgeTable, gathered: Gathered) -> Bools:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property
 from itertools import chain
 
 from sbafab.geometry.edges import EPSILON, Bounds, Edge, Point, distance_to
@@ -101,15 +102,20 @@ class EdgeIndex:
         self.across = max(self._high[0] - self._low[0], self._high[1] - self._low[1])
         self.cell = self.across / max(1.0, math.sqrt(len(edges))) or 1.0
         self._reach = self._places((*self._low, *self._high))
-        self._filed: dict[tuple[int, int], list[int]] = {}
+
+    @cached_property
+    def _filed(self) -> dict[tuple[int, int], list[int]]:
+        """The numbers of edges in each cell."""
+        filed: dict[tuple[int, int], list[int]] = {}
         for number, box in enumerate(self._boxes):
             x0, y0, x1, y1 = self._places(box)
             if x0 == x1 and y0 == y1:
-                self._filed.setdefault((x0, y0), []).append(number)
+                filed.setdefault((x0, y0), []).append(number)
                 continue
             for x in range(x0, x1 + 1):
                 for y in range(y0, y1 + 1):
-                    self._filed.setdefault((x, y), []).append(number)
+                    filed.setdefault((x, y), []).append(number)
+        return filed
 
     def _places(self, box: Bounds) -> tuple[int, int, int, int]:
         (x, y), cell = self._low, self.cell
@@ -124,21 +130,15 @@ class EdgeIndex:
         """Edges whose bounding boxes meet a box."""
         return (self.edges[number] for number in self.numbers(box))
 
-    def numbers(self, box: Bounds) -> list[int]:
-        """The same, by their place among the edges that were filed."""
-        x0, y0, x1, y1 = self._places(box)
+    def numbers(self, box: Bounds, among: Sequence[int] | None = None) -> list[int]:
+        """The same, by their place among the edges that were filed.
+
+        ``among``, in rising order: those that come into question.
+        """
         left, bottom, right, top = box
-        filed, boxes = self._filed, self._boxes
-        near: Iterable[int]
-        if x0 == x1 and y0 == y1:
-            near = filed.get((x0, y0), ())
-        else:
-            low_x, low_y, high_x, high_y = self._reach
-            columns = range(max(x0, low_x), min(x1, high_x) + 1)
-            rows = range(max(y0, low_y), min(y1, high_y) + 1)
-            cells = [filed[x, y] for x in columns for y in rows if (x, y) in filed]
-            near = dict.fromkeys(chain.from_iterable(cells)) if len(cells) > 1 else chain(*cells)
-        return [
+        boxes = self._boxes
+        near = self._near(box) if among is None else among
+        found = [
             number
             for number in near
             if (own := boxes[number])[0] <= right
@@ -146,6 +146,24 @@ class EdgeIndex:
             and own[1] <= top
             and own[3] >= bottom
         ]
+        if among is not None and len(found) > 1:
+            x0, y0, _, _ = self._places(box)
+            cells = {number: self._places(boxes[number]) for number in found}
+            # The first cell that both touch, as they are told cell by cell.
+            found.sort(key=lambda n: (max(x0, cells[n][0]), max(y0, cells[n][1])))
+        return found
+
+    def _near(self, box: Bounds) -> Iterable[int]:
+        """The edges in the cells that a box touches, cell by cell, each once."""
+        x0, y0, x1, y1 = self._places(box)
+        filed = self._filed
+        if x0 == x1 and y0 == y1:
+            return filed.get((x0, y0), ())
+        low_x, low_y, high_x, high_y = self._reach
+        columns = range(max(x0, low_x), min(x1, high_x) + 1)
+        rows = range(max(y0, low_y), min(y1, high_y) + 1)
+        cells = [filed[x, y] for x in columns for y in rows if (x, y) in filed]
+        return dict.fromkeys(chain.from_iterable(cells)) if len(cells) > 1 else chain(*cells)
 
     @property
     def right(self) -> float:

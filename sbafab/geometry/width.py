@@ -8,30 +8,30 @@ between corners; these are exact for lines and arcs.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
-from sbafab.geometry.edges import Arc, Edge, Line, Point, left_normal
-from sbafab.geometry.ends import ROUNDED
+from sbafab.geometry.corners import Corner, corners_of, pinch
+from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, left_normal
+from sbafab.geometry.ends import tapered_ends
 from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.kept import kept
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.remembered import remembered
-from sbafab.geometry.sides import (
-    BoundarySide,
-    Corner,
-    Foot,
-    corners_of,
-    dot,
-    ends_of,
-    from_outside,
-    sides_of,
-)
+
+if TYPE_CHECKING:
+    from sbafab.geometry.side_table import SideTable
 
 ALONGSIDE = 1e-3
 """Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
+BESIDE = 1e-5
+"""mm that an edge may miss another's normals by, for rounding."""
 SHORTER = 1e-9
 """mm by which a segment must be shorter than another to be the narrowest."""
+ROUNDING = 1e-12
+"""mm: more than what distances are rounded by."""
 TOUCH = 1e-6
 """mm within which two points are one."""
 STEP = math.radians(15)
@@ -40,6 +40,8 @@ ASIDE = math.acos(0.9)
 """Radians (25 degrees) that the normals of samples which still face each other may turn aside."""
 SQUARE = 0.05
 """The same for edges square on each other: room for rounding, and for those alongside."""
+MANY_SIDES = 100
+"""From which on looking at all pairs in arrays is worth it."""
 
 
 class Width(NamedTuple):
@@ -66,24 +68,88 @@ def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) ->
 @remembered
 def least_gap(region: Region, sharp: float = 90.0, below: float = math.inf) -> Width | None:
     """The narrowest slot, hole or gap between pieces, likewise."""
-    outside = [from_outside(contour) for contour in region.contours]
+    outside = [kept(one, "from_outside", Contour.reversed) for one in region.contours]
     return least_of(Boundary(outside, sharp), below)
+
+
+class _Foot(NamedTuple):
+    point: Point
+    normal: Point
+
+
+class BoundarySide(NamedTuple):
+    """An edge with what the search asks of it again and again.
+
+    ``half`` is how far its ends lie from its middle, ``lean`` the sine of its half turn.
+    """
+
+    edge: Edge
+    box: Bounds
+    middle: Point
+    normal: Point
+    half_turn: float
+    half: float
+    lean: float
+
+    def may_hold_feet(self, other: BoundarySide, within: float) -> bool:
+        """Whether a normal of this edge may meet the other no farther off than ``within``."""
+        (x, y), (nx, ny) = self.middle, self.normal
+        aside = abs((other.middle[0] - x) * ny - (other.middle[1] - y) * nx)
+        return aside <= self.half + other.half + within * self.lean + BESIDE
+
+    def feet(self, p: Point) -> list[_Foot]:
+        """Points of the edge where its normal passes through ``p``."""
+        edge = self.edge
+        if isinstance(edge, Line):
+            (x0, y0), (x1, y1) = edge
+            dx, dy = x1 - x0, y1 - y0
+            square = dx * dx + dy * dy
+            t = ((p[0] - x0) * dx + (p[1] - y0) * dy) / square
+            if not -1e-9 <= t <= 1 + 1e-9:
+                return []
+            length = math.sqrt(square)
+            return [_Foot((x0 + t * dx, y0 + t * dy), (-dy / length, dx / length))]
+        (cx, cy), r = edge.centre, edge.radius
+        ux, uy = p[0] - cx, p[1] - cy
+        distance = math.hypot(ux, uy)
+        if distance < 1e-12:
+            return [_Foot(self.middle, left_normal(edge, self.middle))]
+        inward = -1.0 if edge.ccw else 1.0
+        mx, my = self.middle[0] - cx, self.middle[1] - cy
+        least = r * (math.cos(self.half_turn) - 1e-9)
+        found = []
+        for sign in (1.0, -1.0):
+            vx, vy = sign * ux / distance, sign * uy / distance
+            if vx * mx + vy * my >= least:
+                found.append(_Foot((cx + r * vx, cy + r * vy), (inward * vx, inward * vy)))
+        return found
 
 
 class Boundary:
     """Contours with the material on their left, made ready for the search."""
 
     def __init__(self, contours: Sequence[Contour], sharp: float) -> None:
-        self.sides = [side for contour in contours for side in sides_of(contour)]
+        self.sides = [side for one in contours for side in kept(one, "sides", _sides)]
+        self.corners = [corner for one in contours for corner in kept(one, "corners", _corners)]
+        """What corner each side starts at, if any."""
+        self.ends = [
+            ends
+            for one in contours
+            for ends in kept(one, f"ends{sharp}", lambda c: list(tapered_ends(c, sharp)))
+        ]
+        self.pinch = pinch(contours, self.corners, sharp)
         self.index = EdgeIndex(
             [side.edge for side in self.sides], [side.box for side in self.sides]
         )
-        self.corners = [corner for contour in contours for corner in corners_of(contour)]
-        """What corner each side starts at, if any."""
-        self.ends = [ends for contour in contours for ends in ends_of(contour, sharp)]
-        self.pinch = _pinch(contours, self.corners, sharp)
         self.known_clear: dict[tuple[Point, Point], bool] = {}
         """Of segments that were asked: whether no edge crosses them."""
+
+    @cached_property
+    def table(self) -> SideTable:
+        """The sides in arrays."""
+        from sbafab.geometry.side_table import SideTable
+
+        return SideTable(self.sides)
 
 
 def _made_ready(region: Region, sharp: float) -> Boundary:
@@ -111,7 +177,7 @@ class _Narrowest:
         if value < self.value - SHORTER and self.is_clear(p, q):
             self.value, self.best = value, Width(value, p, q)
 
-    def offer_facing(self, a: Foot, b: Foot) -> None:
+    def offer_facing(self, a: _Foot, b: _Foot) -> None:
         (px, py), (nx, ny) = a
         (qx, qy), (mx, my) = b
         dx, dy = qx - px, qy - py
@@ -119,17 +185,21 @@ class _Narrowest:
             self.offer((px, py), (qx, qy))
 
     def near(
-        self, a: BoundarySide | Corner, aside: float, after: int = -1
+        self,
+        a: BoundarySide | Corner,
+        aside: float,
+        after: int = -1,
+        among: Sequence[int] | None = None,
     ) -> Iterator[tuple[int, BoundarySide]]:
         """Numbered sides that a segment shorter than the best could join to ``a``.
 
         Their normals are opposed somewhere, to within ``aside`` radians, and their numbers come
-        ``after`` this one.
+        ``after`` this one. ``among``: no others come into question.
         """
         (nx, ny), turn = a.normal, a.half_turn + aside
         sides = self.boundary.sides
         straight = -math.cos(turn)
-        for number in self.boundary.index.numbers(widened(a.box, self.value)):
+        for number in self.boundary.index.numbers(widened(a.box, self.value), among):
             if number <= after:
                 continue
             side = sides[number]
@@ -188,8 +258,13 @@ def least_of(boundary: Boundary, below: float) -> Width | None:
 def search(narrowest: _Narrowest) -> None:
     """Offers every place where edges or corners face each other."""
     boundary = narrowest.boundary
-    for i, a in enumerate(boundary.sides):
-        for _, b in narrowest.near(a, SQUARE, after=i):
+    later: Sequence[Sequence[int] | None] = [None] * len(boundary.sides)
+    if len(boundary.sides) >= MANY_SIDES:
+        later = boundary.table.later(SQUARE, narrowest.value)
+    for i, (a, among) in enumerate(zip(boundary.sides, later, strict=True)):
+        if among == []:
+            continue
+        for _, b in narrowest.near(a, SQUARE, i, among):
             if a.may_hold_feet(b, narrowest.value) or b.may_hold_feet(a, narrowest.value):
                 _between_edges(a, b, narrowest)
     _at_corners(boundary.corners, narrowest)
@@ -197,24 +272,28 @@ def search(narrowest: _Narrowest) -> None:
         narrowest.offer(p, q)
 
 
-def _pinch(
-    contours: Iterable[Contour], corners: Iterable[Corner | None], sharp: float
-) -> Point | None:
-    """A corner sharper than allowed, or a point where the boundary meets itself."""
-    for corner in corners:
-        if corner is not None and math.degrees(math.pi - corner.turn) < sharp - ROUNDED:
-            return corner.point
-    seen: set[Point] = set()
-    for contour in contours:
-        for edge in contour.edges:
-            if edge.start in seen:
-                return edge.start
-            seen.add(edge.start)
-    return None
+def _sides(contour: Contour) -> list[BoundarySide]:
+    return [_side(edge, box) for edge, box in zip(contour.edges, contour.boxes, strict=True)]
+
+
+def _corners(contour: Contour) -> list[Corner | None]:
+    return list(corners_of(contour))
+
+
+def _side(edge: Edge, box: Bounds) -> BoundarySide:
+    if isinstance(edge, Arc):
+        # As ``at`` says, which would work out the sweep once more.
+        sweep = edge.sweep
+        middle, half_turn = edge.on_circle(edge.start_angle + 0.5 * sweep), abs(sweep) / 2
+    else:
+        middle, half_turn = edge.at(0.5), 0.0
+    half = max(math.dist(middle, edge.start), math.dist(middle, edge.end))
+    lean = math.sin(min(half_turn, math.pi / 2))
+    return BoundarySide(edge, box, middle, left_normal(edge, middle), half_turn, half, lean)
 
 
 def _between_edges(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> None:
-    if a.lies_farther(b, narrowest.most):
+    if _lie_farther(a.edge, b.edge, narrowest.most):
         return
     if isinstance(a.edge, Arc):
         if _alongside(a.edge, b.edge) and _may_face(a.edge, b.edge, narrowest.value):
@@ -237,12 +316,24 @@ def _between_edges(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> N
         _along_each_other(a, b, narrowest)
 
 
+def _lie_farther(a: Edge, b: Edge, than: float) -> bool:
+    """Whether two arcs surely lie farther apart than so many mm, for their circles do."""
+    if not (isinstance(a, Arc) and isinstance(b, Arc)):
+        return False
+    gap, r, s = math.dist(a.centre, b.centre), a.radius, b.radius
+    apart = max(gap - r - s, abs(r - s) - gap)
+    if apart <= than:
+        return False
+    off = [abs(math.dist(p, e.centre) - e.radius) for e in (a, b) for p in (e.start, e.end)]
+    return apart - sum(off) - ROUNDING > than
+
+
 def _alongside(a: Edge, b: Edge) -> bool:
     if isinstance(a, Arc) and isinstance(b, Arc):
         return math.dist(a.centre, b.centre) < ALONGSIDE
     if isinstance(a, Line) and isinstance(b, Line):
         u, v = a.direction(a.start), b.direction(b.start)
-        return dot(u, v) < 0 and abs(u[0] * v[1] - u[1] * v[0]) < ALONGSIDE
+        return _dot(u, v) < 0 and abs(u[0] * v[1] - u[1] * v[0]) < ALONGSIDE
     return False
 
 
@@ -265,7 +356,7 @@ def _may_face(a: Arc, b: Edge, within: float) -> bool:
 def _along_each_other(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> None:
     for one, other in ((a, b), (b, a)):
         for p in (one.middle, one.edge.start, one.edge.end):
-            here = Foot(p, left_normal(one.edge, p))
+            here = _Foot(p, left_normal(one.edge, p))
             for foot in other.feet(p):
                 narrowest.offer_facing(here, foot)
 
@@ -290,9 +381,9 @@ def _between_corners(a: Corner, b: Corner, narrowest: _Narrowest) -> None:
         narrowest.offer(a.point, b.point)
 
 
-def _corner_to_edge(corner: Corner, side: BoundarySide, foot: Foot, narrowest: _Narrowest) -> None:
+def _corner_to_edge(corner: Corner, side: BoundarySide, foot: _Foot, narrowest: _Narrowest) -> None:
     d = (foot.point[0] - corner.point[0], foot.point[1] - corner.point[1])
-    if dot(d, foot.normal) > -TOUCH:
+    if _dot(d, foot.normal) > -TOUCH:
         return
     if corner.turn < 0:
         if corner.squarely(d):
@@ -300,6 +391,10 @@ def _corner_to_edge(corner: Corner, side: BoundarySide, foot: Foot, narrowest: _
         return
     ends = math.dist(foot.point, side.edge.start), math.dist(foot.point, side.edge.end)
     if min(ends) > 10 * TOUCH and any(
-        dot(normal, foot.normal) < 0 < dot(normal, d) for normal in corner.normals()
+        _dot(normal, foot.normal) < 0 < _dot(normal, d) for normal in corner.normals()
     ):
         narrowest.offer(corner.point, foot.point)
+
+
+def _dot(a: Point, b: Point) -> float:
+    return a[0] * b[0] + a[1] * b[1]

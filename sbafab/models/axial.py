@@ -95,7 +95,7 @@ def _force(
     asked: Asked,
 ) -> NDArray[np.float64]:
     factor = actuator.form.pushing * asked.calibration.contact_factor
-    return factor * force(pressure, k.rate(stroke))
+    return factor * force(pressure, k.push(stroke))
 
 
 def _each(actuator: Actuator) -> str:

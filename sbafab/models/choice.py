@@ -8,7 +8,7 @@ from dataclasses import replace
 from sbafab.models.figures import Figure
 
 BEHIND = (
-    # An upper bound: it says 140 degrees where the paper measured 81 and the stack says 69 to 93.
+    # An upper bound: it says 140 degrees where the paper measured 81 and the stack says 69 to 83.
     ("bending", "constant curvature", "elastic stack"),
     # The modulus was measured, at a pressure that nobody knows; the stack's is 0.2 of it.
     ("stiffness", "elastic stack", "3 E I / l^3"),

@@ -17,7 +17,8 @@ Inflated = Mapping[Balloon, Shapes]
 ELASTIC = Model(
     "elastic balloon",
     "membrane of revolution, the film's modulus",
-    "one balloon to 10 kPa: within 1 % of an axisymmetric mesh, 2 % of a solid one that wrinkles; "
+    "one balloon to 10 kPa: within 1.2 % of an axisymmetric mesh; d = 5 to 6 kPa within 3 % of a "
+    "solid one that wrinkles, while d = 10, whose rim then ripples, rises up to a quarter more; "
     "all balloons of a stack are taken for inner ones, inlets left out",
 )
 
@@ -74,7 +75,7 @@ def _inflated(kinds: Iterable[Balloon], pressures: Sequence[float]) -> list[Infl
 def _risen(
     kinds: Counter[Balloon], pressure: float, known: Inflated | None
 ) -> tuple[float, float, float]:
-    """Stroke in mm, air in ul and energy in uJ (that is the integral of p dV) of one stack."""
+    """Stroke in mm, air in ul and energy in uJ (to 3 % the integral of p dV) of one stack."""
     stroke = volume = stored = 0.0
     for kind, count in kinds.items():
         shape = known[kind] if known else inflate(kind, pressure)

@@ -2,7 +2,7 @@
 
 Balloons of unlike size (a tapered stack) are taken at equal height over radius, so that one
 formula holds for all: strokes add up with l, volumes with l^3. Volumes are the mean of a chamber's
-balloons.
+balloons. Held at a height they all carry one force, and are then at unlike heights over radius.
 """
 
 from __future__ import annotations
@@ -24,9 +24,15 @@ if TYPE_CHECKING:
     Law = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
+SAMPLES = 401
+
+
 @dataclass(frozen=True)
 class Kinematics:
-    """One stack by one model: limits, and ``_stroke``, ``_volume`` and ``_rate`` within them."""
+    """One stack by one model: limits, and ``_stroke``, ``_volume`` and ``_rate`` within them.
+
+    ``_push`` is given for balloons of unlike size.
+    """
 
     model: Model
     largest_volume: float
@@ -34,6 +40,7 @@ class Kinematics:
     _stroke: Law
     _volume: Law
     _rate: Law
+    _push: Law | None = None
 
     def stroke(self, volume: ArrayLike) -> NDArray[np.float64]:
         """Stroke of the stack in mm at ul a balloon. Raises DesignError out of range."""
@@ -47,6 +54,14 @@ class Kinematics:
     def rate(self, stroke: ArrayLike) -> NDArray[np.float64]:
         """dv/dh of the stack in mm2: the chamber's whole volume by the stack's stroke."""
         return self._rate(self._within(stroke))
+
+    def push(self, stroke: ArrayLike) -> NDArray[np.float64]:
+        """Force over pressure in mm2 of the stack held at a stroke: that of every balloon in it.
+
+        Of a tapered stack at most what its weakest balloon has when flat; what solid films of shut
+        balloons may carry beyond is not counted.
+        """
+        return (self._push or self._rate)(self._within(stroke))
 
     def _within(self, stroke: ArrayLike) -> NDArray[np.float64]:
         return within(stroke, self.largest_stroke, "stroke of the stack", "mm", self.model.name)
@@ -65,6 +80,7 @@ def round_stack(radii: Sequence[float]) -> tuple[Kinematics, Kinematics]:
             lambda v: stroke(v / scale) * first,
             lambda h: volume(h / first) * scale,
             lambda h: rate(h / first) * third / first,
+            _in_series(radii, rate, most) if len(set(radii)) > 1 else None,
         )
 
     by_eq_4 = scaled(
@@ -87,6 +103,20 @@ def round_stack(radii: Sequence[float]) -> tuple[Kinematics, Kinematics]:
         2 * parabola.fullest(1.0).height,
     )
     return by_eq_4, by_eqs_1_to_3
+
+
+def _in_series(radii: Sequence[float], rate: Law, most: float) -> Law:
+    """Force over pressure by stroke of unlike balloons that carry the same force.
+
+    ``rate`` is dv/dh of a balloon of radius 1 up to the stroke ``most``.
+    """
+    share = np.linspace(0.0, most, SAMPLES)
+    # Past its full state a formula may rise again; a balloon does not.
+    falling = np.minimum.accumulate(rate(share))
+    force = np.linspace(0.0, min(radii) ** 2 * falling[0], SAMPLES)
+    stroke = sum(r * np.interp(force / r**2, falling[::-1], share[::-1]) for r in radii)
+    by_stroke = np.asarray(stroke)[::-1]
+    return lambda h: np.asarray(np.interp(h, by_stroke, force[::-1]))
 
 
 def slot_stack(width: float, run: float, balloons: int) -> tuple[Kinematics]:

@@ -19,7 +19,7 @@ from sbafab.reproduction.records import NONE, Row, exact, predicted
 STACK = "elastic stack"
 FITTED = Factors(press_factor=0.509, pocket_loss=0.28)
 """The pocket loss that makes the 1-DoF actuator's force right when flat, in steps of 0.01 mm; the
-press factor is the measured flat height over the nominal."""
+press factor is the measured flat height over the nominal. ``predict`` given both says the same."""
 LENGTHS = (50.0, 100.0, 150.0)
 """Lengths of tube in mm for which the water's time is shown."""
 
@@ -241,8 +241,9 @@ CALIBRATED_WHY = {
         "the one figure that is fitted: no column buckles when flat, and the film's modulus hardly "
         "counts",
         "high: a column of six balloons is not stable here at 25 and 75 % where its tip may slide "
-        "on the sensor, one of ten not even where it sticks; the paper says that the 3-DoF is less "
-        "likely to buckle, and gives no number of balloons",
+        "on the sensor, one of ten not even where it sticks; but one that has slid away keeps a "
+        "tenth, so that it likely gave way in part. The paper says that the 3-DoF is less likely "
+        "to buckle, and gives no number of balloons",
         "high: as at 25 %, and as the 3-DoF",
     ),
     "3-DoF": (
@@ -250,7 +251,7 @@ CALIBRATED_WHY = {
         "its pockets lost 0.1 mm less",
         "near: films touch the plates there over most of the pocket, which the model has",
         "high: the film is likely stiffer than 10 MPa where 100 kPa stretch it, and then bulges "
-        "and touches less: films that do not stretch at all would push 2.1 N",
+        "and touches less: with 20 MPa it is right to 3 %, and the height at 10 kPa is not",
     ),
 }
 
@@ -284,8 +285,8 @@ def _calibrated_bent(found: Prediction) -> Iterator[Row]:
     chambers = "2 chambers"
     whys = {
         30: "low: the paper does not say which chambers push, nor how the sensor holds the tip; "
-        "with one chamber it is half of this",
-        60: "high: as at 30 degrees; with one chamber it is half of this",
+        "where it slides, 6 % low, and where the third chamber pushes too, 22 % high",
+        60: "high: as at 30 degrees; a tip that slides gives way, and one chamber has half of this",
         90: "near, as the paper does not say which chambers push: with one it is 1.5 times this",
     }
     for angle, value in paper.FORCE_BENT:
@@ -304,25 +305,30 @@ def _calibrated_motion(three: Stack) -> Iterator[Row]:
     """
     full = paper.FULL_KPA
     time, pose = filled(three, paper.WATER_FLOW, full, length=1e-3)
+    with_tubes = [filled(three, paper.WATER_FLOW, full, length)[0] for length in (50.0, 150.0)]
     yield Row(
         f"height of the 3-DoF of 15 balloons ({HELD_OUT})",
         paper.FULL_HEIGHT,
         pose.height,
         f"{CALIBRATED}, {full:g} kPa in the chambers",
-        "within the 5 % aimed at; the paper gives no pressure, and counts 10 kPa as full actuation",
+        "within the 5 % aimed at, with the measured flat height; the paper gives no pressure, and "
+        "counts 10 kPa as full actuation",
     )
     yield Row(
         f"time to 10 kPa, water, 35 ml/min ({HELD_OUT})",
         paper.WATER_TIME,
         time,
         f"{CALIBRATED}, {full:g} kPa in the chambers, no tubes",
-        "within the 0.08 s aimed at: the pump stops at the SBA's internal pressure (Sec. 7)",
+        "within the 0.08 s aimed at: the pump stops at the SBA's internal pressure (Sec. 7). If "
+        f"the sensor sat at the pump it would be {with_tubes[0]:.2f} s with 50 mm of tube, "
+        f"{with_tubes[1]:.2f} s with 150",
     )
     for chambers, words, why in (
         (
             2,
             "2 chambers",
-            "low, by little more than the 6 degrees aimed at; the paper does not say which "
+            "low, by little more than the 6 degrees aimed at: pockets 0.1 mm less reduced, as this "
+            "actuator's own force when flat asks for, bend by 80; the paper does not say which "
             "chambers, nor at which pressure",
         ),
         (

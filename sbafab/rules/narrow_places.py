@@ -180,7 +180,10 @@ class _Profile(NamedTuple):
 def _profile(profile: Region) -> _Profile:
     numbered = [(n, c) for n, region in enumerate(profile.pieces) for c in region.contours]
     return _Profile(
-        EdgeTable.of([edge for _, contour in numbered for edge in contour.edges]),
+        EdgeTable.of(
+            [edge for _, contour in numbered for edge in contour.edges],
+            [box for _, contour in numbered for box in contour.boxes],
+        ),
         np.repeat(np.arange(len(numbered)), [len(contour.edges) for _, contour in numbered]),
         [piece for piece, _ in numbered],
     )

@@ -53,7 +53,10 @@ def test_listing_the_templates_loads_no_heavy_library() -> None:
 
 ARRAYS = {
     f"sbafab.{name}"
-    for name in ("geometry.edge_table", "geometry.facing_places", "rules.narrow_places")
+    for name in (
+        *("geometry.edge_table", "geometry.facing_places", "geometry.side_table"),
+        "rules.narrow_places",
+    )
 }
 """What the registration rules fetch when they measure; no other rule needs them."""
 

@@ -124,6 +124,18 @@ def test_reproduce_writes_every_figure_with_the_papers_error_bars(
     ):
         row = held_out[f"{figure} (held out)"]
         assert abs(row["predicted"] - row["paper"]) < aim
+    # One question, one answer: what the page names as its command says the same.
+    given = ["--pocket-loss", "0.28", "--press-factor", "0.509"]
+    assert " ".join(given) in (folder / "reproduction.md").read_text(encoding="utf-8")
+    _, out, _ = run(["predict", "3dof-15mm", *given, "--json", "-o", str(tmp_path)], capsys)
+    told = {(f["name"], f["model"].split(",")[0]): f["value"] for f in json.loads(out)["figures"]}
+    for angle in (30, 60, 90):
+        row = held_out[f"3-DoF, 100 kPa, bent by {angle} deg (held out)"]
+        name = f"force at 100 kPa in 2 chambers, bent by {angle} deg"
+        (value,) = (
+            v for (what, model), v in told.items() if (what, model[:13]) == (name, "elastic stack")
+        )
+        assert value == pytest.approx(row["predicted"], rel=1e-6)
     assert len(list(folder.glob("figure-*.svg"))) == 7
     assert "1.48 +- 0.04 N" in (folder / "reproduction.md").read_text(encoding="utf-8")
     assert "paper: 3-DoF, 100 kPa" in (folder / "figure-8a-force-3dof.svg").read_text()

@@ -12,12 +12,12 @@ from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Arc
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import disc, polygon, rectangle, stadium, strip
-from sbafab.geometry.sides import side_of
 from sbafab.geometry.width import (
     Boundary,
     Gathered,
     _along_each_other,
     _may_face,
+    _side,
     least_gap,
     least_width,
 )
@@ -233,6 +233,6 @@ def test_arcs_of_nearly_one_centre_that_are_left_out_face_each_other_nowhere(see
             continue
         left_out += 1
         gathered = Gathered(Boundary([], 30.0), within)
-        _along_each_other(side_of(a), side_of(b), gathered)
+        _along_each_other(_side(a, a.bounds), _side(b, b.bounds), gathered)
         assert gathered.offered == []
     assert 50 < left_out < 250

@@ -95,3 +95,25 @@ def test_comparison_of_eq_4_in_the_documentation() -> None:
         assert ratio == pytest.approx(by_eq_4 / by_eqs, abs=1e-3)
         exact = float(printed.rate(h, 2.5) / parabola.rate(h, 2.5))
         assert slopes == pytest.approx(exact, abs=6e-3)
+
+
+def test_what_the_misses_hang_on_begins_with_the_calibrated_figures() -> None:
+    lines = PATH.read_text(encoding="utf-8").splitlines()
+    (three, one) = [line for line in lines if line.startswith("| calibrated, as above |")]
+    measured = [line for line in lines if line.startswith("| **measured** |")]
+    held = {
+        row[0].split(" (")[0]: row for row in rows() if row[0].endswith(("held out)", "fitted)"))
+    }
+    names = [f"3-DoF, 100 kPa, {at}" for at in ("flat", *PARTS, *BENT)]
+    names += ["height of the 3-DoF of 15 balloons"]
+    others = [f"1-DoF, 100 kPa, {at}" for at in ("flat", *PARTS)]
+    for table, figures, paper in ((three, names, measured[0]), (one, others, measured[1])):
+        for name, value, wanted in zip(
+            figures, table.split("|")[2:-1], paper.split("|")[2:-1], strict=False
+        ):
+            assert float(value) == pytest.approx(float(held[name][3].split()[0]), abs=0.06), name
+            assert float(wanted) == pytest.approx(float(held[name][1].split()[0])), name
+
+
+PARTS = ("at 25 % of full stroke", "at 75 % of full stroke")
+BENT = ("bent by 30 deg", "bent by 60 deg", "bent by 90 deg")

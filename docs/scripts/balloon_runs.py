@@ -1,0 +1,186 @@
+"""Holds the elastic balloon against CalculiX and writes the table into docs/prediction.md.
+
+``python -m docs.scripts.balloon_runs`` needs ccx and the extra "mesh": seconds for the sections through
+the axis, some minutes of processor time for each solid mesh. Parts of rows' names as arguments run only
+these ("smooth", "d = 5, alone"); the other rows stay.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import sbafab
+from sbafab.actuators import load_design
+from sbafab.meshing.conforming.settings import MeshSettings
+from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.balloons import balloons_of
+from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_states
+from sbafab.simulators.calculix.job import simulate
+from sbafab.simulators.calculix.settings import deck_settings
+
+PAGE = Path(__file__).parents[1] / "prediction.md"
+BEGIN, END = "<!-- written by docs.scripts.balloon_runs -->", "<!-- to here -->"
+PRESSURES = (0.5, 2.0, 6.0, 10.0)
+"""kPa."""
+HOUR = 3600.0
+SMOOTH, FREE = "held smooth", "free to wrinkle"
+Found = tuple["np.ndarray", "np.ndarray"]
+"""Strokes in mm and air in ul at the pressures."""
+
+
+class Run(NamedTuple):
+    """A solid mesh in time: what pressures (kPa) it is for, and how many s it takes to the last.
+
+    The slower, the less inertia counts and the more steps ripples take: below 1 kPa columns and wide
+    pockets need it slow.
+    """
+
+    pressures: tuple[float, ...]
+    ramp: float
+
+
+class Case(NamedTuple):
+    """A row: the balloon of a template, alone or an inner one of a stack.
+
+    ``h`` mm is the solid mesh's; without ``runs`` it is a section through the axis.
+    """
+
+    template: str
+    alone: bool
+    h: float = 0.0
+    runs: tuple[Run, ...] = ()
+
+    @property
+    def pressures(self) -> tuple[float, ...]:
+        found = tuple(pressure for run in self.runs for pressure in run.pressures)
+        return found or PRESSURES
+
+    @property
+    def name(self) -> str:
+        size = self.template.removeprefix("1dof-").removesuffix("mm")
+        where = "alone" if self.alone else "in a stack"
+        return f"d = {size}, {where}, {FREE if self.runs else SMOOTH}"
+
+    @property
+    def balloon(self) -> Balloon:
+        design = load_design(self.template, (f"stack.balloons={1 if self.alone else 3}",))
+        return replace(balloons_of(design, sbafab.build(design))[0], wrinkles=bool(self.runs))
+
+
+CASES = (
+    Case("1dof-5mm", alone=True),
+    Case("1dof-5mm", alone=False),
+    Case("1dof-10mm", alone=True),
+    Case("1dof-10mm", alone=False),
+    Case("1dof-5mm", True, 0.22, (Run((0.5, 2.0, 6.0), 0.05),)),
+    Case("1dof-5mm", False, 0.35, (Run((0.5,), 1.0), Run((2.0, 6.0, 10.0), 0.05))),
+    Case("1dof-10mm", True, 0.45, (Run((0.15, 0.25), 0.16),)),
+)
+"""Wrinkles of an inner balloon of d = 10, and of a lone one whose rim ripples, would be hours."""
+
+
+def elastic(case: Case) -> Found:
+    """What the elastic balloon says."""
+    found = inflate(case.balloon, case.pressures)
+    return found.height, found.volume
+
+
+def measured(case: Case) -> Found:
+    """What CalculiX says."""
+    if not case.runs:
+        one = case.balloon
+        section = MeridianSection(
+            2 * one.pocket, one.ring, one.thickness, 2 * one.neck, 2 * one.bore
+        )
+        states = axisymmetric_states(case.pressures, section)
+        return np.array([s.stroke for s in states]), np.array([s.volume for s in states])
+    found = [_alone_or_inner(case, run) for run in case.runs]
+    return np.concatenate([one[0] for one in found]), np.concatenate([one[1] for one in found])
+
+
+def _alone_or_inner(case: Case, run: Run) -> Found:
+    if case.alone:
+        return solid(case, run, 1)
+    # The bottom and the top balloon are in both; what is left is an inner one.
+    three, two = solid(case, run, 3), solid(case, run, 2)
+    return three[0] - two[0], three[1] - two[1]
+
+
+def solid(case: Case, run: Run, balloons: int) -> Found:
+    """Quarter of a stack of wedges, in time; what its air holds beyond the flat one."""
+    laminate = sbafab.build(case.template, f"stack.balloons={balloons}")
+    settings = replace(
+        deck_settings(laminate), pressures={"chamber1": max(run.pressures)}, ramp=run.ramp
+    )
+    mesh = MeshSettings(h=case.h, symmetry="quarter")
+    with tempfile.TemporaryDirectory() as place:
+        found = simulate(laminate, mesh, settings, Path(place), HOUR, lambda *_: None)
+    if found.stopped:
+        raise SystemExit(found.stopped)
+    states = found.states
+    # Strokes grow about as the cube root of the pressure: nearly straight between outputs.
+    at = np.cbrt([state.pressures["chamber1"] for state in states])
+    wanted = np.cbrt(run.pressures)
+    strokes = np.interp(wanted, at, [state.stroke for state in states])
+    air = [state.volumes["chamber1"] - states[0].volumes["chamber1"] for state in states]
+    return strokes, np.interp(wanted, at, air)
+
+
+def apart(own: np.ndarray, other: np.ndarray) -> str:
+    return ", ".join(f"{share:+.1f}" for share in 100 * (own / other - 1))
+
+
+def row(case: Case) -> str:
+    """The row of a case."""
+    (stroke, air), (mesh_stroke, mesh_air) = elastic(case), measured(case)
+    kilopascals = ", ".join(f"{pressure:g}" for pressure in case.pressures)
+    cells = [
+        case.name,
+        kilopascals,
+        listed(stroke, 3),
+        listed(mesh_stroke, 3),
+        apart(stroke, mesh_stroke),
+    ]
+    cells += [listed(air, 2), listed(mesh_air, 2), apart(air, mesh_air)]
+    return "| " + " | ".join(cells) + " |"
+
+
+def listed(values: np.ndarray, digits: int) -> str:
+    return ", ".join(f"{value:.{digits}f}" for value in values)
+
+
+def known(text: str) -> dict[str, str]:
+    """The rows of the page by name."""
+    rows = (line for line in text.splitlines() if line.startswith("| d = "))
+    return {line.split("|")[1].strip(): line for line in rows}
+
+
+def main() -> None:
+    asked = sys.argv[1:]
+    run = {}
+    for case in CASES:
+        if not asked or any(part in case.name for part in asked):
+            run[case.name] = row(case)
+            print(run[case.name], flush=True)
+    head, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
+    body, _, tail = rest.partition(END)
+    found = known(body) | run
+    rows = [found[case.name] for case in CASES if case.name in found]
+    text = "\n".join([*HEADS, *rows])
+    PAGE.write_text(f"{head}{BEGIN}\n\n{text}\n\n{END}{tail}", encoding="utf-8", newline="\n")
+
+
+HEADS = (
+    "| balloon | kPa | stroke, mm: elastic | CalculiX | apart, % | air, ul: elastic | CalculiX "
+    "| apart, % |",
+    "|---|---|---|---|---|---|---|---|",
+)
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,73 @@
+"""The sides of a boundary in arrays: which of them may face each other is asked of all at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sbafab.geometry.edge_table import CellOrder, EdgeTable, dot, touching
+from sbafab.geometry.width import BESIDE, BoundarySide
+
+if TYPE_CHECKING:
+    from sbafab.geometry.edge_table import Bools, Floats, Indices
+
+ROOM = 1e-9
+"""More than the rounding of what is asked once more of each pair."""
+
+
+class SideTable:
+    """What the search knows of a boundary's sides."""
+
+    def __init__(self, sides: Sequence[BoundarySide]) -> None:
+        self.edges = [side.edge for side in sides]
+        self.table = EdgeTable.of(self.edges, [side.box for side in sides])
+        rows = [
+            (*side.middle, *side.normal, side.half_turn, side.half, side.lean) for side in sides
+        ]
+        columns = np.array(rows).T
+        self.middle, self.normal = columns[0:2], columns[2:4]
+        self.half_turn, self.half, self.lean = columns[4:7]
+
+    def pairs(self, aside: float, within: float) -> tuple[Indices, Indices]:
+        """Sides and those that their normals may meet no farther off, as ``near`` tells them."""
+        asked, a, b = self._near(within)
+        chosen = self._opposed(a, b, aside) & self._may_hold_feet(b, a, within) & (a != b)
+        a, b = a[chosen], b[chosen]
+        order = CellOrder(self.table.box).sorted(asked, a, b)
+        return a[order], b[order]
+
+    def later(self, aside: float, within: float) -> list[list[int]]:
+        """For each side the later ones that it may face square no farther off, and few others."""
+        _, a, b = self._near(within)
+        a, b = a[a < b], b[a < b]
+        opposed = self._opposed(a, b, aside)
+        a, b = a[opposed], b[opposed]
+        feet = self._may_hold_feet(a, b, within) | self._may_hold_feet(b, a, within)
+        found: list[list[int]] = [[] for _ in self.edges]
+        for one, other in zip(a[feet].tolist(), b[feet].tolist(), strict=True):
+            found[one].append(other)
+        return found
+
+    def _near(self, within: float) -> tuple[Floats, Indices, Indices]:
+        """The boxes of sides widened by ``within``, and the sides whose boxes these touch."""
+        asked, box = self.table.box.copy(), self.table.box
+        asked[:2] -= within
+        asked[2:] += within
+        return asked, *touching(asked, box)
+
+    def _opposed(self, a: Indices, b: Indices, aside: float) -> Bools:
+        """Whether their normals are opposed somewhere, to within ``aside`` radians."""
+        room = self.half_turn[a] + aside + self.half_turn[b]
+        opposed = dot(self.normal[:, a], self.normal[:, b]) < ROOM - np.cos(room)
+        found: Bools = opposed | (room > math.pi)
+        return found
+
+    def _may_hold_feet(self, a: Indices, b: Indices, within: float) -> Bools:
+        """Whether normals of sides ``a`` may meet sides ``b`` no farther off than ``within``."""
+        off, normal = self.middle[:, b] - self.middle[:, a], self.normal[:, a]
+        missed = np.abs(off[0] * normal[1] - off[1] * normal[0])
+        may: Bools = missed <= self.half[a] + self.half[b] + within * self.lean[a] + BESIDE + ROOM
+        return may
