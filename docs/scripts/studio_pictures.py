@@ -108,10 +108,16 @@ def _assembly(seen: Watched) -> None:
     seen.page.evaluate("text => studio.open(text)", api.template("brace"))
     seen.until("Boolean(studio.parts) && !Object.values(studio.stale).some(Boolean)")
     seen.page.click("#tab-plan")
-    seen.page.get_by_role("group", name="Seen from").get_by_role("button", name="Front").click()
-    seen.page.locator(".finding[data-rule=line-clearance]").click()
+    plan = seen.page.locator("#view-plan")
+    plan.get_by_role("button", name="Front", exact=True).click()
+    plan.get_by_role("button", name="Section", exact=True).click()
+    seen.until("(studio.prediction?.figures ?? []).length > 0")
     seen.page.wait_for_timeout(500)
     _keep(seen, "assembly")
+    seen.page.click("#tab-swing")
+    seen.until("document.querySelectorAll('#view-swing .reading').length > 0")
+    seen.page.wait_for_timeout(1500)
+    _keep(seen, "assembly-motion")
     seen.close()
 
 

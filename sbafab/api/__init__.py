@@ -30,7 +30,7 @@ from sbafab.api.designs import (
 )
 from sbafab.api.lab import kerf, record, report
 from sbafab.api.making import cut, generate, mesh, nest, press, simulate
-from sbafab.api.predicting import find, motion, predict, stack, sweep
+from sbafab.api.predicting import find, grip, motion, predict, predict_assembly, stack, sweep
 from sbafab.api.sources import Source
 
 __all__ = [
@@ -45,6 +45,7 @@ __all__ = [
     "drawing",
     "find",
     "generate",
+    "grip",
     "kerf",
     "load",
     "loads",
@@ -52,6 +53,7 @@ __all__ = [
     "motion",
     "nest",
     "predict",
+    "predict_assembly",
     "press",
     "record",
     "report",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
     from sbafab.laminate.laminate import Laminate, Layer
     from sbafab.meshing.surface import Surface
+    from sbafab.progress import Progress
     from sbafab.reports.features import Dimension
     from sbafab.rules.finding import Findings
 
@@ -91,11 +92,17 @@ def assemble(source: str | Path | Assembly, *changes: Change, **tables: Any) -> 
     return put_together(load_assembly(source, [*changes, tables]))
 
 
-def check(source: Source | Assembly, *changes: Change, **tables: Any) -> Findings:
+def check(
+    source: Source | Assembly,
+    *changes: Change,
+    progress: Progress | None = None,
+    **tables: Any,
+) -> Findings:
     """What the rule deck finds in a design; of an assembly, also what is found between parts.
 
-    Each finding has its limit and worst measured value in its own ``unit``. Raises DesignError for
-    what cannot be built. Limits are the paper's (Sec. 2) where it gives one, else ours.
+    Each finding has its limit and worst measured value in its own ``unit``. ``progress`` is told
+    each rule; what it raises ends the check. Raises DesignError for what cannot be built. Limits
+    are the paper's (Sec. 2) where it gives one, else ours.
     """
     from sbafab.assemblies.records import Assembly
     from sbafab.output.assembly import check_assembly
@@ -104,15 +111,18 @@ def check(source: Source | Assembly, *changes: Change, **tables: Any) -> Finding
 
     found = either_of(source, changes, tables)
     if isinstance(found, Assembly):
-        return Findings(check_assembly(found).findings)
-    return Findings(run_check(found)[1])
+        return Findings(check_assembly(found, progress).findings)
+    return Findings(run_check(found, progress)[1])
 
 
-def checking(source: Source, laminate: Laminate | None = None) -> Iterator[tuple[str, Findings]]:
+def checking(
+    source: Source, laminate: Laminate | None = None, pause: Callable[[], None] | None = None
+) -> Iterator[tuple[str, Findings]]:
     """Every rule's name and what it finds in a design, one after the other, as they are measured.
 
     Who stops asking stops the deck; registration-yield, which draws builds, comes last.
-    ``laminate`` is the design's, where it is built already. Raises DesignError.
+    ``laminate`` is the design's, where it is built already; ``pause`` is called between parts of
+    long rules, and what it raises ends the deck. Raises DesignError.
     """
     from sbafab.output.settings import limits
     from sbafab.rules.deck import RULES, run_rule
@@ -120,7 +130,7 @@ def checking(source: Source, laminate: Laminate | None = None) -> Iterator[tuple
     from sbafab.rules.measures import Measures
 
     design = load(source)
-    measures = Measures(laminate or build(design), limits(design))
+    measures = Measures(laminate or build(design), limits(design), pause or (lambda: None))
     for rule in RULES:
         found = run_rule(rule, measures.laminate, measures.limits, measures)
         yield rule.name, Findings(found)

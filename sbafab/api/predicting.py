@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,10 +11,14 @@ from sbafab.api.sources import Source, parted
 from sbafab.design.reading import Change
 
 if TYPE_CHECKING:
+    from sbafab.assemblies.build import Assembled
+    from sbafab.assemblies.records import Assembly
     from sbafab.laminate.laminate import Laminate
+    from sbafab.meshing.surface import Surface
     from sbafab.models.figures import Prediction
     from sbafab.models.motion import Motion
     from sbafab.models.stack import Stack
+    from sbafab.reports.assembly_prediction import AssemblyPrediction, Grip
     from sbafab.search.find import FoundDesign
     from sbafab.search.sweep import SweptDesigns
 
@@ -32,12 +36,12 @@ def predict(
     """What a design will do; each figure has a unit and names its model and its trust.
 
     Forces and works are at ``pressures_kpa``, times at ``flow_ml_min`` into each chamber, strokes
-    with ``volumes_ul`` in each balloon. ``quick`` leaves out the figures of the elastic stack,
-    which take seconds; ``laminate`` is the design's, where it is built already. ``asked`` holds
-    fields of ``Factors``: ``press_factor``, ``contact_factor``, ``pocket_loss`` mm and
-    ``modulus_mpa``, beside tables of the design. Raises
-    DesignError for what is out of every model's range. Models: the paper's Eqs. 1-4 (Sec. 3), and
-    elastic balloons of axisymmetric film in balance.
+    with ``volumes_ul`` in each balloon. ``quick`` leaves out the curves and the figures of the
+    elastic stack, which take seconds; ``laminate`` is the design's, where it is built already.
+    ``asked`` holds fields of ``Factors``: ``press_factor``, ``contact_factor``, ``pocket_loss`` mm
+    and ``modulus_mpa``, beside tables of the design. Raises DesignError for what is out of every
+    model's range. Models: the paper's Eqs. 1-4 (Sec. 3), and elastic balloons of axisymmetric film
+    in balance.
     """
     from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict as model_predict
@@ -45,6 +49,51 @@ def predict(
     factors, tables = parted(asked, Factors)
     wish = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), Factors(**factors))
     return model_predict(load(source, *changes, **tables), wish, laminate, quick)
+
+
+def predict_assembly(
+    source: str | Path | Assembly | Assembled,
+    *changes: Change,
+    pressure_kpa: float = 10.0,
+    load_g: float = 1.2,
+    pause: Callable[[], None] | None = None,
+    **tables: Any,
+) -> AssemblyPrediction:
+    """What the parts of an assembly do inflated: reach, load, grip, and what they then touch.
+
+    All actuators are at ``pressure_kpa``, and ``load_g`` g hangs across their tips; the paper's
+    marble by default (Sec. 5). ``pause`` is called between parts of the work, which takes seconds;
+    what it raises ends it. Raises DesignError for pressures that the models do not reach.
+    """
+    from sbafab.api.designs import assemble
+    from sbafab.assemblies.build import Assembled
+    from sbafab.reports.assembly_prediction import predict_assembly as model_predict
+
+    found = source if isinstance(source, Assembled) else assemble(source, *changes, **tables)
+    return model_predict(found, pressure_kpa, load_g, pause or (lambda: None))
+
+
+def grip(assembled: Assembled, part: str) -> tuple[Grip, Surface] | None:
+    """How a radial part of an assembly holds, and its inflated balloons; None for other parts.
+
+    The surface is in mm in the part's own frame, as high as the lumen leaves room, free without
+    one: lenses of two arcs of film that does not stretch (as for the paper's Sec. 5). Raises
+    DesignError where the assembly has no such part.
+    """
+    from sbafab.assemblies.build import PlacedSba
+    from sbafab.errors import DesignError
+    from sbafab.reports.assembly_prediction import grip as grip_of
+    from sbafab.reports.gripping import gripping
+
+    names = [placed.name for placed in assembled.parts]
+    if part not in names:
+        raise DesignError(f"no part is named {part!r}; there are {', '.join(names)}")
+    placed = assembled[part]
+    found = grip_of(assembled, placed) if isinstance(placed, PlacedSba) else None
+    if found is None or not isinstance(placed, PlacedSba):
+        return None
+    free = (found.free - found.deflated) / 2 / placed.made.laminate.balloons
+    return found, gripping(placed, found.room or free)
 
 
 def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **asked: Any) -> Stack:

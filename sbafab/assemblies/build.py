@@ -89,6 +89,18 @@ class PlacedPart:
         """Points (n, 3) in mm, turned about the part's own axis before they are bent or placed."""
         return about_axis(self.turn).points(points)
 
+    def upright(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points (n, 3) in mm of the part's own frame in the assembly, not bent: one that lies on a
+        tube stands on the tangent.
+        """
+        import numpy as np
+
+        turned = self.turned(points)
+        if self.radius is not None:
+            x, y, z = turned.T
+            turned = np.column_stack([self.radius + z, x, y])
+        return self.pose.points(turned)
+
 
 @dataclass(frozen=True)
 class PlacedSba(PlacedPart):

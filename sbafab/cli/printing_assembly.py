@@ -65,23 +65,7 @@ def print_assembly_prediction(found: AssemblyPrediction) -> None:
     out = console()
     out.print(Text(f"{found.name} at {found.pressure_kpa:g} kPa", style="bold"))
     out.print(table)
-    for touch in found.touches:
-        out.print(
-            Text(
-                f"{touch.part} and {touch.other} meet when inflated: they share "
-                f"{touch.volume:.2f} mm3; move them apart, or give less pressure"
-            )
-        )
-    for met in found.bent_touches:
-        out.print(
-            Text(
-                f"press {met.chambers} of {met.part} to less than {met.from_kpa:.2g} kPa, or move "
-                f"{met.other}: from there on, bent by {met.bend:.0f} degrees, they meet, and at "
-                f"{found.pressure_kpa:g} kPa they share {met.volume:.2f} mm3"
-            )
-        )
-    if not found.touches:
-        how = "standing straight" if found.bent_touches else "straight or bent"
-        out.print(Text(f"no inflated part meets another one, {how}"))
+    for sentence in found.met():
+        out.print(Text(sentence))
     for one in found.left_out:
         out.print(Text(f"left out: {one}"))

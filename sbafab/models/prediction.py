@@ -17,7 +17,7 @@ from sbafab.laminate.extent import film_mass
 from sbafab.laminate.laminate import Laminate
 from sbafab.models import axial, elastic, lobes, paper, stacked
 from sbafab.models.actuator import NO_OUTLINE, Actuator, actuator
-from sbafab.models.choice import chosen
+from sbafab.models.choice import STACK, chosen
 from sbafab.models.figures import (
     Asked,
     Figure,
@@ -49,7 +49,7 @@ def predict(
     laminate: Laminate | None = None,
     quick: bool = False,
 ) -> Prediction:
-    """Figures and curves of a design of any family; ``quick`` leaves out the elastic stack's.
+    """Figures and curves of a design of any family; ``quick`` gives no curves and no elastic stack.
 
     Raises DesignError where the design cannot be built, or for pressures, a flow or volumes that
     are out of range.
@@ -68,10 +68,12 @@ def predict(
     elif together is not None:
         found += stacked.figures(one, wish, together)
     found.sort(key=_place)
+    known = together if isinstance(together, Stack) else None
+    to_come = (STACK,) if quick and one.radii else ()
     return Prediction(
         wish,
-        chosen(item for item in found if isinstance(item, Figure)),
-        tuple(_relations(one, wish, together if isinstance(together, Stack) else None)),
+        chosen((item for item in found if isinstance(item, Figure)), to_come),
+        () if quick else tuple(_relations(one, wish, known)),
         tuple(item for item in found if isinstance(item, LeftOut)),
     )
 

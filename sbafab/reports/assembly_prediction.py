@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -17,7 +17,6 @@ from sbafab.reports.inflated_parts import (
     TOUCHING,
     as_it_is,
     carried,
-    in_place,
     lifted,
     shared,
     solids,
@@ -39,7 +38,7 @@ PAPERS = ("aperture", "brace", "standing")
 
 
 class AssemblyFigure(NamedTuple):
-    """One figure of a part: its value, the model it is of, and what the paper says, if it does."""
+    """One figure of a part: value in ``unit``, model, and what the paper says, if it does."""
 
     part: str
     name: str
@@ -70,12 +69,48 @@ class AssemblyPrediction(NamedTuple):
     left_out: tuple[str, ...]
     bent_touches: tuple[BentTouch, ...] = ()
 
+    def met(self) -> list[str]:
+        """Sentences on what inflated parts meet, and what would mend it."""
+        said = [
+            f"{touch.part} and {touch.other} meet when inflated: they share "
+            f"{touch.volume:.2f} mm3; move them apart, or give less pressure"
+            for touch in self.touches
+        ]
+        said += [
+            f"press {bent.chambers} of {bent.part} to less than {bent.from_kpa:.2g} kPa, or move "
+            f"{bent.other}: from there on, bent by {bent.bend:.0f} degrees, they meet, and at "
+            f"{self.pressure_kpa:g} kPa they share {bent.volume:.2f} mm3"
+            for bent in self.bent_touches
+        ]
+        if not self.touches:
+            how = "standing straight" if self.bent_touches else "straight or bent"
+            said.append(f"no inflated part meets another one, {how}")
+        return said
+
+
+class Grip(NamedTuple):
+    """A radial actuator inflated: diameters ``deflated`` and ``free``, out of any lumen, in mm.
+
+    In the assembly's lumen a balloon is ``room`` mm high; each stack pushes on the wall with
+    ``push`` N a kPa. Both are None without a lumen that it reaches.
+    """
+
+    part: str
+    deflated: float
+    free: float
+    room: float | None = None
+    push: float | None = None
+
 
 def predict_assembly(
-    assembled: Assembled, pressure_kpa: float = 10.0, load_g: float = MARBLE_G
+    assembled: Assembled,
+    pressure_kpa: float = 10.0,
+    load_g: float = MARBLE_G,
+    pause: Callable[[], None] = lambda: None,
 ) -> AssemblyPrediction:
     """What the parts do at one pressure, with a mass at the tips; the paper's marble has 1.2 g.
 
+    ``pause`` is called between parts of the work, which takes seconds; what it raises ends it.
     Raises DesignError for pressures that the models do not reach.
     """
     figures: list[AssemblyFigure] = []
@@ -87,18 +122,20 @@ def predict_assembly(
     for placed in assembled.parts:
         if not isinstance(placed, PlacedSba):
             continue
+        pause()
         pockets = placed.made.design.form.pockets
         if isinstance(pockets, Slots):
-            figures += _grip(assembled, placed, pockets, pressure_kpa, load_g)
+            figures += _held(assembled, placed, pressure_kpa, load_g)
         elif isinstance(pockets, Discs):
             figures += _arm(placed, stacks[placed.name], pressure_kpa, load_g)
             touches += _touches(assembled, placed, stacks, rises, pressure_kpa)
-            for met in bent_arms(assembled, placed, stacks, rises, pressure_kpa):
-                if isinstance(met, Clearance):
-                    what = f"clearance to {met.other}, bent by {met.chambers}"
-                    figures.append(AssemblyFigure(placed.name, what, met.gap, "mm", ELASTIC))
+            pause()
+            for bend in bent_arms(assembled, placed, stacks, rises, pressure_kpa, pause):
+                if isinstance(bend, Clearance):
+                    what = f"clearance to {bend.other}, bent by {bend.chambers}"
+                    figures.append(AssemblyFigure(placed.name, what, bend.gap, "mm", ELASTIC))
                 else:
-                    bent.append(met)
+                    bent.append(bend)
         else:
             left_out.append(f"{placed.name}: no model knows the form of a drawn pocket outline")
     if assembled.assembly.name not in PAPERS:
@@ -150,46 +187,51 @@ def _arm(
         )
 
 
-def _grip(
-    assembled: Assembled, placed: PlacedSba, pockets: Slots, pressure: float, load_g: float
-) -> Iterator[AssemblyFigure]:
-    """Diameter of a radial actuator, and how hard it holds in the assembly's lumen."""
+def grip(assembled: Assembled, placed: PlacedSba) -> Grip | None:
+    """How a radial actuator holds in the assembly's lumen; None for one of another form."""
     form, laminate = placed.made.design.form, placed.made.laminate
+    pockets = form.pockets
+    if not isinstance(pockets, Slots):
+        return None
     tube = form.wrap.tube_diameter if form.wrap is not None else 2 * (placed.radius or 0.0)
     balloons = laminate.balloons
     deflated = tube + 2 * laminate.thickness
-    highest = 2 * pockets.width / math.pi
-    yield AssemblyFigure(
-        placed.name, "diameter, deflated", deflated, "mm", "films", "15.33 (Sec. 2.1)"
-    )
-    yield AssemblyFigure(
-        placed.name,
-        "diameter, inflated free",
-        deflated + 2 * balloons * highest,
-        "mm",
-        "lens of two arcs",
-        "about 28 (Sec. 2.1)",
-    )
+    found = Grip(placed.name, deflated, deflated + 4 * balloons * pockets.width / math.pi)
     lumen = assembled.assembly.deploy.lumen_diameter
     if lumen is None:
-        return
+        return found
     room = (lumen - deflated) / 2 / balloons
-    most = fullest(pockets.width, pockets.run).stroke
-    if not 0 < room < most:
-        return
+    if not 0 < room < fullest(pockets.width, pockets.run).stroke:
+        return found
     # 1 kPa mm2 is 1 mN.
-    force = pressure * float(rate(room, pockets.width, pockets.run)) / 1000
-    yield AssemblyFigure(
-        placed.name, f"height of a balloon in the lumen of {lumen:g} mm", room, "mm", STATIC
+    push = float(rate(room, pockets.width, pockets.run)) / 1000
+    return found._replace(room=room, push=push)
+
+
+def _held(
+    assembled: Assembled, placed: PlacedSba, pressure: float, load_g: float
+) -> Iterator[AssemblyFigure]:
+    """Diameter of a radial actuator, and how hard it holds in the assembly's lumen."""
+    found = grip(assembled, placed)
+    assert found is not None
+    name = placed.name
+    said = (
+        ("diameter, deflated", found.deflated, "films", "15.33 (Sec. 2.1)"),
+        ("diameter, inflated free", found.free, "lens of two arcs", "about 28 (Sec. 2.1)"),
     )
-    yield AssemblyFigure(
-        placed.name, "push of each stack on the wall", force, "N", LENS, "holds (Sec. 5)"
-    )
+    for what, value, model, paper in said:
+        yield AssemblyFigure(name, what, value, "mm", model, paper)
+    if found.room is None or found.push is None:
+        return
+    force = pressure * found.push
+    lumen = f"height of a balloon in the lumen of {assembled.assembly.deploy.lumen_diameter:g} mm"
+    yield AssemblyFigure(name, lumen, found.room, "mm", STATIC)
+    push = "push of each stack on the wall"
+    yield AssemblyFigure(name, push, force, "N", LENS, "holds (Sec. 5)")
     if load_g > 0:
-        needed = load_g * 1e-3 * GRAVITY / (form.stacks * force)
-        yield AssemblyFigure(
-            placed.name, f"friction that holds {load_g:g} g along the lumen", needed, "", STATIC
-        )
+        needed = load_g * 1e-3 * GRAVITY / (placed.made.design.form.stacks * force)
+        hold = f"friction that holds {load_g:g} g along the lumen"
+        yield AssemblyFigure(name, hold, needed, "", STATIC)
 
 
 def _stacks(assembled: Assembled) -> dict[str, Stack]:
@@ -209,7 +251,7 @@ def _rise(placed: PlacedPart, found: Stack, pressure: float) -> NDArray[np.float
     """By what (3,) in mm an actuator lifts what stands on its top."""
     free = found.pose((pressure,) * found.chambers)
     ends = np.array([[0.0, 0.0, found.flat_height], [0.0, 0.0, free.height]])
-    low, high = in_place(placed, ends)
+    low, high = placed.upright(ends)
     lift: NDArray[np.float64] = high - low
     return lift
 

@@ -7,7 +7,7 @@ actuator stands inflated; what stands on the arm goes along with its tip.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -18,7 +18,6 @@ from sbafab.reports.inflated_parts import (
     apart,
     as_it_is,
     carried,
-    in_place,
     lifted,
     shared,
     solids,
@@ -77,6 +76,7 @@ def bent_arms(
     stacks: Mapping[str, Stack],
     rises: Mapping[str, NDArray[np.float64]],
     pressure: float,
+    pause: Callable[[], None] = lambda: None,
 ) -> Iterator[Clearance | BentTouch]:
     """For each other part the least clearance, or each way of bending in which the arm meets it.
 
@@ -90,6 +90,7 @@ def bent_arms(
     nearest: dict[str, Clearance] = {}
     met = set()
     for pressed in _ways(found.chambers):
+        pause()
         names = " and ".join(placed.made.laminate.chambers[i].name for i in pressed)
         own = _moved(around, _bent(found, pressed, pressure))
         for other, theirs in around.others.items():
@@ -161,7 +162,7 @@ class _Arm(NamedTuple):
 
 def _moved(around: _Around, pose: Pose) -> _Arm:
     """The bent arm and what stands on it."""
-    places = in_place(around.placed, pose.frames[0]) + around.lift
+    places = around.placed.upright(pose.frames[0]) + around.lift
     levels = (places[1:] + places[:-1]) / 2
     arm = _Arm([], [])
     for one in solids(around.placed, around.found, pose, around.lift):
@@ -182,7 +183,7 @@ def _moved(around: _Around, pose: Pose) -> _Arm:
 
 def _frame(placed: PlacedPart) -> NDArray[np.float64]:
     """Matrix (4, 4) of a part's own frame in the assembly's."""
-    corners = in_place(placed, np.concatenate([np.zeros((1, 3)), np.eye(3)]))
+    corners = placed.upright(np.concatenate([np.zeros((1, 3)), np.eye(3)]))
     found = np.eye(4)
     found[:3, 3] = corners[0]
     found[:3, :3] = (corners[1:] - corners[0]).T

@@ -62,18 +62,9 @@ def solids(placed: PlacedSba, found: Stack, pose: Pose, lift: NDArray[np.float64
     """An inflated actuator's balloons and webs in a pose, in place."""
     pieces = []
     for part in inflated(placed.made.laminate, found, pose, COARSE):
-        points = in_place(placed, part.surface.points) + lift
+        points = placed.upright(part.surface.points) + lift
         pieces += manifold(part.surface._replace(points=points)).decompose()
     return pieces
-
-
-def in_place(placed: PlacedPart, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points of a part's own frame in the assembly; on a tube it stands on the tangent."""
-    turned = placed.turned(points)
-    if placed.radius is not None:
-        x, y, z = turned.T
-        turned = np.column_stack([placed.radius + z, x, y])
-    return placed.pose.points(turned)
 
 
 def manifold(surface: Surface) -> manifold3d.Manifold:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache, cached_property
 
 from sbafab.geometry.edges import Edge
@@ -19,11 +20,17 @@ from sbafab.rules.margins import SHARP, Felt, InterfaceMargins, felt_alike, narr
 
 
 class Measures:
-    """Measured when first asked for; the deck passes one to all rules that share them."""
+    """Measured when first asked for; the deck passes one to all rules that share them.
 
-    def __init__(self, laminate: Laminate, limits: Limits) -> None:
+    ``pause`` is called between parts of long work; what it raises ends the work.
+    """
+
+    def __init__(
+        self, laminate: Laminate, limits: Limits, pause: Callable[[], None] = lambda: None
+    ) -> None:
         self.laminate = laminate
         self.limits = limits
+        self.pause = pause
         self._bond = cache(_bond)
         self._reaches = cache(_reaches)
 
@@ -32,7 +39,7 @@ class Measures:
 
         Places that are narrow with the rougher hand hold all that are so with a steadier one.
         """
-        other = Measures(self.laminate, limits)
+        other = Measures(self.laminate, limits, self.pause)
         other.margins, other.laid = self.margins, self.laid
         return other
 

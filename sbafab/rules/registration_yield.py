@@ -7,7 +7,7 @@ assumed: every cutting error and turn uniform within its most, every shift unifo
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -146,7 +146,7 @@ def simulate(
             for interface in alike.interfaces
         }
         groups.append(_Group(rows, own))
-    return _counted(groups, limits, seed)
+    return _counted(groups, limits, seed, measures.pause)
 
 
 def _rows(
@@ -171,7 +171,9 @@ def _in_order(rows: Mapping[Quantity, Iterable[MarginRows]]) -> list[Error]:
     )
 
 
-def _counted(groups: Sequence[_Group], limits: Limits, seed: int) -> Yield:
+def _counted(
+    groups: Sequence[_Group], limits: Limits, seed: int, pause: Callable[[], None]
+) -> Yield:
     """Draws the builds, in batches, and counts those in which all rows keep room."""
     import numpy as np
 
@@ -196,6 +198,7 @@ def _counted(groups: Sequence[_Group], limits: Limits, seed: int) -> Yield:
         for quantity in QUANTITIES
     }
     for first in range(0, wanted, BATCH):
+        pause()
         builds = min(BATCH, wanted - first)
         asked, bad = of_builds.short(numbers(seed, first * count, count, builds))
         whole += _different(bad)

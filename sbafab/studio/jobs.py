@@ -9,21 +9,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sbafab import api
 from sbafab.errors import DesignError, SbafabError
 from sbafab.studio import places
 from sbafab.studio.editing import MOST_EDITS, edited
 from sbafab.studio.model import Beat, finding_model, laminate_model
-from sbafab.studio.moving import Filling, poses, stack_model
+from sbafab.studio.moving import Filling, poses, stack_model, stack_of
+from sbafab.studio.moving_parts import moving_parts, part_poses, whole_prediction
 from sbafab.studio.parts import parts_model
 
 if TYPE_CHECKING:
+    from sbafab.assemblies.build import Assembled
     from sbafab.assemblies.records import Assembly
     from sbafab.design.records import Design
     from sbafab.laminate.laminate import Laminate
-    from sbafab.models.stack import Stack
     from sbafab.output.run import Run
 
 StudioJob = dict[str, Any]
@@ -40,19 +41,20 @@ def live(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     """
     text = _text(job)
     yield {"kind": "text", "text": text}
-    found = _loaded(text, job)
+    known = _known(text, job)
+    found = _read(known)
     if found.family == "assembly":
-        yield from _assembly(found, job, beat)
+        yield from _assembly(known, job, beat)
         return
     yield {"kind": "design", "name": found.name, "family": found.family, **_values(found)}
     beat()
-    laminate = _laminate(text, job["folder"], job["path"])
+    laminate = _laminate(known)
     yield laminate_model(laminate, frozenset(job.get("has", ())))
     beat()
     yield _prediction(found, laminate)
     beat()
     try:
-        for number, (rule, findings) in enumerate(api.checking(found, laminate), 1):
+        for number, (rule, findings) in enumerate(api.checking(found, laminate, beat), 1):
             yield {
                 "kind": "rule",
                 "rule": rule,
@@ -74,20 +76,19 @@ def _values(design: Design | Assembly) -> Answer:
     return {"values": api.resolved(design)}
 
 
-def _assembly(assembly: Assembly, job: StudioJob, beat: Beat) -> Iterator[Answer]:
+def _assembly(known: _Known, job: StudioJob, beat: Beat) -> Iterator[Answer]:
     """An assembly's keys, its parts in place, and what the rules find in and between them."""
+    assembly = _read(known)
     yield {"kind": "assembly", "name": assembly.name, **_values(assembly)}
     beat()
-    assembled = api.assemble(assembly)
+    assembled = _assembled(known)
     yield parts_model(assembled, frozenset(job.get("has", ())))
     beat()
-    yield {
-        "kind": "unpredicted",
-        "message": f"{assembly.name} is an assembly. Open one of its parts to have its actuator "
-        f"predicted; sbafab predict says what the whole does inflated.",
-    }
+    # What the whole does takes seconds, and is asked for when the hand rests.
+    yield {"kind": "prediction", "quick": True, "figures": [], "left_out": []}
     designs = {made.design.name for made in assembled.designs}
-    findings = [finding_model(finding) for finding in api.check(assembly)]
+    checked = api.check(assembly, progress=lambda *_: beat())
+    findings = [finding_model(finding) for finding in checked]
     for finding in findings:
         of, _, rest = finding["message"].partition(": ")
         if of in designs:
@@ -97,31 +98,37 @@ def _assembly(assembly: Assembly, job: StudioJob, beat: Beat) -> Iterator[Answer
 
 
 def _prediction(design: Design, laminate: Laminate) -> Answer:
-    """Figures and curves by closed formulas; why there are none, where that is so."""
+    """Figures by closed formulas; why there are none, where that is so."""
     try:
         found = api.predict(design, quick=True, laminate=laminate)
     except SbafabError as error:
         return {"kind": "unpredicted", "message": str(error)}
     except ModuleNotFoundError as error:
         return {"kind": "unpredicted", "message": f"This needs {error.name}, which is not here."}
-    return {"kind": "prediction", **found.as_dict()}
+    return {"kind": "prediction", "quick": True, **found.as_dict()}
 
 
 def elastic(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     """All figures, with those of the elastic stack, which take seconds."""
-    design = _loaded(_text(job), job)
+    known = _known(_text(job), job)
+    found = _read(known)
     beat()
-    yield {"kind": "prediction", **api.predict(design).as_dict()}
+    if found.family == "assembly":
+        yield whole_prediction(_assembled(known), job.get("pose") or {}, beat)
+    else:
+        yield {"kind": "prediction", **api.predict(found).as_dict()}
 
 
 def generate(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     """Writes the folder of a design into ``out``; every step is told, the last answer names it."""
-    yield _made(api.generate(_loaded(_text(job), job), out=job["out"], progress=_told(job, beat)))
+    yield _made(
+        api.generate(_read(_known(_text(job), job)), out=job["out"], progress=_told(job, beat))
+    )
 
 
 def cut(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     """The same with cut files and film sheets alone, which a page can write without a server."""
-    design = _loaded(_text(job), job)
+    design = _read(_known(_text(job), job))
     if design.family == "assembly":
         raise DesignError(f"{design.name} is an assembly; cut it with sbafab generate")
     yield _made(api.cut(design, out=job["out"], progress=_told(job, beat)))
@@ -154,11 +161,17 @@ def _made(run: Run) -> Answer:
 def motion(job: StudioJob, beat: Beat) -> Iterator[Answer]:
     """The actuator as the fast stack has it, and how it moves as its pressures grow together.
 
-    The pose asks for ``pressures``, or gives none for what the page has to know beforehand.
+    The pose asks for ``pressures``, or gives none for what the page has to know beforehand; of an
+    assembly for ``parts``, the pressures of each.
     """
-    text, asked = _text(job), job.get("pose") or {}
-    design = _loaded(text, job)
-    stack = _stack(text, job["folder"], job["path"])
+    known, asked = _known(_text(job), job), job.get("pose") or {}
+    design = _read(known)
+    if design.family == "assembly":
+        assembled = _assembled(known)
+        beat()
+        yield part_poses(assembled, asked) if "parts" in asked else moving_parts(assembled)
+        return
+    stack = stack_of(design)
     beat()
     if "pressures" not in asked:
         yield stack_model(design.name, stack)
@@ -182,31 +195,33 @@ def _text(job: StudioJob) -> str:
     return edited(job["text"], edits) if edits else str(job["text"])
 
 
-def _loaded(text: str, job: StudioJob) -> Any:
-    return _design(text, job["folder"], job["path"])
+class _Known(NamedTuple):
+    """A design's text, where its file would lie, and the states of the files that it names."""
+
+    text: str
+    path: Path
+    files: tuple[str, ...]
+
+
+def _known(text: str, job: StudioJob) -> _Known:
+    """Raises DesignError for a file outside the folder."""
+    folder = Path(job["folder"])
+    return _Known(text, folder / job["path"], places.named_files(text, folder))
 
 
 @lru_cache(maxsize=4)
-def _read(text: str, folder: str, path: str) -> Any:
-    return api.loads(text, Path(folder) / path)
-
-
-def _design(text: str, folder: str, path: str) -> Any:
-    """A design, read again each time where it names a file, which may have changed."""
-    if places.refuse_outside(text, Path(folder)):
-        _laminate.cache_clear()
-        return api.loads(text, Path(folder) / path)
-    return _read(text, folder, path)
+def _read(known: _Known) -> Any:
+    return api.loads(known.text, known.path)
 
 
 @lru_cache(maxsize=2)
-def _laminate(text: str, folder: str, path: str) -> Laminate:
-    return api.build(_design(text, folder, path))
+def _laminate(known: _Known) -> Laminate:
+    return api.build(_read(known))
 
 
 @lru_cache(maxsize=2)
-def _stack(text: str, folder: str, path: str) -> Stack:
-    return api.stack(_design(text, folder, path))
+def _assembled(known: _Known) -> Assembled:
+    return api.assemble(_read(known))
 
 
 JOBS: dict[str, Callable[[StudioJob, Beat], Iterator[Answer]]] = {

@@ -34,11 +34,12 @@ class AnswerShapes:
         key = region.key[:24]
         self.used.add(key)
         if key not in self.has and key not in self.new:
-            self.new[key] = [_flat(contour.vertices) for contour in region.contours]
+            self.new[key] = [flat(contour.vertices) for contour in region.contours]
         return key
 
 
-def _flat(vertices: Iterable[tuple[float, float, float]]) -> list[float]:
+def flat(vertices: Iterable[tuple[float, float, float]]) -> list[float]:
+    """A contour as the page reads it."""
     return [round(number, 6) for vertex in vertices for number in vertex]
 
 

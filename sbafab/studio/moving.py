@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,7 @@ from sbafab import api
 from sbafab.errors import DesignError
 
 if TYPE_CHECKING:
+    from sbafab.design.records import Design
     from sbafab.models.motion import Motion
     from sbafab.models.stack import Pose, Stack
 
@@ -17,8 +19,21 @@ CURVE = 25
 """Points of the curves beside the view."""
 LONGEST_STEP = 0.2
 """Seconds that one step of a motion spans at most."""
+MOST_STACKS = 6
+_STACKS: dict[str, Stack] = {}
 MOST_LOAD = 0.5
 """N that a hand may put on the tip."""
+
+
+def stack_of(design: Design) -> Stack:
+    """The stack of a design, kept for the next pose. Raises DesignError where there is none."""
+    own = {**api.resolved(design), "name": None, "order": None}
+    key = json.dumps(own, sort_keys=True, default=str)
+    if key not in _STACKS:
+        _STACKS[key] = api.stack(design)
+        while len(_STACKS) > MOST_STACKS:
+            del _STACKS[next(iter(_STACKS))]
+    return _STACKS[key]
 
 
 def stack_model(name: str, stack: Stack) -> dict[str, Any]:
@@ -26,7 +41,7 @@ def stack_model(name: str, stack: Stack) -> dict[str, Any]:
     return {
         "kind": "stack",
         "name": name,
-        "axes": _numbers(stack.axes),
+        "axes": numbers(stack.axes),
         "pitch": stack.pitch,
         "flat_height": stack.flat_height,
         "outline": stack.outline,
@@ -49,8 +64,8 @@ def poses(stack: Stack, asked: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
     Raises DesignError for what is out of the model's range.
     """
-    pressures = _asked(asked.get("pressures"), stack.chambers, "pressures")
-    yield _pose_model(stack.pose(pressures, **_loads(asked)))
+    pressures = asked_numbers(asked.get("pressures"), stack.chambers, "pressures")
+    yield pose_model(stack.pose(pressures, **_loads(asked)))
     if not asked.get("curves"):
         return
     most = max(pressures) or 1.0
@@ -64,7 +79,7 @@ def poses(stack: Stack, asked: dict[str, Any]) -> Iterator[dict[str, Any]]:
         rows.append((share * most, one.height, one.bend, float(sum(one.volumes))))
     names = ("pressure", "height", "bend", "volume")
     columns = zip(*rows, strict=True)
-    yield {"kind": "curves", **{name: _numbers(c) for name, c in zip(names, columns, strict=False)}}
+    yield {"kind": "curves", **{name: numbers(c) for name, c in zip(names, columns, strict=False)}}
 
 
 class Filling:
@@ -80,8 +95,8 @@ class Filling:
         It starts anew, vented, with another stack, tube or load, and where ``restart`` is asked.
         """
         tube = asked["tube"] if isinstance(asked.get("tube"), dict) else {}
-        pressures = _asked(asked.get("pressures"), stack.chambers, "pressures")
-        length, diameter, dt = _asked(
+        pressures = asked_numbers(asked.get("pressures"), stack.chambers, "pressures")
+        length, diameter, dt = asked_numbers(
             [tube.get("length"), tube.get("diameter"), tube.get("dt")], 3, "tube"
         )
         load = _loads(asked)
@@ -90,12 +105,12 @@ class Filling:
             self.known = known
             self.motion = api.motion(stack, length=length, diameter=diameter, **load)
         pose = self.motion.step(min(max(dt, 1e-4), LONGEST_STEP), pressures=pressures)
-        return {**_pose_model(pose), "valves": pressures, "time": round(self.motion.time, 4)}
+        return {**pose_model(pose), "valves": pressures, "time": round(self.motion.time, 4)}
 
 
 def _loads(asked: dict[str, Any]) -> dict[str, Any]:
     """What acts on the tip: a pull, weight, an outer plate."""
-    load = _asked(asked.get("load") or [0, 0, 0], 3, "load")
+    load = asked_numbers(asked.get("load") or [0, 0, 0], 3, "load")
     size = math.hypot(*load)
     if size > MOST_LOAD:
         load = [part * MOST_LOAD / size for part in load]
@@ -104,34 +119,34 @@ def _loads(asked: dict[str, Any]) -> dict[str, Any]:
     return {"tip_load": load, "gravity": bool(asked.get("gravity")), "plate": height}
 
 
-def _pose_model(pose: Pose) -> dict[str, Any]:
+def pose_model(pose: Pose) -> dict[str, Any]:
     origins, axes = pose.frames
     return {
         "kind": "pose",
         "pressures": list(pose.pressures),
-        "origins": _numbers(origins),
-        "axes": _numbers(axes.reshape(len(axes), 9)),
-        "gaps": _numbers(pose.gaps),
+        "origins": numbers(origins),
+        "axes": numbers(axes.reshape(len(axes), 9)),
+        "gaps": numbers(pose.gaps),
         "height": round(pose.height, 4),
         "bend": round(pose.bend, 3),
         "direction": round(pose.direction, 2),
-        "volumes": _numbers(pose.volumes),
+        "volumes": numbers(pose.volumes),
         "force": round(float(pose.force), 6),
         "stable": bool(pose.stable),
     }
 
 
-def _asked(values: Any, count: int, what: str) -> list[float]:
+def asked_numbers(values: Any, count: int, what: str) -> list[float]:
     good = isinstance(values, list) and len(values) == count
     if not good or not all(isinstance(v, int | float) and math.isfinite(v) for v in values):
         raise DesignError(f"{what} must be {count} finite numbers")
     return [float(value) for value in values]
 
 
-def _numbers(values: Any) -> Any:
+def numbers(values: Any) -> Any:
     """Nested lists with five decimals: 10 nm."""
     if hasattr(values, "tolist"):
         values = values.tolist()
     if isinstance(values, Sequence):
-        return [_numbers(value) for value in values]
+        return [numbers(value) for value in values]
     return round(float(values), 5)

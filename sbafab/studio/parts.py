@@ -15,6 +15,7 @@ from sbafab import api
 
 if TYPE_CHECKING:
     from sbafab.assemblies.build import Assembled, PlacedPart
+    from sbafab.meshing.surface import Surface
 
 PLACED_BY = {"on", "at", "angle", "along", "offset", "glue", "note", "design", "set"}
 """Keys of a part that do not change its own surface; of an actuator its laminate does."""
@@ -66,17 +67,18 @@ def _key(placed: PlacedPart) -> str:
 def _surface(placed: PlacedPart, key: str) -> dict[str, str]:
     found = _KNOWN.get(key)
     if found is None:
-        surface = api.solid(placed)
-        found = _KNOWN[key] = {
-            "points": _packed(surface.points, "<f4"),
-            "faces": _packed(surface.faces, "<u4"),
-        }
+        found = _KNOWN[key] = packed(api.solid(placed))
         while len(_KNOWN) > MOST_KNOWN:
             del _KNOWN[next(iter(_KNOWN))]
     return found
 
 
-def _packed(numbers: Any, kind: str) -> str:
+def packed(surface: Surface) -> dict[str, str]:
+    """Points and faces of a surface as the page unpacks them."""
+    return {"points": _words(surface.points, "<f4"), "faces": _words(surface.faces, "<u4")}
+
+
+def _words(numbers: Any, kind: str) -> str:
     return base64.b64encode(numbers.astype(kind).tobytes()).decode("ascii")
 
 

@@ -77,26 +77,29 @@ def save(path: Path, text: str, seen: str | None) -> str:
     return _hash(content)
 
 
-def refuse_outside(text: str, folder: Path) -> bool:
-    """Whether a design's text names files; raises DesignError for one outside the folder.
+def named_files(text: str, folder: Path, above: frozenset[Path] = frozenset()) -> tuple[str, ...]:
+    """The states of the files that a design's text names, so that a change in them is seen.
 
-    What is no TOML, or holds a value of another type there, is left to who reads it.
+    Raises DesignError for one outside the folder. What is no TOML, or holds a value of another type
+    there, is left to who reads it.
     """
     try:
         tables = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError):
-        return False
-    named = False
+        return ()
+    named: list[str] = []
     for key, value in _references(tables):
         if value in (*api.templates(), "paper"):
             continue
-        named = True
         path = folder / value
         if "\0" in value or not _lies_in(path, folder):
             raise DesignError(f"{key} = {value[:60]!r} lies outside {folder}; copy it into there")
-        if key.endswith("design") and path.is_file():
-            refuse_outside(path.read_text("utf-8", "replace"), path.parent)
-    return named
+        named.append(state(path) if path.is_file() else "")
+        # One that names itself is refused by who reads it.
+        if path.suffix == ".toml" and path.is_file() and path not in above:
+            inner = path.read_text("utf-8", "replace")
+            named += named_files(inner, path.parent, above | {path})
+    return tuple(named)
 
 
 def _references(tables: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:

@@ -252,13 +252,38 @@ def test_undo_and_redo(seen: Watched) -> None:
     seen.until("studio.laminate.balloons === 6")
 
 
+def test_each_quantity_is_predicted_once_and_other_models_unfold(seen: Watched) -> None:
+    seen.until("studio.prediction && !studio.prediction.quick")
+    figures = api.predict(api.loads(DESIGN)).as_dict()["figures"]
+    first = [figure["name"] for figure in figures if figure["design_with"]]
+    others = [figure["name"] for figure in figures if not figure["design_with"]]
+    panel = seen.page.locator(".section-block", has_text="Prediction")
+    names = panel.locator("tr:visible td:first-child")
+    assert names.all_inner_texts() == first
+    panel.get_by_text(f"Other models of the same ({len(others)})").click()
+    assert names.all_inner_texts() == first + others
+    # It stays open when the figures change.
+    seen.say("studio.edit([['bond.width', '0.8']])")
+    seen.ready()
+    assert panel.locator("details.more[open] tr:visible").count() > len(others) / 3
+    row = panel.locator("tr", has_text=others[0]).last
+    assert "Eqs." in (row.get_attribute("title") or "")
+
+
 def test_two_designs_side_by_side(seen: Watched) -> None:
     seen.page.get_by_role("button", name="Compare").click()
-    assert seen.page.locator(".diffs").inner_text().startswith("No key differs")
+    assert seen.page.locator("#view-compare .diffs").inner_text().startswith("No key differs")
     seen.say("studio.edit([['lumen.diameter', '3']])")
     seen.ready()
-    told = seen.page.locator(".diffs").inner_text()
+    told = seen.page.locator("#view-compare .diffs").inner_text()
     assert "lumen.diameter" in told
+    # A rule that measures two things is listed for both where both differ.
+    rules = [(f["rule"], f["measured"]) for f in seen.say("studio.findings")]
+    was = [(f.rule, f.measured) for f in api.check(api.loads(DESIGN))]
+    changed = [ours[0] for ours, theirs in zip(rules, was, strict=True) if ours != theirs]
+    assert [line.split(",")[0] for line in told.split("\n") if ", limit" in line] == [
+        rule for rule in changed if rule != "registration-yield"
+    ]
     assert "Prediction" in told
     # What differs is painted in a colour that nothing else has.
     drawn = picture(seen, ".half >> nth=0")

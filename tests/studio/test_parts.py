@@ -44,7 +44,7 @@ offset = [-10, 0]
 def seen(folder: Path, text: str, has: tuple[str, ...] = ()) -> dict[str, Any]:
     """The answers before those of the rules, by kind."""
     live = JOBS["live"]({**job(folder, text), "has": list(has)}, lambda: None)
-    return {a["kind"]: a for a in takewhile(lambda a: a["kind"] != "unpredicted", live)}
+    return {a["kind"]: a for a in takewhile(lambda a: a["kind"] != "prediction", live)}
 
 
 def points(answer: dict[str, Any], name: str) -> Any:
@@ -151,3 +151,25 @@ def test_findings_of_an_assembly_name_their_design(tmp_path: Path) -> None:
     ]
     assert {f.get("design") for f in findings} == {"1dof-5mm", None}
     assert not any(f["message"].startswith("1dof-5mm:") for f in findings)
+
+
+def test_a_change_ends_the_check_of_an_assembly_between_two_rules(tmp_path: Path) -> None:
+    class EnoughError(Exception):
+        pass
+
+    seen: list[str] = []
+    beats = 0
+
+    def beat() -> None:
+        nonlocal beats
+        beats += "prediction" in seen
+        if beats == 3:
+            raise EnoughError
+
+    def follow() -> None:
+        for answer in JOBS["live"](job(tmp_path, BASE), beat):
+            seen.append(answer["kind"])
+
+    with pytest.raises(EnoughError):
+        follow()
+    assert seen[-1] == "prediction"

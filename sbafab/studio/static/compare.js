@@ -3,7 +3,7 @@ import { el, plain } from "./dom.js";
 import { PanZoom } from "./panzoom.js";
 import { pathOf } from "./shapes.js";
 import { inkOf } from "./layers.js";
-import { significant } from "./findings.js";
+import { named, significant } from "./findings.js";
 
 export class Compare {
   title = "Compare";
@@ -40,7 +40,7 @@ export class Compare {
     this.eyes.forEach((eye) => eye.bounds(box, [34, 20, 20, 20]));
     this.halves[0].name.textContent = `Before: ${reference.name}`;
     this.halves[1].name.textContent = `Now: ${this.studio.designName}`;
-    this.list();
+    this.diffs.replaceChildren(differences(this.studio));
     this.draw();
   }
   draw() {
@@ -58,26 +58,6 @@ export class Compare {
       svg.setAttribute("aria-label", `${i ? "Now" : "Before"}, ${this.role.value}`);
     });
   }
-  list() {
-    const { reference, values, findings, prediction, laminate } = this.studio, rows = [];
-    const head = (words) => rows.push(el("tr", {}, el("th", { colspan: 4, scope: "rowgroup" }, words)));
-    const row = (name, a, b) => rows.push(el("tr", {}, el("td", {}, name), el("td", { class: "v" }, a), el("td", { class: "n" }, "→"), el("td", { class: "v" }, b)));
-    const a = flat(reference.values), b = flat(values);
-    const keys = [...new Set([...a.keys(), ...b.keys()])].filter((key) => a.get(key) !== b.get(key));
-    head(keys.length ? "Keys" : "No key differs");
-    for (const key of keys) row(key, a.get(key) ?? "–", b.get(key) ?? "–");
-    if (laminate.thickness !== reference.laminate.thickness) row("thickness, mm", plain(reference.laminate.thickness), plain(laminate.thickness));
-    const verdicts = (list) => new Map(list.map((finding) => [finding.rule, `${finding.verdict} ${finding.measured ?? ""}`]));
-    const before = verdicts(reference.findings), now = verdicts(findings);
-    const other = [...now.keys()].filter((rule) => before.has(rule) && before.get(rule) !== now.get(rule));
-    if (other.length) head("Rules");
-    for (const rule of other) row(rule, before.get(rule), now.get(rule));
-    const figures = new Map((reference.prediction?.figures ?? []).map((figure) => [figure.group + figure.name + figure.model, figure]));
-    const moved = (prediction?.figures ?? []).filter((figure) => { const was = figures.get(figure.group + figure.name + figure.model); return was && was.value !== figure.value; });
-    if (moved.length) head("Prediction");
-    for (const figure of moved) row(`${figure.name}, ${figure.unit}`, significant(figures.get(figure.group + figure.name + figure.model).value), significant(figure.value));
-    this.diffs.replaceChildren(el("table", { class: "figures" }, el("tbody", {}, ...rows)));
-  }
 }
 // The first layer of each kind, as both designs have it.
 function kinds(laminate) {
@@ -93,6 +73,37 @@ function flat(table, prefix = "", found = new Map()) {
   for (const [key, value] of Object.entries(table ?? {})) {
     if (value && typeof value === "object" && !Array.isArray(value)) flat(value, `${prefix}${key}.`, found);
     else found.set(prefix + key, typeof value === "object" ? JSON.stringify(value) : String(value));
+  }
+  return found;
+}
+// What differs from the state that is kept: keys, rules, figures.
+export function differences(studio) {
+  const { reference, values, findings, prediction, laminate } = studio, rows = [];
+  const head = (words) => rows.push(el("tr", {}, el("th", { colspan: 4, scope: "rowgroup" }, words)));
+  const row = (name, a, b) => rows.push(el("tr", {}, el("td", {}, name), el("td", { class: "v" }, a), el("td", { class: "n" }, "→"), el("td", { class: "v" }, b)));
+  const a = flat(reference.values), b = flat(values);
+  const keys = [...new Set([...a.keys(), ...b.keys()])].filter((key) => a.get(key) !== b.get(key));
+  head(keys.length ? "Keys" : "No key differs");
+  for (const key of keys) row(key, a.get(key) ?? "–", b.get(key) ?? "–");
+  if (laminate && laminate.thickness !== reference.laminate.thickness) row("thickness, mm", plain(reference.laminate.thickness), plain(laminate.thickness));
+  const before = verdicts(reference.findings), now = verdicts(findings);
+  const other = [...now.keys()].filter((name) => before.has(name) && before.get(name).words !== now.get(name).words);
+  if (other.length) head("Rules");
+  for (const name of other) row(now.get(name).label, before.get(name).words, now.get(name).words);
+  const figures = new Map((reference.prediction?.figures ?? []).map((figure) => [named(figure), figure]));
+  const moved = (prediction?.figures ?? []).filter((figure) => { const was = figures.get(named(figure)); return figure.design_with && was && significant(was.value) !== significant(figure.value); });
+  if (moved.length) head("Prediction");
+  for (const figure of moved) row(`${studio.family === "assembly" ? `${figure.group}: ` : ""}${figure.name}, ${figure.unit}`, significant(figures.get(named(figure)).value), significant(figure.value));
+  return el("table", { class: "figures" }, el("tbody", {}, ...rows));
+}
+// What each rule measured; one that measures several things, in their order.
+function verdicts(findings) {
+  const found = new Map();
+  for (const { rule, design, verdict, measured, limit, unit } of findings) {
+    const label = `${rule}${design ? ` of ${design}` : ""}${limit === null ? "" : `, limit ${plain(limit)} ${unit}`}`;
+    let name = label;
+    for (let i = 2; found.has(name); i++) name = `${label} ${i}`;
+    found.set(name, { label, words: `${verdict} ${measured === null ? "" : plain(measured)}` });
   }
   return found;
 }

@@ -1,6 +1,9 @@
 // What the rules found, as they are measured, and what the models predict.
 import { $, el, plain } from "./dom.js";
+import { withoutServer } from "./server.js";
 
+// ms between two looks at a deck that runs; laying the list out oftener takes the time of what is measured.
+const READABLE = 110;
 const RANK = { fail: 0, warn: 1, waived: 2, pass: 3 };
 
 export class Findings {
@@ -10,15 +13,26 @@ export class Findings {
     this.sum = el("span", { class: "sum" });
     this.block = el("div", { class: "section-block" }, el("h2", {}, "Rules", this.sum), this.list, el("div", { class: "stale-mark" }, "Checking"));
     this.figures = el("div", { class: "body" });
-    this.figuresBlock = el("div", { class: "section-block" }, el("h2", {}, "Prediction", el("span", { class: "sum" }, "formulas, elastic stack")), this.figures, el("div", { class: "stale-mark" }, "Updating"));
+    this.unfolded = new Set();
+    this.figuresBlock = el("div", { class: "section-block" }, el("h2", {}, "Prediction", el("span", { class: "sum", title: "Each quantity once, by the model to design with" }, "by the model to design with")), this.figures, el("div", { class: "stale-mark" }, "Updating"));
+    this.figures.before(this.whole());
     $("#panel-findings").append(this.block, this.figuresBlock);
-    // Rules that come in quick succession are shown together, once a frame.
-    studio.on("rule", () => { this.frame ??= requestAnimationFrame(() => { this.frame = null; this.draw(); }); });
+    // Rules that come in quick succession are shown together.
+    studio.on("rule", () => { this.soon ??= setTimeout(() => this.draw(), READABLE); });
     studio.on("checked opened", () => this.draw());
     studio.on("figures reference", () => this.drawFigures());
+    studio.on("design", () => { this.asked.hidden = studio.family !== "assembly" || withoutServer; });
     studio.on("failed", (answer) => { if (!answer.field) this.draw(); });
   }
+  // What an assembly is asked for: one pressure in all its actuators, and a mass at the tips.
+  whole() {
+    const { studio } = this;
+    const field = (name, label, unit) => el("label", {}, label, el("input", { type: "text", inputmode: "decimal", value: studio.inflated[name], "aria-label": `${label}, ${unit}`, onchange: (event) => studio.inflate({ [name]: Number(event.target.value.replace(",", ".") || NaN) }) }), unit);
+    return (this.asked = el("div", { class: "whole-asked", hidden: true }, field("pressure_kpa", "All at", "kPa"), field("load_g", "Mass at the tips", "g")));
+  }
   draw() {
+    clearTimeout(this.soon);
+    this.soon = null;
     const { studio } = this;
     // While the deck runs, a rule that was not measured again keeps its old line, pale.
     const fresh = new Map(studio.running.map((answer) => [answer.rule, answer.findings]));
@@ -44,21 +58,40 @@ export class Findings {
   }
 
   drawFigures() {
-    const { prediction, reference, noFigures } = this.studio;
+    const { studio } = this, { prediction, reference, noFigures } = studio;
     if (noFigures) { this.figures.replaceChildren(el("p", { class: "fallback" }, noFigures)); return; }
     if (!prediction) return;
-    const before = new Map((reference?.prediction?.figures ?? []).map((figure) => [figure.group + figure.name + figure.model, figure.value]));
-    const rows = [];
-    let group = null;
-    for (const figure of prediction.figures) {
-      if (figure.group !== group) { group = figure.group; rows.push(el("tr", {}, el("th", { colspan: 4, scope: "rowgroup" }, group))); }
-      const was = before.get(figure.group + figure.name + figure.model);
+    const before = new Map((reference?.prediction?.figures ?? []).map((figure) => [named(figure), figure.value]));
+    const row = (figure) => {
+      const was = before.get(named(figure));
       const change = was === undefined || was === figure.value ? "" : `${figure.value > was ? "+" : "−"}${significant(Math.abs(figure.value - was))}`;
-      rows.push(el("tr", { title: `${figure.model}. ${figure.trust}` }, el("td", {}, figure.name), el("td", { class: "v" }, significant(figure.value)), el("td", { class: "n" }, figure.unit), reference ? el("td", { class: "d" }, change) : null));
-    }
-    this.figures.replaceChildren(el("table", { class: "figures" }, el("tbody", {}, ...rows)));
+      return el("tr", { title: `${figure.model}. ${figure.trust}` }, el("td", {}, figure.name), el("td", { class: "v" }, significant(figure.value)), el("td", { class: "n" }, figure.unit), reference ? el("td", { class: "d" }, change) : null);
+    };
+    const table = (figures) => {
+      const groups = [...new Set(figures.map(({ group }) => group))];
+      return el("table", { class: "figures" }, el("tbody", {}, ...groups.flatMap((group) => [el("tr", {}, el("th", { colspan: 4, scope: "rowgroup" }, group)), ...figures.filter((figure) => figure.group === group).map(row)])));
+    };
+    const { figures, left_out: left, quick, met = [], meets, refused, before: old } = prediction, whole = studio.family === "assembly", others = figures.filter((figure) => !figure.design_with);
+    this.figures.replaceChildren(table(figures.filter((figure) => figure.design_with)),
+      old?.figures.length ? el("div", { class: "of-before", role: "group", "aria-label": "Figures of the state before" }, table(old.figures)) : "",
+      ...met.map((words) => el("p", { class: `met${meets ? " beyond" : ""}` }, words)),
+      refused ? el("p", { class: "met beyond" }, refused) : quick ? el("p", { class: "more" }, `${old?.figures.length ? "Figures of the state before. " : ""}${later(whole)}`) : "",
+      this.fold("others", `Other models of the same (${others.length})`, others.length, () => table(others)),
+      this.fold("left", `Left out (${left.length})`, left.length, () => el("dl", { class: "left-out" }, ...left.flatMap(({ name, reason }) => [el("dt", {}, name), el("dd", {}, reason)]))));
+  }
+  // What is shown on demand; it stays open when the figures change.
+  fold(name, words, count, content) {
+    if (!count) return "";
+    const details = el("details", { class: "more", open: this.unfolded.has(name), ontoggle: () => { this.unfolded[details.open ? "add" : "delete"](name); if (details.open && details.children.length < 2) details.append(content()); } }, el("summary", {}, words));
+    if (this.unfolded.has(name)) details.append(content());
+    return details;
   }
 }
+function later(whole) {
+  if (withoutServer) return whole ? "What the whole does inflated is left out here; sbafab predict has it." : "Without the elastic stack's figures; sbafab predict has them.";
+  return whole ? "What the whole does inflated follows once the design rests." : "The elastic stack's figures follow once the design rests.";
+}
+export const named = (figure) => figure.group + figure.name + figure.model;
 export function significant(value) {
   if (value === 0) return "0";
   const digits = Math.max(0, 2 - Math.floor(Math.log10(Math.abs(value))));

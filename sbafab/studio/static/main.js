@@ -13,6 +13,8 @@ import { Motion } from "./motion.js";
 import { Compare } from "./compare.js";
 import { PartsSolid } from "./parts_solid.js";
 import { PartsPlan } from "./parts_plan.js";
+import { PartsMotion } from "./parts_motion.js";
+import { PartsCompare } from "./parts_compare.js";
 import { goBack } from "./assembly_form.js";
 import { Dialogs } from "./dialogs.js";
 
@@ -36,9 +38,9 @@ async function start() {
 
   new Form(studio);
   new Editor(studio);
-  views = { solid: new Solid(studio), layers: new Layers(studio), motion: new Motion(studio), parts: new PartsSolid(studio), plan: new PartsPlan(studio), make: new Make(studio), compare: new Compare(studio) };
+  views = { solid: new Solid(studio), layers: new Layers(studio), motion: new Motion(studio), parts: new PartsSolid(studio), plan: new PartsPlan(studio), swing: new PartsMotion(studio), make: new Make(studio), compare: new Compare(studio), beside: new PartsCompare(studio) };
   studio.motion = views.motion;
-  studio.moving = () => !views.motion.element.hidden;
+  studio.moving = () => !views.motion.element.hidden || views.swing.moving;
   const section = new Section(studio);
   $("#lower-stage").append(section.element);
   new Findings(studio, (finding) => goto(finding, section));
@@ -107,15 +109,13 @@ function tabs() {
     next.focus();
     next.click();
   });
-  const compareTab = $("#tab-compare");
-  compareTab.hidden = true;
   studio.on("design", suitTabs);
   suitTabs();
   studio.on("reference", () => {
-    compareTab.hidden = !studio.reference;
+    suitTabs();
     $("#pin").setAttribute("aria-pressed", String(Boolean(studio.reference)));
     $("#pin").textContent = studio.reference ? "End comparison" : "Compare";
-    if (studio.reference) show("compare"); else if (upper.shown === "compare") show("layers");
+    if (studio.reference) show("compare");
   });
   show(recall("sbafab-view", "solid") in views ? recall("sbafab-view", "solid") : "solid");
   const panels = { form: $("#form"), toml: $("#toml") };
@@ -128,16 +128,20 @@ function tabs() {
   side(recall("sbafab-side", "form"));
 }
 // An assembly has views of its own; what stands in their place goes with a single design.
-const INSTEAD = { solid: "parts", layers: "plan", motion: "parts", compare: "plan" };
+const INSTEAD = { solid: "parts", layers: "plan", motion: "swing", compare: "beside" };
+const BACK = Object.fromEntries(Object.entries(INSTEAD).map(([single, whole]) => [whole, single]));
 function suitTabs() {
-  const whole = studio.family === "assembly", hidden = (name) => (whole ? name in INSTEAD : Object.values(INSTEAD).includes(name));
-  for (const name of Object.keys(views)) if (name !== "compare" || whole) $(`#tab-${name}`).hidden = hidden(name);
-  $("#pin").disabled = whole;
-  if (hidden(upper.shown)) show(upper.shown);
+  const whole = studio.family === "assembly", { reference } = studio;
+  // Only what is of one kind stands side by side.
+  const alike = reference && (reference.family === "assembly") === whole;
+  const hidden = (name) => name in (whole ? INSTEAD : BACK) || (["compare", "beside"].includes(name) && !alike);
+  for (const name of Object.keys(views)) $(`#tab-${name}`).hidden = hidden(name);
+  if (upper.shown && hidden(upper.shown)) show(upper.shown);
 }
 function show(name) {
-  if (name === "compare" && !studio.reference) name = "layers";
-  name = studio.family === "assembly" ? INSTEAD[name] ?? name : { parts: "solid", plan: "layers" }[name] ?? name;
+  const whole = studio.family === "assembly";
+  name = (whole ? INSTEAD : BACK)[name] ?? name;
+  if ($(`#tab-${name}`).hidden) name = whole ? "plan" : "layers";
   upper.shown = name;
   for (const [own, view] of Object.entries(views)) {
     view.element.hidden = own !== name;
@@ -147,10 +151,10 @@ function show(name) {
     if (own !== name) view.hide?.();
   }
   // What needs the room takes the section's as well.
-  $("#views").classList.toggle("whole", ["motion", "make", "compare", "parts", "plan"].includes(name));
+  $("#views").classList.toggle("whole", ["motion", "make", "compare", ...Object.keys(BACK)].includes(name));
   $("#low").hidden = $("#views").classList.contains("whole");
   views[name].show?.();
-  if (name !== "compare") remember("sbafab-view", name);
+  if (!["compare", "beside"].includes(name)) remember("sbafab-view", name);
 }
 
 // A finding shows its place in the plan, in the section and in space.
@@ -220,7 +224,7 @@ function marks(section) {
       const words = $(".stale-mark", element);
       if (words) words.textContent = bad ? "Last good design" : element.classList.contains("section-block") ? "Updating" : "Updating";
     };
-    for (const view of [views.solid, views.layers, views.compare, views.parts, views.plan]) mark(view.element, studio.stale.laminate || bad);
+    for (const view of [views.solid, views.layers, views.compare, views.parts, views.plan, views.swing, views.beside]) mark(view.element, studio.stale.laminate || bad);
     mark(section.element, studio.stale.laminate || bad);
     mark($("#panel-findings").children[0], studio.stale.rules || bad);
     mark($("#panel-findings").children[1], studio.stale.figures || bad);

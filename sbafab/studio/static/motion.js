@@ -1,7 +1,7 @@
 // The actuator under pressure: poses from the fast stack, drawn as they come.
 import { css, el, plain } from "./dom.js";
-import { COARSE, FINE, chart, frame, meridian, meshOf } from "./motion_drawing.js";
-import { area, polygons } from "./shapes.js";
+import { Balloons } from "./balloons.js";
+import { COARSE, FINE, chart, meshOf } from "./motion_drawing.js";
 import { listen, tab } from "./server.js";
 import { Stage3D, THREE } from "./stage3d.js";
 
@@ -78,7 +78,7 @@ export class Motion {
     this.sliders = [];
     this.values.replaceChildren();
     this.plot.replaceChildren();
-    this.body?.geometry.setDrawRange(0, 0);
+    this.body?.clear();
     this.stage?.draw();
     this.say(message, true);
   }
@@ -197,9 +197,7 @@ export class Motion {
   }
 
   scene() {
-    const geometry = new THREE.BufferGeometry();
-    this.body = new THREE.Mesh(geometry, new THREE.MeshPhongMaterial({ side: THREE.DoubleSide, shininess: 26, specular: 0x333a42, vertexColors: true }));
-    this.body.frustumCulled = false;
+    this.body = new Balloons(this.mesh);
     this.base = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 64), new THREE.MeshLambertMaterial());
     this.base.rotation.x = Math.PI / 2;
     this.plate = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 64), new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.35 }));
@@ -208,7 +206,7 @@ export class Motion {
     this.arrow.visible = this.plate.visible = false;
     this.trail = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ transparent: true, opacity: 0.7 }));
     this.trail.frustumCulled = false;
-    this.stage.scene.add(this.body, this.base, this.plate, this.arrow, this.trail);
+    this.stage.scene.add(this.body.group, this.base, this.plate, this.arrow, this.trail);
     this.colours();
     this.grab();
   }
@@ -220,93 +218,18 @@ export class Motion {
     if (this.stack) { this.shape(); if (this.pose) this.draw(); }
   }
   shape() {
-    const { stack } = this, count = stack.levels.length * stack.axes.length;
-    const { turn, rings } = this.mesh, rows = 2 * rings + 2, each = rows * turn;
-    this.points = new Float32Array(count * each * 3);
-    const colours = new Float32Array(count * each * 3), index = [];
-    const tones = ["--tpe", "--bond", "--waived", "--ptfe", "--pass", "--warn", "--tpe", "--bond"].map((name) => new THREE.Color(css(name)));
-    for (let b = 0; b < count; b++) {
-      const tone = tones[0].clone().lerp(tones[1], 0.22 * (b % stack.axes.length));
-      for (let i = 0; i < each; i++) tone.toArray(colours, (b * each + i) * 3);
-      for (let row = 0; row < rows - 1; row++) for (let t = 0; t < turn; t++) {
-        const a = b * each + row * turn + t, c = b * each + row * turn + ((t + 1) % turn);
-        index.push(a, c, a + turn, c, c + turn, a + turn);
-      }
-    }
-    const geometry = this.body.geometry;
-    geometry.setAttribute("position", new THREE.BufferAttribute(this.points, 3).setUsage(THREE.DynamicDrawUsage));
-    geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
-    geometry.setIndex(index);
-    geometry.setDrawRange(0, Infinity);
-    this.webs();
+    const { stack, studio: { laminate } } = this;
+    const walls = Object.values(laminate.patterns).filter(({ layers }) => laminate.layers[layers[0] - 1].role === "wall");
+    const wall = walls.sort((a, b) => b.layers.length - a.layers.length)[0];
+    this.body.shape(stack, { wall: wall && this.studio.shape(wall.shape), lumen: laminate.lumen });
     this.base.scale.set(stack.outline * 1.12, 0.6, stack.outline * 1.12);
     this.base.position.z = -0.32;
     this.plate.scale.set(stack.outline * 1.6, 0.15, stack.outline * 1.6);
     this.tips = [];
   }
-  // The bonded films between the balloons of a level: the plate's outline, one a level.
-  webs() {
-    const { stack, studio } = this, { laminate } = studio;
-    if (this.web) { this.stage.scene.remove(this.web); this.web.dispose(); this.web = null; }
-    const walls = Object.values(laminate.patterns).filter(({ layers }) => laminate.layers[layers[0] - 1].role === "wall");
-    const wall = walls.sort((a, b) => b.layers.length - a.layers.length)[0];
-    if (!wall || stack.axes.length < 2) return;
-    const round = (x, y, r) => Array.from({ length: 32 }, (_, t) => new THREE.Vector2(x + r * Math.cos(-t * Math.PI / 16), y + r * Math.sin(-t * Math.PI / 16)));
-    const outer = polygons(studio.shape(wall.shape), 0.02).filter((points) => area(points) > 0).sort((a, b) => area(b) - area(a))[0];
-    const shape = new THREE.Shape(outer.map(([x, y]) => new THREE.Vector2(x, y)));
-    for (const [x, y] of stack.axes) shape.holes.push(new THREE.Path(round(x, y, stack.balloons[0].pocket * 0.9)));
-    if (laminate.lumen) shape.holes.push(new THREE.Path(round(0, 0, laminate.lumen / 2)));
-    const flat = new THREE.ShapeGeometry(shape, 1);
-    this.web = new THREE.InstancedMesh(flat, new THREE.MeshLambertMaterial({ color: css("--tpe"), side: THREE.DoubleSide }), stack.levels.length);
-    this.web.frustumCulled = false;
-    this.stage.scene.add(this.web);
-  }
-  place() {
-    const { pose, stack } = this, m = new THREE.Matrix4();
-    stack.levels.forEach((_, level) => {
-      const a = pose.origins[level], b = pose.origins[level + 1], u = pose.axes[level], v = pose.axes[level + 1];
-      const x = new THREE.Vector3(u[0] + v[0], u[3] + v[3], u[6] + v[6]).normalize(), z = new THREE.Vector3(u[2] + v[2], u[5] + v[5], u[8] + v[8]).normalize();
-      const y = new THREE.Vector3().crossVectors(z, x).normalize();
-      // The rims draw the bonded films in as the balloons rise.
-      const { pocket, neck } = stack.balloons[stack.levels[level]], rise = Math.max(...pose.gaps[level]) + stack.pitch;
-      const k = 1 - (pocket - meridian(rise, pocket - neck, neck, 1)[1][0]) / stack.outline;
-      m.makeBasis(x.multiplyScalar(k), y.multiplyScalar(k), z).setPosition((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2);
-      this.web.setMatrixAt(level, m);
-    });
-    this.web.instanceMatrix.needsUpdate = true;
-  }
   draw() {
-    if (this.web) this.place();
-    const { pose, stack, points } = this, chambers = stack.axes.length;
-    const { turn, rings, cos, sin } = this.mesh;
-    let at = 0;
-    const put = (x, y, z) => { points[at++] = x; points[at++] = y; points[at++] = z; };
-    stack.levels.forEach((kind, level) => {
-      const { neck, pocket, ring } = stack.balloons[kind];
-      const low = frame(pose, level), high = frame(pose, level + 1);
-      for (let c = 0; c < chambers; c++) {
-        const [ax, ay] = stack.axes[c];
-        const bottom = low(ax, ay, 0), top = high(ax, ay, 0);
-        const h = Math.max(0.02, Math.hypot(top[0] - bottom[0], top[1] - bottom[1], top[2] - bottom[2]));
-        const wall = meridian(h, pocket - neck, neck, rings);
-        // From the lower neck out to the rim, along the bonded ring and back to the upper neck.
-        for (let half = 0; half < 2; half++) for (let k = 0; k <= rings; k++) {
-          const j = half ? rings - k : k;
-          const r = j === rings ? wall[rings][0] + ring * 0.55 : wall[j][0];
-          const z = wall[j][1];
-          // Between the two plates the frames are blended by height.
-          const s = half ? 1 - z / h : z / h;
-          for (let t = 0; t < turn; t++) {
-            const x = ax + r * cos[t], y = ay + r * sin[t];
-            const p = low(x, y, 0), q = high(x, y, 0);
-            put(p[0] + (q[0] - p[0]) * s, p[1] + (q[1] - p[1]) * s, p[2] + (q[2] - p[2]) * s);
-          }
-        }
-      }
-    });
-    const geometry = this.body.geometry;
-    geometry.attributes.position.needsUpdate = true;
-    geometry.computeVertexNormals();
+    const { pose, stack } = this;
+    this.body.draw(pose);
     const tip = pose.origins.at(-1);
     this.tips.push(...tip);
     if (this.tips.length > 900) this.tips.splice(0, 3);

@@ -2,16 +2,36 @@
 import { el, plain } from "./dom.js";
 import { PanZoom, niceBar } from "./panzoom.js";
 import { along, check, spread, text } from "./layers.js";
-import { PartMeshes, THREE, partWords } from "./parts_scene.js";
+import { PartMeshes, THREE, paintOf, partWords } from "./parts_scene.js";
+import { areaOf, contoursOf } from "./parts_section.js";
 import { partsList, sizeWords } from "./parts_solid.js";
 import { css } from "./dom.js";
 
 // Which axes lie across and up, from where one looks, and along which axis.
-const WAYS = {
+export const WAYS = {
   Top: { across: "x", up: "y", from: [0, 0, 1], head: [0, 1, 0] },
   Front: { across: "x", up: "z", from: [0, -1, 0], head: [0, 0, 1] },
   Side: { across: "y", up: "z", from: [1, 0, 0], head: [0, 0, 1] },
 };
+
+// An orthographic camera where an eye is, square on to the assembly.
+export function aim(camera, way, eye, box) {
+  const { across, up, from, head } = WAYS[way], middle = box.isEmpty() ? new THREE.Vector3() : box.getCenter(new THREE.Vector3());
+  middle[across] = eye.x;
+  middle[up] = eye.y;
+  const w = eye.width / eye.scale / 2, h = eye.height / eye.scale / 2;
+  Object.assign(camera, { left: -w, right: w, top: h, bottom: -h, near: 1, far: 3000 });
+  camera.up.set(...head);
+  camera.position.set(...from).multiplyScalar(1500).add(middle);
+  camera.lookAt(middle);
+  camera.updateProjectionMatrix();
+  camera.updateMatrixWorld();
+}
+// The light comes over the left shoulder, so that faces that lean are told from flat ones.
+export function lightOf(light, way) {
+  const from = new THREE.Vector3(...WAYS[way].from), head = new THREE.Vector3(...WAYS[way].head);
+  light.position.copy(from).multiplyScalar(2).add(head).addScaledVector(head.clone().cross(from), -0.7);
+}
 
 export class PartsPlan {
   title = "Plan";
@@ -22,15 +42,19 @@ export class PartsPlan {
     this.svg = el("svg", { role: "img", "aria-label": "Assembly in plan" });
     this.surface = el("div", { class: "surface" });
     this.sizes = check("Dimensions", true, () => this.draw());
+    this.opened = el("button", { "aria-pressed": "false", onclick: () => this.open(!this.isCut) }, "Section");
+    this.depth = el("input", { type: "range", min: 0, max: 100, step: 0.5, value: 50, disabled: true, "aria-label": "Depth of the section", oninput: () => this.cut() });
+    this.depthOut = el("output", {});
     this.buttons = Object.keys(WAYS).map((way) => el("button", { "aria-pressed": String(way === this.way), onclick: () => this.turn(way) }, way));
     this.element = el("div", { class: "view layers parts" }, this.list.element, this.surface,
-      el("div", { class: "tools" }, this.sizes.label, el("button", { onclick: () => { this.eye.touched = false; this.eye.fit(); } }, "Fit")),
+      el("div", { class: "tools" }, this.sizes.label, this.opened, this.depth, this.depthOut, el("button", { onclick: () => { this.eye.touched = false; this.eye.fit(); } }, "Fit")),
       el("div", { class: "tools right-top", role: "group", "aria-label": "Seen from" }, ...this.buttons),
       el("div", { class: "stale-mark" }, "Updating"));
     try { this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true }); } catch {
       this.surface.append(el("p", { class: "fallback" }, "This view takes WebGL, which the browser does not offer here."));
       return;
     }
+    this.renderer.localClippingEnabled = true;
     this.canvas = this.renderer.domElement;
     this.canvas.setAttribute("aria-hidden", "true");
     this.surface.append(this.canvas, this.svg);
@@ -56,6 +80,37 @@ export class PartsPlan {
     this.way = way;
     for (const button of this.buttons) button.setAttribute("aria-pressed", String(button.textContent === way));
     this.eye.touched = false;
+    if (this.isCut) this.open(true);
+    else this.frame();
+  }
+  // The section square to the way one looks: through the axis of what stands alone, where that lies about the middle.
+  open(on) {
+    this.isCut = on;
+    this.opened.setAttribute("aria-pressed", String(on));
+    this.depth.disabled = !on;
+    if (on && this.box && !this.box.isEmpty()) {
+      const { near, far } = this.range(), share = (0 - near) / (far - near);
+      this.depth.value = share > 0.25 && share < 0.75 ? 100 * share : 50;
+    }
+    this.cut();
+  }
+  range() {
+    const { from } = WAYS[this.way], axis = ["x", "y", "z"].find((_, i) => from[i]), way = from["xyz".indexOf(axis)];
+    const [near, far] = way > 0 ? [this.box.max[axis], this.box.min[axis]] : [this.box.min[axis], this.box.max[axis]];
+    return { axis, way, near, far };
+  }
+  cut() {
+    this.meshes.planes = [];
+    this.loops = [];
+    this.depthOut.textContent = "";
+    if (this.isCut && this.box && !this.box.isEmpty()) {
+      const { axis, way, near, far } = this.range(), value = near + (this.depth.value / 100) * (far - near);
+      const normal = new THREE.Vector3(...WAYS[this.way].from).negate(), { across, up } = WAYS[this.way];
+      this.meshes.planes = [new THREE.Plane(normal, way * value)];
+      this.loops = this.meshes.group.children.map((holder) => ({ part: holder.userData.part, loops: contoursOf(holder, axis, value, across, up) })).filter(({ loops }) => loops.length);
+      this.depthOut.textContent = `${axis} ${plain(value, 1)}`;
+    }
+    this.meshes.paint();
     this.frame();
   }
   update() {
@@ -63,12 +118,13 @@ export class PartsPlan {
     this.behind = this.element.hidden;
     if (this.behind) return;
     this.meshes.update();
-    this.frame();
+    this.box = this.meshes.box();
+    this.cut();
   }
   frame() {
     const { across, up } = WAYS[this.way], box = (this.box = this.meshes.box());
     if (box.isEmpty()) { this.draw(); return; }
-    this.aim();
+    aim(this.camera, this.way, this.eye, box);
     this.anchors = this.meshes.group.children.map((holder) => this.anchor(holder));
     this.eye.bounds([box.min[across], box.min[up], box.max[across], box.max[up]], [56, 150, 92, 70]);
     this.draw();
@@ -87,20 +143,6 @@ export class PartsPlan {
     }
     return { part, place: at(0.5, 0.5), hidden: true };
   }
-  // The camera where the eye is.
-  aim() {
-    const { eye, camera } = this, { across, up, from, head } = WAYS[this.way];
-    const middle = this.box.isEmpty() ? new THREE.Vector3() : this.box.getCenter(new THREE.Vector3());
-    middle[across] = eye.x;
-    middle[up] = eye.y;
-    const w = eye.width / eye.scale / 2, h = eye.height / eye.scale / 2;
-    Object.assign(camera, { left: -w, right: w, top: h, bottom: -h, near: 1, far: 3000 });
-    camera.up.set(...head);
-    camera.position.set(...from).multiplyScalar(1500).add(middle);
-    camera.lookAt(middle);
-    camera.updateProjectionMatrix();
-    camera.updateMatrixWorld();
-  }
   draw() {
     const { eye, canvas, studio } = this, width = eye.width, height = eye.height;
     if (!width || !height || !this.box) return;
@@ -108,17 +150,20 @@ export class PartsPlan {
     this.renderer.setSize(width, height, false);
     Object.assign(canvas.style, { width: "100%", height: "100%" });
     this.renderer.setClearColor(css("--canvas"));
-    const { from, head } = WAYS[this.way];
-    this.aim();
-    // The light comes over the left shoulder, so that faces that lean are told from flat ones.
-    this.light.position.set(...from).multiplyScalar(2).add(new THREE.Vector3(...head)).addScaledVector(new THREE.Vector3(...head).cross(new THREE.Vector3(...from)), -0.7);
+    aim(this.camera, this.way, eye, this.box);
+    lightOf(this.light, this.way);
     this.renderer.render(this.scene, this.camera);
-    this.svg.replaceChildren(...(studio.parts && this.sizes.box.checked ? [...this.overall(), ...this.names()] : []), ...this.scale());
+    this.svg.replaceChildren(...(studio.parts ? this.faces() : []), ...(studio.parts && this.sizes.box.checked ? [...this.overall(), ...this.names()] : []), ...this.scale());
     this.svg.setAttribute("aria-label", this.words());
+  }
+  // What the plane goes through, in the colours of the parts.
+  faces() {
+    const { parts, pickedParts } = this.studio;
+    return (this.loops ?? []).map(({ part, loops }) => el("path", { d: loops.map((loop) => `M${loop.map(([u, v]) => this.eye.px(u, v).map((n) => n.toFixed(2)).join(" ")).join("L")}Z`).join(""), fill: `var(${pickedParts.includes(part.name) ? "--select" : paintOf(part, parts)})`, "fill-rule": "evenodd", stroke: "var(--ink)", "stroke-width": 1.2, class: "cut-face", "data-part": part.name }));
   }
   words() {
     const { across, up } = WAYS[this.way], size = this.box.isEmpty() ? null : this.box.getSize(new THREE.Vector3());
-    return `Assembly of ${this.studio.parts?.length ?? 0} parts from the ${this.way.toLowerCase()}${size ? `, ${plain(size[across], 2)} by ${plain(size[up], 2)} mm` : ""}`;
+    return `Assembly of ${this.studio.parts?.length ?? 0} parts from the ${this.way.toLowerCase()}${this.isCut ? ` cut at ${this.depthOut.textContent} mm (${this.loops.map(({ part, loops }) => `${part.name} ${plain(areaOf(loops), 1)} mm²`).join(", ")})` : ""}${size ? `, ${plain(size[across], 2)} by ${plain(size[up], 2)} mm` : ""}`;
   }
   overall() {
     const { eye, box } = this, { across, up } = WAYS[this.way];
@@ -134,7 +179,7 @@ export class PartsPlan {
     return marks.flatMap(({ part, hidden, to }, i) => [el("path", { d: `M${to.join(" ")}L${column - 12} ${rows[i]}H${column - 4}`, stroke: "var(--faint)", "stroke-dasharray": hidden && "3 3", fill: "none" }), el("circle", { cx: to[0], cy: to[1], r: 2, fill: "var(--soft)" }), text(part.name, column, rows[i] + 4)]);
   }
   scale() {
-    const step = niceBar(this.eye.scale), w = step * this.eye.scale, x = this.eye.width - w - 14, y = this.eye.height - 16;
+    const step = niceBar(this.eye.scale), w = step * this.eye.scale, x = this.eye.width - w - 14, y = this.eye.height - (this.eye.width < 560 ? 66 : 16);
     return [el("path", { d: `M${x} ${y - 5}V${y}H${x + w}V${y - 5}`, fill: "none", stroke: "var(--soft)" }), text(`${step} mm`, x + w / 2, y - 7, "middle")];
   }
   under(event) {

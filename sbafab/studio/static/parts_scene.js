@@ -9,7 +9,7 @@ const MOST_KEPT = 40;
 const built = new Map();
 
 // Points, faces and creases of a surface as it came, in the part's own frame.
-function geometryOf(key, surface) {
+export function geometryOf(key, surface) {
   if (built.has(key)) return built.get(key);
   const points = new Float32Array(bytes(surface.points)), faces = new Uint32Array(bytes(surface.faces));
   const solid = new THREE.BufferGeometry();
@@ -78,9 +78,9 @@ export class PartMeshes {
     this.paint();
   }
   paint() {
-    const { parts, pickedParts } = this.studio, clippingPlanes = this.planes;
+    const { parts, pickedParts, marked } = this.studio, clippingPlanes = this.planes;
     for (const { children: [outside, inside, lines], userData: { part } } of this.group.children) {
-      const colour = css(pickedParts.includes(part.name) ? "--select" : paintOf(part, parts));
+      const colour = css(pickedParts.includes(part.name) ? "--select" : marked?.has(part.name) ? "--ghost" : paintOf(part, parts));
       for (const one of [outside, inside, lines]) one.material.dispose();
       outside.material = new THREE.MeshLambertMaterial({ color: colour, flatShading: true, clippingPlanes, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
       inside.material = new THREE.MeshBasicMaterial({ color: new THREE.Color(colour).multiplyScalar(0.62), side: THREE.BackSide, clippingPlanes });

@@ -59,6 +59,7 @@ export class Solid {
   }
   setClip() {
     const planes = this.isCut ? [this.clip] : [];
+    if (this.material.tpe.clippingPlanes?.length === planes.length) return;
     for (const material of [...Object.values(this.material), ...Object.values(this.lines)]) { material.clippingPlanes = planes; material.needsUpdate = true; }
   }
 

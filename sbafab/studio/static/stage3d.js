@@ -3,8 +3,8 @@ import * as THREE from "./vendor/three.module.js";
 import { OrbitControls } from "./vendor/OrbitControls.js";
 import { css } from "./dom.js";
 
-// Frames that a computer without a graphics card draws one by one are coarser while they follow each other.
-const COARSE = 0.6, QUICK = 200;
+// Without a graphics card frames are drawn coarser until nothing has changed for a while, in ms.
+const COARSE = 0.6, QUICK = 300;
 
 // Whether the browser draws without a graphics card.
 function isSoftware() {
@@ -89,17 +89,16 @@ export class Stage3D {
   finest() { return this.software ? 1.5 : Math.min(devicePixelRatio || 1, 2); }
   draw() {
     if (this.asked) return;
-    this.asked = requestAnimationFrame((now) => {
+    this.asked = requestAnimationFrame(() => {
       this.asked = null;
-      if (this.software) this.suit(now);
+      if (this.software) this.suit();
       if (this.surface.clientWidth) this.renderer.render(this.scene, this.camera);
       this.drawn?.();
     });
   }
-  // Frames in quick succession are drawn coarser, the last one again as fine as it goes.
-  suit(now) {
-    const ratio = now - (this.last ?? -QUICK) < QUICK && !this.resting ? COARSE : this.finest();
-    this.last = now;
+  // What changed is seen at once, coarser; the last frame is drawn again as fine as it goes.
+  suit() {
+    const ratio = this.resting ? this.finest() : COARSE;
     this.resting = false;
     if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
     clearTimeout(this.rest);

@@ -34,6 +34,7 @@ export class Studio {
     this.hovered = null;
     this.cut = null;
     this.reference = null;
+    this.inflated = { pressure_kpa: 10, load_g: 1.2 };
     this.latency = { geometry: [], figures: [], deck: [], all: [] };
     this.listeners = new Map();
     this.flight = null;
@@ -52,7 +53,7 @@ export class Studio {
 
   // What is opened: a text with the file it came from (or none) and what lies on disk.
   open(text, { name = null, seen = null, saved = text, back = null } = {}) {
-    Object.assign(this, { text, name, seen, savedText: saved, back, picked: null, pickedParts: [], cut: null });
+    Object.assign(this, { text, name, seen, savedText: saved, back, prediction: null, picked: null, pickedParts: [], cut: null });
     this.keepBack();
     this.pending.clear();
     this.history = [text];
@@ -188,7 +189,9 @@ export class Studio {
       parts: () => this.heardParts(answer, flight),
       laminate: () => this.heardLaminate(answer, flight),
       prediction: () => {
-        this.prediction = answer;
+        // What an assembly does takes seconds; until then the figures before are shown as such.
+        const old = this.prediction;
+        this.prediction = answer.figures.length ? answer : { ...answer, before: old?.before ?? old };
         this.heardFigures(null);
         this.time("figures", flight);
         this.askElastic();
@@ -266,22 +269,30 @@ export class Studio {
   }
   // What takes seconds comes once the hand rests, and not while the actuator is being moved. In the page it would
   // take half a minute, and motion and cutting wait for it.
-  askElastic() {
+  askElastic(after = 1500) {
     if (withoutServer) return;
     clearTimeout(this.elasticTimer);
     this.elastic?.abort();
     this.elasticTimer = setTimeout(async () => {
-      if (this.moving?.() || this.stale.figures || this.stale.laminate) return;
+      if (this.moving?.()) { this.askElastic(); return; }
+      if (this.stale.figures || this.stale.laminate) return;
       const own = (this.elastic = new AbortController());
       try {
-        await listen("/api/elastic", this.body(), (answer) => {
-          if (answer.kind !== "prediction" || own.signal.aborted || this.stale.figures) return;
-          this.prediction = answer;
+        await listen("/api/elastic", { ...this.body(), pose: this.inflated }, (answer) => {
+          if (own.signal.aborted || this.stale.figures) return;
+          if (answer.kind === "prediction") {
+            this.prediction = answer;
+            if (this.reference?.text === this.text) this.reference.prediction = answer;
+          }
+          else if (answer.message && this.prediction) this.prediction = { ...this.prediction, refused: answer.message };
           this.emit("figures");
         }, own.signal);
       } catch { /* the closed formulas stay */ }
-    }, 1500);
+    }, after);
   }
+
+  // What an assembly is inflated with: kPa in all its actuators, g at their tips.
+  inflate(asked) { this.inflated = { ...this.inflated, ...asked }; this.askElastic(0); }
 
   // A look at the file on disk whenever it changes.
   async watch() {
@@ -328,8 +339,8 @@ export class Studio {
 
   pin() {
     this.reference = this.reference ? null : {
-      name: this.designName, text: this.text, laminate: this.laminate, values: this.values,
-      findings: this.findings, prediction: this.prediction,
+      name: this.designName, family: this.family, text: this.text, laminate: this.laminate, values: this.values,
+      parts: this.parts, surfaces: new Map(this.surfaces), findings: this.findings, prediction: this.prediction,
     };
     this.emit("reference");
   }

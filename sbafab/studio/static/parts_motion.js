@@ -1,0 +1,245 @@
+// An assembly under pressure: every actuator by its own fast stack, and what stands on its top goes along.
+import { Balloons } from "./balloons.js";
+import { css, el, plain } from "./dom.js";
+import { COARSE, FINE, meshOf } from "./motion_drawing.js";
+import { PartMeshes, THREE, geometryOf, paintOf } from "./parts_scene.js";
+import { listen, tab } from "./server.js";
+import { Stage3D } from "./stage3d.js";
+
+// ms between two readings: figures that change oftener cannot be read.
+const READABLE = 110;
+// ms after which parts that no hand moves are at rest.
+const RESTS = 2500;
+// kPa at which a part stands when it is first shown, and the most that a grip is given.
+const FIRST = 5, FIRST_GRIP = 10, MOST_GRIP = 110;
+const TRUST = {
+  stack: "Each actuator by its own elastic stack, no calibration on a built one; what it carries moves with its tip and weighs nothing.",
+  grip: "Grips are lenses of film that does not stretch, equally high at any pressure.",
+  all: "Contact between parts is not felt here: where they meet, and what hangs on the tips, stands under Prediction. Supply tubes, and lines through an arm that moves, are left out.",
+};
+
+export class PartsMotion {
+  title = "Motion";
+  constructor(studio) {
+    this.studio = studio;
+    this.surface = el("div", { class: "surface" });
+    this.side = el("div", { class: "side" });
+    this.element = el("div", { class: "view" }, el("div", { class: "motion" }, this.surface, this.side), el("div", { class: "stale-mark" }, "Updating"));
+    Object.assign(this, { movers: new Map(), kept: new Map(), times: [], costs: [] });
+    this.build();
+    try { this.stage = new Stage3D(this.surface, { up: 16 }); } catch {
+      this.surface.append(el("p", { class: "fallback" }, "This view takes WebGL, which the browser does not offer here. The figures beside it are the same."));
+    }
+    if (this.stage) {
+      this.mesh = meshOf(this.stage.software ? COARSE : FINE);
+      this.meshes = new PartMeshes(studio);
+      this.bodies = new THREE.Group();
+      this.stage.scene.add(this.meshes.group, this.bodies);
+    }
+    studio.on("parts", () => { this.text = null; if (!this.element.hidden) this.load(); });
+    studio.on("opened", () => { this.kept.clear(); this.fitted = false; });
+    studio.on("part", () => { if (this.stage && this.text) { this.meshes.paint(); this.stage.draw(); } });
+    studio.on("theme", () => { if (this.stage) { this.stage.repaint(); if (this.text) { this.meshes.paint(); this.shape(); this.draw(); } } });
+  }
+  // Whether a hand moves it, so that what takes seconds waits.
+  get moving() { return !this.element.hidden && performance.now() - (this.moved ?? -RESTS) < RESTS; }
+  show() { this.stage?.resize(); if (!this.text) this.load(); }
+  hide() { this.stop(); }
+
+  build() {
+    this.knobs = el("div", { role: "group", "aria-label": "Pressures" });
+    this.playing = el("button", { "aria-pressed": "false", onclick: () => (this.timer ? this.stop() : this.play()) }, "Play");
+    this.values = el("div", { "aria-live": "off" });
+    this.trust = el("div", { class: "trust", role: "status" });
+    this.side.append(el("h3", {}, "Pressure, kPa"), this.knobs, el("div", { class: "group" }, this.playing, el("button", { onclick: () => this.set(() => 0) }, "Vent")), el("h3", {}, "Reading"), this.values, this.trust);
+  }
+  say(words, beyond) { this.trust.textContent = words; this.trust.classList.toggle("beyond", beyond); }
+
+  // What moves and how; the map of a balloon takes a second or two, once a shape.
+  async load() {
+    const { studio } = this, { text } = studio;
+    if (studio.error || !studio.parts) return;
+    const own = (this.loading = {});
+    this.say("Working out the balloons of these designs", false);
+    try {
+      await listen("/api/motion", { tab, text, edits: [], name: studio.name, pose: {} }, (answer) => {
+        if (this.loading !== own) return;
+        if (answer.kind === "movers") this.start(answer.movers, text);
+        else if (answer.message) this.say(answer.message, true);
+      });
+    } catch (error) { this.say(error.message, true); }
+  }
+  start(movers, text) {
+    this.text = text;
+    this.movers = new Map(movers.map((mover) => [mover.part, { ...mover, sliders: this.sliders(mover) }]));
+    this.knobs.replaceChildren(...[...this.movers.values()].flatMap(({ part, message, sliders }) => [el("h4", {}, part), ...sliders.map(({ row }) => row), message ? el("p", { class: "trust beyond" }, message) : ""]));
+    if (this.stage) { this.meshes.update(); this.shape(); this.draw(); }
+    this.want();
+  }
+  sliders(mover) {
+    const names = { stack: mover.chambers, grip: ["all stacks"], still: [] }[mover.is];
+    return names.map((name, i) => {
+      const key = `${mover.part} ${name}`, first = mover.is === "grip" ? FIRST_GRIP : i ? 0 : FIRST;
+      const out = el("output", {}), told = () => { out.textContent = plain(Number(input.value), 1); this.kept.set(key, input.value); };
+      const input = el("input", { type: "range", min: 0, max: mover.most_pressure ?? MOST_GRIP, step: 0.1, value: this.kept.get(key) ?? first, "aria-label": `${mover.part}, ${name}, kPa`, oninput: () => { told(); this.want(); } });
+      told();
+      return { input, told, row: el("label", { class: "knob" }, el("span", {}, name), input, out) };
+    });
+  }
+  pressures({ sliders }) { return sliders.map(({ input }) => Number(input.value)); }
+  set(of) {
+    for (const mover of this.movers.values()) mover.sliders.forEach(({ input, told }, i) => { input.value = of(i, mover); told(); });
+    this.want();
+  }
+
+  // The newest wish goes out as soon as the last one is answered.
+  want() {
+    this.wanted = true;
+    this.moved = performance.now();
+    // What takes seconds gives way to the hand.
+    if (this.studio.prediction?.quick) this.studio.askElastic();
+    if (!this.asking) this.ask();
+  }
+  async ask() {
+    if (!this.text) return;
+    this.wanted = false;
+    this.asking = true;
+    const { text } = this, stacks = [...this.movers.values()].filter((mover) => mover.is === "stack");
+    try {
+      await listen("/api/motion", { tab, text, edits: [], name: this.studio.name, pose: { parts: Object.fromEntries(stacks.map((mover) => [mover.part, this.pressures(mover)])) } }, (answer) => {
+        if (answer.kind === "poses") this.arrived(answer.poses, text);
+        else if (answer.message) this.say(answer.message, true);
+      });
+    } catch (error) { this.say(error.message, true); }
+    this.asking = false;
+    if (this.wanted) this.ask();
+  }
+  // Poses are drawn in the next frame; while it is painted the next ones are worked out.
+  arrived(poses, text) {
+    this.newest = poses;
+    this.frame ??= requestAnimationFrame(() => {
+      this.frame = null;
+      if (this.text !== text) return;
+      for (const [part, pose] of Object.entries(this.newest)) if (this.movers.has(part)) this.movers.get(part).pose = pose;
+      const before = performance.now();
+      if (this.stage) this.draw();
+      this.times.push(before);
+      this.costs.push(performance.now() - before);
+      for (const list of [this.times, this.costs]) if (list.length > 240) list.shift();
+      this.tell();
+    });
+  }
+  tell() {
+    const now = performance.now(), wait = READABLE - (now - (this.told ?? -READABLE));
+    clearTimeout(this.telling);
+    if (wait > 0) { this.telling = setTimeout(() => this.tell(), wait); return; }
+    this.told = now;
+    this.values.replaceChildren(...[...this.movers.values()].flatMap((mover) => [el("h4", {}, mover.part), el("dl", { class: "reading" }, ...rows(mover, this.pressures(mover)).flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)]))]));
+    const leaning = [...this.movers.values()].find(({ pose }) => pose && !pose.stable);
+    this.say(leaning ? `${leaning.part} stands as a straight column that would rather buckle` : this.trusted(), Boolean(leaning));
+    this.surface.firstChild?.setAttribute("aria-label", `Assembly in motion: ${[...this.movers.values()].flatMap((mover) => rows(mover, this.pressures(mover)).slice(0, 2).map(([name, value]) => `${mover.part} ${name.toLowerCase()} ${value}`)).join(", ")}`);
+  }
+
+  trusted() {
+    const kinds = new Set([...this.movers.values()].map((mover) => mover.is));
+    return Object.entries(TRUST).filter(([kind]) => kind === "all" || kinds.has(kind)).map(([, words]) => words).join(" ");
+  }
+
+  // What is drawn of each mover: balloons that a pose shapes, or a grip's, and the lumen round it.
+  shape() {
+    this.bodies.clear();
+    for (const mover of this.movers.values()) {
+      const part = this.studio.parts.find(({ name }) => name === mover.part), tone = paintOf(part, this.studio.parts);
+      if (mover.is === "stack") {
+        mover.drawn = new Balloons(this.mesh);
+        mover.drawn.shape(mover, { wall: mover.wall, lumen: mover.lumen, tone });
+        this.bodies.add(mover.drawn.group);
+        const [a, b, c] = mover.frame;
+        mover.place = new THREE.Matrix4().set(...a, ...b, ...c, 0, 0, 0, 1);
+      } else if (mover.is === "grip") {
+        const { solid, lines } = geometryOf(`grip:${mover.part}:${this.text}`, mover.surface);
+        mover.body = new THREE.Group();
+        mover.body.matrixAutoUpdate = false;
+        mover.full = new THREE.Mesh(solid, new THREE.MeshLambertMaterial({ color: css(tone), side: THREE.DoubleSide }));
+        mover.full.add(new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ color: css("--part-ink") })));
+        mover.body.add(mover.full, ...(mover.lumen ? [lumenOf(mover, solid)] : []));
+        this.bodies.add(mover.body);
+      }
+    }
+  }
+  draw() {
+    const moved = new Map();
+    for (const holder of this.meshes.group.children) {
+      const { part, place } = holder.userData, below = moved.get(part.on), mover = this.movers.get(part.name);
+      const move = (below?.move ?? new THREE.Matrix4()).clone();
+      if (below?.lift && part.at === "top") move.multiply(below.lift);
+      holder.matrix.multiplyMatrices(move, place);
+      holder.matrixWorldNeedsUpdate = true;
+      holder.visible = !(mover?.pose && mover.drawn) && !(part.kind === "line" && part.at === "lumen" && below?.lift);
+      let lift = null;
+      if (mover?.pose && mover.drawn) {
+        mover.drawn.draw(mover.pose);
+        mover.drawn.group.matrix.multiplyMatrices(move, mover.place);
+        lift = mover.place.clone().multiply(tipOf(mover.pose)).multiply(new THREE.Matrix4().makeTranslation(0, 0, -mover.flat_height)).multiply(mover.place.clone().invert());
+      }
+      if (mover?.body) { mover.body.matrix.copy(holder.matrix); mover.full.visible = this.pressures(mover)[0] > 0; }
+      moved.set(part.name, { move, lift });
+    }
+    this.bodies.updateMatrixWorld(true);
+    if (!this.fitted && [...this.movers.values()].every(({ drawn, pose }) => !drawn || pose)) { this.stage.fit(this.reach()); this.fitted = true; }
+    this.stage.draw();
+  }
+  // All that the parts may come to, so that the camera need not follow.
+  reach() {
+    const box = this.meshes.box();
+    for (const { drawn, place, outline, levels, body } of this.movers.values()) {
+      if (body) box.expandByObject(body);
+      if (drawn) for (const [x, y, z] of [[-1, -1, 1], [1, 1, 1]]) box.expandByPoint(new THREE.Vector3(1.5 * outline * x, 1.5 * outline * y, Math.max(8, 1.5 * levels.length) * z).applyMatrix4(place));
+    }
+    return box;
+  }
+  // Pressure that goes round the chambers of every arm; a single chamber breathes.
+  play() {
+    if (!this.text) return;
+    const most = new Map([...this.movers].map(([name, mover]) => [name, Math.max(5, ...this.pressures(mover))])), start = performance.now();
+    this.playing.textContent = "Pause";
+    this.playing.setAttribute("aria-pressed", "true");
+    const step = () => {
+      const turn = ((performance.now() - start) / 4000) * 2 * Math.PI;
+      this.set((i, { part, is, sliders }) => (is === "grip" ? most.get(part) : (most.get(part) * (1 + Math.cos(turn - (i * 2 * Math.PI) / sliders.length))) / 2));
+      this.timer = requestAnimationFrame(step);
+    };
+    this.timer = requestAnimationFrame(step);
+  }
+  stop() {
+    if (!this.timer) return;
+    cancelAnimationFrame(this.timer);
+    this.timer = null;
+    this.playing.textContent = "Play";
+    this.playing.setAttribute("aria-pressed", "false");
+  }
+  picture() { return this.stage.picture("assembly-motion.png"); }
+}
+
+function rows(mover, pressures) {
+  const { pose } = mover;
+  if (mover.is === "stack" && pose) return [["Height", `${pose.height.toFixed(2)} mm`], ["Bend", `${pose.bend.toFixed(1)}°`], ["Volume", `${pose.volumes.reduce((sum, one) => sum + one, 0).toFixed(1)} µl`]];
+  if (mover.is !== "grip") return [];
+  const [p] = pressures, inside = mover.room !== null, across = p > 0 ? (inside ? mover.lumen : mover.free) : mover.deflated;
+  const found = [["Diameter", `${across.toFixed(2)} mm`]];
+  if (inside) found.push(["Push of each stack on the wall", p > 0 ? `${(p * mover.push).toFixed(3)} N` : "–"]);
+  else if (mover.lumen) found.push([`Wall of ${plain(mover.lumen, 2)} mm`, "not reached"]);
+  return found;
+}
+// Where the last plate stands: its frame in the actuator's own.
+function tipOf(pose) {
+  const [x, y, z] = pose.origins.at(-1), a = pose.axes.at(-1);
+  return new THREE.Matrix4().set(a[0], a[1], a[2], x, a[3], a[4], a[5], y, a[6], a[7], a[8], z, 0, 0, 0, 1);
+}
+function lumenOf({ lumen }, solid) {
+  const { min, max } = solid.boundingBox, long = 1.5 * (max.z - min.z);
+  const wall = new THREE.Mesh(new THREE.CylinderGeometry(lumen / 2, lumen / 2, long, 64, 1, true), new THREE.MeshLambertMaterial({ color: css("--accent"), transparent: true, opacity: 0.16, side: THREE.DoubleSide, depthWrite: false }));
+  wall.rotation.x = Math.PI / 2;
+  wall.position.z = (min.z + max.z) / 2;
+  return wall;
+}
