@@ -8,13 +8,13 @@ from pathlib import Path
 import sbafab
 from sbafab.assemblies.reading import load
 from sbafab.assemblies.records import Assembly
+from sbafab.cli.verdicts import counted
 from sbafab.design.records import Design
 from sbafab.design.templates import template_names, templates_folder
 from sbafab.errors import DesignError
 from sbafab.models.figures import Prediction
 from sbafab.reports.assembly_png import assembly_png
 from sbafab.reports.solid_png import solid_png
-from sbafab.rules.finding import summary
 
 DESIGNS = Path(__file__).parents[1] / "gallery"
 PIXELS = (720, 540)
@@ -23,6 +23,7 @@ FIGURES = (
     ("deflated height", "flat", 2),
     ("full stroke", "full stroke", 1),
     ("blocked force at 10 kPa, flat", "blocked force at 10 kPa", 2),
+    ("blocked force at 10 kPa, flat, at most", "blocked force at 10 kPa at most", 2),
     ("bend with one chamber at full stroke, the others flat", "bend with one chamber full", 0),
 )
 """Figures of the prediction, what they are called here, and their decimals."""
@@ -72,8 +73,7 @@ def _entry(source: str, target: Path) -> Iterator[str]:
     yield f"\n### {found.name}\n"
     yield f"{_first_sentence(text)}\n"
     yield f"![{found.name}, flat](gallery/{picture}){{width=600px}}\n"
-    counts = summary(findings)
-    held = f"{counts['pass']} rules pass" + (f", {counts['warn']} warn" if counts["warn"] else "")
+    held = counted(findings)
     if isinstance(found, Design):
         yield _told(f"{', '.join(_figures(found))}; {held}.")
     else:

@@ -1,14 +1,20 @@
 """Makes the pictures that README and docs show, from the templates.
 
-python -m docs.scripts.pictures
+``python -m docs.scripts.pictures`` makes all of them, ``... pictures solid traveller`` some. That of
+the traveller takes Chromium.
 """
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
+from PIL import Image
+
 import sbafab
-from sbafab.laminate.laminate import Laminate
 from sbafab.reports.assembly_png import assembly_png
 from sbafab.reports.inflated_picture import PictureWish, write_picture
 from sbafab.reports.layers_svg import layers_svg
@@ -17,29 +23,64 @@ from sbafab.reports.solid_png import solid_png
 from sbafab.reports.stack_svg import stack_svg
 
 IMAGES = Path(__file__).parents[1] / "images"
+ARM = "3dof-15mm"
+PAGE = "820,1160"
+"""Pixels of the window in which a page of A4 is seen whole."""
 
 
-def inflated(laminate: Laminate) -> None:
+def solid() -> None:
+    """The solids of the templates and of an assembly."""
+    for name in ("1dof-5mm", ARM, "radial-15mm"):
+        (IMAGES / f"{name}-solid.png").write_bytes(solid_png(sbafab.build(name), 1200, 900))
+    (IMAGES / "brace-assembled.png").write_bytes(assembly_png(sbafab.assemble("brace")))
+
+
+def flat() -> None:
+    """Layers and section."""
+    laminate = sbafab.build(ARM)
+    (IMAGES / f"{ARM}-layers.svg").write_text(layers_svg(laminate), encoding="utf-8")
+    (IMAGES / f"{ARM}-stack.svg").write_text(stack_svg(laminate), encoding="utf-8")
+
+
+def force() -> None:
+    """Predicted and measured force."""
+    for relation in sbafab.predict(ARM).relations:
+        if relation.name == "force":
+            plot = relation_svg(ARM, relation)
+            (IMAGES / f"{ARM}-force.svg").write_text(plot, encoding="utf-8")
+
+
+def inflated() -> None:
     """The actuator bent by two of its chambers, and with pressure going round all three."""
-    stack = sbafab.stack("3dof-15mm")
+    laminate, stack = sbafab.build(ARM), sbafab.stack(ARM)
     bent = PictureWish({"chamber1": 5.0, "chamber2": 5.0}, width=1200, height=900)
     write_picture(laminate, stack, bent, IMAGES / "inflated.png")
     round_all = PictureWish({"": 5.0}, width=480, height=384, motion="circle", frames=36)
     write_picture(laminate, stack, round_all, IMAGES / "moving.webp")
 
 
+def traveller() -> None:
+    """The first page of the tutorial's traveller, as Chromium shows it."""
+    with tempfile.TemporaryDirectory() as scratch:
+        first = sbafab.generate("1dof-5mm", "stack.balloons=4", out=scratch, name="first")
+        shot = f"--screenshot={IMAGES / 'traveller-first.png'}"
+        asked = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", shot]
+        page = (first.folder / "traveller.html").resolve().as_uri()
+        subprocess.run(
+            ["chromium", *asked, f"--window-size={PAGE}", page], check=True, capture_output=True
+        )
+    shown = Image.open(IMAGES / "traveller-first.png").convert("RGB").quantize(64)
+    shown.save(IMAGES / "traveller-first.png", optimize=True)
+
+
+MAKERS: dict[str, Callable[[], None]] = {
+    made.__name__: made for made in (solid, flat, force, inflated, traveller)
+}
+
+
 def main() -> None:
-    for name in ("1dof-5mm", "3dof-15mm", "radial-15mm"):
-        (IMAGES / f"{name}-solid.png").write_bytes(solid_png(sbafab.build(name), 1200, 900))
-    (IMAGES / "brace-assembled.png").write_bytes(assembly_png(sbafab.assemble("brace")))
-    laminate = sbafab.build("3dof-15mm")
-    inflated(laminate)
-    (IMAGES / "3dof-15mm-layers.svg").write_text(layers_svg(laminate), encoding="utf-8")
-    (IMAGES / "3dof-15mm-stack.svg").write_text(stack_svg(laminate), encoding="utf-8")
-    for relation in sbafab.predict("3dof-15mm").relations:
-        if relation.name == "force":
-            plot = relation_svg("3dof-15mm", relation)
-            (IMAGES / "3dof-15mm-force.svg").write_text(plot, encoding="utf-8")
+    for name in sys.argv[1:] or MAKERS:
+        MAKERS[name]()
 
 
 if __name__ == "__main__":

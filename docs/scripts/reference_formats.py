@@ -9,8 +9,8 @@ from sbafab.output.schemas import SCHEMAS, schema_of
 
 HEAD = """# File formats
 
-What a program may rely on. Each of these but a design file carries the id of its format as `schema`; additions
-keep the id, a change that would break a reader gets a new number. `sbafab schema NAME` prints these schemas (JSON Schema 2020-12), and tests hold what is written and printed against them.
+What a program may rely on. Each of these but a design file and the list of templates carries the id
+of its format as `schema`; additions keep the id, a change that would break a reader gets a new number. `sbafab schema NAME` prints these schemas (JSON Schema 2020-12), and tests hold what is written and printed against them.
 
 | name | id | what it describes | schema |
 |---|---|---|---|
@@ -47,9 +47,10 @@ conforming meshes as VTU, legacy VTK, Gmsh MSH 4.1 and Abaqus INP with named set
 | `checks.json` | what the rules found |
 | `press.json`, `press.csv` | the press schedule |
 | `predict.json` | from `sbafab predict`: every figure with model and trust |
+| `calculix/result.json`, `sofa/`, `mujoco/` likewise | from `sbafab simulate`: what the simulator found, in which units |
 
 The other JSON files serve the program itself and may change: `sheets/nest.json` (where parts lie) and what a simulator's
-folder holds, but for the figures of `result.json`, whose `units` it says.
+folder holds beside its `result.json`.
 """
 
 

@@ -1,4 +1,4 @@
-"""Runs the scenes in SOFA and writes what they gave into docs/sofa.md.
+"""Runs the scenes in SOFA and writes the tables of docs/sofa.md.
 
 ``python -m docs.scripts.sofa_runs`` takes four minutes of processor time; it needs runSofa and ccx on
 PATH.
@@ -12,17 +12,19 @@ import resource
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from datetime import date
 from pathlib import Path
 from unittest import mock
 
 import sbafab
+from docs.scripts.measured import Record, Table, keep
 from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_strokes
 from sbafab.simulators.coarse.actuator import CoarseActuator
 from sbafab.simulators.sofa import files, shell
 from sbafab.simulators.sofa.run import SofaJob, SofaRun, simulate
 
-PAGE = Path(__file__).parents[1] / "sofa.md"
-BEGIN, END = "<!-- written by docs.scripts.sofa_runs -->", "<!-- to here -->"
+COMMAND = "python -m docs.scripts.sofa_runs"
+PROGRAMS = {"SOFA": "25.06", "CalculiX": "2.20"}
 NAME = "3dof-15mm"
 PRESSURES = (1.0, 2.0, 5.0, 10.0)
 CHAMBERS = ("chamber1", "chamber2", "chamber3")
@@ -81,11 +83,10 @@ def told(done: SofaRun) -> str:
     return f"{done.last.place[2]:.2f}, {done.last.tilt:.1f}"
 
 
-def scenes() -> Iterator[str]:
+def scenes() -> Iterator[list[str]]:
     """Every scene at every pressure, in all chambers, in two and in one."""
     known = {name: pose for name, pose in OTHERS.items() if pose is not None}
     yield row("kPa in chambers", "A shell", "B frames", "D beam", *known)
-    yield row(*["---"] * (4 + len(known)))
     rates: dict[str, list[float]] = {"shell": [], "frames": [], "beam": []}
     for on in (3, 2, 1):
         for kpa in PRESSURES:
@@ -103,20 +104,18 @@ def scenes() -> Iterator[str]:
     yield row("steps/s", *means, *[""] * len(known))
 
 
-def volumes() -> Iterator[str]:
+def volumes() -> Iterator[list[str]]:
     """Scene C."""
     yield row("ul above the start", "C volume", "steps/s")
-    yield row("---", "---", "---")
     for on in (3, 2, 1):
         asked = dict(zip(CHAMBERS, [80.0] * on + [0.0] * (3 - on), strict=True))
         done, rate = ran([0.0] * 2 + [5.0], "volume", volumes=asked)
         yield row(", ".join(f"{ul:g}" for ul in asked.values()), told(done), f"{rate:.0f}")
 
 
-def finer() -> Iterator[str]:
+def finer() -> Iterator[list[str]]:
     """Scene A with rings of more and fewer corners at 5 kPa."""
     yield row("corners of a ring", "nodes", "height, mm", "steps/s")
-    yield row(*["---"] * 4)
     for sectors in (8, 12, 16):
         with _changed(lambda made, n=sectors: replace(made, sectors=n)):
             done, rate = ran([5.0] * 3)
@@ -124,10 +123,9 @@ def finer() -> Iterator[str]:
         yield row(sectors, nodes, f"{done.last.place[2]:.2f}", f"{rate:.0f}")
 
 
-def three() -> Iterator[str]:
+def three() -> Iterator[list[str]]:
     """Three balloons on one axis against the ripples of CalculiX's wedges."""
     yield row("kPa", "A shell, mm", "CalculiX, quarter, mm", "", "steps/s")
-    yield row(*["---"] * 5)
     for kpa in PRESSURES:
         done, rate = ran([kpa], design=("1dof-5mm", "stack.balloons=3"))
         high = done.last.place[2]
@@ -135,10 +133,9 @@ def three() -> Iterator[str]:
         yield row(f"{kpa:g}", f"{high:.2f}", f"{CALCULIX[kpa]:.2f}", off, f"{rate:.0f}")
 
 
-def bending() -> Iterator[str]:
+def bending() -> Iterator[list[str]]:
     """What the bend depends on, at 5 kPa in one chamber and in two."""
     yield row("", "5 kPa in one chamber", "in two")
-    yield row("---", "---", "---")
     cases: dict[str, Callable[[CoarseActuator], CoarseActuator]] = {
         "as drawn": lambda made: made,
         "pockets 0.3 mm smaller in radius": lambda made: _stack(made, pockets=(2.2,) * 15),
@@ -179,26 +176,25 @@ def _changed(change: Callable[[CoarseActuator], CoarseActuator]) -> mock._patch[
     return mock.patch.object(files, "round_actuator", lambda *given: change(make(*given)))
 
 
-def row(*cells: object) -> str:
-    return "| " + " | ".join(map(str, cells)) + " |"
+def row(*cells: object) -> list[str]:
+    return [str(cell) for cell in cells]
 
 
-PARTS: dict[str, Callable[[], Iterator[str]]] = {
-    "Height of the mid-surfaces in mm and tilt in degrees, 15 balloons of 5 mm": scenes,
-    "The same, driven by volume": volumes,
-    "Finer rings, 5 kPa in all chambers": finer,
-    "Three balloons of 5 mm on one axis": three,
-    "What the tilt depends on": bending,
+PARTS: dict[str, Callable[[], Iterator[list[str]]]] = {
+    "pressures": scenes,
+    "volumes": volumes,
+    "rings": finer,
+    "three": three,
+    "tilt": bending,
 }
 
 
 def main() -> None:
-    text = PAGE.read_text(encoding="utf-8")
-    head, _, rest = text.partition(BEGIN)
-    _, _, tail = rest.partition(END)
-    parts = [f"**{title}**\n\n" + "\n".join(rows()) for title, rows in PARTS.items()]
-    body = "\n\n".join([BEGIN, *parts, END])
-    PAGE.write_text(head + body + tail, encoding="utf-8", newline="\n")
+    tables = {}
+    for name, rows in PARTS.items():
+        head, *others = rows()
+        tables[name] = Table(head, others)
+    keep("sofa", Record(COMMAND, date.today().isoformat(), PROGRAMS, tables))
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import tempfile
 from pathlib import Path
@@ -10,6 +11,8 @@ import sbafab
 from sbafab.cutting.svg_write import STROKE
 
 HAIRLINE = f'stroke-width="{STROKE:g}"'
+ROOM = 8.0
+"""mm of film that are shown above the parts."""
 KEPT = ("preview/solid.png", "preview/layers.svg", "preview/stack.svg", "sheets/TPE_1.svg")
 
 
@@ -30,4 +33,15 @@ def _keep(made: Path, target: Path) -> None:
     sheet = target / "TPE_1.svg"
     # A laser's lines are too fine for a small picture.
     thicker = sheet.read_text(encoding="utf-8").replace(HAIRLINE, 'stroke-width="0.6"')
-    sheet.write_text(thicker, encoding="utf-8")
+    sheet.write_text(_lower_part(thicker), encoding="utf-8")
+
+
+def _lower_part(drawing: str) -> str:
+    """The part of a sheet that is cut, which begins below; the film above it is left out."""
+    box = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', drawing)
+    assert box is not None
+    width, height = map(float, box.groups())
+    cut = drawing.partition('id="REFERENCE"')[0]
+    top = max(0.0, min(float(y) for y in re.findall(r"[ML][\d.]+ ([\d.]+)", cut)) - ROOM)
+    shown = f'width="{width}mm" height="{height - top}mm" viewBox="0 {top} {width} {height - top}"'
+    return re.sub(r'width="\S+" height="\S+" viewBox="[^"]+"', shown, drawing, count=1)

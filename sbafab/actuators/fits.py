@@ -105,9 +105,7 @@ class _Search:
         start = next((n for n in STARTS if self.over(n) is not None), None)
         if start is None:
             raise DesignError(self._why)
-        first = self.over(start)
-        assert first is not None
-        if first <= 0:
+        if self._fit(start):
             good, bad = start, start + 1
             while self._fit(bad):
                 good, bad = bad, bad + max(1, self._guess(bad))

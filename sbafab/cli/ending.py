@@ -73,8 +73,10 @@ def ended_plainly(as_json: bool = False) -> Iterator[None]:
                 raise KeyboardInterrupt(asked[0])
             sys.stdout.flush()
     except click.UsageError as error:
-        help_of = f"; see {error.ctx.command_path} --help" if error.ctx is not None else ""
-        sentence = f"{error.format_message().rstrip('.')}{help_of}"
+        sentence = error.format_message().rstrip(".")
+        if error.ctx is not None:
+            see = " See" if sentence.endswith("?") else "; see"
+            sentence += f"{see} {error.ctx.command_path} --help"
         end(Exit("usage", sentence, BAD_INPUT), as_json)
     except DefectError as error:
         end(Exit("defect", str(error), RULE_FAILED), as_json)

@@ -17,11 +17,13 @@ def explain(rule: str | None, as_json: bool) -> None:
     Without RULE: a line for every rule and check.
     """
     from sbafab.cli.printing import print_json
+    from sbafab.output.printed import EXPLAIN_SCHEMA, EXPLAINED_SCHEMA
     from sbafab.rules.explained import EXPLAINED
 
     if rule is None:
         if as_json:
-            print_json({name: one._asdict() for name, one in EXPLAINED.items()})
+            every = {name: one._asdict() for name, one in EXPLAINED.items()}
+            print_json({"schema": EXPLAINED_SCHEMA, "rules": every})
             return
         width = max(map(len, EXPLAINED))
         for name, one in EXPLAINED.items():
@@ -34,7 +36,7 @@ def explain(rule: str | None, as_json: bool) -> None:
         hint = f"did you mean {near[0]}?" if near else "sbafab explain lists them"
         raise click.BadParameter(f"{rule!r} is no rule; {hint}", param_hint="RULE")
     if as_json:
-        print_json({"rule": rule, **EXPLAINED[rule]._asdict()})
+        print_json({"schema": EXPLAIN_SCHEMA, "rule": rule, **EXPLAINED[rule]._asdict()})
         return
     _print(rule)
 

@@ -71,7 +71,7 @@ if TYPE_CHECKING:
 @set_option
 @json_option
 def find(source: str | None, **asked: Any) -> None:
-    """Find the design that meets requirements and is best in one thing.
+    """Find the best design that meets requirements.
 
     Without DESIGN it starts from every family. Exit code 1 where nothing meets all: then the
     nearest miss is shown and no file written.

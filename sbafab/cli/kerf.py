@@ -49,6 +49,7 @@ def kerf(
     from sbafab.cutting.calibration import calibrated
     from sbafab.cutting.measured_table import read_measurements
     from sbafab.errors import DesignError
+    from sbafab.output.printed import KERF_SCHEMA
 
     found = calibrated(read_measurements(measurements), resolution)
     if split_xy and (found.x is None or found.y is None):
@@ -59,6 +60,7 @@ def kerf(
     if as_json:
         print_json(
             {
+                "schema": KERF_SCHEMA,
                 "all": _as_dict(found.overall),
                 "x": _as_dict(found.x),
                 "y": _as_dict(found.y),

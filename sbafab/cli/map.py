@@ -46,7 +46,10 @@ def map_(
     points: int,
     **factors: Any,
 ) -> None:
-    """Map the balloons of a design: force and volume at any pressure and height."""
+    """Map force and volume of a design's balloons.
+
+    At any pressure and height, for other programs.
+    """
     from sbafab.actuators import load_design
     from sbafab.errors import DesignError, OutputError
     from sbafab.models.figures import Factors

@@ -67,15 +67,19 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
     elevation: float,
     azimuth: float,
 ) -> None:
-    """Draw the actuator at given pressures or volumes, from the elastic stack.
+    """Draw the inflated actuator, still or moving.
 
-    Balloons are drawn as they stand between their plates; ears are snipped off, and inlet tubes are
-    left out. Elevation and azimuth are degrees over the bench and round it.
+    It stands as the elastic stack says at the given pressures or volumes. Balloons are drawn as
+    they are between their plates; ears are snipped off, and inlet tubes are left out. Elevation and
+    azimuth are degrees over the bench and round it. Drawn or oblong pockets have no such model:
+    they are drawn flat.
     """
     from sbafab.actuators import build, load_design
     from sbafab.cli.printing import shown_progress
     from sbafab.errors import DesignError, OutputError
+    from sbafab.models.balloons import has_balloons
     from sbafab.models.stack import stack
+    from sbafab.reports.flat_picture import WHY, write_flat_picture
     from sbafab.reports.inflated_picture import MOVING, PictureWish, write_picture
 
     if pressures and volumes:
@@ -93,6 +97,13 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
         motion=motion,
     )
     laminate = build(loaded)
+    if not has_balloons(loaded.form):
+        try:
+            write_flat_picture(laminate, path, wish.width, wish.height)
+        except OSError as error:
+            raise OutputError(f"{path} cannot be written: {error.strerror}") from error
+        click.echo(f"written to {path}: {loaded.name}, flat, for {WHY}")
+        return
     with shown_progress(False) as tell:
         try:
             shown = write_picture(

@@ -133,11 +133,12 @@ def _predict_assembly(
     from sbafab.assemblies.build import assemble
     from sbafab.cli.printing import print_json
     from sbafab.cli.printing_assembly import print_assembly_prediction
+    from sbafab.output.printed import ASSEMBLY_PREDICT_SCHEMA
     from sbafab.reports.assembly_prediction import as_json, predict_assembly
 
     found = predict_assembly(assemble(assembly), pressure_kpa, load_g)
     if request.as_json:
-        print_json(as_json(found))
+        print_json({"schema": ASSEMBLY_PREDICT_SCHEMA, **as_json(found)})
     else:
         print_assembly_prediction(found)
     if found.touches:

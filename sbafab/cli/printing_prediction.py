@@ -42,7 +42,11 @@ def print_prediction(found: Prediction) -> None:
         part(OTHERS, figure_lines(others, models, out.width))
     part("Models and validity", _numbered(models, out.width))
     if found.left_out:
-        left = (f"{one.name}: {one.reason}" for one in found.left_out)
+        # What is left out for one reason is said together.
+        why: dict[str, list[str]] = {}
+        for one in found.left_out:
+            why.setdefault(one.reason, []).append(one.name)
+        left = (f"{', '.join(names)}: {reason}" for reason, names in why.items())
         part("Left out", (line for said in left for line in wrapped(said, out.width, "- ", "  ")))
     out.print()
 

@@ -19,7 +19,7 @@ FOLDER = "reproduction"
 @out_option
 @json_option
 def reproduce(out: Path, as_json: bool) -> None:
-    """Put every figure that the paper states beside ours: table, charts, page.
+    """Put the paper's figures beside ours.
 
     OUT/reproduction/ gets reproduction.md, reproduction.json and a chart for each figure of the
     paper that is predicted, with the paper's error bars.

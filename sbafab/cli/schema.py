@@ -6,7 +6,9 @@ import click
 
 FORMATS = (
     *("design", "checks", "manifest", "job", "assembly"),
-    *("press", "predict", "find", "run", "nested", "records", "report", "error"),
+    *("press", "predict", "find", "run", "nested", "records", "report"),
+    *("sweep", "simulate", "assembly-predict", "reproduction"),
+    *("balloon-map", "kerf", "explain", "explained", "templates", "error"),
 )
 """As in ``sbafab.output.schemas``, whose imports would slow ``--help`` down."""
 

@@ -93,6 +93,7 @@ def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> N
     from sbafab.cli.verdicts import Group, print_findings
     from sbafab.models.paper import BURST
     from sbafab.output.checking import checks
+    from sbafab.output.simulating import result_json
     from sbafab.output.simulating import simulate as run
     from sbafab.simulators.simulator import Wish
 
@@ -109,7 +110,7 @@ def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> N
         click.get_current_context().exit(RULE_FAILED)
     found = made.result
     if request.as_json:
-        print_json({"folder": str(made.folder), **found.figures, "stopped": found.stopped})
+        print_json({**result_json(found), "folder": str(made.folder)})
     else:
         _print(found, made.folder)
     most = max(wish.pressure or 0.0, *wish.chambers.values(), 0.0)

@@ -32,7 +32,9 @@ def studio(
     static: Path | None,
     pyodide: Path | None,
 ) -> None:
-    """Edit a design in the browser and see layers, rules and actuator at once.
+    """Edit a design in the browser.
+
+    Layers, rules, prediction and actuator follow at once.
 
     The page is served on this machine only and asks for the token in its link. Ctrl-C ends it.
     """

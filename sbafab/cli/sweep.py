@@ -99,7 +99,10 @@ def sweep(
 
 
 def _as_json(found: SweptDesigns) -> dict[str, object]:
+    from sbafab.output.printed import SWEEP_SCHEMA
+
     return {
+        "schema": SWEEP_SCHEMA,
         "folder": str(found.folder),
         "designs": found.designs,
         "measured_now": found.measured,

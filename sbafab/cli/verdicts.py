@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from sbafab.rules.finding import Finding, Verdict
 
 
+SHARES = {"pin-fit": "stretch", "registration-yield": "hold"}
+"""Rules that measure a share, and what it is of: a film stretches over its pin, builds hold."""
+
+
 class Group(NamedTuple):
     """Findings that belong together: of one design, or between the parts of an assembly."""
 
@@ -54,7 +58,7 @@ def print_lines(findings: Sequence[Finding], verbose: bool = False) -> None:
     for one in shown:
         line = Text(f"{one.rule:{wide}}  ")
         line.append(f"{one.verdict:7}", style=COLOURS[one.verdict])
-        measured = short_figure(one.measured, one.unit)
+        measured = short_figure(one.measured, _unit(one))
         line.append(f"  {measured:>13}  {limit_said(one):>14}")
         line.rstrip()
         out.print(line, soft_wrap=True)
@@ -99,9 +103,14 @@ def verdict_said(name: str, groups: Sequence[Group], more: str) -> str:
 def limit_said(finding: Finding) -> str:
     """A limit with its sense: ">=" the least that may be measured, "<=" the most."""
     if finding.limit is None:
-        return ""
+        return "no target" if finding.rule in SHARES else ""
     sense = "<=" if _is_most(finding.rule) else ">="
-    return f"{sense} {short_figure(finding.limit, finding.unit)}"
+    return f"{sense} {short_figure(finding.limit, _unit(finding))}"
+
+
+def _unit(finding: Finding) -> str:
+    """The unit of a finding's figures; of a share what is counted, after a per cent sign."""
+    return f"% {SHARES[finding.rule]}" if finding.rule in SHARES else finding.unit
 
 
 def _is_most(rule: str) -> bool:
@@ -118,5 +127,7 @@ def short_figure(value: float | None, unit: str) -> str:
     """A measured value in a column; none where nothing was measured."""
     if value is None:
         return ""
+    if unit.startswith("%"):
+        return f"{100 * value:.3g}{unit}"
     digits = f"{value:.3f}" if unit == "mm" else f"{value:.4g}"
     return f"{digits} {unit}".strip()

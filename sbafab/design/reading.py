@@ -248,7 +248,7 @@ def validated(
     if family == ASSEMBLY:
         raise DesignError(
             f"{shown(data.get('name', folder.name))} is an assembly of several designs; it goes "
-            "with generate and check, and every other command takes one of its designs"
+            "with generate, check, predict and studio, and other commands take one of its designs"
         )
     if not isinstance(family, str) or family not in families:
         near = difflib.get_close_matches(shown(family).strip("'"), families, 1)

@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
 
 DEGREE = 5
-PRESSURE_SPANS, HEIGHT_SPANS = 9, 9
+PRESSURE_SPANS, HEIGHT_SPANS = 12, 12
 """Pieces of the spline each way."""
-PRESSURE_POINTS, HEIGHT_POINTS = 12, 12
+PRESSURE_POINTS, HEIGHT_POINTS = 16, 18
 """Balloons computed each way."""
-P0 = 0.3
+P0 = 0.1
 """Pressure in kPa below which the spline's pieces are alike in pressure, above alike in ratio."""
 RISES = 65
 """Pressures at which free heights are kept to begin with."""
@@ -36,6 +36,10 @@ ABOVE = 1.15
 """How far the map goes on above the highest free balloon, as a share of it."""
 FLATTEST = 0.01
 """Least height in mm that is computed; what lies below is carried on."""
+FLAT = 0.1
+"""Weight of balloons that are pressed flat and hold nothing."""
+NEARLY_FLAT = 0.2
+"""Height in mm above which volumes are fitted by their share of what they are, below all alike."""
 MOST_STRETCH = 0.15
 """Share by which films may stretch; one modulus is unlikely to hold beyond."""
 
@@ -57,9 +61,12 @@ def _pieces() -> Array:
 
 
 PIECES = _pieces()
+POWERS = np.arange(DEGREE + 1.0)
 SLOPES = np.stack([PIECES[:, k] * k for k in range(1, DEGREE + 1)], -1)
 WINDOWS = np.arange(HEIGHT_SPANS)[:, None] + np.arange(DEGREE + 1)
 """The coefficients of each piece by height."""
+PIECES_IN_ALL = HEIGHT_SPANS + 2
+"""Those of a spline by height, and what it goes on with at either end."""
 CURVES = np.stack([SLOPES[:, k] * k for k in range(1, DEGREE)], -1)
 
 
@@ -72,6 +79,19 @@ def basis(x: Array, order: int = 0) -> tuple[NDArray[np.int_], Array]:
     u = x - first
     powers = u[..., None] ** np.arange(table.shape[1])
     return first, powers @ table.T
+
+
+def _shifted(by: float, count: int) -> Array:
+    """What the first three powers of a polynomial are about a place ``by`` further: (3, count)."""
+    found = np.zeros((3, count))
+    for k in range(count):
+        for j in range(min(k, 2) + 1):
+            found[j, k] = math.comb(k, j) * by ** (k - j)
+    return found
+
+
+ENDS = _shifted(-1.0, 3), _shifted(1.0, DEGREE + 1)
+"""What goes on below the first piece, and above the last one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,22 +110,33 @@ class BalloonMap:
         """Pieces of the spline a mm of height."""
         return HEIGHT_SPANS / self.most_height
 
-    def pressed(self, pressure: ArrayLike) -> tuple[Array, Array]:
-        """Coefficients by height of W and of -dW/dp (the volume) at pressures, a row each.
+    @cached_property
+    def _polynomials(self) -> Array:
+        """By powers of both places: (pieces in pressure, powers, pieces by height x powers)."""
+        by_height = pieces(self.coefficients).reshape(len(self.coefficients), -1)
+        rows = by_height[np.arange(PRESSURE_SPANS)[:, None] + np.arange(DEGREE + 1)]
+        return np.asarray(PIECES.T @ rows)
+
+    def pressed(self, pressure: ArrayLike) -> Array:
+        """Polynomials by height, of W and of -dW/dp (the volume), at pressures: (..., 2, pieces,
+        powers).
 
         Raises DesignError for a pressure outside the map.
         """
         p = np.asarray(pressure, dtype=float)
-        if not ((p >= 0) & (p <= self.most_pressure)).all():
+        if not (p.min() >= 0 and p.max() <= self.most_pressure):
             raise DesignError(
                 f"a pressure of {float(p.max()):g} kPa is outside the balloon's map; give 0 to "
                 f"{self.most_pressure:g} kPa"
             )
         x, rate = self._scaled(p)
-        first, weights = basis(x)
-        slopes = basis(x, 1)[1] * -rate[..., None]
-        rows = self.coefficients[WINDOWS[first]]
-        return (weights[..., None, :] @ rows)[..., 0, :], (slopes[..., None, :] @ rows)[..., 0, :]
+        first = x.astype(np.int_)
+        powers = np.empty((*p.shape, 2, DEGREE + 1))
+        powers[..., 0, :] = (x - first)[..., None] ** POWERS
+        powers[..., 1, 0] = 0.0
+        powers[..., 1, 1:] = powers[..., 0, :-1] * POWERS[1:] * -rate[..., None]
+        found = powers @ self._polynomials[first]
+        return found.reshape(*p.shape, 2, PIECES_IN_ALL, DEGREE + 1)
 
     def _scaled(self, p: Array) -> tuple[Array, Array]:
         """Place among the pieces in pressure, and its rate by pressure."""
@@ -127,9 +158,9 @@ class BalloonMap:
 
     def _along(self, which: int, pressure: ArrayLike, height: ArrayLike) -> Along:
         p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
-        found = pieces(self.pressed(p)[which]).reshape(-1, DEGREE + 1)
+        found = self.pressed(p)[..., which, :, :].reshape(-1, DEGREE + 1)
         return along(
-            derivatives(found), HEIGHT_SPANS * np.arange(p.size).reshape(p.shape), h * self.spans
+            derivatives(found), PIECES_IN_ALL * np.arange(p.size).reshape(p.shape), h * self.spans
         )
 
     def free_height(self, pressure: ArrayLike) -> Array:
@@ -161,8 +192,16 @@ class Along(NamedTuple):
 
 
 def pieces(coefficients: Array) -> Array:
-    """Polynomials of splines by height: (..., coefficients) become (..., pieces, powers)."""
-    return np.asarray(coefficients[..., WINDOWS] @ PIECES)
+    """Polynomials of splines by height: (..., coefficients) become (..., PIECES_IN_ALL, powers).
+
+    The first goes on below the spline and the last above it, with the second derivative there.
+    """
+    inner = coefficients[..., WINDOWS] @ PIECES
+    found = np.zeros((*inner.shape[:-2], PIECES_IN_ALL, DEGREE + 1))
+    found[..., 1:-1, :] = inner
+    found[..., 0, :3] = inner[..., 0, :3] @ ENDS[0].T
+    found[..., -1, :3] = inner[..., -1, :] @ ENDS[1].T
+    return found
 
 
 def derivatives(polynomials: Array) -> Array:
@@ -179,22 +218,23 @@ def along(table: Array, which: NDArray[np.int_], y: Array) -> Along:
     """Splines at places ``y``, in pieces.
 
     ``table`` are the ``derivatives`` of the pieces of all splines; ``which`` says at which row each
-    one begins. Outside its ends it goes on with the second derivative that it has there.
+    one begins.
     """
-    inside = np.minimum(np.maximum(y, 0.0), HEIGHT_SPANS - 1e-9)
-    first = inside.astype(np.int_)
-    u = inside - first
-    powers = table.take(which + first, axis=2)
+    found = horner(table, which, y)
+    return Along(*found)
+
+
+def horner(table: Array, which: NDArray[np.int_], y: Array) -> Array:
+    """Polynomials (powers, ..., rows) of splines at places ``y``, in pieces."""
+    first = np.clip(np.floor(y), -1.0, HEIGHT_SPANS)
+    u = y - first
+    powers = table.take(which + 1 + first.astype(np.int_), axis=-1)
     found = powers[DEGREE] * u
     for power in powers[DEGREE - 1 : 0 : -1]:
         found += power
         found *= u
     found += powers[0]
-    value, slope, curve = found
-    beyond = y - inside
-    if beyond.any():
-        value, slope = value + beyond * (slope + beyond * curve / 2), slope + beyond * curve
-    return Along(value, slope, curve)
+    return np.asarray(found)
 
 
 @lru_cache(maxsize=64)
@@ -202,7 +242,9 @@ def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
     """The map of a balloon from 0 to a pressure in kPa, and somewhat higher than it may rise."""
     top = ABOVE * highest(balloon, most_pressure)
     p = P0 * np.sinh(_spread(PRESSURE_POINTS) * math.asinh(most_pressure / P0))
-    h = FLATTEST + (top - FLATTEST) * _spread(HEIGHT_POINTS)
+    # A film that is slack comes taut at a pressure that is the lower the flatter it lies.
+    even = _spread(HEIGHT_POINTS)
+    h = FLATTEST + (top - FLATTEST) * (even + even**2) / 2
     pressures, heights = (grid.ravel() for grid in np.meshgrid(p, h))
     found = inflate(balloon, pressures, heights, tied=True)
     return BalloonMap(
@@ -232,12 +274,15 @@ def _fitted(p: Array, h: Array, found: Shapes, most: float, top: float) -> Array
     by_p = [_rows(x, order, blank.shape[0]) for order in (0, 1)]
     by_h = [_rows(y, order, blank.shape[1]) for order in (0, 1)]
 
-    def equations(i: int, j: int, scale: Array) -> Array:
-        return np.asarray((by_p[i][:, :, None] * by_h[j][:, None, :]).reshape(len(p), -1) * scale)
+    flat, lowest = _rows(0 * y, 0, blank.shape[1]), h == h.min()
+
+    def equations(i: int, j: int, scale: Array, by_height: Array | None = None) -> Array:
+        rows = by_h[j] if by_height is None else by_height
+        return np.asarray((by_p[i][:, :, None] * rows[:, None, :]).reshape(len(p), -1) * scale)
 
     area = found.r[:, -1].max() ** 2 * math.pi
     push = 1 / (area * (p + 0.5) + 3 * np.abs(found.force))
-    room = 2 / (area * top + 3 * np.abs(found.force) / (p + 1.0))
+    room = 2 / (area * np.minimum(h + NEARLY_FLAT, top) + 3 * np.abs(found.force) / (p + 1.0))
     potential = found.energy - p * found.volume
     scale = push / top
     matrix = np.concatenate(
@@ -245,9 +290,13 @@ def _fitted(p: Array, h: Array, found: Shapes, most: float, top: float) -> Array
             equations(0, 0, scale[:, None]),
             equations(0, 1, (-push * HEIGHT_SPANS / top)[:, None]),
             equations(1, 0, (-rate * room)[:, None]),
+            # Pressed flat, it holds nothing.
+            equations(1, 0, (-FLAT * rate * room)[:, None], flat)[lowest],
         ]
     )
-    wanted = np.concatenate([potential * scale, found.force * push, found.volume * room])
+    wanted = np.concatenate(
+        [potential * scale, found.force * push, found.volume * room, np.zeros(lowest.sum())]
+    )
     best = np.linalg.lstsq(matrix, wanted, rcond=None)[0]
     return np.asarray(best.reshape(blank.shape))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from sbafab.design.form import Discs
+from sbafab.design.form import Discs, Form
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon
 
@@ -13,6 +13,11 @@ if TYPE_CHECKING:
     from sbafab.design.records import Design
     from sbafab.laminate.laminate import Laminate
     from sbafab.models.figures import Factors
+
+
+def has_balloons(form: Form) -> bool:
+    """Whether the elastic model knows such pockets: round ones on flat plates."""
+    return isinstance(form.pockets, Discs) and form.wrap is None
 
 
 def balloons_of(
@@ -24,7 +29,7 @@ def balloons_of(
     Raises DesignError where pockets are not round, or for films whose modulus is not known.
     """
     form = design.form
-    if not isinstance(form.pockets, Discs) or form.wrap is not None:
+    if not has_balloons(form) or not isinstance(form.pockets, Discs):
         raise DesignError(
             f"design {design.name} has no round pockets on flat plates; only those have an elastic "
             "model: simulate the design instead"

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 SMALL = 1e-8
 """Square of the angle below which its functions are those at this one."""
-ACROSS, FLAT = np.array([1.0, -1.0]), np.eye(2)
+BASE = np.eye(3)
 SIGNS = np.zeros((3, 3, 3))
 """The Levi-Civita symbol."""
 SIGNS[[0, 1, 2], [1, 2, 0], [2, 0, 1]] = 1.0
@@ -40,6 +40,24 @@ def _felt() -> Array:
 FELT = _felt()
 
 
+def _turned() -> Array:
+    """Matrix (13, 15) behind ``_rotations``: of 1, x, y, twice xx, xy, yx, yy, then x, y."""
+    found = np.zeros((13, 15))
+    turn, rate = found[:, :9].reshape(13, 3, 3), found[:, 9:].reshape(13, 2, 3)
+    turn[0] = BASE
+    # The vector (x, y, 0) as a cross product, then that twice.
+    turn[1:3] = SIGNS[:, :2].transpose(1, 0, 2)
+    turn[3:7] = (turn[1:3, None] @ turn[None, 1:3]).reshape(4, 3, 3)
+    rate[0] = BASE[:2] / 2
+    rate[7:11] = turn[3:7, :2] / 2
+    rate[7:11, :, 2] = 0.0
+    rate[11:] = -turn[1:3, :2] / 2
+    return found
+
+
+TURNED = _turned()
+
+
 class Chain(NamedTuple):
     """Plates of a chain, the base first: places (n + 1, 3) in mm and axes (n + 1, 3, 3), whose
     columns are the plates' x, y and z; ``rises`` (n, 3) are the levels' directions.
@@ -58,7 +76,7 @@ def chain(freedoms: Array, pitch: float) -> Chain:
     count = len(freedoms)
     turned, rates = _rotations(freedoms[:, 1:] / 2)
     axes = np.empty((count + 1, 3, 3))
-    axes[0] = np.eye(3)
+    axes[0] = BASE
     np.matmul(turned, turned, out=axes[1:])
     reach = 1
     while reach < count:
@@ -79,23 +97,21 @@ def _rotations(vectors: Array) -> tuple[Array, Array]:
     """Rotations (n, 3, 3) by vectors (n, 2) in the xy plane, and half the turn by a unit change of
     each (n, 2, 3): Rodrigues' formula and the left Jacobian.
     """
-    across = vectors[:, ::-1] * ACROSS
-    squares = across[:, :, None] * across[:, None]
-    square = squares[:, 0, 0] + squares[:, 1, 1]
+    count = len(vectors)
+    pairs = (vectors[:, :, None] * vectors[:, None]).reshape(count, 4)
+    square = pairs[:, :1] + pairs[:, 3:]
     safe = np.maximum(square, SMALL)
     angle = np.sqrt(safe)
     sine = np.sin(angle) / angle
     versine = (1 - np.cos(angle)) / safe
-    rest = (1 - sine) / safe
-    found = np.empty((len(vectors), 3, 3))
-    found[:, :2, :2] = FLAT - versine[:, None, None] * squares
-    found[:, :2, 2] = sine[:, None] * across
-    found[:, 2, :2] = -found[:, :2, 2]
-    found[:, 2, 2] = 1 - versine * square
-    rates = np.empty((len(vectors), 2, 3))
-    rates[:, :, :2] = (FLAT - rest[:, None, None] * squares) / 2
-    rates[:, :, 2] = versine[:, None] * across / -2
-    return found, rates
+    parts = np.empty((count, 13))
+    parts[:, :1] = 1.0
+    np.multiply(sine, vectors, out=parts[:, 1:3])
+    np.multiply(versine, pairs, out=parts[:, 3:7])
+    np.multiply((1 - sine) / safe, pairs, out=parts[:, 7:11])
+    np.multiply(versine, vectors, out=parts[:, 11:])
+    found = parts @ TURNED
+    return found[:, :9].reshape(count, 3, 3), found[:, 9:].reshape(count, 2, 3)
 
 
 def crossing(vectors: Array) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -13,18 +13,34 @@ from sbafab.errors import DesignError
 from sbafab.models.pneumatics import Line
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from sbafab.models.film_elements import Array
     from sbafab.models.stack import Pose, Stack
 
 MOST_ROUNDS = 40
-HALVINGS = 8
-DAMPED, LEAST_DAMPING = 10.0, 0.05
-"""By what steps are damped more where they do not help, and what is none."""
+HALVINGS = 20
+OVERSHOT = 0.5
+"""Share of a step's first slope that its last one may rise to."""
+STEP = 1e-3
+"""By which slopes are found."""
 SOFTEST = 0.01
 """Pressure in kPa below which volumes are nearly straight in pressure, above in its logarithm."""
-FARTHEST = 1.0
+FARTHEST = 2.0
 CLOSE = 1e-5
-"""Share of a chamber's content by which it may be missed."""
+LITTLE = 20.0
+"""Share of a chamber's content by which it may be missed; in ul, the content that is least."""
+
+
+class _Tried(NamedTuple):
+    """A pose that is tried: at asinh(p / SOFTEST) of the chambers; what their volumes are too large
+    by in ul; and kPa by x.
+    """
+
+    x: Array
+    pose: Pose
+    wrong: Array
+    rates: Array
 
 
 @dataclass
@@ -96,53 +112,86 @@ class Motion:
         return self._solved(lambda pose: np.asarray(self._contents(pose) - wanted), wanted)
 
     def _solved(self, missed: Callable[[Pose], Array], scale: Array) -> Pose:
-        """The pose at which nothing is missed: Newton's method in asinh(p / SOFTEST), in which
-        volumes are nearly straight. A chamber that would need less than no pressure draws in what
-        it lacks.
+        """The pose at which nothing is missed. A chamber that would need less than no pressure
+        draws in what it lacks.
+
+        What is missed, as volume, is the slope of one function of the pressures, whose least is
+        sought: volumes are slopes of a potential that bends one way, and more pressure lets less
+        in. Newton's method in asinh(p / SOFTEST), in which volumes are nearly straight; a step is
+        as long as it leads downhill.
         """
         most = math.asinh(self.stack.most_pressure / SOFTEST)
-        x = np.arcsinh(np.asarray(self.pose.pressures) / SOFTEST)
-        pose = self._at(x)
-        wrong = missed(pose)
-        close = CLOSE * np.maximum(np.abs(scale), 1.0)
-        damping = 0.0
+        close = CLOSE * np.maximum(np.abs(scale), LITTLE)
+        start = np.arcsinh(np.asarray(self.pose.pressures) / SOFTEST)
+        now = self._tried(start, missed, self.pose)
         for _ in range(MOST_ROUNDS):
-            counts = ~((x <= 0) & (wrong >= 0))
-            if (np.abs(wrong) <= close)[counts].all():
-                return pose
-            if (counts & (x >= most) & (wrong < 0)).any():
-                break
-            slopes = self._slopes(missed, x, wrong)[np.ix_(counts, counts)]
-            # Below some 0.05 kPa maps may give a chamber less for more pressure.
-            slopes += damping * np.diag(np.abs(slopes).sum(-1))
-            move = np.zeros_like(x)
-            move[counts] = np.clip(-np.linalg.solve(slopes, wrong[counts]), -FARTHEST, FARTHEST)
-            for _ in range(HALVINGS):
-                tried_x = np.clip(x + move, 0.0, most)
-                tried = self._at(tried_x)
-                left = missed(tried)
-                still = ~((tried_x <= 0) & (left >= 0))
-                if np.abs(left / close)[still].max(initial=0) < np.abs(wrong / close)[counts].max():
-                    x, pose, wrong, damping = tried_x, tried, left, damping / DAMPED
-                    break
-                move = move / 2
-            else:
-                damping = max(DAMPED * damping, 1.0)
-            damping = damping if damping > LEAST_DAMPING else 0.0
-        raise DesignError(
-            f"the chambers would need more than {self.stack.most_pressure:g} kPa; ask for less, or "
-            "make the stack with a larger most_pressure"
-        )
+            lacks = (now.x >= most) & (now.wrong < 0)
+            counts = ~((now.x <= 0) & (now.wrong >= 0)) & ~lacks
+            if (np.abs(now.wrong) <= close)[counts].all():
+                if lacks.any():
+                    raise DesignError(
+                        f"the chambers would need more than {self.stack.most_pressure:g} kPa; ask "
+                        "for less, or make the stack with a larger most_pressure"
+                    )
+                return now.pose
+            ahead = self._ahead(missed, now, counts)
+            ahead *= min(1.0, FARTHEST / max(float(np.abs(ahead).max()), 1e-12))
+            now = self._downhill(missed, now, ahead, most)
+        raise DesignError("the stack finds no balance at the end of this step; try a shorter one")
 
-    def _slopes(self, missed: Callable[[Pose], Array], x: Array, wrong: Array) -> Array:
-        found = np.empty((len(x), len(x)))
-        for chamber in range(len(x)):
-            step = 1e-3 if x[chamber] < 1 else -1e-3
-            moved = x.copy()
-            moved[chamber] += step
-            found[:, chamber] = (missed(self._at(moved)) - wrong) / step
-        return found
+    def _downhill(
+        self, missed: Callable[[Pose], Array], now: _Tried, ahead: Array, most: float
+    ) -> _Tried:
+        """What is found along a step, as far as it leads downhill."""
+        steep = float(now.wrong @ (now.rates * ahead))
+        share = 1.0
+        for _ in range(HALVINGS):
+            x = np.clip(now.x + share * ahead, 0.0, most)
+            try:
+                tried = self._tried(x, missed, now.pose)
+            except DesignError:
+                share /= 2
+                continue
+            still = (x > 0) & (x < most)
+            slope = float((tried.wrong * tried.rates * ahead)[still].sum())
+            if slope <= -OVERSHOT * steep:
+                return tried
+            share *= min(max(steep / (steep - slope), 0.1), 0.7)
+        return tried
 
-    def _at(self, x: Array) -> Pose:
+    def _tried(self, x: Array, missed: Callable[[Pose], Array], near: Pose) -> _Tried:
         pressures = np.minimum(SOFTEST * np.sinh(x), self.stack.most_pressure)
-        return self.stack.pose(tuple(pressures.tolist()), near=self.pose, **self.load)
+        pose = self.stack.pose(tuple(pressures.tolist()), near=near, **self.load)
+        return _Tried(x, pose, missed(pose) / self._dense(pose), SOFTEST * np.cosh(x))
+
+    def _dense(self, pose: Pose) -> Array:
+        """How much fluid a volume holds in each chamber."""
+        return np.array([self.line.content(1.0, p) for p in pose.pressures])
+
+    def _ahead(
+        self, missed: Callable[[Pose], Array], now: _Tried, counts: NDArray[np.bool_]
+    ) -> Array:
+        """Newton's step by x of the chambers that count; 0 of the others."""
+        found = []
+        for chamber in np.flatnonzero(counts):
+            moved = now.x.copy()
+            moved[chamber] += STEP if moved[chamber] < 1 else -STEP
+            tried = self._tried(moved, missed, now.pose)
+            found.append((tried.wrong - now.wrong)[counts] / (tried.x - now.x)[chamber])
+        which, slopes = np.flatnonzero(counts), np.array(found).T
+        while True:
+            ahead = np.zeros_like(now.x)
+            ahead[which] = _newton(slopes, now.wrong[which], now.rates[which])
+            may = (now.x[which] > 0) | (ahead[which] >= 0)
+            if may.all():
+                return ahead
+            # What has no pressure cannot have less: the others move alone.
+            which, slopes = which[may], slopes[np.ix_(may, may)]
+
+
+def _newton(slopes: Array, wrong: Array, rates: Array) -> Array:
+    """The step by x, its matrix made symmetric and firm by pressure, as that of a least is."""
+    matrix = slopes / rates
+    values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
+    values = np.maximum(np.abs(values), 1e-9 * np.abs(values).max(initial=0.0) + 1e-12)
+    return np.asarray(-(vectors @ ((vectors.T @ wrong) / values)) / rates)

@@ -18,6 +18,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.models import axial, elastic, lobes, paper, stacked
 from sbafab.models.actuator import NO_OUTLINE, Actuator, actuator
 from sbafab.models.choice import STACK, chosen
+from sbafab.models.drawn import flat_forces
 from sbafab.models.figures import (
     Asked,
     Figure,
@@ -86,7 +87,10 @@ def _all(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
     yield Figure("size", "mass", mass.value, mass.unit, mass.model)
     yield from _tubes(one)
     if not one.kinematics:
-        for what in ("stroke", "force", "actuation", "bending", "folded diameter"):
+        pushed = list(flat_forces(one, asked))
+        yield from pushed
+        force = "force once the plates part" if pushed else "force"
+        for what in ("stroke", force, "actuation", "bending", "folded diameter"):
             yield LeftOut(what, NO_OUTLINE)
         return
     yield from axial.strokes(one, asked)

@@ -22,16 +22,11 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon
-from sbafab.models.balloon_map import (
-    DEGREE,
-    HEIGHT_SPANS,
-    BalloonMap,
-    balloon_map,
-    derivatives,
-    pieces,
-)
+from sbafab.models.balloon_map import BalloonMap, balloon_map
 from sbafab.models.chain import Chain, chain
-from sbafab.models.stack_balance import Load, Springs, free, held
+from sbafab.models.loads import Load
+from sbafab.models.springs import RING, GapPlaces, Springs
+from sbafab.models.stack_balance import free, held
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -43,8 +38,6 @@ if TYPE_CHECKING:
     from sbafab.models.motion import Motion
     from sbafab.models.pneumatics import Line
 
-RING = 6
-"""Points of each balloon at which its gap is looked at."""
 AROUND = 24
 """Points round a level's outline, or a few more, where its rims may meet the next level's."""
 MOST_PRESSURE = 110.0
@@ -197,28 +190,28 @@ class Stack:
             found.append(np.stack([np.ones_like(x), y, -x], -1))
         return np.stack(found)
 
+    @cached_property
+    def _places(self) -> GapPlaces:
+        """Where kinds of balloons are looked at."""
+        return GapPlaces.of(self.maps, self._gap_of, self.rims)
+
+    @cached_property
+    def _level_places(self) -> GapPlaces:
+        """Where levels are."""
+        return self._places.at(self.levels)
+
     def springs(self, pressures: Sequence[float]) -> Springs:
-        """What the levels do at pressures, one a chamber. Raises DesignError."""
-        asked = tuple(float(p) for p in pressures)
+        """What kinds of balloons do at pressures, one a chamber. Raises DesignError."""
+        asked = np.array(pressures, dtype=float)
         if len(asked) != self.chambers:
             raise DesignError(
                 f"{len(asked)} pressures are given for {self.chambers} chambers; give one a chamber"
             )
-        rows = [one.pressed(np.array(asked)) for one in self.maps]
-        found = pieces(np.array(rows).transpose(1, 0, 2, 3)).reshape(-1, DEGREE + 1)
-        return Springs(derivatives(found), *self._rows)
+        return Springs.pressed(self.maps, asked, self._places)
 
-    @cached_property
-    def _rows(self) -> tuple[NDArray[np.int_], int, Array, Array, Array, Array, int, Array]:
-        """What springs hold beside their polynomials."""
-        count = len(self.maps) * self.chambers
-        begins = np.arange(count).reshape(len(self.maps), -1) * HEIGHT_SPANS
-        gap_of = self._gap_of
-        squares = (gap_of[..., :, None] * gap_of[..., None, :]).reshape(*gap_of.shape[:2], 9)
-        spans = np.array([[one.spans] for one in self.maps])
-        top = np.array([one.most_height for one in self.maps])
-        each = np.repeat(begins, RING, axis=1)
-        return each, count * HEIGHT_SPANS, gap_of, squares, spans, top, RING, self.rims
+    def each(self, springs: Springs) -> Springs:
+        """What levels do."""
+        return Springs(springs.table, self._level_places)
 
     def pose(
         self,
@@ -244,8 +237,11 @@ class Stack:
         if near is not None:
             start = near.freedoms
         else:
-            start = free(springs, self._risen(pressures))[self.levels]
-        found, push, stable = held(springs, self.levels, self.pitch, load, start, near is not None)
+            start = self._risen(pressures)
+            if load.point is not None and not (load.is_level and load.sticks):
+                start = free(springs, start)
+            start = start[self.levels]
+        found, push, stable = held(self.each(springs), self.pitch, load, start, near is not None)
         return self._pose(pressures, springs, found, None, push / 1000, stable)
 
     def _risen(self, pressures: Sequence[float]) -> Array:
@@ -270,6 +266,11 @@ class Stack:
     def most_pressure(self) -> float:
         """How far its maps go, in kPa."""
         return min(one.most_pressure for one in self.maps)
+
+    @cached_property
+    def _top(self) -> Array:
+        """How far each level's map goes in mm: (levels, 1)."""
+        return np.array([self.maps[kind].most_height for kind in self.levels])[:, None]
 
     @cached_property
     def _first(self) -> NDArray[np.int_]:
@@ -317,15 +318,14 @@ class Stack:
         kind are alike.
         """
         gaps = found @ self._centres
-        top = springs.top[self.levels]
-        highest = float((gaps - top[:, None]).max())
+        highest = float((gaps - self._top).max())
         if highest > 0:
             raise DesignError(
                 "a balloon would rise higher than its films can be stretched "
-                f"({highest:.2g} mm above {float(top.min()):.3g} mm); give less pressure or load"
+                f"({highest:.2g} mm above {self._top.min():.3g} mm); give less pressure or load"
             )
         if kinds is None:
-            volumes, energies = springs.of(self.levels).contents(found)
+            volumes, energies = self.each(springs).contents(found)
         else:
             each, stored = springs.contents(kinds)
             volumes, energies = each[self.levels], stored[self.levels]

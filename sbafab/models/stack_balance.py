@@ -3,129 +3,45 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.balloon_map import along
-from sbafab.models.chain import chain, crossing, felt, twists
+from sbafab.models.loads import Load, Loaded, loaded, pushed, with_blocks
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from sbafab.models.chain import Chain
     from sbafab.models.film_elements import Array
+    from sbafab.models.springs import Springs
 
-SHUT = 2e4
-"""mN/mm with which a flat balloon resists being flattened further: no film gives way visibly."""
-WALL = 1e6
-"""mN/mm of an outer plate."""
 WALLS = (1e3, 1e5)
 """The same on the way there."""
-TOUCHES = 12
-"""Points round the top's outline that may touch the outer plate."""
-TURN = np.arange(TOUCHES) * math.tau / TOUCHES
-RIM = np.stack([np.cos(TURN), np.sin(TURN), 0 * TURN], -1)
 MOST_STEPS = 300
-CLOSE = 1e-5
+CLOSE = 1e-7
 """Out of balance in mN (or mN mm) that is none."""
 FARTHEST = np.array([0.4, 0.15, 0.15])
 """The most by which one step moves rise (mm) and tilt (rad)."""
 FINE = 1e-6
 """A step (mm, rad) that need not be made."""
+FINEST = 5e-8
+"""The same where what all levels do adds up: tilts under a load, volumes without."""
 CLOSELY, LITTLE = 3e-5, 1e-7
 """Largest last step (mm, rad) against an outer plate, and the energy (uJ) that it may gain: the
 plate's force is to be right as well."""
 ROUGH = 0.01
 """The same on the way to an outer plate."""
-ROUNDS = 2
+TRIES = 2
 """How often a step is held off by rims that it would meet."""
+ROUNDS, NEARLY = 16, 0.2
+"""How often a step is bettered by the springs at its end, and the share of it that is little."""
+STRAIGHT = 6e-3
+"""A step (mm, rad) along which springs are straight enough."""
+SMALL, ALIKE = 2e-3, 1e-9
+"""A step with whose matrix another one may be made, and what the product of both must be below for
+that one to be the last.
+"""
 FEW_STEPS = 12
 """Steps in which a start far away meets an outer plate, or never does."""
-
-
-class Load(NamedTuple):
-    """What acts from outside, in mN: force on the tip, weight of each level; and the outer plate:
-    the line (a point and the normal) on which the tip meets it, whether it sticks to that line, the
-    radius of the top that meets it, and the plate's stiffness.
-    """
-
-    tip: Array
-    weight: Array
-    point: Array | None
-    normal: Array
-    sticks: bool
-    outline: float
-    wall: float = WALL
-
-
-@dataclass(frozen=True, eq=False)
-class Springs:
-    """What levels do at given pressures: a row a level or a kind of balloon.
-
-    ``table`` holds the ``derivatives`` of the potentials of all splines, then of their volumes.
-    ``begins`` (rows, chambers x points) is where the potential of each point begins in it,
-    ``volumes`` by how many rows later its volume does; ``gap_of`` (rows, chambers x points, 3) are
-    the gaps by rise and tilt, ``squares`` (rows, chambers x points, 9) their products, ``spans``
-    (rows, 1) pieces of the spline a mm and ``top`` (rows) its end in mm; ``ring`` is the number of
-    points a balloon. ``rims`` (rows, points, 3) are the gaps by rise and tilt round the outline.
-    """
-
-    table: Array
-    begins: NDArray[np.int_]
-    volumes: int
-    gap_of: Array
-    squares: Array
-    spans: Array
-    top: Array
-    ring: int
-    rims: Array
-
-    def of(self, levels: NDArray[np.int_]) -> Springs:
-        """A row for each of these."""
-        return replace(
-            self,
-            begins=self.begins[levels],
-            gap_of=self.gap_of[levels],
-            squares=self.squares[levels],
-            spans=self.spans[levels],
-            top=self.top[levels],
-            rims=self.rims[levels],
-        )
-
-    def energy(self, freedoms: Array) -> tuple[Array, Array, Array]:
-        """Energy (rows) in uJ with its gradient (rows, 3) and second derivatives (rows, 3, 3)."""
-        gaps = (self.gap_of @ freedoms[..., None])[..., 0]
-        found = along(self.table, self.begins, gaps * self.spans)
-        value, slope = found.value, found.first * self.spans
-        curve = found.second * (self.spans * self.spans)
-        shut = np.minimum(gaps, 0.0)
-        if shut.any():
-            value = value + SHUT * shut**2 / 2
-            slope = slope + SHUT * shut
-            curve = curve + np.where(gaps < 0, SHUT, 0.0)
-        value = value.sum(-1)
-        gradient = (slope[:, None] @ self.gap_of)[:, 0]
-        matrix = (curve[:, None] @ self.squares).reshape(-1, 3, 3)
-        rims = (self.rims @ freedoms[..., None])[..., 0]
-        if rims.min() < 0:
-            shut = np.minimum(rims, 0.0)
-            value = value + SHUT * (shut**2).sum(-1) / 2
-            gradient = gradient + SHUT * (shut[:, None] @ self.rims)[:, 0]
-            touch = np.where(rims < 0, SHUT, 0.0)[..., None] * self.rims
-            matrix = matrix + touch.transpose(0, 2, 1) @ self.rims
-        return value / self.ring, gradient / self.ring, matrix / self.ring
-
-    def contents(self, freedoms: Array) -> tuple[Array, Array]:
-        """Volume in ul of each balloon (rows, chambers), and the potential of each row."""
-        gaps = (self.gap_of @ freedoms[..., None])[..., 0] * self.spans
-        both = self.begins + np.array([[[0]], [[self.volumes]]])
-        stored, held = along(self.table, both, gaps).value
-        volumes = held.reshape(len(held), -1, self.ring).sum(-1) / self.ring
-        return volumes, stored.sum(-1) / self.ring
 
 
 def free(springs: Springs, start: Array) -> Array:
@@ -137,7 +53,7 @@ def free(springs: Springs, start: Array) -> Array:
             return at
         move, is_firm = _towards(gradient, matrix)
         largest = float(np.abs(move).max())
-        if is_firm and _ends(largest, before):
+        if is_firm and _ends(largest, before, FINEST):
             return at + move
         share = _limited(move)
         slope = (move * gradient).sum(-1)
@@ -154,11 +70,11 @@ def free(springs: Springs, start: Array) -> Array:
     raise DesignError("the stack finds no balance at these pressures; try others")
 
 
-def _ends(largest: float, before: float) -> bool:
+def _ends(largest: float, before: float, fine: float = FINE) -> bool:
     """Whether a step is the last: what would follow it, if steps go on to shrink as they did since
     the whole step before, is none.
     """
-    return largest * largest < FINE * before
+    return largest * largest < fine * before
 
 
 def _towards(gradient: Array, matrix: Array) -> tuple[Array, bool]:
@@ -180,7 +96,7 @@ def _limited(move: Array) -> Array:
 
 
 def held(
-    kinds: Springs, levels: NDArray[np.int_], pitch: float, load: Load, start: Array, is_near: bool
+    springs: Springs, pitch: float, load: Load, start: Array, is_near: bool
 ) -> tuple[Array, float, bool]:
     """Rise and tilt of each level (levels, 3) under a load, the force in mN on the plate, and
     whether the balance is stable.
@@ -189,11 +105,13 @@ def held(
     run far into it; ``is_near`` tells a start that may be met as it is. Raises DesignError where no
     balance is found.
     """
-    springs = kinds.of(levels)
     if load.point is None:
-        found = _settled(springs, pitch, load, start, MOST_STEPS)
+        fine = FINE if is_near else FINEST
+        found = _settled(springs, pitch, load, start, FEW_STEPS, quick=fine)
+        if found is None:
+            found = _settled(springs, pitch, load, start, MOST_STEPS)
     else:
-        at = start if is_near else _under(start, pitch, load, load.point)
+        at = start if is_near else _under(springs, start, pitch, load, load.point)
         found = _settled(springs, pitch, load, at, MOST_STEPS if is_near else FEW_STEPS)
         if found is None:
             found = _met(springs, pitch, load, at)
@@ -215,75 +133,126 @@ def _met(
     return _settled(springs, pitch, load, at, MOST_STEPS)
 
 
-def _under(start: Array, pitch: float, load: Load, point: Array) -> Array:
-    """The same start below a level plate."""
+def _under(springs: Springs, start: Array, pitch: float, load: Load, point: Array) -> Array:
+    """The same start below a level plate, a little past it, so that it is met all round: what is
+    alike on all sides stays so.
+    """
     at = start.copy()
-    if load.normal[2] > 0.999:
-        # A little past it, so that it is met all round: what is alike on all sides stays so.
+    if load.is_level:
         room = max(point[2] / len(at) - pitch, 0.0)
-        at[:, 0] = np.where(at[:, 0] > room, room + 1e-4, at[:, 0])
+        is_high = at[:, 0] > room
         straight = load.sticks | (np.abs(at[:, 1:]) < 1e-9)
         at[:, 1:] = np.where(straight, 0.0, at[:, 1:])
+        at[:, 0] = np.where(is_high, room, at[:, 0])
+        past = 1e-4
+        if load.sticks and is_high.all():
+            # As far as the plate gives way to them.
+            push = float(-springs.energy(at)[1][:, 0].mean())
+            past = max(push, 0.0) / load.wall / len(at) + 1e-9
+        at[:, 0] += np.where(is_high, past, 0.0)
     return at
 
 
 def _settled(
-    springs: Springs, pitch: float, load: Load, start: Array, most: int, enough: float = 0.0
+    springs: Springs,
+    pitch: float,
+    load: Load,
+    start: Array,
+    most: int,
+    enough: float = 0.0,
+    quick: float = 0.0,
 ) -> tuple[Array, float, bool] | None:
     """What ``held`` gives, or None where so many steps do not get there. A step that is no larger
-    than ``enough`` ends it.
+    than ``enough`` ends it. ``quick`` makes fewer and larger ones, until less than it is left.
     """
-    at, before = start, FINE
-    value, gradient, matrix, push = _loaded(springs, pitch, load, at)
+    fine = quick or FINE
+    at, before, last = start, fine, None
+    now = loaded(springs, pitch, load, at)
     for _ in range(most):
-        if np.abs(gradient).max() < CLOSE * (1 + 1e-3 * push):
-            return at, push, _is_firm(matrix)
-        flat, is_firm = _towards(gradient[None], matrix[None])
-        flat = _held_off(springs, at, flat, gradient, matrix)
+        if np.abs(now.gradient).max() < CLOSE * (1 + 1e-3 * now.push):
+            return at, now.push, _is_firm(with_blocks(now.rest(), now.blocks))
+        if last is not None:
+            # The matrix of a step so small is still good enough for the last one.
+            matrix, blocks = last
+            flat = -np.linalg.solve(matrix, now.gradient)
+            if np.abs(flat).max() * before < ALIKE and _are_alike(blocks, now.blocks):
+                return at + flat.reshape(-1, 3), now.push, True
+        rest = now.rest()
+        matrix = with_blocks(rest, now.blocks)
+        found, is_firm = _towards(now.gradient[None], matrix[None])
+        flat = _held_off(springs, at, found[0], now.gradient, rest, now.blocks)
+        if quick and np.abs(flat).max() > STRAIGHT:
+            flat = _bettered(springs, at, flat, now, rest)
         move = flat.reshape(-1, 3)
         largest = float(np.abs(move).max())
-        slope = float((flat @ gradient)[0])
+        slope = float(flat @ now.gradient)
         fits = load.point is None or (largest < CLOSELY and slope > -LITTLE)
-        if is_firm and (largest <= enough or (fits and _ends(largest, before))):
+        if is_firm and (largest <= enough or (fits and _ends(largest, before, fine))):
             at = at + move
-            if load.point is not None:
-                push = _acting(chain(at, pitch), load).push
-            return at, push, True
+            return at, 0.0 if load.point is None else pushed(at, pitch, load), True
         share = float(_limited(move).min())
         for _ in range(14):
-            tried = _loaded(springs, pitch, load, at + share * move)
-            if tried[0] <= value + 1e-4 * share * slope + 1e-11 * (1 + abs(value)):
+            tried = loaded(springs, pitch, load, at + share * move)
+            if tried.value <= now.value + 1e-4 * share * slope + 1e-11 * (1 + abs(now.value)):
                 break
             share /= 2
         before = largest if share == 1.0 else 0.0
+        may_last = load.point is None and is_firm and 0 < before < SMALL
+        last = (matrix, now.blocks) if may_last else None
         at = at + share * move
-        value, gradient, matrix, push = tried
-        if abs(slope) < 1e-11 * (1 + abs(value)):
-            return at, push, _is_firm(matrix)
+        now = tried
+        if abs(slope) < 1e-11 * (1 + abs(now.value)):
+            return at, now.push, _is_firm(with_blocks(now.rest(), now.blocks))
     return None
 
 
-def _held_off(springs: Springs, at: Array, flat: Array, gradient: Array, matrix: Array) -> Array:
+def _are_alike(one: Array, other: Array) -> bool:
+    """Whether the springs of two places are: where rims meet or part they are not."""
+    return float(np.abs(one - other).max()) < NEARLY * float(np.abs(one).max())
+
+
+def _held_off(
+    springs: Springs, at: Array, flat: Array, gradient: Array, rest: Array, blocks: Array
+) -> Array:
     """The step to where rims just touch which it would drive into each other.
 
     A step that does not see them yet would run far past them (a primal-dual active set).
     """
-    rims = (springs.rims @ at[..., None])[..., 0]
-    for _ in range(ROUNDS):
-        ahead = rims + (springs.rims @ flat.reshape(-1, 3, 1))[..., 0]
-        met = (ahead < 0) & (rims >= 0)
-        if not met.any():
+    for _ in range(TRIES):
+        met = springs.meeting(at, flat.reshape(-1, 3))
+        if met is None:
             break
-        each = springs.rims * met[..., None]
-        push = SHUT / springs.ring * (rims[:, None] @ each)[:, 0]
-        stiffer = matrix.copy()
-        diagonal = np.einsum("iaib->iab", stiffer.reshape(len(at), 3, len(at), 3))
-        diagonal += SHUT / springs.ring * (each.transpose(0, 2, 1) @ each)
-        tried, _ = _towards((gradient + push.ravel())[None], stiffer[None])
+        push, stiffer = met
+        matrix = with_blocks(rest, blocks + stiffer)
+        tried, _ = _towards((gradient + push.ravel())[None], matrix[None])
         if float((tried @ gradient)[0]) >= 0:
             break  # it would lead uphill
-        flat = tried
+        flat = tried[0]
     return flat
+
+
+def _bettered(springs: Springs, at: Array, flat: Array, now: Loaded, rest: Array) -> Array:
+    """The step by which springs come into balance, with all else as it is at the step's start.
+
+    Films, and rims that meet on the way, are most of what a step does not see.
+    """
+    outside = now.gradient - now.own.ravel()
+    best, least = flat, math.inf
+    for _ in range(ROUNDS):
+        value, own, blocks = springs.energy(at + flat.reshape(-1, 3))
+        follows = outside + rest @ flat
+        total = float(value.sum() + (outside + follows) @ flat / 2)
+        if total > least:
+            flat = (best + flat) / 2
+            continue
+        best, least = flat, total
+        gradient = follows + own.ravel()
+        more = np.asarray(-np.linalg.solve(with_blocks(rest, blocks), gradient))
+        more = _held_off(springs, at + best.reshape(-1, 3), more, gradient, rest, blocks)
+        flat = best + more
+        if np.abs(more).max() < NEARLY * np.abs(best).max():
+            return flat
+    return best
 
 
 def _is_firm(matrix: Array) -> bool:
@@ -293,92 +262,3 @@ def _is_firm(matrix: Array) -> bool:
     except np.linalg.LinAlgError:
         return False
     return True
-
-
-class _Acting(NamedTuple):
-    """What acts on the plates: the sum of the forces f beyond each level (n, 3), that of x f over
-    the points x they act on (n, 3, 3), and their energy; n is 1 where all levels carry the same.
-
-    ``stiffness`` (6, 6) is the outer plate's, by turn and move of the tip as of ``twists``;
-    ``push`` is its force.
-    """
-
-    forces: Array
-    arms: Array
-    energy: float
-    stiffness: Array | None = None
-    push: float = 0.0
-
-
-def _acting(plates: Chain, load: Load) -> _Acting:
-    tip = plates.places[-1]
-    found = _Acting(load.tip[None], np.multiply.outer(tip, load.tip)[None], -float(load.tip @ tip))
-    if load.point is not None:
-        found = _pressed(found, plates, load, load.point)
-    if load.weight.any():
-        above = plates.places[:0:-1].cumsum(0)[::-1]
-        number = np.arange(len(above), 0, -1)[:, None]
-        found = found._replace(
-            forces=found.forces + number * load.weight,
-            arms=found.arms + above[:, :, None] * load.weight,
-            energy=found.energy - float(above[0] @ load.weight),
-        )
-    return found
-
-
-def _pressed(found: _Acting, plates: Chain, load: Load, point: Array) -> _Acting:
-    """With what the outer plate does to the tip."""
-    tip, normal = plates.places[-1], load.normal
-    touching = tip + load.outline * RIM @ plates.axes[-1].T
-    into = np.maximum((touching - point) @ normal, 0.0)
-    each = load.wall / TOUCHES * into
-    push = float(each.sum())
-    lines = np.empty((TOUCHES, 6))
-    lines[:, :3] = -touching @ crossing(normal)
-    lines[:, 3:] = normal
-    touched = lines[into > 0]
-    stiffness = load.wall / TOUCHES * touched.T @ touched
-    force, arms = -push * normal, -np.multiply.outer(each @ touching, normal)
-    energy = float(each @ into) / 2
-    if load.sticks:
-        across = load.wall * (np.eye(3) - np.multiply.outer(normal, normal))
-        aside = across @ (tip - point)
-        follows = np.concatenate([-crossing(tip).T, np.eye(3)], axis=1)
-        stiffness += follows.T @ across @ follows
-        force = force - aside
-        arms -= np.multiply.outer(tip, aside)
-        energy += float(aside @ (tip - point)) / 2
-    return _Acting(found.forces + force, found.arms + arms, found.energy + energy, stiffness, push)
-
-
-def _loaded(
-    springs: Springs, pitch: float, load: Load, at: Array
-) -> tuple[float, Array, Array, float]:
-    """Energy with its gradient and second derivatives by all freedoms, and the plate's force.
-
-    A level nearer the base turns all movements beyond it. What the tilts of one level do to each
-    other is taken at their mean: enough to descend by.
-    """
-    size = at.size
-    value, gradient, blocks = springs.energy(at)
-    plates = chain(at, pitch)
-    acting = _acting(plates, load)
-    moved = twists(plates)
-    works = moved @ felt(acting.arms, acting.forces)
-    gradient = gradient - works[..., 3]
-    flat = moved.reshape(size, 6)
-    half = flat[:, :3] @ works[..., :3].reshape(size, 3).T
-    half *= _nearer(len(at))
-    matrix = -(half + half.T)
-    if acting.stiffness is not None:
-        matrix += flat @ acting.stiffness @ flat.T
-    diagonal = np.einsum("iaib->iab", matrix.reshape(len(at), 3, len(at), 3))
-    diagonal += blocks
-    return float(value.sum()) + acting.energy, gradient.ravel(), matrix, acting.push
-
-
-@lru_cache(maxsize=16)
-def _nearer(count: int) -> Array:
-    """1 where the row's level is nearer the base than the column's, half where it is the same."""
-    level = np.repeat(np.arange(count), 3)
-    return np.asarray(np.heaviside(level[None, :] - level[:, None], 0.5))

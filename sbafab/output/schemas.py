@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, get_args
 
 from sbafab.errors import ERROR_SCHEMA
+from sbafab.output import printed
 from sbafab.output.checking import CHECKS_SCHEMA
 from sbafab.output.predicting import SCHEMA as PREDICT_SCHEMA
-from sbafab.output.printed import NESTED_SCHEMA, RECORDS_SCHEMA, REPORT_SCHEMA, RUN_SCHEMA
 from sbafab.output.schema_parts import COUNT, TEXT, and_perhaps, array, finding, number, table
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.pressing.tables import PRESS_SCHEMA
@@ -27,10 +27,28 @@ SCHEMAS: Mapping[str, tuple[str, str]] = {
     "press": (PRESS_SCHEMA, "`press.json`, the heat-press schedule"),
     "predict": (PREDICT_SCHEMA, "`predict.json`, and what `predict --json` prints of a design"),
     "find": (FIND_SCHEMA, "what `find --json` prints"),
-    "run": (RUN_SCHEMA, "what `generate`, `cut`, `press` and `mesh` print with `--json`"),
-    "nested": (NESTED_SCHEMA, "what `nest --json` prints"),
-    "records": (RECORDS_SCHEMA, "what `record --json` prints of records"),
-    "report": (REPORT_SCHEMA, "what `record --report --json` prints"),
+    "run": (printed.RUN_SCHEMA, "what `generate`, `cut`, `press` and `mesh` print with `--json`"),
+    "nested": (printed.NESTED_SCHEMA, "what `nest --json` prints"),
+    "records": (printed.RECORDS_SCHEMA, "what `record --json` prints of records"),
+    "report": (printed.REPORT_SCHEMA, "what `record --report --json` prints"),
+    "sweep": (printed.SWEEP_SCHEMA, "what `sweep --json` prints"),
+    "simulate": (
+        printed.SIMULATE_SCHEMA,
+        "`result.json` of a simulator's folder, and what `simulate --json` prints",
+    ),
+    "assembly-predict": (
+        printed.ASSEMBLY_PREDICT_SCHEMA,
+        "what `predict --json` prints of an assembly",
+    ),
+    "reproduction": (
+        printed.REPRODUCTION_SCHEMA,
+        "`reproduction.json`, and what `reproduce --json` prints",
+    ),
+    "balloon-map": (printed.MAP_SCHEMA, "what `map --to FILE.json` writes"),
+    "kerf": (printed.KERF_SCHEMA, "what `kerf --json` prints"),
+    "explain": (printed.EXPLAIN_SCHEMA, "what `explain RULE --json` prints"),
+    "explained": (printed.EXPLAINED_SCHEMA, "what `explain --json` prints of all rules"),
+    "templates": (printed.TEMPLATES_SCHEMA, "what `templates --json` prints: a list, without id"),
     "error": (ERROR_SCHEMA, "what any command prints with `--json` when it ends in an error"),
 }
 """Formats by name: the id that stands in the files, and what it describes."""
@@ -38,9 +56,12 @@ SCHEMAS: Mapping[str, tuple[str, str]] = {
 
 def schema_of(name: str) -> dict[str, Any]:
     """The JSON schema of a format in ``SCHEMAS``."""
+    from sbafab.output.printed_schemas import BODIES as PRINTED
+
     identity = SCHEMAS[name][0]
     head = {"$schema": DIALECT, "$id": f"urn:{identity.replace('/', ':')}"}
-    return {**head, **_BODIES[name]()}
+    body = _BODIES.get(name) or PRINTED[name]
+    return {**head, **body()}
 
 
 def _design() -> dict[str, Any]:
@@ -208,15 +229,6 @@ def _find() -> dict[str, Any]:
     )
 
 
-def _printed(name: str) -> Callable[[], dict[str, Any]]:
-    def body() -> dict[str, Any]:
-        from sbafab.output.printed_schemas import BODIES
-
-        return BODIES[name]()
-
-    return body
-
-
 _BODIES = {
     "design": _design,
     "checks": _checks,
@@ -226,6 +238,5 @@ _BODIES = {
     "press": _press,
     "predict": _predict,
     "find": _find,
-    **{name: _printed(name) for name in ("run", "nested", "records", "report")},
     "error": _error,
 }

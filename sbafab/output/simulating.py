@@ -6,12 +6,14 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from sbafab.design.records import Design
 from sbafab.output.checking import check
 from sbafab.output.earlier import refuse_to_replace
 from sbafab.output.manifest import as_json
 from sbafab.output.planned import Checked
+from sbafab.output.printed import SIMULATE_SCHEMA
 from sbafab.output.run import Extras, generate, with_folder
 from sbafab.progress import Progress, unheard
 from sbafab.rules.finding import Finding
@@ -44,6 +46,12 @@ class Simulated:
         return self.folder is None
 
 
+def result_json(found: Result) -> dict[str, Any]:
+    """What ``result.json`` holds."""
+    head = {"schema": SIMULATE_SCHEMA, "units": UNITS}
+    return {**head, **found.figures, "stopped": found.stopped}
+
+
 def simulate(
     design: Design,
     name: Name,
@@ -71,7 +79,7 @@ def simulate(
             simulator(name).export(checked.laminate, wish, folder)
         else:
             found = simulator(name).run(checked.laminate, wish, folder, tell)
-            told = as_json({"units": UNITS, **found.figures, "stopped": found.stopped})
+            told = as_json(result_json(found))
             (folder / "result.json").write_text(told, encoding="utf-8", newline="\n")
         extras = Extras(also=with_folder(folder), own=(name,))
         run = generate(design, out, (), tell, extras=extras)

@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from sbafab.errors import OutputError
+from sbafab.output.printed import REPRODUCTION_SCHEMA
 from sbafab.reproduction.page import charts, page_of, tables
 from sbafab.reproduction.records import Row, predicted
-
-SCHEMA = "sbafab/reproduction@1"
 
 
 def reproduce(folder: Path) -> dict[str, list[Row]]:
@@ -40,7 +39,7 @@ def reproduce(folder: Path) -> dict[str, list[Row]]:
 def as_json(found: dict[str, list[Row]]) -> dict[str, Any]:
     """What ``reproduction.json`` holds."""
     return {
-        "schema": SCHEMA,
+        "schema": REPRODUCTION_SCHEMA,
         "rows": [
             {
                 "section": section,

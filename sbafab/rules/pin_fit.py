@@ -54,26 +54,32 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     good = worst.stretch <= limits.pin_stretch + 2 * TOLERANCE / max(worst.least, TOLERANCE)
     pin = worst.pin
     message = (
-        f"the {worst.drawn:.3f} mm hole of layer {worst.layer.index} ({worst.layer.name}) may come "
-        f"out {max(worst.least, 0.0):.3f} mm wide, and the pin {pin.name} up to {worst.most:.3f}: "
+        f"{_stretch_said(worst)}; {100 * limits.pin_stretch:.4g}% at most is allowed: the "
+        f"{worst.drawn:.3f} mm hole of layer {worst.layer.index} ({worst.layer.name}) may come out "
+        f"{max(worst.least, 0.0):.3f} mm wide, and the pin {pin.name} at {at(pin.centre)} up to "
+        f"{worst.most:.3f} mm; {_threaded(laminate, pin)} films are threaded on this pin"
     )
-    if worst.stretch > 0:
-        message += f"the film stretches by {worst.stretch:.1%} over it, at {at(pin.centre)}"
-    else:
-        message += f"it goes on with {worst.least - worst.most:.3f} mm to spare"
-    message += f"; {_threaded(laminate, pin)} films are threaded on this pin"
     if worst.layer.film.material not in limits.kerf:
         message += "; its kerf is not measured, so holes come out wider by it and hold less"
     if not good:
         message += (
-            f"; {limits.pin_stretch:.0%} is allowed: take a thinner pin or a wider hole "
-            "(bore.pin_diameter, bore.diameter, registration.pin_diameter)"
+            "; take a thinner pin or a wider hole (bore.pin_diameter, bore.diameter, "
+            "registration.pin_diameter)"
         )
     value = None if math.isinf(worst.stretch) else worst.stretch
     place = Place(None, (worst.layer.index,), *pin.centre)
     return [
         Finding(NAME, "pass" if good else "fail", limits.pin_stretch, value, "", place, message)
     ]
+
+
+def _stretch_said(fit: _Fit) -> str:
+    """What the film of a fit must do, in words."""
+    if math.isinf(fit.stretch):
+        return "no hole may be left to go over a pin"
+    if fit.stretch > 0:
+        return f"at worst a film must stretch by {fit.stretch:.1%} over its pin"
+    return f"no film must stretch over its pin ({fit.least - fit.most:.3f} mm to spare at worst)"
 
 
 def _fits(laminate: Laminate, limits: Limits) -> Iterator[_Fit]:

@@ -90,10 +90,12 @@ def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) 
         f"(95 % interval {low:.2%} to {high:.2%}){_by_interface(found)}; errors are assumed spread "
         f"evenly, up to {_by_hand(laminate, limits)}"
     )
+    if target is None:
+        message += "; no least share is asked for (rules.target_yield)"
+    else:
+        message += f"; the lower end of the interval must be {100 * target:.10g}% at least"
     if verdict == "fail":
-        message += (
-            f"; the interval must lie above {target:.10g}: `sbafab check --target-yield` advises"
-        )
+        message += ": `sbafab check --target-yield` advises"
     remedy = _remedy(laminate) if verdict == "warn" else ""
     if remedy:
         message = f"{remedy}: {message}"

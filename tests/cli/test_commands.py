@@ -89,7 +89,7 @@ def test_bad_usage_is_one_sentence_and_exit_2(
     assert code == 2
     assert out == ""
     assert err.startswith("sbafab: ")
-    assert err.endswith(f"; see {command} --help\n")
+    assert err.endswith((f"; see {command} --help\n", f"? See {command} --help\n"))
     assert err.count("\n") == 1
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -67,6 +68,21 @@ def test_limits_say_whether_they_are_the_least_or_the_most(
     assert senses["mask-overhang", "fail"] is False
     assert senses["press-fit", "fail"] is True
     assert {sense for (_, verdict), sense in senses.items() if verdict == "pass"} == {False, True}
+
+
+def test_help_says_what_every_command_does_in_a_line(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = run(["--help"], capsys)
+    assert "..." not in out.partition("Commands:")[2]
+
+
+def test_shares_say_what_they_are_of(capsys: pytest.CaptureFixture[str]) -> None:
+    few = ["1dof-5mm", "--set", "stack.balloons=1", "--set", "rules.yield_builds=100"]
+    few += ["--set", "registration.method=ears"]
+    _, out, _ = run(["check", *few], capsys)
+    assert re.search(r"^pin-fit +pass +[\d.]+% stretch  <= 30% stretch$", out, re.MULTILINE)
+    assert re.search(r"^registration-yield +pass +[\d.]+% hold +no target$", out, re.MULTILINE)
+    _, out, _ = run(["check", *few, "--set", "rules.target_yield=0.5"], capsys)
+    assert re.search(r"^registration-yield +pass +[\d.]+% hold +>= 50% hold$", out, re.MULTILINE)
 
 
 def test_check_json_names_schema_design_and_summary(capsys: pytest.CaptureFixture[str]) -> None:

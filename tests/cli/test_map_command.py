@@ -13,6 +13,7 @@ import pytest
 import sbafab
 from sbafab.cli import main
 from sbafab.models.balloon_map import BalloonMap
+from tests.site.formats import hold
 
 
 def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
@@ -48,7 +49,7 @@ def test_json_says_where_each_balloon_is(
     code, out, _ = run(["map", "3dof-15mm", "--points", "3", "--to", str(file)], capsys)
     assert (code, out) == (0, f"written to {file}\n")
     found = json.loads(file.read_text())
-    assert found["schema"] == "sbafab/balloon-map@1"
+    hold("balloon-map", found)
     assert found["levels"] == [1] * 15
     # Paper, Sec. 2: the axes stand 4.25 from the middle.
     assert found["chamber_axes_mm"][0] == pytest.approx([4.25, 0.0])
@@ -111,6 +112,7 @@ def test_reproduce_writes_every_figure_with_the_papers_error_bars(
     code, out, _ = run(["reproduce", "-o", str(tmp_path), "--json"], capsys)
     assert code == 0
     folder = tmp_path / "reproduction"
+    hold("reproduction", json.loads(out))
     rows = json.loads(out)["rows"]
     assert rows == json.loads((folder / "reproduction.json").read_text())["rows"]
     roles = {row["figure"].split("(")[-1] for row in rows if row["section"].startswith("Calib")}

@@ -5,7 +5,14 @@ from collections.abc import Iterator
 import pyogrio
 import pytest
 
+from tests.interop import page
 from tests.interop.made import DESIGNS, NAMES, PROFILES, Sheet, sheet_of, write_design
+
+
+def pytest_sessionfinish() -> None:
+    """Writes what was measured for docs/programs.md, where that was asked for."""
+    if page.is_measuring and page.measured:
+        page.write_page()
 
 
 @pytest.fixture(scope="session")

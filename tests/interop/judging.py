@@ -28,6 +28,8 @@ TOLERANCE = 2 * SAGITTA + 20 * UNIT
 """A chord on either side, and the grid."""
 WIDEST = 3.0
 """mm; of anything wider it is only asked that KLayout, too, finds nothing narrower than this."""
+CORNERS = 0.1
+"""mm past our measure that KLayout looks at corners: of ends that just reach it finds nothing."""
 GRAZING = 100
 """Steps along which edges must face: less is a corner of one chord grazing another's normal."""
 
@@ -100,7 +102,8 @@ def compared(what: str, region: Region, layer: int, ours: Width | None) -> Compa
         tapers = what == "slot" and square is not None and square < ours.value - TOLERANCE
         return Compared(what, layer, ours.value, square, "aslant" if tapers else "square")
     # At corners nothing need stand square; then any of KLayout's distances may be ours.
-    corners = _distances(check(limit, False, kdb.Region.Euclidian, 90.0, None, None))
+    further = limit + round(CORNERS / UNIT)
+    corners = _distances(check(further, False, kdb.Region.Euclidian, 90.0, None, None))
     nearest = min(corners, key=lambda value: abs(value - ours.value), default=None)
     return Compared(what, layer, ours.value, nearest, "corners")
 

@@ -74,6 +74,21 @@ def test_both_measure_a_slot_that_tapers_to_a_rounded_bottom(bottom: float) -> N
     assert found.agrees, found
 
 
+def test_both_measure_a_slot_between_discs_whose_bottom_bulges() -> None:
+    """Two lobes 60 degrees off an axis, and the disc between them that ends their slot."""
+    hub, lobe, away, turn = 5.565, 5.721, 8.0, math.radians(60.0)
+    region = disc((0.0, 0.0), hub)
+    for side in (-1, 1):
+        centre = away * math.cos(turn), side * away * math.sin(turn)
+        region = region | disc(centre, lobe)
+    found = compared("slot", region, 1, least_gap(region, 15.0))
+    # Hub and lobe meet where the law of cosines says; the slot ends between two such corners.
+    corner = turn - math.acos((hub**2 + away**2 - lobe**2) / (2 * hub * away))
+    assert found is not None
+    assert found.ours == pytest.approx(2 * hub * math.sin(corner))
+    assert found.agrees, found
+
+
 @settings(max_examples=6)
 @given(valid())
 def test_klayout_finds_the_least_bonds_webs_and_slots_of_random_designs(draft: Draft) -> None:

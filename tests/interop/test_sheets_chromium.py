@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 from tests.interop.made import EXACT, LENGTH, WIDTH, Sheet, outline_bounds
+from tests.interop.page import film_is_as_on_the_page
 from tests.interop.painting import painted
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -72,3 +73,4 @@ def test_what_the_lines_enclose_has_the_area(sheet: Sheet, tmp_path: Path) -> No
     red, green, _ = (int(np.asarray(channel).sum(dtype=np.int64)) for channel in channels)
     film = (red - green) / 255 / (FINE * PIXELS_PER_MM) ** 2
     assert film == pytest.approx(sheet.film, rel=EXACT)
+    film_is_as_on_the_page("Chromium 156", sheet, film)

@@ -9,6 +9,7 @@ import pytest
 from ezdxf.addons.drawing import Frontend, RenderContext, layout, svg
 
 from tests.interop.made import EXACT, LENGTH, WIDTH, Sheet
+from tests.interop.page import contours_are_as_on_the_page
 from tests.interop.svg_contours import Drawing, svg_contours
 
 BLUE, RED = "#0000ff", "#ff0000"
@@ -29,6 +30,8 @@ def test_every_contour_has_its_colour_and_area(sheet: Sheet, tmp_path: Path) -> 
     found = drawn(sheet.files["bulges"], tmp_path)
     assert found.areas(RED) == pytest.approx(sheet.outers, rel=EXACT)
     assert found.areas(BLUE) == pytest.approx(sheet.holes, rel=EXACT)
+    program = "ezdxf 1.4 drawing add-on"
+    contours_are_as_on_the_page(program, sheet, found.areas(RED), found.areas(BLUE))
 
 
 def test_the_drawing_is_as_large_as_the_sheet(sheet: Sheet, tmp_path: Path) -> None:

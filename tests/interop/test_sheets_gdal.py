@@ -11,6 +11,7 @@ from pyogrio import raw
 
 from sbafab.cutting.dxf_write import DxfProfile
 from tests.interop.made import BORDER, LENGTH, PROFILES, WIDTH, Sheet
+from tests.interop.page import contours_are_as_on_the_page
 
 EXACT = 1e-5
 """Chords of a quarter degree are 3e-6 of a disc's area off."""
@@ -45,8 +46,10 @@ def areas(polygons: list[shapely.Polygon]) -> list[float]:
 @pytest.mark.parametrize("profile", PROFILES)
 def test_every_contour_has_its_area(profile: DxfProfile, sheet: Sheet) -> None:
     found = lines(sheet.files[profile])
-    assert areas(rings(found["CUT_OUTER"])) == pytest.approx(sheet.outers, rel=EXACT)
-    assert areas(rings(found["CUT_INNER"])) == pytest.approx(sheet.holes, rel=EXACT)
+    outers, holes = areas(rings(found["CUT_OUTER"])), areas(rings(found["CUT_INNER"]))
+    assert outers == pytest.approx(sheet.outers, rel=EXACT)
+    assert holes == pytest.approx(sheet.holes, rel=EXACT)
+    contours_are_as_on_the_page("GDAL (pyogrio 0.13)", sheet, outers, holes)
 
 
 def test_every_contour_is_one_closed_ring(sheet: Sheet) -> None:

@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 
 from tests.interop.made import EXACT, LENGTH, WIDTH, Sheet, outline_bounds
+from tests.interop.page import film_is_as_on_the_page
 from tests.interop.painting import Painted, painted
 
 INKSCAPE = shutil.which("inkscape")
@@ -57,8 +58,9 @@ def imported(sheet: Sheet, folder: Path) -> Path:
     return drawing
 
 
-def agrees(found: Painted, sheet: Sheet) -> None:
+def agrees(found: Painted, sheet: Sheet, reads: str) -> None:
     assert found.film == pytest.approx(sheet.film, rel=EXACT)
+    film_is_as_on_the_page(f"Inkscape 1.2.2, {reads}", sheet, found.film)
     assert (found.pieces, found.holes) == (len(sheet.outers), len(sheet.holes))
     bounds = outline_bounds(sheet.files["bulges"])
     assert found.bounds == pytest.approx(bounds, abs=0.2)
@@ -69,7 +71,7 @@ def test_the_imported_cut_file_has_the_area(sheet: Sheet, tmp_path: Path) -> Non
     corner = (0.0, A4_HEIGHT - LENGTH, WIDTH, A4_HEIGHT)
     area = ":".join(str(place * PIXELS_PER_MM) for place in corner)
     picture = exported(imported(sheet, tmp_path), COARSE, tmp_path, f"--export-area={area}")
-    agrees(painted(picture, COARSE / 25.4), sheet)
+    agrees(painted(picture, COARSE / 25.4), sheet, "DXF")
 
 
 def test_layers_are_imported_under_their_names(sheet: Sheet, tmp_path: Path) -> None:
@@ -81,7 +83,7 @@ def test_layers_are_imported_under_their_names(sheet: Sheet, tmp_path: Path) -> 
 def test_the_picture_has_the_area(sheet: Sheet, tmp_path: Path) -> None:
     picture = exported(sheet.picture, FINE, tmp_path)
     assert picture.size == pytest.approx((WIDTH / 25.4 * FINE, LENGTH / 25.4 * FINE), abs=1.0)
-    agrees(painted(picture, FINE / 25.4), sheet)
+    agrees(painted(picture, FINE / 25.4), sheet, "SVG")
 
 
 @pytest.mark.usefixtures("fine_arcs")

@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 from tests.interop.made import EXACT, LENGTH, WIDTH, Sheet, outline_bounds
+from tests.interop.page import film_is_as_on_the_page
 from tests.interop.painting import painted
 
 LIBRECAD = shutil.which("librecad")
@@ -47,6 +48,7 @@ def printed(sheet: Sheet, folder: Path) -> Image.Image:
 def test_its_print_has_the_area_and_the_contours(sheet: Sheet, tmp_path: Path) -> None:
     found = painted(printed(sheet, tmp_path), DOTS / 25.4)
     assert found.film == pytest.approx(sheet.film, rel=EXACT)
+    film_is_as_on_the_page("LibreCAD 2.2.0", sheet, found.film)
     assert (found.pieces, found.holes) == (len(sheet.outers), len(sheet.holes))
     bounds = outline_bounds(sheet.files["bulges"])
     assert found.bounds == pytest.approx(bounds, abs=0.1)

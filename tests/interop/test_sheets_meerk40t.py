@@ -10,6 +10,7 @@ import pytest
 
 from sbafab.cutting.properties import PTFE_WARNING
 from tests.interop.made import EXACT, LENGTH, WIDTH, Sheet, outline_bounds
+from tests.interop.page import contours_are_as_on_the_page
 
 pytest.importorskip("meerk40t", reason="MeerK40t is not installed")
 
@@ -83,6 +84,7 @@ def test_meerk40t_cuts_what_the_sheet_says_in_its_order_with_no_power(sheet: She
     assert areas["CUT_OUTER"] == pytest.approx(sheet.outers, rel=EXACT)
     assert areas["CUT_INNER"] == pytest.approx(sheet.holes, rel=EXACT)
     assert areas["REFERENCE"] == pytest.approx([WIDTH * LENGTH])
+    contours_are_as_on_the_page("MeerK40t 0.9.91", sheet, areas["CUT_OUTER"], areas["CUT_INNER"])
     # Numbers, not looks: MeerK40t counts y downwards, as a project does that says MirrorY.
     xs, ys = zip(*(p for run in runs["CUT_OUTER"] for p in run), strict=True)
     bounds = (min(xs), min(ys), max(xs), max(ys))

@@ -10,6 +10,7 @@ import pytest
 
 from sbafab.cutting.dxf_write import DxfProfile
 from tests.interop.made import EXACT, Sheet
+from tests.interop.page import contours_are_as_on_the_page
 from tests.interop.svg_contours import svg_contours
 
 OPENSCAD = shutil.which("openscad")
@@ -37,6 +38,7 @@ def test_lines_and_arcs_close_to_every_contour(sheet: Sheet, tmp_path: Path) -> 
     assert outers == pytest.approx(sheet.outers, rel=EXACT)
     holes = imported(sheet, "arcs", "CUT_INNER", tmp_path)
     assert holes == pytest.approx(sheet.holes, rel=EXACT)
+    contours_are_as_on_the_page("OpenSCAD 2021.01", sheet, outers, holes)
 
 
 def test_bulges_are_lost_without_a_word(sheets: dict[str, Sheet], tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import pytest
 import shapely
 
 from tests.interop.made import LENGTH, WIDTH, Sheet, outline_bounds
+from tests.interop.page import contours_are_as_on_the_page
 from tests.interop.svg_contours import svg_contours
 
 EXACT = 1e-4
@@ -16,6 +17,7 @@ def test_every_contour_has_its_colour_and_area(sheet: Sheet) -> None:
     found = svg_contours(sheet.picture)
     assert found.areas(RED) == pytest.approx(sheet.outers, rel=EXACT)
     assert found.areas(BLUE) == pytest.approx(sheet.holes, rel=EXACT)
+    contours_are_as_on_the_page("svgelements 1.9", sheet, found.areas(RED), found.areas(BLUE))
     assert found.areas(GREY) == pytest.approx([WIDTH * LENGTH], rel=EXACT)
 
 

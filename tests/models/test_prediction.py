@@ -14,6 +14,7 @@ from sbafab.errors import DesignError
 from sbafab.models import parabola, printed
 from sbafab.models.balloon import inflate
 from sbafab.models.balloons import balloons_of
+from sbafab.models.drawn import FLAT
 from sbafab.models.figures import Prediction
 from sbafab.models.kinematics import round_stack, slot_stack
 
@@ -192,10 +193,25 @@ def test_drawn_outline_has_sizes_and_reasons_for_the_rest(tmp_path: Path) -> Non
     )
     drawn = f'chamber.outline="{tmp_path / "pocket.svg"}"'
     found = sbafab.predict("1dof-10mm", drawn)
-    assert {figure.group for figure in found.figures} == {"size", "inlet"}
-    assert {"stroke", "force", "actuation"} <= {left.name for left in found.left_out}
+    assert {figure.group for figure in found.figures} == {"size", "inlet", "force"}
+    # A square of 8 mm under 10 and 100 kPa.
+    pushed = [figure.value for figure in found.figures if figure.group == "force"]
+    assert pushed == pytest.approx([0.64, 6.4])
+    assert {"stroke", "actuation"} <= {left.name for left in found.left_out}
     assert found.relations == ()
     assert all("drawn pocket outline" in left.reason for left in found.left_out)
+
+
+def test_drawn_discs_push_flat_with_pressure_times_area_at_most(tmp_path: Path) -> None:
+    (tmp_path / "disc.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="20mm" height="20mm" '
+        'viewBox="-10 -10 20 20"><circle r="2.5"/></svg>'
+    )
+    drawn = ("3dof-15mm", "stack.balloons=2", f'chamber.outline="{tmp_path / "disc.svg"}"')
+    most = sbafab.predict(*drawn).value("blocked force at 100 kPa, flat, at most")
+    assert most == pytest.approx(3 * math.pi * 2.5**2 * 0.1)
+    # Sec. 4.3: the 3-DoF actuator pushed with 4.87 N, which the bound's own words tell.
+    assert f"{4.87 / most:.2f} of it" in FLAT.trust
 
 
 def test_tapered_stack_is_the_sum_of_its_balloons() -> None:

@@ -22,6 +22,7 @@ from sbafab.models.stack import Stack
 from sbafab.reports.inflated import InflatedPart, inflated, pressed
 from sbafab.reports.inflated_picture import PictureWish, picture_png, write_picture
 
+GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 CHANGES = ("stack.balloons=4",)
 TWO = {"chamber1": 5.0, "chamber2": 5.0}
 SMALL = PictureWish(TWO, width=160, height=128, frames=4)
@@ -160,3 +161,25 @@ def test_the_command_says_what_it_drew_and_refuses_in_a_sentence(tmp_path: Path)
         refused = run(app, [*asked, *extra])
         assert refused.exit_code != 0
         assert said in refused.output
+
+
+@pytest.mark.parametrize("name", ["oval", "radial-15mm"])
+def test_what_no_model_inflates_is_drawn_flat_and_said_to_be(name: str, tmp_path: Path) -> None:
+    design = str(GALLERY / f"{name}.toml") if name == "oval" else name
+    arguments = ["picture", design, "--width", "160", "--set", "stack.balloons=1", "--to"]
+    for ending in (".png", ".glb"):
+        path = tmp_path / f"shown{ending}"
+        result = CliRunner().invoke(app, [*arguments, str(path)])
+        assert result.exit_code == 0, result.output
+        assert f"{name}, flat, for no model inflates pockets" in result.output
+    with Image.open(tmp_path / "shown.png") as image:
+        assert image.size == (160, 128)
+    mesh = trimesh.load(tmp_path / "shown.glb", force="mesh")
+    laminate = sbafab.build(design, "stack.balloons=1")
+    assert isinstance(mesh, trimesh.Trimesh)
+    # Metres, and y is up.
+    assert mesh.extents[1] == pytest.approx(laminate.thickness / 1000, rel=1e-5)
+    moving = CliRunner().invoke(app, [*arguments, str(tmp_path / "shown.webp")])
+    assert moving.exit_code == 2
+    assert "a .png or .glb shows it flat" in moving.output
+    assert not (tmp_path / "shown.webp").exists()

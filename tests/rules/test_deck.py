@@ -227,6 +227,8 @@ def test_a_pin_too_thick_for_its_holes_fails_pin_fit_alone(good: Callable[..., L
     assert failing(thick, cut) == {"pin-fit"}
     (found,) = (f for f in run_deck(thick, cut) if f.rule == "pin-fit")
     assert found.measured == pytest.approx(1.198 / 0.8 - 1)
+    most = "a film must stretch by 49.7% over its pin; 30% at most is allowed"
+    assert most in found.message
     assert found.where.layers == (2,)
 
 

@@ -235,7 +235,7 @@ def test_the_interfaces_that_lose_most_are_told_first(
         place,
         f"{share:.2%} of 400 random builds keep every limit (95 % interval {low:.2%} to "
         f"{high:.2%}){says}; errors are assumed spread evenly, up to 0.3 mm and 2 degree where a "
-        "hand places",
+        "hand places; no least share is asked for (rules.target_yield)",
     )
 
 
@@ -251,8 +251,9 @@ def test_a_yields_verdict(
     monkeypatch.setattr(registration_yield, "simulate", lambda *_: shares(count))
     (told,) = registration_yield.check(good(*ONE), Limits(target_yield=target))
     assert (told.verdict, told.limit) == (verdict, target)
-    asked = "; the interval must lie above 0.995: `sbafab check --target-yield` advises"
-    assert told.message.endswith(asked) == (verdict == "fail")
+    assert ("; no least share is asked for" in told.message) == (target is None)
+    asked = "; the lower end of the interval must be 99.5% at least: `sbafab check --target-yield`"
+    assert told.message.endswith(f"{asked} advises") == (verdict == "fail")
 
 
 @pytest.mark.parametrize(

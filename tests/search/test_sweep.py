@@ -13,12 +13,14 @@ import pytest
 from pyarrow import parquet
 
 import sbafab
+from sbafab.cli.sweep import _as_json
 from sbafab.design.writing import design_sha256
 from sbafab.search import sweep as module
 from sbafab.search.measure import measured
 from sbafab.search.plots import Dots, Objective, passes_svg, trades_svg
 from sbafab.search.sweep import SweptDesigns
 from sbafab.search.worker import MeasureJob
+from tests.site.formats import hold
 
 VARY = ("chamber.diameter=2,5", "bond.width=0.7,0.75")
 QUICK: dict[str, Any] = {"rules": {"yield_builds": 100}, "pressures_kpa": (10.0,)}
@@ -82,6 +84,10 @@ def test_parquet_holds_what_the_csv_holds(found: SweptDesigns) -> None:
     for name in table.column_names:
         for cell, text in zip(table[name].to_pylist(), [row[name] for row in rows], strict=True):
             assert text == "" if cell is None else str(cell) == text or float(text) == cell
+
+
+def test_what_is_printed_is_of_its_schema(found: SweptDesigns) -> None:
+    hold("sweep", _as_json(found))
 
 
 def test_the_page_stands_alone_and_counts_right(found: SweptDesigns) -> None:

@@ -20,6 +20,7 @@ from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetri
 from sbafab.simulators.calculix.job import History, simulate
 from sbafab.simulators.calculix.run import run_ccx
 from sbafab.simulators.calculix.settings import DeckSettings
+from tests.site.formats import hold
 
 pytest.importorskip("netgen")
 needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="ccx is not installed")
@@ -96,6 +97,7 @@ def test_simulate_command(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, result.output
     told = json.loads(result.stdout)
+    hold("simulate", told)
     assert told["stopped"] is None
     assert told["states"][-1]["pressures"] == {"chamber1": 0.5}
     folder = tmp_path / "1dof-5mm"

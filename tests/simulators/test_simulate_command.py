@@ -13,6 +13,7 @@ from sbafab.cli import app
 from sbafab.cli.simulate import SIMULATORS
 from sbafab.errors import DesignError
 from sbafab.simulators.simulator import NAMES, Wish, chamber_pressures, simulator
+from tests.site.formats import hold
 
 CHAMBERS = ("chamber1", "chamber2")
 
@@ -152,4 +153,6 @@ def test_a_run_leaves_what_it_found(tmp_path: Path) -> None:
     told = json.loads(result.stdout)
     found = json.loads((tmp_path / "1dof-5mm" / "mujoco" / "result.json").read_text())
     assert found["stroke"] == told["stroke"] > 0.5
+    hold("simulate", found)
+    assert told == {**found, "folder": str(tmp_path / "1dof-5mm" / "mujoco")}
     assert found["stopped"] is None

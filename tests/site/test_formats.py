@@ -64,6 +64,53 @@ def test_what_is_printed_is_of_its_schema(
     hold("predict", prediction_json(design, sbafab.predict(design, quick=True)))
 
 
+def test_what_is_printed_of_rules_and_templates_is_of_its_schema(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    hold("explain", json.loads(run(["explain", "bond-width", "--json"], capsys)))
+    hold("explained", json.loads(run(["explain", "--json"], capsys)))
+    jsonschema.validate(json.loads(run(["templates", "--json"], capsys)), schema_of("templates"))
+
+
+def test_what_is_printed_of_a_measured_coupon_is_of_its_schema(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    sizes = [(4.9, 5.1), (9.9, 10.1), (19.9, 20.1)]
+    rows = [
+        f"{nominal} {kind},{axis},{nominal},{measured}"
+        for nominal, pair in zip((5, 10, 20), sizes, strict=True)
+        for kind, measured in zip(("outer", "window"), pair, strict=True)
+        for axis in "xy"
+    ]
+    table = tmp_path / "coupon.csv"
+    table.write_text("\n".join(["feature,axis,nominal_mm,measured_mm", *rows]))
+    found = json.loads(run(["kerf", str(table), "--json"], capsys))
+    hold("kerf", found)
+    assert found["all"]["kerf"]["value"] == pytest.approx(0.1)
+
+
+def test_what_is_predicted_of_an_assembly_is_of_its_schema() -> None:
+    from sbafab.output.printed import ASSEMBLY_PREDICT_SCHEMA
+    from sbafab.reports.assembly_prediction import AssemblyFigure, AssemblyPrediction, Touch
+    from sbafab.reports.assembly_prediction import as_json as told
+    from sbafab.reports.bent_arms import BentTouch
+
+    figure = AssemblyFigure("arm", "height, flat", 1.14, "mm", "elastic stack")
+    touch, bent = Touch("arm", "cup", 0.1), BentTouch("arm", "cup", "chamber1", 0.1, 5.0, 80.0)
+    found = AssemblyPrediction("one", 10.0, 1.2, (figure,), (touch,), ("x: why",), (bent,))
+    document = json.loads(json.dumps({"schema": ASSEMBLY_PREDICT_SCHEMA, **told(found)}))
+    hold("assembly-predict", document)
+
+
+def test_the_reproduction_is_of_its_schema() -> None:
+    from sbafab.models.paper import Measured
+    from sbafab.reproduction.records import Row
+    from sbafab.reproduction.write import as_json as told
+
+    rows = [Row("x", Measured(1.0, 0.1, "mm", "Sec. 2"), value, "m", "w") for value in (1.1, None)]
+    hold("reproduction", told({"one": rows}))
+
+
 def test_what_runs_print_is_of_its_schema(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

@@ -5,6 +5,8 @@ import { withoutServer } from "./server.js";
 // ms between two looks at a deck that runs; laying the list out oftener takes the time of what is measured.
 const READABLE = 110;
 const RANK = { fail: 0, warn: 1, waived: 2, pass: 3 };
+// Rules that measure a share, as the command line words it.
+const SHARES = { "pin-fit": "stretch", "registration-yield": "hold" };
 
 export class Findings {
   constructor(studio, goto) {
@@ -46,7 +48,9 @@ export class Findings {
     if (studio.unmeasured) this.list.append(el("div", { role: "listitem", class: "unmeasured" }, studio.unmeasured));
   }
   line(finding, waiting) {
-    const { measured, limit, unit } = finding;
+    const of = SHARES[finding.rule];
+    const unit = of ? `% ${of}` : finding.unit;
+    const [measured, limit] = [finding.measured, finding.limit].map((value) => (value === null || !of ? value : 100 * value));
     const size = measured === null ? "" : `${plain(measured, 3)}${limit === null ? "" : ` / ${plain(limit, 3)}`} ${unit.replace("mm2", "mm²").replace("mm3", "mm³")}`;
     return el("div", { role: "listitem" }, el("button", { class: "finding" + (waiting ? " waiting" : ""), "data-verdict": finding.verdict, "data-rule": finding.rule, "aria-label": `${finding.rule}${finding.design ? ` of ${finding.design}` : ""}: ${finding.verdict}. ${finding.message}`, onclick: (event) => this.open(finding, event.currentTarget) },
       el("span", { class: "dot" }), el("span", { class: "rule" }, finding.rule, finding.design ? el("small", {}, finding.design) : null), el("span", { class: "measured", title: "measured / limit" }, size), el("span", { class: "why" }, finding.message)));

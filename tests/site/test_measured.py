@@ -1,0 +1,160 @@
+"""Pages say what the records of measured figures say, and what the program says today."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from docs.scripts import measured
+from docs.scripts.measured import BLOCK, FOLDER, HOW, Table, filled, record
+from sbafab.cli import COMMANDS
+from sbafab.rules.deck import rule_names
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+TEXTS = {
+    path: path.read_text(encoding="utf-8")
+    for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.glob("*.md")))
+}
+BLOCKS = [found.group(2, 3) for text in TEXTS.values() for found in BLOCK.finditer(text)]
+NAMES = sorted(path.stem for path in FOLDER.glob("*.json"))
+CI = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+
+
+def text(page: str) -> str:
+    return " ".join(TEXTS[DOCS / f"{page}.md"].split())
+
+
+def numbers(table: Table, column: str) -> list[int]:
+    return [int(row[list(table.columns).index(column)]) for row in table.rows]
+
+
+@pytest.mark.parametrize("page", list(measured.pages()), ids=lambda page: page.stem)
+def test_a_page_shows_what_was_recorded(page: Path) -> None:
+    written = page.read_text(encoding="utf-8")
+    assert filled(written) == written, "python -m docs.scripts.measured writes the tables anew"
+
+
+def test_a_page_that_was_edited_by_hand_is_told() -> None:
+    page = "<!-- measured: mutation how -->\n\n*Measured yesterday.*\n\n<!-- end -->"
+    assert "2026" in filled(page)
+    assert filled(page) != page
+
+
+def test_every_record_is_shown_whole_with_its_day_and_command() -> None:
+    assert len(NAMES) >= 6
+    every = {(name, table) for name in NAMES for table in (*record(name).tables, HOW)}
+    assert sorted(BLOCKS) == sorted(every)
+    for name in NAMES:
+        assert re.fullmatch(r"\d{4}-\d\d-\d\d", record(name).day)
+
+
+def test_every_command_on_the_pages_exists() -> None:
+    own = {command.name for command in COMMANDS}
+    asked = set()
+    for path, said in TEXTS.items():
+        asked |= {(path.stem, name) for name in re.findall(r"python -m ([\w.]+)", said)}
+        commands = set(re.findall(r"(?:^ {4}|`|\$ )sbafab ([a-z]+)\b", said, re.MULTILINE))
+        assert commands <= own, path
+    assert len(asked) > 20
+    outside = {"build", "twine", "uv"}  # for a release alone
+    lost = {(page, name) for page, name in asked if name not in outside and not find_spec(name)}
+    assert lost == set()
+
+
+def test_the_pages_of_judges_say_what_is_run_for_them() -> None:
+    """Designs and seeds of the runs that repeat a part of them, as .ci/run has them."""
+    for command, said in (
+        ("tests.judge", "`.ci/run` judges {designs} designs of seed {seed}."),
+        ("tests.hunt", "`.ci/run` draws {booleans} booleans and {offsets} offsets of seed {seed}."),
+    ):
+        (line,) = (line for line in CI.splitlines() if f"python -m {command}" in line)
+        words = shlex.split(line)
+        told = {
+            word.removeprefix("--"): f"{int(value):,}"
+            for word, value in zip(words, words[1:], strict=False)
+            if word.startswith("--")
+        }
+        assert said.format(**told) in text("judges")
+
+
+def test_what_the_judges_saw_adds_up() -> None:
+    found = record("klayout").tables
+    (row,) = found["designs"].rows
+    designs, *families, areas, off = row
+    assert int(designs) == sum(map(int, families)) == 200
+    assert float(off.removesuffix(" %")) < 0.01  # what docs/judges.md allows
+    widths = found["widths"]
+    for cells in widths.rows:
+        name, compared, *ways, apart, disagree = cells
+        assert int(compared) == sum(map(int, ways)), name
+        assert float(apart) <= 0.0022, name
+        assert int(disagree) == 0, name
+    assert widths.cell("overhang", "compared") == designs
+    assert widths.cell("web", "compared") == areas
+    judged = re.search(
+        r"(\d+) designs judged \((\d+) 1-DoF, (\d+) lobed, (\d+) radial, (\d+) pairs",
+        text("judges"),
+    )
+    assert judged is not None
+    whole, *parts = map(int, judged.groups())
+    assert whole == sum(parts)
+    refused = re.search(r"\. (\d+) were refused", text("judges"))
+    assert refused is not None
+    assert whole + int(refused[1]) == 1000
+
+
+def test_every_judge_has_its_line() -> None:
+    lines = set(re.findall(r"^\| `([a-z]+)` \| ", TEXTS[DOCS / "judges.md"], re.MULTILINE))
+    source = "".join(path.read_text() for path in (ROOT / "tests" / "judge").glob("*.py"))
+    named = set(re.findall(r"Disagreement\(\s*\"([a-z]+)\"", source))
+    # A crash, an exit, what cannot be read and what takes too long are told in a sentence.
+    assert lines == named - {"crash", "exit", "reading", "time"}
+
+
+def test_programs_are_counted_as_they_are_listed() -> None:
+    table = record("programs").tables["areas"]
+    programs = {re.split(r"[ ,(]", row[0])[0] for row in table.rows}
+    words = ["six", "seven", "eight", "nine", "ten"]
+    assert f"What {words[len(programs) - 6]} programs make of" in text("programs")
+    tests = "".join(path.read_text() for path in (ROOT / "tests/interop").glob("test_sheets_*.py"))
+    assert all(program.lower() in tests.lower() for program in programs)
+    assert all(float(row[3].removesuffix(" %")) <= 0.1 for row in table.rows)
+
+
+def test_mutation_testing_adds_up_and_names_every_file() -> None:
+    table = record("mutation").tables["files"]
+    run, killed, survived = (numbers(table, name) for name in ("run", "killed", "survived"))
+    assert [k + s for k, s in zip(killed, survived, strict=True)] == run
+    assert f"it is {sum(killed)} of {sum(run)} ({sum(killed) / sum(run):.0%})" in text(
+        "mutation"
+    ).replace(" %)", "%)")
+    assert abs(sum(numbers(table, "mutants")) - 4100) < 50
+    there = {
+        f"{room}/{path.name}"
+        for room in ("laminate", "rules")
+        for path in (ROOT / "sbafab" / room).glob("*.py")
+        if path.stem != "__init__"
+    }
+    measured_files = {row[0].strip("`") for row in table.rows}
+    assert measured_files <= there
+    since = re.search(r"What came since is not measured: (.*?)\. ", text("mutation"))
+    assert since is not None
+    others = set()
+    for part in since[1].split(";"):
+        room, *names = re.findall(r"(?:`(\w+)/)?(\w+\.py)`", part)
+        others |= {f"{room[0]}/{name}" for name in (room[1], *(name for _, name in names))}
+    assert others == there - measured_files
+
+
+def test_rules_and_checks_are_counted_as_there_are() -> None:
+    for page in ("rules",):
+        listed = re.findall(r"^\| `([a-z-]+)` \| ", TEXTS[DOCS / f"{page}.md"], re.MULTILINE)
+        assert listed[: len(rule_names())] == list(rule_names())
+    readme = re.findall(r"^\| `([a-z-]+)` \| ", TEXTS[ROOT / "README.md"], re.MULTILINE)
+    assert [name for name in readme if name in rule_names()] == list(rule_names())
+    assert f"{len(rule_names()) - 1} rules pass, 1 warns" in TEXTS[ROOT / "README.md"]
