@@ -154,7 +154,8 @@ def build(design: LobedDesign) -> Laminate:
     plates = union(shape.outline for shape in shapes)
     held_by = roots(design, shapes, bottom.outline, [inlet for _, _, inlet in inlets])
     bottom, shapes = with_stubs(bottom, held_by), tuple(with_stubs(s, held_by) for s in shapes)
-    body = bottom.outline | plates
+    # Nothing but ears and tails asks for both together.
+    body = bottom.outline | plates if design.registration.method == "ears" else plates
     ears = _ears(design, body, plates, axes)
     held = tails([inlet for _, _, inlet in inlets], body, ears, design)
     stack = BalloonStack(bottom, shapes, shape_of, axes, design.lumen.diameter, ears, held)
@@ -211,14 +212,29 @@ def _check_tabs(
     """Raises DesignError where a tab comes nearer than one overhang to another lobe or tab."""
     room = design.mask.overhang
     for i, (tab, _, inlet) in enumerate(inlets):
+        aside = [
+            j
+            for j, other in enumerate(outlines)
+            if j != i
+            and not all(_lies_ahead(tab, one, inlet, room) for one in (other, inlets[j][0]))
+        ]
+        if not aside:
+            continue
         free = grow(tab - outlines[i], room)
-        for j, other in enumerate(outlines):
-            if j != i and (_overlap(free, other) or _overlap(free, inlets[j][0])):
+        for j in aside:
+            if _overlap(free, outlines[j]) or _overlap(free, inlets[j][0]):
                 raise DesignError(
                     f"the inlet tab of {inlet.chamber} ({inlet.width + 2 * design.bond.width:g} "
                     f"wide) meets the lobe or tab of {inlets[j][2].chamber}; make inlet.width "
                     "smaller, chamber.axis_radius larger or chamber.count smaller"
                 )
+
+
+def _lies_ahead(tab: Region, other: Region, inlet: Inlet, room: float) -> bool:
+    """Whether all of a tab lies farther out along its inlet than another shape, and some room."""
+    (x, y), centre = inlet.direction, (0.0, 0.0)
+    nearest = -max(edge.farthest_along(centre, (-x, -y)) for edge in tab.edges)
+    return nearest - max(edge.farthest_along(centre, (x, y)) for edge in other.edges) > room
 
 
 def _overlap(a: Region, b: Region) -> bool:

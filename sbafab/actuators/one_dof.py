@@ -66,7 +66,8 @@ def build(design: OneDofDesign) -> Laminate:
     plates = union(shape.outline for shape in shapes)
     held_by = roots(design, shapes, bottom.outline, [inlet])
     bottom, shapes = with_stubs(bottom, held_by), tuple(with_stubs(s, held_by) for s in shapes)
-    body = bottom.outline | plates
+    # Nothing but ears and tails asks for both together.
+    body = bottom.outline | plates if design.registration.method == "ears" else plates
     ears = _ears(design, body, plates)
     held = tails([inlet], body, ears, design)
     stack = BalloonStack(bottom, shapes, shape_of, (AXIS,), ears=ears, tails=held)

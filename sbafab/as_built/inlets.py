@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from sbafab.geometry.boolean import tidy
 from sbafab.geometry.edges import Edge, Line, Point
 from sbafab.geometry.region import Region
+from sbafab.geometry.tidy import tidy
 from sbafab.laminate.interfaces import Interface
 from sbafab.rules.boundary import edges_along
 from sbafab.rules.limits import TOLERANCE

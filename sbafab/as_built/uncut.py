@@ -10,10 +10,10 @@ from sbafab.as_built.chords import with_arcs
 from sbafab.cutting.chaining import check_clear
 from sbafab.errors import OutputError
 from sbafab.geometry.beam import Kerf, widths
-from sbafab.geometry.boolean import tidy
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
 from sbafab.geometry.offset import shrink
 from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.tidy import tidy
 from sbafab.geometry.tracks import rim
 
 KINK = 0.05

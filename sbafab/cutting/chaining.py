@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
-from sbafab.geometry.boolean import LEAST_AREA, tidy
 from sbafab.geometry.copies import COPIED, Copies, between
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, edge_from_bulge
 from sbafab.geometry.intersect import meeting_points
@@ -16,6 +15,7 @@ from sbafab.geometry.nearby import close_pairs, widened
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.runs import same_support
 from sbafab.geometry.shapes import circle
+from sbafab.geometry.tidy import LEAST_AREA, tidy
 
 CLEAR = 10 * EPSILON
 """mm between two circles from which on they surely do not touch."""

@@ -6,10 +6,10 @@ nearer to its arcs than anything measures: films and round holes stay, masks giv
 
 from __future__ import annotations
 
-from sbafab.geometry.boolean import tidy
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line
 from sbafab.geometry.facets import run_chords
 from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.tidy import tidy
 from sbafab.laminate.laminate import Role
 
 FINE = 0.0004

@@ -10,13 +10,13 @@ from typing import NamedTuple
 from sbafab.design.strands import JOIN, Strand, Traced, counted, joined, sealed, widest_gap
 from sbafab.errors import DesignError
 from sbafab.geometry.biarc import FitError
-from sbafab.geometry.boolean import tidy
 from sbafab.geometry.centroid import centroid
 from sbafab.geometry.edges import EPSILON, Point
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import close_pairs
 from sbafab.geometry.pieces import split_edges
 from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.tidy import tidy
 
 MOST_BYTES = 2_000_000
 LARGEST = 150.0

@@ -1,45 +1,37 @@
 """Boolean operations on regions of lines and arcs, exact but for points that are made one (SAME).
 
-The edges of all regions are laid over each other; a piece stays if what is asked for lies on one
-side of it only; the pieces that stay are chained into contours. Nothing is flattened on the way.
+Contours that meet are laid over each other; a piece stays if what is asked for lies on one side of
+it only; the pieces that stay are chained into contours. Those that meet no other stay or fall whole
+(``apart.py``). Nothing is flattened on the way.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
 from typing import TypeVar
 
 from sbafab.errors import SbafabError
-from sbafab.geometry.arrangement import Arrangement, InconsistentError
-from sbafab.geometry.edges import (
-    EPSILON,
-    SAME,
-    Arc,
-    Edge,
-    Line,
-    Point,
-    distance_to,
-    left_normal,
-    quarter_arcs,
+from sbafab.geometry.apart import (
+    ChainGroup,
+    ClosedChain,
+    Wound,
+    chains_of,
+    grouped,
+    settled,
+    turned_round,
 )
-from sbafab.geometry.facets import run_sweep
-from sbafab.geometry.nearby import close_pairs
-from sbafab.geometry.pieces import by_owner, overlaid
+from sbafab.geometry.arrangement import Arrangement, InconsistentError
+from sbafab.geometry.edges import EPSILON, Edge, Point
+from sbafab.geometry.pieces import DIGIT, by_owner, overlaid, overlay
 from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.remembered import MOST
-from sbafab.geometry.shapes import circle
+from sbafab.geometry.remembered import MOST, remembered
+from sbafab.geometry.tidy import tidy
 
 Found = TypeVar("Found")
+WantedTurns = Callable[[int], bool]
+"""Whether a place belongs to a region, from how often chains wind round it."""
 
-LEAST_AREA = 1e-7
-"""Contours that enclose less, in mm2, are rounding dust; so are those thinner than 4 EPSILON, as
-they are on average where no place in them is ROOM wide.
-"""
-ROOM = 50 * EPSILON
-"""mm: a tenth of a micrometre."""
-QUARTER = math.pi / 2
 WAYS = (1, 4, 16, 64)
 """With how many EPSILON edges are cut where they meet, tried in turn; by the last, points within a
 quarter of a micrometre are one.
@@ -54,33 +46,36 @@ def union(regions: Iterable[Region]) -> Region:
     solid = [region for region in regions if not region.is_empty]
     if len(solid) < 2:
         return solid[0] if solid else Region()
-    if _are_separate_discs(solid):
-        return _region([contour.edges for region in solid for contour in region.contours])
-    return wound([edge for region in solid for edge in region.edges], 0)
+    return _union(*solid)
 
 
-def _are_separate_discs(regions: Sequence[Region]) -> bool:
-    """Whether each is one whole circle, apart from all others: then nothing is to be cut."""
-    for region in regions:
-        if len(region.contours) > 1 or region.contours[0].circle is None or region.area <= 0:
-            return False
-        # Arcs that were read from a file may differ in their last digits.
-        if len({(edge.centre, edge.radius) for edge in region.edges if isinstance(edge, Arc)}) > 1:
-            return False
-    boxes = [region.bounds for region in regions]
-    return next(close_pairs(boxes, 2 * SAME), None) is None
+@remembered
+def _union(*regions: Region) -> Region:
+    return enclosed([contour for region in regions for contour in region.contours])
 
 
 def intersection(a: Region, b: Region) -> Region:
     if a.is_empty or b.is_empty:
         return Region()
-    return wound([*a.edges, *b.edges], 1)
+    return _intersection(a, b)
+
+
+@remembered
+def _intersection(a: Region, b: Region) -> Region:
+    return enclosed([*a.contours, *b.contours], 1)
 
 
 def difference(a: Region, b: Region) -> Region:
     if a.is_empty or b.is_empty:
         return a
-    return wound([*a.edges, *(edge.reversed() for edge in b.edges)], 0)
+    return _difference(a, b)
+
+
+@remembered
+def _difference(a: Region, b: Region) -> Region:
+    own, other = ((contour, 1) for contour in a.contours), ((c, -1) for c in b.contours)
+    (found,) = _enclosed([*own, *other], [lambda turns: turns > 0])
+    return found
 
 
 def divided(region: Region, by: Region) -> tuple[Region, Region]:
@@ -90,18 +85,28 @@ def divided(region: Region, by: Region) -> tuple[Region, Region]:
     """
     if region.is_empty or by.is_empty:
         return region, Region()
-    return _divided(tuple(region.edges), tuple(by.edges))
+    return _divided(region, by)
+
+
+@remembered
+def _divided(region: Region, by: Region) -> tuple[Region, Region]:
+    own, other = ((c, 1) for c in region.contours), ((c, 1 << DIGIT) for c in by.contours)
+    outside, inside = _enclosed([*own, *other], [_is_outside, _is_inside])
+    return outside, inside
 
 
 @lru_cache(maxsize=MOST)
-def _divided(edges: tuple[Edge, ...], by: tuple[Edge, ...]) -> tuple[Region, Region]:
-    def contours(found: Arrangement) -> tuple[Region, Region]:
-        winds = {turns: by_owner(turns, 2) for turns in set(found.left)}
-        outside = {turns for turns, (own, other) in winds.items() if own > 0 >= other}
-        inside = {turns for turns, (own, other) in winds.items() if own > 0 and other > 0}
-        return _enclosed(found, found.edging(outside)), _enclosed(found, found.edging(inside))
+def _is_outside(turns: int) -> bool:
+    """Whether the first of two regions is there alone."""
+    own, other = by_owner(turns, 2)
+    return own > 0 >= other
 
-    return arranged([edges, by], contours)
+
+@lru_cache(maxsize=MOST)
+def _is_inside(turns: int) -> bool:
+    """Whether both of two regions are there."""
+    own, other = by_owner(turns, 2)
+    return own > 0 and other > 0
 
 
 def wound(edges: Sequence[Edge], above: int) -> Region:
@@ -109,22 +114,64 @@ def wound(edges: Sequence[Edge], above: int) -> Region:
 
     Raises GeometryError where no way to cut the edges where they meet gives one answer.
     """
-    return _wound(tuple(edges), above)
+    return arranged(
+        [edges],
+        lambda found: _region(_loops(found, lambda turns: turns > above)),
+    )
 
 
-@lru_cache(maxsize=MOST)
-def _wound(edges: tuple[Edge, ...], above: int) -> Region:
-    return arranged([edges], lambda found: _enclosed(found, found.borders(above)))
+def enclosed(contours: Iterable[Contour], above: int = 0) -> Region:
+    """The same for contours, each a closed chain by itself."""
+    (found,) = _enclosed([(contour, 1) for contour in contours], [lambda turns: turns > above])
+    return found
 
 
-def _enclosed(found: Arrangement, borders: Sequence[int]) -> Region:
-    return _region(found.loops(borders))
+def _enclosed(chains: Iterable[Wound], wanted: Sequence[WantedTurns]) -> list[Region]:
+    """The regions of the places that are wanted, from how often chains wind round them."""
+    found: list[list[Contour]] = [[] for _ in wanted]
+    for group in grouped(chains_of(chains)):
+        if group.is_alone:
+            own = [_whole(group.chains[0], group.outside, is_in) for is_in in wanted]
+        else:
+            own = _cut(group, wanted)
+        for contours, more in zip(found, own, strict=True):
+            contours.extend(more)
+    return [Region(tuple(sorted(contours, key=_reading_order))) for contours in found]
+
+
+def _whole(chain: ClosedChain, outside: int, wanted: WantedTurns) -> list[Contour]:
+    """A chain that nothing meets, with the material on its left; nothing if it bounds none."""
+    contour = chain.contour
+    inside = outside + (-chain.turns if contour.is_hole else chain.turns)
+    if wanted(inside) == wanted(outside):
+        return []
+    return [contour if wanted(outside) == contour.is_hole else turned_round(contour)]
+
+
+def _cut(group: ChainGroup, wanted: Sequence[WantedTurns]) -> list[list[Contour]]:
+    """The contours of each region, where chains meet each other."""
+
+    def read(found: Arrangement) -> list[list[Contour]]:
+        return [_contours(_loops(found, is_in, group.outside)) for is_in in wanted]
+
+    edges, clear = group.edges, group.clear
+    return _in_some_way(lambda tolerance: read(Arrangement(overlay(edges, tolerance, clear))))
+
+
+def _loops(found: Arrangement, wanted: WantedTurns, outside: int = 0) -> Iterable[Sequence[Edge]]:
+    """Loops round what is wanted, where other chains wind so often round all of it."""
+    return found.loops(
+        found.edging({turns for turns in set(found.left) if wanted(turns + outside)})
+    )
+
+
+def _contours(loops: Iterable[Sequence[Edge]]) -> list[Contour]:
+    return [settled(contour) for contour in map(tidy, loops) if contour is not None]
 
 
 def _region(loops: Iterable[Sequence[Edge]]) -> Region:
     """The region inside closed chains that meet nowhere."""
-    contours = [contour for contour in map(tidy, loops) if contour is not None]
-    return Region(tuple(sorted(contours, key=_reading_order)))
+    return Region(tuple(sorted(_contours(loops), key=_reading_order)))
 
 
 def arranged(owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Found]) -> Found:
@@ -132,10 +179,15 @@ def arranged(owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Fou
 
     Raises GeometryError where no way to cut the edges where they meet gives one answer.
     """
+    return _in_some_way(lambda tolerance: read(Arrangement(overlaid(owners, tolerance))))
+
+
+def _in_some_way(read: Callable[[float], Found]) -> Found:
+    """What is read where edges are cut with a tolerance, the finest that gives one answer."""
     place: Point | None = None
     for coarser in WAYS:
         try:
-            return read(Arrangement(overlaid(owners, coarser * EPSILON)))
+            return read(coarser * EPSILON)
         except InconsistentError as fault:
             place = place or fault.args[0]
     x, y = place or (0.0, 0.0)
@@ -148,51 +200,3 @@ def arranged(owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Fou
 def _reading_order(contour: Contour) -> tuple[bool, float, float, float]:
     low_x, low_y, high_x, _ = contour.bounds
     return contour.is_hole, round(low_x, 6), round(low_y, 6), round(high_x, 6)
-
-
-def tidy(loop: Sequence[Edge]) -> Contour | None:
-    """One contour with edges of one support joined and arcs of at most a quarter turn."""
-    contour = Contour(tuple(loop))
-    if abs(contour.area) < LEAST_AREA:
-        return None
-    if abs(contour.area) < 2 * EPSILON * contour.length and not _has_room(contour):
-        return None
-    if contour.circle is not None:
-        whole = circle(*contour.circle)
-        return whole if contour.area > 0 else whole.reversed()
-    edges = [edge for run in contour.runs for edge in _joined(run)]
-    first = min(range(len(edges)), key=lambda i: _rounded(edges[i].start))
-    return Contour((*edges[first:], *edges[:first]))
-
-
-def _has_room(contour: Contour) -> bool:
-    """Whether there is a place in a contour of hardly any width, beside an edge, that is ROOM wide.
-
-    A long sliver would hide it in its average.
-    """
-    into = -ROOM / 2 if contour.area < 0 else ROOM / 2
-    for edge in contour.edges:
-        if edge.length < ROOM:
-            continue
-        for share in (0.25, 0.5, 0.75):
-            x, y = edge.at(share)
-            nx, ny = left_normal(edge, (x, y))
-            p = (x + into * nx, y + into * ny)
-            if contour.winding(p) and all(
-                distance_to(other, p) > 0.99 * ROOM / 2 for other in contour.edges
-            ):
-                return True
-    return False
-
-
-def _rounded(p: Point) -> Point:
-    return round(p[0], 6), round(p[1], 6)
-
-
-def _joined(run: Sequence[Edge]) -> Sequence[Edge]:
-    head, end = run[0], run[-1].end
-    if isinstance(head, Line):
-        return [Line(head.start, end)]
-    if len(run) == 1 and 0 < (head.sweep if head.ccw else -head.sweep) < QUARTER:
-        return run
-    return quarter_arcs(head.start, end, head.centre, head.radius, run_sweep(run))

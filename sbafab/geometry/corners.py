@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Bounds, Edge, Line, Point
-from sbafab.geometry.ends import SMOOTH
+from sbafab.geometry.ends import ROUNDED, SMOOTH
 from sbafab.geometry.region import Contour
 
 
@@ -52,6 +52,22 @@ def corners_of(contour: Contour) -> Iterator[Corner | None]:
             # At a cusp only the curvatures tell which side the material is on.
             turn = math.pi if _curvature(before) + _curvature(after) < 0 else -math.pi
         yield Corner(after.start, u, v, turn) if abs(turn) > SMOOTH else None
+
+
+def pinch(
+    contours: Iterable[Contour], corners: Iterable[Corner | None], sharp: float
+) -> Point | None:
+    """A corner sharper than allowed, or a point where the boundary meets itself."""
+    for corner in corners:
+        if corner is not None and math.degrees(math.pi - corner.turn) < sharp - ROUNDED:
+            return corner.point
+    seen: set[Point] = set()
+    for contour in contours:
+        for edge in contour.edges:
+            if edge.start in seen:
+                return edge.start
+            seen.add(edge.start)
+    return None
 
 
 def _curvature(edge: Edge) -> float:

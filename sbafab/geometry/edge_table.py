@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,20 +28,23 @@ def dot(a: Floats, b: Floats) -> Floats:
     return found
 
 
-@dataclass(frozen=True)
 class EdgeTable:
     """Points and boxes have a row a coordinate; the centre of a line is its start.
 
     ``turn`` is 1 for an arc that runs counter-clockwise, -1 for one that runs clockwise, 0 for a
-    line.
+    line. All of it is rows of ``columns``, a column each.
     """
 
-    start: Floats
-    end: Floats
-    centre: Floats
-    radius: Floats
-    turn: Floats
-    box: Floats
+    __slots__ = ("box", "centre", "columns", "end", "radius", "start", "turn")
+
+    def __init__(self, columns: Floats) -> None:
+        self.columns = columns
+        self.start: Floats = columns[0:2]
+        self.end: Floats = columns[2:4]
+        self.centre: Floats = columns[4:6]
+        self.radius: Floats = columns[6]
+        self.turn: Floats = columns[7]
+        self.box: Floats = columns[8:12]
 
     @staticmethod
     def of(edges: Sequence[Edge], boxes: Sequence[Bounds] | None = None) -> EdgeTable:
@@ -54,23 +56,15 @@ class EdgeTable:
             else (*e.start, *e.end, *e.start, 0.0, 0.0, *box)
             for e, box in zip(edges, known, strict=True)
         ]
-        c = np.array(rows, dtype=float).reshape(-1, 12).T.copy()
-        return EdgeTable(c[0:2], c[2:4], c[4:6], c[6], c[7], c[8:12])
+        return EdgeTable(np.array(rows, dtype=float).reshape(-1, 12).T.copy())
 
     @staticmethod
     def joined(tables: Sequence[EdgeTable]) -> EdgeTable:
-        return EdgeTable(
-            *(
-                np.concatenate([getattr(table, name) for table in tables], axis=-1)
-                for name in EdgeTable.__dataclass_fields__
-            )
-        )
+        return EdgeTable(np.concatenate([table.columns for table in tables], axis=1))
 
     def at(self, numbers: Indices) -> EdgeTable:
         """The edges with these numbers, in their order."""
-        return EdgeTable(
-            *(getattr(self, name)[..., numbers] for name in EdgeTable.__dataclass_fields__)
-        )
+        return EdgeTable(self.columns.take(numbers, axis=1))
 
     def normal(self, p: Floats) -> Floats:
         """Unit normals to the left of travel, each edge's at its own point."""

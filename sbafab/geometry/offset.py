@@ -6,9 +6,11 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from sbafab.geometry.boolean import wound
+from sbafab.geometry.apart import FAR, alone, meets_itself
+from sbafab.geometry.boolean import enclosed
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, left_turn
 from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.shapes import circle
 
 CUSP = 3.0
 """Radians: a path that turns by more is taken to turn back on itself."""
@@ -20,7 +22,8 @@ def grow(region: Region, distance: float) -> Region:
         return shrink(region, -distance)
     if distance < EPSILON or region.is_empty:
         return region
-    return wound([edge for contour in region.contours for edge in _moved(contour, distance)], 0)
+    chains = [_chain(contour, distance) for contour in region.contours]
+    return enclosed([chain for chain in chains if chain.edges])
 
 
 def shrink(region: Region, distance: float) -> Region:
@@ -31,8 +34,8 @@ def shrink(region: Region, distance: float) -> Region:
         return region
     # What is outside grows: the chains wind round it 0 times, or more; round what is left, -1.
     outside = [contour.reversed() for contour in region.contours]
-    moved = [edge.reversed() for contour in outside for edge in _moved(contour, distance)]
-    return wound(moved, 0)
+    chains = [_chain(contour, distance) for contour in outside]
+    return enclosed([chain.reversed() for chain in chains if chain.edges])
 
 
 def fillet(region: Region, radius: float) -> Region:
@@ -40,8 +43,34 @@ def fillet(region: Region, radius: float) -> Region:
     return shrink(grow(region, radius), radius)
 
 
+def _chain(contour: Contour, distance: float) -> Contour:
+    """A closed chain that winds round what the contour does, and the bands beside its edges."""
+    if contour.circle is not None and alone(contour):
+        centre, radius = contour.circle
+        radius += -distance if contour.is_hole else distance
+        if radius > FAR:
+            return circle(centre, radius).reversed() if contour.is_hole else circle(centre, radius)
+    moved = list(_moved(contour, distance))
+    chain = Contour(tuple(_joined_up(moved)))
+    corners = {edge.start for edge in contour.edges}
+    # Where it goes by way of a corner, it meets itself.
+    return meets_itself(chain) if any(edge.end in corners for edge in moved) else chain
+
+
+def _joined_up(edges: Sequence[Edge]) -> Iterator[Edge]:
+    """The edges, those that follow each other but for a rounding by way of one point."""
+    starts = [edge.start for edge in edges]
+    for i, start in enumerate(starts):
+        end = edges[i - 1].end
+        if end < start and math.dist(end, start) < EPSILON:
+            starts[i] = end
+    for edge, start, following in zip(edges, starts, (*starts[1:], *starts[:1]), strict=True):
+        end = following if math.dist(edge.end, following) < EPSILON else edge.end
+        yield edge if start is edge.start and end == edge.end else edge.part(start, end)
+
+
 def _moved(contour: Contour, distance: float) -> Iterator[Edge]:
-    """A closed chain that winds round what the contour does, and the bands beside its edges.
+    """The edges of such a chain.
 
     The band of an edge reaches ``distance`` to its right. Bands that overlap at a corner are walked
     round one by one, by way of the corner, or straight on where both cover the difference.

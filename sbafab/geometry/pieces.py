@@ -52,9 +52,23 @@ def overlaid(owners: Sequence[Iterable[Edge]], tolerance: float = EPSILON) -> Ov
     What was bent to meet another edge is cut over again, for it may have come to meet a third.
     """
     entries = [(edge, 1 << DIGIT * i) for i, edges in enumerate(owners) for edge in edges]
+    return overlay(entries, tolerance)
+
+
+def overlay(
+    entries: Sequence[tuple[Edge, int]],
+    tolerance: float = EPSILON,
+    chain: Sequence[int] | None = None,
+) -> Overlay:
+    """The same for edges that each count so many turns.
+
+    ``chain`` numbers the closed chain of each edge where it is known to stay clear of itself; of
+    others it is negative.
+    """
     bent = True
     for _ in range(ROUNDS):
-        split, bent = split_edges([edge for edge, _ in entries], tolerance)
+        split, bent = split_edges([edge for edge, _ in entries], tolerance, chain)
+        chain = None
         entries = [
             (part, turns)
             for parts, (_, turns) in zip(split, entries, strict=True)
@@ -79,7 +93,9 @@ class Split(NamedTuple):
     bent: bool
 
 
-def split_edges(edges: Sequence[Edge], tolerance: float = EPSILON) -> Split:
+def split_edges(
+    edges: Sequence[Edge], tolerance: float = EPSILON, chain: Sequence[int] | None = None
+) -> Split:
     """Each edge cut where it meets another; points nearer than 2 ``tolerance`` become one.
 
     The order of the edges has no part in where they are cut. What meets an arc is looked for along
@@ -92,7 +108,11 @@ def split_edges(edges: Sequence[Edge], tolerance: float = EPSILON) -> Split:
     # An arc may leave the box of its ends by as much as these are off its circle.
     near = [widened(box, tolerance + BENT) for box in bounds]
     for i, j in close_pairs(bounds, tolerance):
-        if _only_follows(edges[i], edges[j], near[i], near[j], 2 * tolerance):
+        if chain is not None and chain[i] == chain[j] >= 0:
+            continue
+        if _stay_apart(edges[i], edges[j], tolerance) or _only_follows(
+            edges[i], edges[j], near[i], near[j], 2 * tolerance
+        ):
             continue
         points = meeting_points(edges[i], edges[j], tolerance, (near[i], near[j]))
         if points:
@@ -117,6 +137,15 @@ def split_edges(edges: Sequence[Edge], tolerance: float = EPSILON) -> Split:
             for p in own
         ),
     )
+
+
+def _stay_apart(a: Edge, b: Edge, tolerance: float) -> bool:
+    """Whether two arcs lie on circles that come nowhere near each other."""
+    if not (isinstance(a, Arc) and isinstance(b, Arc)):
+        return False
+    gap, r, s = math.dist(a.centre, b.centre), a.radius, b.radius
+    # Their ends may be as much as BENT off their circles.
+    return max(gap - r - s, abs(r - s) - gap) > tolerance + 2 * BENT
 
 
 def _only_follows(a: Edge, b: Edge, near_a: Bounds, near_b: Bounds, same: float) -> bool:
@@ -167,6 +196,8 @@ def _share(
 def _stops(edge: Edge, points: Sequence[Point], pool: PointPool) -> list[Point]:
     """Where the parts of an edge end, from its start to its end."""
     start, end = pool.snapped(edge.start), pool.snapped(edge.end)
+    if not points:
+        return [start, end]
     inner = dict.fromkeys(map(pool.snapped, points))
     inner.pop(start, None)
     inner.pop(end, None)

@@ -242,11 +242,14 @@ class Region:
         """The edges filed by place."""
         return EdgeIndex(self.edges, [box for contour in self.contours for box in contour.boxes])
 
-    @cached_property
+    @property
     def pieces(self) -> tuple[Region, ...]:
         """The connected pieces, each an outer contour with its holes."""
-        if len(self.outers) == 1:
-            return (self,)
+        # A region that kept itself would be freed late.
+        return (self,) if len(self.outers) == 1 else self._several
+
+    @cached_property
+    def _several(self) -> tuple[Region, ...]:
         held: list[list[Contour]] = [[outer] for outer in self.outers]
         places = [hole.edges[0].at(0.5) for hole in self.holes]
         boxes = [*(outer.bounds for outer in self.outers), *((*p, *p) for p in places)]
@@ -391,10 +394,9 @@ class Region:
     def polygons(self, sagitta: float = 0.001) -> list[list[list[Point]]]:
         """Each piece as rings of points, outer first; chords within ``sagitta`` mm of the arcs."""
         return [
-            [contour.polygon(sagitta) for contour in sorted(piece.contours, key=_outer_first)]
+            [
+                contour.polygon(sagitta)
+                for contour in sorted(piece.contours, key=lambda one: one.is_hole)
+            ]
             for piece in self.pieces
         ]
-
-
-def _outer_first(contour: Contour) -> bool:
-    return contour.is_hole

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 from sbafab.geometry.edges import Arc, Line, Point
 from sbafab.geometry.region import Contour, Region
 
 
+@lru_cache(maxsize=256)
 def circle(centre: Point, radius: float) -> Contour:
-    """A full circle, counter-clockwise, as four quarter arcs."""
+    """A full circle, counter-clockwise, as four quarter arcs.
+
+    The same one for all layers that a bore goes through, with what is known of it.
+    """
     x, y = centre
     compass = [(x + radius, y), (x, y + radius), (x - radius, y), (x, y - radius)]
     contour = Contour(

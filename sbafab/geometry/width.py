@@ -8,14 +8,15 @@ between corners; these are exact for lines and arcs.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
-from sbafab.geometry.corners import Corner, corners_of
+from sbafab.geometry.corners import Corner, corners_of, pinch
 from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, left_normal
-from sbafab.geometry.ends import ROUNDED, tapered_ends
+from sbafab.geometry.ends import tapered_ends
 from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.kept import kept
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.remembered import remembered
@@ -27,6 +28,10 @@ ALONGSIDE = 1e-3
 """Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
 BESIDE = 1e-5
 """mm that an edge may miss another's normals by, for rounding."""
+SHORTER = 1e-9
+"""mm by which a segment must be shorter than another to be the narrowest."""
+ROUNDING = 1e-12
+"""mm: more than what distances are rounded by."""
 TOUCH = 1e-6
 """mm within which two points are one."""
 STEP = math.radians(15)
@@ -63,7 +68,7 @@ def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) ->
 @remembered
 def least_gap(region: Region, sharp: float = 90.0, below: float = math.inf) -> Width | None:
     """The narrowest slot, hole or gap between pieces, likewise."""
-    outside = [contour.reversed() for contour in region.contours]
+    outside = [kept(one, "from_outside", Contour.reversed) for one in region.contours]
     return least_of(Boundary(outside, sharp), below)
 
 
@@ -124,15 +129,15 @@ class Boundary:
     """Contours with the material on their left, made ready for the search."""
 
     def __init__(self, contours: Sequence[Contour], sharp: float) -> None:
-        self.sides = [
-            _side(edge, box)
-            for contour in contours
-            for edge, box in zip(contour.edges, contour.boxes, strict=True)
-        ]
-        self.corners = [corner for contour in contours for corner in corners_of(contour)]
+        self.sides = [side for one in contours for side in kept(one, "sides", _sides)]
+        self.corners = [corner for one in contours for corner in kept(one, "corners", _corners)]
         """What corner each side starts at, if any."""
-        self.ends = [ends for contour in contours for ends in tapered_ends(contour, sharp)]
-        self.pinch = _pinch(contours, self.corners, sharp)
+        self.ends = [
+            ends
+            for one in contours
+            for ends in kept(one, f"ends{sharp}", lambda c: list(tapered_ends(c, sharp)))
+        ]
+        self.pinch = pinch(contours, self.corners, sharp)
         self.index = EdgeIndex(
             [side.edge for side in self.sides], [side.box for side in self.sides]
         )
@@ -162,9 +167,14 @@ class _Narrowest:
         self.best: Width | None = None
         self.value = below
 
+    @property
+    def most(self) -> float:
+        """Longer ones are not kept, mm."""
+        return self.value - SHORTER
+
     def offer(self, p: Point, q: Point) -> None:
         value = math.dist(p, q)
-        if value < self.value - 1e-9 and self.is_clear(p, q):
+        if value < self.value - SHORTER and self.is_clear(p, q):
             self.value, self.best = value, Width(value, p, q)
 
     def offer_facing(self, a: _Foot, b: _Foot) -> None:
@@ -223,6 +233,10 @@ class Gathered(_Narrowest):
         super().__init__(boundary, below)
         self.offered: list[tuple[Point, Point]] = []
 
+    @property
+    def most(self) -> float:
+        return self.value
+
     def offer(self, p: Point, q: Point) -> None:
         if math.dist(p, q) <= self.value:
             self.offered.append((p, q))
@@ -258,6 +272,14 @@ def search(narrowest: _Narrowest) -> None:
         narrowest.offer(p, q)
 
 
+def _sides(contour: Contour) -> list[BoundarySide]:
+    return [_side(edge, box) for edge, box in zip(contour.edges, contour.boxes, strict=True)]
+
+
+def _corners(contour: Contour) -> list[Corner | None]:
+    return list(corners_of(contour))
+
+
 def _side(edge: Edge, box: Bounds) -> BoundarySide:
     if isinstance(edge, Arc):
         # As ``at`` says, which would work out the sweep once more.
@@ -270,23 +292,9 @@ def _side(edge: Edge, box: Bounds) -> BoundarySide:
     return BoundarySide(edge, box, middle, left_normal(edge, middle), half_turn, half, lean)
 
 
-def _pinch(
-    contours: Iterable[Contour], corners: Iterable[Corner | None], sharp: float
-) -> Point | None:
-    """A corner sharper than allowed, or a point where the boundary meets itself."""
-    for corner in corners:
-        if corner is not None and math.degrees(math.pi - corner.turn) < sharp - ROUNDED:
-            return corner.point
-    seen: set[Point] = set()
-    for contour in contours:
-        for edge in contour.edges:
-            if edge.start in seen:
-                return edge.start
-            seen.add(edge.start)
-    return None
-
-
 def _between_edges(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> None:
+    if _lie_farther(a.edge, b.edge, narrowest.most):
+        return
     if isinstance(a.edge, Arc):
         if _alongside(a.edge, b.edge) and _may_face(a.edge, b.edge, narrowest.value):
             _along_each_other(a, b, narrowest)
@@ -306,6 +314,18 @@ def _between_edges(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> N
         _between_edges(b, a, narrowest)
     elif _alongside(a.edge, b.edge):
         _along_each_other(a, b, narrowest)
+
+
+def _lie_farther(a: Edge, b: Edge, than: float) -> bool:
+    """Whether two arcs surely lie farther apart than so many mm, for their circles do."""
+    if not (isinstance(a, Arc) and isinstance(b, Arc)):
+        return False
+    gap, r, s = math.dist(a.centre, b.centre), a.radius, b.radius
+    apart = max(gap - r - s, abs(r - s) - gap)
+    if apart <= than:
+        return False
+    off = [abs(math.dist(p, e.centre) - e.radius) for e in (a, b) for p in (e.start, e.end)]
+    return apart - sum(off) - ROUNDING > than
 
 
 def _alongside(a: Edge, b: Edge) -> bool:

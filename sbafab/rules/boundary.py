@@ -6,10 +6,11 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
+from sbafab.geometry.apart import ChainGroup, chains_of, grouped
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal
 from sbafab.geometry.intersect import line_circle
 from sbafab.geometry.nearby import EdgeIndex, widened
-from sbafab.geometry.pieces import by_owner, overlaid
+from sbafab.geometry.pieces import DIGIT, Piece, by_owner, overlay
 from sbafab.geometry.region import Region
 from sbafab.geometry.remembered import remembered
 
@@ -26,11 +27,20 @@ STEEP = 0.01
 def edges_along(region: Region, other: Region) -> tuple[Edge, ...]:
     """The stretches of ``region``'s edges that run along edges of ``other``, the same way."""
     along = []
-    for edge, turns in overlaid([region.edges, other.edges]).pieces:
-        own, others = by_owner(turns, 2)
-        if own * others > 0:
-            along.append(edge if own > 0 else edge.reversed())
+    own, others = ((c, 1) for c in region.contours), ((c, 1 << DIGIT) for c in other.contours)
+    for group in grouped(chains_of([*own, *others])):
+        for edge, turns in _pieces(group):
+            one, two = by_owner(turns, 2)
+            if one * two > 0:
+                along.append(edge if one > 0 else edge.reversed())
     return tuple(along)
+
+
+def _pieces(group: ChainGroup) -> Iterable[Piece]:
+    """What the chains of a group are cut into."""
+    if group.is_alone:
+        return (Piece(edge, turns) for edge, turns in group.edges)
+    return overlay(group.edges, EPSILON, group.clear).pieces
 
 
 def beside(edge: Edge, distance: float) -> Point:

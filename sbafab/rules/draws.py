@@ -7,8 +7,7 @@ for it again.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -19,14 +18,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
-    Indices = NDArray[np.intp]
 
 KEPT = 4_000_000
 """Numbers at the stream's beginning that are kept: 32 MB at most, of which a page is taken up when
 it is first written.
 """
-ROOM = 1e-12
-"""mm: far more than the rounding of a sum of a few errors."""
 
 
 class CutContour(NamedTuple):
@@ -85,65 +81,3 @@ def numbers(seed: int, first: int, rows: int, builds: int) -> Floats:
     ahead = np.random.PCG64(seed)
     ahead.advance(first)
     return np.random.Generator(ahead).random((rows, builds))
-
-
-class Draws:
-    """The errors of a batch of builds of interfaces that are alike.
-
-    ``numbers`` has a row of builds for each error of the laminate, ``first`` the rows of each error
-    of the first interface and of those that stand in its place in the others.
-    """
-
-    def __init__(self, numbers: Floats, first: Mapping[Error, Indices], cutting: float) -> None:
-        self.numbers = numbers
-        self.first = first
-        self.cutting = cutting
-
-    def of(self, error: Error, interfaces: Indices, builds: Indices) -> Floats:
-        """X and y of a shift, or the one value of a cutting error or turn, in builds of these."""
-        import numpy as np
-
-        if is_shift(error):
-            radius = self.reach(error, interfaces, builds)
-            rows = self.first[error][interfaces] + 1
-            angle = math.tau * self.numbers[rows, builds]
-            return np.array([radius * np.cos(angle), radius * np.sin(angle)])
-        return self.value(error, interfaces, builds)[None, :]
-
-    def reach(self, shift: Error, interfaces: Indices, builds: Indices) -> Floats:
-        """How far a shift goes: uniform over a disc, so that the radius goes with the root."""
-        import numpy as np
-
-        assert isinstance(shift, Freedom)
-        drawn = self.numbers[self.first[shift][interfaces], builds]
-        far: Floats = shift.most * np.sqrt(drawn)
-        return far
-
-    def value(self, error: Error, interfaces: Indices, builds: Indices) -> Floats:
-        """The one value of a cutting error or a turn."""
-        most = error.most if isinstance(error, Freedom) else self.cutting
-        drawn = self.numbers[self.first[error][interfaces], builds]
-        values: Floats = -most + (most + most) * drawn
-        return values
-
-    def cut_below(
-        self, contours: Sequence[tuple[Error, float]], least: float
-    ) -> tuple[Indices, Indices]:
-        """Interfaces and builds in which the cutting errors, by their signs, may add up to less."""
-        import numpy as np
-
-        count, builds = len(self.first[contours[0][0]]), self.numbers.shape[1]
-        if self.cutting <= 0:
-            interfaces, every = np.nonzero(np.full((count, builds), least > -ROOM))
-            return interfaces, every
-        share = (least + ROOM) / (2 * self.cutting) + sum(sign for _, sign in contours) / 2
-        found: list[Indices] = []
-        # One interface after the other: rows of all at once would be copied first.
-        for number in range(count):
-            total = np.zeros(1)
-            for error, sign in contours:
-                row = self.numbers[self.first[error][number]]
-                total = total + row if sign > 0 else total - row
-            found.append((total < share).nonzero()[0])
-        interfaces = np.repeat(np.arange(count), [len(one) for one in found])
-        return interfaces, np.concatenate(found)

@@ -71,15 +71,11 @@ class _Shapes:
     def __init__(self, laminate: Laminate) -> None:
         self.laminate = laminate
         self.openings = pin_openings(laminate)
-        self.laid = cache(self._laid)
-        self.minus = cache(self._minus)
+        # Not methods of its own, or it would hold itself until rings are searched for.
+        self.laid = cache(_laid)
+        self.minus = cache(_minus)
         self.both = cache(Region.__and__)
         self.union = cache(_union)
-
-    def _laid(self, seen: Region, film: Region) -> tuple[Region, Region]:
-        """What a film covers of a region, and what it leaves."""
-        rest, shared = map(without_slivers, divided(seen, film))
-        return shared, rest if shared.contours else seen
 
     def left_by_next(self, index: int, below: Layer, above: Layer) -> Region:
         """What the film next to it leaves of a film; their contact is known."""
@@ -90,9 +86,6 @@ class _Shapes:
             return below.profile
         # Interfaces have asked for it as well.
         return without_slivers(divided(below.profile, above.profile)[0])
-
-    def _minus(self, region: Region, other: Region) -> Region:
-        return without_slivers(region - other)
 
     def kept_apart(
         self, region: Region, index: int, below: Layer, above: Layer
@@ -115,6 +108,16 @@ class _Shapes:
         return Interface(
             index, "separator", below, above, used, mask, contact, Region(), unbonded
         ), bare
+
+
+def _laid(seen: Region, film: Region) -> tuple[Region, Region]:
+    """What a film covers of a region, and what it leaves."""
+    rest, shared = map(without_slivers, divided(seen, film))
+    return shared, rest if shared.contours else seen
+
+
+def _minus(region: Region, other: Region) -> Region:
+    return without_slivers(region - other)
 
 
 def _union(regions: tuple[Region, ...]) -> Region:

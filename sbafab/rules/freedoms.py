@@ -14,8 +14,8 @@ from itertools import combinations
 from typing import NamedTuple
 
 from sbafab.geometry.centroid import centroid
-from sbafab.geometry.edges import Point
-from sbafab.geometry.nearby import boxes_meet
+from sbafab.geometry.edges import Point, distance_to
+from sbafab.geometry.nearby import boxes_meet, widened
 from sbafab.geometry.region import Region
 from sbafab.laminate.assembly import AssemblyStep, assembly
 from sbafab.laminate.laminate import LOOSE, Laminate
@@ -299,6 +299,20 @@ def _plainly_meet(a: Region, b: Region) -> bool:
     for region in (a, b):
         for edge in region.edges[:: max(1, len(region.edges) // BESIDE)]:
             p = beside(edge, INSIDE)
-            if all(one.contains(p) and one.distance_to_edge(p) > INSIDE / 2 for one in (a, b)):
+            if all(one.contains(p) and not _has_edge_near(one, p) for one in (a, b)):
                 return True
     return False
+
+
+def _has_edge_near(region: Region, p: Point) -> bool:
+    """Whether an edge of a region lies within half of INSIDE of a point."""
+    left, low, right, high = widened((*p, *p), INSIDE / 2)
+    return any(
+        box[0] <= right
+        and box[2] >= left
+        and box[1] <= high
+        and box[3] >= low
+        and distance_to(edge, p) <= INSIDE / 2
+        for contour in region.contours
+        for edge, box in zip(contour.edges, contour.boxes, strict=True)
+    )

@@ -224,27 +224,44 @@ def _farthest(freedom: Freedom, box: Bounds) -> float:
     return max(math.dist(freedom.centre, (x, y)) for x in box[::2] for y in box[1::2])
 
 
+class Felt(NamedTuple):
+    """Interfaces that are alike, and what their margins can lose; ``bond`` is the least width."""
+
+    alike: tuple[Interface, ...]
+    loss: _Loss
+    bond: Width | None
+
+    @staticmethod
+    def of(alike: Sequence[Interface], limits: Limits, moves: Freedoms, bond: Width | None) -> Felt:
+        return Felt(tuple(alike), _loss(alike[0], limits, moves), bond)
+
+    def slack(self, limits: Limits) -> float:
+        """How much wider than its narrowest place a bond is looked at."""
+        if self.bond is None:
+            return 0.0
+        return self.loss.slack(self.bond.value, limits.bond_width, limits.worst_bond_width)
+
+
 def narrow_places(
-    interface: Interface,
+    felt: Felt,
+    widest: float,
     pins: tuple[Pin, ...],
     limits: Limits,
-    moves: Freedoms,
-    bond: Width | None,
     reaches: Sequence[tuple[Edge, Reach]],
 ) -> dict[Quantity, Places]:
     """All margins that could become the least under the tolerances, or come short of a limit.
 
-    ``bond`` is the least width of its bond, ``reaches`` how far its masks reach past film edges.
+    ``widest`` is the greatest slack of all with the same bond, ``reaches`` is how far masks reach
+    past film edges.
     """
     from sbafab.rules.narrow_places import bond_places, overhang_places
 
+    interface, loss = felt.alike[0], felt.loss
     if interface.contact.is_empty:
         return {}
-    loss = _loss(interface, limits, moves)
     found: dict[Quantity, Places] = {}
-    if bond is not None:
-        slack = loss.slack(bond.value, limits.bond_width, limits.worst_bond_width)
-        found["bond"] = bond_places(interface, bond, slack)
+    if felt.bond is not None:
+        found["bond"] = bond_places(interface, felt.bond, felt.slack(limits), widest)
     flush = limits.mask_overhang
     free = [
         (edge, reach)

@@ -16,7 +16,7 @@ from sbafab.rules.facing import Facing, facing_films
 from sbafab.rules.forms import LinearForm, linear_forms
 from sbafab.rules.freedoms import Freedoms, Laid, freedoms, lay_up
 from sbafab.rules.limits import Limits
-from sbafab.rules.margins import SHARP, InterfaceMargins, felt_alike, narrow_places
+from sbafab.rules.margins import SHARP, Felt, InterfaceMargins, felt_alike, narrow_places
 
 
 class Measures:
@@ -69,19 +69,27 @@ class Measures:
     @cached_property
     def margins(self) -> list[InterfaceMargins]:
         """The narrow places of every interface."""
+        limits = self.limits
+        every = [
+            Felt.of(alike, limits, self.moves, self.bond(alike[0]))
+            for alike in felt_alike(self.laminate, self.facing, self.moves)
+        ]
+        widest: dict[Region, float] = {}
+        for felt in every:
+            bond = felt.alike[0].bond
+            widest[bond] = max(felt.slack(limits), widest.get(bond, 0.0))
         return [
             InterfaceMargins(
-                tuple(alike),
+                felt.alike,
                 narrow_places(
-                    alike[0],
+                    felt,
+                    widest[felt.alike[0].bond],
                     self.laminate.pins,
-                    self.limits,
-                    self.moves,
-                    self.bond(alike[0]),
-                    self.reaches(alike[0]),
+                    limits,
+                    self.reaches(felt.alike[0]),
                 ),
             )
-            for alike in felt_alike(self.laminate, self.facing, self.moves)
+            for felt in every
         ]
 
     @cached_property

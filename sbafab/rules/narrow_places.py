@@ -62,19 +62,28 @@ class Places(NamedTuple):
 NONE = Places(np.zeros(0), np.zeros((2, 0)), np.zeros((2, 0)), np.zeros((2, 0)), [])
 
 
-def bond_places(interface: Interface, least: Width, slack: float) -> Places:
-    """Where its bond is at most ``slack`` mm wider than at its narrowest."""
-    return _bond_places(interface.bond, least, slack, *_profiles(interface))
+def bond_places(interface: Interface, least: Width, slack: float, widest: float) -> Places:
+    """Where its bond is at most ``slack`` mm wider than at its narrowest.
+
+    ``widest`` is the most that is asked for of any interface with the same bond.
+    """
+    return _bond_places(interface.bond, least, slack, widest, *_profiles(interface))
 
 
 @remembered
-def _bond_places(bond: Region, least: Width, slack: float, *profiles: Region) -> Places:
-    p, q, value = facing_places(bond, slack, SHARP, least)
+def _bond_places(
+    bond: Region, least: Width, slack: float, widest: float, *profiles: Region
+) -> Places:
+    p, q, value = facing_places(bond, widest, SHARP, least)
+    if slack < widest:
+        (kept,) = (value <= least.value + slack).nonzero()
+        p, q, value = p[:, kept], q[:, kept], value[kept]
     off = q - p
     length = np.sqrt(dot(off, off))
     normal = off / np.where(length > 0, length, 1.0)
     every = _filed(profiles, films=True, masks=True)
-    return _owned(value, p, q, normal, (every.at(p, normal), every.at(q, normal)))
+    both = every.at(np.concatenate([p, q], axis=1), np.concatenate([normal, normal], axis=1))
+    return _owned(value, p, q, normal, (both[: len(value)], both[len(value) :]))
 
 
 def overhang_places(

@@ -1,292 +1,330 @@
 """Random builds: in which of them every margin of an interface keeps its limit.
 
 What is left at a margin beyond its limit is a row: its room and a sum over the errors drawn. Most
-builds are decided without that sum: by the cuts alone where the films hardly move, by the length of
-all shifts together, which no normal can lose more than, and by the row that looks most against
-them. What rests is summed up, row by row, and what is summed decides: bounds only say where it need
-not be done.
+builds are decided without that sum: by the cuts alone where the films hardly move, and by the
+length of all shifts together, which no normal can lose more than. What rests is summed up, row by
+row, and what is summed decides: bounds only say where it need not be done. All interfaces are asked
+at once, in arrays.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
-from sbafab.rules.draws import CutContour, Draws, Error
-from sbafab.rules.forms import LinearForm
-from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import TOLERANCE
-from sbafab.rules.margins import Quantity
+from sbafab.rules.margin_rows import MarginRows
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    Floats = NDArray[np.float64]
     Bools = NDArray[np.bool_]
+    Floats = NDArray[np.float64]
     Indices = NDArray[np.intp]
 
 SURE = 1e-9 - TOLERANCE
 """mm: what is bounded to be left so far above what holds is so, however the sum is rounded."""
+ROOM = 1e-12
+"""mm: far more than the rounding of a sum of two errors."""
+NEAR = 1e-9
+"""mm: more than the rounding of a sum of all errors."""
 AT_ONCE = 200_000
 """Sums of rows in builds that are worked out at once, which bounds the memory."""
-UNITS = 1000
-"""Factors that are equal to so many parts are one: rows that feel all errors alike."""
 
 
-class RowBounds(NamedTuple):
-    """Least and largest of room, normal's x and y, and levers, of all rows."""
-
-    low: list[float]
-    high: list[float]
-
-
-@dataclass(frozen=True)
-class MarginRows:
-    """What is left at margins of one form beyond their limit: ``room`` and a sum of errors.
-
-    Contours count by their sign, shifts by the normal times theirs, turns by the levers times
-    theirs. Rows are sorted by the normal's ``angle``.
+class RowsAsked(NamedTuple):
+    """Rows of an interface, and where the numbers of each of its errors begin, as ``rows.errors``
+    names them.
     """
-
-    quantity: Quantity
-    room: Floats
-    normal: Floats
-    angle: Floats
-    contours: tuple[tuple[CutContour, float], ...]
-    moves: tuple[tuple[Freedom, float, Floats | None], ...]
-
-    @property
-    def errors(self) -> tuple[Error, ...]:
-        return *(one for one, _ in self.contours), *(freedom for freedom, _, _ in self.moves)
-
-    @cached_property
-    def bounds(self) -> RowBounds:
-        levers = [levers for _, _, levers in self.moves if levers is not None]
-        columns = [self.room, *self.normal, *levers]
-        return RowBounds(
-            [float(column.min()) for column in columns], [float(column.max()) for column in columns]
-        )
-
-    @cached_property
-    def least_uncut(self) -> float:
-        """No row leaves less than this, whatever moves, before what cutting adds or takes."""
-        low, high = self.bounds
-        left, turn = low[0], 3
-        for freedom, _, levers in self.moves:
-            farthest = 1.0
-            if levers is not None:
-                farthest = max(-low[turn], high[turn])
-                turn += 1
-            left -= freedom.most * farthest
-        return left
-
-
-def rows_of(
-    form: LinearForm, layers: Sequence[int], limit: float, cutting: float
-) -> tuple[int, MarginRows] | None:
-    """The margins that can come short at all; of those that feel all errors alike, the least.
-
-    With the number of the first of them; None if there is none.
-    """
-    import numpy as np
-
-    room = form.nominal - limit
-    (short,) = np.nonzero(room - 2 * cutting - form.loss() < -TOLERANCE)
-    if not len(short):
-        return None
-    chosen = short[_least_alike(form, room, short)]
-    normal = form.normal[:, chosen]
-    angle = np.arctan2(normal[1], normal[0])
-    order = np.argsort(angle, kind="stable")
-    chosen = chosen[order]
-    # More film widens a bond, more mask an overhang.
-    signs = (1.0 if one.is_film == (form.quantity == "bond") else -1.0 for one in form.owners)
-    contours = (CutContour(layers[one.seat], one.contour) for one in form.owners)
-    return int(form.numbers[short[0]]), MarginRows(
-        form.quantity,
-        room[chosen],
-        form.normal[:, chosen],
-        angle[order],
-        tuple(zip(contours, signs, strict=True)),
-        tuple(
-            (freedom, 1.0 if at_end else -1.0, None if levers is None else levers[chosen])
-            for freedom, at_end, levers in form.felt
-        ),
-    )
-
-
-def _least_alike(form: LinearForm, room: Floats, short: Indices) -> list[int]:
-    """Which of the short margins have the least room of all with the same factors, rounded."""
-    import numpy as np
-
-    columns: list[Floats] = []
-    if any(levers is None for _, _, levers in form.felt):
-        columns += list(form.normal)
-    columns += [levers for _, _, levers in form.felt if levers is not None]
-    # Where nothing but cutting is felt there is no column, and all are alike.
-    keys = np.array([_parts(column[short]) for column in columns], dtype=np.int64)
-    keys = keys.reshape(len(columns), len(short))
-    found: dict[bytes, int] = {}
-    left = room[short].tolist()
-    for place, key in enumerate(np.ascontiguousarray(keys.T)):
-        name = key.tobytes()
-        known = found.get(name)
-        if known is None or left[place] < left[known]:
-            found[name] = place
-    return list(found.values())
-
-
-def _parts(factors: Floats) -> Floats:
-    """Factors as whole parts, rounded as the decimal number is."""
-    import numpy as np
-
-    scaled = factors * UNITS
-    parts = np.rint(scaled)
-    for doubtful in np.nonzero(np.abs(scaled - np.floor(scaled) - 0.5) < 1e-6)[0]:
-        parts[doubtful] = round(round(float(factors[doubtful]), 3) * UNITS)
-    return parts
-
-
-def short(rows: Iterable[MarginRows], draws: Draws) -> list[tuple[Indices, Indices]]:
-    """Interfaces and builds of them that come short at a row; one may be named several times."""
-    bad: list[tuple[Indices, Indices]] = []
-    for some in rows:
-        interfaces, builds = draws.cut_below(some.contours, SURE - some.least_uncut)
-        roughly = _rough(some, draws, interfaces, builds) < SURE
-        interfaces, builds = interfaces[roughly], builds[roughly]
-        if not len(builds):
-            continue
-        sums = _Sums.of(some, [draws.of(error, interfaces, builds) for error in some.errors])
-        unsure = _picked(sums.least() < SURE)
-        if not len(unsure):
-            continue
-        interfaces, builds, sums = interfaces[unsure], builds[unsure], sums.at(unsure)
-        missed = sums.left(_looking(some, sums.shift), slice(None)) < -TOLERANCE
-        unsure = _picked(~missed)
-        if len(unsure):
-            missed[unsure] = sums.at(unsure).short()
-        bad.append((interfaces[missed], builds[missed]))
-    return bad
-
-
-def _rough(rows: MarginRows, draws: Draws, interfaces: Indices, builds: Indices) -> Floats:
-    """No row leaves less than this, wherever the shifts go; a turn counts by the farthest lever."""
-    import numpy as np
-
-    low, high = rows.bounds
-    left = np.full(len(builds), low[0])
-    for contour, sign in rows.contours:
-        left += sign * draws.value(contour, interfaces, builds)
-    column = 3
-    for freedom, sign, levers in rows.moves:
-        if levers is None:
-            left -= draws.reach(freedom, interfaces, builds)
-        else:
-            turn = sign * draws.value(freedom, interfaces, builds)
-            left += np.minimum(low[column] * turn, high[column] * turn)
-            column += 1
-    return left
-
-
-class _Sums(NamedTuple):
-    """Rows, what was drawn for builds, and that taken together: cuts, shifts and each turn."""
 
     rows: MarginRows
-    drawn: list[Floats]
-    cut: Floats
+    first: tuple[int, ...]
+
+
+class _Bounds(NamedTuple):
+    """What moves may take from the rows of each kind, a line for each move, turns first.
+
+    ``place`` is where the errors stand among those of the kind. ``low`` and ``high`` (mm) are what
+    a turn to either side takes at most, ``shift`` (mm) is how far shifts go; ``after`` is the most
+    that all further lines take. What a kind has not takes nothing.
+    """
+
+    place: Indices
+    low: Floats
+    high: Floats
     shift: Floats
-    turns: list[Floats]
+    after: Floats
 
     @staticmethod
-    def of(rows: MarginRows, drawn: list[Floats]) -> _Sums:
+    def of(kinds: Sequence[MarginRows]) -> _Bounds:
         import numpy as np
 
-        cut, shift = np.zeros(drawn[0].shape[1]), np.zeros((2, drawn[0].shape[1]))
-        for (_, sign), (one,) in zip(rows.contours, drawn, strict=False):
-            cut += sign * one
-        moved = drawn[len(rows.contours) :]
-        for (_, sign, levers), one in zip(rows.moves, moved, strict=True):
-            if levers is None:
-                shift += sign * one
-        turns = [
-            sign * one[0]
-            for (_, sign, levers), one in zip(rows.moves, moved, strict=True)
-            if levers is not None
-        ]
-        return _Sums(rows, drawn, cut, shift, turns)
+        turns = [_of_turns(rows) for rows in kinds]
+        shifts = [_of_shifts(rows) for rows in kinds]
+        lines = max(map(len, turns), default=0), max(map(len, shifts), default=0)
+        place = np.zeros((sum(lines), len(kinds)), dtype=np.intp)
+        bounds, shift = np.zeros((2, lines[0], len(kinds))), np.zeros((lines[1], len(kinds)))
+        for number, (own, others) in enumerate(zip(turns, shifts, strict=True)):
+            for line, (error, low, high) in enumerate(own):
+                place[line, number] = error
+                bounds[:, line, number] = low, high
+            for line, (error, far) in enumerate(others):
+                place[lines[0] + line, number] = error
+                shift[line, number] = far
+        takes = np.concatenate([abs(bounds).max(axis=0), shift])
+        after = np.cumsum(takes[::-1], axis=0)[::-1] - takes
+        return _Bounds(place, bounds[0], bounds[1], shift, after)
 
-    def at(self, builds: Indices | Bools) -> _Sums:
-        """The same for some of the builds."""
-        return _Sums(
-            self.rows,
-            [one[:, builds] for one in self.drawn],
-            self.cut[builds],
-            self.shift[:, builds],
-            [turn[builds] for turn in self.turns],
+    def of_each(self, kind: Indices, first: Indices) -> _Bounds:
+        """The same of what asks, by its kind; with the rows of its numbers for the places."""
+        import numpy as np
+
+        rows = first[self.place[:, kind], np.arange(len(kind))]
+        low, high, shift, after = (column[:, kind] for column in self[1:])
+        return _Bounds(rows, low, high, shift, after)
+
+
+def _of_turns(rows: MarginRows) -> list[tuple[int, float, float]]:
+    """Where turns stand among the errors, and what they take either way; most of all first."""
+    low, high = rows.bounds
+    moves = enumerate(rows.moves, len(rows.contours))
+    turns = [(error, one, sign) for error, (one, sign, levers) in moves if levers is not None]
+    found = [
+        (error, low[column] * sign * turn.most, high[column] * sign * turn.most)
+        for column, (error, turn, sign) in enumerate(turns, 3)
+    ]
+    return sorted(found, key=lambda one: -max(map(abs, one[1:])))
+
+
+def _of_shifts(rows: MarginRows) -> list[tuple[int, float]]:
+    """Where shifts stand among the errors, and how far they go; the farthest first."""
+    moves = enumerate(rows.moves, len(rows.contours))
+    found = [(error, shift.most) for error, (shift, _, levers) in moves if levers is None]
+    return sorted(found, key=lambda one: -one[1])
+
+
+class _Table(NamedTuple):
+    """All rows of all kinds, one kind after the other: their rooms, and their factors, a line each.
+
+    A move has two lines: the normal's x and y times its sign, or its levers and 0. ``shift`` (mm)
+    and ``turn`` (radians) say how far the moves of each kind go, ``sign`` how its shifts count.
+    """
+
+    begins: Indices
+    room: Floats
+    factors: Floats
+    shift: Floats
+    turn: Floats
+    sign: Floats
+
+    @staticmethod
+    def of(kinds: Sequence[MarginRows], moves: int) -> _Table:
+        import numpy as np
+
+        begins = np.cumsum([0, *(len(rows.room) for rows in kinds)])
+        factors = np.zeros((2 * moves, int(begins[-1])))
+        shift, turn, signs = np.zeros((3, moves, len(kinds)))
+        for number, rows in enumerate(kinds):
+            own = slice(begins[number], begins[number + 1])
+            for line, (freedom, sign, levers) in enumerate(rows.moves):
+                if levers is None:
+                    shift[line, number], signs[line, number] = freedom.most, sign
+                    factors[2 * line : 2 * line + 2, own] = sign * rows.normal
+                else:
+                    turn[line, number] = freedom.most
+                    factors[2 * line, own] = sign * levers
+        room = np.concatenate([np.zeros(0), *(rows.room for rows in kinds)])
+        return _Table(begins, room, factors, shift, turn, signs)
+
+
+class _Drawn(NamedTuple):
+    """Builds of what is asked: by number of what asks, of its kind and of the build.
+
+    ``cuts`` are both cutting errors by their signs, ``moves`` x and y of each shift, or a turn
+    and 0.
+    """
+
+    asked: Indices
+    kind: Indices
+    build: Indices
+    cuts: Floats
+    moves: Floats
+
+    def at(self, some: Indices) -> _Drawn:
+        return _Drawn(
+            self.asked[some],
+            self.kind[some],
+            self.build[some],
+            self.cuts[:, some],
+            self.moves[:, some],
         )
 
-    def least(self) -> Floats:
-        """No row leaves less: all shifts together count by their length, as no normal loses more.
 
-        A turn counts by the farthest lever.
+class RandomBuilds:
+    """Tells in which builds the rows of interfaces come short, of all interfaces at once."""
+
+    def __init__(self, asked: Sequence[RowsAsked], cutting: float) -> None:
+        import numpy as np
+
+        kinds = {id(one.rows): one.rows for one in asked}
+        numbers = {name: number for number, name in enumerate(kinds)}
+        every = list(kinds.values())
+        moves = max([len(rows.moves) for rows in every], default=0)
+        self.cutting = cutting
+        self.kind = np.array([numbers[id(one.rows)] for one in asked], dtype=np.intp)
+        first = [(*one.first, *[0] * (2 + moves - len(one.first))) for one in asked]
+        self.first = np.array(first, dtype=np.intp).reshape(-1, 2 + moves).T
+        signs = [[sign for _, sign in rows.contours] for rows in every]
+        self.signs = np.array(signs).reshape(-1, 2).T
+        self.least = np.array([rows.bounds.low[0] for rows in every])
+        self.bounds = _Bounds.of(every).of_each(self.kind, self.first)
+        self.table = _Table.of(every, moves)
+        self.cuts: dict[tuple[int, int, float, float], list[tuple[int, float]]] = {}
+        """By the numbers and signs of two contours: what asks for them, and below which sum of
+        their numbers its rows may come short."""
+        for number, (rows, (a, b, *_)) in enumerate(asked):
+            (_, one), (_, other) = rows.contours
+            least = SURE - rows.least_uncut + ROOM
+            share = math.inf if least > 0 else -math.inf
+            if cutting > 0:
+                share = least / (2 * cutting) + (one + other) / 2
+            self.cuts.setdefault((a, b, one, other), []).append((number, share))
+
+    def short(self, numbers: Floats) -> tuple[Indices, Indices]:
+        """What was asked for, by number, and the builds in which it comes short.
+
+        ``numbers`` has a row of builds for each error.
+        """
+        drawn = self._drawn(numbers, *self._roughly(numbers))
+        if not len(drawn.asked):
+            return drawn.asked, drawn.build
+        least = self._least(drawn)
+        # What is so near to the limit that it hangs on rounding is summed up in one order.
+        near = _picked(abs(least + TOLERANCE) < NEAR)
+        is_short = least < -TOLERANCE
+        is_short[near] = self._is_short(drawn.at(near))
+        return drawn.asked[is_short], drawn.build[is_short]
+
+    def _roughly(self, numbers: Floats) -> tuple[Indices, Indices, Floats]:
+        """Where errors may take enough, each by itself; and what cuts and turns leave there.
+
+        One error after the other is taken into account: most builds are decided by the first.
         """
         import numpy as np
 
-        low, high = self.rows.bounds
-        left: Floats = low[0] + self.cut - np.hypot(*self.shift)
-        for column, turn in enumerate(self.turns, 3):
-            left += np.minimum(low[column] * turn, high[column] * turn)
-        return left
+        asked, builds, total = self._cut(numbers)
+        signs = self.cutting * self.signs.sum(axis=0)
+        held = (self.least - signs)[self.kind][asked] + 2 * self.cutting * total
+        drawn, count = numbers.ravel(), numbers.shape[1]
+        own, turns = self.bounds, len(self.bounds.low)
+        left = held
+        for line, (row, after) in enumerate(zip(own.place * count, own.after, strict=True)):
+            number = drawn.take(row.take(asked) + builds)
+            if line < turns:
+                turn = 2 * number - 1
+                low, high = own.low[line].take(asked), own.high[line].take(asked)
+                left = held = held + np.minimum(low * turn, high * turn)
+            else:
+                left = left - own.shift[line - turns].take(asked) * np.sqrt(number)
+            some = _picked(left - after.take(asked) < SURE)
+            asked, builds = asked.take(some), builds.take(some)
+            held, left = held.take(some), left.take(some)
+        return asked, builds, held
 
-    def short(self) -> Bools:
-        """In which builds a row comes short."""
+    def _cut(self, numbers: Floats) -> tuple[Indices, Indices, Floats]:
+        """Where cutting errors may take enough, and the sums of their numbers, signs kept."""
         import numpy as np
 
-        bad = np.zeros(len(self.cut), dtype=bool)
-        every = np.arange(len(self.rows.room))[:, None]
-        count = max(1, AT_ONCE // len(every))
-        for first in range(0, len(bad), count):
-            builds = slice(first, first + count)
-            bad[builds] = (self.left(every, builds) < -TOLERANCE).any(axis=0)
-        return bad
+        asked: list[int] = []
+        found: list[Indices] = []
+        sums: list[Floats] = []
+        total = np.empty(numbers.shape[1])
+        for (a, b, one, other), wanted in self.cuts.items():
+            (np.add if one == other else np.subtract)(numbers[a], numbers[b], out=total)
+            if one < 0:
+                np.negative(total, out=total)
+            for number, share in wanted:
+                builds = _picked(total < share)
+                asked.append(number)
+                found.append(builds)
+                sums.append(total[builds])
+        every = np.repeat(np.array(asked, dtype=np.intp), [len(builds) for builds in found])
+        none = np.zeros(0, dtype=np.intp)
+        return every, np.concatenate([none, *found]), np.concatenate([np.zeros(0), *sums])
 
-    def left(self, rows: Indices, builds: Indices | slice) -> Floats:
-        """What is left of rows in builds, summed in one order everywhere.
+    def _drawn(self, numbers: Floats, asked: Indices, builds: Indices, held: Floats) -> _Drawn:
+        """What was drawn for those of which no row may be left for sure, sorted by kind.
+
+        All shifts together count by their length, as no normal loses more than that of what cuts
+        and turns have ``held``.
+        """
+        import numpy as np
+
+        order = np.argsort(self.kind[asked], kind="stable")
+        asked, builds, held = asked[order], builds[order], held[order]
+        kind, table = self.kind[asked], self.table
+        drawn, places = numbers.ravel(), self.first * numbers.shape[1]
+        moves = np.zeros((2 * len(table.shift), len(asked)))
+        together = np.zeros((2, len(asked)))
+        for line, most in enumerate(table.shift):
+            own = _picked(most[kind] > 0)
+            place = places[2 + line][asked[own]] + builds[own]
+            radius = most[kind[own]] * np.sqrt(drawn[place])
+            angle = math.tau * drawn[place + numbers.shape[1]]
+            moves[2 * line, own] = radius * np.cos(angle)
+            moves[2 * line + 1, own] = radius * np.sin(angle)
+            together += table.sign[line][kind] * moves[2 * line : 2 * line + 2]
+        some = _picked(held - np.hypot(*together) < SURE)
+        asked, builds, kind, moves = asked[some], builds[some], kind[some], moves[:, some]
+        for line, reach in enumerate(table.turn):
+            own = _picked(reach[kind] > 0)
+            number, most = drawn[places[2 + line][asked[own]] + builds[own]], reach[kind[own]]
+            moves[2 * line, own] = -most + (most + most) * number
+        cutting = self.cutting
+        number = drawn[places[:2, asked] + builds]
+        cuts = self.signs[:, kind] * (-cutting + (cutting + cutting) * number)
+        return _Drawn(asked, kind, builds, cuts, moves)
+
+    def _least(self, drawn: _Drawn) -> Floats:
+        """What is left at the worst row of each, but for rounding."""
+        import numpy as np
+
+        table, least = self.table, np.zeros(len(drawn.kind))
+        kinds = range(len(table.begins))
+        begins = np.searchsorted(drawn.kind, kinds).tolist()
+        for number, (start, stop) in enumerate(pairwise(begins)):
+            own = slice(*table.begins[number : number + 2])
+            step = max(1, AT_ONCE // (own.stop - own.start))
+            for first in range(start, stop, step):
+                builds = slice(first, min(stop, first + step))
+                left = table.factors[:, own].T @ drawn.moves[:, builds]
+                left += table.room[own, None]
+                least[builds] = left.min(axis=0)
+        found: Floats = least + drawn.cuts[0] + drawn.cuts[1]
+        return found
+
+    def _is_short(self, drawn: _Drawn) -> Bools:
+        """Whether a row comes short when all is summed up in one order, the same everywhere.
 
         A matrix product would round differently on another machine.
         """
-        left = self.rows.room[rows]
-        nx, ny = self.rows.normal[0][rows], self.rows.normal[1][rows]
-        cuts = len(self.rows.contours)
-        for (_, sign), (cut,) in zip(self.rows.contours, self.drawn, strict=False):
-            left = left + sign * cut[builds]
-        for (_, sign, levers), drawn in zip(self.rows.moves, self.drawn[cuts:], strict=True):
-            if levers is None:
-                left = left + (sign * nx) * drawn[0][builds]
-                left = left + (sign * ny) * drawn[1][builds]
-            else:
-                left = left + (sign * levers[rows]) * drawn[0][builds]
-        return left
+        import numpy as np
+
+        table, bad = self.table, np.zeros(len(drawn.kind), dtype=bool)
+        for number, kind in enumerate(drawn.kind.tolist()):
+            own = slice(*table.begins[kind : kind + 2])
+            left = table.room[own]
+            for cut in drawn.cuts[:, number]:
+                left = left + cut
+            for factor, moved in zip(table.factors[:, own], drawn.moves[:, number], strict=True):
+                left = left + factor * moved
+            bad[number] = bool((left < -TOLERANCE).any())
+        return bad
 
 
 def _picked(some: Bools) -> Indices:
     (numbers,) = some.nonzero()
     return numbers
-
-
-def _looking(rows: MarginRows, shift: Floats) -> Indices:
-    """For each build the row whose normal looks most against all shifts together."""
-    import numpy as np
-
-    angle, own = np.arctan2(-shift[1], -shift[0]), rows.angle
-    after = np.searchsorted(own, angle) % len(own)
-    off = [
-        np.abs(np.remainder(own[number] - angle + math.pi, math.tau) - math.pi)
-        for number in (after, after - 1)
-    ]
-    nearest: Indices = np.where(off[0] <= off[1], after, after - 1)
-    return nearest

@@ -13,17 +13,18 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules.draws import CutContour, Draws, Error, numbers, rows_by_error
+from sbafab.rules.draws import CutContour, Error, numbers, rows_by_error
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.forms import LinearForm
 from sbafab.rules.freedoms import Freedom, Freedoms
 from sbafab.rules.limits import Limits, Tolerances
+from sbafab.rules.margin_rows import MarginRows, rows_of
 from sbafab.rules.margins import QUANTITIES, Quantity, own_freedoms, seated
 from sbafab.rules.measures import Measures
-from sbafab.rules.random_builds import MarginRows, rows_of, short
+from sbafab.rules.random_builds import RandomBuilds, RowsAsked
 
 if TYPE_CHECKING:
-    from sbafab.rules.draws import Indices
+    from sbafab.rules.random_builds import Indices
 
 NAME = "registration-yield"
 
@@ -72,15 +73,6 @@ class _Group:
 
     rows: dict[Quantity, tuple[MarginRows, ...]]
     own: dict[int, dict[Error, Error]]
-
-    def places(self, first: Mapping[Error, int]) -> dict[Error, Indices]:
-        """Where the numbers of each error begin, of all interfaces, from where those of one do."""
-        import numpy as np
-
-        errors = next(iter(self.own.values()))
-        return {
-            error: np.array([first[own[error]] for own in self.own.values()]) for error in errors
-        }
 
 
 def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
@@ -194,32 +186,39 @@ def _counted(
     rows, count = rows_by_error(
         error for group in groups for own in group.own.values() for error in own.values()
     )
-    places = [(group, group.places(rows)) for group in groups]
+    told = [
+        (quantity, index, RowsAsked(some, tuple(rows[own[error]] for error in some.errors)))
+        for group in groups
+        for quantity, asked in group.rows.items()
+        for some in asked
+        for index, own in group.own.items()
+    ]
+    of_builds = RandomBuilds([asked for *_, asked in told], limits.tolerances.cutting)
+    own_index = np.array([index for _, index, _ in told], dtype=np.intp)
+    is_of = {
+        quantity: np.array([one == quantity for one, *_ in told], dtype=bool)
+        for quantity in QUANTITIES
+    }
     for first in range(0, wanted, BATCH):
         pause()
         builds = min(BATCH, wanted - first)
-        drawn = numbers(seed, first * count, count, builds)
-        bad_of = {quantity: np.zeros(builds, dtype=bool) for quantity in QUANTITIES}
-        for group, own in places:
-            draws = Draws(drawn, own, limits.tolerances.cutting)
-            bad_at: list[Indices] = []
-            for quantity, asked in group.rows.items():
-                for interface, build in short(asked, draws):
-                    bad_of[quantity][build] = True
-                    bad_at.append(interface * builds + build)
-            if bad_at:
-                names = list(group.own)
-                # With the counts, or numpy would load its masked arrays.
-                every, _ = np.unique(np.concatenate(bad_at), return_counts=True)
-                for number in (every // builds).tolist():
-                    interfaces[names[number]] += 1
-        whole += int(np.logical_or.reduce(list(bad_of.values())).sum())
-        quantities = {name: total + int(bad_of[name].sum()) for name, total in quantities.items()}
+        asked, bad = of_builds.short(numbers(seed, first * count, count, builds))
+        whole += _different(bad)
+        for quantity in QUANTITIES:
+            quantities[quantity] += _different(bad[is_of[quantity][asked]])
+        every = np.sort(own_index[asked] * builds + bad)
+        for place in every[np.diff(every, prepend=-1) > 0].tolist():
+            interfaces[place // builds] += 1
     return Yield(
         Share(wanted - whole, wanted),
         {index: Share(wanted - bad, wanted) for index, bad in interfaces.items()},
         {quantity: Share(wanted - bad, wanted) for quantity, bad in quantities.items()},
     )
+
+
+def _different(builds: Indices) -> int:
+    """How many builds are named, some more than once."""
+    return len(set(builds.tolist()))
 
 
 def _quick_number(interfaces: int) -> int:

@@ -12,10 +12,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
-from sbafab.geometry.boolean import tidy
+from sbafab.geometry.apart import alone, turned_round
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import rectangle
+from sbafab.geometry.tidy import tidy
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.rules.boundary import beside, edges_along
@@ -132,7 +133,10 @@ def _around(region: Region, frame: Region) -> Region:
     if len(starts) < len(region.edges):
         # Where contours touch at a point, what they leave may hang together otherwise.
         return frame - region
-    turned = (tidy(contour.reversed().edges) for contour in region.contours)
+    turned = (
+        turned_round(contour) if alone(contour) is contour else tidy(contour.reversed().edges)
+        for contour in region.contours
+    )
     contours = [*frame.contours, *(contour for contour in turned if contour is not None)]
     return Region(tuple(sorted(contours, key=lambda c: (c.is_hole, *map(_to_nm, c.bounds[:3])))))
 

@@ -16,13 +16,14 @@ from sbafab.geometry.shapes import disc, rectangle
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import boundary, draws, freedoms, margins
 from sbafab.rules.boundary import outward_reach
-from sbafab.rules.draws import CutContour, Draws, numbers, rows_by_error
+from sbafab.rules.draws import CutContour, numbers, rows_by_error
 from sbafab.rules.forms import linear_forms
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
+from sbafab.rules.margin_rows import MarginRows
 from sbafab.rules.margins import pushes
 from sbafab.rules.measures import Measures
-from sbafab.rules.random_builds import MarginRows, short
+from sbafab.rules.random_builds import RandomBuilds, RowsAsked
 from sbafab.rules.registration_worst_case import least_remaining
 from sbafab.rules.registration_yield import simulate
 from sbafab.rules.voids import _around
@@ -39,12 +40,11 @@ DESIGNS = [("1dof-5mm", "stack.balloons=3"), ("3dof-15mm", "stack.balloons=2"), 
 def rows(number: int, least: float, seed: int) -> MarginRows:
     """Rows of random normals, rooms and levers that feel two cuts, two shifts and a turn."""
     generator = np.random.default_rng(seed)
-    angle = np.sort(generator.uniform(-math.pi, math.pi, number))
+    angle = generator.uniform(-math.pi, math.pi, number)
     return MarginRows(
         "bond",
         generator.uniform(least, least + 0.1, number),
         np.vstack([np.cos(angle), np.sin(angle)]),
-        angle,
         ((CUT, 1.0), (AGAIN, -1.0)),
         ((SHIFT, -1.0, None), (OTHER, 1.0, None), (TURN, 1.0, generator.uniform(-9, 9, number))),
     )
@@ -56,19 +56,24 @@ def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float
     asked = rows(number, least, number)
     first, count = rows_by_error(asked.errors)
     # Two interfaces, of which the second one's errors are drawn after the first one's.
-    places = {error: np.array([row, count + row]) for error, row in first.items()}
     drawn = numbers(5, 0, 2 * count, BUILDS)
-    own = Draws(drawn, places, 0.1)
+    both = [
+        RowsAsked(asked, tuple(count * interface + first[error] for error in asked.errors))
+        for interface in (0, 1)
+    ]
     good = np.ones((2, BUILDS), dtype=bool)
-    for interfaces, builds in short([asked], own):
-        good[interfaces, builds] = False
+    good[RandomBuilds(both, 0.1).short(drawn)] = False
     levers = asked.moves[2][2]
     assert levers is not None
-    every = np.arange(BUILDS)
     for interface in (0, 1):
-        cut, again, turn, shift, other = (
-            own.of(error, np.full(BUILDS, interface), every)
-            for error in (CUT, AGAIN, TURN, SHIFT, OTHER)
+        own = {error: drawn[count * interface + row :] for error, row in first.items()}
+        cut, again = (-0.1 + 0.2 * own[error][0] for error in (CUT, AGAIN))
+        turn = TURN.most * (2 * own[TURN][0] - 1)
+        shift, other = (
+            one.most
+            * np.sqrt(own[one][0])
+            * np.array([np.cos(math.tau * own[one][1]), np.sin(math.tau * own[one][1])])
+            for one in (SHIFT, OTHER)
         )
         (nx, ny), moved = asked.normal, other - shift
         left = asked.room[:, None] + cut - again + levers[:, None] * turn

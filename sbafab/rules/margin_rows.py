@@ -1,0 +1,136 @@
+"""What is left at the margins of an interface beyond their limits: a row each, with its factors.
+
+A row is its room and a sum over the errors drawn (``random_builds.py``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+from sbafab.rules.draws import CutContour, Error
+from sbafab.rules.forms import LinearForm
+from sbafab.rules.freedoms import Freedom
+from sbafab.rules.limits import TOLERANCE
+from sbafab.rules.margins import Quantity
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Indices = NDArray[np.intp]
+
+UNITS = 1000
+"""Factors that are equal to so many parts are one: rows that feel all errors alike."""
+
+
+class RowBounds(NamedTuple):
+    """Least and largest of room, normal's x and y, and levers, of all rows."""
+
+    low: list[float]
+    high: list[float]
+
+
+@dataclass(frozen=True)
+class MarginRows:
+    """What is left at margins of one form beyond their limit: ``room`` and a sum of errors.
+
+    Contours count by their sign, shifts by the normal times theirs, turns by the levers times
+    theirs.
+    """
+
+    quantity: Quantity
+    room: Floats
+    normal: Floats
+    contours: tuple[tuple[CutContour, float], ...]
+    moves: tuple[tuple[Freedom, float, Floats | None], ...]
+
+    @property
+    def errors(self) -> tuple[Error, ...]:
+        return *(one for one, _ in self.contours), *(freedom for freedom, _, _ in self.moves)
+
+    @cached_property
+    def bounds(self) -> RowBounds:
+        levers = [levers for _, _, levers in self.moves if levers is not None]
+        columns = [self.room, *self.normal, *levers]
+        return RowBounds(
+            [float(column.min()) for column in columns], [float(column.max()) for column in columns]
+        )
+
+    @cached_property
+    def least_uncut(self) -> float:
+        """No row leaves less than this, whatever moves, before what cutting adds or takes."""
+        low, high = self.bounds
+        left, turn = low[0], 3
+        for freedom, _, levers in self.moves:
+            farthest = 1.0
+            if levers is not None:
+                farthest = max(-low[turn], high[turn])
+                turn += 1
+            left -= freedom.most * farthest
+        return left
+
+
+def rows_of(
+    form: LinearForm, layers: Sequence[int], limit: float, cutting: float
+) -> tuple[int, MarginRows] | None:
+    """The margins that can come short at all; of those that feel all errors alike, the least.
+
+    With the number of the first of them; None if there is none.
+    """
+    import numpy as np
+
+    room = form.nominal - limit
+    (short,) = np.nonzero(room - 2 * cutting - form.loss() < -TOLERANCE)
+    if not len(short):
+        return None
+    chosen = short[_least_alike(form, room, short)]
+    # More film widens a bond, more mask an overhang.
+    signs = (1.0 if one.is_film == (form.quantity == "bond") else -1.0 for one in form.owners)
+    contours = (CutContour(layers[one.seat], one.contour) for one in form.owners)
+    return int(form.numbers[short[0]]), MarginRows(
+        form.quantity,
+        room[chosen],
+        form.normal[:, chosen],
+        tuple(zip(contours, signs, strict=True)),
+        tuple(
+            (freedom, 1.0 if at_end else -1.0, None if levers is None else levers[chosen])
+            for freedom, at_end, levers in form.felt
+        ),
+    )
+
+
+def _least_alike(form: LinearForm, room: Floats, short: Indices) -> list[int]:
+    """Which of the short margins have the least room of all with the same factors, rounded."""
+    import numpy as np
+
+    columns: list[Floats] = []
+    if any(levers is None for _, _, levers in form.felt):
+        columns += list(form.normal)
+    columns += [levers for _, _, levers in form.felt if levers is not None]
+    # Where nothing but cutting is felt there is no column, and all are alike.
+    every = np.array(columns).reshape(len(columns), len(form.nominal))
+    keys = _parts(every[:, short]).astype(np.int64)
+    found: dict[bytes, int] = {}
+    left = room[short].tolist()
+    for place, key in enumerate(np.ascontiguousarray(keys.T)):
+        name = key.tobytes()
+        known = found.get(name)
+        if known is None or left[place] < left[known]:
+            found[name] = place
+    return list(found.values())
+
+
+def _parts(factors: Floats) -> Floats:
+    """Factors as whole parts, rounded as the decimal number is."""
+    import numpy as np
+
+    scaled = factors * UNITS
+    parts = np.rint(scaled)
+    doubtful = np.abs(scaled - np.floor(scaled) - 0.5) < 1e-6
+    if doubtful.any():
+        parts[doubtful] = [round(round(one, 3) * UNITS) for one in factors[doubtful].tolist()]
+    return parts
