@@ -33,6 +33,8 @@ def main() -> None:
             signal.signal(signal.SIGINT, stop_at_once)
         # Plugins of pydantic, which have no part in this, are looked for in every package there is.
         os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+        # Matrices here are small: more threads take longer, and may sum in another order elsewhere.
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         gc.set_threshold(YOUNG, *gc.get_threshold()[1:])
         # What is left when the process ends goes with it: looking for rings takes 0.05 s and more.
         atexit.register(gc.freeze)

@@ -2,7 +2,7 @@
 import { el, plain } from "./dom.js";
 
 // How finely a balloon is drawn; without a graphics card coarser, for more frames a second.
-export const FINE = { turn: 28, rings: 7 }, COARSE = { turn: 20, rings: 5 };
+export const FINE = { turn: 28, rings: 7 }, COARSE = { turn: 20, rings: 4 };
 
 export function meshOf(fineness) {
   const angles = Array.from({ length: fineness.turn }, (_, t) => (2 * Math.PI * t) / fineness.turn);
