@@ -17,7 +17,7 @@ from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc
 from sbafab.nesting.raster import Cells, aligned, meetings, quarter_turned, raster
-from sbafab.nesting.records import Stock, Turn
+from sbafab.nesting.records import TURNS, Stock, Turn
 
 CELL = 0.1
 """mm; the finest grid. It is coarser where the maps would outgrow ``MEMORY`` bytes."""
@@ -50,6 +50,7 @@ class Grid:
     margin: float
     cell: float
     forms: tuple[TurnedShape, ...]
+    _form_of: dict[tuple[int, Turn], TurnedShape] = field(repr=False)
     _clear: dict[tuple[int, int], Cells] = field(default_factory=dict, repr=False)
 
     @property
@@ -61,13 +62,18 @@ class Grid:
         """Offsets of ``b`` from ``a`` that keep them apart, from one less than b's size below 0."""
         key = (a.number, b.number)
         if key not in self._clear:
-            opposite = self._clear.get((b.number, a.number))
-            self._clear[key] = (
-                ~meetings(a.cells, b.cells)
-                if opposite is None
-                else np.ascontiguousarray(opposite[::-1, ::-1])
-            )
+            self._clear[key] = self._found(a, b)
         return self._clear[key]
+
+    def _found(self, a: TurnedShape, b: TurnedShape) -> Cells:
+        opposite = self._clear.get((b.number, a.number))
+        if opposite is not None:
+            return np.ascontiguousarray(opposite[::-1, ::-1])
+        if a.turn == 0:
+            return ~meetings(a.cells, b.cells)
+        # What both are turned by turns the offsets with them.
+        back = self._form_of[b.shape, TURNS[(b.turn - a.turn) % len(TURNS)]]
+        return quarter_turned(self.clear(self._form_of[a.shape, 0], back), a.turn)
 
     def shift(self, form: TurnedShape, row: int, column: int) -> Point:
         """What moves the turned shape to a place, in mm."""
@@ -106,18 +112,20 @@ def grid_of(shapes: Sequence[Region], area: Bounds, spacing: float, turns: Seque
     cell = _cell_size(shapes, area, spacing, len(turns))
     grown = [grow(shape, margin) for shape in shapes]
     forms: list[TurnedShape] = []
+    form_of: dict[tuple[int, Turn], TurnedShape] = {}
     for number, shape in enumerate(shapes):
         cells, frame = raster(grown[number], cell)
-        seen: set[tuple[tuple[int, ...], bytes]] = set()
+        seen: dict[tuple[tuple[int, ...], bytes], TurnedShape] = {}
         for turn in turns:
             turned = quarter_turned(cells, turn)
             mark = (turned.shape, turned.tobytes())
             # Only turns that differ on the grid.
             if mark not in seen:
-                seen.add(mark)
                 boxes = _turned(frame, turn), _turned(shape.bounds, turn)
-                forms.append(TurnedShape(len(forms), number, turn, turned, *boxes))
-    return Grid(area, margin, cell, tuple(forms))
+                seen[mark] = TurnedShape(len(forms), number, turn, turned, *boxes)
+                forms.append(seen[mark])
+            form_of[number, turn] = seen[mark]
+    return Grid(area, margin, cell, tuple(forms), form_of)
 
 
 def _turned(box: Bounds, turn: Turn) -> Bounds:
