@@ -175,7 +175,7 @@ def test_generate_can_be_cancelled(seen: Watched, folder: Path) -> None:
 def test_a_link_holds_the_design(seen: Watched, chrome: Any, link: str) -> None:
     seen.say("studio.edit([['stack.balloons', '7']])")
     seen.ready()
-    seen.page.get_by_role("button", name="Share").click()
+    seen.page.get_by_role("button", name="Share", exact=True).click()
     shared = seen.page.get_by_label("Link that holds the design").input_value()
     assert "token" not in shared
     token = link.partition("#token=")[2]

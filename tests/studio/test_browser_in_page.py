@@ -129,7 +129,7 @@ def test_cut_files_come_as_a_zip_if_every_rule_was_measured(
 def test_a_link_holds_the_design_and_save_downloads_it(
     seen: Watched, chrome: Any, page: tuple[str, bool]
 ) -> None:
-    seen.page.get_by_role("button", name="Share").click()
+    seen.page.get_by_role("button", name="Share", exact=True).click()
     link = seen.page.get_by_label("Link that holds the design").input_value()
     assert link.startswith(f"{page[0]}#design=")
     seen.page.keyboard.press("Escape")
