@@ -88,7 +88,7 @@ def _motion(seen: Watched) -> list[Frame]:
         kpa = [round(aim, 1) for aim in aims]
         seen.page.evaluate("kpa => { studio.motion.set(i => kpa[i]); }", kpa)
         seen.until(f"studio.motion.pose.pressures.join() === '{_joined(kpa)}'")
-        frames.append(_frame(seen, words, 150, 450))
+        frames.append(_frame(seen, words, 150, 900))
     return [*frames[:-1], (frames[-1][0], 1500)]
 
 
