@@ -261,6 +261,7 @@ def test_each_quantity_is_predicted_once_and_other_models_unfold(seen: Watched) 
     names = panel.locator("tr:visible td:first-child")
     assert names.all_inner_texts() == first
     panel.get_by_text(f"Other models of the same ({len(others)})").click()
+    names.nth(len(first)).wait_for()
     assert names.all_inner_texts() == first + others
     # It stays open when the figures change.
     seen.say("studio.edit([['bond.width', '0.8']])")
