@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 
 import ezdxf
+import pytest
 
 from sbafab.cutting.cut_layers import COLOURS
 from sbafab.cutting.skeleton import SKELETON, skeleton_text
 
 
+@pytest.mark.skipif(ezdxf.version < (1, 4), reason="older ezdxf writes one tag more in dictionaries")
 def test_packaged_document_is_the_one_ezdxf_writes() -> None:
     assert SKELETON.read_text(encoding="utf-8") == skeleton_text()
 
