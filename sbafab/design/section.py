@@ -37,6 +37,10 @@ class Section(BaseModel):
     @classmethod
     def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> Any:
         """With each key's docstring as its description."""
+        for field in cls.model_fields.values():
+            if isinstance(field.default, BaseModel):
+                # Pydantic before 2.14 writes a default with what its record has not made yet.
+                type(field.default).model_rebuild()
         schema = handler(core)
         keys = handler.resolve_ref_schema(schema).get("properties", {})
         for record in (one for one in cls.__mro__ if one is not Section):
