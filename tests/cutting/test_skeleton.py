@@ -11,7 +11,7 @@ from sbafab.cutting.cut_layers import COLOURS
 from sbafab.cutting.skeleton import SKELETON, skeleton_text
 
 
-@pytest.mark.skipif(ezdxf.version < (1, 4), reason="older ezdxf writes one tag more in dictionaries")
+@pytest.mark.skipif(ezdxf.version < (1, 4), reason="older ezdxf writes more tags")
 def test_packaged_document_is_the_one_ezdxf_writes() -> None:
     assert SKELETON.read_text(encoding="utf-8") == skeleton_text()
 
