@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sbafab.design.outline_plain import as_plain
-from sbafab.design.strands import Strand, Traced, line, place, refuse_more_than_limit, through, turn
+from sbafab.design.strands import Strand, Traced, place, polyline, refuse_more_than_limit
 from sbafab.errors import DesignError
 from sbafab.geometry.biarc import FitError, elliptical_arc, fit_arcs
-from sbafab.geometry.edges import Edge, Point
+from sbafab.geometry.edges import EPSILON, Edge, Line, Point
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
@@ -54,14 +53,6 @@ def dxf_strands(path: Path) -> Traced:
     """
     content = path.read_bytes()
     _refuse_excess(content)
-    plain = as_plain(content)
-    if plain is not None and plain.unit in MM_PER_UNIT:
-        return Traced(plain.strands(MM_PER_UNIT[plain.unit]), SCALES[plain.unit])
-    return strands_by_ezdxf(path, content)
-
-
-def strands_by_ezdxf(path: Path, content: bytes) -> Traced:
-    """The same as ezdxf says, of any file. Raises DesignError."""
     drawing, space = _drawing(path)
     _refuse_compensated(drawing)
     # Where a file has no header at all, the reader makes one up that says metres.
@@ -100,7 +91,7 @@ def _strands(drawing: Drawing, space: Modelspace, factor: float) -> Iterator[Str
 def _is_shown(entity: Any, drawing: Drawing) -> bool:
     """Whether a program shows the entity: it is visible, and its layer on and thawed."""
     if not (entity.dxf.is_supported("layer") and entity.dxf.is_supported("invisible")):
-        return True
+        return True  # no entity at all, such as a BLOCK: refused by its kind
     name = str(entity.dxf.get("layer", "0"))
     if entity.dxf.get("invisible", 0) or name not in drawing.layers:
         return not entity.dxf.get("invisible", 0)
@@ -192,26 +183,33 @@ def _side(entity: Any) -> float:
 
 def _line(entity: Any, factor: float) -> Strand:
     start, end = entity.dxf.start, entity.dxf.end
-    return line((start.x, start.y), (end.x, end.y), factor)
+    edge = Line(place(start.x * factor, start.y * factor), place(end.x * factor, end.y * factor))
+    return (edge,) if edge.length > EPSILON else ()
 
 
 def _arc(entity: Any, factor: float) -> Strand:
-    angles = entity.dxf.get("start_angle", 0.0), entity.dxf.get("end_angle", 360.0)
-    return _turn(entity, angles, factor)
+    first = math.radians(entity.dxf.get("start_angle", 0.0))
+    last = math.radians(entity.dxf.get("end_angle", 360.0))
+    place(first, last)
+    turn = (last - first) % math.tau or math.tau
+    return _turn(entity, factor, first, first + turn)
 
 
 def _circle(entity: Any, factor: float) -> Strand:
-    return _turn(entity, (), factor)
+    return _turn(entity, factor, 0.0, math.tau)
 
 
-def _turn(entity: Any, angles: Sequence[float], factor: float) -> Strand:
-    centre = entity.dxf.center
-    side = _side(entity)
-    return turn(entity.dxftype(), (centre.x, centre.y), entity.dxf.radius, angles, side, factor)
+def _turn(entity: Any, factor: float, first: float, last: float) -> Strand:
+    side, radius = _side(entity), entity.dxf.radius * factor
+    place(radius, 0.0)
+    if radius <= 0:
+        raise DesignError(f"holds a {entity.dxftype()} of radius {radius:g}; delete it")
+    centre = place(side * entity.dxf.center.x * factor, entity.dxf.center.y * factor)
+    return elliptical_arc(centre, (side * radius, 0.0), (0.0, radius), first, last)
 
 
 def _light_polyline(entity: Any, factor: float) -> Strand:
-    return through(entity.get_points("xyb"), _side(entity), factor, entity.closed)
+    return _through(entity.get_points("xyb"), _side(entity), factor, entity.closed)
 
 
 def _heavy_polyline(entity: Any, factor: float) -> Strand:
@@ -224,7 +222,16 @@ def _heavy_polyline(entity: Any, factor: float) -> Strand:
         if not vertex.dxf.flags & 16
     ]
     side = _side(entity) if entity.is_2d_polyline else 1.0
-    return through(points, side, factor, entity.is_closed)
+    return _through(points, side, factor, entity.is_closed)
+
+
+def _through(points: Any, side: float, factor: float, closed: bool) -> Strand:
+    vertices = []
+    for x, y, bulge in (map(float, point) for point in points):
+        place(bulge, 0.0)
+        vertices.append((*place(side * x * factor, y * factor), side * bulge))
+    refuse_more_than_limit(len(vertices))
+    return polyline(vertices, closed)
 
 
 def _ellipse(entity: Any, factor: float) -> Strand:

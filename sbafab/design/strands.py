@@ -10,7 +10,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from sbafab.errors import DesignError
-from sbafab.geometry.biarc import elliptical_arc
 from sbafab.geometry.edges import EPSILON, Edge, Line, Point, edge_from_bulge
 
 Strand = tuple[Edge, ...]
@@ -53,41 +52,6 @@ def refuse_more_than_limit(edges: int) -> None:
         raise DesignError(
             f"has more than {MOST_EDGES} edges; draw the outline with fewer, longer curves"
         )
-
-
-def line(start: Point, end: Point, factor: float) -> Strand:
-    """From a point to another, at ``factor`` mm a unit; nothing where they are one."""
-    (x, y), (u, v) = start, end
-    edge = Line(place(x * factor, y * factor), place(u * factor, v * factor))
-    return (edge,) if edge.length > EPSILON else ()
-
-
-def turn(
-    kind: str, centre: Point, radius: float, angles: Sequence[float], side: float, factor: float
-) -> Strand:
-    """A whole circle, or from the first of two ``angles`` in degrees to the other.
-
-    ``side``: 1, or -1 where it is drawn on the back of the plane (its x runs the other way).
-    """
-    first, last = map(math.radians, angles) if angles else (0.0, math.tau)
-    place(first, last)
-    swept = (last - first) % math.tau or math.tau
-    radius *= factor
-    place(radius, 0.0)
-    if radius <= 0:
-        raise DesignError(f"holds a {kind} of radius {radius:g}; delete it")
-    middle = place(side * centre[0] * factor, centre[1] * factor)
-    return elliptical_arc(middle, (side * radius, 0.0), (0.0, radius), first, first + swept)
-
-
-def through(points: Iterable[Iterable[float]], side: float, factor: float, closed: bool) -> Strand:
-    """Lines and arcs through vertices of x, y and bulge; ``side`` as above."""
-    vertices = []
-    for x, y, bulge in (map(float, point) for point in points):
-        place(bulge, 0.0)
-        vertices.append((*place(side * x * factor, y * factor), side * bulge))
-    refuse_more_than_limit(len(vertices))
-    return polyline(vertices, closed)
 
 
 def polyline(vertices: Sequence[tuple[float, float, float]], closed: bool) -> Strand:

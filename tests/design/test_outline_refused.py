@@ -207,3 +207,10 @@ def test_a_compensated_cut_file_is_no_outline(tmp_path: Path, state: str) -> Non
             read_outline(path)
     else:
         assert read_outline(path).area == pytest.approx(9 * math.pi)
+
+
+def test_a_block_among_the_entities_is_refused(tmp_path: Path) -> None:
+    path = dxf(tmp_path, lambda space: space.add_circle((1, 2), 3))
+    path.write_text(path.read_text().replace("  0\nCIRCLE\n", "  0\nBLOCK\n"))
+    with pytest.raises(DesignError, match="BLOCK"):
+        read_outline(path)
