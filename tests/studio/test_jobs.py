@@ -16,7 +16,7 @@ from sbafab.studio.answering import SupersededError, refusal
 from sbafab.studio.editing import edited
 from sbafab.studio.jobs import JOBS
 from sbafab.studio.links import design_in, packed
-from tests.studio.worked import answers, job
+from tests.studio.worked import EnoughError, answers, given_up_at, job
 
 SMALL = api.template("1dof-5mm").replace("balloons = 6", "balloons = 2") + (
     "[rules]\nyield_builds = 100\n"
@@ -150,19 +150,8 @@ def test_a_change_that_comes_during_the_yield_ends_it(tmp_path: Path) -> None:
 
 
 def test_work_that_nobody_waits_for_ends(tmp_path: Path) -> None:
-    class EnoughError(Exception):
-        pass
-
-    beats = 0
-
-    def beat() -> None:
-        nonlocal beats
-        beats += 1
-        if beats == 3:
-            raise EnoughError
-
     with pytest.raises(EnoughError):
-        answers(job(tmp_path, SMALL), beat)
+        answers(job(tmp_path, SMALL), given_up_at(3))
 
 
 def test_edits_keep_comments_and_order() -> None:

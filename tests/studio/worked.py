@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -24,3 +25,18 @@ def job(folder: Path, text: str) -> dict[str, Any]:
 def answers(asked: dict[str, Any], beat: Callable[[], None] = lambda: None) -> list[dict[str, Any]]:
     """Everything that the job answers."""
     return list(JOBS[asked["do"]](asked, beat))
+
+
+class EnoughError(Exception):
+    """Nobody waits for the work any more."""
+
+
+def given_up_at(beat: int) -> Callable[[], None]:
+    """What a job calls as it goes on; that beat, counted from 1, raises EnoughError."""
+    beats = count(1)
+
+    def called() -> None:
+        if next(beats) == beat:
+            raise EnoughError
+
+    return called

@@ -1,6 +1,6 @@
 // Two designs side by side with one zoom; what only one of them has is marked.
 import { el, plain } from "./dom.js";
-import { PanZoom } from "./panzoom.js";
+import { inStep } from "./panzoom.js";
 import { pathOf } from "./shapes.js";
 import { inkOf } from "./layers.js";
 import { named, significant } from "./findings.js";
@@ -17,18 +17,10 @@ export class Compare {
     });
     this.diffs = el("div", { class: "diffs" });
     this.element = el("div", { class: "view" }, el("div", { class: "surface compare" }, el("div", { class: "twin" }, ...this.halves.map(({ half }) => half)), this.diffs), el("div", { class: "stale-mark" }, "Updating"));
-    this.eyes = this.halves.map(({ half }, i) => new PanZoom(half, () => this.follow(i)));
+    this.eyes = inStep(this.halves, () => this.draw());
     studio.on("laminate reference figures checked theme", () => this.update());
   }
   show() { this.update(); }
-  follow(i) {
-    if (this.following) return;
-    this.following = true;
-    const { x, y, scale, touched } = this.eyes[i];
-    Object.assign(this.eyes[1 - i], { x, y, scale, touched });
-    this.draw();
-    this.following = false;
-  }
   update() {
     const { reference, laminate } = this.studio;
     if (!reference || !laminate || this.element.hidden) return;

@@ -2,6 +2,7 @@
 import { css, el, plain } from "./dom.js";
 import { Balloons } from "./balloons.js";
 import { COARSE, FINE, chart, meshOf } from "./motion_drawing.js";
+import { Playing } from "./playing.js";
 import { listen, tab } from "./server.js";
 import { Stage3D, THREE } from "./stage3d.js";
 
@@ -31,11 +32,11 @@ export class Motion {
     studio.on("theme", () => { if (this.stage) { this.stage.repaint(); this.colours(); } this.plots(); });
   }
   show() { this.stage?.resize(); if (!this.stack) this.load(); }
-  hide() { this.stop(); }
+  hide() { this.playing.stop(); }
 
   build() {
     this.knobs = el("div", { role: "group", "aria-label": "Pressures" });
-    this.playing = el("button", { "aria-pressed": "false", onclick: () => (this.timer ? this.stop() : this.play()) }, "Play");
+    this.playing = new Playing(() => this.round(), () => this.want());
     const gravity = el("input", { type: "checkbox", onchange: (event) => { this.gravity = event.target.checked; this.want(); } });
     const plate = el("input", { type: "checkbox", "aria-label": "Plate", onchange: (event) => { this.plated = event.target.checked; this.plateHeight.disabled = !this.plated; this.want(); } });
     this.plateHeight = el("input", { type: "range", min: 0, max: 40, step: 0.1, value: 12, disabled: true, "aria-label": "Height of the plate, mm", oninput: () => { this.plateOut.textContent = `${plain(Number(this.plateHeight.value), 1)} mm`; this.want(); } });
@@ -49,7 +50,7 @@ export class Motion {
     this.values = el("dl", { class: "reading", "aria-live": "off" });
     this.trust = el("div", { class: "trust", role: "status" });
     this.plot = el("div");
-    this.side.append(el("h3", {}, "Pressure, kPa"), this.knobs, el("div", { class: "group" }, this.playing, el("button", { onclick: () => this.set(() => 0) }, "Vent")),
+    this.side.append(el("h3", {}, "Pressure, kPa"), this.knobs, el("div", { class: "group" }, this.playing.button, el("button", { onclick: () => this.set(() => 0) }, "Vent")),
       el("h3", {}, "Acting on it"), el("label", { class: "knob" }, el("span", {}, plate, " Plate"), this.plateHeight, this.plateOut), el("label", {}, gravity, " Gravity, base level"), el("p", { class: "trust" }, "Drag the top of the actuator to pull it aside."),
       el("h3", {}, "Supply"), el("label", {}, tube, " Air through a tube, in real time"), this.tubeRows,
       el("h3", {}, "Reading"), this.values, el("label", { class: "knob" }, el("span", {}, "Flow"), this.flow, el("output", {}, "ml/min")), this.trust, this.plot);
@@ -186,7 +187,7 @@ export class Motion {
 
   plots() {
     if (!this.pose) return;
-    if (this.timer || this.tubed) {
+    if (this.playing.on || this.tubed) {
       const t = this.trace.map((row) => row[0] - this.trace[0][0]), of = (i) => this.trace.map((row) => row[i]);
       this.plot.replaceChildren(el("h3", {}, "The last seconds"), ...[["Height, mm", 1], ["Bend, °", 2], ["Volume, µl", 3]].map(([words, i]) => chart(t, of(i), t.at(-1), of(i).at(-1), words, "s")));
       return;
@@ -278,26 +279,13 @@ export class Motion {
     }, { capture: true });
   }
   // Pressure that goes round the chambers; a single chamber breathes.
-  play() {
-    if (!this.sliders?.length) return;
-    const most = Math.max(5, ...this.pressures()), start = performance.now();
-    this.playing.textContent = "Pause";
-    this.playing.setAttribute("aria-pressed", "true");
-    const step = () => {
-      const turn = ((performance.now() - start) / 4000) * 2 * Math.PI, n = this.sliders.length;
-      this.set((i) => (most * (1 + Math.cos(turn - (i * 2 * Math.PI) / n))) / 2);
+  round() {
+    if (!this.sliders?.length) return null;
+    const most = Math.max(5, ...this.pressures());
+    return (turn) => {
+      this.set((i) => (most * (1 + Math.cos(turn - (i * 2 * Math.PI) / this.sliders.length))) / 2);
       clearTimeout(this.rest);
-      this.timer = requestAnimationFrame(step);
     };
-    this.timer = requestAnimationFrame(step);
-  }
-  stop() {
-    if (!this.timer) return;
-    cancelAnimationFrame(this.timer);
-    this.timer = null;
-    this.playing.textContent = "Play";
-    this.playing.setAttribute("aria-pressed", "false");
-    this.want();
   }
   // Poses drawn a second, over the last ones.
   rate() { const t = this.times; return t.length > 1 ? (1000 * (t.length - 1)) / (t.at(-1) - t[0]) : 0; }

@@ -87,3 +87,17 @@ export function niceBar(scale, most = 110) {
   for (const step of [100, 50, 20, 10, 5, 2, 1, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005]) if (step * scale <= most) return step;
   return 0.002;
 }
+
+// The eyes of two halves; when one moves, the other goes along, and both are drawn.
+export function inStep(halves, draw) {
+  let following = false;
+  const eyes = halves.map(({ half }, i) => new PanZoom(half, () => {
+    if (following) return;
+    following = true;
+    const { x, y, scale, touched } = eyes[i];
+    Object.assign(eyes[1 - i], { x, y, scale, touched });
+    draw();
+    following = false;
+  }));
+  return eyes;
+}

@@ -1,7 +1,7 @@
 // Two assemblies side by side with one zoom; parts that differ in form or place are marked.
 import { differences } from "./compare.js";
 import { css, el } from "./dom.js";
-import { PanZoom } from "./panzoom.js";
+import { inStep } from "./panzoom.js";
 import { WAYS, aim, lightOf } from "./parts_plan.js";
 import { PartMeshes, THREE } from "./parts_scene.js";
 
@@ -28,17 +28,9 @@ export class PartsCompare {
     this.light = new THREE.DirectionalLight(0xffffff, 1.6);
     this.scene = new THREE.Scene();
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0xc8ced6, 1.9), this.light);
-    this.eyes = this.halves.map(({ half }, i) => new PanZoom(half, () => this.follow(i)));
+    this.eyes = inStep(this.halves, () => this.draw());
   }
   show() { this.update(); }
-  follow(i) {
-    if (this.following) return;
-    this.following = true;
-    const { x, y, scale, touched } = this.eyes[i];
-    Object.assign(this.eyes[1 - i], { x, y, scale, touched });
-    this.draw();
-    this.following = false;
-  }
   turn(way) {
     this.way = way;
     for (const button of this.buttons) button.setAttribute("aria-pressed", String(button.textContent === way));

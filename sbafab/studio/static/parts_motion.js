@@ -3,6 +3,7 @@ import { Balloons } from "./balloons.js";
 import { css, el, plain } from "./dom.js";
 import { COARSE, FINE, meshOf } from "./motion_drawing.js";
 import { PartMeshes, THREE, geometryOf, paintOf } from "./parts_scene.js";
+import { Playing } from "./playing.js";
 import { listen, tab } from "./server.js";
 import { Stage3D } from "./stage3d.js";
 
@@ -44,14 +45,14 @@ export class PartsMotion {
   // Whether a hand moves it, so that what takes seconds waits.
   get moving() { return !this.element.hidden && performance.now() - (this.moved ?? -RESTS) < RESTS; }
   show() { this.stage?.resize(); if (!this.text) this.load(); }
-  hide() { this.stop(); }
+  hide() { this.playing.stop(); }
 
   build() {
     this.knobs = el("div", { role: "group", "aria-label": "Pressures" });
-    this.playing = el("button", { "aria-pressed": "false", onclick: () => (this.timer ? this.stop() : this.play()) }, "Play");
+    this.playing = new Playing(() => this.round());
     this.values = el("div", { "aria-live": "off" });
     this.trust = el("div", { class: "trust", role: "status" });
-    this.side.append(el("h3", {}, "Pressure, kPa"), this.knobs, el("div", { class: "group" }, this.playing, el("button", { onclick: () => this.set(() => 0) }, "Vent")), el("h3", {}, "Reading"), this.values, this.trust);
+    this.side.append(el("h3", {}, "Pressure, kPa"), this.knobs, el("div", { class: "group" }, this.playing.button, el("button", { onclick: () => this.set(() => 0) }, "Vent")), el("h3", {}, "Reading"), this.values, this.trust);
   }
   say(words, beyond) { this.trust.textContent = words; this.trust.classList.toggle("beyond", beyond); }
 
@@ -199,24 +200,10 @@ export class PartsMotion {
     return box;
   }
   // Pressure that goes round the chambers of every arm; a single chamber breathes.
-  play() {
-    if (!this.text) return;
-    const most = new Map([...this.movers].map(([name, mover]) => [name, Math.max(5, ...this.pressures(mover))])), start = performance.now();
-    this.playing.textContent = "Pause";
-    this.playing.setAttribute("aria-pressed", "true");
-    const step = () => {
-      const turn = ((performance.now() - start) / 4000) * 2 * Math.PI;
-      this.set((i, { part, is, sliders }) => (is === "grip" ? most.get(part) : (most.get(part) * (1 + Math.cos(turn - (i * 2 * Math.PI) / sliders.length))) / 2));
-      this.timer = requestAnimationFrame(step);
-    };
-    this.timer = requestAnimationFrame(step);
-  }
-  stop() {
-    if (!this.timer) return;
-    cancelAnimationFrame(this.timer);
-    this.timer = null;
-    this.playing.textContent = "Play";
-    this.playing.setAttribute("aria-pressed", "false");
+  round() {
+    if (!this.text) return null;
+    const most = new Map([...this.movers].map(([name, mover]) => [name, Math.max(5, ...this.pressures(mover))]));
+    return (turn) => this.set((i, { part, is, sliders }) => (is === "grip" ? most.get(part) : (most.get(part) * (1 + Math.cos(turn - (i * 2 * Math.PI) / sliders.length))) / 2));
   }
   picture() { return this.stage.picture("assembly-motion.png"); }
 }
