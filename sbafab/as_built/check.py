@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sbafab.actuators import build, load_design, records
+from sbafab.as_built.by_layer import UNMEASURED, findings_as_built, rules_by_layer
 from sbafab.as_built.chords import chorded_place
 from sbafab.as_built.claims import (
     claim,
@@ -51,24 +52,19 @@ from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
-from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.panel import SheetPanel
 from sbafab.models.sizes import sizes
 from sbafab.output.manifest_records import Manifest
 from sbafab.output.planned import Checked
 from sbafab.output.settings import limits as limits_of
-from sbafab.rules import film_limits
-from sbafab.rules.deck import RULES, Rule, run_deck, run_rule
-from sbafab.rules.finding import Finding, Place
+from sbafab.rules.deck import RULES, run_deck
+from sbafab.rules.finding import Finding
 from sbafab.rules.limits import TOLERANCE, Limits
 from sbafab.rules.lowered import lowered
 from sbafab.rules.measures import Measures
 
 AS_DESIGNED = "all that lies here is what design.toml makes"
-BY_LAYER = (film_limits.NAME,)
-"""Rules that need no layer but the one they look at."""
-UNMEASURED = (ArithmeticError, ValueError, LookupError, StopIteration)
-"""What shapes that no rule foresees can raise; a mistake of the program's own is not among them."""
 
 
 @dataclass(frozen=True)
@@ -129,11 +125,11 @@ def check_written(folder: Path, works: Mapping[str, RunWork]) -> tuple[Finding, 
 def _deck(built: AsBuilt) -> tuple[Finding, ...]:
     """What the rules find in the layers as they are cut."""
     if built.laminate is None:
-        return _by_layer(built)
+        return rules_by_layer(built.files, built.claims, built.design, built.limits)
     if built.is_meant and built.known is not None:
         return built.known
     measures = Measures(built.laminate, built.limits)
-    return tuple(finding for rule in RULES for finding in _measured(rule, measures))
+    return tuple(finding for rule in RULES for finding in findings_as_built(rule, measures))
 
 
 def _findings(built: AsBuilt, measured: Sequence[Finding]) -> tuple[Finding, ...]:
@@ -365,43 +361,6 @@ def _drawn_in_chords(design: Design) -> bool:
         return chorded_place(read_outline(design.drawing)) is not None
     except (DesignError, OSError):
         return False
-
-
-def _measured(rule: Rule, measures: Measures) -> list[Finding]:
-    """What a rule finds; doctored files can make shapes that no rule can measure, which fails."""
-    try:
-        return run_rule(rule, measures.laminate, measures.limits, measures)
-    except UNMEASURED as error:
-        message = f"cannot be measured on these files ({error}); regenerate them"
-        return [Finding(rule.name, "fail", None, None, "", Place(), message)]
-
-
-def _by_layer(built: AsBuilt) -> tuple[Finding, ...]:
-    """The rules that can run on the layers that could be read; the others say that they did not."""
-    layers: tuple[Layer, ...] = stacked_layers(built.files, built.design)
-    lost = tuple(file.position for file in built.files if file.part is None)
-    some = Laminate(
-        name=built.claims.name,
-        family=built.claims.family,
-        layers=layers,
-        chambers=(),
-        bores=(),
-        inlets=(),
-        pins=(),
-        lumen=None,
-        balloons=0,
-        registration=built.design.registration.method,
-    )
-    why = "it needs every layer, and not all could be read" if lost else "there is no whole stack"
-    found: list[Finding] = []
-    measures = Measures(some, built.limits)
-    for rule in RULES:
-        if layers and rule.name in BY_LAYER:
-            found += _measured(rule, measures)
-        else:
-            message = f"not run: {why}"
-            found.append(Finding(rule.name, "warn", None, None, "", Place(None, lost), message))
-    return tuple(found)
 
 
 def _unsaid_waivers(measured: Sequence[Finding], claims: Manifest) -> list[Problem]:

@@ -394,9 +394,6 @@ class Region:
     def polygons(self, sagitta: float = 0.001) -> list[list[list[Point]]]:
         """Each piece as rings of points, outer first; chords within ``sagitta`` mm of the arcs."""
         return [
-            [
-                contour.polygon(sagitta)
-                for contour in sorted(piece.contours, key=lambda one: one.is_hole)
-            ]
+            [contour.polygon(sagitta) for contour in (*piece.outers, *piece.holes)]
             for piece in self.pieces
         ]
