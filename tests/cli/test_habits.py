@@ -95,6 +95,18 @@ def test_check_json_names_schema_design_and_summary(capsys: pytest.CaptureFixtur
     assert (found["summary"]["holds"], found["summary"]["fail"]) == (False, len(failed))
 
 
+def test_the_module_is_the_command() -> None:
+    """Where pip's folder of scripts is not on the path, as on many a Windows machine."""
+    ended = subprocess.run(
+        [sys.executable, "-m", "sbafab", "check", "1dof-6mm"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.returncode == 2
+    assert ended.stderr.startswith("sbafab: '1dof-6mm' is neither a template nor a design file")
+
+
 @pytest.mark.parametrize(
     ("name", "said"),
     [
