@@ -49,8 +49,8 @@ AT = {"stroke": "mm", "force": "N"}
 KEYS = {"lumen": "lumen.diameter"}
 """Quantities that are keys: they are asked for, and need no model."""
 REACHED, WIDEST = "reached_diameter", "inflated_diameter"
-"""Of what lies inflated round a tube: the lower figure, for a wall that it must reach, and the upper
-end, for one that it must not touch."""
+"""Inflated round a tube: the lower figure, for a wall that it must reach, and the upper end, for
+one that it must not touch."""
 HOW = 'for example overall_diameter, mass, "stroke@50kPa", "force@12.5mm@50kPa" or chamber.diameter'
 
 
