@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -84,10 +85,8 @@ class _Search:
     def over(self, steps: int) -> float | None:
         """By how many mm the design is too wide, None where it cannot be built."""
         if steps not in self._known:
-            # Balloons above the second change nothing seen from above.
-            few = min(2, self._design.stack.balloons)
             try:
-                laminate = self._build(_with_chamber(self._design, steps * STEP, few))
+                laminate = self._laminate(steps)
             except DesignError as error:
                 self._why = str(error)
                 self._known[steps] = None
@@ -141,9 +140,26 @@ class _Search:
         said = " and ".join(f"{key} = {value:g}" for key, value in asked)
         raise DesignError(
             f"no chamber fits {said}: the smallest that can be built, chamber.diameter = "
-            f"{some * STEP:.2f}, is {over or 0.0:.3f} mm too wide; shorten inlet.tab_length, or "
-            "make room"
+            f"{some * STEP:.2f}, is {over or 0.0:.3f} mm too wide; {self._room(some)}"
         )
+
+    def _room(self, steps: int) -> str:
+        """What would make room for a chamber; tabs are no part of ``fits.outline``."""
+        laminate, said = self._laminate(steps), []
+        for key, most, measured, also in (
+            ("diameter", self._fits.diameter, overall_diameter, " (or shorten inlet.tab_length)"),
+            ("outline", self._fits.outline, outline_diameter, ""),
+        ):
+            if most is not None and (found := measured(laminate)) > most + ROUNDING:
+                said.append(
+                    f"fits.{key} at least {math.ceil((found - ROUNDING) * 1000) / 1000:.3f}{also}"
+                )
+        return f"make {' and '.join(said)}"
+
+    def _laminate(self, steps: int) -> Laminate:
+        # Balloons above the second change nothing seen from above.
+        few = min(2, self._design.stack.balloons)
+        return self._build(_with_chamber(self._design, steps * STEP, few))
 
     def _between(self, good: int, bad: int) -> int:
         """The most steps that fit, from some that do and more that do not."""

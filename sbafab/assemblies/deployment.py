@@ -12,7 +12,7 @@ from sbafab.assemblies.supply import folded_diameter_with_tubes, reach
 from sbafab.design.form import Discs
 from sbafab.laminate.extent import outline_diameter
 from sbafab.models.folded import LOBES, folded_diameter
-from sbafab.models.sizes import deflated_diameter, inflated_diameter
+from sbafab.models.sizes import deflated_diameter, reached_diameter
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import holds
 
@@ -145,10 +145,10 @@ def lumen_brace(assembled: Assembled) -> Iterator[Finding]:
     if lumen is None:
         return
     sizes = [
-        (inflated, placed.name)
+        (reached, placed.name)
         for placed in assembled.parts
         if placed.made is not None
-        and (inflated := inflated_diameter(placed.made.design.form, placed.made.laminate))
+        and (reached := reached_diameter(placed.made.design.form, placed.made.laminate))
     ]
     if not sizes:
         message = (
@@ -159,7 +159,8 @@ def lumen_brace(assembled: Assembled) -> Iterator[Finding]:
         return
     widest, name = max(sizes)
     good = holds(widest, lumen)
-    message = f"inflated, {name} reaches {widest:.2f} free, and the lumen is {lumen:g}"
+    message = f"inflated, {name} reaches {widest:.2f} free (lens of two arcs), and the lumen is "
+    message += f"{lumen:g}"
     if not good:
-        message += "; use wider chambers, more balloons or a thicker tube"
+        message += "; use wider or longer chambers, more balloons or a thicker tube"
     yield found("lumen-brace", good, lumen, widest, message)

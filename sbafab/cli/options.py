@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 Command = Callable[..., Any]
 
+_GIVEN = click.core.ParameterSource.COMMANDLINE
+
 set_option = click.option(
     "--set",
     "assignments",
@@ -157,6 +159,14 @@ def sheet_options(command: Command) -> Command:
         help="Cut K of each actuator [default: the design's order.copies, 1].",
     )
     return count(engine(assigned))
+
+
+def refuse_given(why: str, *names: str) -> None:
+    """Raises UsageError, which ends with ``why``, for the first of these parameters on the line."""
+    ctx = click.get_current_context()
+    for param in ctx.command.params:
+        if param.name in names and ctx.get_parameter_source(param.name) is _GIVEN:
+            raise click.UsageError(f"{max(param.opts, key=len)} {why}")
 
 
 def finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:

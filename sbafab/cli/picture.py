@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sbafab.cli.options import finite, set_option
+from sbafab.cli.options import finite, refuse_given, set_option
 from sbafab.cli.quantities import PRESSURE, VOLUME, OfChamber, by_chamber
 
 if TYPE_CHECKING:
@@ -96,8 +96,13 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
         height=wide * 4 // 5,
         motion=motion,
     )
+    _refuse_still(path.suffix.lower())
     laminate = build(loaded)
     if not has_balloons(loaded.form):
+        refuse_given(
+            f"is for inflated actuators, and {WHY}: {loaded.name} is drawn flat; leave it out",
+            *("pressures", "volumes", "elevation", "azimuth"),
+        )
         try:
             write_flat_picture(laminate, path, wish.width, wish.height)
         except OSError as error:
@@ -121,3 +126,15 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
         f"written to {path}: {kpa} kPa, {held} ul, tip {shown.height:.2f} mm high, "
         f"bent {shown.bend:.1f} degrees"
     )
+
+
+def _refuse_still(ending: str) -> None:
+    """Raises UsageError for options of another kind of picture than ``ending`` says."""
+    from sbafab.reports.inflated_picture import MOVING
+
+    if ending not in MOVING:
+        moving = f"a moving picture; give --to FILE{MOVING[0]}"
+        refuse_given(f"is for {moving}, or leave it out", "motion")
+    if ending == ".glb":
+        why = "is for a picture, and a .glb is looked at from anywhere; leave it out"
+        refuse_given(why, "elevation", "azimuth", "width")

@@ -6,12 +6,24 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sbafab.cli.options import Request, calibration_options, finite, run_options
+from sbafab.cli.options import (
+    Request,
+    calibration_options,
+    finite,
+    refuse_given,
+    run_options,
+)
 from sbafab.cli.quantities import FLOW, PRESSURE, VOLUME
 from sbafab.cli.working import RULE_FAILED
 
 if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
+    from sbafab.design.records import Design
+
+OF_ELASTIC = ("pocket_loss", "modulus_mpa")
+"""Options that elastic balloons take, and no other model."""
+OF_FORMULAS = ("flow", "volumes", "contact_factor")
+"""Those that a formula of the pocket's form takes."""
 
 
 @click.command()
@@ -79,8 +91,8 @@ def predict(
 
     Writes predict.json and plots. Every figure names its model and how far that is trusted. A
     design that fails a rule is predicted on the screen only (exit code 1). Of an assembly: reach,
-    load, grip in its lumen, and whether inflated parts meet, at the first pressure given (default
-    10 kPa), on the screen.
+    load, grip in its lumen, and whether inflated parts meet, at one pressure (default 10 kPa), on
+    the screen.
     """
     from sbafab.assemblies.reading import load
     from sbafab.assemblies.records import Assembly
@@ -96,8 +108,10 @@ def predict(
 
     design = load(request.designs[0], request.assignments, request.waivers)
     if isinstance(design, Assembly):
+        _refuse_for_assembly(design, pressures)
         _predict_assembly(design, request, pressures[0] if pressures else 10.0, load_g)
         return
+    _refuse_for_one(design)
     wish = Asked(pressures or Asked.pressures_kpa, flow, volumes, Factors(**factors))
     with shown_progress(request.as_json) as tell:
         tell("predicting", 0, 1)
@@ -125,6 +139,29 @@ def predict(
             err=True,
         )
         click.get_current_context().exit(RULE_FAILED)
+
+
+def _refuse_for_one(design: Design) -> None:
+    """Raises UsageError for an option that no model of the design takes."""
+    from sbafab.design.form import Drawn
+    from sbafab.models.balloons import has_balloons
+
+    of = f"and {design.name} has other ones; leave it out"
+    refuse_given(f"is for an assembly, and {design.name} is one actuator; leave it out", "load_g")
+    if not has_balloons(design.form):
+        refuse_given(f"is for elastic balloons, round pockets on flat plates, {of}", *OF_ELASTIC)
+    if isinstance(design.form.pockets, Drawn):
+        refuse_given(f"is for pockets that are round or oblong, {of}", *OF_FORMULAS)
+
+
+def _refuse_for_assembly(assembly: Assembly, pressures: tuple[float, ...]) -> None:
+    """Raises UsageError for an option that only a design's own prediction takes."""
+    one = f"is for one actuator, and {assembly.name} is an assembly; predict the part's own design"
+    refuse_given(one, *OF_FORMULAS, *OF_ELASTIC, "press_factor")
+    writes = f"is for what is written, and of an assembly nothing is; predict {assembly.name} "
+    refuse_given(f"{writes}without it", "out", "waivers")
+    if len(pressures) > 1:
+        raise click.UsageError("--pressure is given once for an assembly; leave the others out")
 
 
 def _predict_assembly(

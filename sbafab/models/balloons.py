@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from sbafab.laminate.laminate import Laminate
     from sbafab.models.figures import Factors
 
+WIDER, LEAST_RADIUS = 1.1, 0.1
+"""How wide a pocket must be: in neck radii, and in mm."""
+
 
 def has_balloons(form: Form) -> bool:
     """Whether the elastic model knows such pockets: round ones on flat plates."""
@@ -39,10 +42,15 @@ def balloons_of(
     radii = [diameter / 2 - loss for diameter in form.pockets.diameters]
     bore = design.bore.diameter / 2 if len(radii) > 1 else 0.0
     neck = bore + design.bond.width if len(radii) > 1 else 0.0
-    if min(radii) < max(1.1 * neck, 0.1):
+    least, smallest = max(WIDER * neck, LEAST_RADIUS), min(radii)
+    if smallest < least:
+        has = f"a pocket loss of {loss:g} mm leaves {smallest:.4g}"
+        if not loss:
+            has = f"this one has {smallest:.4g}"
+        of = f", {WIDER:g} times the neck's {neck:.4g}" if least > LEAST_RADIUS else ""
         raise DesignError(
-            f"a pocket loss of {loss:g} mm leaves a pocket of radius {min(radii):g} mm, no wider "
-            f"than the neck of {neck:g} mm; give less"
+            f"the elastic balloon's pocket must be at least {least:.4g} mm in radius{of}, and "
+            f"{has}; {'give less loss' if loss else 'make the chamber wider'}"
         )
     ring = design.bond.width + loss
     found = []

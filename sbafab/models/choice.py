@@ -8,11 +8,15 @@ from dataclasses import replace
 from sbafab.models.figures import Figure
 
 STACK = "elastic stack"
+REACHED = "lens of two arcs"
+WIDEST = "cylinder of unstretched film"
 BEHIND = (
     # An upper bound: it says 140 degrees where the paper measured 81 and the stack says 69 to 83.
     ("bending", "constant curvature", STACK),
     # The modulus was measured, at a pressure that nobody knows; the stack's is a tenth of it.
     ("stiffness", STACK, "3 E I / l^3"),
+    # No air drives a balloon to the cylinder that its film could be: short ones stay far below it.
+    ("size", WIDEST, REACHED),
 )
 """Group, what models begin with that stand behind, and what those begin with that they yield to."""
 FREE = ", free"

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 ATMOSPHERE_KPA = 101.325
+LEAST_FLOW, MOST_FLOW = 1e-6, 1e6
+"""ml/min: from a nanolitre a minute, of the slowest syringe pumps, to 1,000 litres."""
 
 
 def seconds(
@@ -20,9 +22,11 @@ def seconds(
     """Seconds to a volume at a flow.
 
     ``gas_at_kpa`` is the pressure that a gas is squeezed to, above the atmosphere at which its
-    flow is counted; leave it for a liquid. Raises DesignError for a flow of 0 or less.
+    flow is counted; leave it for a liquid. Raises DesignError for a flow that no pump has.
     """
-    if not (np.isfinite(flow_ml_min) and flow_ml_min > 0):
-        raise DesignError(f"flow = {flow_ml_min:g} ml/min must be above 0 ml/min")
+    if not LEAST_FLOW <= flow_ml_min <= MOST_FLOW:
+        raise DesignError(
+            f"flow = {flow_ml_min:g} ml/min must be from {LEAST_FLOW:g} to {MOST_FLOW:g} ml/min"
+        )
     squeezed = 1 + gas_at_kpa / ATMOSPHERE_KPA
     return np.asarray(volume_ul, dtype=float) * squeezed / (flow_ml_min * 1000 / 60)

@@ -26,8 +26,9 @@ def sizes(design: Design, laminate: Laminate) -> dict[str, float]:
     if form.wrap is not None:
         found["pitch"] = form.wrap.pitch
         found["deflated_diameter"] = deflated_diameter(form.wrap, laminate)
-        inflated = inflated_diameter(form, laminate)
-        if inflated is not None:
+        reached, inflated = reached_diameter(form, laminate), inflated_diameter(form, laminate)
+        if reached is not None and inflated is not None:
+            found["reached_diameter"] = reached
             found["inflated_diameter"] = inflated
     else:
         if not laminate.outline.is_empty:
@@ -41,16 +42,36 @@ def deflated_diameter(wrap: Wrap, laminate: Laminate) -> float:
     return wrap.tube_diameter + 2 * laminate.thickness
 
 
+def reached_diameter(form: Form, laminate: Laminate) -> float | None:
+    """Tube plus SBAs that hold the most their films let them: what they must reach lies within it.
+
+    None without a tube, or for pockets of another shape. Balloons are lenses of two arcs
+    (``models.lens``); the paper's reach 27.29, about 28 (Sec. 2.1).
+    """
+    if not isinstance(form.pockets, Slots):
+        return None
+    from sbafab.models.lens import fullest
+
+    return _round_the_tube(form, laminate, fullest(form.pockets.width, form.pockets.run).stroke)
+
+
 def inflated_diameter(form: Form, laminate: Laminate) -> float | None:
-    """Tube plus fully inflated SBAs; the paper gives about 28 (Sec. 2.1).
+    """Tube plus SBAs as wide as can be: what they must not touch lies outside.
 
     None without a tube, or for pockets of another shape. A flat pocket of width w whose films do
-    not stretch becomes a cylinder of diameter 2 w / pi.
+    not stretch becomes a cylinder of diameter 2 w / pi where its ends do not hold it back: 28.06
+    for the paper's, about 28 (Sec. 2.1).
     """
-    if form.wrap is None or not isinstance(form.pockets, Slots):
+    if not isinstance(form.pockets, Slots):
         return None
-    height = laminate.balloons * 2 * form.pockets.width / math.pi
-    return form.wrap.tube_diameter + 2 * (height + laminate.thickness)
+    return _round_the_tube(form, laminate, 2 * form.pockets.width / math.pi)
+
+
+def _round_the_tube(form: Form, laminate: Laminate, rise: float) -> float | None:
+    """Diameter with every balloon ``rise`` mm high."""
+    if form.wrap is None:
+        return None
+    return form.wrap.tube_diameter + 2 * (laminate.balloons * rise + laminate.thickness)
 
 
 def size_said(design: Design, laminate: Laminate) -> tuple[str, ...]:

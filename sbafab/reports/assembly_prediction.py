@@ -10,6 +10,7 @@ import numpy as np
 
 from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
 from sbafab.design.form import Discs, Slots
+from sbafab.models.choice import REACHED, WIDEST
 from sbafab.models.lens import fullest, rate
 from sbafab.models.stack import Stack, stack
 from sbafab.reports.bent_arms import BentTouch, Clearance, bent_arms
@@ -31,8 +32,13 @@ GRAVITY = 9.80665
 MARBLE_G = 1.2
 """Mass of the marble that the paper's brace lifts, g (Sec. 5)."""
 ELASTIC = "elastic stack"
-LENS = "lens of two arcs, virtual work p dV/dh"
+LENS = f"{REACHED}, virtual work p dV/dh"
 STATIC = "statics"
+IN_THE_LUMEN = (
+    "height of a balloon in the lumen",
+    "push of each stack on the wall",
+    "friction",
+)
 PAPERS = ("aperture", "brace", "standing")
 """The assemblies that the paper built: figures of others stand beside nothing."""
 
@@ -89,17 +95,36 @@ class AssemblyPrediction(NamedTuple):
 
 
 class Grip(NamedTuple):
-    """A radial actuator inflated: diameters ``deflated`` and ``free``, out of any lumen, in mm.
+    """A radial actuator: diameters ``deflated``, inflated ``free``, out of any lumen, and ``most``,
+    the upper end, in mm.
 
-    In the assembly's lumen a balloon is ``room`` mm high; each stack pushes on the wall with
+    In the assembly's ``lumen`` a balloon is ``room`` mm high; each stack pushes on the wall with
     ``push`` N a kPa. Both are None without a lumen that it reaches.
     """
 
     part: str
     deflated: float
     free: float
+    most: float
+    lumen: float | None = None
     room: float | None = None
     push: float | None = None
+
+    @property
+    def why_none(self) -> str:
+        """Why nothing is told of its hold in the lumen."""
+        if self.lumen is None:
+            return "no lumen is given: set deploy.lumen_diameter"
+        if self.deflated >= self.lumen:
+            return (
+                f"deflated it is {self.deflated:.2f} mm wide already, in a lumen of "
+                f"{self.lumen:g} mm; make it narrower"
+            )
+        return (
+            f"its stacks do not touch the wall: {self.free:.2f} mm by the lens of two arcs in a "
+            f"lumen of {self.lumen:g} mm; use wider or longer chambers, more balloons or a thicker "
+            "tube"
+        )
 
 
 def predict_assembly(
@@ -125,7 +150,11 @@ def predict_assembly(
         pause()
         pockets = placed.made.design.form.pockets
         if isinstance(pockets, Slots):
-            figures += _held(assembled, placed, pressure_kpa, load_g)
+            held = grip(assembled, placed)
+            assert held is not None
+            figures += _held(held, placed.made.design.form.stacks, pressure_kpa, load_g)
+            if held.push is None:
+                left_out.append(f"{placed.name}, {', '.join(IN_THE_LUMEN)}: {held.why_none}")
         elif isinstance(pockets, Discs):
             figures += _arm(placed, stacks[placed.name], pressure_kpa, load_g)
             touches += _touches(assembled, placed, stacks, rises, pressure_kpa)
@@ -196,41 +225,40 @@ def grip(assembled: Assembled, placed: PlacedSba) -> Grip | None:
     tube = form.wrap.tube_diameter if form.wrap is not None else 2 * (placed.radius or 0.0)
     balloons = laminate.balloons
     deflated = tube + 2 * laminate.thickness
-    found = Grip(placed.name, deflated, deflated + 4 * balloons * pockets.width / math.pi)
+    rise, widest = fullest(pockets.width, pockets.run).stroke, 2 * pockets.width / math.pi
+    free, most = (deflated + 2 * balloons * high for high in (rise, widest))
     lumen = assembled.assembly.deploy.lumen_diameter
+    found = Grip(placed.name, deflated, free, most, lumen)
     if lumen is None:
         return found
     room = (lumen - deflated) / 2 / balloons
-    if not 0 < room < fullest(pockets.width, pockets.run).stroke:
+    if not 0 < room <= rise:
         return found
     # 1 kPa mm2 is 1 mN.
     push = float(rate(room, pockets.width, pockets.run)) / 1000
     return found._replace(room=room, push=push)
 
 
-def _held(
-    assembled: Assembled, placed: PlacedSba, pressure: float, load_g: float
-) -> Iterator[AssemblyFigure]:
-    """Diameter of a radial actuator, and how hard it holds in the assembly's lumen."""
-    found = grip(assembled, placed)
-    assert found is not None
-    name = placed.name
+def _held(found: Grip, stacks: int, pressure: float, load_g: float) -> Iterator[AssemblyFigure]:
+    """Diameter of a radial actuator, and how hard its stacks hold in the assembly's lumen."""
+    name, paper = found.part, "about 28 (Sec. 2.1)"
     said = (
         ("diameter, deflated", found.deflated, "films", "15.33 (Sec. 2.1)"),
-        ("diameter, inflated free", found.free, "lens of two arcs", "about 28 (Sec. 2.1)"),
+        ("diameter, inflated free", found.free, REACHED, paper),
+        ("diameter, inflated at most", found.most, WIDEST, paper),
     )
     for what, value, model, paper in said:
         yield AssemblyFigure(name, what, value, "mm", model, paper)
     if found.room is None or found.push is None:
         return
     force = pressure * found.push
-    lumen = f"height of a balloon in the lumen of {assembled.assembly.deploy.lumen_diameter:g} mm"
+    height, push, friction = IN_THE_LUMEN
+    lumen = f"{height} of {found.lumen:g} mm"
     yield AssemblyFigure(name, lumen, found.room, "mm", STATIC)
-    push = "push of each stack on the wall"
     yield AssemblyFigure(name, push, force, "N", LENS, "holds (Sec. 5)")
     if load_g > 0:
-        needed = load_g * 1e-3 * GRAVITY / (placed.made.design.form.stacks * force)
-        hold = f"friction that holds {load_g:g} g along the lumen"
+        needed = load_g * 1e-3 * GRAVITY / (stacks * force)
+        hold = f"{friction} that holds {load_g:g} g along the lumen"
         yield AssemblyFigure(name, hold, needed, "", STATIC)
 
 

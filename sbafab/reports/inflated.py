@@ -266,22 +266,31 @@ def pressed(stack: Stack, volumes_ul: Sequence[float], rounds: int = 60) -> Pose
         )
     p = np.full(stack.chambers, 1.0)
     pose = stack.pose(tuple(p))
-    for _ in range(rounds):
-        miss = wanted - pose.volumes
-        if (np.abs(miss) <= 1e-3 * np.maximum(wanted, 1.0)).all():
-            return pose
-        slopes = np.empty((stack.chambers, stack.chambers))
-        for number in range(stack.chambers):
-            step = p.copy()
-            step[number] += 0.01 + 0.01 * p[number]
-            there = stack.pose(tuple(step), near=pose)
-            slopes[:, number] = (there.volumes - pose.volumes) / (step[number] - p[number])
-        move = np.linalg.lstsq(slopes, miss, rcond=None)[0]
-        p = np.clip(
-            p + np.clip(move, -0.6 * p - 0.02, 1.5 * p + 0.2), 0.0, 0.98 * stack.most_pressure
-        )
-        pose = stack.pose(tuple(p), near=pose)
-    raise DesignError(
-        "no pressures give the volumes asked for: nearest are "
-        + ", ".join(f"{v:.0f} ul" for v in pose.volumes)
+    try:
+        for _ in range(rounds):
+            miss = wanted - pose.volumes
+            if (np.abs(miss) <= 1e-3 * np.maximum(wanted, 1.0)).all():
+                return pose
+            slopes = np.empty((stack.chambers, stack.chambers))
+            for number in range(stack.chambers):
+                step = p.copy()
+                step[number] += 0.01 + 0.01 * p[number]
+                there = stack.pose(tuple(step), near=pose)
+                slopes[:, number] = (there.volumes - pose.volumes) / (step[number] - p[number])
+            move = np.linalg.lstsq(slopes, miss, rcond=None)[0]
+            p = np.clip(
+                p + np.clip(move, -0.6 * p - 0.02, 1.5 * p + 0.2), 0.0, 0.98 * stack.most_pressure
+            )
+            pose = stack.pose(tuple(p), near=pose)
+    except DesignError as error:
+        raise _out_of_reach(wanted, pose) from error
+    raise _out_of_reach(wanted, pose)
+
+
+def _out_of_reach(wanted: Array, pose: Pose) -> DesignError:
+    asked, nearest = (", ".join(f"{v:.4g}" for v in some) for some in (wanted, pose.volumes))
+    nearer = ", or volumes that lie nearer together" if np.ptp(wanted) > 0 else ""
+    return DesignError(
+        f"no pressures give the volumes {asked} ul: the search ended at {nearest} ul; give less"
+        f"{nearer}"
     )

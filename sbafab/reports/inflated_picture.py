@@ -60,7 +60,17 @@ class PictureWish:
 def pose_of(laminate: Laminate, stack: Stack, wish: PictureWish) -> Pose:
     """The pose that a wish names. Raises DesignError for a chamber that is not there."""
     if wish.volumes_ul is not None:
-        return pressed(stack, _by_chamber(laminate, wish.volumes_ul))
+        volumes = _by_chamber(laminate, wish.volumes_ul)
+        empty = [c.name for c in laminate.chambers if not {"", c.name} & set(wish.volumes_ul)]
+        try:
+            return pressed(stack, volumes)
+        except DesignError as error:
+            if not empty:
+                raise
+            shown = " and ".join(empty)
+            raise DesignError(
+                f"{error}; a chamber not named counts as empty: name {shown}"
+            ) from None
     return stack.pose(_by_chamber(laminate, wish.pressures_kpa))
 
 

@@ -165,7 +165,7 @@ BETWEEN_PARTS: Mapping[str, Explanation] = {
     "lumen-brace": Explanation(
         "inflated, a radial part reaches the wall of the lumen",
         "What does not touch the wall holds nothing.",
-        "Use longer balloons or more of them in the stack.",
+        "Use wider or longer balloons, or more of them in the stack.",
         ("deploy.lumen_diameter",),
     ),
     "supply-tubes": Explanation(

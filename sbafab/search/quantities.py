@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -40,6 +40,7 @@ SIZES = (
     "outline_diameter",
     "deflated_diameter",
     "inflated_diameter",
+    "reached_diameter",
     "width",
     "length",
 )
@@ -47,6 +48,9 @@ PLAIN = {**dict.fromkeys(SIZES, "mm"), "height": "mm", "lumen": "mm", "mass": "g
 AT = {"stroke": "mm", "force": "N"}
 KEYS = {"lumen": "lumen.diameter"}
 """Quantities that are keys: they are asked for, and need no model."""
+REACHED, WIDEST = "reached_diameter", "inflated_diameter"
+"""Inflated round a tube: the lower figure, for a wall that it must reach, and the upper end, for
+one that it must not touch."""
 HOW = 'for example overall_diameter, mass, "stroke@50kPa", "force@12.5mm@50kPa" or chamber.diameter'
 
 
@@ -84,6 +88,13 @@ def read_quantity(text: str, kpa: float | None = None) -> AskedQuantity:
         known = listed([*PLAIN, *AT])
         raise DesignError(f"{shown(text)} is no quantity; there are {known} and the design's keys")
     return AskedQuantity(name, PLAIN.get(name, ""))
+
+
+def safer(quantity: AskedQuantity, at_least: bool) -> AskedQuantity:
+    """The quantity to hold a limit against: of the inflated diameters the one that is safer."""
+    if quantity.name not in (REACHED, WIDEST):
+        return quantity
+    return replace(quantity, name=REACHED if at_least else WIDEST)
 
 
 def _at(name: str, places: list[str], text: str, kpa: float | None) -> AskedQuantity:

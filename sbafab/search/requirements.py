@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from sbafab.design.messages import shown
 from sbafab.design.units import millimetres
 from sbafab.errors import DesignError
-from sbafab.search.quantities import AskedQuantity, named_pressure, read_quantity
+from sbafab.search.quantities import AskedQuantity, named_pressure, read_quantity, safer
 
 CLOSE = 1e-9
 
@@ -81,7 +81,7 @@ def _read(text: str, at_least: bool, kpa: float | None) -> Requirement:
             f"{option} {shown(text)} is not QUANTITY=VALUE; write for example {option} "
             f"{'stroke@50kPa=25' if at_least else 'overall_diameter=20'}"
         )
-    quantity = read_quantity(name, kpa)
+    quantity = safer(read_quantity(name, kpa), at_least)
     try:
         limit = millimetres(value) if quantity.unit in ("mm", "") else float(value)
     except ValueError:

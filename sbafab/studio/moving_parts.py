@@ -44,7 +44,6 @@ def _movers(assembled: Assembled) -> Iterator[dict[str, Any]]:
                 **known,
                 "is": "grip",
                 **found._asdict(),
-                "lumen": assembled.assembly.deploy.lumen_diameter,
                 "surface": packed(surface),
             }
             continue

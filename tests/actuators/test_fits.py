@@ -77,6 +77,12 @@ def test_both_limits_count_and_ears_are_named() -> None:
 def test_where_nothing_fits_the_smallest_is_said() -> None:
     with pytest.raises(DesignError, match=r"chamber.diameter = 2\.55, is .* mm too wide"):
         sbafab.load("1dof-5mm", "fits.diameter=14")
+    # Chambers of 2.55: 2 x (1 + 2 bonds + 2.55) without tabs, which no shorter tab makes less.
+    with pytest.raises(DesignError, match=r"make fits\.outline at least 10\.100$"):
+        sbafab.load("3dof-15mm", "fits.outline=5")
+    assert sbafab.load("3dof-15mm", "fits.outline=10.1").chamber.diameter == 2.55
+    with pytest.raises(DesignError, match=r"make fits\.diameter at least .*inlet\.tab_length\)$"):
+        sbafab.load("3dof-15mm", {"fits.diameter": 14, "fits.outline": 12})
     with pytest.raises(DesignError, match='belongs to "1dof", "lobed"'):
         sbafab.load("radial-15mm", "fits.diameter=20")
 

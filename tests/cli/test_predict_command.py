@@ -13,6 +13,8 @@ from sbafab.cli import main
 from sbafab.output.run import generate
 from tests.site.formats import hold
 
+OVAL = str(Path(__file__).parents[2] / "docs" / "gallery" / "oval.toml")
+
 
 def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
     with pytest.raises(SystemExit) as ended:
@@ -127,7 +129,9 @@ def test_failing_design_is_predicted_but_not_written(
         (["--pressure", "4 bar"], "give 0 to 367 kPa"),
         (["--pressure", "4 atm"], "'4 atm' must be a pressure such as"),
         (["--pressure", "368"], "give 0 to 367 kPa"),
-        (["--flow", "0"], "must be above 0 ml/min"),
+        (["--flow", "0"], "must be from 1e-06 to 1e+06 ml/min"),
+        (["--flow", "1e-30"], "must be from 1e-06 to 1e+06 ml/min"),
+        (["--load", "5"], "--load is for an assembly, and 1dof-5mm is one actuator"),
         (["--flow", "inf"], "must be a flow such as"),
         (["--flow", "1e999"], "must be a finite flow"),
         (["--press-factor", "2"], "at most 1"),
@@ -143,3 +147,29 @@ def test_out_of_range_is_one_sentence_exit_2_and_nothing_on_disk(
     assert said in err
     assert "Traceback" not in err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["brace", "--flow", "30"], "--flow is for one actuator, and brace is an assembly"),
+        (["brace", "--volume", "5"], "--volume is for one actuator"),
+        (["brace", "--modulus", "3"], "--modulus is for one actuator"),
+        (["brace", "--pocket-loss", "0"], "--pocket-loss is for one actuator"),
+        (["brace", "--press-factor", "0.5"], "--press-factor is for one actuator"),
+        (["brace", "--contact-factor", "2"], "--contact-factor is for one actuator"),
+        (["brace", "--waive", "seat"], "--waive is for what is written"),
+        (["brace", "-o", "x"], "--out is for what is written"),
+        (["brace", "--pressure", "5", "--pressure", "6"], "--pressure is given once"),
+        (["radial-15mm", "--modulus", "3"], "--modulus is for elastic balloons, round pockets"),
+        (["radial-15mm", "--load", "1.2"], "--load is for an assembly"),
+        ([OVAL, "--volume", "5"], "--volume is for pockets that are round or oblong"),
+    ],
+)
+def test_an_option_that_nothing_takes_is_refused(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, err = run(arguments, capsys)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1

@@ -67,6 +67,23 @@ def test_radial_is_15_33_flat_and_about_28_inflated() -> None:
     (around,) = (r for r in found.relations if r.name == "diameter")
     assert around.lines[0].y[0] == pytest.approx(15.328)
     assert 27 < around.lines[0].y[-1] < 28.06
+    assert found.value("reached diameter") == pytest.approx(around.lines[0].y[-1])
+
+
+@pytest.mark.parametrize("press_factor", [1.0, 0.5])
+def test_what_a_radial_design_reaches_is_its_deflated_diameter_and_its_stroke(
+    press_factor: float,
+) -> None:
+    short = {"width": 9.5, "length": 9.5}
+    found = sbafab.predict("radial-15mm", chamber=short, press_factor=press_factor)
+    reached = found.value("deflated diameter") + 2 * found.value("full stroke")
+    assert found.value("reached diameter") == pytest.approx(reached)
+    # A pocket 8 wide as a cylinder: what it must not touch.
+    widest = found.value("deflated diameter") + 4 * 8 / math.pi
+    assert found.value("inflated diameter") == pytest.approx(widest)
+    rows = {row["name"]: row for row in found.rows}
+    assert rows["reached diameter"]["design_with"]
+    assert not rows["inflated diameter"]["design_with"]
 
 
 @pytest.mark.parametrize(("template", "pushes"), [("3dof-15mm", 1), ("radial-15mm", 3)])

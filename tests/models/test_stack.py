@@ -215,8 +215,17 @@ def test_calibration_makes_pockets_smaller_or_films_stiffer() -> None:
     drawn = smaller.maps[0].balloon
     assert (drawn.pocket, drawn.ring) == pytest.approx((2.2, 1.05))
     assert replace(drawn, pocket=2.5, ring=0.75) == stack(design).maps[0].balloon
-    with pytest.raises(DesignError, match="no wider than the neck"):
+    # 1.1 times the neck of 0.52 + 0.75.
+    with pytest.raises(
+        DesignError, match=r"at least 1\.397 mm .* loss of 1\.2 mm leaves 1\.3; give"
+    ):
         stack(design, factors=Factors(pocket_loss=1.2))
+    narrow = sbafab.load("1dof-5mm", "chamber.diameter=2.6")
+    with pytest.raises(
+        DesignError, match=r"at least 1\.397 mm .* this one has 1\.3; make"
+    ) as refused:
+        stack(narrow)
+    assert "loss" not in str(refused.value)
 
 
 def test_what_has_no_round_pockets_is_refused() -> None:

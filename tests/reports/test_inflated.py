@@ -20,7 +20,7 @@ from sbafab.laminate.extent import outline_diameter
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.stack import Stack
 from sbafab.reports.inflated import InflatedPart, inflated, pressed
-from sbafab.reports.inflated_picture import PictureWish, picture_png, write_picture
+from sbafab.reports.inflated_picture import PictureWish, picture_png, pose_of, write_picture
 
 GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 CHANGES = ("stack.balloons=4",)
@@ -108,8 +108,20 @@ def test_films_of_a_chamber_do_not_pass_through_each_other(
 
 def test_chambers_can_be_given_volumes(stack: Stack) -> None:
     assert pressed(stack, (50.0, 40.0, 40.0)).volumes == pytest.approx([50, 40, 40], rel=2e-3)
-    with pytest.raises(DesignError, match="no pressures give the volumes asked for"):
+    with pytest.raises(DesignError, match="no pressures give the volumes 900, 0, 0 ul"):
         pressed(stack, (900.0, 0.0, 0.0))
+    with pytest.raises(DesignError, match=r"no pressures give the volumes 1e\+09, .*; give less$"):
+        pressed(stack, (1e9,) * 3)
+
+
+def test_chambers_that_no_volume_names_are_said_to_be_empty(
+    laminate: Laminate, stack: Stack
+) -> None:
+    with pytest.raises(DesignError, match=r"empty: name chamber2 and chamber3$"):
+        pose_of(laminate, stack, PictureWish({}, {"chamber1": 900.0}))
+    every = {f"chamber{number}": 900.0 * (number == 1) for number in (1, 2, 3)}
+    with pytest.raises(DesignError, match=r"nearer together$"):
+        pose_of(laminate, stack, PictureWish({}, every))
 
 
 def test_the_picture_shows_full_chambers_and_is_the_same_again(
@@ -157,6 +169,7 @@ def test_the_command_says_what_it_drew_and_refuses_in_a_sentence(tmp_path: Path)
         (["--pressure", "arm=5"], "chamber arm is not there; the chambers are chamber1"),
         (["--pressure", "5", "--volume", "5"], "give --pressure or --volume, not both"),
         (["--to", str(tmp_path / "no" / "a.png")], "cannot be written"),
+        (["--motion", "circle", "--to", "a.png"], "--motion is for a moving picture"),
     ):
         refused = run(app, [*asked, *extra])
         assert refused.exit_code != 0
@@ -166,10 +179,10 @@ def test_the_command_says_what_it_drew_and_refuses_in_a_sentence(tmp_path: Path)
 @pytest.mark.parametrize("name", ["oval", "radial-15mm"])
 def test_what_no_model_inflates_is_drawn_flat_and_said_to_be(name: str, tmp_path: Path) -> None:
     design = str(GALLERY / f"{name}.toml") if name == "oval" else name
-    arguments = ["picture", design, "--width", "160", "--set", "stack.balloons=1", "--to"]
-    for ending in (".png", ".glb"):
+    arguments = ["picture", design, "--set", "stack.balloons=1", "--to"]
+    for ending, wide in ((".png", ["--width", "160"]), (".glb", [])):
         path = tmp_path / f"shown{ending}"
-        result = CliRunner().invoke(app, [*arguments, str(path)])
+        result = CliRunner().invoke(app, [*arguments, str(path), *wide])
         assert result.exit_code == 0, result.output
         assert f"{name}, flat, for no model inflates pockets" in result.output
     with Image.open(tmp_path / "shown.png") as image:
@@ -179,6 +192,12 @@ def test_what_no_model_inflates_is_drawn_flat_and_said_to_be(name: str, tmp_path
     assert isinstance(mesh, trimesh.Trimesh)
     # Metres, and y is up.
     assert mesh.extents[1] == pytest.approx(laminate.thickness / 1000, rel=1e-5)
+    glb = [*arguments, str(tmp_path / "other.glb")]
+    for extra in (["--width", "160"], ["--azimuth", "3"], ["--pressure", "5"], ["--volume", "5"]):
+        refused = CliRunner().invoke(app, [*glb, *extra])
+        assert refused.exit_code == 2
+        assert f"{extra[0]} is for " in refused.output
+    assert not (tmp_path / "other.glb").exists()
     moving = CliRunner().invoke(app, [*arguments, str(tmp_path / "shown.webp")])
     assert moving.exit_code == 2
     assert "a .png or .glb shows it flat" in moving.output

@@ -112,10 +112,14 @@ def test_keys_are_freed_and_fixed_by_name() -> None:
 CASES = {
     # The paper's 1-DoF actuator (Sec. 4): pockets of 5 in an outline of 6.5, 7 mm at 10 kPa.
     "paper-1dof": ("1dof-5mm", ["--min", "stroke@10kPa=7", "--max", "outline_diameter=6.5"]),
-    # Its radial expansion (Sec. 2.1, 5): passes deflated, and holds in a lumen of one inch.
+    # Its radial expansion (Sec. 2.1, 5): passes deflated, and pushes on a lumen of one inch, which
+    # leaves 5.036 mm to rise; 0.3 N a stack at 10 kPa are ours.
     "paper-radial": (
         "radial-15mm",
-        ["--min", "inflated_diameter=25.4", "--max", "deflated_diameter=15.4"],
+        [
+            *("--min", "inflated_diameter=25.4", "--max", "deflated_diameter=15.4"),
+            *("--min", "force@5.036mm@10kPa=0.3"),
+        ],
     ),
     # The small STIFF-FLOP arm, 14.3 mm across to pass a trocar of 15 (stiff-flop.eu, news).
     "trocar": (

@@ -77,6 +77,20 @@ def test_sizes_are_those_of_the_geometry() -> None:
         _value("lumen")
 
 
+@pytest.mark.parametrize("name", ["inflated_diameter", "reached_diameter"])
+def test_what_must_reach_counts_the_lens_and_what_must_not_touch_the_cylinder(name: str) -> None:
+    """Pockets 8 wide: cylinders of 2 x 8 / pi, which no air makes of them."""
+    (reach, clear), _ = read_all([f"{name}=25"], [f"{name}=25"], "mass")
+    design = sbafab.load("radial-15mm", chamber={"width": 9.5, "length": 9.5})
+    subject = Subject(design, sbafab.build(design))
+    reached, widest = (subject.value(one.quantity, lambda: 1.0) for one in (reach, clear))
+    assert widest == pytest.approx(15.328 + 4 * 8 / math.pi)
+    stroke = sbafab.predict(design).value("full stroke")
+    assert reached == pytest.approx(15.328 + 2 * stroke)
+    assert not reach.holds(reached)
+    assert not clear.holds(widest)
+
+
 def test_balloons_in_series_rise_more_and_push_as_hard() -> None:
     six, twelve = {"balloons": 6}, {"balloons": 12}
     one = _value("force@3mm@30kPa", stack=six)

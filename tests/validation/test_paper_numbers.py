@@ -88,6 +88,9 @@ def test_radial_sizes() -> None:
     assert found["pitch"] == pytest.approx(15.708, abs=0.0005)
     assert found["deflated_diameter"] == pytest.approx(15.328, abs=1e-9)
     assert found["inflated_diameter"] == pytest.approx(28.06, abs=0.005)
+    # Sec. 2.1: about 28; balloons that hold the most stay below the cylinder.
+    assert found["reached_diameter"] == pytest.approx(28, rel=0.03)
+    assert found["reached_diameter"] < found["inflated_diameter"]
 
 
 def test_radial_sbas_are_11_5_by_20_and_120_degrees_apart() -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Sba, Tube
 from sbafab.assemblies.supply import runs
-from sbafab.models.sizes import inflated_diameter
+from sbafab.models.sizes import inflated_diameter, reached_diameter
 from sbafab.pressing.words import listed
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
@@ -330,18 +330,22 @@ def final_checks(assembled: Assembled) -> list[Action]:
         actions += [
             Action(
                 f"Inflated in the open until its films are taut, {placed.name} measures about "
-                f"{inflated:.1f} mm across at most; in the tube of {lumen} it holds against a pull."
+                f"{across}; in the tube of {lumen} it holds against a pull."
             )
             for placed in made
-            if (inflated := _inflated(placed)) is not None
+            if (across := _across(placed)) is not None
         ]
     if any(isinstance(placed.part, Magnet) for placed in assembled.parts):
         actions.append(Action("The outer magnet draws and holds the base through the wall."))
     return actions
 
 
-def _inflated(placed: PlacedSba) -> float | None:
-    return inflated_diameter(placed.made.design.form, placed.made.laminate)
+def _across(placed: PlacedSba) -> str | None:
+    form, laminate = placed.made.design.form, placed.made.laminate
+    reached, widest = reached_diameter(form, laminate), inflated_diameter(form, laminate)
+    if reached is None or widest is None:
+        return None
+    return f"{reached:.1f} mm across, {widest:.1f} mm at most"
 
 
 def bought(assembled: Assembled, copies: int) -> list[Item]:

@@ -177,7 +177,8 @@ def _facts(work: Work) -> list[tuple[str, str]]:
         "overall_diameter": f"All that is cut, with {extras}, fits one of",
         "pitch": "Pitch round the tube",
         "deflated_diameter": "Diameter on its tube, deflated",
-        "inflated_diameter": "Diameter on its tube, inflated (computed)",
+        "reached_diameter": "Diameter on its tube, inflated (computed)",
+        "inflated_diameter": "Diameter on its tube, inflated, at most (computed)",
     }
     return [
         ("Copies", str(work.job.copies)),
