@@ -29,7 +29,7 @@ def either_of(
     source: Source | Assembly, changes: Sequence[Change], tables: Mapping[str, Any]
 ) -> Design | Assembly:
     """The design or the assembly, likewise."""
-    from sbafab.assemblies.reading import load
+    from sbafab.assemblies.loading import load
     from sbafab.assemblies.records import Assembly
 
     if isinstance(source, Assembly):

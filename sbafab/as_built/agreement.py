@@ -10,7 +10,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from statistics import median
 
 from sbafab.cutting.verify import check_contours
 from sbafab.errors import OutputError
@@ -102,7 +101,11 @@ class _Alike:
 
 
 def _median(values: Sequence[float]) -> float:
-    return values[0] if max(values) - min(values) < SAME else median(values)
+    if max(values) - min(values) < SAME:
+        return values[0]
+    from statistics import median
+
+    return median(values)
 
 
 def _off(

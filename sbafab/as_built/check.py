@@ -19,8 +19,6 @@ from sbafab.as_built.claims import (
     property_problems,
 )
 from sbafab.as_built.cut_files import CutPart, LayerFile, inside, read_layers
-from sbafab.as_built.derived import derived_job_problems, derived_problems
-from sbafab.as_built.joined import joined_findings, lowered_between
 from sbafab.as_built.meant import Meant, RunWork, departure, meant_by
 from sbafab.as_built.measures import (
     batch_problems,
@@ -178,6 +176,8 @@ def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tupl
     order = SheetOrder(job, first.design, first.claims.kerf, lots)
     problems += sheet_problems(folder, order)
     if is_joined(job):
+        from sbafab.as_built.joined import joined_findings, lowered_between
+
         weak += lowered_between(folder)
         between, wrong = joined_findings(folder)
         found += between
@@ -185,6 +185,8 @@ def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tupl
     problems += lowered_problems(job.lowered_limits, weak)
     whole = [one for one in checked if one is not None]
     if works is None and len(whole) == len(checked):
+        from sbafab.as_built.derived import derived_job_problems
+
         problems += derived_job_problems(folder, job, whole, folders[0].claims.curves)
     count = len(job.sheets)
     return (
@@ -275,6 +277,8 @@ def design_problems_of(folder: Path, built: AsBuilt, measured: Sequence[Finding]
     problems = _layer_problems(built)
     checked = _as_designed(built, measured)
     if checked is not None and built.meant is not None:
+        from sbafab.as_built.derived import derived_problems
+
         of_job = is_job(folder.absolute().parent)
         problems += derived_problems(folder, built.claims, checked, built.meant.paths, of_job)
     return problems

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from statistics import median
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Point
@@ -72,6 +71,8 @@ def openings(
     layers: Sequence[Layer], nearness: float, fits: Callable[[Contour], bool] = lambda hole: True
 ) -> list[Opening]:
     """Holes of all layers gathered by place, in the order of their first layer."""
+    from statistics import median
+
     places: list[list[tuple[Point, float]]] = []
     for layer in layers:
         for hole in filter(fits, layer.profile.holes):

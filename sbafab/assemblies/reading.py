@@ -7,7 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
-from sbafab.actuators import load_design, records
+from sbafab.actuators import records
+from sbafab.assemblies.loading import load
 from sbafab.assemblies.records import FAMILY, KINDS, AnyPart, Assembly, CheckName, Sba
 from sbafab.design.messages import listed, shown
 from sbafab.design.reading import (
@@ -24,20 +25,6 @@ from sbafab.design.reading import (
 from sbafab.design.records import Design, RuleName
 from sbafab.design.templates import kit_names
 from sbafab.errors import DesignError
-
-
-def load(
-    source: str | Path, changes: Iterable[Change] = (), waivers: Sequence[str] = ()
-) -> Design | Assembly:
-    """A design or an assembly, whichever the file holds. Raises DesignError."""
-    changes = list(changes)
-    path = design_path(source)
-    data = override(read_toml(path), changes)
-    if data.get("family") != FAMILY:
-        return load_design(source, changes, waivers)
-    _start_where_the_user_stands(data, changes)
-    known = (*get_args(RuleName), *get_args(CheckName))
-    return assembly_of(add_waivers(data, waivers, known), path)
 
 
 def load_text(text: str, path: Path) -> Design | Assembly:
@@ -59,6 +46,15 @@ def load_assembly(
     raise DesignError(
         f'{found.name} is no assembly; give a file with family = "{FAMILY}" and [parts.NAME] tables'
     )
+
+
+def changed_assembly(
+    data: dict[str, Any], path: Path, changes: Sequence[Change], waivers: Sequence[str]
+) -> Assembly:
+    """The assembly of a file's tables in which the changes are made. Raises DesignError."""
+    _start_where_the_user_stands(data, changes)
+    known = (*get_args(RuleName), *get_args(CheckName))
+    return assembly_of(add_waivers(data, waivers, known), path)
 
 
 def assembly_of(data: Mapping[str, Any], path: Path) -> Assembly:

@@ -120,7 +120,8 @@ def _checked(asked: CheckRequest) -> bool:
 def _print(told: Told, advice: Advice | None, verbose: bool) -> None:
     from rich.text import Text
 
-    from sbafab.cli.printing import FILES, console, print_failed, print_listed, print_wrapped
+    from sbafab.cli.lines import console, print_wrapped
+    from sbafab.cli.printing import FILES, print_failed, print_listed
     from sbafab.cli.verdicts import print_findings, verdict_said
     from sbafab.design.kits import cited
     from sbafab.rules.deck import has_failed
@@ -150,14 +151,14 @@ def _print(told: Told, advice: Advice | None, verbose: bool) -> None:
 def _of_source(asked: CheckRequest) -> Told:
     """What is found in a design or an assembly."""
     from sbafab.actuators import load_design
-    from sbafab.assemblies.reading import load
-    from sbafab.assemblies.records import Assembly
+    from sbafab.assemblies.loading import load
     from sbafab.cli.printing import shown_progress
+    from sbafab.design.records import Design
     from sbafab.errors import DesignError
 
     found = load(asked.source, asked.assignments, asked.waivers)
     with shown_progress(asked.as_json) as progress:
-        if isinstance(found, Assembly):
+        if not isinstance(found, Design):
             if asked.target is not None:
                 raise DesignError(
                     "--target-yield goes with a design, and this is an assembly; check its "

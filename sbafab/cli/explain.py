@@ -44,7 +44,7 @@ def explain(rule: str | None, as_json: bool) -> None:
 def _print(rule: str) -> None:
     from rich.text import Text
 
-    from sbafab.cli.printing import console, facts_table
+    from sbafab.cli.lines import console, facts_table
     from sbafab.rules.explained import EXPLAINED
 
     one = EXPLAINED[rule]

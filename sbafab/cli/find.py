@@ -171,7 +171,7 @@ def _as_json(found: FoundDesign, started: str, target: Path) -> dict[str, Any]:
 def _print(found: FoundDesign, started: str, target: Path) -> None:
     from rich.text import Text
 
-    from sbafab.cli.printing import console
+    from sbafab.cli.lines import console
 
     out = console()
     keys = _keys(found.best)

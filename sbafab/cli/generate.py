@@ -27,13 +27,13 @@ def generate(request: Request, curves: Curves, decks: bool) -> None:
     With --decks also calculix/, sofa/ and mujoco/, as `sbafab simulate --export` writes them.
     An assembly gets a folder for each of its designs, and sheets, traveller and solid of the whole.
     """
-    from sbafab.assemblies.reading import load
-    from sbafab.assemblies.records import Assembly
+    from sbafab.assemblies.loading import load
+    from sbafab.design.records import Design
     from sbafab.output.planned import EVERYTHING
     from sbafab.output.run import Extras
 
     found = load(request.designs[0], request.assignments, request.waivers)
-    if isinstance(found, Assembly):
+    if not isinstance(found, Design):
         if decks:
             raise click.UsageError("--decks goes with one design; leave it out for an assembly")
         _generate_assembly(found, request, curves)

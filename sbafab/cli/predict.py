@@ -94,10 +94,10 @@ def predict(
     load, grip in its lumen, and whether inflated parts meet, at one pressure (default 10 kPa), on
     the screen.
     """
-    from sbafab.assemblies.reading import load
-    from sbafab.assemblies.records import Assembly
+    from sbafab.assemblies.loading import load
     from sbafab.cli.printing import print_json, print_listed, shown_progress
     from sbafab.cli.printing_prediction import print_prediction
+    from sbafab.design.records import Design
     from sbafab.errors import OutputError
     from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict as predicted
@@ -107,7 +107,7 @@ def predict(
     from sbafab.output.run import Extras, generate
 
     design = load(request.designs[0], request.assignments, request.waivers)
-    if isinstance(design, Assembly):
+    if not isinstance(design, Design):
         _refuse_for_assembly(design, pressures)
         _predict_assembly(design, request, pressures[0] if pressures else 10.0, load_g)
         return

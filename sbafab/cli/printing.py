@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import json
 import sys
-import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from sbafab.cli.lines import KEPT, console, facts_table, print_facts, print_line, print_wrapped
 from sbafab.progress import Progress, unheard
 
 if TYPE_CHECKING:
-    from rich.console import Console
     from rich.table import Table
 
     from sbafab.output.planned import Checked
@@ -29,26 +28,11 @@ LEFT_AS_IT_WAS = (
 )
 FILES = "files"
 """What is to be changed where a folder was checked."""
-KEPT = "\u00a0"
-"""A space at which no line is broken."""
 COLOURS = {"pass": "green", "fail": "bold red", "waived": "yellow", "warn": "yellow"}
 
 
 def print_json(value: object) -> None:
     click.echo(json.dumps(value, indent=1, ensure_ascii=False))
-
-
-def console() -> Console:
-    """A console on standard output; 80 columns where there is no terminal and no COLUMNS."""
-    from rich.console import Console
-
-    class Told(Console):
-        """A console that leaves it to its caller what a closed pipe means."""
-
-        def on_broken_pipe(self) -> None:
-            raise BrokenPipeError
-
-    return Told(highlight=False, soft_wrap=False)
 
 
 def print_listed(label: str, phrases: Sequence[str]) -> None:
@@ -64,32 +48,6 @@ def print_listed(label: str, phrases: Sequence[str]) -> None:
         else:
             line += f", {phrase}"
     out.print(Text(line), soft_wrap=True)
-
-
-def wrapped(said: str, width: int, first: str = "", rest: str = "") -> list[str]:
-    """Lines of a sentence, broken between words; ``first`` stands before the first, ``rest`` before
-    the others.
-    """
-    return textwrap.wrap(
-        said,
-        width,
-        initial_indent=first,
-        subsequent_indent=rest,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-
-
-def print_wrapped(said: str, style: str = "") -> None:
-    """A sentence, broken between words where it is longer than a line; the rest indented.
-
-    Words joined by ``KEPT`` stay on one line.
-    """
-    from rich.text import Text
-
-    out = console()
-    for line in wrapped(said, out.width, rest="  "):
-        out.print(Text(line.replace(KEPT, " "), style=style), soft_wrap=True)
 
 
 @contextmanager
@@ -120,16 +78,6 @@ def notes_of(checked: Iterable[Checked]) -> list[str]:
         note if len(of) == len(designs) else f"{', '.join(of)}: {note}"
         for note, of in names.items()
     ]
-
-
-def facts_table() -> Table:
-    """Without rows yet: a bold label and what is said of it."""
-    from rich.table import Table
-
-    made = Table(box=None, pad_edge=False, show_header=False)
-    made.add_column(no_wrap=True, style="bold")
-    made.add_column(ratio=1)
-    return made
 
 
 def add_batch(table: Table, run: Run) -> None:
@@ -171,35 +119,26 @@ def print_failed(findings: Iterable[Finding], written: str, change: str) -> None
 
 def print_run(run: Run) -> None:
     """The closing table of a run: sizes, what was made, what the rules found."""
-    from rich.text import Text
-
-    out = console()
     if not run.kept:
-        made = facts_table()
-        for label, text in _made(run):
-            made.add_row(label, Text(text))
-        out.print(made)
-        out.print()
+        print_facts(_made(run))
+        click.echo()
     print_verdict(run, "design")
 
 
 def print_verdict(run: Run, change: str) -> None:
     """What needs something done, and last whether the design or assembly holds."""
-    from rich.text import Text
-
     from sbafab.cli.verdicts import groups_of, print_open, verdict_said
 
-    out = console()
     groups = groups_of(run.checked, run.between)
     for group in groups:
         print_open(group.findings)
     if run.failed:
         print_failed(run.findings, "No cut files were written", change)
         if run.kept:
-            out.print(Text(f"{run.folder} {LEFT_AS_IT_WAS}"), soft_wrap=True)
+            print_line(f"{run.folder} {LEFT_AS_IT_WAS}")
         return
     more = f"sbafab check {run.folder} says more"
-    out.print(Text(verdict_said(run.folder.name, groups, more), style="bold"), soft_wrap=True)
+    print_line(verdict_said(run.folder.name, groups, more), "bold")
 
 
 def print_job(job: Run) -> None:

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sbafab.cli.printing import (
-    add_batch,
-    console,
-    facts_table,
-    print_verdict,
-)
+from sbafab.cli.lines import console, facts_table
+from sbafab.cli.printing import add_batch, print_verdict
 
 if TYPE_CHECKING:
     from rich.table import Table

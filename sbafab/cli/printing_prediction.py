@@ -9,7 +9,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from sbafab.cli.printing import console, wrapped
+from sbafab.cli.lines import console, wrapped
 
 if TYPE_CHECKING:
     from sbafab.models.figures import Figure, Model, Prediction

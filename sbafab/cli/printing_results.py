@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sbafab.cli.printing import console, print_json
+from sbafab.cli.lines import console
+from sbafab.cli.printing import print_json
 from sbafab.output.printed import RECORDS_SCHEMA, REPORT_SCHEMA
 
 if TYPE_CHECKING:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from sbafab.cli.printing import COLOURS, console, print_wrapped, wrapped
+from sbafab.cli.lines import console, print_wrapped, wrapped
+from sbafab.cli.printing import COLOURS
 
 if TYPE_CHECKING:
     from sbafab.output.planned import Checked

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from sbafab.geometry.edges import EPSILON, Line, Point
+from sbafab.geometry.edges import EPSILON, Bounds, Line, Point
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.region import Region
 
 Interval = tuple[float, float]
+NEAR = 1e-3
+"""mm: far more than the tolerance within which a line touches an edge."""
 
 
 def section(region: Region, origin: Point, direction: Point) -> list[Interval]:
@@ -25,7 +27,9 @@ def section(region: Region, origin: Point, direction: Point) -> list[Interval]:
     line = Line((ox - reach * ux, oy - reach * uy), (ox + reach * ux, oy + reach * uy))
     stops = sorted(
         (x - ox) * ux + (y - oy) * uy
-        for edge in region.edges
+        for contour in region.contours
+        for edge, box in zip(contour.edges, contour.boxes, strict=True)
+        if _may_meet(box, origin, direction)
         for x, y in meeting_points(edge, line)
     )
     inside: list[Interval] = []
@@ -40,3 +44,11 @@ def section(region: Region, origin: Point, direction: Point) -> list[Interval]:
         else:
             inside.append((start, end))
     return inside
+
+
+def _may_meet(box: Bounds, origin: Point, direction: Point) -> bool:
+    """Whether a line comes into a box, or so near that it could touch what is in it."""
+    (ox, oy), (ux, uy) = origin, direction
+    left, low, right, high = box
+    off = ux * ((low + high) / 2 - oy) - uy * ((left + right) / 2 - ox)
+    return abs(off) <= (abs(ux) * (high - low) + abs(uy) * (right - left)) / 2 + NEAR

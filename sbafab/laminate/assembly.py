@@ -49,6 +49,15 @@ def assembly(laminate: Laminate) -> tuple[AssemblyStep, ...]:
     bond after it has no pins either, unless ``laminate.pins_in_full_bonds``. In registered
     sheets the pins, which stand in the frame, are in every time.
     """
+    # Kept with the laminate: pins, rules, schedule and every page ask for its steps.
+    kept = laminate.__dict__
+    if "_steps" not in kept:
+        kept["_steps"] = _steps(laminate)
+    steps: tuple[AssemblyStep, ...] = kept["_steps"]
+    return steps
+
+
+def _steps(laminate: Laminate) -> tuple[AssemblyStep, ...]:
     plans = [plan for plan in _plans(laminate) if plan.adds]
     if laminate.registration == "ears" and not laminate.pins_in_full_bonds:
         plans = [one for plan in plans for one in _tacked(plan)]

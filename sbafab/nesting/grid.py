@@ -70,6 +70,11 @@ class Grid:
         if opposite is not None:
             return np.ascontiguousarray(opposite[::-1, ::-1])
         if a.turn == 0:
+            # The other way round, turned until a lies as it is drawn.
+            turned = self._form_of[a.shape, TURNS[-b.turn % len(TURNS)]]
+            twin = self._clear.get((self._form_of[b.shape, 0].number, turned.number))
+            if twin is not None:
+                return np.ascontiguousarray(quarter_turned(twin, b.turn)[::-1, ::-1])
             return ~meetings(a.cells, b.cells)
         # What both are turned by turns the offsets with them.
         back = self._form_of[b.shape, TURNS[(b.turn - a.turn) % len(TURNS)]]

@@ -17,8 +17,11 @@ from sbafab.geometry.facets import ticks
 from sbafab.geometry.region import Region
 
 Cells = NDArray[np.bool_]
+Counts = NDArray[np.intp]
 Numbers = NDArray[np.float64]
 
+AT_ONCE = 1_000_000
+"""Pairs of runs that are looked at together, which bounds the memory."""
 TOUCH = 1e-7
 """mm by which a region may reach into a cell that is not set: regions side by side may touch."""
 
@@ -69,11 +72,24 @@ def meetings(a: Cells, b: Cells) -> Cells:
     Entry (0, 0) is where b's upper right cell lies on a's lower left one; the last, the reverse.
     """
     rows, columns = (m + n - 1 for m, n in zip(a.shape, b.shape, strict=True))
-    size = _smooth(rows), _smooth(columns)
-    product = np.fft.rfft2(a.astype(np.float64), size)
-    product = product * np.fft.rfft2(b[::-1, ::-1].astype(np.float64), size)
-    # The sums are whole numbers; a half is far above the rounding of any transform.
-    return np.asarray(np.fft.irfft2(product, size)[:rows, :columns] > 0.5)
+    a_row, a_first, a_end = _runs(a)
+    b_row, b_first, b_end = _runs(b)
+    width = columns + 1
+    counts = np.zeros(rows * width, dtype=np.int64)
+    # Where two runs of cells meet: from the offset at which they begin to, to that where they end.
+    for some in np.array_split(np.arange(len(a_row)), 1 + len(a_row) * len(b_row) // AT_ONCE):
+        line = (a_row[some, None] - b_row + b.shape[0] - 1) * width + b.shape[1]
+        counts += np.bincount((line + a_first[some, None] - b_end).ravel(), minlength=counts.size)
+        ends = line + a_end[some, None] - b_first - 1
+        counts -= np.bincount(ends.ravel(), minlength=counts.size)
+    return np.asarray(counts.reshape(rows, width).cumsum(axis=1)[:, :-1] > 0)
+
+
+def _runs(cells: Cells) -> tuple[Counts, Counts, Counts]:
+    """Row, first column and the column past the last of all runs of set cells in a row."""
+    steps = np.diff(cells.astype(np.int8), axis=1, prepend=0, append=0)
+    row, first = np.nonzero(steps > 0)
+    return row, first, np.nonzero(steps < 0)[1]
 
 
 def quarter_turned(cells: Cells, turns: int) -> Cells:
@@ -89,19 +105,6 @@ def _centred(low: float, high: float, cell: float) -> tuple[int, float]:
 def _span(low: float, high: float, cell: float) -> tuple[int, int]:
     """First and last cell that an interval reaches into; first > last where it lies on a limit."""
     return math.floor((low + TOUCH) / cell), math.ceil((high - TOUCH) / cell) - 1
-
-
-def _smooth(least: int) -> int:
-    """The smallest number without prime factors above 5 that is no less: quick to transform."""
-    number = least
-    while True:
-        rest = number
-        for prime in (2, 3, 5):
-            while rest % prime == 0:
-                rest //= prime
-        if rest == 1:
-            return number
-        number += 1
 
 
 def _monotone(edge: Edge) -> list[Edge]:

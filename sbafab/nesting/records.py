@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 from sbafab.geometry.edges import Bounds, Point, unit
@@ -102,8 +103,15 @@ class Nest:
         return max(tops) + self.stock.border
 
     def region(self, placement: Placement) -> Region:
-        """The part's path where the nest puts it."""
-        return placed(self.parts[placement.part].region, placement.turn, placement.shift)
+        """The part's path where the nest puts it: check, sheet and its picture ask for it."""
+        return self._regions[placement]
+
+    @cached_property
+    def _regions(self) -> dict[Placement, Region]:
+        return {
+            placement: placed(self.parts[placement.part].region, placement.turn, placement.shift)
+            for placement in self.placements
+        }
 
 
 def placed(region: Region, turn: Turn, shift: Point) -> Region:

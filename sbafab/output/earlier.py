@@ -12,7 +12,7 @@ from sbafab.design.messages import shown
 from sbafab.design.records import Design
 from sbafab.design.writing import dotted, resolved
 from sbafab.errors import OutputError
-from sbafab.output.manifest import carried_over, file_hashes, identity
+from sbafab.output.manifest import carried_over, file_hash, file_names, identity
 from sbafab.output.swap import listed_files, read_manifest
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 
@@ -94,12 +94,16 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
     old = read_manifest(old_folder)
     if old is None or not carried_over(old, index):
         return
-    made = file_hashes(folder)
+    made = file_names(folder)
     files = old.get("files")
-    kept = file_hashes(old_folder)
+    kept = set(file_names(old_folder))
     carried: set[str] = set()
     # Results belong to the input beside them: with other input they go, whole.
-    anew: set[str] = {name for name in SIMULATORS if _differs(name, made, kept)}
+    anew: set[str] = {
+        name
+        for name in SIMULATORS
+        if any(_differs(path, old_folder, folder) for path in made if path.startswith(f"{name}/"))
+    }
     for name in anew:
         if f"{name}/{RESULTS}" in kept and f"{name}/{RESULTS}" not in made:
             raise OutputError(
@@ -110,7 +114,9 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
     if "mesh_statistics" in index and old_meshes not in (None, index["mesh_statistics"]):
         anew.update(MESH)
     for path, digest in (files if isinstance(files, dict) else {}).items():
-        if path not in made and kept.get(path) == digest and path.partition("/")[0] not in anew:
+        if path in made or path not in kept or path.partition("/")[0] in anew:
+            continue
+        if file_hash(old_folder / path) == digest:
             target = folder / path
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(old_folder / path, target)
@@ -130,9 +136,10 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
             index["mesh_statistics"] = old.get("mesh_statistics", {})
 
 
-def _differs(name: str, made: Mapping[str, str], kept: Mapping[str, str]) -> bool:
-    """Whether a new run wrote a folder ``name`` with other files in it than the old run's."""
-    return any(kept.get(path) != made[path] for path in made if path.startswith(f"{name}/"))
+def _differs(path: str, old_folder: Path, folder: Path) -> bool:
+    """Whether a file that a new run wrote was not in the old folder, or was another one."""
+    old = old_folder / path
+    return not old.is_file() or old.read_bytes() != (folder / path).read_bytes()
 
 
 def _are_files(entries: object, carried: set[str]) -> bool:

@@ -280,11 +280,18 @@ def _interface(interface: Interface) -> InterfaceClaim:
 
 def file_hashes(folder: Path) -> dict[str, str]:
     """sha256 of every file of a folder, by relative path."""
-    return {
-        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
+    return {name: file_hash(folder / name) for name in file_names(folder)}
+
+
+def file_names(folder: Path) -> list[str]:
+    """The relative paths of all files of a folder."""
+    paths = (path for path in sorted(folder.rglob("*")) if path.is_file())
+    return [path.relative_to(folder).as_posix() for path in paths]
+
+
+def file_hash(path: Path) -> str:
+    """sha256 of what a file holds."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def identity(design: Design, waived: Sequence[str]) -> dict[str, Any]:

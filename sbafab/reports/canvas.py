@@ -49,6 +49,7 @@ class Canvas:
         self._image = Image.new("P", (width * supersample, height * supersample), 0)
         self._draw = ImageDraw.Draw(self._image)
         self._index: dict[Colour, int] = {PAPER: 0}
+        self._known: dict[tuple[Tone, int], int] = {}
 
     def fill(self, points: Sequence[Point], tone: Tone, level: float) -> None:
         """Fills a polygon; ``level`` darkens the tone (1: as it is)."""
@@ -59,23 +60,31 @@ class Canvas:
         self._draw.line(closed, fill=self._colour("line", 1.0), width=self._enlarged)
 
     def _colour(self, tone: Tone, level: float) -> int:
-        step = round(level * LEVELS) / LEVELS
-        r, g, b = COLOURS[tone]
-        colour = min(255, round(r * step)), min(255, round(g * step)), min(255, round(b * step))
-        return self._index.setdefault(colour, len(self._index))
+        steps = round(level * LEVELS)
+        number = self._known.get((tone, steps))
+        if number is None:
+            r, g, b = (min(255, round(part * (steps / LEVELS))) for part in COLOURS[tone])
+            number = self._index.setdefault((r, g, b), len(self._index))
+            self._known[tone, steps] = number
+        return number
 
     def png(self, footprint: Sequence[Sequence[Point]], caption: str, films: str) -> bytes:
         """The picture over the soft shadow of ``footprint``, with caption and key of ``films``."""
         from PIL import ImageChops
 
         self._image.putpalette([part for colour in self._index for part in colour])
-        painted = self._image.convert("RGB").reduce(self._enlarged)
-        empty = self._image.point([255] + [0] * 255, "L").reduce(self._enlarged)
-        backdrop = self._backdrop(footprint)
+        picture = self._backdrop(footprint).convert("RGB")
+        # What nothing is painted on is backdrop.
+        whole = self._enlarged
+        left, top, right, bottom = self._image.getbbox() or (0, 0, *self._image.size)
+        box = left // whole, top // whole, -(-right // whole), -(-bottom // whole)
+        inside = self._image.crop((whole * box[0], whole * box[1], whole * box[2], whole * box[3]))
+        painted = inside.convert("RGB").reduce(whole)
+        empty = inside.point([255] + [0] * 255, "L").reduce(whole).convert("RGB")
         # Where the canvas is empty it is white: taking off what the backdrop lacks of white,
         # in proportion, leaves no bright rim round the solid.
-        lack = ImageChops.multiply(ImageChops.invert(backdrop).convert("RGB"), empty.convert("RGB"))
-        picture = ImageChops.subtract(painted, lack)
+        lack = ImageChops.multiply(ImageChops.invert(picture.crop(box)), empty)
+        picture.paste(ImageChops.subtract(painted, lack), box[:2])
         self._write(picture, caption, films)
         out = BytesIO()
         picture.save(out, "PNG", compress_level=6)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from sbafab.assemblies.build import Assembled, assemble
-from sbafab.assemblies.reading import load
+from sbafab.assemblies.loading import load
 from sbafab.assemblies.writing import assembly_sha256
 from sbafab.design.reading import Change
 from sbafab.design.records import Design

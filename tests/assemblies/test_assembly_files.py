@@ -10,7 +10,8 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.assemblies.build import Assembled, assemble
-from sbafab.assemblies.reading import load, load_assembly
+from sbafab.assemblies.loading import load
+from sbafab.assemblies.reading import load_assembly
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 

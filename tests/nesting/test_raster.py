@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -10,7 +11,9 @@ from shapely.geometry import Polygon, box
 
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc, polygon, rectangle, stadium
+from sbafab.nesting.grid import grid_of
 from sbafab.nesting.raster import aligned, meetings, quarter_turned, raster
+from sbafab.nesting.records import TURNS
 
 SHAPES = {
     "disc": disc((0.3, -0.2), 2.0),
@@ -69,6 +72,14 @@ def test_meetings_are_what_trying_every_offset_finds() -> None:
     for row, column in np.ndindex(found.shape):
         expected = bool((padded[row : row + rows, column : column + columns] & b).any())
         assert found[row, column] == expected
+
+
+def test_what_keeps_two_forms_apart_does_not_hang_on_what_was_asked_before() -> None:
+    shapes = [SHAPES["triangle"], SHAPES["bent"]]
+    grid = grid_of(shapes, (0.0, 0.0, 30.0, 30.0), 1.0, TURNS)
+    assert len(grid.forms) == 8
+    for a, b in product(grid.forms, repeat=2):
+        assert np.array_equal(grid.clear(a, b), ~meetings(a.cells, b.cells)), (a, b)
 
 
 def test_the_cells_cover_the_area_and_little_more() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.as_built.check import check_folder
-from sbafab.assemblies.reading import load
+from sbafab.assemblies.loading import load
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.dxf_write import Curves
 from sbafab.errors import OutputError

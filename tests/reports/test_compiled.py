@@ -43,6 +43,17 @@ def test_nothing_is_kept_where_python_keeps_nothing(
     assert not (tmp_path / "__pycache__").exists()
 
 
+def test_what_is_kept_is_read_where_nothing_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    (tmp_path / "page.j2").write_text("design {{ name }}")
+    rendered(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    monkeypatch.setattr(Environment, "compile", None)
+    assert rendered(tmp_path) == "design 1dof"
+
+
 def test_a_folder_that_takes_no_file_goes_without(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

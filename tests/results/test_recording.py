@@ -8,7 +8,7 @@ import pytest
 
 import sbafab
 from sbafab.assemblies.build import assemble
-from sbafab.assemblies.reading import load
+from sbafab.assemblies.loading import load
 from sbafab.assemblies.records import Assembly
 from sbafab.assemblies.writing import assembly_sha256, assembly_toml
 from sbafab.design.writing import design_toml

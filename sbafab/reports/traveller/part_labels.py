@@ -50,24 +50,39 @@ def labels(words: str, part: Region) -> Iterator[PlacedLabel]:
     em = draw.text_width(words, 1.0)
     middles = list(_middles(part.bounds))
     waiting = [
-        (far + (1 - share), _label(em, middle, share * most), False)
+        _Candidate(far + (1 - share), _label(em, middle, share * most), far + (1 - share))
         for share in SIZES
         if share * most >= LEGIBLE
         for far, middle in middles
     ]
     heapify(waiting)
     while waiting:
-        cost, label, is_measured = heappop(waiting)
-        if is_measured:
-            yield label
+        best = heappop(waiting)
+        box = best.label.box
+        if best.off is not None:
+            yield best.label
+        elif best.covered is None:
+            covered = sum(_meet(box, hole) for hole in holes)
+            heappush(waiting, best.measured(covered, None))
         else:
-            heappush(waiting, (cost + _in_the_way(label, part, holes), label, True))
+            off = sum(not part.contains(p) for p in _sides(box, holes))
+            heappush(waiting, best.measured(best.covered, off))
 
 
-def _in_the_way(label: PlacedLabel, part: Region, holes: Sequence[Bounds]) -> float:
-    covered = sum(_meet(label.box, hole) for hole in holes)
-    off = sum(not part.contains(p) for p in _sides(label.box, holes))
-    return HOLE * covered + OUTSIDE * off
+class _Candidate(NamedTuple):
+    """A label with the least that it costs, as far as is known: ``far`` off the middle and small,
+    ``covered`` holes, points ``off`` the part; what is quickly told is asked first.
+    """
+
+    cost: float
+    label: PlacedLabel
+    far: float
+    covered: int | None = None
+    off: int | None = None
+
+    def measured(self, covered: int, off: int | None) -> _Candidate:
+        cost = self.far + (HOLE * covered + OUTSIDE * (off or 0))
+        return _Candidate(cost, self.label, self.far, covered, off)
 
 
 def first_free(
