@@ -5,11 +5,12 @@ computed; the other one mirrors it. A film stretches (plane stress; Saint Venant
 law, or Hencky's) and bends. Where its hoop is compressed it wrinkles, and carries what wrinkles of
 least energy do:
 
-    N = 2 pi / L sqrt(B T)      (after Cerda and Mahadevan, 2003)
+    N = 2 sqrt(B K)    K = T (pi / L)^2 + E t c^2      (after Cerda and Mahadevan, 2003)
 
-with the bending stiffness B, the tension T along the meridian and the length L of the compressed
-zone. The rim, two films thick, does not ripple. Shapes are those of least energy, found by Newton's
-method for many pressures and heights at once. Lengths mm, pressures kPa, volumes ul, forces mN.
+with the bending stiffness B, the tension T along the meridian, the length L of the compressed zone
+and the curvature c of the meridian. The rim, two films thick, ripples (``rim_ripple``). Shapes are
+those of least energy, found by Newton's method for many pressures and heights at once. Lengths mm,
+pressures kPa, volumes ul, forces mN.
 """
 
 from __future__ import annotations
@@ -23,12 +24,16 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.laminate.films import PAPER_TPE
-from sbafab.models.film_elements import Flat, Term, add, air, bending, membrane, strain
+from sbafab.models import rim_ripple
+from sbafab.models.film_elements import Flat, Term, add, air, bending, curvature, membrane, strain
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike, NDArray
 
     from sbafab.models.film_elements import Array
+    from sbafab.models.rim_ripple import Ripple
 
 FILM_ELEMENTS = 24
 RIM_ELEMENTS = 5
@@ -158,15 +163,24 @@ class Shapes(NamedTuple):
 
 
 class BalloonLoad(NamedTuple):
-    """Pressure, half the height between the plates, and the stress that wrinkles carry."""
+    """Pressure, half the height between the plates, the stress that wrinkles carry, and how the
+    rim ripples.
+    """
 
     pressure: Array
     half: Array
     cap: Array
     tied: bool
+    ripple: Ripple
 
     def rows(self, these: NDArray[np.int_]) -> BalloonLoad:
-        return BalloonLoad(self.pressure[these], self.half[these], self.cap[these], self.tied)
+        return BalloonLoad(
+            self.pressure[these],
+            self.half[these],
+            self.cap[these],
+            self.tied,
+            self.ripple.rows(these),
+        )
 
 
 def inflate(
@@ -186,7 +200,8 @@ def inflate(
         raise DesignError("pressure and height of a balloon must be above 0 kPa and 0 mm")
     elements = len(balloon.nodes) - 1
     smooth = np.where(balloon.may_wrinkle & balloon.inextensible, 0.0, math.inf)
-    load = BalloonLoad(p, high / 2, np.broadcast_to(smooth, (len(p), elements)), tied)
+    cap = np.broadcast_to(smooth, (len(p), elements))
+    load = BalloonLoad(p, high / 2, cap, tied, rim_ripple.smooth(balloon, len(p)))
     if balloon.mate is not None:
         from sbafab.models import two_films
 
@@ -197,7 +212,8 @@ def inflate(
         if balloon.wrinkles and not balloon.inextensible:
             zone = compressed(balloon, r, z)
             for _ in range(ROUNDS):
-                load = load._replace(cap=wrinkling(balloon, r, z, zone))
+                (ripple,) = rippling((balloon,), ((r, z),))
+                load = load._replace(cap=wrinkling(balloon, r, z, zone), ripple=ripple)
                 r, z = _settled(balloon, load, r, z)
     term, force = total(balloon, load, r, z)
     held = air(balloon.film, balloon.edge, r, z).energy
@@ -223,17 +239,21 @@ def total(
     bent = slice(balloon.held, edge)
     total = bending(film, balloon.rigidity, bent, r, z, slopes)
     stretched = membrane(film, r, z, load.cap, slopes)
+    eased = rim_ripple.eased(film, edge, load.ripple, r, slopes)
     filled = air(film, edge, r, z, slopes)
     p = load.pressure
     number = np.arange(len(film.nodes))
     stiff = PLATE * p[:, None] * np.where(number < edge, balloon.widths, 0.0)
     over = np.maximum(z - load.half[:, None], 0.0)
+    touching = over > 0
     if load.tied:
         holds = number <= balloon.held
         stiff = np.where(holds, PLATE * np.maximum(p, 1.0)[:, None] * balloon.widths, stiff)
         over = np.where(holds, z - load.half[:, None], over)
+        touching |= holds
     pressed = stiff * over
-    energy = total.energy + stretched.energy - p * filled.energy + (pressed * over).sum(-1) / 2
+    energy = total.energy + stretched.energy + eased.energy - p * filled.energy
+    energy = energy + (pressed * over).sum(-1) / 2
     if not slopes:
         return total._replace(energy=energy), pressed.sum(-1)
     add(
@@ -241,9 +261,11 @@ def total(
         stretched.gradient - p[:, None, None] * filled.gradient,
         stretched.hessian - p[:, None, None, None] * filled.hessian,
     )
+    total.gradient[:] += eased.gradient
+    total.hessian[:] += eased.hessian
     heights = np.arange(1, 2 * len(film.nodes), 2)
     total.gradient[:, heights] += pressed
-    total.hessian[:, heights, heights] += np.where(over != 0, stiff, 0.0)
+    total.hessian[:, heights, heights] += np.where(touching, stiff, 0.0)
     return total._replace(energy=energy), pressed.sum(-1)
 
 
@@ -330,8 +352,22 @@ def compressed(balloon: Balloon, r: Array, z: Array) -> Array:
 
 def wrinkling(balloon: Balloon, r: Array, z: Array, zone: Array) -> Array:
     """The hoop stress in kPa that wrinkles over a zone carry, for each element's tension."""
-    tension = balloon.modulus * balloon.thickness * strain(balloon.film, r, z).meridian
-    force = math.tau / zone[:, None] * np.sqrt(balloon.rigidity * np.maximum(tension, 0.0))
+    film = balloon.film
+    tension = balloon.rigid * strain(film, r, z).meridian
+    # A wrinkle of a curved film stretches the meridian: many short ones cost least.
+    held = np.maximum(tension, 0.0) * (math.pi / zone[:, None]) ** 2
+    held = held + balloon.rigid * curvature(film, r, z) ** 2
+    force = 2 * np.sqrt(balloon.rigidity * held)
     carried: Array = np.full_like(force, math.inf)
     carried[:, balloon.may_wrinkle] = force[:, balloon.may_wrinkle] / balloon.thickness
     return carried
+
+
+def rippling(films: Sequence[Balloon], shapes: Sequence[tuple[Array, Array]]) -> list[Ripple]:
+    """How the rim ripples at the shapes of its one film, which another mirrors, or of both."""
+    strains = [strain(one.film, *shape) for one, shape in zip(films, shapes, strict=True)]
+    pulls = [
+        one.rigid * found.meridian[:, one.edge - 1]
+        for one, found in zip(films, strains, strict=True)
+    ]
+    return rim_ripple.rippling(films, strains[0].hoop[:, films[0].edge :], pulls)

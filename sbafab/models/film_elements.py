@@ -78,6 +78,15 @@ def strain(flat: Flat, r: Array, z: Array) -> Strain:
     return Strain(_measure(flat, along), _measure(flat, around))
 
 
+def curvature(flat: Flat, r: Array, z: Array) -> Array:
+    """Curvature of the meridian in 1/mm by element: mean of its two ends."""
+    slope = np.arctan2(-np.diff(z), np.diff(r))
+    lengths = flat.lengths
+    bent = np.diff(slope) / ((lengths[1:] + lengths[:-1]) / 2)
+    ends = np.concatenate([bent[:, :1], bent, bent[:, -1:]], axis=1)
+    return np.asarray((ends[:, 1:] + ends[:, :-1]) / 2)
+
+
 def _squares(flat: Flat, r: Array, z: Array) -> tuple[Array, Array]:
     """Squared stretches of each element."""
     length = np.diff(r) ** 2 + np.diff(z) ** 2

@@ -14,6 +14,7 @@ import numpy as np
 from sbafab.errors import DesignError
 from sbafab.models import balloon as single
 from sbafab.models.film_elements import air
+from sbafab.models.rim_ripple import both_bend
 
 if TYPE_CHECKING:
     from sbafab.models.balloon import Balloon, BalloonLoad, Shapes
@@ -40,9 +41,12 @@ def inflate(films: TwoFilms, load: BalloonLoad) -> Shapes:
                 single.compressed(one, *part) for one, part in zip(films, _parts(both), strict=True)
             ]
             for _ in range(single.ROUNDS):
+                ripples = single.rippling(films, _parts(both))
                 loads = tuple(
-                    load._replace(cap=single.wrinkling(one, *part, zone))
-                    for one, part, zone in zip(films, _parts(both), zones, strict=True)
+                    load._replace(cap=single.wrinkling(one, *part, zone), ripple=ripple)
+                    for one, part, zone, ripple in zip(
+                        films, _parts(both), zones, ripples, strict=True
+                    )
                 )  # type: ignore[assignment]
                 both = _settled(films, loads, basis, both)
     parts = _parts(both)
@@ -64,11 +68,8 @@ def _wringing(films: TwoFilms) -> Array:
 
     A ring of both films bonded turns round its middle line: hoops are bent.
     """
-    (e1, t1), (e2, t2) = ((one.modulus, one.thickness) for one in films)
-    mixed = e1 * e2 * t1 * t2 * (4 * t1**2 + 6 * t1 * t2 + 4 * t2**2)
-    bent = (e1**2 * t1**4 + e2**2 * t2**4 + mixed) / (12 * (e1 * t1 + e2 * t2))
     one = films[0]
-    stiff = math.tau * bent * math.log((one.pocket + one.ring) / one.pocket)
+    stiff = math.tau * both_bend(films) * math.log((one.pocket + one.ring) / one.pocket)
     found = np.zeros(4 * len(one.nodes))
     found[[2 * len(one.nodes) - 1, 2 * one.edge + 1]] = 1.0, -1.0
     return np.asarray(found * math.sqrt(stiff) / one.ring)
