@@ -1,7 +1,7 @@
-"""The bonded rim of a balloon, which buckles out of its plane in waves where its hoop is compressed.
+"""The bonded rim of a balloon, which buckles out of its plane where its hoop is compressed.
 
-The rim tilts about the pocket's edge by a cos(n turn), a in rad: the films, pulled tight, hold that edge.
-At s from it a ripple takes up the hoop strain
+The films, pulled tight, hold the pocket's edge; the rim tilts about it by a cos(n turn), a in rad.
+At s from that edge a ripple takes up the hoop strain
 
     a^2 rho,    rho = (n^2 s^2 / r^2 - s / r) / 4
 
@@ -10,10 +10,10 @@ the first part for the waves' length, the second for the tilt, which draws the h
     a^2 K / 2,    K = pi int D ((1/r - n^2 s / r^2)^2 + 2 (1 - nu) n^2 (1/r - s/r^2)^2) r ds
                       + pi R sum sqrt(B T)
 
-the rim's bending and twisting (plate of both films, Kirchhoff), and the films' roots: a long film of
-bending stiffness B under the tension T is turned at its end against sqrt(B T). With the rim's hoop
-strain e the energy is a^2 K / 2 + int E (e + a^2 rho)^2 / 2, so that the amplitude of least energy
-has a closed form, and what is left is quadratic in e. The number of waves is the one of least
+the rim's bending and twisting (plate of both films, Kirchhoff), and the films' roots: a long film
+of bending stiffness B under the tension T is turned at its end against sqrt(B T). With the rim's
+hoop strain e the energy is a^2 K / 2 + int E (e + a^2 rho)^2 / 2, so that the amplitude of least
+energy has a closed form, and what is left is quadratic in e. The number of waves is the one of least
 energy. Nothing is fitted. Lengths mm, pressures kPa, energies uJ.
 """
 
@@ -28,6 +28,8 @@ from sbafab.models.film_elements import NOTHING, Term, outer, strain
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from numpy.typing import NDArray
 
     from sbafab.models.balloon import Balloon
     from sbafab.models.film_elements import Array, Flat
@@ -52,7 +54,7 @@ class Ripple(NamedTuple):
     pull: Array
     stiff: Array
 
-    def rows(self, these: Array) -> Ripple:
+    def rows(self, these: NDArray[np.int_]) -> Ripple:
         return Ripple(*(part[these] for part in self))
 
 
@@ -72,8 +74,7 @@ def rippling(films: Sequence[Balloon], hoop: Array, tensions: Sequence[Array]) -
     pair = films if len(films) == 2 else (films[0], films[0])
     pulls = tensions if len(films) == 2 else (tensions[0], tensions[0])
     roots = sum(
-        np.sqrt(one.rigidity * np.maximum(pull, 0.0))
-        for one, pull in zip(pair, pulls, strict=True)
+        np.sqrt(one.rigidity * np.maximum(pull, 0.0)) for one, pull in zip(pair, pulls, strict=True)
     )
     rigid = sum(one.rigid for one in pair)
     cost, relief, weight, stiff = _modes(pair)
@@ -128,7 +129,7 @@ def both_bend(pair: Sequence[Balloon]) -> float:
 
 def amplitude(flat: Flat, edge: int, ripple: Ripple, r: Array) -> Array:
     """The squared tilt a^2 of least energy, a row a balloon."""
-    return _drive(_hoop(flat, edge, r), ripple) / ripple.stiff
+    return np.asarray(_drive(_hoop(flat, edge, r), ripple) / ripple.stiff)
 
 
 def eased(flat: Flat, edge: int, ripple: Ripple, r: Array, slopes: bool = True) -> Term:
@@ -167,4 +168,4 @@ def _hoop(flat: Flat, edge: int, r: Array) -> Array:
 
 def _drive(hoop: Array, ripple: Ripple) -> Array:
     """By how much the hoop's compression outdoes the ripples' cost; 0 where it does not."""
-    return np.maximum(-(ripple.cost + (hoop * ripple.pull).sum(-1)), 0.0)
+    return np.asarray(np.maximum(-(ripple.cost + (hoop * ripple.pull).sum(-1)), 0.0))

@@ -32,8 +32,8 @@ def onset(one: Balloon, tension: float) -> tuple[float, float]:
 @pytest.mark.parametrize("tension", [0.5, 4.0])
 def test_a_straight_rim_ripples_as_a_strip_hinged_at_one_edge_does(tension: float) -> None:
     """The flange of Timoshenko and Gere (Theory of Elastic Stability, 9.4): a strip of width b that
-    turns about one edge, the other one free, buckles at N = D (k^2 + 6 (1 - nu) / b^2), which for nu
-    = 0.25 is their pi^2 D / b^2 (0.456 + (b k / pi)^2). A spring c against the turning adds
+    turns about one edge, the other one free, buckles at N = D (k^2 + 6 (1 - nu) / b^2), which for
+    nu = 0.25 is their pi^2 D / b^2 (0.456 + (b k / pi)^2). A spring c against the turning adds
     3 c / (k^2 b^3); at the films' roots it is sqrt(B T) each.
     """
     b, nu = WIDE.ring, WIDE.poisson
@@ -58,8 +58,7 @@ def test_what_ripples_take_off_has_the_slopes_that_it_says() -> None:
             step = np.zeros_like(found.r)
             step[0, node] = 1e-5
             up, down = (
-                rim_ripple.eased(flat, lone.edge, ripple, found.r + sign * step)
-                for sign in (1, -1)
+                rim_ripple.eased(flat, lone.edge, ripple, found.r + sign * step) for sign in (1, -1)
             )
             slope = (up.energy - down.energy) / 2e-5
             assert term.gradient[0, 2 * node] == pytest.approx(slope[0], rel=1e-5)
