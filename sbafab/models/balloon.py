@@ -34,7 +34,7 @@ from sbafab.models.film_elements import (
     membrane,
     strain,
 )
-from sbafab.models.least_energy import NoBalance, State, settled
+from sbafab.models.least_energy import Descent, NoBalance, settled
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -286,16 +286,16 @@ class Energies:
         self.balloon, self.load = balloon, load
         self.scale, self.close = sizes(balloon, load)
 
-    def at(self, x: Array, rows: NDArray[np.int_]) -> State:
+    def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
         found = total(self.balloon, self.load.rows(rows), x)
         freely = self.balloon.free_band
         for height in range(1, self.balloon.level, 2):
             found.gradient[self.balloon.level] += found.gradient[height]
             banded.join(found.matrix, height, self.balloon.level)
         slopes, band = found.gradient * freely[:, :1], found.matrix * freely[..., None]
-        return State(found.energy, slopes, band)
+        return Descent(found.energy, slopes, band)
 
-    def ahead(self, state: State, damping: Array) -> Array:
+    def ahead(self, state: Descent, damping: Array) -> Array:
         band = state.matrix.copy()
         band[:, 0] += damping * np.abs(band[:, 0])
         found = banded.solve(band, -state.gradient, self.balloon.freedoms)

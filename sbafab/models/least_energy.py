@@ -23,7 +23,7 @@ class NoBalance(Exception):  # noqa: N818
     """No end was found."""
 
 
-class State(NamedTuple):
+class Descent(NamedTuple):
     """Energies (rows,), their slopes by coordinate (coordinates, rows), 0 where none may move, and
     second derivatives as the problem keeps them, rows last.
     """
@@ -42,11 +42,11 @@ class Problem(Protocol):
     scale: Array
     close: Array
 
-    def at(self, x: Array, rows: NDArray[np.int_]) -> State:
+    def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
         """The energies of ``rows`` at coordinates ``x`` (coordinates, rows)."""
         ...
 
-    def ahead(self, state: State, damping: Array) -> Array:
+    def ahead(self, state: Descent, damping: Array) -> Array:
         """Where Newton's step leads, (coordinates, rows), with that share of the diagonal more."""
         ...
 

@@ -15,7 +15,7 @@ from sbafab.errors import DesignError
 from sbafab.models import balloon as single
 from sbafab.models import banded
 from sbafab.models.film_elements import Elements, air
-from sbafab.models.least_energy import NoBalance, State, settled
+from sbafab.models.least_energy import Descent, NoBalance, settled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -135,7 +135,7 @@ class _Energies:
         self.wrings = _wringing(films) @ basis
         self.scale, self.close = single.sizes(films[0], loads[0])
 
-    def at(self, x: Array, rows: NDArray[np.int_]) -> State:
+    def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
         wrung = self.wrings @ x
         energy, slopes = wrung**2 / 2, wrung * self.wrings[:, None]
         matrix = np.tile(np.multiply.outer(self.wrings, self.wrings), (x.shape[1], 1, 1))
@@ -145,9 +145,9 @@ class _Energies:
             energy = energy + found.energy
             slopes += basis.T @ found.gradient
             matrix += basis.T @ banded.dense(found.matrix) @ basis
-        return State(energy, slopes, matrix)
+        return Descent(energy, slopes, matrix)
 
-    def ahead(self, state: State, damping: Array) -> Array:
+    def ahead(self, state: Descent, damping: Array) -> Array:
         matrix, diagonal = state.matrix.copy(), np.arange(len(self.wrings))
         matrix[:, diagonal, diagonal] += damping[:, None] * np.abs(matrix[:, diagonal, diagonal])
         return np.asarray(-np.linalg.solve(matrix, state.gradient.T[..., None])[..., 0].T)

@@ -9,7 +9,7 @@ import pytest
 
 from sbafab.models import banded
 from sbafab.models.balloon import Balloon, BalloonLoad, coordinates, start, total
-from sbafab.models.least_energy import NoBalance, State, settled
+from sbafab.models.least_energy import Descent, NoBalance, settled
 
 INNER = Balloon(neck=1.25, bore=0.5)
 DRAW = np.random.default_rng(3)
@@ -72,10 +72,10 @@ class Well:
 
     scale, close = np.ones(2), np.full(2, 1e-12)
 
-    def at(self, x: np.ndarray, rows: np.ndarray) -> State:
-        return State((x**4 - x**2)[0], 4 * x**3 - 2 * x, (12 * x**2 - 2)[:, None])
+    def at(self, x: np.ndarray, rows: np.ndarray) -> Descent:
+        return Descent((x**4 - x**2)[0], 4 * x**3 - 2 * x, (12 * x**2 - 2)[:, None])
 
-    def ahead(self, state: State, damping: np.ndarray) -> np.ndarray:
+    def ahead(self, state: Descent, damping: np.ndarray) -> np.ndarray:
         band = state.matrix + damping * np.abs(state.matrix)
         return banded.solve(band, -state.gradient, np.arange(1))
 
@@ -91,8 +91,8 @@ def test_the_least_energy_is_found_from_where_it_bends_downward() -> None:
 class Slope(Well):
     """Falls for ever."""
 
-    def at(self, x: np.ndarray, rows: np.ndarray) -> State:
-        return State(x[0], np.ones_like(x), np.ones((1, *x.shape)))
+    def at(self, x: np.ndarray, rows: np.ndarray) -> Descent:
+        return Descent(x[0], np.ones_like(x), np.ones((1, *x.shape)))
 
 
 def test_an_energy_without_a_least_one_is_given_up() -> None:
