@@ -64,7 +64,7 @@ class Elements(NamedTuple):
 
 Slopes = list["Array"]
 """Derivatives by dr, dz and the middle radius, each (rows, elements)."""
-Curves = list["Array"]
+SecondSlopes = list["Array"]
 """Second derivatives: dr dr, dr dz, dz dz, dr middle, dz middle, middle middle."""
 
 
@@ -73,7 +73,7 @@ class Term(NamedTuple):
 
     energy: Array
     slopes: Slopes
-    curves: Curves
+    curves: SecondSlopes
 
 
 class Strain(NamedTuple):
@@ -250,7 +250,7 @@ def gradient(slopes: Slopes) -> Array:
     return found
 
 
-def matrix(curves: Curves, joined: list[Array]) -> Array:
+def matrix(curves: SecondSlopes, joined: list[Array]) -> Array:
     """Second derivatives by coordinates, as a band: (coordinates, 6, rows), of which ``[i, k]`` is
     that by coordinates i and i + k.
     """

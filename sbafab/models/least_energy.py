@@ -33,7 +33,7 @@ class Descent(NamedTuple):
     matrix: Array
 
 
-class Problem(Protocol):
+class Potential(Protocol):
     """Energies of a row of shapes.
 
     ``scale`` (rows,) is an energy of their size, ``close`` (rows,) what slope counts as none.
@@ -55,7 +55,7 @@ class Problem(Protocol):
         ...
 
 
-def settled(problem: Problem, x: Array) -> Array:
+def settled(problem: Potential, x: Array) -> Array:
     """The coordinates (coordinates, rows) of least energy downhill of these.
 
     Raises NoBalance where no end is found.
