@@ -109,8 +109,8 @@ def _crossing(over: Callable[[Array], Array], low: Array, high: Array) -> Array:
 def stresses(balloon: Balloon, shapes: Shapes) -> FilmStress:
     """What the film's elements bear, from the inside outward; round the hoop 0 where it wrinkles.
 
-    A rim that ripples bears the mean round it: more inside, less or pull outside. Bending, which adds
-    to it at neck and rim, is left out. Raises DesignError for unlike films.
+    A rim that ripples bears the mean round it: more inside, less or pull outside. Bending, which
+    adds to it at neck and rim, is left out. Raises DesignError for unlike films.
     """
     if balloon.mate is not None:
         raise DesignError("stresses of unlike films are not given; ask for each film alone")

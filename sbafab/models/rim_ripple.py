@@ -13,8 +13,8 @@ the first part for the waves' length, the second for the tilt, which draws the h
 the rim's bending and twisting (plate of both films, Kirchhoff), and the films' roots: a long film
 of bending stiffness B under the tension T is turned at its end against sqrt(B T). With the rim's
 hoop strain e the energy is a^2 K / 2 + int E (e + a^2 rho)^2 / 2, so that the amplitude of least
-energy has a closed form, and what is left is quadratic in e. The number of waves is the one of least
-energy. Nothing is fitted. Lengths mm, pressures kPa, energies uJ.
+energy has a closed form, and what is left is quadratic in e. The number of waves is the one of
+least energy. Nothing is fitted. Lengths mm, pressures kPa, energies uJ.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sbafab.models.film_elements import NOTHING, Term, outer, strain
+from sbafab.models.film_elements import strain
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -132,34 +132,36 @@ def amplitude(flat: Flat, edge: int, ripple: Ripple, r: Array) -> Array:
     return np.asarray(_drive(_hoop(flat, edge, r), ripple) / ripple.stiff)
 
 
-def eased(flat: Flat, edge: int, ripple: Ripple, r: Array, slopes: bool = True) -> Term:
-    """What ripples take off the energy of a smooth rim, by coordinate of the whole film."""
-    hoop = _hoop(flat, edge, r)
-    drive = _drive(hoop, ripple)
-    energy = -(drive**2) / (2 * ripple.stiff)
-    if not slopes:
-        return Term(energy, NOTHING, NOTHING)
-    count = r.shape[1]
-    gradient, hessian = np.zeros((len(r), 2 * count)), np.zeros((len(r), 2 * count, 2 * count))
+class Eased(NamedTuple):
+    """An energy (rows,) with its derivatives by the radii of the rim's nodes: (nodes, rows) and
+    (nodes, nodes, rows).
+    """
+
+    energy: Array
+    slopes: Array
+    curves: Array
+
+
+def eased(flat: Flat, edge: int, ripple: Ripple, r: Array) -> Eased:
+    """What ripples take off the energy of a smooth rim."""
+    drive = _drive(_hoop(flat, edge, r), ripple)
     middles = flat.middles[edge:]
     wide = (r[:, edge + 1 :] + r[:, edge:-1]) / (2 * middles)
     # Slopes of the hoop strain by the radius of either node, and what they change by.
     first = wide ** (flat.order - 1) / (2 * middles)
     second = (flat.order - 1) * wide ** (flat.order - 2) / (2 * middles) ** 2
-    pulled = (drive / ripple.stiff)[:, None] * ripple.pull
-    steep = np.zeros((len(r), count - edge))
-    for side in (slice(0, -1), slice(1, None)):
-        steep[:, side] += ripple.pull * first
-    at = np.arange(2 * edge, 2 * count, 2)
-    gradient[:, at] = (drive / ripple.stiff)[:, None] * steep
-    active = np.where(drive > 0, 1 / ripple.stiff, 0.0)
-    block = -active[:, None, None] * outer(steep, steep)
-    number = np.arange(count - edge - 1)
+    tilt = drive / ripple.stiff
+    pulled = (ripple.pull * first).T
+    steep = np.zeros((len(pulled) + 1, len(r)))
+    steep[:-1] += pulled
+    steep[1:] += pulled
+    curves = np.where(drive > 0, -1 / ripple.stiff, 0.0) * steep[:, None] * steep
+    bent = (tilt[:, None] * ripple.pull * second).T
+    number = np.arange(len(bent))
     for i in (0, 1):
         for j in (0, 1):
-            block[:, number + i, number + j] += pulled * second
-    hessian[:, at[:, None], at] = block
-    return Term(energy, gradient, hessian)
+            curves[number + i, number + j] += bent
+    return Eased(-drive * tilt / 2, tilt * steep, curves)
 
 
 def _hoop(flat: Flat, edge: int, r: Array) -> Array:
