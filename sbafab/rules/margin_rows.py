@@ -60,19 +60,6 @@ class MarginRows:
             [float(column.min()) for column in columns], [float(column.max()) for column in columns]
         )
 
-    @cached_property
-    def least_uncut(self) -> float:
-        """No row leaves less than this, whatever moves, before what cutting adds or takes."""
-        low, high = self.bounds
-        left, turn = low[0], 3
-        for freedom, _, levers in self.moves:
-            farthest = 1.0
-            if levers is not None:
-                farthest = max(-low[turn], high[turn])
-                turn += 1
-            left -= freedom.most * farthest
-        return left
-
 
 def rows_of(
     form: LinearForm, layers: Sequence[int], limit: float, cutting: float

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
+from sbafab.rules.draws import Batch, Pair
 from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.margin_rows import MarginRows
 
@@ -139,6 +140,19 @@ class _Table(NamedTuple):
         room = np.concatenate([np.zeros(0), *(rows.room for rows in kinds)])
         return _Table(begins, room, factors, shift, turn, signs)
 
+    def least_uncut(self) -> Floats:
+        """By kind: no row leaves less, whatever moves, before what cutting adds or takes."""
+        import numpy as np
+
+        if not len(self.room):
+            return np.zeros(0)
+        kind = np.repeat(np.arange(len(self.begins) - 1), np.diff(self.begins))
+        left = self.room - self.shift.sum(axis=0)[kind]
+        for levers, most in zip(self.factors[::2], self.turn, strict=True):
+            left -= most[kind] * np.abs(levers)
+        least: Floats = np.minimum.reduceat(left, self.begins[:-1])
+        return least
+
 
 class _Drawn(NamedTuple):
     """Builds of what is asked: by number of what asks, of its kind and of the build.
@@ -182,23 +196,25 @@ class RandomBuilds:
         self.least = np.array([rows.bounds.low[0] for rows in every])
         self.bounds = _Bounds.of(every).of_each(self.kind, self.first)
         self.table = _Table.of(every, moves)
-        self.cuts: dict[tuple[int, int, float, float], list[tuple[int, float]]] = {}
-        """By the numbers and signs of two contours: what asks for them, and below which sum of
-        their numbers its rows may come short."""
-        for number, (rows, (a, b, *_)) in enumerate(asked):
-            (_, one), (_, other) = rows.contours
-            least = SURE - rows.least_uncut + ROOM
-            share = math.inf if least > 0 else -math.inf
-            if cutting > 0:
-                share = least / (2 * cutting) + (one + other) / 2
-            self.cuts.setdefault((a, b, one, other), []).append((number, share))
+        lines: dict[Pair, int] = {}
+        pairs = [
+            Pair(a, b, *signs[kind])
+            for kind, (a, b, *_) in zip(self.kind.tolist(), first, strict=True)
+        ]
+        self.line = np.array([lines.setdefault(pair, len(lines)) for pair in pairs], dtype=np.intp)
+        """Of what asks, the number of its pair of contours among ``pairs``."""
+        self.pairs = tuple(lines)
+        least = SURE - self.table.least_uncut() + ROOM
+        share = np.where(least > 0, math.inf, -math.inf)
+        if cutting > 0:
+            share = least / (2 * cutting) + self.signs.sum(axis=0) / 2
+        self.share = share[self.kind]
+        """Below which sum of the numbers of its pair what asks may come short."""
 
-    def short(self, numbers: Floats) -> tuple[Indices, Indices]:
-        """What was asked for, by number, and the builds in which it comes short.
-
-        ``numbers`` has a row of builds for each error.
-        """
-        drawn = self._drawn(numbers, *self._roughly(numbers))
+    def short(self, batch: Batch) -> tuple[Indices, Indices]:
+        """What was asked for, by number, and the builds in which it comes short."""
+        numbers = batch.numbers
+        drawn = self._drawn(numbers, *self._roughly(batch, numbers))
         if not len(drawn.asked):
             return drawn.asked, drawn.build
         least = self._least(drawn)
@@ -208,14 +224,14 @@ class RandomBuilds:
         is_short[near] = self._is_short(drawn.at(near))
         return drawn.asked[is_short], drawn.build[is_short]
 
-    def _roughly(self, numbers: Floats) -> tuple[Indices, Indices, Floats]:
+    def _roughly(self, batch: Batch, numbers: Floats) -> tuple[Indices, Indices, Floats]:
         """Where errors may take enough, each by itself; and what cuts and turns leave there.
 
         One error after the other is taken into account: most builds are decided by the first.
         """
         import numpy as np
 
-        asked, builds, total = self._cut(numbers)
+        asked, builds, total = self._cut(batch, numbers)
         signs = self.cutting * self.signs.sum(axis=0)
         held = (self.least - signs)[self.kind][asked] + 2 * self.cutting * total
         drawn, count = numbers.ravel(), numbers.shape[1]
@@ -234,26 +250,22 @@ class RandomBuilds:
             held, left = held.take(some), left.take(some)
         return asked, builds, held
 
-    def _cut(self, numbers: Floats) -> tuple[Indices, Indices, Floats]:
+    def _cut(self, batch: Batch, numbers: Floats) -> tuple[Indices, Indices, Floats]:
         """Where cutting errors may take enough, and the sums of their numbers, signs kept."""
         import numpy as np
 
-        asked: list[int] = []
-        found: list[Indices] = []
-        sums: list[Floats] = []
-        total = np.empty(numbers.shape[1])
-        for (a, b, one, other), wanted in self.cuts.items():
-            (np.add if one == other else np.subtract)(numbers[a], numbers[b], out=total)
-            if one < 0:
-                np.negative(total, out=total)
-            for number, share in wanted:
-                builds = _picked(total < share)
-                asked.append(number)
-                found.append(builds)
-                sums.append(total[builds])
-        every = np.repeat(np.array(asked, dtype=np.intp), [len(builds) for builds in found])
-        none = np.zeros(0, dtype=np.intp)
-        return every, np.concatenate([none, *found]), np.concatenate([np.zeros(0), *sums])
+        lowest, line = batch.lowest(self.pairs), self.line
+        within = self.share <= lowest.below[line]
+        limit = np.where(within, self.share, -math.inf)
+        place = np.flatnonzero(lowest.totals.take(line, axis=0) < limit[:, None])
+        asked, place = np.divmod(place, lowest.builds.shape[1])
+        found = [(asked, lowest.builds[line[asked], place], lowest.totals[line[asked], place])]
+        # More may come short than the lowest sums tell of.
+        for number in _picked(~within).tolist():
+            total = self.pairs[line[number]].total(numbers)
+            builds = _picked(total < self.share[number])
+            found.append((np.full(len(builds), number), builds, total[builds]))
+        return tuple(np.concatenate(one) for one in zip(*found, strict=True))  # type: ignore[return-value]
 
     def _drawn(self, numbers: Floats, asked: Indices, builds: Indices, held: Floats) -> _Drawn:
         """What was drawn for those of which no row may be left for sure, sorted by kind.
