@@ -21,7 +21,6 @@ from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.margin_rows import MarginRows, rows_of
 from sbafab.rules.margins import QUANTITIES, Quantity, own_freedoms, seated
 from sbafab.rules.measures import Measures
-from sbafab.rules.random_builds import RandomBuilds, RowsAsked
 
 if TYPE_CHECKING:
     from sbafab.rules.random_builds import Indices
@@ -178,6 +177,8 @@ def _counted(
 ) -> Yield:
     """Draws the builds, in batches, and counts those in which all rows keep room."""
     import numpy as np
+
+    from sbafab.rules.random_builds import RandomBuilds, RowsAsked
 
     interfaces = dict.fromkeys(sorted(index for group in groups for index in group.own), 0)
     wanted = limits.yield_builds or _quick_number(len(interfaces))
