@@ -76,7 +76,7 @@ class _Stream:
 _stream = lru_cache(maxsize=1)(_Stream)
 
 
-class Batch(NamedTuple):
+class DrawnBuilds(NamedTuple):
     """Builds drawn at a time: which numbers of the seed's stream, a row of ``builds`` an error."""
 
     seed: int
@@ -121,7 +121,7 @@ class LowestSums(NamedTuple):
 
 
 @lru_cache(maxsize=4)
-def _lowest(batch: Batch, pairs: tuple[Pair, ...]) -> LowestSums:
+def _lowest(batch: DrawnBuilds, pairs: tuple[Pair, ...]) -> LowestSums:
     """Laminates with the same layers and contours ask for the same, whatever their sizes."""
     import numpy as np
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sbafab.rules.draws import Batch, Pair
+from sbafab.rules.draws import DrawnBuilds, Pair
 from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.margin_rows import MarginRows
 
@@ -195,7 +195,7 @@ class RandomBuilds:
         self.share = share[self.kind]
         """Below which sum of the numbers of its pair what asks may come short."""
 
-    def short(self, batch: Batch) -> tuple[Indices, Indices]:
+    def short(self, batch: DrawnBuilds) -> tuple[Indices, Indices]:
         """What was asked for, by number, and the builds in which it comes short."""
         numbers = batch.numbers
         drawn = self._drawn(numbers, *self._roughly(batch, numbers))
@@ -208,7 +208,7 @@ class RandomBuilds:
         is_short[near] = self._is_short(drawn.at(near))
         return drawn.asked[is_short], drawn.build[is_short]
 
-    def _roughly(self, batch: Batch, numbers: Floats) -> tuple[Indices, Indices, Floats]:
+    def _roughly(self, batch: DrawnBuilds, numbers: Floats) -> tuple[Indices, Indices, Floats]:
         """Where errors may take enough, each by itself; and what cuts and turns leave there.
 
         One error after the other is taken into account: most builds are decided by the first.
@@ -232,7 +232,7 @@ class RandomBuilds:
             held, left = held.take(some), left.take(some)
         return asked, builds, held
 
-    def _cut(self, batch: Batch, numbers: Floats) -> tuple[Indices, Indices, Floats]:
+    def _cut(self, batch: DrawnBuilds, numbers: Floats) -> tuple[Indices, Indices, Floats]:
         """Where cutting errors may take enough, and the sums of their numbers, signs kept."""
         lowest, line = batch.lowest(self.pairs), self.line
         within = self.share <= lowest.below[line]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules.draws import Batch, CutContour, Error, rows_by_error
+from sbafab.rules.draws import DrawnBuilds, CutContour, Error, rows_by_error
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.forms import LinearForm
 from sbafab.rules.freedoms import Freedom, Freedoms
@@ -203,7 +203,7 @@ def _counted(
     for first in range(0, wanted, BATCH):
         pause()
         builds = min(BATCH, wanted - first)
-        asked, bad = of_builds.short(Batch(seed, first * count, count, builds))
+        asked, bad = of_builds.short(DrawnBuilds(seed, first * count, count, builds))
         whole += _different(bad)
         for quantity in QUANTITIES:
             quantities[quantity] += _different(bad[is_of[quantity][asked]])
