@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules.draws import DrawnBuilds, CutContour, Error, rows_by_error
+from sbafab.rules.draws import CutContour, DrawnBuilds, Error, rows_by_error
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.forms import LinearForm
 from sbafab.rules.freedoms import Freedom, Freedoms

@@ -16,7 +16,7 @@ from sbafab.geometry.shapes import disc, rectangle
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import boundary, draws, freedoms, margins
 from sbafab.rules.boundary import outward_reach
-from sbafab.rules.draws import DrawnBuilds, CutContour, numbers, rows_by_error
+from sbafab.rules.draws import CutContour, DrawnBuilds, numbers, rows_by_error
 from sbafab.rules.forms import linear_forms
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
