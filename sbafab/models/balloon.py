@@ -23,7 +23,18 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.laminate.films import PAPER_TPE
-from sbafab.models.film_elements import Flat, Term, add, air, bending, membrane, strain
+from sbafab.models import banded
+from sbafab.models.film_elements import (
+    Elements,
+    Flat,
+    air,
+    bending,
+    gradient,
+    matrix,
+    membrane,
+    strain,
+)
+from sbafab.models.least_energy import Descent, NoBalance, settled
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -33,12 +44,6 @@ if TYPE_CHECKING:
 FILM_ELEMENTS = 24
 RIM_ELEMENTS = 5
 NECK_ELEMENTS = 2
-FARTHEST = 0.7
-"""Share of its length by which an element may change in one step."""
-MOST_STEPS = 400
-ROUNDING = 1e-13
-"""Share of the energy that is lost in its own digits."""
-HALVINGS = 12
 CLOSE = 1e-9
 """Force out of balance, as a share of pressure times pocket area, that is none."""
 LEAST = 0.01
@@ -127,6 +132,13 @@ class Balloon:
         found += [2 * node + 1 for node in nodes[self.held : self.edge]]
         return np.array(sorted(found))
 
+    @cached_property
+    def free_band(self) -> Array:
+        """1 where both coordinates i and i + k move on their own, else 0: (coordinates, 6)."""
+        free = np.zeros(2 * len(self.nodes) + 5)
+        free[self.freedoms] = 1.0
+        return free[: 2 * len(self.nodes), None] * np.lib.stride_tricks.sliding_window_view(free, 6)
+
     @property
     def level(self) -> int:
         """Number of the height that the neck's others are equal to."""
@@ -193,15 +205,16 @@ def inflate(
         return two_films.inflate((replace(balloon, mate=None), balloon.mate), load)
     # Where no balance is found, elements may shrink to nothing on the way; that is said in the end.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        r, z = _settled(balloon, load, *start(balloon, load))
+        x = _settled(balloon, load, coordinates(*start(balloon, load)))
         if balloon.wrinkles and not balloon.inextensible:
-            zone = compressed(balloon, r, z)
+            zone = compressed(balloon, *places(x))
             for _ in range(ROUNDS):
-                load = load._replace(cap=wrinkling(balloon, r, z, zone))
-                r, z = _settled(balloon, load, r, z)
-    term, force = total(balloon, load, r, z)
-    held = air(balloon.film, balloon.edge, r, z).energy
-    return Shapes(p, 2 * z[:, 0], 2 * held, force, 2 * (term.energy + p * held), r, z)
+                load = load._replace(cap=wrinkling(balloon, *places(x), zone))
+                x = _settled(balloon, load, x)
+    r, z = (np.ascontiguousarray(part) for part in places(x))
+    found = total(balloon, load, x)
+    held = air(balloon.film, balloon.edge, Elements.of(r, z)).energy
+    return Shapes(p, 2 * z[:, 0], 2 * held, found.force, 2 * (found.energy + p * held), r, z)
 
 
 def start(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
@@ -215,16 +228,42 @@ def start(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
     return np.tile(flat, (len(rise), 1)), rise[:, None] * shape
 
 
-def total(
-    balloon: Balloon, load: BalloonLoad, r: Array, z: Array, slopes: bool = True
-) -> tuple[Term, Array]:
-    """Energy of films and plates less the work of the air, by coordinate, and the plates' force."""
+class Total(NamedTuple):
+    """Energy (rows,) of a film and plates less the work of the air, its derivatives by coordinate,
+    (coordinates, rows) and as a band (coordinates, 6, rows), and the plates' force, (rows,).
+    """
+
+    energy: Array
+    gradient: Array
+    matrix: Array
+    force: Array
+
+
+def coordinates(r: Array, z: Array) -> Array:
+    """Coordinates r, z of each node in turn: (coordinates, rows)."""
+    return np.stack([r.T, z.T], 1).reshape(-1, len(r))
+
+
+def places(x: Array) -> tuple[Array, Array]:
+    """The radii and heights of the nodes, a row a film."""
+    return x[0::2].T, x[1::2].T
+
+
+def total(balloon: Balloon, load: BalloonLoad, x: Array) -> Total:
+    """The energy at coordinates."""
     film, edge = balloon.film, balloon.edge
-    bent = slice(balloon.held, edge)
-    total = bending(film, balloon.rigidity, bent, r, z, slopes)
-    stretched = membrane(film, r, z, load.cap, slopes)
-    filled = air(film, edge, r, z, slopes)
+    r, z = places(x)
+    lie = Elements.of(r, z)
     p = load.pressure
+    bent = bending(film, balloon.rigidity, slice(balloon.held, edge), lie)
+    stretched, filled = membrane(film, lie, load.cap), air(film, edge, lie)
+    slopes, curves = (
+        [a + b - p[:, None] * c for a, b, c in zip(*parts, strict=True)]
+        for parts in (
+            (bent.term.slopes, stretched.slopes, filled.slopes),
+            (bent.term.curves, stretched.curves, filled.curves),
+        )
+    )
     number = np.arange(len(film.nodes))
     stiff = PLATE * p[:, None] * np.where(number < edge, balloon.widths, 0.0)
     over = np.maximum(z - load.half[:, None], 0.0)
@@ -233,90 +272,60 @@ def total(
         stiff = np.where(holds, PLATE * np.maximum(p, 1.0)[:, None] * balloon.widths, stiff)
         over = np.where(holds, z - load.half[:, None], over)
     pressed = stiff * over
-    energy = total.energy + stretched.energy - p * filled.energy + (pressed * over).sum(-1) / 2
-    if not slopes:
-        return total._replace(energy=energy), pressed.sum(-1)
-    add(
-        total,
-        stretched.gradient - p[:, None, None] * filled.gradient,
-        stretched.hessian - p[:, None, None, None] * filled.hessian,
-    )
-    heights = np.arange(1, 2 * len(film.nodes), 2)
-    total.gradient[:, heights] += pressed
-    total.hessian[:, heights, heights] += np.where(over != 0, stiff, 0.0)
-    return total._replace(energy=energy), pressed.sum(-1)
+    energy = bent.term.energy + stretched.energy - p * filled.energy + (pressed * over).sum(-1) / 2
+    by_place, band = gradient(slopes), matrix(curves, bent.joined)
+    by_place[1::2] += pressed.T
+    band[1::2, 0] += np.where(over != 0, stiff, 0.0).T
+    return Total(energy, by_place, band, pressed.sum(-1))
 
 
-def _settled(balloon: Balloon, load: BalloonLoad, r: Array, z: Array) -> tuple[Array, Array]:
-    """The shapes of least energy downhill of these: Newton's method, damped where it climbs.
+class Energies:
+    """A balloon's energies under a load, for ``least_energy``."""
 
-    Raises DesignError where it does not end.
-    """
-    freedoms = balloon.freedoms
-    r, z, damping = r.copy(), z.copy(), np.zeros(len(r))
-    live = np.arange(len(r))
-    own = np.ix_(freedoms, freedoms)
-    diagonal = np.arange(len(freedoms))
-    for _ in range(MOST_STEPS):
-        part, at = load.rows(live), (r[live], z[live])
-        term, _ = total(balloon, part, *at)
-        for height in range(1, balloon.level, 2):
-            term.gradient[:, balloon.level] += term.gradient[:, height]
-            term.hessian[:, balloon.level] += term.hessian[:, height]
-        for height in range(1, balloon.level, 2):
-            term.hessian[:, :, balloon.level] += term.hessian[:, :, height]
-        gradient = term.gradient[:, freedoms]
-        stiffness = term.hessian[:, own[0], own[1]]
-        stiffness[:, diagonal, diagonal] += damping[live, None] * np.abs(
-            stiffness[:, diagonal, diagonal]
-        )
-        move = -np.linalg.solve(stiffness, gradient[..., None])[..., 0]
-        slope = (move * gradient).sum(-1)
-        small = CLOSE * np.maximum(part.pressure, LEAST) * math.pi * balloon.pocket**2
-        still = np.abs(gradient).max(-1) <= small
-        # Where rounding alone decides whether the energy falls, there is nothing left to gain.
-        digits = ROUNDING * (np.abs(term.energy) + part.pressure * balloon.pocket**3)
-        still |= (np.abs(slope) <= digits) & (damping[live] == 0.0)
-        if still.all():
-            return r, z
-        ahead = np.zeros_like(term.gradient)
-        ahead[:, freedoms] = np.where(still[:, None], 0.0, move)
-        ahead[:, 1 : balloon.level : 2] = ahead[:, balloon.level, None]
-        share = _downhill(balloon, part, at, ahead, term.energy, slope)
-        r[live] += share[:, None] * ahead[:, ::2]
-        z[live] += share[:, None] * ahead[:, 1::2]
-        damped = np.where(share > 0, damping[live] / 10, np.clip(10 * damping[live], 1e-3, 1e9))
-        damping[live] = np.where(damped < 1e-6, 0.0, damped)
-        live = live[~still]
-    raise DesignError(
-        f"a balloon of radius {balloon.pocket:g} mm finds no balance; try another load"
-    )
+    def __init__(self, balloon: Balloon, load: BalloonLoad) -> None:
+        self.balloon, self.load = balloon, load
+        self.scale, self.close = sizes(balloon, load)
+
+    def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
+        found = total(self.balloon, self.load.rows(rows), x)
+        freely = self.balloon.free_band
+        for height in range(1, self.balloon.level, 2):
+            found.gradient[self.balloon.level] += found.gradient[height]
+            banded.join(found.matrix, height, self.balloon.level)
+        slopes, band = found.gradient * freely[:, :1], found.matrix * freely[..., None]
+        return Descent(found.energy, slopes, band)
+
+    def ahead(self, state: Descent, damping: Array) -> Array:
+        band = state.matrix.copy()
+        band[:, 0] += damping * np.abs(band[:, 0])
+        found = banded.solve(band, -state.gradient, self.balloon.freedoms)
+        found[1 : self.balloon.level : 2] = found[self.balloon.level]
+        return found
+
+    def change(self, x: Array, ahead: Array) -> Array:
+        return change(x, ahead)
 
 
-def _downhill(
-    balloon: Balloon,
-    load: BalloonLoad,
-    at: tuple[Array, Array],
-    ahead: Array,
-    energy: Array,
-    slope: Array,
-) -> Array:
-    """The share of each step that lowers the energy; 0 where none does or it leads uphill."""
-    # No element is stretched, turned or shortened by more than its own length: none collapses.
-    length = np.hypot(np.diff(at[0]), np.diff(at[1]))
-    change = np.hypot(np.diff(ahead[:, ::2]), np.diff(ahead[:, 1::2]))
-    share = np.minimum(1.0, FARTHEST / np.maximum((change / length).max(-1), 1e-300))
-    share = np.where(slope <= 0, share, 0.0)
-    room = 1e-12 * (np.abs(energy) + load.pressure * balloon.pocket**3)
-    for _ in range(HALVINGS):
-        step = share[:, None] * ahead
-        to = at[0] + step[:, ::2], at[1] + step[:, 1::2]
-        tried = total(balloon, load, *to, slopes=False)[0].energy
-        good = tried <= energy + 1e-4 * share * slope + room
-        if good.all():
-            return share
-        share = np.where(good, share, share / 2)
-    return np.where(good, share, 0.0)
+def sizes(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
+    """An energy of the size of each balloon's, uJ, and the force in mN that counts as none."""
+    force = CLOSE * np.maximum(load.pressure, LEAST) * math.pi * balloon.pocket**2
+    return load.pressure * balloon.pocket**3, force
+
+
+def change(x: Array, ahead: Array) -> Array:
+    """The largest share of its length by which a step changes an element: (rows,)."""
+    length, by = (np.hypot(np.diff(y[0::2], axis=0), np.diff(y[1::2], axis=0)) for y in (x, ahead))
+    return np.asarray((by / length).max(0))
+
+
+def _settled(balloon: Balloon, load: BalloonLoad, x: Array) -> Array:
+    """The shapes of least energy downhill of these. Raises DesignError where none is found."""
+    try:
+        return settled(Energies(balloon, load), x)
+    except NoBalance:
+        raise DesignError(
+            f"a balloon of radius {balloon.pocket:g} mm finds no balance; try another load"
+        ) from None
 
 
 def compressed(balloon: Balloon, r: Array, z: Array) -> Array:
