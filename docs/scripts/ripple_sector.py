@@ -114,9 +114,7 @@ def mesh(one: Sector) -> SectorMesh:
     poles = numbers[0, 0, 2, "upper"], numbers[0, 0, -2, "lower"]
     middle = [numbers[2 * one.film, j, 0, "both"] for j in range(last + 1)]
     outside = [numbers[len(radii) - 1, j, 0, "both"] for j in range(last + 1)]
-    return SectorMesh(
-        np.array(places), elements, sides, poles, middle[one.round], middle, outside
-    )
+    return SectorMesh(np.array(places), elements, sides, poles, middle[one.round], middle, outside)
 
 
 def _off(one: Sector, r: float, turn: float, film: str) -> float:
