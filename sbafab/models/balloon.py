@@ -222,10 +222,10 @@ def start(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
     flat, free = balloon.nodes, balloon.pocket - balloon.neck
     rise = 0.3 * free * np.cbrt(load.pressure * balloon.pocket / (balloon.modulus * 0.0025))
     rise = np.clip(rise, 0.05 * free, 0.8 * free)
-    rise = load.half if load.tied else np.minimum(rise, load.half)
+    rise = np.maximum(rise, load.half) if load.tied else rise
     shape = np.clip(1 - ((flat - balloon.neck) / free) ** 2, 0.0, 1.0)
     shape[: balloon.held + 1] = 1.0
-    return np.tile(flat, (len(rise), 1)), rise[:, None] * shape
+    return np.tile(flat, (len(rise), 1)), np.minimum(rise[:, None] * shape, load.half[:, None] + 1 / PLATE)
 
 
 class Total(NamedTuple):
