@@ -225,7 +225,9 @@ def start(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
     rise = np.maximum(rise, load.half) if load.tied else rise
     shape = np.clip(1 - ((flat - balloon.neck) / free) ** 2, 0.0, 1.0)
     shape[: balloon.held + 1] = 1.0
-    return np.tile(flat, (len(rise), 1)), np.minimum(rise[:, None] * shape, load.half[:, None] + 1 / PLATE)
+    return np.tile(flat, (len(rise), 1)), np.minimum(
+        rise[:, None] * shape, load.half[:, None] + 1 / PLATE
+    )
 
 
 class Total(NamedTuple):
