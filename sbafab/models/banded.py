@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -59,6 +59,33 @@ def join(band: Array, from_: int, to: int) -> None:
             value = 2 * value
         at = to if i == from_ else i
         band[min(at, to), abs(at - to)] += value
+
+
+class Packing(NamedTuple):
+    """Which entries [i, k] of a band are kept, and where they go in one without the others."""
+
+    row: NDArray[np.int_]
+    off: NDArray[np.int_]
+    to_row: NDArray[np.int_]
+    to_off: NDArray[np.int_]
+    size: int
+
+
+def packing(freedoms: NDArray[np.int_], size: int, width: int) -> Packing:
+    """Of a band (size, width) what is left when only ``freedoms`` are unknown."""
+    number = np.full(size + width, -1)
+    number[freedoms] = np.arange(len(freedoms))
+    row, off = (part.ravel() for part in np.meshgrid(freedoms, np.arange(width), indexing="ij"))
+    kept = number[row + off] >= 0
+    row, off = row[kept], off[kept]
+    return Packing(row, off, number[row], number[row + off] - number[row], len(freedoms))
+
+
+def packed(band: Array, how: Packing) -> Array:
+    """The band (freedoms, width, rows) of the unknowns alone, from one (n, width, rows)."""
+    found = np.zeros((how.size, *band.shape[1:]))
+    found[how.to_row, how.to_off] = band[how.row, how.off]
+    return found
 
 
 def dense(band: Array) -> Array:

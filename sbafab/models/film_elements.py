@@ -89,6 +89,14 @@ def strain(flat: Flat, r: Array, z: Array) -> Strain:
     return Strain(_measure(flat, along), _measure(flat, around))
 
 
+def curvature(flat: Flat, r: Array, z: Array) -> Array:
+    """Curvature of the meridian in 1/mm by element: mean of its two ends."""
+    slope = np.arctan2(-np.diff(z), np.diff(r))
+    bent = np.diff(slope) / ((flat.lengths[1:] + flat.lengths[:-1]) / 2)
+    ends = np.concatenate([bent[:, :1], bent, bent[:, -1:]], axis=1)
+    return np.asarray((ends[:, 1:] + ends[:, :-1]) / 2)
+
+
 def _squares(flat: Flat, at: Elements) -> tuple[Array, Array]:
     """Squared stretches of each element."""
     return at.square / flat.lengths**2, (at.middle / flat.middles) ** 2

@@ -8,8 +8,16 @@ import numpy as np
 import pytest
 
 from sbafab.models import banded
-from sbafab.models.balloon import Balloon, BalloonLoad, coordinates, start, total
+from sbafab.models.balloon import (
+    RIM_ELEMENTS,
+    Balloon,
+    BalloonLoad,
+    coordinates,
+    start,
+    total,
+)
 from sbafab.models.least_energy import Descent, NoBalance, settled
+from sbafab.models.rim_ripple import amplitude, rippling
 
 INNER = Balloon(neck=1.25, bore=0.5)
 DRAW = np.random.default_rng(3)
@@ -45,17 +53,28 @@ def test_unknowns_that_are_equal_are_joined_and_those_that_are_held_are_none() -
     assert own == pytest.approx(small)
 
 
+def test_unknowns_that_are_held_leave_no_gap_in_a_packed_band() -> None:
+    band, free = positive(), np.array([0, 2, 3, 6, 8, 9, 11])
+    small = banded.packed(band, banded.packing(free, 12, 4))
+    whole = banded.dense(band)[:, free[:, None], free]
+    assert banded.dense(small) == pytest.approx(whole)
+
+
 @pytest.mark.parametrize("order", [0, 2])
 def test_slopes_are_what_the_energy_changes_by(order: int) -> None:
     one = replace(INNER, order=order)
+    (ripple,) = rippling((one,), np.full((2, RIM_ELEMENTS), -0.04), [np.array([1.0, 9.0])])
     load = BalloonLoad(
         np.array([3.0, 50.0]),
         np.array([0.4, 0.7]),
         np.full((2, len(one.nodes) - 1), 20.0),
         tied=True,
+        ripple=ripple,
     )
     x = coordinates(*start(one, load))
     x += DRAW.normal(0, 0.003, x.shape)
+    x[2 * one.edge :: 2] *= 0.96
+    assert (amplitude(one.film, one.edge, ripple, x[::2].T) > 0).all()
     found, step = total(one, load, x), 1e-6
     slopes, curves = [], []
     for i in range(len(x)):
