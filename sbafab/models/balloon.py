@@ -304,6 +304,14 @@ def total(balloon: Balloon, load: BalloonLoad, x: Array) -> Total:
     return Total(energy, by_place, band, eased.curves, pressed.sum(-1))
 
 
+def second_slopes(balloon: Balloon, found: Total) -> Array:
+    """The whole matrices of second derivatives by coordinate: (rows, coordinates, coordinates)."""
+    whole = banded.dense(found.matrix)
+    rim = np.arange(2 * balloon.edge, len(found.gradient), 2)
+    whole[:, rim[:, None], rim] += np.moveaxis(found.rim, -1, 0)
+    return whole
+
+
 class Energies:
     """A balloon's energies under a load, for ``least_energy``."""
 
@@ -329,7 +337,7 @@ class Energies:
         band[:, 0] += damping * np.abs(band[:, 0])
         freedoms = self.balloon.freedoms
         found = np.zeros_like(state.gradient)
-        found[freedoms] = banded.solve(band, -state.gradient[freedoms], np.arange(len(freedoms)))
+        found[freedoms] = banded.solve(band, -state.gradient[freedoms])
         found[1 : self.balloon.level : 2] = found[self.balloon.level]
         return found
 
