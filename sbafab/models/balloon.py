@@ -238,10 +238,12 @@ def start(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
     flat, free = balloon.nodes, balloon.pocket - balloon.neck
     rise = 0.3 * free * np.cbrt(load.pressure * balloon.pocket / (balloon.modulus * 0.0025))
     rise = np.clip(rise, 0.05 * free, 0.8 * free)
-    rise = load.half if load.tied else np.minimum(rise, load.half)
+    rise = np.maximum(rise, load.half) if load.tied else rise
     shape = np.clip(1 - ((flat - balloon.neck) / free) ** 2, 0.0, 1.0)
     shape[: balloon.held + 1] = 1.0
-    return np.tile(flat, (len(rise), 1)), rise[:, None] * shape
+    return np.tile(flat, (len(rise), 1)), np.minimum(
+        rise[:, None] * shape, load.half[:, None] + 1 / PLATE
+    )
 
 
 class Total(NamedTuple):
@@ -302,6 +304,14 @@ def total(balloon: Balloon, load: BalloonLoad, x: Array) -> Total:
     return Total(energy, by_place, band, eased.curves, pressed.sum(-1))
 
 
+def second_slopes(balloon: Balloon, found: Total) -> Array:
+    """The whole matrices of second derivatives by coordinate: (rows, coordinates, coordinates)."""
+    whole = banded.dense(found.matrix)
+    rim = np.arange(2 * balloon.edge, len(found.gradient), 2)
+    whole[:, rim[:, None], rim] += np.moveaxis(found.rim, -1, 0)
+    return whole
+
+
 class Energies:
     """A balloon's energies under a load, for ``least_energy``."""
 
@@ -327,7 +337,7 @@ class Energies:
         band[:, 0] += damping * np.abs(band[:, 0])
         freedoms = self.balloon.freedoms
         found = np.zeros_like(state.gradient)
-        found[freedoms] = banded.solve(band, -state.gradient[freedoms], np.arange(len(freedoms)))
+        found[freedoms] = banded.solve(band, -state.gradient[freedoms])
         found[1 : self.balloon.level : 2] = found[self.balloon.level]
         return found
 

@@ -13,7 +13,6 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.models import balloon as single
-from sbafab.models import banded
 from sbafab.models.film_elements import Elements, air
 from sbafab.models.least_energy import Descent, NoBalance, settled
 from sbafab.models.rim_ripple import both_bend
@@ -143,9 +142,7 @@ class _Energies:
             found = single.total(one, load.rows(rows), part)
             energy = energy + found.energy
             slopes += basis.T @ found.gradient
-            whole = banded.dense(found.matrix)
-            rim = np.arange(2 * one.edge, len(part), 2)
-            whole[:, rim[:, None], rim] += np.moveaxis(found.rim, -1, 0)
+            whole = single.second_slopes(one, found)
             matrix += basis.T @ whole @ basis
         return Descent(energy, slopes, matrix)
 
