@@ -287,8 +287,8 @@ def _calibrated_bent(found: Prediction) -> Iterator[Row]:
         30: "low: the paper does not say which chambers push, nor how the sensor holds the tip; "
         "where it slides, 6 % low, and where the third chamber pushes too, 22 % high",
         60: "high: as at 30 degrees; a tip that slides gives way, and one chamber has half of this",
-        90: "low: two chambers hardly bend so far, and every assumption counts; pockets 0.1 mm less "
-        "reduced push 8 times, one chamber 5 times as hard",
+        90: "low: two chambers hardly bend so far, and every assumption counts; pockets 0.1 mm "
+        "less reduced push 8 times, one chamber 5 times as hard",
     }
     for angle, value in paper.FORCE_BENT:
         yield Row(
@@ -312,8 +312,8 @@ def _calibrated_motion(three: Stack) -> Iterator[Row]:
         paper.FULL_HEIGHT,
         pose.height,
         f"{CALIBRATED}, {full:g} kPa in the chambers",
-        "high, by little more than the 5 % aimed at, with the measured flat height; the paper gives no "
-        "pressure, and counts 10 kPa as full actuation",
+        "high, by little more than the 5 % aimed at, with the measured flat height; the paper "
+        "gives no pressure, and counts 10 kPa as full actuation",
     )
     yield Row(
         f"time to 10 kPa, water, 35 ml/min ({HELD_OUT})",
