@@ -226,9 +226,11 @@ def along(table: Array, which: NDArray[np.int_], y: Array) -> Along:
 
 def horner(table: Array, which: NDArray[np.int_], y: Array) -> Array:
     """Polynomials (powers, ..., rows) of splines at places ``y``, in pieces."""
-    first = np.clip(np.floor(y), -1.0, HEIGHT_SPANS)
-    u = y - first
-    powers = table.take(which + 1 + first.astype(np.int_), axis=-1)
+    # Pieces are counted from the one below the spline.
+    after = y + 1.0
+    piece = np.minimum(np.maximum(after, 0.0), PIECES_IN_ALL - 1).astype(np.int_)
+    u = after - piece
+    powers = table.take(which + piece, axis=-1)
     found = powers[DEGREE] * u
     for power in powers[DEGREE - 1 : 0 : -1]:
         found += power

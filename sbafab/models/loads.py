@@ -30,7 +30,7 @@ class Load(NamedTuple):
     """
 
     tip: Array
-    weight: Array
+    weight: Array | None
     point: Array | None
     normal: Array
     sticks: bool
@@ -63,15 +63,24 @@ def _acting(plates: Chain, load: Load) -> _Acting:
     found = _Acting(load.tip[None], np.multiply.outer(tip, load.tip)[None], -float(load.tip @ tip))
     if load.point is not None:
         found = _pressed(found, plates, load, load.point)
-    if load.weight.any():
-        above = plates.places[:0:-1].cumsum(0)[::-1]
-        number = np.arange(len(above), 0, -1)[:, None]
-        found = found._replace(
-            forces=found.forces + number * load.weight,
-            arms=found.arms + above[:, :, None] * load.weight,
-            energy=found.energy - float(above[0] @ load.weight),
+    if load.weight is not None:
+        beyond, number = _beyond(len(plates.rises))
+        above = beyond @ plates.places
+        found = _Acting(
+            found.forces + number * load.weight,
+            found.arms + above[:, :, None] * load.weight,
+            found.energy - float(above[0] @ load.weight),
+            found.stiffness,
+            found.push,
         )
     return found
+
+
+@lru_cache(maxsize=16)
+def _beyond(count: int) -> tuple[Array, Array]:
+    """Which plates (count, count + 1) lie beyond each level, and their number (count, 1)."""
+    found = 1.0 - np.tri(count, count + 1)
+    return found, found.sum(axis=1, keepdims=True)
 
 
 def pushed(at: Array, pitch: float, load: Load) -> float:

@@ -291,11 +291,12 @@ class Stack:
             down = np.asarray(gravity, dtype=float) / np.linalg.norm(gravity)
         elif gravity:
             down = np.array([0.0, 0.0, -1.0])
-        if not force.any() and not down.any() and plate is None:
+        weight = down * self.weight if down.any() else None
+        if not force.any() and weight is None and plate is None:
             return None
         wall = plate if isinstance(plate, Plate) or plate is None else Plate.at(float(plate))
         if wall is None:
-            return Load(force, down * self.weight, None, UP, False, self.outline)
+            return Load(force, weight, None, UP, False, self.outline)
         point, normal = np.asarray(wall.point, float), np.asarray(wall.normal, float)
         normal = normal / np.linalg.norm(normal)
         if normal[2] > 1 - 1e-9 and point[2] < self.flat_height - 1e-9:
@@ -303,7 +304,7 @@ class Stack:
                 f"a plate {point[2]:g} mm high is lower than the flat stack; give at least "
                 f"{self.flat_height:.4g} mm"
             )
-        return Load(force, down * self.weight, point, normal, wall.sticks, self.outline)
+        return Load(force, weight, point, normal, wall.sticks, self.outline)
 
     def _pose(
         self,
