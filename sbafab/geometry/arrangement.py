@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Container, Iterator, Sequence
-from functools import cached_property, cmp_to_key
+from functools import cmp_to_key
 from typing import NamedTuple
 
 from sbafab.geometry.edges import (
@@ -23,6 +23,7 @@ from sbafab.geometry.edges import (
     left_normal,
 )
 from sbafab.geometry.nearby import EdgeIndex, widened
+from sbafab.geometry.once import once
 from sbafab.geometry.pieces import Overlay
 from sbafab.geometry.region import turns_round
 
@@ -123,7 +124,7 @@ class Arrangement:
                 start = stop
         return ring
 
-    @cached_property
+    @once
     def _index(self) -> EdgeIndex:
         return EdgeIndex(self._drawn)
 

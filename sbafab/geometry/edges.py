@@ -10,6 +10,8 @@ import math
 from itertools import pairwise
 from typing import NamedTuple
 
+from sbafab.geometry.once import once
+
 Point = tuple[float, float]
 Bounds = tuple[float, float, float, float]
 
@@ -110,20 +112,25 @@ class Line(NamedTuple):
         return Line((x0 + nx, y0 + ny), (x1 + nx, y1 + ny))
 
 
-class Arc(NamedTuple):
-    """A circular edge round ``centre``, counter-clockwise if ``ccw``; at most half a turn."""
-
+class _Arc(NamedTuple):
     start: Point
     end: Point
     centre: Point
     radius: float
     ccw: bool
 
-    @property
+
+class Arc(_Arc):
+    """A circular edge round ``centre``, counter-clockwise if ``ccw``; at most half a turn.
+
+    Rules ask for its values again and again: they are worked out once.
+    """
+
+    @once
     def start_angle(self) -> float:
         return math.atan2(self.start[1] - self.centre[1], self.start[0] - self.centre[0])
 
-    @property
+    @once
     def sweep(self) -> float:
         """Signed angle turned through: positive counter-clockwise."""
         cx, cy = self.centre
@@ -134,21 +141,21 @@ class Arc(NamedTuple):
             return turn if turn > -1e-9 else turn + math.tau
         return turn if turn < 1e-9 else turn - math.tau
 
-    @property
+    @once
     def length(self) -> float:
         return self.radius * abs(self.sweep)
 
-    @property
+    @once
     def bulge(self) -> float:
         return math.tan(self.sweep / 4)
 
-    @property
+    @once
     def segment_area(self) -> float:
         """Signed area between the chord and the arc: positive when counter-clockwise."""
         sweep = self.sweep
         return 0.5 * self.radius**2 * (sweep - math.sin(sweep))
 
-    @property
+    @once
     def bounds(self) -> Bounds:
         (cx, cy), r = self.centre, self.radius
         (x0, y0), (x1, y1) = (self.start, self.end) if self.ccw else (self.end, self.start)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from functools import cached_property
 from itertools import chain
 
 from sbafab.geometry.edges import EPSILON, Bounds, Edge, Point, distance_to
+from sbafab.geometry.once import once
 
 MANY_BOXES = 500
 """From which on comparing all at once is worth fetching numpy."""
@@ -103,7 +103,7 @@ class EdgeIndex:
         self.cell = self.across / max(1.0, math.sqrt(len(edges))) or 1.0
         self._reach = self._places((*self._low, *self._high))
 
-    @cached_property
+    @once
     def _filed(self) -> dict[tuple[int, int], list[int]]:
         """The numbers of edges in each cell."""
         filed: dict[tuple[int, int], list[int]] = {}

@@ -10,7 +10,6 @@ import hashlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 from sbafab.geometry.edges import (
@@ -25,6 +24,7 @@ from sbafab.geometry.edges import (
     unit,
 )
 from sbafab.geometry.nearby import EdgeIndex, close_pairs
+from sbafab.geometry.once import once
 from sbafab.geometry.runs import runs, same_support
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ class Contour:
 
     edges: tuple[Edge, ...]
 
-    @cached_property
+    @once
     def area(self) -> float:
         """Enclosed area in mm2: positive counter-clockwise, negative for a hole."""
         (ox, oy) = self.edges[0].start
@@ -85,16 +85,16 @@ class Contour:
             bulges += edge.segment_area
         return twice / 2 + bulges
 
-    @cached_property
+    @once
     def length(self) -> float:
         return sum(edge.length for edge in self.edges)
 
-    @cached_property
+    @once
     def boxes(self) -> tuple[Bounds, ...]:
         """The bounds of each edge."""
         return tuple([edge.bounds for edge in self.edges])
 
-    @cached_property
+    @once
     def bounds(self) -> Bounds:
         return _join(self.boxes)
 
@@ -102,7 +102,7 @@ class Contour:
     def is_hole(self) -> bool:
         return self.area < 0
 
-    @cached_property
+    @once
     def circle(self) -> tuple[Point, float] | None:
         """Centre and radius if the contour is one full circle."""
         first = self.edges[0]
@@ -113,7 +113,7 @@ class Contour:
                 return None
         return first.centre, first.radius
 
-    @cached_property
+    @once
     def runs(self) -> tuple[tuple[Edge, ...], ...]:
         """The edges gathered by the line or circle they lie on, from the first corner on."""
         return tuple(runs(self.edges))
@@ -123,7 +123,7 @@ class Contour:
         """x, y and bulge of each vertex, as a DXF polyline carries them."""
         return tuple((*edge.start, edge.bulge) for edge in self.edges)
 
-    @cached_property
+    @once
     def marks(self) -> tuple[Mark, ...]:
         """What the contour is known by: its vertices with their bulges, or one circle (which may be
         split anywhere) with its radius, negative round a hole.
@@ -178,7 +178,7 @@ class Contour:
         low, step, rows = self._rows
         return rows[min(len(rows) - 1, int((y - low) / step))]
 
-    @cached_property
+    @once
     def _rows(self) -> tuple[float, float, list[list[Edge]]]:
         """Edges by level: lowest y, height of a row, and each row's edges."""
         _, low, _, high = self.bounds
@@ -209,12 +209,12 @@ class Region:
 
     contours: tuple[Contour, ...] = ()
 
-    @cached_property
+    @once
     def area(self) -> float:
         """Area in mm2."""
         return sum(contour.area for contour in self.contours)
 
-    @cached_property
+    @once
     def bounds(self) -> Bounds:
         """Least x, least y, largest x, largest y, mm."""
         return _join([contour.bounds for contour in self.contours])
@@ -223,21 +223,21 @@ class Region:
     def is_empty(self) -> bool:
         return not self.contours
 
-    @cached_property
+    @once
     def outers(self) -> tuple[Contour, ...]:
         """The outer contours, counter-clockwise."""
         return tuple(contour for contour in self.contours if not contour.is_hole)
 
-    @cached_property
+    @once
     def holes(self) -> tuple[Contour, ...]:
         """The contours of holes, clockwise."""
         return tuple(contour for contour in self.contours if contour.is_hole)
 
-    @cached_property
+    @once
     def edges(self) -> tuple[Edge, ...]:
         return tuple(edge for contour in self.contours for edge in contour.edges)
 
-    @cached_property
+    @once
     def index(self) -> EdgeIndex:
         """The edges filed by place."""
         return EdgeIndex(self.edges, [box for contour in self.contours for box in contour.boxes])
@@ -248,7 +248,7 @@ class Region:
         # A region that kept itself would be freed late.
         return (self,) if len(self.outers) == 1 else self._several
 
-    @cached_property
+    @once
     def _several(self) -> tuple[Region, ...]:
         held: list[list[Contour]] = [[outer] for outer in self.outers]
         places = [hole.edges[0].at(0.5) for hole in self.holes]
@@ -267,7 +267,7 @@ class Region:
             min(inside, key=lambda group: group[0].area).append(contour)
         return tuple(Region(tuple(group)) for group in held)
 
-    @cached_property
+    @once
     def key(self) -> str:
         """A name for the shape, from its corners rounded to 1 nm; the same on every machine.
 

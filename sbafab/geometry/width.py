@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.geometry.corners import Corner, corners_of, pinch
@@ -18,6 +17,7 @@ from sbafab.geometry.ends import tapered_ends
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.kept import kept
 from sbafab.geometry.nearby import EdgeIndex, widened
+from sbafab.geometry.once import once
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.remembered import remembered
 
@@ -144,7 +144,7 @@ class Boundary:
         self.known_clear: dict[tuple[Point, Point], bool] = {}
         """Of segments that were asked: whether no edge crosses them."""
 
-    @cached_property
+    @once
     def table(self) -> SideTable:
         """The sides in arrays."""
         from sbafab.geometry.side_table import SideTable

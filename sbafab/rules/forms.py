@@ -6,7 +6,6 @@ are drawn, in their normal, and in the levers of what turns. Worst case and yiel
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -56,27 +55,27 @@ def linear_forms(group: InterfaceMargins, moves: Freedoms) -> tuple[LinearForm, 
     found: list[LinearForm] = []
     before = 0
     for quantity, places in group.places.items():
-        own: dict[tuple[Owner, Owner], list[int]] = {}
-        for number, owners in enumerate(places.owners):
-            own.setdefault(owners, []).append(number)
-        for owners, numbers in own.items():
+        for owners, numbers in _by_owners(places):
             found.append(_form(quantity, owners, numbers, before, places, group.first, moves))
-        before += len(places.owners)
+        before += len(places.nominal)
     return tuple(found)
+
+
+def _by_owners(places: Places) -> list[tuple[tuple[Owner, Owner], Indices]]:
+    """The numbers of places by the owners of their edges, in the order of their first."""
+    found = [(own, (places.between == i).nonzero()[0]) for i, own in enumerate(places.owners)]
+    return sorted((one for one in found if len(one[1])), key=lambda one: one[1][0])
 
 
 def _form(
     quantity: Quantity,
     owners: tuple[Owner, Owner],
-    numbers: Sequence[int],
+    own: Indices,
     before: int,
     places: Places,
     interface: Interface,
     moves: Freedoms,
 ) -> LinearForm:
-    import numpy as np
-
-    own = np.array(numbers)
     normal, start, end = places.normal[:, own], places.start[:, own], places.end[:, own]
     return LinearForm(
         quantity,

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from sbafab.rules.draws import CutContour, Error
 from sbafab.rules.forms import LinearForm
@@ -25,13 +24,6 @@ if TYPE_CHECKING:
 
 UNITS = 1000
 """Factors that are equal to so many parts are one: rows that feel all errors alike."""
-
-
-class RowBounds(NamedTuple):
-    """Least and largest of room, normal's x and y, and levers, of all rows."""
-
-    low: list[float]
-    high: list[float]
 
 
 @dataclass(frozen=True)
@@ -51,27 +43,6 @@ class MarginRows:
     @property
     def errors(self) -> tuple[Error, ...]:
         return *(one for one, _ in self.contours), *(freedom for freedom, _, _ in self.moves)
-
-    @cached_property
-    def bounds(self) -> RowBounds:
-        levers = [levers for _, _, levers in self.moves if levers is not None]
-        columns = [self.room, *self.normal, *levers]
-        return RowBounds(
-            [float(column.min()) for column in columns], [float(column.max()) for column in columns]
-        )
-
-    @cached_property
-    def least_uncut(self) -> float:
-        """No row leaves less than this, whatever moves, before what cutting adds or takes."""
-        low, high = self.bounds
-        left, turn = low[0], 3
-        for freedom, _, levers in self.moves:
-            farthest = 1.0
-            if levers is not None:
-                farthest = max(-low[turn], high[turn])
-                turn += 1
-            left -= freedom.most * farthest
-        return left
 
 
 def rows_of(

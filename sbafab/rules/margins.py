@@ -88,16 +88,17 @@ class InterfaceMargins:
         return self.interfaces[0]
 
     def __len__(self) -> int:
-        return sum(len(found.owners) for found in self.places.values())
+        return sum(len(found.nominal) for found in self.places.values())
 
     def __getitem__(self, number: int) -> Margin:
         for quantity, found in self.places.items():
-            if number < len(found.owners):
+            if number < len(found.nominal):
                 (x, y), (u, v) = found.start[:, number].tolist(), found.end[:, number].tolist()
                 nx, ny = found.normal[:, number].tolist()
                 nominal = float(found.nominal[number])
-                return Margin(quantity, nominal, (x, y), (u, v), (nx, ny), found.owners[number])
-            number -= len(found.owners)
+                owners = found.owners[found.between[number]]
+                return Margin(quantity, nominal, (x, y), (u, v), (nx, ny), owners)
+            number -= len(found.nominal)
         raise IndexError(number)
 
 

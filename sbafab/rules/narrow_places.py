@@ -40,14 +40,16 @@ SQUARE = 0.9
 class Places(NamedTuple):
     """Places from an edge to another, in the order in which they were found.
 
-    ``nominal`` mm apart along the unit ``normal``; ``owners`` are those of both edges.
+    ``nominal`` mm apart along the unit ``normal``; ``between`` is the number of both edges' owners
+    among ``owners``.
     """
 
     nominal: Floats
     start: Floats
     end: Floats
     normal: Floats
-    owners: list[tuple[Owner, Owner]]
+    between: Indices
+    owners: Sequence[tuple[Owner, Owner]]
 
     def at(self, numbers: Indices) -> Places:
         return Places(
@@ -55,11 +57,9 @@ class Places(NamedTuple):
             self.start[:, numbers],
             self.end[:, numbers],
             self.normal[:, numbers],
-            [self.owners[number] for number in numbers.tolist()],
+            self.between[numbers],
+            self.owners,
         )
-
-
-NONE = Places(np.zeros(0), np.zeros((2, 0)), np.zeros((2, 0)), np.zeros((2, 0)), [])
 
 
 def bond_places(interface: Interface, least: Width, slack: float, widest: float) -> Places:
@@ -83,7 +83,7 @@ def _bond_places(
     normal = off / np.where(length > 0, length, 1.0)
     every = _filed(profiles, films=True, masks=True)
     both = every.at(np.concatenate([p, q], axis=1), np.concatenate([normal, normal], axis=1))
-    return _owned(value, p, q, normal, (both[: len(value)], both[len(value) :]))
+    return _owned(value, p, q, normal, both.parted(len(value)))
 
 
 def overhang_places(
@@ -119,23 +119,36 @@ def _overhang_places(
     return found.at(kept)
 
 
+class _Owned(NamedTuple):
+    """Whose edges run through places: the place in rising order, and a number of ``owners``."""
+
+    place: Indices
+    owner: Indices
+    owners: list[Owner]
+
+    def parted(self, place: int) -> tuple[_Owned, _Owned]:
+        """Those of the places before this one, and of the others, counted from it on."""
+        cut = int(np.searchsorted(self.place, place))
+        rest = _Owned(self.place[cut:] - place, self.owner[cut:], self.owners)
+        return _Owned(self.place[:cut], self.owner[:cut], self.owners), rest
+
+
 def _owned(
-    nominal: Floats,
-    start: Floats,
-    end: Floats,
-    normal: Floats,
-    owners: tuple[list[list[Owner]], list[list[Owner]]],
+    nominal: Floats, start: Floats, end: Floats, normal: Floats, both: tuple[_Owned, _Owned]
 ) -> Places:
     """Places once for every two owners of their edges."""
-    rows: list[int] = []
-    pairs: list[tuple[Owner, Owner]] = []
-    for row, (ours, theirs) in enumerate(zip(*owners, strict=True)):
-        for one in ours:
-            for other in theirs:
-                rows.append(row)
-                pairs.append((one, other))
-    numbers = np.array(rows, dtype=np.intp)
-    return Places(nominal[numbers], start[:, numbers], end[:, numbers], normal[:, numbers], pairs)
+    ours, theirs = both
+    counts = np.bincount(theirs.place, minlength=len(nominal))
+    begins = np.cumsum(counts) - counts
+    own = counts[ours.place]
+    rows = np.repeat(ours.place, own)
+    within = np.arange(len(rows)) - np.repeat(np.cumsum(own) - own, own)
+    others = len(theirs.owners)
+    pairs = np.repeat(ours.owner, own) * others + theirs.owner[begins[rows] + within]
+    names = sorted(set(pairs.tolist()))
+    owners = [(ours.owners[one // others], theirs.owners[one % others]) for one in names]
+    between = np.searchsorted(names, pairs)
+    return Places(nominal[rows], start[:, rows], end[:, rows], normal[:, rows], between, owners)
 
 
 @dataclass(frozen=True)
@@ -146,7 +159,7 @@ class _Filed:
     owner: Indices
     owners: list[Owner]
 
-    def at(self, p: Floats, normal: Floats) -> list[list[Owner]]:
+    def at(self, p: Floats, normal: Floats) -> _Owned:
         """Whose edges run through each point: of those square to its normal, if any, else all."""
         asked = boxes_round(p, p, ON_EDGE)
         place, number = touching(asked, self.table.box)
@@ -159,13 +172,13 @@ class _Filed:
         chosen = square | ~has_square[place]
         place, number = place[chosen], number[chosen]
         order = CellOrder(self.table.box).sorted(asked, place, number)
-        found: list[list[Owner]] = [[] for _ in range(p.shape[1])]
-        owners = self.owner[number[order]].tolist()
-        for here_too, own in zip(place[order].tolist(), owners, strict=True):
-            known, owner = found[here_too], self.owners[own]
-            if owner not in known:
-                known.append(owner)
-        return found
+        place, owner = place[order], self.owner[number[order]]
+        # Each owner once a place, where it comes first.
+        key = place * len(self.owners) + owner
+        by_key = np.argsort(key, kind="stable")
+        is_first = np.ones(len(key), dtype=bool)
+        is_first[by_key[1:]] = key[by_key[1:]] != key[by_key[:-1]]
+        return _Owned(place[is_first], owner[is_first], self.owners)
 
 
 class _Profile(NamedTuple):

@@ -14,11 +14,13 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
+from sbafab.rules.draws import DrawnBuilds, Pair
 from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.margin_rows import MarginRows
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     Bools = NDArray[np.bool_]
@@ -59,51 +61,24 @@ class _Bounds(NamedTuple):
     after: Floats
 
     @staticmethod
-    def of(kinds: Sequence[MarginRows]) -> _Bounds:
-        import numpy as np
-
-        turns = [_of_turns(rows) for rows in kinds]
-        shifts = [_of_shifts(rows) for rows in kinds]
-        lines = max(map(len, turns), default=0), max(map(len, shifts), default=0)
-        place = np.zeros((sum(lines), len(kinds)), dtype=np.intp)
-        bounds, shift = np.zeros((2, lines[0], len(kinds))), np.zeros((lines[1], len(kinds)))
-        for number, (own, others) in enumerate(zip(turns, shifts, strict=True)):
-            for line, (error, low, high) in enumerate(own):
-                place[line, number] = error
-                bounds[:, line, number] = low, high
-            for line, (error, far) in enumerate(others):
-                place[lines[0] + line, number] = error
-                shift[line, number] = far
-        takes = np.concatenate([abs(bounds).max(axis=0), shift])
+    def of(table: _Table) -> _Bounds:
+        low, high = table.turned()
+        turns = np.argsort(-np.maximum(-low, high), axis=0, kind="stable")
+        turns = turns[: (table.turn > 0).sum(axis=0).max(initial=0)]
+        shifts = np.argsort(-table.shift, axis=0, kind="stable")
+        shifts = shifts[: (table.shift > 0).sum(axis=0).max(initial=0)]
+        low, high = np.take_along_axis(low, turns, 0), np.take_along_axis(high, turns, 0)
+        shift = np.take_along_axis(table.shift, shifts, 0)
+        takes = np.concatenate([np.maximum(-low, high), shift])
         after = np.cumsum(takes[::-1], axis=0)[::-1] - takes
-        return _Bounds(place, bounds[0], bounds[1], shift, after)
+        # The first two errors are cuts.
+        return _Bounds(np.concatenate([turns, shifts]) + 2, low, high, shift, after)
 
     def of_each(self, kind: Indices, first: Indices) -> _Bounds:
         """The same of what asks, by its kind; with the rows of its numbers for the places."""
-        import numpy as np
-
         rows = first[self.place[:, kind], np.arange(len(kind))]
         low, high, shift, after = (column[:, kind] for column in self[1:])
         return _Bounds(rows, low, high, shift, after)
-
-
-def _of_turns(rows: MarginRows) -> list[tuple[int, float, float]]:
-    """Where turns stand among the errors, and what they take either way; most of all first."""
-    low, high = rows.bounds
-    moves = enumerate(rows.moves, len(rows.contours))
-    turns = [(error, one, sign) for error, (one, sign, levers) in moves if levers is not None]
-    found = [
-        (error, low[column] * sign * turn.most, high[column] * sign * turn.most)
-        for column, (error, turn, sign) in enumerate(turns, 3)
-    ]
-    return sorted(found, key=lambda one: -max(map(abs, one[1:])))
-
-
-def _of_shifts(rows: MarginRows) -> list[tuple[int, float]]:
-    """Where shifts stand among the errors, and how far they go; the farthest first."""
-    moves = enumerate(rows.moves, len(rows.contours))
-    found = [(error, shift.most) for error, (shift, _, levers) in moves if levers is None]
-    return sorted(found, key=lambda one: -one[1])
 
 
 class _Table(NamedTuple):
@@ -122,8 +97,6 @@ class _Table(NamedTuple):
 
     @staticmethod
     def of(kinds: Sequence[MarginRows], moves: int) -> _Table:
-        import numpy as np
-
         begins = np.cumsum([0, *(len(rows.room) for rows in kinds)])
         factors = np.zeros((2 * moves, int(begins[-1])))
         shift, turn, signs = np.zeros((3, moves, len(kinds)))
@@ -138,6 +111,33 @@ class _Table(NamedTuple):
                     factors[2 * line, own] = sign * levers
         room = np.concatenate([np.zeros(0), *(rows.room for rows in kinds)])
         return _Table(begins, room, factors, shift, turn, signs)
+
+    @property
+    def least(self) -> Floats:
+        """The least room of each kind."""
+        return _of_kinds(np.minimum, self.room, self.begins)
+
+    def least_uncut(self) -> Floats:
+        """By kind: no row leaves less, whatever moves, before what cutting adds or takes."""
+        kind = np.repeat(np.arange(len(self.begins) - 1), np.diff(self.begins))
+        left = self.room - self.shift.sum(axis=0)[kind]
+        for levers, most in zip(self.factors[::2], self.turn, strict=True):
+            left -= most[kind] * np.abs(levers)
+        return _of_kinds(np.minimum, left, self.begins)
+
+    def turned(self) -> tuple[Floats, Floats]:
+        """What the full turn of each line adds to the rows of each kind, at least and at most."""
+        levers = self.factors[::2]
+        low, high = (_of_kinds(one, levers, self.begins) for one in (np.minimum, np.maximum))
+        return low * self.turn, high * self.turn
+
+
+def _of_kinds(which: np.ufunc, rows: Floats, begins: Indices) -> Floats:
+    """The least, or the largest, of the rows of each kind."""
+    if not rows.shape[-1]:
+        return rows
+    found: Floats = which.reduceat(rows, begins[:-1], axis=-1)
+    return found
 
 
 class _Drawn(NamedTuple):
@@ -167,8 +167,6 @@ class RandomBuilds:
     """Tells in which builds the rows of interfaces come short, of all interfaces at once."""
 
     def __init__(self, asked: Sequence[RowsAsked], cutting: float) -> None:
-        import numpy as np
-
         kinds = {id(one.rows): one.rows for one in asked}
         numbers = {name: number for number, name in enumerate(kinds)}
         every = list(kinds.values())
@@ -179,26 +177,28 @@ class RandomBuilds:
         self.first = np.array(first, dtype=np.intp).reshape(-1, 2 + moves).T
         signs = [[sign for _, sign in rows.contours] for rows in every]
         self.signs = np.array(signs).reshape(-1, 2).T
-        self.least = np.array([rows.bounds.low[0] for rows in every])
-        self.bounds = _Bounds.of(every).of_each(self.kind, self.first)
         self.table = _Table.of(every, moves)
-        self.cuts: dict[tuple[int, int, float, float], list[tuple[int, float]]] = {}
-        """By the numbers and signs of two contours: what asks for them, and below which sum of
-        their numbers its rows may come short."""
-        for number, (rows, (a, b, *_)) in enumerate(asked):
-            (_, one), (_, other) = rows.contours
-            least = SURE - rows.least_uncut + ROOM
-            share = math.inf if least > 0 else -math.inf
-            if cutting > 0:
-                share = least / (2 * cutting) + (one + other) / 2
-            self.cuts.setdefault((a, b, one, other), []).append((number, share))
+        self.least = self.table.least
+        self.bounds = _Bounds.of(self.table).of_each(self.kind, self.first)
+        lines: dict[Pair, int] = {}
+        pairs = [
+            Pair(a, b, *signs[kind])
+            for kind, (a, b, *_) in zip(self.kind.tolist(), first, strict=True)
+        ]
+        self.line = np.array([lines.setdefault(pair, len(lines)) for pair in pairs], dtype=np.intp)
+        """Of what asks, the number of its pair of contours among ``pairs``."""
+        self.pairs = tuple(lines)
+        least = SURE - self.table.least_uncut() + ROOM
+        share = np.where(least > 0, math.inf, -math.inf)
+        if cutting > 0:
+            share = least / (2 * cutting) + self.signs.sum(axis=0) / 2
+        self.share = share[self.kind]
+        """Below which sum of the numbers of its pair what asks may come short."""
 
-    def short(self, numbers: Floats) -> tuple[Indices, Indices]:
-        """What was asked for, by number, and the builds in which it comes short.
-
-        ``numbers`` has a row of builds for each error.
-        """
-        drawn = self._drawn(numbers, *self._roughly(numbers))
+    def short(self, batch: DrawnBuilds) -> tuple[Indices, Indices]:
+        """What was asked for, by number, and the builds in which it comes short."""
+        numbers = batch.numbers
+        drawn = self._drawn(numbers, *self._roughly(batch, numbers))
         if not len(drawn.asked):
             return drawn.asked, drawn.build
         least = self._least(drawn)
@@ -208,14 +208,12 @@ class RandomBuilds:
         is_short[near] = self._is_short(drawn.at(near))
         return drawn.asked[is_short], drawn.build[is_short]
 
-    def _roughly(self, numbers: Floats) -> tuple[Indices, Indices, Floats]:
+    def _roughly(self, batch: DrawnBuilds, numbers: Floats) -> tuple[Indices, Indices, Floats]:
         """Where errors may take enough, each by itself; and what cuts and turns leave there.
 
         One error after the other is taken into account: most builds are decided by the first.
         """
-        import numpy as np
-
-        asked, builds, total = self._cut(numbers)
+        asked, builds, total = self._cut(batch, numbers)
         signs = self.cutting * self.signs.sum(axis=0)
         held = (self.least - signs)[self.kind][asked] + 2 * self.cutting * total
         drawn, count = numbers.ravel(), numbers.shape[1]
@@ -234,26 +232,20 @@ class RandomBuilds:
             held, left = held.take(some), left.take(some)
         return asked, builds, held
 
-    def _cut(self, numbers: Floats) -> tuple[Indices, Indices, Floats]:
+    def _cut(self, batch: DrawnBuilds, numbers: Floats) -> tuple[Indices, Indices, Floats]:
         """Where cutting errors may take enough, and the sums of their numbers, signs kept."""
-        import numpy as np
-
-        asked: list[int] = []
-        found: list[Indices] = []
-        sums: list[Floats] = []
-        total = np.empty(numbers.shape[1])
-        for (a, b, one, other), wanted in self.cuts.items():
-            (np.add if one == other else np.subtract)(numbers[a], numbers[b], out=total)
-            if one < 0:
-                np.negative(total, out=total)
-            for number, share in wanted:
-                builds = _picked(total < share)
-                asked.append(number)
-                found.append(builds)
-                sums.append(total[builds])
-        every = np.repeat(np.array(asked, dtype=np.intp), [len(builds) for builds in found])
-        none = np.zeros(0, dtype=np.intp)
-        return every, np.concatenate([none, *found]), np.concatenate([np.zeros(0), *sums])
+        lowest, line = batch.lowest(self.pairs), self.line
+        within = self.share <= lowest.below[line]
+        limit = np.where(within, self.share, -math.inf)
+        place = np.flatnonzero(lowest.totals.take(line, axis=0) < limit[:, None])
+        asked, place = np.divmod(place, lowest.builds.shape[1])
+        found = [(asked, lowest.builds[line[asked], place], lowest.totals[line[asked], place])]
+        # More may come short than the lowest sums tell of.
+        for number in _picked(~within).tolist():
+            total = self.pairs[line[number]].total(numbers)
+            builds = _picked(total < self.share[number])
+            found.append((np.full(len(builds), number), builds, total[builds]))
+        return tuple(np.concatenate(one) for one in zip(*found, strict=True))  # type: ignore[return-value]
 
     def _drawn(self, numbers: Floats, asked: Indices, builds: Indices, held: Floats) -> _Drawn:
         """What was drawn for those of which no row may be left for sure, sorted by kind.
@@ -261,8 +253,6 @@ class RandomBuilds:
         All shifts together count by their length, as no normal loses more than that of what cuts
         and turns have ``held``.
         """
-        import numpy as np
-
         order = np.argsort(self.kind[asked], kind="stable")
         asked, builds, held = asked[order], builds[order], held[order]
         kind, table = self.kind[asked], self.table
@@ -290,8 +280,6 @@ class RandomBuilds:
 
     def _least(self, drawn: _Drawn) -> Floats:
         """What is left at the worst row of each, but for rounding."""
-        import numpy as np
-
         table, least = self.table, np.zeros(len(drawn.kind))
         kinds = range(len(table.begins))
         begins = np.searchsorted(drawn.kind, kinds).tolist()
@@ -311,8 +299,6 @@ class RandomBuilds:
 
         A matrix product would round differently on another machine.
         """
-        import numpy as np
-
         table, bad = self.table, np.zeros(len(drawn.kind), dtype=bool)
         for number, kind in enumerate(drawn.kind.tolist()):
             own = slice(*table.begins[kind : kind + 2])

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules.draws import CutContour, Error, numbers, rows_by_error
+from sbafab.rules.draws import CutContour, DrawnBuilds, Error, rows_by_error
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.forms import LinearForm
 from sbafab.rules.freedoms import Freedom, Freedoms
@@ -21,7 +21,6 @@ from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.margin_rows import MarginRows, rows_of
 from sbafab.rules.margins import QUANTITIES, Quantity, own_freedoms, seated
 from sbafab.rules.measures import Measures
-from sbafab.rules.random_builds import RandomBuilds, RowsAsked
 
 if TYPE_CHECKING:
     from sbafab.rules.random_builds import Indices
@@ -179,6 +178,8 @@ def _counted(
     """Draws the builds, in batches, and counts those in which all rows keep room."""
     import numpy as np
 
+    from sbafab.rules.random_builds import RandomBuilds, RowsAsked
+
     interfaces = dict.fromkeys(sorted(index for group in groups for index in group.own), 0)
     wanted = limits.yield_builds or _quick_number(len(interfaces))
     whole = 0
@@ -202,7 +203,7 @@ def _counted(
     for first in range(0, wanted, BATCH):
         pause()
         builds = min(BATCH, wanted - first)
-        asked, bad = of_builds.short(numbers(seed, first * count, count, builds))
+        asked, bad = of_builds.short(DrawnBuilds(seed, first * count, count, builds))
         whole += _different(bad)
         for quantity in QUANTITIES:
             quantities[quantity] += _different(bad[is_of[quantity][asked]])

@@ -16,7 +16,7 @@ from sbafab.geometry.shapes import disc, rectangle
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import boundary, draws, freedoms, margins
 from sbafab.rules.boundary import outward_reach
-from sbafab.rules.draws import CutContour, numbers, rows_by_error
+from sbafab.rules.draws import CutContour, DrawnBuilds, numbers, rows_by_error
 from sbafab.rules.forms import linear_forms
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
@@ -56,13 +56,14 @@ def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float
     asked = rows(number, least, number)
     first, count = rows_by_error(asked.errors)
     # Two interfaces, of which the second one's errors are drawn after the first one's.
-    drawn = numbers(5, 0, 2 * count, BUILDS)
+    batch = DrawnBuilds(5, 0, 2 * count, BUILDS)
+    drawn = batch.numbers
     both = [
         RowsAsked(asked, tuple(count * interface + first[error] for error in asked.errors))
         for interface in (0, 1)
     ]
     good = np.ones((2, BUILDS), dtype=bool)
-    good[RandomBuilds(both, 0.1).short(drawn)] = False
+    good[RandomBuilds(both, 0.1).short(batch)] = False
     levers = asked.moves[2][2]
     assert levers is not None
     for interface in (0, 1):
