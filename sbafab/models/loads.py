@@ -23,7 +23,7 @@ TURN = np.arange(TOUCHES) * math.tau / TOUCHES
 RIM = np.stack([np.cos(TURN), np.sin(TURN), 0 * TURN], -1)
 
 
-class Wall(NamedTuple):
+class OuterPlate(NamedTuple):
     """An outer plate: the line (``point`` and ``normal``) on which the tip meets it, whether it
     ``sticks`` to that line, and how.
 
@@ -43,7 +43,7 @@ class Wall(NamedTuple):
     least: Array
 
     @classmethod
-    def of(cls, point: Array, normal: Array, sticks: bool, outline: float) -> Wall:
+    def of(cls, point: Array, normal: Array, sticks: bool, outline: float) -> OuterPlate:
         """That which a top meets whose rim has the radius ``outline`` in mm."""
         local, ways, least = outline * RIM, np.tile(normal, (TOUCHES, 1)), np.zeros(TOUCHES)
         if sticks:
@@ -69,11 +69,11 @@ class Load(NamedTuple):
 
     tip: Array
     weight: Array | None
-    wall: Wall | None
+    wall: OuterPlate | None
     stiffness: float = STIFF
 
 
-class Touch(NamedTuple):
+class PlateContact(NamedTuple):
     """Where the top is against an outer plate: by how many mm its points are too ``deep``, and by
     how many a unit of each turn and move of ``twists`` makes them deeper, ``lines`` (points, 6).
 
@@ -104,7 +104,7 @@ class _Acting(NamedTuple):
     forces: Array
     arms: Array
     energy: float
-    touch: Touch | None = None
+    touch: PlateContact | None = None
 
 
 def _acting(plates: Chain, load: Load, forces: Array | None) -> _Acting:
@@ -125,7 +125,7 @@ def _acting(plates: Chain, load: Load, forces: Array | None) -> _Acting:
 
 
 def _pressed(
-    found: _Acting, plates: Chain, wall: Wall, stiffness: float, forces: Array | None
+    found: _Acting, plates: Chain, wall: OuterPlate, stiffness: float, forces: Array | None
 ) -> _Acting:
     """With what the outer plate does to the tip: ``forces``, or those of points so deep."""
     points = plates.places[-1] + wall.local @ plates.axes[-1].T
@@ -140,7 +140,7 @@ def _pressed(
         found.forces - acts @ wall.ways,
         found.arms - points.T @ each,
         found.energy + float(resists @ deep) / 2,
-        Touch(deep, lines, stiff, wall.least, acts),
+        PlateContact(deep, lines, stiff, wall.least, acts),
     )
 
 
@@ -165,7 +165,7 @@ class Loaded(NamedTuple):
     blocks: Array
     moved: Array
     works: Array
-    touch: Touch | None
+    touch: PlateContact | None
 
     @property
     def push(self) -> float:
@@ -183,7 +183,7 @@ class Loaded(NamedTuple):
         half *= _nearer(size // 3)
         return -(half + half.T)
 
-    def deeper(self, touch: Touch) -> Array:
+    def deeper(self, touch: PlateContact) -> Array:
         """Mm by which a unit of each freedom makes the points of a touch deeper: (points,
         freedoms).
         """

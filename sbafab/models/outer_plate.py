@@ -17,7 +17,7 @@ from sbafab.models.loads import loaded, with_blocks
 
 if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
-    from sbafab.models.loads import Load, Loaded, Touch, Wall
+    from sbafab.models.loads import Load, Loaded, OuterPlate, PlateContact
     from sbafab.models.springs import Springs
 
 STEPS = 12
@@ -37,7 +37,9 @@ PUSHES = 2.0
 """By how many times the largest push of a level a plate may be pressed on to begin with."""
 
 
-def below(springs: Springs, start: Array, pitch: float, wall: Wall, stiffness: float) -> Array:
+def below(
+    springs: Springs, start: Array, pitch: float, wall: OuterPlate, stiffness: float
+) -> Array:
     """The same start below a level plate, a little past it, so that it is met all round: what is
     alike on all sides stays so.
     """
@@ -58,7 +60,7 @@ def below(springs: Springs, start: Array, pitch: float, wall: Wall, stiffness: f
 
 
 def pressed(
-    springs: Springs, pitch: float, load: Load, wall: Wall, start: Array
+    springs: Springs, pitch: float, load: Load, wall: OuterPlate, start: Array
 ) -> tuple[Array, float, bool] | None:
     """Rise and tilt of each level (levels, 3), the force in mN on the plate, and that the balance
     is stable; None where the way there leads over a place where it is not, or is too long.
@@ -90,8 +92,8 @@ def pressed(
 
 
 def _step(
-    springs: Springs, at: Array, now: Loaded, touch: Touch
-) -> tuple[Array, Touch, bool] | None:
+    springs: Springs, at: Array, now: Loaded, touch: PlateContact
+) -> tuple[Array, PlateContact, bool] | None:
     """The step (freedoms) to balance with all straight but springs and touching, the touch there,
     and whether it is that balance; None where the energy curves the wrong way.
     """
@@ -130,7 +132,7 @@ def _more(
     at: Array,
     matrix: Array,
     gradient: Array,
-    touch: Touch,
+    touch: PlateContact,
     lines: Array,
     deep: Array,
 ) -> Array | None:

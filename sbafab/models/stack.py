@@ -24,7 +24,7 @@ from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import BalloonMap, balloon_map
 from sbafab.models.chain import Chain, chain
-from sbafab.models.loads import Load, Wall
+from sbafab.models.loads import Load, OuterPlate
 from sbafab.models.springs import RING, GapPlaces, Springs
 from sbafab.models.stack_balance import free, held
 
@@ -382,10 +382,10 @@ def stack(
 
 
 @lru_cache(maxsize=256)
-def _wall(line: tuple[float, ...], sticks: bool, outline: float) -> Wall:
+def _wall(line: tuple[float, ...], sticks: bool, outline: float) -> OuterPlate:
     """The outer plate on a line: a point, then the normal."""
     point, normal = np.array(line[:3]), np.array(line[3:])
-    return Wall.of(point, normal / np.linalg.norm(normal), sticks, outline)
+    return OuterPlate.of(point, normal / np.linalg.norm(normal), sticks, outline)
 
 
 def _gripped(one: Balloon) -> Balloon:
