@@ -11,6 +11,8 @@ from sbafab.geometry.once import once
 
 MANY_BOXES = 500
 """From which on comparing all at once is worth fetching numpy."""
+FEW_BOXES = 100
+"""Up to which a sweep needs no bands."""
 AT_ONCE = 1_000_000
 """Pairs that are compared at once, which bounds the memory."""
 
@@ -33,6 +35,9 @@ def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, in
     """
     if len(boxes) >= MANY_BOXES:
         yield from _close_among_many(boxes, reach)
+        return
+    if len(boxes) <= FEW_BOXES:
+        yield from _close_among_few(boxes, reach)
         return
     order = sorted(range(len(boxes)), key=lambda i: boxes[i][0])
     height = reach + sum(box[3] - box[1] for box in boxes) / max(1, len(boxes)) or 1.0
@@ -59,6 +64,19 @@ def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, in
         bottom, top = math.floor(low / height), math.floor(high / height)
         for band in range(bottom, top + 1):
             active.setdefault(band, []).append((rank, i, bottom))
+
+
+def _close_among_few(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
+    """The same pairs in the same order."""
+    active: list[tuple[float, float, float, int]] = []
+    for i in sorted(range(len(boxes)), key=lambda i: boxes[i][0]):
+        left, low, right, high = boxes[i]
+        first, bottom, top = left - reach, low - reach, high + reach
+        active = [one for one in active if one[0] >= first]
+        for _, other_low, other_high, j in active:
+            if other_low <= top and other_high >= bottom:
+                yield j, i
+        active.append((right, low, high, i))
 
 
 def _close_among_many(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
