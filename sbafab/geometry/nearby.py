@@ -107,6 +107,10 @@ def _close_among_many(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[i
     yield from zip(order[before[turn]].tolist(), order[behind[turn]].tolist(), strict=True)
 
 
+FEW_EDGES = 64
+"""Up to which all boxes are looked at, which costs less than filing them."""
+
+
 class EdgeIndex:
     """Edges filed by the cells of a square grid that their bounding boxes touch."""
 
@@ -135,6 +139,11 @@ class EdgeIndex:
                     filed.setdefault((x, y), []).append(number)
         return filed
 
+    @once
+    def _cells(self) -> list[tuple[int, int]]:
+        """The first cell of each edge."""
+        return [self._places(box)[:2] for box in self._boxes]
+
     def _places(self, box: Bounds) -> tuple[int, int, int, int]:
         (x, y), cell = self._low, self.cell
         return (
@@ -155,19 +164,27 @@ class EdgeIndex:
         """
         left, bottom, right, top = box
         boxes = self._boxes
-        near = self._near(box) if among is None else among
+        if among is None and len(boxes) > FEW_EDGES:
+            return [
+                number
+                for number in self._near(box)
+                if (own := boxes[number])[0] <= right
+                and own[2] >= left
+                and own[1] <= top
+                and own[3] >= bottom
+            ]
         found = [
             number
-            for number in near
+            for number in (range(len(boxes)) if among is None else among)
             if (own := boxes[number])[0] <= right
             and own[2] >= left
             and own[1] <= top
             and own[3] >= bottom
         ]
-        if among is not None and len(found) > 1:
-            x0, y0, _, _ = self._places(box)
-            cells = {number: self._places(boxes[number]) for number in found}
+        if len(found) > 1:
             # The first cell that both touch, as they are told cell by cell.
+            x0, y0, _, _ = self._places(box)
+            cells = self._cells
             found.sort(key=lambda n: (max(x0, cells[n][0]), max(y0, cells[n][1])))
         return found
 
