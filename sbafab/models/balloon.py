@@ -5,11 +5,12 @@ computed; the other one mirrors it. A film stretches (plane stress; Saint Venant
 law, or Hencky's) and bends. Where its hoop is compressed it wrinkles, and carries what wrinkles of
 least energy do:
 
-    N = 2 pi / L sqrt(B T)      (after Cerda and Mahadevan, 2003)
+    N = 2 sqrt(B K)    K = T (pi / L)^2 + E t c^2      (after Cerda and Mahadevan, 2003)
 
-with the bending stiffness B, the tension T along the meridian and the length L of the compressed
-zone. The rim, two films thick, does not ripple. Shapes are those of least energy, found by Newton's
-method for many pressures and heights at once. Lengths mm, pressures kPa, volumes ul, forces mN.
+with the bending stiffness B, the tension T along the meridian, the length L of the compressed zone
+and the curvature c of the meridian. The rim, two films thick, ripples (``rim_ripple``). Shapes are
+those of least energy, found by Newton's method for many pressures and heights at once. Lengths mm,
+pressures kPa, volumes ul, forces mN.
 """
 
 from __future__ import annotations
@@ -23,12 +24,13 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.laminate.films import PAPER_TPE
-from sbafab.models import banded
+from sbafab.models import banded, rim_ripple
 from sbafab.models.film_elements import (
     Elements,
     Flat,
     air,
     bending,
+    curvature,
     gradient,
     matrix,
     membrane,
@@ -37,9 +39,12 @@ from sbafab.models.film_elements import (
 from sbafab.models.least_energy import Descent, NoBalance, settled
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike, NDArray
 
     from sbafab.models.film_elements import Array
+    from sbafab.models.rim_ripple import Ripple
 
 FILM_ELEMENTS = 24
 RIM_ELEMENTS = 5
@@ -133,11 +138,16 @@ class Balloon:
         return np.array(sorted(found))
 
     @cached_property
-    def free_band(self) -> Array:
-        """1 where both coordinates i and i + k move on their own, else 0: (coordinates, 6)."""
-        free = np.zeros(2 * len(self.nodes) + 5)
-        free[self.freedoms] = 1.0
-        return free[: 2 * len(self.nodes), None] * np.lib.stride_tricks.sliding_window_view(free, 6)
+    def free(self) -> Array:
+        """1 where a coordinate moves on its own, else 0: (coordinates, 1)."""
+        found = np.zeros((2 * len(self.nodes), 1))
+        found[self.freedoms] = 1.0
+        return found
+
+    @cached_property
+    def packing(self) -> banded.Packing:
+        """How a band by coordinates becomes one by freedoms."""
+        return banded.packing(self.freedoms, 2 * len(self.nodes), 6)
 
     @property
     def level(self) -> int:
@@ -170,15 +180,19 @@ class Shapes(NamedTuple):
 
 
 class BalloonLoad(NamedTuple):
-    """Pressure, half the height between the plates, and the stress that wrinkles carry."""
+    """Pressure, half the height between the plates, the stress that wrinkles carry, and how the
+    rim ripples.
+    """
 
     pressure: Array
     half: Array
     cap: Array
     tied: bool
+    ripple: Ripple
 
     def rows(self, these: NDArray[np.int_]) -> BalloonLoad:
-        return BalloonLoad(self.pressure[these], self.half[these], self.cap[these], self.tied)
+        pressure, half, cap = self.pressure[these], self.half[these], self.cap[these]
+        return BalloonLoad(pressure, half, cap, self.tied, self.ripple.rows(these))
 
 
 def inflate(
@@ -198,7 +212,8 @@ def inflate(
         raise DesignError("pressure and height of a balloon must be above 0 kPa and 0 mm")
     elements = len(balloon.nodes) - 1
     smooth = np.where(balloon.may_wrinkle & balloon.inextensible, 0.0, math.inf)
-    load = BalloonLoad(p, high / 2, np.broadcast_to(smooth, (len(p), elements)), tied)
+    cap = np.broadcast_to(smooth, (len(p), elements))
+    load = BalloonLoad(p, high / 2, cap, tied, rim_ripple.smooth(balloon, len(p)))
     if balloon.mate is not None:
         from sbafab.models import two_films
 
@@ -209,7 +224,8 @@ def inflate(
         if balloon.wrinkles and not balloon.inextensible:
             zone = compressed(balloon, *places(x))
             for _ in range(ROUNDS):
-                load = load._replace(cap=wrinkling(balloon, *places(x), zone))
+                (ripple,) = rippling((balloon,), (places(x),))
+                load = load._replace(cap=wrinkling(balloon, *places(x), zone), ripple=ripple)
                 x = _settled(balloon, load, x)
     r, z = (np.ascontiguousarray(part) for part in places(x))
     found = total(balloon, load, x)
@@ -222,20 +238,24 @@ def start(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
     flat, free = balloon.nodes, balloon.pocket - balloon.neck
     rise = 0.3 * free * np.cbrt(load.pressure * balloon.pocket / (balloon.modulus * 0.0025))
     rise = np.clip(rise, 0.05 * free, 0.8 * free)
-    rise = load.half if load.tied else np.minimum(rise, load.half)
+    rise = np.maximum(rise, load.half) if load.tied else rise
     shape = np.clip(1 - ((flat - balloon.neck) / free) ** 2, 0.0, 1.0)
     shape[: balloon.held + 1] = 1.0
-    return np.tile(flat, (len(rise), 1)), rise[:, None] * shape
+    return np.tile(flat, (len(rise), 1)), np.minimum(
+        rise[:, None] * shape, load.half[:, None] + 1 / PLATE
+    )
 
 
 class Total(NamedTuple):
     """Energy (rows,) of a film and plates less the work of the air, its derivatives by coordinate,
-    (coordinates, rows) and as a band (coordinates, 6, rows), and the plates' force, (rows,).
+    (coordinates, rows) and as a band (coordinates, 6, rows), without what ripples join: that is by
+    the radii of the rim's nodes (nodes, nodes, rows). And the plates' force, (rows,).
     """
 
     energy: Array
     gradient: Array
     matrix: Array
+    rim: Array
     force: Array
 
 
@@ -257,6 +277,7 @@ def total(balloon: Balloon, load: BalloonLoad, x: Array) -> Total:
     p = load.pressure
     bent = bending(film, balloon.rigidity, slice(balloon.held, edge), lie)
     stretched, filled = membrane(film, lie, load.cap), air(film, edge, lie)
+    eased = rim_ripple.eased(film, edge, load.ripple, r)
     slopes, curves = (
         [a + b - p[:, None] * c for a, b, c in zip(*parts, strict=True)]
         for parts in (
@@ -267,16 +288,28 @@ def total(balloon: Balloon, load: BalloonLoad, x: Array) -> Total:
     number = np.arange(len(film.nodes))
     stiff = PLATE * p[:, None] * np.where(number < edge, balloon.widths, 0.0)
     over = np.maximum(z - load.half[:, None], 0.0)
+    touches = over > 0
     if load.tied:
         holds = number <= balloon.held
         stiff = np.where(holds, PLATE * np.maximum(p, 1.0)[:, None] * balloon.widths, stiff)
         over = np.where(holds, z - load.half[:, None], over)
+        touches |= holds
     pressed = stiff * over
-    energy = bent.term.energy + stretched.energy - p * filled.energy + (pressed * over).sum(-1) / 2
+    energy = bent.term.energy + stretched.energy + eased.energy
+    energy = energy - p * filled.energy + (pressed * over).sum(-1) / 2
     by_place, band = gradient(slopes), matrix(curves, bent.joined)
     by_place[1::2] += pressed.T
-    band[1::2, 0] += np.where(over != 0, stiff, 0.0).T
-    return Total(energy, by_place, band, pressed.sum(-1))
+    by_place[2 * edge :: 2] += eased.slopes
+    band[1::2, 0] += np.where(touches, stiff, 0.0).T
+    return Total(energy, by_place, band, eased.curves, pressed.sum(-1))
+
+
+def second_slopes(balloon: Balloon, found: Total) -> Array:
+    """The whole matrices of second derivatives by coordinate: (rows, coordinates, coordinates)."""
+    whole = banded.dense(found.matrix)
+    rim = np.arange(2 * balloon.edge, len(found.gradient), 2)
+    whole[:, rim[:, None], rim] += np.moveaxis(found.rim, -1, 0)
+    return whole
 
 
 class Energies:
@@ -288,17 +321,23 @@ class Energies:
 
     def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
         found = total(self.balloon, self.load.rows(rows), x)
-        freely = self.balloon.free_band
         for height in range(1, self.balloon.level, 2):
             found.gradient[self.balloon.level] += found.gradient[height]
             banded.join(found.matrix, height, self.balloon.level)
-        slopes, band = found.gradient * freely[:, :1], found.matrix * freely[..., None]
-        return Descent(found.energy, slopes, band)
+        band = banded.packed(found.matrix, self.balloon.packing)
+        # The rim's radii are the last freedoms, next to each other.
+        ends = len(found.rim)
+        for k in range(ends):
+            number = np.arange(ends - k)
+            band[len(band) - ends + number, k] += found.rim[number, number + k]
+        return Descent(found.energy, found.gradient * self.balloon.free, band)
 
     def ahead(self, state: Descent, damping: Array) -> Array:
         band = state.matrix.copy()
         band[:, 0] += damping * np.abs(band[:, 0])
-        found = banded.solve(band, -state.gradient, self.balloon.freedoms)
+        freedoms = self.balloon.freedoms
+        found = np.zeros_like(state.gradient)
+        found[freedoms] = banded.solve(band, -state.gradient[freedoms])
         found[1 : self.balloon.level : 2] = found[self.balloon.level]
         return found
 
@@ -339,8 +378,22 @@ def compressed(balloon: Balloon, r: Array, z: Array) -> Array:
 
 def wrinkling(balloon: Balloon, r: Array, z: Array, zone: Array) -> Array:
     """The hoop stress in kPa that wrinkles over a zone carry, for each element's tension."""
-    tension = balloon.modulus * balloon.thickness * strain(balloon.film, r, z).meridian
-    force = math.tau / zone[:, None] * np.sqrt(balloon.rigidity * np.maximum(tension, 0.0))
+    film = balloon.film
+    tension = balloon.rigid * strain(film, r, z).meridian
+    # A wrinkle of a curved film stretches the meridian: many short ones cost least.
+    held = np.maximum(tension, 0.0) * (math.pi / zone[:, None]) ** 2
+    held = held + balloon.rigid * curvature(film, r, z) ** 2
+    force = 2 * np.sqrt(balloon.rigidity * held)
     carried: Array = np.full_like(force, math.inf)
     carried[:, balloon.may_wrinkle] = force[:, balloon.may_wrinkle] / balloon.thickness
     return carried
+
+
+def rippling(films: Sequence[Balloon], shapes: Sequence[tuple[Array, Array]]) -> list[Ripple]:
+    """How the rim ripples at the shapes of its one film, which another mirrors, or of both."""
+    strains = [strain(one.film, *shape) for one, shape in zip(films, shapes, strict=True)]
+    pulls = [
+        one.rigid * found.meridian[:, one.edge - 1]
+        for one, found in zip(films, strains, strict=True)
+    ]
+    return rim_ripple.rippling(films, strains[0].hoop[:, films[0].edge :], pulls)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,12 +12,12 @@ if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
 
 
-def solve(band: Array, wanted: Array, freedoms: NDArray[np.int_]) -> Array:
-    """The ``x`` of A x = ``wanted``: (n, rows); 0 but at ``freedoms``.
+def solve(band: Array, wanted: Array) -> Array:
+    """The ``x`` of A x = ``wanted``: (n, rows).
 
-    ``band`` (n, width, rows) holds ``A[i, i + k]`` at ``[i, k]``, 0 where one of both is no
-    freedom. By A = L D L^T without a change of order, all rows in step; a pivot below 0 is taken
-    for its size, so that of an energy's slopes ``x`` leads downhill always.
+    ``band`` (n, width, rows) holds ``A[i, i + k]`` at ``[i, k]``. By A = L D L^T without a change
+    of order, all rows in step; a pivot below 0 is taken for its size, so that of an energy's slopes
+    ``x`` leads downhill always.
     """
     size, width, rows = band.shape
     reach = width - 1
@@ -31,11 +31,9 @@ def solve(band: Array, wanted: Array, freedoms: NDArray[np.int_]) -> Array:
     squares = np.lib.stride_tricks.as_strided(
         full[1:, reach:], (size, reach, reach, rows), (step, step - across, across, row)
     )
-    lower = np.empty((size, reach, rows))
-    pivots = np.ones((size, rows))
-    product = np.empty((reach, reach, rows))
-    side = np.empty((reach, rows))
-    for i in freedoms.tolist():
+    lower, pivots = np.empty((size, reach, rows)), np.empty((size, rows))
+    product, side = np.empty((reach, reach, rows)), np.empty((reach, rows))
+    for i in range(size):
         right = full[i, reach + 1 :]
         pivot = np.abs(full[i, reach], out=pivots[i])
         share = np.divide(right, pivot, out=lower[i])
@@ -43,11 +41,11 @@ def solve(band: Array, wanted: Array, freedoms: NDArray[np.int_]) -> Array:
         squares[i] -= product
         np.multiply(share, found[i], out=side)
         found[i + 1 : i + width] -= side
-    solved = np.zeros((size + reach, rows))
-    for i in reversed(freedoms.tolist()):
-        np.multiply(lower[i], solved[i + 1 : i + width], out=side)
-        np.subtract(found[i] / pivots[i], side.sum(0), out=solved[i])
-    return solved[:size]
+    found[:size] /= pivots
+    for i in reversed(range(size)):
+        np.multiply(lower[i], found[i + 1 : i + width], out=side)
+        found[i] -= side.sum(0)
+    return found[:size]
 
 
 def join(band: Array, from_: int, to: int) -> None:
@@ -59,6 +57,33 @@ def join(band: Array, from_: int, to: int) -> None:
             value = 2 * value
         at = to if i == from_ else i
         band[min(at, to), abs(at - to)] += value
+
+
+class Packing(NamedTuple):
+    """Which entries [i, k] of a band are kept, and where they go in one without the others."""
+
+    row: NDArray[np.int_]
+    off: NDArray[np.int_]
+    to_row: NDArray[np.int_]
+    to_off: NDArray[np.int_]
+    size: int
+
+
+def packing(freedoms: NDArray[np.int_], size: int, width: int) -> Packing:
+    """Of a band (size, width) what is left when only ``freedoms`` are unknown."""
+    number = np.full(size + width, -1)
+    number[freedoms] = np.arange(len(freedoms))
+    row, off = (part.ravel() for part in np.meshgrid(freedoms, np.arange(width), indexing="ij"))
+    kept = number[row + off] >= 0
+    row, off = row[kept], off[kept]
+    return Packing(row, off, number[row], number[row + off] - number[row], len(freedoms))
+
+
+def packed(band: Array, how: Packing) -> Array:
+    """The band (freedoms, width, rows) of the unknowns alone, from one (n, width, rows)."""
+    found = np.zeros((how.size, *band.shape[1:]))
+    found[how.to_row, how.to_off] = band[how.row, how.off]
+    return found
 
 
 def dense(band: Array) -> Array:

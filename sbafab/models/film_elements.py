@@ -89,6 +89,14 @@ def strain(flat: Flat, r: Array, z: Array) -> Strain:
     return Strain(_measure(flat, along), _measure(flat, around))
 
 
+def curvature(flat: Flat, r: Array, z: Array) -> Array:
+    """Curvature of the meridian in 1/mm by element: mean of its two ends."""
+    slope = np.arctan2(-np.diff(z), np.diff(r))
+    bent = np.diff(slope) / ((flat.lengths[1:] + flat.lengths[:-1]) / 2)
+    ends = np.concatenate([bent[:, :1], bent, bent[:, -1:]], axis=1)
+    return np.asarray((ends[:, 1:] + ends[:, :-1]) / 2)
+
+
 def _squares(flat: Flat, at: Elements) -> tuple[Array, Array]:
     """Squared stretches of each element."""
     return at.square / flat.lengths**2, (at.middle / flat.middles) ** 2
@@ -167,8 +175,7 @@ def bending(flat: Flat, rigidity: float, bent: slice, at: Elements) -> Bent:
     """Bending along the meridian and round the hoop between clamped edges.
 
     What lies outside the nodes ``bent`` is bonded face to face with its mirror. It
-    does not bend, but gives way at its root as the arms of a double cantilever beam do. The
-    second derivatives leave out those of the slopes themselves: enough to descend by.
+    does not bend, but gives way at its root as the arms of a double cantilever beam do.
     """
     slope = np.arctan2(-at.dz, at.dr)
     held, edge = bent.start, bent.stop
@@ -187,16 +194,13 @@ def bending(flat: Flat, rigidity: float, bent: slice, at: Elements) -> Bent:
     turn = -ring * at.dz * at.dr / at.square
     turn[:, 1 : edge + 1] += moment
     turn[:, :edge] -= moment
-    stiffness = ring * cosine2
+    stiffness = ring * (cosine2 - sine2)
     stiffness[:, 1 : edge + 1] += stiff
     stiffness[:, :edge] += stiff
     stiff_a, stiff_b = stiffness * a, stiffness * b
-    none = np.zeros_like(a)
-    term = Term(
-        energy,
-        [turn * a, turn * b, none],
-        [stiff_a * a, stiff_a * b, stiff_b * b, none, none, none],
-    )
+    none, twice = np.zeros_like(a), 2 * turn * a * b
+    curves = [stiff_a * a + twice, stiff_a * b + turn * (b * b - a * a), stiff_b * b - twice]
+    term = Term(energy, [turn * a, turn * b, none], [*curves, none, none, none])
     before = -stiff * a[:, :edge], -stiff * b[:, :edge]
     after = a[:, 1 : edge + 1], b[:, 1 : edge + 1]
     return Bent(term, [x * y for x in before for y in after])

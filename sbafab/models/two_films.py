@@ -13,9 +13,9 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.models import balloon as single
-from sbafab.models import banded
 from sbafab.models.film_elements import Elements, air
 from sbafab.models.least_energy import Descent, NoBalance, settled
+from sbafab.models.rim_ripple import both_bend
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,10 +44,11 @@ def inflate(films: TwoFilms, load: BalloonLoad) -> Shapes:
                 for one, part in zip(films, np.split(basis @ y, 2), strict=True)
             ]
             for _ in range(single.ROUNDS):
-                parts = zip(films, np.split(basis @ y, 2), zones, strict=True)
+                shapes = [single.places(part) for part in np.split(basis @ y, 2)]
+                ripples = single.rippling(films, shapes)
                 loads = tuple(
-                    load._replace(cap=single.wrinkling(one, *single.places(part), zone))
-                    for one, part, zone in parts
+                    load._replace(cap=single.wrinkling(one, *shape, zone), ripple=ripple)
+                    for one, shape, zone, ripple in zip(films, shapes, zones, ripples, strict=True)
                 )  # type: ignore[assignment]
                 y = _settled(films, loads, basis, y)
     x = basis @ y
@@ -71,11 +72,8 @@ def _wringing(films: TwoFilms) -> Array:
 
     A ring of both films bonded turns round its middle line: hoops are bent.
     """
-    (e1, t1), (e2, t2) = ((one.modulus, one.thickness) for one in films)
-    mixed = e1 * e2 * t1 * t2 * (4 * t1**2 + 6 * t1 * t2 + 4 * t2**2)
-    bent = (e1**2 * t1**4 + e2**2 * t2**4 + mixed) / (12 * (e1 * t1 + e2 * t2))
     one = films[0]
-    stiff = math.tau * bent * math.log((one.pocket + one.ring) / one.pocket)
+    stiff = math.tau * both_bend(films) * math.log((one.pocket + one.ring) / one.pocket)
     found = np.zeros(4 * len(one.nodes))
     found[[2 * len(one.nodes) - 1, 2 * one.edge + 1]] = 1.0, -1.0
     return np.asarray(found * math.sqrt(stiff) / one.ring)
@@ -144,7 +142,8 @@ class _Energies:
             found = single.total(one, load.rows(rows), part)
             energy = energy + found.energy
             slopes += basis.T @ found.gradient
-            matrix += basis.T @ banded.dense(found.matrix) @ basis
+            whole = single.second_slopes(one, found)
+            matrix += basis.T @ whole @ basis
         return Descent(energy, slopes, matrix)
 
     def ahead(self, state: Descent, damping: Array) -> Array:

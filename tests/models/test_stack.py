@@ -42,7 +42,7 @@ def test_a_map_is_the_balloon_that_it_was_made_from(balloon: BalloonMap) -> None
     # Places that no balloon of the map was computed at, pushed on and pulled on.
     p, h = np.array([0.7, 3.3, 8.1, 47.0]), np.array([0.33, 0.81, 1.6, 0.52])
     found = inflate(balloon.balloon, p, h, tied=True)
-    assert balloon.force(p, h) == pytest.approx(found.force, rel=0.025, abs=0.5)
+    assert balloon.force(p, h) == pytest.approx(found.force, rel=0.025, abs=1.0)
     assert balloon.volume(p, h) == pytest.approx(found.volume, rel=0.01)
     free = inflate(balloon.balloon, [1.0, 5.0, 20.0])
     assert balloon.free_height([1.0, 5.0, 20.0]) == pytest.approx(free.height, rel=0.01)

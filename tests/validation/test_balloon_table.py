@@ -11,7 +11,7 @@ from docs.scripts.balloon_runs import CASES, PAGE, PRESSURES, Case, Run, elastic
 
 LIMITS = {"held smooth": 1.5, "free to wrinkle": 3.0}
 """Per cent in stroke and air."""
-MISSED = {"d = 10, alone, free to wrinkle": 8.0, "d = 5, in a stack, free to wrinkle": 5.5}
+MISSED = {"d = 10, alone, free to wrinkle": 4.5, "d = 5, in a stack, free to wrinkle": 5.5}
 """Rows that do not keep their limit, and by how much they miss it at most; the page says why."""
 
 
