@@ -16,7 +16,7 @@ from sbafab.output.planned import Checked
 from sbafab.output.settings import limits
 from sbafab.rules.deck import run_deck
 from sbafab.search.margins import RuleMargin, margins
-from sbafab.search.quantities import Subject
+from sbafab.search.quantities import AskedQuantity, Subject, shown_value
 from sbafab.search.requirements import CLOSE, Goal, Requirement
 
 YIELD = "registration-yield"
@@ -69,8 +69,12 @@ class Wanted:
 
     @property
     def asks_for_yield(self) -> bool:
-        asked = [*(one.quantity for one in self.requirements), self.goal.quantity]
-        return any(quantity.name == "yield" for quantity in asked)
+        return any(quantity.name == "yield" for quantity in self.quantities)
+
+    @property
+    def quantities(self) -> list[AskedQuantity]:
+        """All that figures are asked of: requirements first, then the goal."""
+        return [*(one.quantity for one in self.requirements), self.goal.quantity]
 
 
 def tried(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
@@ -113,8 +117,7 @@ def _figures(
             raise DesignError(f"no yield of {subject.design.name} can be counted")
         return found.measured
 
-    asked = [*(one.quantity for one in wanted.requirements), wanted.goal.quantity]
-    return {quantity.said: subject.value(quantity, share_of_good) for quantity in asked}
+    return {quantity.said: subject.value(quantity, share_of_good) for quantity in wanted.quantities}
 
 
 def misses(wanted: Wanted, trial: Trial) -> list[str]:
@@ -122,9 +125,14 @@ def misses(wanted: Wanted, trial: Trial) -> list[str]:
     if trial.refused:
         return [trial.refused]
     said = [
-        f"{one.quantity.said} {trial.value(one):.4g} {one.quantity.unit}, not {one.bound}"
+        f"{one.quantity.said} {shown_value(one.quantity, trial.value(one))}, not {one.bound}"
         for one in wanted.requirements
         if not one.holds(trial.value(one))
     ]
+    return [*said, *broken_rules(trial)]
+
+
+def broken_rules(trial: Trial) -> list[str]:
+    """The rules that a design breaks, a sentence each."""
     failed = [one for one in (trial.rules or {}).values() if one.verdict == "fail"]
-    return [*said, *(f"{one.rule}: {one.message}" for one in failed)]
+    return [f"{one.rule}: {one.message}" for one in failed]
