@@ -1,9 +1,13 @@
-"""One ripple of a lone balloon in CalculiX: half a wave of its rim between two planes of symmetry.
+"""One ripple of a lone balloon in CalculiX: half a wave of its rim, or a quarter.
 
 ``python -m docs.scripts.ripple_sector 10 11`` inflates the balloon of d = 10 with 11 waves round its
 rim and prints stroke, air and ripples by pressure, in some minutes. A whole or quarter balloon jumps
 between numbers of waves on the way and takes hours; a sector keeps its own. Both films are there,
-in elements of second order (C3D20, C3D15 at the axis), free to wrinkle as often as the planes allow.
+in elements of second order (C3D20, C3D15 at the axis), free to wrinkle as often as symmetry allows.
+
+Half a wave lies between two planes of symmetry; its rim may also roll to one side. With ``even`` as
+third argument a quarter ends where the rim crosses the middle plane, on an axis about which half a
+turn changes nothing: what goes up before it goes down behind it, and the rim as a whole stays level.
 """
 
 from __future__ import annotations
@@ -35,8 +39,9 @@ POINTS = 40
 class Sector(NamedTuple):
     """A balloon of diameter ``pocket``, its ring and films in mm, ``waves`` round its rim.
 
-    ``film``, ``rim`` and ``round`` are numbers of elements along the film, the rim and half a
-    wave; ``ramp`` is the time in s to the last pressure.
+    ``film``, ``rim`` and ``round`` are numbers of elements along the film, the rim and round the
+    sector; ``ramp`` is the time in s to the last pressure; ``even`` that a quarter of a wave is
+    taken.
     """
 
     pocket: float = 10.0
@@ -47,6 +52,12 @@ class Sector(NamedTuple):
     rim: int = 5
     round: int = 8
     ramp: float = 0.2
+    even: bool = False
+
+    @property
+    def share(self) -> int:
+        """The whole turn over the sector's."""
+        return (4 if self.even else 2) * self.waves
 
     @property
     def radii(self) -> np.ndarray:
@@ -62,13 +73,15 @@ class Sector(NamedTuple):
 
 
 class SectorMesh(NamedTuple):
-    """Places of nodes (n, 3); elements by type and film; each film's inner faces by eight nodes (six
-    at the axis), in the order of the element; the radial columns' and rounds' numbers of nodes.
+    """Places of nodes (n, 3); elements by film and part; numbers of nodes on the ``sides``, of
+    ``pairs`` on the axis of an even ripple that move alike, of the ``poles``, the one ``held``, and
+    those of the pocket's ``edge`` and of the ``outside``.
     """
 
     points: np.ndarray
     elements: dict[tuple[str, str], list[list[int]]]
     sides: list[int]
+    pairs: list[tuple[int, int]]
     poles: tuple[int, int]
     held: int
     edge: list[int]
@@ -86,7 +99,7 @@ def mesh(one: Sector) -> SectorMesh:
         owner = "both" if level == 0 and i >= 2 * one.film else film
         key = (i, 0 if i == 0 else j, level, owner)
         if key not in numbers:
-            turn = math.pi / one.waves * key[1] / last
+            turn = math.tau / one.share * key[1] / last
             r = float(radii[i])
             off = _off(one, r, turn, film)
             places.append((r * math.cos(turn), r * math.sin(turn), level * one.thickness / 2 + off))
@@ -110,17 +123,27 @@ def mesh(one: Sector) -> SectorMesh:
                 row += [node(*at, low + 1, film) for at in ring]
                 kind = "axis" if i == 0 else "wall" if i < 2 * one.film else "rim"
                 elements.setdefault((film, kind), []).append(row)
+    pairs = []
+    if one.even:
+        for (i, j, level, owner), n in numbers.items():
+            if (j == last or i == 0) and level >= 0 and owner != "lower":
+                other = owner if owner == "both" and level == 0 else "lower"
+                pairs.append((n, numbers[i, j, -level, other]))
     sides = [n for (i, j, _, _), n in numbers.items() if i and j in (0, last)]
     poles = numbers[0, 0, 2, "upper"], numbers[0, 0, -2, "lower"]
     middle = [numbers[2 * one.film, j, 0, "both"] for j in range(last + 1)]
     outside = [numbers[len(radii) - 1, j, 0, "both"] for j in range(last + 1)]
-    return SectorMesh(np.array(places), elements, sides, poles, middle[one.round], middle, outside)
+    return SectorMesh(
+        np.array(places), elements, sides, pairs, poles, middle[one.round], middle, outside
+    )
 
 
 def _off(one: Sector, r: float, turn: float, film: str) -> float:
     out = r / (one.pocket / 2 + one.ring)
-    short = sum(math.cos(k * one.waves * turn + k * (film == "upper")) for k in (2, 3, 4)) / 3
-    return START * out**2 * (math.cos(one.waves * turn) + short / 5 * (r < one.pocket / 2))
+    wave = one.waves * turn
+    short = math.cos(3 * wave) + math.cos(2 * wave) * (1 if film == "upper" else -1)
+    rolled = 0.0 if one.even else 0.1
+    return START * out**2 * (math.cos(wave) + rolled + short / 10 * (r < one.pocket / 2))
 
 
 def deck(one: Sector, made: SectorMesh, pressures: Sequence[float]) -> Iterator[str]:
@@ -141,11 +164,24 @@ def deck(one: Sector, made: SectorMesh, pressures: Sequence[float]) -> Iterator[
     yield "*TRANSFORM, NSET=sides, TYPE=C\n0, 0, 0, 0, 0, 1\n"
     yield f"*MATERIAL, NAME=TPE\n*ELASTIC\n{TPE.modulus:g}, {TPE.poisson:g}\n"
     yield f"*DENSITY\n{TPE.density:g}\n*SOLID SECTION, ELSET=whole, MATERIAL=TPE\n"
-    yield "*BOUNDARY\nsides, 2, 2\n"
+    # On the axis of an even ripple what moves round above moves back below.
+    mirrored = {node for pair in made.pairs if pair[0] != pair[1] for node in pair}
+    yield "*BOUNDARY\n" + "".join(f"{n}, 2, 2\n" for n in made.sides if n not in mirrored)
     axis = np.hypot(made.points[:, 0], made.points[:, 1]) < 1e-9
     for number in np.flatnonzero(axis) + 1:
         yield f"{number}, 1, 2\n"
-    yield f"{made.held}, 3, 3\n*AMPLITUDE, NAME=ramp\n"
+    if not one.even:
+        yield f"{made.held}, 3, 3\n"
+    on_axis = set((np.flatnonzero(axis) + 1).tolist())
+    for node, other in made.pairs:
+        if node == other:
+            yield f"*BOUNDARY\n{node}, 3, 3\n"
+            continue
+        if node not in on_axis:
+            yield f"*EQUATION\n2\n{node}, 1, 1., {other}, 1, -1.\n"
+            yield f"*EQUATION\n2\n{node}, 2, 1., {other}, 2, 1.\n"
+        yield f"*EQUATION\n2\n{node}, 3, 1., {other}, 3, 1.\n"
+    yield "*AMPLITUDE, NAME=ramp\n"
     times = _times(one, pressures)
     ramp = sorted({*times, *(one.ramp * n / POINTS for n in range(POINTS + 1))})
     yield "".join(f"{time:.9g}, {(time / one.ramp) ** 3:.9g}\n" for time in ramp)
@@ -204,11 +240,16 @@ def _state(one: Sector, made: SectorMesh, pressure: float, moved: np.ndarray) ->
     return SectorState(
         pressure,
         float(top - bottom),
-        2 * one.waves * held,
-        float(np.ptp(edge[:, 2])),
-        float(np.ptp(outside[:, 2])),
+        one.share * held,
+        _swing(one, edge),
+        _swing(one, outside),
         float(np.hypot(edge[:, 0], edge[:, 1]).mean()),
     )
+
+
+def _swing(one: Sector, line: np.ndarray) -> float:
+    """From crest to trough."""
+    return float(2 * np.abs(line[:, 2]).max() if one.even else np.ptp(line[:, 2]))
 
 
 def _air(one: Sector, made: SectorMesh, places: np.ndarray) -> float:
@@ -264,10 +305,10 @@ def _serendipity(s: float, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 def main() -> None:
     pocket, waves = float(sys.argv[1]), int(sys.argv[2])
-    last = float(sys.argv[3]) if len(sys.argv) > 3 else PRESSURES[-1]
-    pressures = [pressure for pressure in PRESSURES if pressure <= last]
+    even = "even" in sys.argv[3:]
+    one = Sector(pocket, waves, round=5 if even else 8, even=even)
     print("kPa   stroke   air      edge    outside  radius of the edge")
-    for state in sector_states(Sector(pocket=pocket, waves=waves), pressures):
+    for state in sector_states(one):
         print("  ".join(f"{value:.4f}" for value in state), flush=True)
 
 
