@@ -22,6 +22,11 @@ are read from files, whose coordinates are off by up to 1 um."""
 STEEP = 0.01
 """Sine of the angle to the normal up to which an edge runs along it."""
 
+NEARER = 1e-9
+"""mm by which a place must be nearer than the nearest so far."""
+ROUNDING = 1e-12
+"""mm: more than what heights are rounded by."""
+
 
 @remembered
 def edges_along(region: Region, other: Region) -> tuple[Edge, ...]:
@@ -107,16 +112,35 @@ def _across(edge: Edge, distance: float, others: Iterable[Edge]) -> Iterable[Edg
 def _nearest(within: _Band, others: Iterable[Edge]) -> Reach | None:
     best: Reach | None = None
     for other in others:
+        if best is not None and _least_height(within.edge, other) >= best.value - NEARER:
+            continue
         for p in within.nearest_candidates(other):
             height = within.height(p)
             if (
                 height is not None
                 and not within.is_passed_by(other, p)
                 and height > -EPSILON
-                and (best is None or height < best.value - 1e-9)
+                and (best is None or height < best.value - NEARER)
             ):
                 best = Reach(max(0.0, height), p)
     return best
+
+
+def _least_height(edge: Edge, other: Edge) -> float:
+    """No point of another edge lies less far outward from ``edge``, or its line or circle."""
+    if isinstance(edge, Arc):
+        centre = edge.centre
+        far = [math.dist(centre, other.start), math.dist(centre, other.end)]
+        if isinstance(other, Arc):
+            gap = math.dist(centre, other.centre)
+            far += [abs(gap - other.radius), gap + other.radius]
+        else:
+            far.append(math.dist(centre, other.nearest(centre)))
+        return (min(far) - edge.radius if edge.ccw else edge.radius - max(far)) - ROUNDING
+    heights = [-edge.to_left(other.start), -edge.to_left(other.end)]
+    if isinstance(other, Arc):
+        heights.append(-edge.to_left(other.centre) - other.radius)
+    return min(heights) - ROUNDING
 
 
 class _Band(NamedTuple):
