@@ -112,7 +112,8 @@ def _across(edge: Edge, distance: float, others: Iterable[Edge]) -> Iterable[Edg
 def _nearest(within: _Band, others: Iterable[Edge]) -> Reach | None:
     best: Reach | None = None
     for other in others:
-        if best is not None and _least_height(within.edge, other) >= best.value - NEARER:
+        least, most = _heights(within.edge, other)
+        if most < -EPSILON or (best is not None and least >= best.value - NEARER):
             continue
         for p in within.nearest_candidates(other):
             height = within.height(p)
@@ -126,8 +127,8 @@ def _nearest(within: _Band, others: Iterable[Edge]) -> Reach | None:
     return best
 
 
-def _least_height(edge: Edge, other: Edge) -> float:
-    """No point of another edge lies less far outward from ``edge``, or its line or circle."""
+def _heights(edge: Edge, other: Edge) -> tuple[float, float]:
+    """Between how far outward from ``edge``, or its line or circle, all of another edge lies."""
     if isinstance(edge, Arc):
         centre = edge.centre
         far = [math.dist(centre, other.start), math.dist(centre, other.end)]
@@ -136,11 +137,16 @@ def _least_height(edge: Edge, other: Edge) -> float:
             far += [abs(gap - other.radius), gap + other.radius]
         else:
             far.append(math.dist(centre, other.nearest(centre)))
-        return (min(far) - edge.radius if edge.ccw else edge.radius - max(far)) - ROUNDING
-    heights = [-edge.to_left(other.start), -edge.to_left(other.end)]
-    if isinstance(other, Arc):
-        heights.append(-edge.to_left(other.centre) - other.radius)
-    return min(heights) - ROUNDING
+        least, most = min(far) - edge.radius, max(far) - edge.radius
+        if not edge.ccw:
+            least, most = -most, -least
+    else:
+        heights = [-edge.to_left(other.start), -edge.to_left(other.end)]
+        if isinstance(other, Arc):
+            middle = -edge.to_left(other.centre)
+            heights += [middle - other.radius, middle + other.radius]
+        least, most = min(heights), max(heights)
+    return least - ROUNDING, most + ROUNDING
 
 
 class _Band(NamedTuple):
