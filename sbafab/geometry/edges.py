@@ -302,3 +302,27 @@ def left_normal(edge: Edge, p: Point) -> Point:
 def distance_to(edge: Edge, p: Point) -> float:
     """Least distance from ``p`` to the edge."""
     return math.dist(p, edge.nearest(p))
+
+
+def turns_round(edge: Edge, p: Point) -> int:
+    """What an edge adds to the times its contour runs counter-clockwise round ``p``."""
+    (px, py), (x0, y0), (x1, y1) = p, edge.start, edge.end
+    side = (x1 - x0) * (py - y0) - (px - x0) * (y1 - y0)
+    turns = 0
+    if y0 <= py < y1 and side > 0:
+        turns = 1
+    elif y1 <= py < y0 and side < 0:
+        turns = -1
+    if isinstance(edge, Arc):
+        cx, cy = edge.centre
+        dx, dy = x1 - x0, y1 - y0
+        # Beside its chord alone: that of a short arc with snapped ends may lean either way.
+        beside = 0 <= (px - x0) * dx + (py - y0) * dy <= dx * dx + dy * dy
+        if beside and (px - cx) ** 2 + (py - cy) ** 2 < edge.radius**2:
+            # A point exactly on the chord belongs to the side the count above gave it.
+            left = side > 0 or (side == 0 and (y0 > y1 or (y0 == y1 and x1 > x0)))
+            if edge.ccw and not left:
+                turns += 1
+            elif not edge.ccw and left:
+                turns -= 1
+    return turns

@@ -11,6 +11,8 @@ from sbafab.geometry.once import once
 
 MANY_BOXES = 500
 """From which on comparing all at once is worth fetching numpy."""
+FEW_BOXES = 100
+"""Up to which a sweep needs no bands."""
 AT_ONCE = 1_000_000
 """Pairs that are compared at once, which bounds the memory."""
 
@@ -33,6 +35,9 @@ def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, in
     """
     if len(boxes) >= MANY_BOXES:
         yield from _close_among_many(boxes, reach)
+        return
+    if len(boxes) <= FEW_BOXES:
+        yield from _close_among_few(boxes, reach)
         return
     order = sorted(range(len(boxes)), key=lambda i: boxes[i][0])
     height = reach + sum(box[3] - box[1] for box in boxes) / max(1, len(boxes)) or 1.0
@@ -59,6 +64,19 @@ def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, in
         bottom, top = math.floor(low / height), math.floor(high / height)
         for band in range(bottom, top + 1):
             active.setdefault(band, []).append((rank, i, bottom))
+
+
+def _close_among_few(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
+    """The same pairs in the same order."""
+    active: list[tuple[float, float, float, int]] = []
+    for i in sorted(range(len(boxes)), key=lambda i: boxes[i][0]):
+        left, low, right, high = boxes[i]
+        first, bottom, top = left - reach, low - reach, high + reach
+        active = [one for one in active if one[0] >= first]
+        for _, other_low, other_high, j in active:
+            if other_low <= top and other_high >= bottom:
+                yield j, i
+        active.append((right, low, high, i))
 
 
 def _close_among_many(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
@@ -89,6 +107,10 @@ def _close_among_many(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[i
     yield from zip(order[before[turn]].tolist(), order[behind[turn]].tolist(), strict=True)
 
 
+FEW_EDGES = 64
+"""Up to which all boxes are looked at, which costs less than filing them."""
+
+
 class EdgeIndex:
     """Edges filed by the cells of a square grid that their bounding boxes touch."""
 
@@ -117,6 +139,11 @@ class EdgeIndex:
                     filed.setdefault((x, y), []).append(number)
         return filed
 
+    @once
+    def _cells(self) -> list[tuple[int, int]]:
+        """The first cell of each edge."""
+        return [self._places(box)[:2] for box in self._boxes]
+
     def _places(self, box: Bounds) -> tuple[int, int, int, int]:
         (x, y), cell = self._low, self.cell
         return (
@@ -137,19 +164,27 @@ class EdgeIndex:
         """
         left, bottom, right, top = box
         boxes = self._boxes
-        near = self._near(box) if among is None else among
+        if among is None and len(boxes) > FEW_EDGES:
+            return [
+                number
+                for number in self._near(box)
+                if (own := boxes[number])[0] <= right
+                and own[2] >= left
+                and own[1] <= top
+                and own[3] >= bottom
+            ]
         found = [
             number
-            for number in near
+            for number in (range(len(boxes)) if among is None else among)
             if (own := boxes[number])[0] <= right
             and own[2] >= left
             and own[1] <= top
             and own[3] >= bottom
         ]
-        if among is not None and len(found) > 1:
-            x0, y0, _, _ = self._places(box)
-            cells = {number: self._places(boxes[number]) for number in found}
+        if len(found) > 1:
             # The first cell that both touch, as they are told cell by cell.
+            x0, y0, _, _ = self._places(box)
+            cells = self._cells
             found.sort(key=lambda n: (max(x0, cells[n][0]), max(y0, cells[n][1])))
         return found
 

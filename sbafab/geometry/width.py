@@ -20,6 +20,7 @@ from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.once import once
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.remembered import remembered
+from sbafab.geometry.width_bounds import may_be_narrower, widest_least
 
 if TYPE_CHECKING:
     from sbafab.geometry.side_table import SideTable
@@ -62,6 +63,9 @@ def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) ->
 
     A corner with an interior angle below ``sharp`` degrees has width 0.
     """
+    near = may_be_narrower(region.contours, below)
+    if len(near) < len(region.contours):
+        return least_of(Boundary(near, sharp), below)
     return least_of(boundary_of(region, sharp), below)
 
 
@@ -69,7 +73,7 @@ def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) ->
 def least_gap(region: Region, sharp: float = 90.0, below: float = math.inf) -> Width | None:
     """The narrowest slot, hole or gap between pieces, likewise."""
     outside = [kept(one, "from_outside", Contour.reversed) for one in region.contours]
-    return least_of(Boundary(outside, sharp), below)
+    return least_of(Boundary(may_be_narrower(outside, below), sharp), below)
 
 
 class _Foot(NamedTuple):
@@ -138,6 +142,7 @@ class Boundary:
             for ends in kept(one, f"ends{sharp}", lambda c: list(tapered_ends(c, sharp)))
         ]
         self.pinch = pinch(contours, self.corners, sharp)
+        self.widest_least = widest_least(contours)
         self.index = EdgeIndex(
             [side.edge for side in self.sides], [side.box for side in self.sides]
         )
@@ -246,7 +251,8 @@ def least_of(boundary: Boundary, below: float) -> Width | None:
     if boundary.pinch is not None:
         return Width(0.0, boundary.pinch, boundary.pinch)
     # Most edges lie far apart: those are looked at only where no near ones face.
-    reach, farthest = boundary.index.cell, min(below, 2 * boundary.index.across)
+    reach = min(boundary.index.cell, boundary.widest_least + 2 * SHORTER)
+    farthest = min(below, 2 * boundary.index.across)
     while True:
         narrowest = _Narrowest(boundary, min(reach, farthest))
         search(narrowest)

@@ -14,6 +14,7 @@ from typing import Literal, NamedTuple
 
 from sbafab.geometry.apart import alone, turned_round
 from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.nearby import widened
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import rectangle
 from sbafab.geometry.tidy import tidy
@@ -122,8 +123,15 @@ def _gap(interface: Interface, frame: Region) -> _Gap:
 
 def _bounded(pieces: tuple[Region, ...], p: Point) -> int:
     """The number of the piece that has ``p`` on an edge."""
-    if len(pieces) == 1:
-        return 0
+    # Most lie in the box of that piece alone.
+    inside = [
+        number
+        for number, piece in enumerate(pieces)
+        for left, low, right, high in [widened(piece.bounds, TOLERANCE)]
+        if left <= p[0] <= right and low <= p[1] <= high
+    ]
+    if len(inside) == 1:
+        return inside[0]
     return min(range(len(pieces)), key=lambda number: pieces[number].distance_to_edge(p))
 
 
