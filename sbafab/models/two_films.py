@@ -148,7 +148,9 @@ class _Energies:
 
     def ahead(self, state: Descent, damping: Array) -> Array:
         matrix, diagonal = state.matrix.copy(), np.arange(len(self.wrings))
-        matrix[:, diagonal, diagonal] += damping[:, None] * np.abs(matrix[:, diagonal, diagonal])
+        own = np.abs(matrix[:, diagonal, diagonal])
+        # Slack films without pressure may be held by nothing; rounding's share of the rest is.
+        matrix[:, diagonal, diagonal] += damping[:, None] * own + 1e-15 * own.max(-1)[:, None]
         return np.asarray(-np.linalg.solve(matrix, state.gradient.T[..., None])[..., 0].T)
 
     def change(self, x: Array, ahead: Array) -> Array:
