@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.descent import FINE, curves_up, ends, limited, towards
+from sbafab.models.descent import FARTHEST, FINE, curves_up, ends, limited, towards
 from sbafab.models.loads import Load, Loaded, loaded, with_blocks
 from sbafab.models.outer_plate import below, pressed
 
@@ -30,13 +30,15 @@ ROUGH = 0.01
 """The same on the way to an outer plate."""
 TRIES = 2
 """How often a step is held off by rims that it would meet."""
-ROUNDS, NEARLY = 16, 0.2
-"""How often a step is bettered by the springs at its end, and the share of it that is little."""
+ROUNDS, NEARLY = 16, 0.8
+"""How often a step is bettered by the springs at its end, and the share of it that is little: the
+next step sees to the rest.
+"""
 STRAIGHT = 6e-3
 """A step (mm, rad) along which springs are straight enough."""
-SMALL, ALIKE = 2e-3, 1e-9
-"""A step with whose matrix another one may be made, and what the product of both must be below for
-that one to be the last.
+SMALL, TINY, ALIKE = 2e-3, 1e-9, 0.2
+"""A step with whose matrix another one may be made, what the product of both must be below for that
+one to be the last, and the share by which springs may change between.
 """
 FEW_STEPS = 12
 """Steps in which a start far away meets an outer plate, or never does."""
@@ -131,31 +133,32 @@ def _settled(
             # The matrix of a step so small is still good enough for the last one.
             matrix, blocks = last
             flat = -np.linalg.solve(matrix, now.gradient)
-            if np.abs(flat).max() * before < ALIKE and _are_alike(blocks, now.blocks):
+            if np.abs(flat).max() * before < TINY and _are_alike(blocks, now.blocks):
                 return at + flat.reshape(-1, 3), now.push, True
         rest = now.rest()
         matrix = with_blocks(rest, now.blocks)
-        found, is_firm = towards(now.gradient[None], matrix[None])
-        flat = _held_off(springs, at, found[0], now.gradient, rest, now.blocks)
+        flat, is_firm = (_downhill if quick else _careful)(now.gradient, matrix)
+        flat = _held_off(springs, at, flat, now.gradient, rest, now.blocks)
         if quick and np.abs(flat).max() > STRAIGHT:
             flat = _bettered(springs, at, flat, now, rest)
         move = flat.reshape(-1, 3)
         largest = float(np.abs(move).max())
         slope = float(flat @ now.gradient)
         fits = load.wall is None or (largest < CLOSELY and slope > -LITTLE)
-        if is_firm and (largest <= enough or (fits and ends(largest, before, fine))):
+        is_last = largest <= enough or (fits and ends(largest, before, fine))
+        if is_last and (curves_up(matrix) if is_firm is None else is_firm):
             at = at + move
             if load.wall is None:
                 return at, 0.0, True
             return at, loaded(springs, pitch, load, at).push, True
-        share = float(limited(move).min())
+        share = float(limited(move).min()) if largest > FARTHEST.min() else 1.0
         for _ in range(14):
             tried = loaded(springs, pitch, load, at + share * move)
             if tried.value <= now.value + 1e-4 * share * slope + 1e-11 * (1 + abs(now.value)):
                 break
             share /= 2
         before = largest if share == 1.0 else 0.0
-        may_last = load.wall is None and is_firm and 0 < before < SMALL
+        may_last = load.wall is None and 0 < before < SMALL and curves_up(matrix)
         last = (matrix, now.blocks) if may_last else None
         at = at + share * move
         now = tried
@@ -164,9 +167,21 @@ def _settled(
     return None
 
 
+def _careful(gradient: Array, matrix: Array) -> tuple[Array, bool]:
+    """Newton's step of all levels, and whether the energy curves the right way."""
+    found, is_firm = towards(gradient[None], matrix[None])
+    return found[0], is_firm
+
+
+def _downhill(gradient: Array, matrix: Array) -> tuple[Array, bool | None]:
+    """The same; where the step leads downhill, it is left open how the energy curves."""
+    flat = -np.linalg.solve(matrix, gradient)
+    return (np.asarray(flat), None) if flat @ gradient < 0 else _careful(gradient, matrix)
+
+
 def _are_alike(one: Array, other: Array) -> bool:
     """Whether the springs of two places are: where rims meet or part they are not."""
-    return float(np.abs(one - other).max()) < NEARLY * float(np.abs(one).max())
+    return float(np.abs(one - other).max()) < ALIKE * float(np.abs(one).max())
 
 
 def _held_off(

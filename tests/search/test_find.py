@@ -294,3 +294,41 @@ def test_optuna_finds_it_too_and_goes_on_from_its_storage(tmp_path: Path) -> Non
     assert more.best.cost <= 1.3 * plain.best.cost
     with pytest.raises(DesignError, match="--storage nowhere cannot be used"):
         sbafab.find("1dof-5mm", optuna=True, storage="nowhere", tries=4, **asked)
+
+
+def test_a_search_by_optuna_that_is_stopped_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The design at which it was stopped is none of those that are stored."""
+    pytest.importorskip("optuna")
+    requirements, goal = read_all(["stroke@50kPa=25"], [], "mass")
+    request = FindRequest(
+        sbafab.load("1dof-5mm"),
+        requirements,
+        goal,
+        FREE,
+        tries=20,
+        optuna=True,
+        storage=f"sqlite:///{tmp_path / 'search.db'}",
+    )
+    seen: list[Mapping[str, Any]] = []
+
+    def stopping(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+        seen.append(values)
+        if len(seen) == 8:
+            raise KeyboardInterrupt
+        return _made_up(wanted, values, with_rules)
+
+    monkeypatch.setattr(module, "tried", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        find(request)
+    assert "Traceback" not in capfd.readouterr().err
+    monkeypatch.setattr(module, "tried", _made_up)
+    find(request)
+    import optuna
+
+    (study,) = optuna.get_all_study_summaries(request.storage or "")
+    kept = optuna.load_study(study_name=study.study_name, storage=request.storage)
+    # 0.6 of the tries are Optuna's, each told to the end.
+    states = [trial.state.name for trial in kept.trials]
+    assert states.count("COMPLETE") == 12
