@@ -21,11 +21,11 @@ from sbafab.geometry.edges import (
     distance_to,
     from_end_to_end,
     left_normal,
+    turns_round,
 )
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.once import once
 from sbafab.geometry.pieces import Overlay
-from sbafab.geometry.region import turns_round
 
 NEAR = 0.05
 """Radians: edges that leave a point at less than this angle are compared farther on."""

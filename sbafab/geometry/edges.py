@@ -127,6 +127,12 @@ class Arc(_Arc):
     """
 
     @once
+    def ends_lie_on_circle(self) -> bool:
+        """Whether both ends lie on the circle, to within BENT."""
+        off = [math.dist(p, self.centre) - self.radius for p in (self.start, self.end)]
+        return min(off) > -BENT and max(off) < BENT
+
+    @once
     def start_angle(self) -> float:
         return math.atan2(self.start[1] - self.centre[1], self.start[0] - self.centre[0])
 
@@ -278,11 +284,7 @@ def from_end_to_end(edge: Edge) -> Edge:
     """The edge; where an end was taken off an arc's circle by more than BENT, the arc of its sweep
     through both ends.
     """
-    if not isinstance(edge, Arc):
-        return edge
-    centre, radius = edge.centre, edge.radius
-    off = math.dist(edge.start, centre) - radius, math.dist(edge.end, centre) - radius
-    if min(off) > -BENT and max(off) < BENT:
+    if not isinstance(edge, Arc) or edge.ends_lie_on_circle:
         return edge
     return edge_from_bulge(edge.start, edge.end, edge.bulge)
 
@@ -302,3 +304,27 @@ def left_normal(edge: Edge, p: Point) -> Point:
 def distance_to(edge: Edge, p: Point) -> float:
     """Least distance from ``p`` to the edge."""
     return math.dist(p, edge.nearest(p))
+
+
+def turns_round(edge: Edge, p: Point) -> int:
+    """What an edge adds to the times its contour runs counter-clockwise round ``p``."""
+    (px, py), (x0, y0), (x1, y1) = p, edge.start, edge.end
+    side = (x1 - x0) * (py - y0) - (px - x0) * (y1 - y0)
+    turns = 0
+    if y0 <= py < y1 and side > 0:
+        turns = 1
+    elif y1 <= py < y0 and side < 0:
+        turns = -1
+    if isinstance(edge, Arc):
+        cx, cy = edge.centre
+        dx, dy = x1 - x0, y1 - y0
+        # Beside its chord alone: that of a short arc with snapped ends may lean either way.
+        beside = 0 <= (px - x0) * dx + (py - y0) * dy <= dx * dx + dy * dy
+        if beside and (px - cx) ** 2 + (py - cy) ** 2 < edge.radius**2:
+            # A point exactly on the chord belongs to the side the count above gave it.
+            left = side > 0 or (side == 0 and (y0 > y1 or (y0 == y1 and x1 > x0)))
+            if edge.ccw and not left:
+                turns += 1
+            elif not edge.ccw and left:
+                turns -= 1
+    return turns

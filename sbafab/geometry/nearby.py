@@ -11,6 +11,8 @@ from sbafab.geometry.once import once
 
 MANY_BOXES = 500
 """From which on comparing all at once is worth fetching numpy."""
+FEW_BOXES = 100
+"""Up to which a sweep needs no bands."""
 AT_ONCE = 1_000_000
 """Pairs that are compared at once, which bounds the memory."""
 
@@ -33,6 +35,9 @@ def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, in
     """
     if len(boxes) >= MANY_BOXES:
         yield from _close_among_many(boxes, reach)
+        return
+    if len(boxes) <= FEW_BOXES:
+        yield from _close_among_few(boxes, reach)
         return
     order = sorted(range(len(boxes)), key=lambda i: boxes[i][0])
     height = reach + sum(box[3] - box[1] for box in boxes) / max(1, len(boxes)) or 1.0
@@ -59,6 +64,19 @@ def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, in
         bottom, top = math.floor(low / height), math.floor(high / height)
         for band in range(bottom, top + 1):
             active.setdefault(band, []).append((rank, i, bottom))
+
+
+def _close_among_few(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
+    """The same pairs in the same order."""
+    active: list[tuple[float, float, float, int]] = []
+    for i in sorted(range(len(boxes)), key=lambda i: boxes[i][0]):
+        left, low, right, high = boxes[i]
+        first, bottom, top = left - reach, low - reach, high + reach
+        active = [one for one in active if one[0] >= first]
+        for _, other_low, other_high, j in active:
+            if other_low <= top and other_high >= bottom:
+                yield j, i
+        active.append((right, low, high, i))
 
 
 def _close_among_many(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
@@ -89,6 +107,10 @@ def _close_among_many(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[i
     yield from zip(order[before[turn]].tolist(), order[behind[turn]].tolist(), strict=True)
 
 
+FEW_EDGES = 64
+"""Up to which all boxes are looked at, which costs less than filing them."""
+
+
 class EdgeIndex:
     """Edges filed by the cells of a square grid that their bounding boxes touch."""
 
@@ -117,6 +139,11 @@ class EdgeIndex:
                     filed.setdefault((x, y), []).append(number)
         return filed
 
+    @once
+    def _cells(self) -> list[tuple[int, int]]:
+        """The first cell of each edge."""
+        return [self._places(box)[:2] for box in self._boxes]
+
     def _places(self, box: Bounds) -> tuple[int, int, int, int]:
         (x, y), cell = self._low, self.cell
         return (
@@ -130,31 +157,39 @@ class EdgeIndex:
         """Edges whose bounding boxes meet a box."""
         return (self.edges[number] for number in self.numbers(box))
 
-    def numbers(self, box: Bounds, among: Sequence[int] | None = None) -> list[int]:
-        """The same, by their place among the edges that were filed.
+    def numbers(self, box: Bounds) -> list[int]:
+        """The same, by their place among the edges that were filed."""
+        found = self.among(box, self.about(box))
+        return found if len(self._boxes) > FEW_EDGES else self.in_order(box, found)
 
-        ``among``, in rising order: those that come into question.
-        """
+    def among(self, box: Bounds, numbers: Iterable[int]) -> list[int]:
+        """Of these edges those whose bounding boxes meet a box."""
         left, bottom, right, top = box
         boxes = self._boxes
-        near = self._near(box) if among is None else among
-        found = [
+        return [
             number
-            for number in near
+            for number in numbers
             if (own := boxes[number])[0] <= right
             and own[2] >= left
             and own[1] <= top
             and own[3] >= bottom
         ]
-        if among is not None and len(found) > 1:
-            x0, y0, _, _ = self._places(box)
-            cells = {number: self._places(boxes[number]) for number in found}
-            # The first cell that both touch, as they are told cell by cell.
-            found.sort(key=lambda n: (max(x0, cells[n][0]), max(y0, cells[n][1])))
+
+    def in_order(self, box: Bounds, found: list[int]) -> list[int]:
+        """Edges that meet a box, in rising order, sorted by the first cell that they share."""
+        if len(found) > 1:
+            (x, y), cell, first = self._low, self.cell, self._cells
+            x0, y0 = math.floor((box[0] - x) / cell), math.floor((box[1] - y) / cell)
+            found.sort(key=lambda n: (max(x0, first[n][0]), max(y0, first[n][1])))
         return found
 
-    def _near(self, box: Bounds) -> Iterable[int]:
-        """The edges in the cells that a box touches, cell by cell, each once."""
+    def about(self, box: Bounds, after: int = -1) -> Iterable[int]:
+        """The edges in the cells that a box touches, cell by cell, each once; all of a few.
+
+        Those up to the number ``after`` may be left out.
+        """
+        if len(self._boxes) <= FEW_EDGES:
+            return range(after + 1, len(self._boxes))
         x0, y0, x1, y1 = self._places(box)
         filed = self._filed
         if x0 == x1 and y0 == y1:

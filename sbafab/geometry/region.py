@@ -21,6 +21,7 @@ from sbafab.geometry.edges import (
     Line,
     Point,
     distance_to,
+    turns_round,
     unit,
 )
 from sbafab.geometry.nearby import EdgeIndex, close_pairs
@@ -41,30 +42,6 @@ def _join(boxes: Sequence[Bounds]) -> Bounds:
         return NOWHERE
     left, bottom, right, top = zip(*boxes, strict=True)
     return min(left), min(bottom), max(right), max(top)
-
-
-def turns_round(edge: Edge, p: Point) -> int:
-    """What an edge adds to the times its contour runs counter-clockwise round ``p``."""
-    (px, py), (x0, y0), (x1, y1) = p, edge.start, edge.end
-    side = (x1 - x0) * (py - y0) - (px - x0) * (y1 - y0)
-    turns = 0
-    if y0 <= py < y1 and side > 0:
-        turns = 1
-    elif y1 <= py < y0 and side < 0:
-        turns = -1
-    if isinstance(edge, Arc):
-        cx, cy = edge.centre
-        dx, dy = x1 - x0, y1 - y0
-        # Beside its chord alone: that of a short arc with snapped ends may lean either way.
-        beside = 0 <= (px - x0) * dx + (py - y0) * dy <= dx * dx + dy * dy
-        if beside and (px - cx) ** 2 + (py - cy) ** 2 < edge.radius**2:
-            # A point exactly on the chord belongs to the side the count above gave it.
-            left = side > 0 or (side == 0 and (y0 > y1 or (y0 == y1 and x1 > x0)))
-            if edge.ccw and not left:
-                turns += 1
-            elif not edge.ccw and left:
-                turns -= 1
-    return turns
 
 
 @dataclass(frozen=True)
@@ -98,7 +75,7 @@ class Contour:
     def bounds(self) -> Bounds:
         return _join(self.boxes)
 
-    @property
+    @once
     def is_hole(self) -> bool:
         return self.area < 0
 
@@ -159,12 +136,27 @@ class Contour:
             turned.__dict__["bounds"] = known["bounds"]
         return turned
 
+    @once
+    def _round_once(self) -> tuple[Point, float, int] | None:
+        """Centre, radius and direction of a full circle that runs round once."""
+        if self.circle is None:
+            return None
+        centre, radius = self.circle
+        if abs(abs(self.area) - math.pi * radius * radius) > SAME * radius:
+            return None
+        return centre, radius, -1 if self.area < 0 else 1
+
     def winding(self, p: Point) -> int:
         """How many times the contour runs counter-clockwise round ``p`` (not on an edge)."""
         px, py = p
         low_x, low_y, high_x, high_y = self.bounds
         if not (low_x <= px <= high_x and low_y <= py <= high_y):
             return 0
+        if self._round_once is not None:
+            (cx, cy), radius, turns = self._round_once
+            room = radius - math.hypot(px - cx, py - cy)
+            if abs(room) > SAME:
+                return turns if room > 0 else 0
         return sum(turns_round(edge, p) for edge in self._level_with(py))
 
     def _level_with(self, y: float) -> Sequence[Edge]:

@@ -8,7 +8,7 @@ between corners; these are exact for lines and arcs.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.geometry.corners import Corner, corners_of, pinch
@@ -20,6 +20,7 @@ from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.once import once
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.remembered import remembered
+from sbafab.geometry.width_bounds import may_be_narrower, widest_least
 
 if TYPE_CHECKING:
     from sbafab.geometry.side_table import SideTable
@@ -62,6 +63,9 @@ def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) ->
 
     A corner with an interior angle below ``sharp`` degrees has width 0.
     """
+    near = may_be_narrower(region.contours, below)
+    if len(near) < len(region.contours):
+        return least_of(Boundary(near, sharp), below)
     return least_of(boundary_of(region, sharp), below)
 
 
@@ -69,7 +73,7 @@ def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) ->
 def least_gap(region: Region, sharp: float = 90.0, below: float = math.inf) -> Width | None:
     """The narrowest slot, hole or gap between pieces, likewise."""
     outside = [kept(one, "from_outside", Contour.reversed) for one in region.contours]
-    return least_of(Boundary(outside, sharp), below)
+    return least_of(Boundary(may_be_narrower(outside, below), sharp), below)
 
 
 class _Foot(NamedTuple):
@@ -138,6 +142,7 @@ class Boundary:
             for ends in kept(one, f"ends{sharp}", lambda c: list(tapered_ends(c, sharp)))
         ]
         self.pinch = pinch(contours, self.corners, sharp)
+        self.widest_least = widest_least(contours)
         self.index = EdgeIndex(
             [side.edge for side in self.sides], [side.box for side in self.sides]
         )
@@ -190,16 +195,18 @@ class _Narrowest:
         aside: float,
         after: int = -1,
         among: Sequence[int] | None = None,
-    ) -> Iterator[tuple[int, BoundarySide]]:
+    ) -> list[tuple[int, BoundarySide]]:
         """Numbered sides that a segment shorter than the best could join to ``a``.
 
         Their normals are opposed somewhere, to within ``aside`` radians, and their numbers come
         ``after`` this one. ``among``: no others come into question.
         """
         (nx, ny), turn = a.normal, a.half_turn + aside
-        sides = self.boundary.sides
+        sides, index = self.boundary.sides, self.boundary.index
         straight = -math.cos(turn)
-        for number in self.boundary.index.numbers(widened(a.box, self.value), among):
+        box = widened(a.box, self.value)
+        found = []
+        for number in index.among(box, index.about(box, after) if among is None else among):
             if number <= after:
                 continue
             side = sides[number]
@@ -208,7 +215,8 @@ class _Narrowest:
             if room > math.pi or nx * mx + ny * my < (
                 -math.cos(room) if side.half_turn else straight
             ):
-                yield number, side
+                found.append(number)
+        return [(number, sides[number]) for number in index.in_order(box, found)]
 
     def is_clear(self, p: Point, q: Point) -> bool:
         known = self.boundary.known_clear
@@ -246,7 +254,8 @@ def least_of(boundary: Boundary, below: float) -> Width | None:
     if boundary.pinch is not None:
         return Width(0.0, boundary.pinch, boundary.pinch)
     # Most edges lie far apart: those are looked at only where no near ones face.
-    reach, farthest = boundary.index.cell, min(below, 2 * boundary.index.across)
+    reach = min(boundary.index.cell, boundary.widest_least + 2 * SHORTER)
+    farthest = min(below, 2 * boundary.index.across)
     while True:
         narrowest = _Narrowest(boundary, min(reach, farthest))
         search(narrowest)

@@ -112,7 +112,7 @@ class Springs:
         begins, ring, squares, meet, _ = self.places
         gaps = (freedoms[:, None] @ meet)[:, 0]
         value, first, second = horner(self.table, begins, gaps[:, : begins.shape[1]])
-        value = value.sum(-1)
+        value = value @ np.ones(value.shape[-1])
         gradient = (first[:, None] @ ring)[:, 0]
         matrix = (second[:, None] @ squares).reshape(-1, 3, 3)
         if gaps.min() < 0:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import BalloonMap, balloon_map
 from sbafab.models.chain import Chain, chain
-from sbafab.models.loads import Load
+from sbafab.models.loads import Load, OuterPlate
 from sbafab.models.springs import RING, GapPlaces, Springs
 from sbafab.models.stack_balance import free, held
 
@@ -47,7 +47,6 @@ GRIP = 0.15
 """Radius, as a share of its pocket's, of the disc that a lone balloon's plates hold it by."""
 SHARES = (1.0, 0.5, 0.2, 0.1)
 """Of the pressure asked for, tried one after the other."""
-UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -238,7 +237,7 @@ class Stack:
             start = near.freedoms
         else:
             start = self._risen(pressures)
-            if load.point is not None and not (load.is_level and load.sticks):
+            if load.wall is not None and not (load.wall.is_level and load.wall.sticks):
                 start = free(springs, start)
             start = start[self.levels]
         found, push, stable = held(self.each(springs), self.pitch, load, start, near is not None)
@@ -294,17 +293,17 @@ class Stack:
         weight = down * self.weight if down.any() else None
         if not force.any() and weight is None and plate is None:
             return None
-        wall = plate if isinstance(plate, Plate) or plate is None else Plate.at(float(plate))
-        if wall is None:
-            return Load(force, weight, None, UP, False, self.outline)
-        point, normal = np.asarray(wall.point, float), np.asarray(wall.normal, float)
-        normal = normal / np.linalg.norm(normal)
-        if normal[2] > 1 - 1e-9 and point[2] < self.flat_height - 1e-9:
+        if plate is None:
+            return Load(force, weight, None)
+        outer = plate if isinstance(plate, Plate) else Plate.at(float(plate))
+        line = tuple(float(x) for x in (*outer.point, *outer.normal))
+        wall = _wall(line, outer.sticks, self.outline)
+        if wall.normal[2] > 1 - 1e-9 and wall.point[2] < self.flat_height - 1e-9:
             raise DesignError(
-                f"a plate {point[2]:g} mm high is lower than the flat stack; give at least "
+                f"a plate {wall.point[2]:g} mm high is lower than the flat stack; give at least "
                 f"{self.flat_height:.4g} mm"
             )
-        return Load(force, weight, point, normal, wall.sticks, self.outline)
+        return Load(force, weight, wall)
 
     def _pose(
         self,
@@ -380,6 +379,13 @@ def stack(
         reach,
         grams * GRAVITY / len(row),
     )
+
+
+@lru_cache(maxsize=256)
+def _wall(line: tuple[float, ...], sticks: bool, outline: float) -> OuterPlate:
+    """The outer plate on a line: a point, then the normal."""
+    point, normal = np.array(line[:3]), np.array(line[3:])
+    return OuterPlate.of(point, normal / np.linalg.norm(normal), sticks, outline)
 
 
 def _gripped(one: Balloon) -> Balloon:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from sbafab.geometry.beam import beam_path, place_of, widths
 from sbafab.geometry.boolean import GeometryError
+from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width, least_gap, least_width
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.rules.finding import Finding, Place
@@ -16,6 +18,9 @@ NAME = "film-limits"
 
 SHARP = 15.0
 """Degrees: a point sharper than this is a sliver; blunter ones are cut as drawn."""
+
+ROUNDING = 1e-6
+"""mm: more than what widths are rounded by."""
 
 
 class _Feature(NamedTuple):
@@ -48,13 +53,20 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
 
 def _finest(laminate: Laminate) -> _Feature | None:
     """The narrowest web or slot of all layers; wider ones than are known are not looked for."""
+    layers = [(own[0], laminate.first_cut(own[0])) for own in laminate.patterns.values()]
+    round_holes = (hole.circle for _, cut in layers for hole in cut.holes if hole.circle)
+    narrowest = min((2 * radius for _, radius in round_holes), default=math.inf)
+    return _finer(layers, narrowest + ROUNDING) or _finer(layers, math.inf)
+
+
+def _finer(layers: Iterable[tuple[Layer, Region]], than: float) -> _Feature | None:
+    """The same, if it is narrower than so many mm."""
     finest: _Feature | None = None
-    for layers in laminate.patterns.values():
+    for layer, cut in layers:
         for kind, least in (("web", least_width), ("slot or hole", least_gap)):
-            below = finest.width.value if finest else math.inf
-            width = least(laminate.first_cut(layers[0]), SHARP, below)
-            if width is not None and (finest is None or width.value < below):
-                finest = _Feature(layers[0], kind, width)
+            width = least(cut, SHARP, than)
+            if width is not None and (finest is None or width.value < than):
+                finest, than = _Feature(layer, kind, width), width.value
     return finest
 
 

@@ -1,15 +1,16 @@
 """What is left at every margin as a linear form of all that may be off, in arrays.
 
-Margins between edges of the same two contours feel the same errors: they differ in how wide they
-are drawn, in their normal, and in the levers of what turns. Worst case and yield read these forms.
+Margins between edges of the same two parts feel the same moves: they differ in how wide they are
+drawn, in their normal, and in the levers of what turns. Worst case and yield read these forms.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from sbafab.laminate.interfaces import Interface
+from sbafab.geometry.once import once
 from sbafab.rules.freedoms import Freedom, Freedoms
 from sbafab.rules.margins import InterfaceMargins, Owner, Quantity, felt
 
@@ -25,15 +26,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LinearForm:
-    """Margins with the same two owners of their edges, in the order they were found.
+    """Margins between edges of the same two parts, in the order they were found.
 
     ``numbers`` are their places among all margins of the interface, ``nominal`` (mm) and ``normal``
-    (2 rows) one column each. ``felt`` is what one of the edges does and the other not, whether it
-    acts at the end, and the levers (mm per radian) of what turns, None for what shifts.
+    (2 rows) one column each; ``between`` is the number of the owners of both edges among
+    ``owners``. ``felt`` is what one of the parts does and the other not, whether it acts at the
+    end, and the levers (mm per radian) of what turns, None for what shifts.
     """
 
     quantity: Quantity
-    owners: tuple[Owner, Owner]
+    owners: Sequence[tuple[Owner, Owner]]
+    between: Indices
     numbers: Indices
     nominal: Floats
     normal: Floats
@@ -41,6 +44,13 @@ class LinearForm:
 
     def loss(self, by_hand: bool = True) -> Floats:
         """The most that all of it takes from each margin, mm; or all but what the hand does."""
+        return self._loss if by_hand else self._lost(False)
+
+    @once
+    def _loss(self) -> Floats:
+        return self._lost(True)
+
+    def _lost(self, by_hand: bool) -> Floats:
         import numpy as np
 
         total = np.zeros(len(self.nominal))
@@ -51,43 +61,46 @@ class LinearForm:
 
 
 def linear_forms(group: InterfaceMargins, moves: Freedoms) -> tuple[LinearForm, ...]:
-    """The margins of an interface by quantity and owners, in the order of their first."""
+    """The margins of an interface by quantity and parts."""
     found: list[LinearForm] = []
     before = 0
     for quantity, places in group.places.items():
-        for owners, numbers in _by_owners(places):
-            found.append(_form(quantity, owners, numbers, before, places, group.first, moves))
+        for first, own in _by_parts(places):
+            start, end = places.start[:, own], places.end[:, own]
+            normal = places.normal[:, own]
+            form = LinearForm(
+                quantity,
+                places.owners,
+                places.between[own],
+                own + before,
+                places.nominal[own],
+                normal,
+                tuple(
+                    (freedom, at_end, _levers(freedom, end if at_end else start, normal))
+                    for freedom, at_end in felt(first, group.first, moves)
+                ),
+            )
+            found.append(form)
         before += len(places.nominal)
     return tuple(found)
 
 
-def _by_owners(places: Places) -> list[tuple[tuple[Owner, Owner], Indices]]:
-    """The numbers of places by the owners of their edges, in the order of their first."""
-    found = [(own, (places.between == i).nonzero()[0]) for i, own in enumerate(places.owners)]
-    return sorted((one for one in found if len(one[1])), key=lambda one: one[1][0])
+def _by_parts(places: Places) -> Iterator[tuple[tuple[Owner, Owner], Indices]]:
+    """The numbers of places between the same two parts, with the first of their owners."""
+    import numpy as np
 
-
-def _form(
-    quantity: Quantity,
-    owners: tuple[Owner, Owner],
-    own: Indices,
-    before: int,
-    places: Places,
-    interface: Interface,
-    moves: Freedoms,
-) -> LinearForm:
-    normal, start, end = places.normal[:, own], places.start[:, own], places.end[:, own]
-    return LinearForm(
-        quantity,
-        owners,
-        own + before,
-        places.nominal[own],
-        normal,
-        tuple(
-            (freedom, at_end, _levers(freedom, end if at_end else start, normal))
-            for freedom, at_end in felt(owners, interface, moves)
-        ),
-    )
+    parts: dict[object, list[int]] = {}
+    for number, (one, other) in enumerate(places.owners):
+        key = one.seat, one.piece, other.seat, other.piece
+        parts.setdefault(key, []).append(number)
+    home = np.empty(len(places.owners), dtype=np.intp)
+    for part, numbers in enumerate(parts.values()):
+        home[numbers] = part
+    of_place = home[places.between]
+    for part, numbers in enumerate(parts.values()):
+        (own,) = (of_place == part).nonzero()
+        if len(own):
+            yield places.owners[numbers[0]], own
 
 
 def _levers(freedom: Freedom, p: Floats, normal: Floats) -> Floats | None:

@@ -5,7 +5,7 @@ A row is its room and a sum over the errors drawn (``random_builds.py``).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -47,35 +47,45 @@ class MarginRows:
 
 def rows_of(
     form: LinearForm, layers: Sequence[int], limit: float, cutting: float
-) -> tuple[int, MarginRows] | None:
-    """The margins that can come short at all; of those that feel all errors alike, the least.
+) -> Iterator[tuple[int, MarginRows]]:
+    """The margins that can come short at all, by the two contours whose edges they join; of those
+    that feel all errors alike, the least.
 
-    With the number of the first of them; None if there is none.
+    With the number of the first of them.
     """
     import numpy as np
 
     room = form.nominal - limit
     (short,) = np.nonzero(room - 2 * cutting - form.loss() < -TOLERANCE)
     if not len(short):
-        return None
-    chosen = short[_least_alike(form, room, short)]
-    # More film widens a bond, more mask an overhang.
-    signs = (1.0 if one.is_film == (form.quantity == "bond") else -1.0 for one in form.owners)
-    contours = (CutContour(layers[one.seat], one.contour) for one in form.owners)
-    return int(form.numbers[short[0]]), MarginRows(
-        form.quantity,
-        room[chosen],
-        form.normal[:, chosen],
-        tuple(zip(contours, signs, strict=True)),
-        tuple(
-            (freedom, 1.0 if at_end else -1.0, None if levers is None else levers[chosen])
-            for freedom, at_end, levers in form.felt
-        ),
-    )
+        return
+    for between, alike in _least_alike(form, room, short).items():
+        first, chosen = short[alike[0]], short[alike[1]]
+        owners = form.owners[between]
+        # More film widens a bond, more mask an overhang.
+        signs = (1.0 if one.is_film == (form.quantity == "bond") else -1.0 for one in owners)
+        contours = (CutContour(layers[one.seat], one.contour) for one in owners)
+        yield (
+            int(form.numbers[first]),
+            MarginRows(
+                form.quantity,
+                room[chosen],
+                form.normal[:, chosen],
+                tuple(zip(contours, signs, strict=True)),
+                tuple(
+                    (freedom, 1.0 if at_end else -1.0, None if levers is None else levers[chosen])
+                    for freedom, at_end, levers in form.felt
+                ),
+            ),
+        )
 
 
-def _least_alike(form: LinearForm, room: Floats, short: Indices) -> list[int]:
-    """Which of the short margins have the least room of all with the same factors, rounded."""
+def _least_alike(
+    form: LinearForm, room: Floats, short: Indices
+) -> dict[int, tuple[int, list[int]]]:
+    """Of the short margins between each two owners the first, and which have the least room of all
+    with the same factors, rounded.
+    """
     import numpy as np
 
     columns: list[Floats] = []
@@ -84,15 +94,16 @@ def _least_alike(form: LinearForm, room: Floats, short: Indices) -> list[int]:
     columns += [levers for _, _, levers in form.felt if levers is not None]
     # Where nothing but cutting is felt there is no column, and all are alike.
     every = np.array(columns).reshape(len(columns), len(form.nominal))
-    keys = _parts(every[:, short]).astype(np.int64)
-    found: dict[bytes, int] = {}
+    keys = np.ascontiguousarray(_parts(every[:, short]).astype(np.int64).T)
+    found: dict[int, tuple[int, dict[bytes, int]]] = {}
     left = room[short].tolist()
-    for place, key in enumerate(np.ascontiguousarray(keys.T)):
+    for place, (between, key) in enumerate(zip(form.between[short].tolist(), keys, strict=True)):
         name = key.tobytes()
-        known = found.get(name)
+        _, own = found.setdefault(between, (place, {}))
+        known = own.get(name)
         if known is None or left[place] < left[known]:
-            found[name] = place
-    return list(found.values())
+            own[name] = place
+    return {between: (first, list(own.values())) for between, (first, own) in found.items()}
 
 
 def _parts(factors: Floats) -> Floats:

@@ -155,10 +155,12 @@ def _rows(
 ) -> dict[Quantity, tuple[MarginRows, ...]]:
     """The rows of an interface by quantity, those of the first margins first."""
     limit = {"bond": limits.worst_bond_width, "overhang": limits.worst_mask_overhang}
-    found = [
-        rows_of(form, layers, limit[form.quantity], limits.tolerances.cutting) for form in forms
-    ]
-    ordered = sorted((one for one in found if one is not None), key=lambda one: one[0])
+    found = (
+        one
+        for form in forms
+        for one in rows_of(form, layers, limit[form.quantity], limits.tolerances.cutting)
+    )
+    ordered = sorted(found, key=lambda one: one[0])
     return {
         quantity: tuple(rows for _, rows in ordered if rows.quantity == quantity)
         for quantity in QUANTITIES

@@ -14,7 +14,7 @@ from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import BalloonMap
 from sbafab.models.chain import chain
-from sbafab.models.loads import loaded, with_blocks
+from sbafab.models.loads import RIM, loaded, with_blocks
 from sbafab.models.series import blocked
 from sbafab.models.stack import Plate, Stack
 from sbafab.models.stack_balance import MOST_STEPS, _settled, free
@@ -291,6 +291,22 @@ def test_any_start_ends_in_the_same_balance(three: Stack, load: str) -> None:
         places = chain(slow[0], three.pitch).places
         assert pose.frames[0] == pytest.approx(places, abs=1e-5)
         assert pose.stable
+
+
+def test_a_plate_that_is_hardly_met_is_met_from_any_start(three: Stack) -> None:
+    """By one or two points of the rim, or by none: the same balance from a pose nearby, too."""
+    for pressures in ((0.21, 0.18, 1.46), (1.174, 0.91, 0.276), (0.832, 0.167, 0.146)):
+        pose = three.pose(pressures, plate=12.0)
+        beside = three.pose([each + 0.3 for each in pressures], plate=12.0)
+        again = three.pose(pressures, plate=12.0, near=beside)
+        assert again.frames[0] == pytest.approx(pose.frames[0], abs=1e-5)
+        assert again.force == pytest.approx(pose.force, rel=1e-4, abs=1e-9)
+        # The points of the top's rim lie below the plate, and its middle on the axis.
+        rim = pose.height + three.outline * float((RIM @ pose.frames[1][-1].T)[:, 2].max())
+        assert rim < 12.0 + 1e-4
+        assert pose.tip[:2] == pytest.approx([0.0, 0.0], abs=1e-4)
+        assert pose.stable
+        assert (pose.force > 0) == (rim > 12.0)
 
 
 def test_following_a_path_ends_where_a_fresh_start_does(three: Stack) -> None:
