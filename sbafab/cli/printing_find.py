@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -78,7 +79,7 @@ def print_found(found: FoundDesign, started: str, target: Path) -> None:
         _say(f"  {spare.rule} {spare.place}: {spare.measured:g} {spare.unit}, nothing to spare")
     _print_front(found)
     _print_cut(found)
-    _say(f"Next: sbafab generate {target}")
+    _say(f"Next: sbafab generate {shlex.quote(str(target))}")
 
 
 def _print_cut(found: FoundDesign) -> None:
@@ -89,10 +90,13 @@ def _print_cut(found: FoundDesign) -> None:
 
 def _print_ends(found: FoundDesign) -> None:
     for one in found.ends:
-        ends = f"{one.low:g} to {one.high:g}"
+        span = one.high - one.low
+        low, high = one.low, one.high + span
+        if one.value <= one.low:
+            low, high = max(one.step, one.low - span), one.high
         _say(
-            f"  {one.key} = {one.value:g} is the end of its range, {ends}; --free "
-            f"{one.key}=LOW:HIGH:{one.step:g} lets it go further"
+            f"  {one.key} = {one.value:g} is the end of its range, {one.low:g} to {one.high:g}; "
+            f"--free {one.key}={low:g}:{high:g}:{one.step:g} lets it go further"
         )
 
 

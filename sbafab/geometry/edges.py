@@ -127,6 +127,12 @@ class Arc(_Arc):
     """
 
     @once
+    def ends_lie_on_circle(self) -> bool:
+        """Whether both ends lie on the circle, to within BENT."""
+        off = [math.dist(p, self.centre) - self.radius for p in (self.start, self.end)]
+        return min(off) > -BENT and max(off) < BENT
+
+    @once
     def start_angle(self) -> float:
         return math.atan2(self.start[1] - self.centre[1], self.start[0] - self.centre[0])
 
@@ -278,11 +284,7 @@ def from_end_to_end(edge: Edge) -> Edge:
     """The edge; where an end was taken off an arc's circle by more than BENT, the arc of its sweep
     through both ends.
     """
-    if not isinstance(edge, Arc):
-        return edge
-    centre, radius = edge.centre, edge.radius
-    off = math.dist(edge.start, centre) - radius, math.dist(edge.end, centre) - radius
-    if min(off) > -BENT and max(off) < BENT:
+    if not isinstance(edge, Arc) or edge.ends_lie_on_circle:
         return edge
     return edge_from_bulge(edge.start, edge.end, edge.bulge)
 

@@ -157,39 +157,39 @@ class EdgeIndex:
         """Edges whose bounding boxes meet a box."""
         return (self.edges[number] for number in self.numbers(box))
 
-    def numbers(self, box: Bounds, among: Sequence[int] | None = None) -> list[int]:
-        """The same, by their place among the edges that were filed.
+    def numbers(self, box: Bounds) -> list[int]:
+        """The same, by their place among the edges that were filed."""
+        found = self.among(box, self.about(box))
+        return found if len(self._boxes) > FEW_EDGES else self.in_order(box, found)
 
-        ``among``, in rising order: those that come into question.
-        """
+    def among(self, box: Bounds, numbers: Iterable[int]) -> list[int]:
+        """Of these edges those whose bounding boxes meet a box."""
         left, bottom, right, top = box
         boxes = self._boxes
-        if among is None and len(boxes) > FEW_EDGES:
-            return [
-                number
-                for number in self._near(box)
-                if (own := boxes[number])[0] <= right
-                and own[2] >= left
-                and own[1] <= top
-                and own[3] >= bottom
-            ]
-        found = [
+        return [
             number
-            for number in (range(len(boxes)) if among is None else among)
+            for number in numbers
             if (own := boxes[number])[0] <= right
             and own[2] >= left
             and own[1] <= top
             and own[3] >= bottom
         ]
+
+    def in_order(self, box: Bounds, found: list[int]) -> list[int]:
+        """Edges that meet a box, in rising order, sorted by the first cell that they share."""
         if len(found) > 1:
-            # The first cell that both touch, as they are told cell by cell.
-            x0, y0, _, _ = self._places(box)
-            cells = self._cells
-            found.sort(key=lambda n: (max(x0, cells[n][0]), max(y0, cells[n][1])))
+            (x, y), cell, first = self._low, self.cell, self._cells
+            x0, y0 = math.floor((box[0] - x) / cell), math.floor((box[1] - y) / cell)
+            found.sort(key=lambda n: (max(x0, first[n][0]), max(y0, first[n][1])))
         return found
 
-    def _near(self, box: Bounds) -> Iterable[int]:
-        """The edges in the cells that a box touches, cell by cell, each once."""
+    def about(self, box: Bounds, after: int = -1) -> Iterable[int]:
+        """The edges in the cells that a box touches, cell by cell, each once; all of a few.
+
+        Those up to the number ``after`` may be left out.
+        """
+        if len(self._boxes) <= FEW_EDGES:
+            return range(after + 1, len(self._boxes))
         x0, y0, x1, y1 = self._places(box)
         filed = self._filed
         if x0 == x1 and y0 == y1:

@@ -10,6 +10,7 @@ from sbafab.geometry.apart import FAR, alone, meets_itself
 from sbafab.geometry.boolean import enclosed
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, left_turn
 from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.remembered import remembered
 from sbafab.geometry.shapes import circle
 
 CUSP = 3.0
@@ -22,6 +23,11 @@ def grow(region: Region, distance: float) -> Region:
         return shrink(region, -distance)
     if distance < EPSILON or region.is_empty:
         return region
+    return _grown(region, distance)
+
+
+@remembered
+def _grown(region: Region, distance: float) -> Region:
     chains = [_chain(contour, distance) for contour in region.contours]
     return enclosed([chain for chain in chains if chain.edges])
 
@@ -32,6 +38,11 @@ def shrink(region: Region, distance: float) -> Region:
         return grow(region, -distance)
     if distance < EPSILON or region.is_empty:
         return region
+    return _shrunk(region, distance)
+
+
+@remembered
+def _shrunk(region: Region, distance: float) -> Region:
     # What is outside grows: the chains wind round it 0 times, or more; round what is left, -1.
     outside = [contour.reversed() for contour in region.contours]
     chains = [_chain(contour, distance) for contour in outside]

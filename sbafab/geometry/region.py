@@ -75,7 +75,7 @@ class Contour:
     def bounds(self) -> Bounds:
         return _join(self.boxes)
 
-    @property
+    @once
     def is_hole(self) -> bool:
         return self.area < 0
 

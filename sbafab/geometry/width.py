@@ -8,7 +8,7 @@ between corners; these are exact for lines and arcs.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.geometry.corners import Corner, corners_of, pinch
@@ -195,16 +195,18 @@ class _Narrowest:
         aside: float,
         after: int = -1,
         among: Sequence[int] | None = None,
-    ) -> Iterator[tuple[int, BoundarySide]]:
+    ) -> list[tuple[int, BoundarySide]]:
         """Numbered sides that a segment shorter than the best could join to ``a``.
 
         Their normals are opposed somewhere, to within ``aside`` radians, and their numbers come
         ``after`` this one. ``among``: no others come into question.
         """
         (nx, ny), turn = a.normal, a.half_turn + aside
-        sides = self.boundary.sides
+        sides, index = self.boundary.sides, self.boundary.index
         straight = -math.cos(turn)
-        for number in self.boundary.index.numbers(widened(a.box, self.value), among):
+        box = widened(a.box, self.value)
+        found = []
+        for number in index.among(box, index.about(box, after) if among is None else among):
             if number <= after:
                 continue
             side = sides[number]
@@ -213,7 +215,8 @@ class _Narrowest:
             if room > math.pi or nx * mx + ny * my < (
                 -math.cos(room) if side.half_turn else straight
             ):
-                yield number, side
+                found.append(number)
+        return [(number, sides[number]) for number in index.in_order(box, found)]
 
     def is_clear(self, p: Point, q: Point) -> bool:
         known = self.boundary.known_clear

@@ -304,12 +304,12 @@ def total(balloon: Balloon, load: BalloonLoad, x: Array) -> Total:
     return Total(energy, by_place, band, eased.curves, pressed.sum(-1))
 
 
-def second_slopes(balloon: Balloon, found: Total) -> Array:
-    """The whole matrices of second derivatives by coordinate: (rows, coordinates, coordinates)."""
-    whole = banded.dense(found.matrix)
-    rim = np.arange(2 * balloon.edge, len(found.gradient), 2)
-    whole[:, rim[:, None], rim] += np.moveaxis(found.rim, -1, 0)
-    return whole
+def levelled(balloon: Balloon, found: Total) -> Total:
+    """The same with the heights of the neck taken for one, at ``level``."""
+    for height in range(1, balloon.level, 2):
+        found.gradient[balloon.level] += found.gradient[height]
+        banded.join(found.matrix, height, balloon.level)
+    return found
 
 
 class Energies:
@@ -320,10 +320,7 @@ class Energies:
         self.scale, self.close = sizes(balloon, load)
 
     def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
-        found = total(self.balloon, self.load.rows(rows), x)
-        for height in range(1, self.balloon.level, 2):
-            found.gradient[self.balloon.level] += found.gradient[height]
-            banded.join(found.matrix, height, self.balloon.level)
+        found = levelled(self.balloon, total(self.balloon, self.load.rows(rows), x))
         band = banded.packed(found.matrix, self.balloon.packing)
         # The rim's radii are the last freedoms, next to each other.
         ends = len(found.rim)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def solve(band: Array, wanted: Array) -> Array:
-    """The ``x`` of A x = ``wanted``: (n, rows).
+    """The ``x`` of A x = ``wanted``: (n, rows), or (n, several, rows) with several wanted of each.
 
     ``band`` (n, width, rows) holds ``A[i, i + k]`` at ``[i, k]``. By A = L D L^T without a change
     of order, all rows in step; a pivot below 0 is taken for its size, so that of an energy's slopes
@@ -24,20 +24,22 @@ def solve(band: Array, wanted: Array) -> Array:
     # Room for both halves and beyond the end; A[i, i + k] at [i, reach + k].
     full = np.zeros((size + reach, 2 * reach + 1, rows))
     full[:size, reach:] = band
-    found = np.zeros((size + reach, rows))
-    found[:size] = wanted
+    several = wanted.reshape(size, -1, rows)
+    found = np.zeros((size + reach, *several.shape[1:]))
+    found[:size] = several
     step, across, row = full.strides
     # Of each pivot, the square of the rows and columns behind it that it reaches.
     squares = np.lib.stride_tricks.as_strided(
         full[1:, reach:], (size, reach, reach, rows), (step, step - across, across, row)
     )
-    lower, pivots = np.empty((size, reach, rows)), np.empty((size, rows))
-    product, side = np.empty((reach, reach, rows)), np.empty((reach, rows))
+    lower, pivots = np.empty((size, reach, 1, rows)), np.empty((size, 1, rows))
+    product, side = np.empty((reach, reach, rows)), np.empty((reach, *several.shape[1:]))
     for i in range(size):
         right = full[i, reach + 1 :]
-        pivot = np.abs(full[i, reach], out=pivots[i])
-        share = np.divide(right, pivot, out=lower[i])
-        np.multiply(share[:, None], right, out=product)
+        pivot = np.abs(full[i, reach], out=pivots[i, 0])
+        share = lower[i]
+        np.divide(right, pivot, out=share[:, 0])
+        np.multiply(share, right, out=product)
         squares[i] -= product
         np.multiply(share, found[i], out=side)
         found[i + 1 : i + width] -= side
@@ -45,7 +47,7 @@ def solve(band: Array, wanted: Array) -> Array:
     for i in reversed(range(size)):
         np.multiply(lower[i], found[i + 1 : i + width], out=side)
         found[i] -= side.sum(0)
-    return found[:size]
+    return found[:size].reshape(wanted.shape)
 
 
 def join(band: Array, from_: int, to: int) -> None:

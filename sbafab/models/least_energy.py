@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -32,7 +32,7 @@ class Descent(NamedTuple):
 
     energy: Array
     gradient: Array
-    matrix: Array
+    matrix: Any
 
 
 class Potential(Protocol):

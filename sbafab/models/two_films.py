@@ -7,12 +7,13 @@ and tilts as they wring it: as a ring whose section turns. Units as there.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.models import balloon as single
+from sbafab.models import banded
 from sbafab.models.film_elements import Elements, air
 from sbafab.models.least_energy import Descent, NoBalance, settled
 from sbafab.models.rim_ripple import both_bend
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from sbafab.models.balloon import Balloon, BalloonLoad, Shapes
     from sbafab.models.film_elements import Array
 
+REACH = 5
+"""Coordinates further on that one is joined with."""
 TwoFilms = tuple["Balloon", "Balloon"]
 Loads = tuple["BalloonLoad", "BalloonLoad"]
 
@@ -82,47 +85,47 @@ def _wringing(films: TwoFilms) -> Array:
 def _basis(one: Balloon, is_free: bool) -> Array:
     """What a unit of each freedom moves: (coordinates of both films, freedoms).
 
-    A free balloon's rim stays in its plane: where it is as a whole does not matter.
+    First come those of each film alone, then those of both: the rim's radii, its tilt, and its
+    height. A free balloon's rim stays in its plane: where it is as a whole does not matter.
     """
-    count, columns = len(one.nodes), []
+    count, own = len(one.nodes), _own(one)
+    found = np.zeros((4 * count, 2 * len(own) + count - one.edge + 1 + (not is_free)))
+    for film, start in ((0, 0), (2 * count, len(own))):
+        found[film + own, start + np.arange(len(own))] = 1.0
+        found[film + 1 : film + one.level : 2, start + np.searchsorted(own, one.level)] = 1.0
+    rim, shared = np.arange(one.edge, count), 2 * len(own)
+    for film, side in ((0, 1.0), (2 * count, -1.0)):
+        found[film + 2 * rim, shared + np.arange(len(rim))] = 1.0
+        found[film + 2 * rim + 1, shared + len(rim)] = side * (one.nodes[rim] - one.pocket)
+        found[film + 2 * rim + 1, shared + len(rim) + 1 :] = side
+    return found
 
-    def column(*moved: tuple[int, float]) -> None:
-        found = np.zeros(4 * count)
-        for coordinate, by in moved:
-            found[coordinate] = by
-        columns.append(found)
 
-    for film in (0, 2 * count):
-        for node in range(0 if one.bore else 1, one.edge):
-            column((film + 2 * node, 1.0))
-        column(*((film + 2 * node + 1, 1.0) for node in range(one.held + 1)))
-        for node in range(one.held + 1, one.edge):
-            column((film + 2 * node + 1, 1.0))
-    for node in range(one.edge, count):
-        column((2 * node, 1.0), (2 * (count + node), 1.0))
-    away = [(node, float(one.nodes[node]) - one.pocket) for node in range(one.edge + 1, count)]
-    column(
-        *((2 * node + 1, by) for node, by in away),
-        *((2 * (count + node) + 1, -by) for node, by in away),
-    )
-    if not is_free:
-        rim = range(one.edge, count)
-        column(
-            *((2 * node + 1, 1.0) for node in rim),
-            *((2 * (count + node) + 1, -1.0) for node in rim),
-        )
-    return np.stack(columns, -1)
+def _own(one: Balloon) -> NDArray[np.int_]:
+    """The coordinates that a film moves alone: those inside the pocket's edge."""
+    return one.freedoms[one.freedoms < 2 * one.edge]
 
 
 def _settled(films: TwoFilms, loads: Loads, basis: Array, y: Array) -> Array:
     """The freedoms (freedoms, rows) of least energy downhill of these."""
     try:
         return settled(_Energies(films, loads, basis), y)
-    except NoBalance:
+    except (NoBalance, np.linalg.LinAlgError):
         raise DesignError(
             f"a balloon of radius {films[0].pocket:g} mm with two unlike films finds no balance; "
             "try another load"
         ) from None
+
+
+class _Matrix(NamedTuple):
+    """Second derivatives, rows last: those of each film's own freedoms as bands (own, 6, 2 rows),
+    the first film's rows before the second's; of its last ones with the shared ones (``REACH``,
+    shared, 2 rows), all others are 0; and of the shared ones (rows, shared, shared).
+    """
+
+    own: Array
+    between: Array
+    shared: Array
 
 
 class _Energies:
@@ -132,27 +135,61 @@ class _Energies:
         self.films, self.loads, self.basis = films, loads, basis
         self.wrings = _wringing(films) @ basis
         self.scale, self.close = single.sizes(films[0], loads[0])
+        own = _own(films[0])
+        self.packing = banded.packing(own, len(basis) // 2, REACH + 1)
+        self.alone = len(own)
 
     def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
+        first = 2 * self.alone
+        by = self.wrings[first:]
         wrung = self.wrings @ x
         energy, slopes = wrung**2 / 2, wrung * self.wrings[:, None]
-        matrix = np.tile(np.multiply.outer(self.wrings, self.wrings), (x.shape[1], 1, 1))
+        shared = np.tile(np.multiply.outer(by, by), (x.shape[1], 1, 1))
         bases, parts = np.split(self.basis, 2), np.split(self.basis @ x, 2)
+        own, between = [], []
         for one, load, part, basis in zip(self.films, self.loads, parts, bases, strict=True):
             found = single.total(one, load.rows(rows), part)
             energy = energy + found.energy
             slopes += basis.T @ found.gradient
-            whole = single.second_slopes(one, found)
-            matrix += basis.T @ whole @ basis
+            single.levelled(one, found)
+            own.append(banded.packed(found.matrix, self.packing))
+            # The rim, and what is near enough to be joined with it.
+            edge = 2 * one.edge
+            end, moved = banded.dense(found.matrix[edge - REACH :]), basis[edge:, first:]
+            rim = np.arange(REACH, end.shape[1], 2)
+            end[:, rim[:, None], rim] += np.moveaxis(found.rim, -1, 0)
+            between.append(np.moveaxis(end[:, :REACH, REACH:] @ moved, 0, -1))
+            shared += moved.T @ end[:, REACH:, REACH:] @ moved
+        matrix = _Matrix(np.concatenate(own, -1), np.concatenate(between, -1), shared)
         return Descent(energy, slopes, matrix)
 
     def ahead(self, state: Descent, damping: Array) -> Array:
-        matrix, diagonal = state.matrix.copy(), np.arange(len(self.wrings))
-        own = np.abs(matrix[:, diagonal, diagonal])
-        # Slack films without pressure may be held by nothing; rounding's share of the rest is.
-        matrix[:, diagonal, diagonal] += damping[:, None] * own + 1e-15 * own.max(-1)[:, None]
-        return np.asarray(-np.linalg.solve(matrix, state.gradient.T[..., None])[..., 0].T)
+        """By the Schur complement of the shared freedoms."""
+        matrix, first = state.matrix, 2 * self.alone
+        several, rows = matrix.shared.shape[1], len(damping)
+        band, shared = matrix.own.copy(), matrix.shared.copy()
+        band[:, 0] += _firmer(band[:, 0], np.tile(damping, 2))
+        number = np.arange(several)
+        shared[:, number, number] += _firmer(shared[:, number, number].T, damping).T
+        wanted = np.zeros((self.alone, several + 1, 2 * rows))
+        wanted[-REACH:, :-1] = matrix.between
+        wanted[:, -1] = -np.concatenate(np.split(state.gradient[:first], 2), -1)
+        alone = banded.solve(band, wanted)
+        passed = np.einsum("iar,ibr->rab", matrix.between, alone[-REACH:])
+        passed = passed[:rows] + passed[rows:]
+        left = -state.gradient[first:].T - passed[..., -1]
+        found = np.linalg.solve(shared - passed[..., :-1], left[..., None])[..., 0].T
+        own = alone[:, -1] - (alone[:, :-1] * np.tile(found, 2)).sum(1)
+        return np.concatenate([own[:, :rows], own[:, rows:], found])
 
     def change(self, x: Array, ahead: Array) -> Array:
         parts = zip(np.split(self.basis @ x, 2), np.split(self.basis @ ahead, 2), strict=True)
         return np.asarray(np.max([single.change(*part) for part in parts], axis=0))
+
+
+def _firmer(diagonal: Array, damping: Array) -> Array:
+    """What is added to a diagonal (n, rows). Slack films without pressure may be held by nothing:
+    rounding's share of the rest is added then.
+    """
+    size = np.abs(diagonal)
+    return np.asarray(damping * size + 1e-15 * size.max(0))

@@ -22,6 +22,11 @@ are read from files, whose coordinates are off by up to 1 um."""
 STEEP = 0.01
 """Sine of the angle to the normal up to which an edge runs along it."""
 
+NEARER = 1e-9
+"""mm by which a place must be nearer than the nearest so far."""
+ROUNDING = 1e-12
+"""mm: more than what heights are rounded by."""
+
 
 @remembered
 def edges_along(region: Region, other: Region) -> tuple[Edge, ...]:
@@ -107,16 +112,41 @@ def _across(edge: Edge, distance: float, others: Iterable[Edge]) -> Iterable[Edg
 def _nearest(within: _Band, others: Iterable[Edge]) -> Reach | None:
     best: Reach | None = None
     for other in others:
+        least, most = _heights(within.edge, other)
+        if most < -EPSILON or (best is not None and least >= best.value - NEARER):
+            continue
         for p in within.nearest_candidates(other):
             height = within.height(p)
             if (
                 height is not None
                 and not within.is_passed_by(other, p)
                 and height > -EPSILON
-                and (best is None or height < best.value - 1e-9)
+                and (best is None or height < best.value - NEARER)
             ):
                 best = Reach(max(0.0, height), p)
     return best
+
+
+def _heights(edge: Edge, other: Edge) -> tuple[float, float]:
+    """Between how far outward from ``edge``, or its line or circle, all of another edge lies."""
+    if isinstance(edge, Arc):
+        centre = edge.centre
+        far = [math.dist(centre, other.start), math.dist(centre, other.end)]
+        if isinstance(other, Arc):
+            gap = math.dist(centre, other.centre)
+            far += [abs(gap - other.radius), gap + other.radius]
+        else:
+            far.append(math.dist(centre, other.nearest(centre)))
+        least, most = min(far) - edge.radius, max(far) - edge.radius
+        if not edge.ccw:
+            least, most = -most, -least
+    else:
+        heights = [-edge.to_left(other.start), -edge.to_left(other.end)]
+        if isinstance(other, Arc):
+            middle = -edge.to_left(other.centre)
+            heights += [middle - other.radius, middle + other.radius]
+        least, most = min(heights), max(heights)
+    return least - ROUNDING, most + ROUNDING
 
 
 class _Band(NamedTuple):

@@ -58,9 +58,9 @@ def facing_films(laminate: Laminate) -> tuple[Facing, ...]:
             if rest.contours:
                 left.append(_Seen(below, rest))
             if shared.contours:
-                gap, bare = shapes.kept_apart(shared, index, below, film)
-                if gap.masks or bare.contours:
-                    found.append(Facing(gap, bare))
+                faced = shapes.kept_apart(shared, index, below, film)
+                if faced is not None:
+                    found.append(faced)
         seen = [*left, _Seen(film, film.profile)]
     return tuple(found)
 
@@ -87,10 +87,8 @@ class _Shapes:
         # Interfaces have asked for it as well.
         return without_slivers(divided(below.profile, above.profile)[0])
 
-    def kept_apart(
-        self, region: Region, index: int, below: Layer, above: Layer
-    ) -> tuple[Interface, Region]:
-        """Two films that face each other over a region, as an interface, and what is bare of it."""
+    def kept_apart(self, region: Region, index: int, below: Layer, above: Layer) -> Facing | None:
+        """Two films that face each other over a region; None where it is all pins' openings."""
         facing = bare = self.minus(region, self.openings)
         masks: dict[Region, Layer] = {}
         for layer in reversed(self.laminate.layers[below.index : above.index - 1]):
@@ -101,13 +99,14 @@ class _Shapes:
                 if left != bare:
                     masks[layer.profile] = layer
                 bare = left
+        if not masks and bare.is_empty:
+            return None
         mask = self.union(tuple(masks))
         unbonded = self.minus(facing, bare) if bare.contours else facing
         contact = self.both(below.profile, above.profile)
         used = tuple(reversed(masks.values()))
-        return Interface(
-            index, "separator", below, above, used, mask, contact, Region(), unbonded
-        ), bare
+        gap = Interface(index, "separator", below, above, used, mask, contact, Region(), unbonded)
+        return Facing(gap, bare)
 
 
 def _laid(seen: Region, film: Region) -> tuple[Region, Region]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import NamedTuple
 
 from sbafab.geometry.centroid import centroid
@@ -200,15 +200,14 @@ class _Shapes:
         self.centres: dict[tuple[str, int], Point] = {}
         self.holders: dict[tuple[str, int], dict[str, float]] = {}
         self.overlaps: dict[tuple[str, int, str, int], bool] = {}
+        self.meeting: dict[tuple[str, str], list[tuple[int, int]]] = {}
+        self.pattern = {layer.index: layer.pattern for layer in laminate.layers}
 
     def parts(self, layer: int) -> list[Part]:
-        return [Part(layer, i) for i in range(len(self.pieces[self._pattern(layer)]))]
-
-    def _pattern(self, layer: int) -> str:
-        return self.laminate.layer(layer).pattern
+        return [Part(layer, i) for i in range(len(self.pieces[self.pattern[layer]]))]
 
     def _region(self, part: Part) -> Region:
-        return self.pieces[self._pattern(part.layer)][part.piece]
+        return self.pieces[self.pattern[part.layer]][part.piece]
 
     def pins(self, body: Iterable[Part], step: AssemblyStep) -> dict[Point, float]:
         """Centres of the step's pins that hold a part of the body, and its play on each, mm."""
@@ -216,7 +215,7 @@ class _Shapes:
             return {}
         found: dict[str, float] = {}
         for part in body:
-            key = self._pattern(part.layer), part.piece
+            key = self.pattern[part.layer], part.piece
             if key not in self.holders:
                 self.holders[key] = _held(self.laminate, self._region(part))
             for name, loose in self.holders[key].items():
@@ -227,7 +226,7 @@ class _Shapes:
         """The body's centre of area, all its parts counted."""
         area = x = y = 0.0
         for part in body:
-            region, key = self._region(part), (self._pattern(part.layer), part.piece)
+            region, key = self._region(part), (self.pattern[part.layer], part.piece)
             if key not in self.centres:
                 self.centres[key] = centroid(region)
             px, py = self.centres[key]
@@ -236,13 +235,25 @@ class _Shapes:
 
     def overlap(self, a: Part, b: Part) -> bool:
         """Whether two parts lie over each other."""
-        key = (self._pattern(a.layer), a.piece, self._pattern(b.layer), b.piece)
+        key = (self.pattern[a.layer], a.piece, self.pattern[b.layer], b.piece)
         if key not in self.overlaps:
             one, other = self._region(a), self._region(b)
             self.overlaps[key] = boxes_meet(one.bounds, other.bounds) and (
                 _plainly_meet(one, other) or not (one & other).is_empty
             )
         return self.overlaps[key]
+
+    def meet(self, lower: int, upper: int) -> list[tuple[int, int]]:
+        """The pieces of two layers that lie over each other."""
+        key = self.pattern[lower], self.pattern[upper]
+        if key not in self.meeting:
+            self.meeting[key] = [
+                (a.piece, b.piece)
+                for a in self.parts(lower)
+                for b in self.parts(upper)
+                if self.overlap(a, b)
+            ]
+        return self.meeting[key]
 
     def under(self, body: Sequence[Part], present: Sequence[Sequence[Part]]) -> Part | None:
         """What a body laid by hand is laid on: the highest film of the body below it."""
@@ -258,9 +269,6 @@ class _Shapes:
     def joined(self, present: Sequence[list[Part]]) -> list[list[Part]]:
         """The bodies after a step: parts that lie on each other have become one."""
         home = {part: index for index, body in enumerate(present) for part in body}
-        layers: dict[int, list[Part]] = {}
-        for part in sorted(home):
-            layers.setdefault(part.layer, []).append(part)
         leader = list(range(len(present)))
 
         def first(index: int) -> int:
@@ -268,13 +276,11 @@ class _Shapes:
                 index = leader[index]
             return index
 
-        ordered = list(layers.values())
-        for lower, upper in zip(ordered, ordered[1:], strict=False):
-            for a in lower:
-                for b in upper:
-                    if self.overlap(a, b):
-                        one, other = sorted((first(home[a]), first(home[b])))
-                        leader[other] = one
+        layers = sorted({part.layer for part in home})
+        for lower, upper in pairwise(layers):
+            for a, b in self.meet(lower, upper):
+                one, other = sorted((first(home[Part(lower, a)]), first(home[Part(upper, b)])))
+                leader[other] = one
         merged: dict[int, list[Part]] = {}
         for part in sorted(home):
             merged.setdefault(first(home[part]), []).append(part)

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.region import Region
+from sbafab.geometry.remembered import remembered
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
 from sbafab.rules.alike import distinct_interfaces
 from sbafab.rules.channels import Channel, channels
@@ -100,29 +101,22 @@ def _off_outline(laminate: Laminate) -> Iterator[_Departure]:
         interface = alike.interface
         if interface.kind != "chamber" or interface.below.pattern == interface.above.pattern:
             continue
-        below, above = interface.below.profile.outers, interface.above.profile.outers
-        yield max(
-            (
-                _Departure(
-                    value,
-                    p,
-                    (interface.below.index, interface.above.index),
-                    f"the outlines of layers {interface.below.index} and {interface.above.index}, "
-                    "one balloon, depart from each other",
-                )
-                for one, other in ((below, above), (above, below))
-                for value, p in _distances(one, other)
-            ),
-            key=lambda departure: departure.value,
+        below, above = (Region(one.profile.outers) for one in (interface.below, interface.above))
+        value, p = max(_farthest(below, above), _farthest(above, below), key=lambda one: one[0])
+        yield _Departure(
+            value,
+            p,
+            (interface.below.index, interface.above.index),
+            f"the outlines of layers {interface.below.index} and {interface.above.index}, one "
+            "balloon, depart from each other",
         )
 
 
-def _distances(
-    one: tuple[Contour, ...], other: tuple[Contour, ...]
-) -> Iterator[tuple[float, Point]]:
-    """How far the ends and middles of all edges of ``one`` lie from ``other``."""
-    outline = Region(other).index
-    for contour in one:
-        for edge in contour.edges:
-            for p in (edge.start, edge.at(0.5)):
-                yield outline.distance(p), p
+@remembered
+def _farthest(one: Region, other: Region) -> tuple[float, Point]:
+    """How far the ends and middles of all edges of ``one`` lie from ``other``, and where most."""
+    return max(
+        ((other.index.distance(p), p) for edge in one.edges for p in (edge.start, edge.at(0.5))),
+        key=lambda found: found[0],
+        default=(0.0, (0.0, 0.0)),
+    )

@@ -16,6 +16,7 @@ from sbafab.geometry.apart import alone, turned_round
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.nearby import widened
 from sbafab.geometry.region import Region
+from sbafab.geometry.remembered import remembered
 from sbafab.geometry.shapes import rectangle
 from sbafab.geometry.tidy import tidy
 from sbafab.laminate.interfaces import Interface
@@ -93,7 +94,7 @@ def void_graph(laminate: Laminate) -> VoidGraph:
     for interface in laminate.interfaces:
         gap = gaps.get(interface.pattern)
         if gap is None:
-            gap = gaps[interface.pattern] = _gap(interface, frame)
+            gap = gaps[interface.pattern] = _gap(interface.unbonded, interface.contact, frame)
         _add_gap(graph, interface, gap, laminate.inlets)
         for layer in (interface.below, interface.above):
             key = interface.pattern, layer.pattern
@@ -110,15 +111,16 @@ def void_graph(laminate: Laminate) -> VoidGraph:
     return graph
 
 
-def _gap(interface: Interface, frame: Region) -> _Gap:
-    unbonded = interface.unbonded.pieces
-    missing = _around(interface.contact, frame).pieces
+@remembered
+def _gap(unbonded: Region, contact: Region, frame: Region) -> _Gap:
+    pieces = unbonded.pieces
+    missing = _around(contact, frame).pieces
     touching = []
-    for edge in edges_along(interface.unbonded, interface.contact):
+    for edge in edges_along(unbonded, contact):
         home = _holding(missing, beside(edge, -INSET))
-        touching.append((_bounded(unbonded, edge.at(0.5)), home, edge.at(0.5)))
+        touching.append((_bounded(pieces, edge.at(0.5)), home, edge.at(0.5)))
     touching.sort(key=lambda one: one[0])
-    return _Gap(unbonded, missing, tuple(touching), _outside(missing, frame))
+    return _Gap(pieces, missing, tuple(touching), _outside(missing, frame))
 
 
 def _bounded(pieces: tuple[Region, ...], p: Point) -> int:

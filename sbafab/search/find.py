@@ -6,11 +6,12 @@ from the best that was found. Rules are asked of what would become the best.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from sbafab.design.form import Free
 from sbafab.design.records import Design
+from sbafab.design.writing import keys_of
 from sbafab.errors import DesignError
 from sbafab.progress import Progress, unheard
 from sbafab.search.quantities import refuse_unknown_key
@@ -95,9 +96,12 @@ def free_keys(request: FindRequest) -> tuple[Free, ...]:
     """
     for quantity in Wanted(request.design, request.requirements, request.goal).quantities:
         refuse_unknown_key(quantity, request.design)
+    keys = {key: value for key, value, _ in keys_of(request.design)}
     asked = {one.quantity.name for one in request.requirements} | {request.goal.quantity.name}
     every = request.design.free if request.free is None else request.free
     own = [one for one in every if not one.asked or one.asked in asked]
+    for one in request.requirements:
+        _refuse_fixed(one, keys, own)
     found = [_within(one, request.requirements) for one in own]
     if not found:
         raise DesignError(
@@ -105,6 +109,21 @@ def free_keys(request: FindRequest) -> tuple[Free, ...]:
             "--free KEY=LOW:HIGH:STEP"
         )
     return tuple(found)
+
+
+def _refuse_fixed(
+    requirement: Requirement, keys: Mapping[str, object], own: Sequence[Free]
+) -> None:
+    """Raises DesignError for a key that is asked to be what it is not, and may not change."""
+    key = requirement.quantity.key
+    value = keys.get(key or "")
+    if key in [one.key for one in own] or not isinstance(value, int | float):
+        return
+    if not requirement.holds(value):
+        raise DesignError(
+            f"{key} = {value:g}, not {requirement.bound}, and the search does not change it; give "
+            f"it a range with --free {key}=LOW:HIGH:STEP"
+        )
 
 
 def _within(free: Free, requirements: Sequence[Requirement]) -> Free:
@@ -133,7 +152,7 @@ def find(request: FindRequest, tell: Progress = unheard) -> FoundDesign:
     place, best = space.best()
     if best.refused:
         raise DesignError(f"no design could be made: {best.refused}")
-    shown, count = pareto_front(space) if best.holds else ([], 0)
+    shown, count = pareto_front(space, best) if best.holds else ([], 0)
     return FoundDesign(
         wanted,
         best,

@@ -22,7 +22,8 @@ def with_optuna(search: SearchSpace, storage: str | None) -> None:
         import optuna
     except ImportError:
         raise DesignError(EXTRA) from None
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    # Of a search that is stopped it would tell a trial that failed, with a traceback.
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
     tries = max(1, round(WALK_SHARE * search.tries))
     try:
         study = optuna.create_study(
@@ -48,9 +49,10 @@ def with_optuna(search: SearchSpace, storage: str | None) -> None:
         return found.cost if found.holds else IMPOSSIBLE * (1 + min(found.missed, IMPOSSIBLE))
 
     # What is stored was tried by an earlier run: here it is looked up again, and tried no more.
-    for old in study.get_trials(states=[optuna.trial.TrialState.COMPLETE]):
+    done = study.get_trials(states=[optuna.trial.TrialState.COMPLETE])
+    for old in done:
         search.trial(tuple(old.params[free.key] for free in search.free))
-    study.optimize(objective, n_trials=max(0, tries - len(study.trials)))
+    study.optimize(objective, n_trials=max(0, tries - len(done)))
 
 
 def _name(search: SearchSpace) -> str:

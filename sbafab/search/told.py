@@ -106,10 +106,11 @@ def _steps(place: Steps) -> list[tuple[int, Steps]]:
     ]
 
 
-def pareto_front(space: SearchSpace) -> tuple[list[Trial], int]:
+def pareto_front(space: SearchSpace, best: Trial) -> tuple[list[Trial], int]:
     """Designs that hold, rules included, and that none of those tried betters in everything.
 
-    In the order of the goal; where they are many the ends and some between, and how many there are.
+    The best first, also where another one equals it in the goal, then in the order of the goal;
+    where they are many the ends and some between. With it how many there are.
     """
     wanted = space.wanted
     sides = [
@@ -118,15 +119,17 @@ def pareto_front(space: SearchSpace) -> tuple[list[Trial], int]:
         if one.quantity.key is None and one.quantity != wanted.goal.quantity
     ]
     left = [trial for trial in space.trials.values() if trial.holds]
+    first = left.index(best)
     more = [False, *(one.at_least for one in sides)]
     while True:
         rows = [[trial.cost, *(trial.value(one) for one in sides)] for trial in left]
-        numbers = sorted(front(rows, more), key=lambda number: left[number].rank)
+        numbers = sorted({first, *front(rows, more)}, key=lambda number: left[number].rank)
         chosen = _spread(numbers)
         checked = {number: space.with_rules(left[number]) for number in chosen}
         failed = [number for number, trial in checked.items() if not trial.holds]
         if not failed:
             return [checked[number] for number in chosen], len(numbers)
+        first -= sum(number < first for number in failed)
         left = [
             checked.get(number, trial) for number, trial in enumerate(left) if number not in failed
         ]

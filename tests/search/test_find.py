@@ -20,7 +20,7 @@ from sbafab.search import space as module
 from sbafab.search.find import FindRequest, find
 from sbafab.search.free import read_free
 from sbafab.search.requirements import read_all
-from sbafab.search.trial import Trial, Wanted
+from sbafab.search.trial import Trial, Wanted, tried
 
 FREE = (Free("chamber.diameter", 3.0, 12.0, 0.1), Free("stack.balloons", 2, 20, 1))
 
@@ -167,6 +167,7 @@ def test_where_nothing_meets_all_the_nearest_miss_is_said(tmp_path: Path) -> Non
         (["--min", "force@1mm@5kPa@6kPa=1"], "names two pressures"),
         (["--min", "chamber.diamter=5"], "did you mean chamber.diameter?"),
         (["--min", "lumen=3"], "1dof-5mm has no lumen"),
+        (["--min", "inlet.tab_length=6"], "--free inlet.tab_length=LOW:HIGH:STEP"),
         (["--max", "deflated_diameter=3"], "only radial designs"),
         (["--free", "chamber.diameter=6:3:1"], "--free 'chamber.diameter=6:3:1' stops below"),
     ],
@@ -190,6 +191,39 @@ def test_a_file_in_no_folder_is_refused_before_the_search(tmp_path: Path) -> Non
     assert ended.exit_code == 2
     assert "is no folder" in ended.output
     assert "trying designs" not in ended.output
+
+
+def test_a_file_with_a_space_in_its_name_names_a_design_that_loads(tmp_path: Path) -> None:
+    target = tmp_path / "my file.toml"
+    asked = ["find", "1dof-5mm", "--min", "stroke=4", "--tries", "20", "-o", str(target)]
+    ended = CliRunner().invoke(app, asked)
+    assert ended.exit_code == 0, ended.output
+    assert sbafab.load(target).name == "my-file"
+    assert f"sbafab generate '{target}'" in ended.output
+
+
+def test_what_equals_the_best_is_told_by_its_mass(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every design has the same width; more balloons weigh more, and give more stroke."""
+
+    def flat(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+        n = values["stack.balloons"]
+        figures = {"width": 5.0, "stroke@10kPa": 1.0 * n}
+        missed = max(0.0, 4 - n)
+        return Trial(values, figures, {} if with_rules else None, missed, 5.0, 10.0 + n)
+
+    monkeypatch.setattr(module, "tried", flat)
+    requirements, goal = read_all(["stroke=4"], [], "width")
+    free = (Free("stack.balloons", 2, 9, 1),)
+    found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, free))
+    assert found.best.values == {"stack.balloons": 4}
+    assert [one.values["stack.balloons"] for one in found.front] == [4, 9]
+
+
+def test_a_force_where_nothing_rises_is_none(tmp_path: Path) -> None:
+    asked = ["find", "1dof-5mm", "--min", "force@200mm@1kPa=1", "--tries", "6"]
+    ended = CliRunner().invoke(app, [*asked, "-o", str(tmp_path / "found.toml")])
+    assert ended.exit_code == 1
+    assert "force@200mm@1kPa none, it does not rise that far, not at least 1 N" in ended.output
 
 
 def test_a_key_that_is_set_stays(tmp_path: Path) -> None:
@@ -282,6 +316,27 @@ def test_a_tip_with_lumen_stroke_and_force() -> None:
 
 
 @pytest.mark.long
+@pytest.mark.parametrize(
+    ("least", "best"),
+    [({"stroke@10kPa": 10}, "mass"), ({"stroke@10kPa": 8, "force@4mm@20kPa": 0.4}, "height")],
+)
+def test_no_real_design_is_better(least: dict[str, float], best: str) -> None:
+    free = (Free("chamber.diameter", 4.0, 9.0, 0.1), Free("stack.balloons", 2, 12, 1))
+    found = sbafab.find("1dof-5mm", least=least, best=best, free=free)
+    asked = [f"{name}={value}" for name, value in least.items()]
+    requirements, goal = read_all(asked, [], best)
+    wanted = Wanted(sbafab.load("1dof-5mm"), requirements, goal)
+    every = (
+        tried(wanted, {"chamber.diameter": round(4 + step / 10, 1), "stack.balloons": n})
+        for step, n in itertools.product(range(51), range(2, 13))
+    )
+    lightest = min(trial.rank for trial in every)
+    assert found.holds
+    assert found.best.rank == lightest
+    assert found.tries < 51 * 11
+
+
+@pytest.mark.long
 def test_optuna_finds_it_too_and_goes_on_from_its_storage(tmp_path: Path) -> None:
     pytest.importorskip("optuna")
     storage = f"sqlite:///{tmp_path / 'search.db'}"
@@ -294,3 +349,41 @@ def test_optuna_finds_it_too_and_goes_on_from_its_storage(tmp_path: Path) -> Non
     assert more.best.cost <= 1.3 * plain.best.cost
     with pytest.raises(DesignError, match="--storage nowhere cannot be used"):
         sbafab.find("1dof-5mm", optuna=True, storage="nowhere", tries=4, **asked)
+
+
+def test_a_search_by_optuna_that_is_stopped_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The design at which it was stopped is none of those that are stored."""
+    pytest.importorskip("optuna")
+    requirements, goal = read_all(["stroke@50kPa=25"], [], "mass")
+    request = FindRequest(
+        sbafab.load("1dof-5mm"),
+        requirements,
+        goal,
+        FREE,
+        tries=20,
+        optuna=True,
+        storage=f"sqlite:///{tmp_path / 'search.db'}",
+    )
+    seen: list[Mapping[str, Any]] = []
+
+    def stopping(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+        seen.append(values)
+        if len(seen) == 8:
+            raise KeyboardInterrupt
+        return _made_up(wanted, values, with_rules)
+
+    monkeypatch.setattr(module, "tried", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        find(request)
+    assert "Traceback" not in capfd.readouterr().err
+    monkeypatch.setattr(module, "tried", _made_up)
+    find(request)
+    import optuna
+
+    (study,) = optuna.get_all_study_summaries(request.storage or "")
+    kept = optuna.load_study(study_name=study.study_name, storage=request.storage)
+    # 0.6 of the tries are Optuna's, each told to the end.
+    states = [trial.state.name for trial in kept.trials]
+    assert states.count("COMPLETE") == 12
