@@ -40,7 +40,9 @@ class Spare:
 
 @dataclass(frozen=True)
 class RangeEnd:
-    """A key at the end of its range, ``low`` to ``high``, that would be better beyond."""
+    """A key at the end of its range that would be better beyond: ``low`` to ``high`` in steps of
+    ``step``, mm or a number of balloons, as the key is.
+    """
 
     key: str
     value: Any
