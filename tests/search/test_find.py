@@ -17,7 +17,7 @@ from sbafab.cli import app
 from sbafab.design.form import Free
 from sbafab.errors import DesignError
 from sbafab.search import space as module
-from sbafab.search.find import FindRequest, find
+from sbafab.search.find import FindRequest, find, free_keys
 from sbafab.search.free import read_free
 from sbafab.search.requirements import read_all
 from sbafab.search.trial import Trial, Wanted, tried
@@ -252,6 +252,31 @@ def test_what_cannot_be_made_binds_on_the_way_to_the_goal_alone(
         assert [one.key for one in found.binds] == bound
 
 
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"tries": 0}, "at least 4"),
+        ({"storage": "sqlite:///search.db"}, "optuna = True"),
+        ({"free": ()}, "no key of 1dof-5mm"),
+        ({"free": FREE, "least": {"chamber.diameter": 20}}, "its range is 3 to 12"),
+    ],
+)
+def test_what_a_program_asks_is_checked_too(asked: dict[str, Any], said: str) -> None:
+    with pytest.raises(DesignError, match=said):
+        sbafab.find("1dof-5mm", **asked)
+
+
+def test_a_requirement_beyond_a_range_that_widens_moves_it() -> None:
+    found = sbafab.find("1dof-5mm", least={"chamber.diameter": 20}, tries=12)
+    assert found.best.values["chamber.diameter"] == 20
+    design = sbafab.load("1dof-5mm")
+    for least, most, ends in (("2", "9", (2.6, 9.0)), ("3", "20", (3.0, 16.0)), ("1", "2", (2, 2))):
+        asked = [f"chamber.diameter={least}"], [f"chamber.diameter={most}"]
+        requirements, goal = read_all(*asked, "mass")
+        free = free_keys(FindRequest(design, requirements, goal))[0]
+        assert (free.low, free.high) == ends
+
+
 def test_a_key_that_is_set_stays(tmp_path: Path) -> None:
     target = tmp_path / "found.toml"
     asked = ["find", "1dof-5mm", "--min", "stroke=4", "--tries", "20", "-o", str(target)]
@@ -413,3 +438,7 @@ def test_a_search_by_optuna_that_is_stopped_goes_on(
     # 0.6 of the tries are Optuna's, each told to the end.
     states = [trial.state.name for trial in kept.trials]
     assert states.count("COMPLETE") == 12
+    # A design that was changed is another search, whatever its name.
+    changed = replace(request, design=sbafab.load("1dof-5mm", "inlet.tab_length=6"))
+    find(changed)
+    assert len(optuna.get_all_study_summaries(request.storage or "")) == 2
