@@ -156,7 +156,7 @@ def find(request: FindRequest, tell: Progress = unheard) -> FoundDesign:
     return FoundDesign(
         wanted,
         best,
-        tuple(bindings(space, place, best)) if best.holds else (),
+        tuple(bindings(space, place, best)),
         tuple(range_ends(space, place, best)),
         tuple(shown),
         count,

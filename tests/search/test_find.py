@@ -226,6 +226,32 @@ def test_a_force_where_nothing_rises_is_none(tmp_path: Path) -> None:
     assert "force@200mm@1kPa none, it does not rise that far, not at least 1 N" in ended.output
 
 
+def test_what_stops_the_nearest_miss_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Least width of what can be made is 3.4 + 1.5; smaller pockets cannot be."""
+    monkeypatch.setattr(module, "tried", _made_up)
+    requirements, goal = read_all([], ["width=4"], "mass")
+    found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, FREE))
+    assert not found.holds
+    assert found.best.values["chamber.diameter"] == 3.4
+    assert [(one.key, one.value, one.breaks) for one in found.binds] == [
+        ("chamber.diameter", 3.3, "too small")
+    ]
+
+
+def test_what_cannot_be_made_binds_on_the_way_to_the_goal_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Pockets of 3.3 cannot be made: that stops the least pocket, and not one that is to grow."""
+    monkeypatch.setattr(module, "tried", _made_up)
+    design = sbafab.load("1dof-5mm")
+    for low, high, bound in ((3.3, 5.0, ["chamber.diameter"]), (3.0, 3.4, [])):
+        free = (Free("chamber.diameter", low, high, 0.1), Free("stack.balloons", 5, 5, 1))
+        requirements, goal = read_all([], [], "mass" if bound else "stroke@50kPa")
+        found = find(FindRequest(design, requirements, goal, free))
+        assert found.best.values["chamber.diameter"] == 3.4
+        assert [one.key for one in found.binds] == bound
+
+
 def test_a_key_that_is_set_stays(tmp_path: Path) -> None:
     target = tmp_path / "found.toml"
     asked = ["find", "1dof-5mm", "--min", "stroke=4", "--tries", "20", "-o", str(target)]
