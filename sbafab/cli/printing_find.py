@@ -66,15 +66,15 @@ def print_found(found: FoundDesign, started: str, target: Path) -> None:
     _say(f"  {said}: {shown_value(goal.quantity, value)}")
     for said in found.broken_rules:
         _say(f"  {said}")
-    if not found.holds:
-        _print_ends(found)
-        _print_miss(found)
-        return
-    if found.binds or found.without_room or found.ends:
-        _say("What binds", "bold")
+    told = found.binds or found.ends or (found.holds and found.without_room)
+    if told:
+        _say("What binds" if found.holds else "What stops it there", "bold")
     for bind in found.binds:
         _say(f"  {bind.key} = {bind.value:g}: {bind.breaks}")
     _print_ends(found)
+    if not found.holds:
+        _print_miss(found)
+        return
     for spare in found.without_room:
         _say(f"  {spare.rule} {spare.place}: {spare.measured:g} {spare.unit}, nothing to spare")
     _print_front(found)

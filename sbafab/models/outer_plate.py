@@ -69,7 +69,8 @@ def pressed(
     now = loaded(springs, pitch, load, at)
     touch = now.touch
     if touch is not None and touch.push > PUSHES * np.abs(now.own[:, 0]).max():
-        # So deep that it says nothing of the force.
+        # So deep that it says nothing of the force, nor the first step of what is stable.
+        before = 0.0
         now = loaded(springs, pitch, load, at, np.zeros(len(touch.deep)))
     for _ in range(STEPS):
         touch = now.touch
@@ -115,12 +116,13 @@ def _step(
                 continue
             best, least = flat, total
         matrix, gradient = with_blocks(turned, blocks), follows + own.ravel()
-        more = _more(springs, at + flat.reshape(-1, 3), matrix, gradient, touch, lines, deep)
-        if more is None:
+        found = _more(springs, at + flat.reshape(-1, 3), matrix, gradient, touch, lines, deep)
+        if found is None:
             return None
+        more, is_settled = found
         flat = best + more
-        largest = np.abs(more).max()
-        is_found = largest < (NEARLY * np.abs(best).max() if number else STRAIGHT)
+        little = NEARLY * np.abs(best).max() if number else STRAIGHT
+        is_found = is_settled and float(np.abs(more).max()) < little
         if is_found:
             break
     deep = touch.deep + lines @ flat
@@ -135,8 +137,10 @@ def _more(
     touch: PlateContact,
     lines: Array,
     deep: Array,
-) -> Array | None:
-    """The step to where the points that touch at its end, and rims that meet, are in balance."""
+) -> tuple[Array, bool] | None:
+    """The step to where the points that touch at its end, and rims that meet, are in balance, and
+    whether they are those that the step was made with.
+    """
     touches, met, held_off = deep > touch.least, None, 0
     for _ in range(TRIES):
         stiff = touch.stiff * touches
@@ -150,9 +154,9 @@ def _more(
             return None
         ahead = deep + lines @ found[0] > touch.least
         if (ahead == touches).all():
+            met = springs.meeting(at, found[0].reshape(-1, 3))
+            if met is None or held_off == HELD:
+                return found[0], met is None
             held_off += 1
-            met = springs.meeting(at, found[0].reshape(-1, 3)) if held_off <= HELD else None
-            if met is None:
-                break
         touches = ahead
-    return np.asarray(found[0])
+    return found[0], False

@@ -30,7 +30,7 @@ from sbafab.search.trial import Trial, Wanted, broken_rules, misses
 from sbafab.search.walks import every_design, explored, refined
 from sbafab.search.widening import widened
 
-TRIES = 240
+TRIES, LEAST_TRIES = 240, 4
 
 
 @dataclass(frozen=True)
@@ -127,16 +127,31 @@ def _refuse_fixed(
 
 
 def _within(free: Free, requirements: Sequence[Requirement]) -> Free:
+    """The range within what requirements say of the key itself. Raises DesignError for none."""
     for one in requirements:
-        if one.quantity.key == free.key:
-            low = max(free.low, one.limit) if one.at_least else free.low
-            high = free.high if one.at_least else min(free.high, one.limit)
-            free = replace(free, low=low, high=max(high, low))
+        if one.quantity.key != free.key:
+            continue
+        is_beyond = one.limit > free.high if one.at_least else one.limit < free.low
+        if is_beyond and not free.widens:
+            raise DesignError(
+                f"{free.key} must be {one.bound}, and its range is {free.low:g} to {free.high:g}; "
+                f"give it another one with --free {free.key}=LOW:HIGH:STEP"
+            )
+        if one.at_least:
+            low = max(free.low, one.limit)
+            free = replace(free, low=low, high=max(free.high, low))
+        else:
+            high = min(free.high, one.limit)
+            free = replace(free, low=min(free.low, high), high=high)
     return free
 
 
 def find(request: FindRequest, tell: Progress = unheard) -> FoundDesign:
     """The best design, or the nearest miss. Raises DesignError for what cannot be asked."""
+    if request.tries < LEAST_TRIES:
+        raise DesignError(f"tries = {request.tries} must be at least {LEAST_TRIES}")
+    if request.storage is not None and not request.optuna:
+        raise DesignError("storage is Optuna's; search with optuna = True, or leave it out")
     wanted = Wanted(request.design, request.requirements, request.goal)
     space = SearchSpace(wanted, free_keys(request), request.tries, tell)
     if request.optuna:
@@ -156,7 +171,7 @@ def find(request: FindRequest, tell: Progress = unheard) -> FoundDesign:
     return FoundDesign(
         wanted,
         best,
-        tuple(bindings(space, place, best)) if best.holds else (),
+        tuple(bindings(space, place, best)),
         tuple(range_ends(space, place, best)),
         tuple(shown),
         count,

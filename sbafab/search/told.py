@@ -40,7 +40,9 @@ class Spare:
 
 @dataclass(frozen=True)
 class RangeEnd:
-    """A key at the end of its range, ``low`` to ``high``, that would be better beyond."""
+    """A key at the end of its range that would be better beyond: ``low`` to ``high`` in steps of
+    ``step``, mm or a number of balloons, as the key is.
+    """
 
     key: str
     value: Any
@@ -64,18 +66,31 @@ def without_room(best: Trial) -> list[Spare]:
 
 
 def bindings(space: SearchSpace, place: Steps, best: Trial) -> list[Binding]:
-    """What stops every single step that would come nearer the goal."""
+    """What stops every single step that would come nearer the goal.
+
+    Of the nearest miss: the steps to designs that cannot be made, or that no model knows.
+    """
     found = []
     for axis, other in _steps(place):
         if not space.lows[axis] <= other[axis] <= space.highs[axis]:
             continue
         trial = space.with_rules(space.looked_at(other))
-        if trial.cost < best.cost or (trial.refused and trial.rank > best.rank):
+        if _is_nearer(space, place, other, trial, best):
             broken = misses(space.wanted, trial)
             if broken:
                 key = space.free[axis].key
                 found.append(Binding(key, trial.values[key], "; ".join(broken)))
     return found
+
+
+def _is_nearer(space: SearchSpace, place: Steps, other: Steps, trial: Trial, best: Trial) -> bool:
+    """Whether a step would come nearer the goal; where nothing comes of it, by the step back."""
+    if not trial.refused:
+        return best.holds and trial.cost < best.cost
+    if not best.holds:
+        return True
+    back = space.looked_at(tuple(2 * at - to for at, to in zip(place, other, strict=True)))
+    return not back.refused and back.cost > best.cost
 
 
 def range_ends(space: SearchSpace, place: Steps, best: Trial) -> list[RangeEnd]:

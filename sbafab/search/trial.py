@@ -33,8 +33,8 @@ class Trial:
 
     ``values`` are those of the free keys, ``figures`` by quantity in its unit: mm, N, g or a share.
     ``missed`` is by what share requirements and rules are missed, all together; 0 where none is.
-    ``cost``, in the unit of what is best, is the less the better. ``refused`` says why no such
-    design can be made.
+    ``cost``, in the unit of what is best, is the less the better; ``mass`` is in g. ``refused``
+    says why no such design can be made.
     """
 
     values: Mapping[str, Any]

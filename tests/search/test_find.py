@@ -17,7 +17,7 @@ from sbafab.cli import app
 from sbafab.design.form import Free
 from sbafab.errors import DesignError
 from sbafab.search import space as module
-from sbafab.search.find import FindRequest, find
+from sbafab.search.find import FindRequest, find, free_keys
 from sbafab.search.free import read_free
 from sbafab.search.requirements import read_all
 from sbafab.search.trial import Trial, Wanted, tried
@@ -226,6 +226,57 @@ def test_a_force_where_nothing_rises_is_none(tmp_path: Path) -> None:
     assert "force@200mm@1kPa none, it does not rise that far, not at least 1 N" in ended.output
 
 
+def test_what_stops_the_nearest_miss_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Least width of what can be made is 3.4 + 1.5; smaller pockets cannot be."""
+    monkeypatch.setattr(module, "tried", _made_up)
+    requirements, goal = read_all([], ["width=4"], "mass")
+    found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, FREE))
+    assert not found.holds
+    assert found.best.values["chamber.diameter"] == 3.4
+    assert [(one.key, one.value, one.breaks) for one in found.binds] == [
+        ("chamber.diameter", 3.3, "too small")
+    ]
+
+
+def test_what_cannot_be_made_binds_on_the_way_to_the_goal_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Pockets of 3.3 cannot be made: that stops the least pocket, and not one that is to grow."""
+    monkeypatch.setattr(module, "tried", _made_up)
+    design = sbafab.load("1dof-5mm")
+    for low, high, bound in ((3.3, 5.0, ["chamber.diameter"]), (3.0, 3.4, [])):
+        free = (Free("chamber.diameter", low, high, 0.1), Free("stack.balloons", 5, 5, 1))
+        requirements, goal = read_all([], [], "mass" if bound else "stroke@50kPa")
+        found = find(FindRequest(design, requirements, goal, free))
+        assert found.best.values["chamber.diameter"] == 3.4
+        assert [one.key for one in found.binds] == bound
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"tries": 0}, "at least 4"),
+        ({"storage": "sqlite:///search.db"}, "optuna = True"),
+        ({"free": ()}, "no key of 1dof-5mm"),
+        ({"free": FREE, "least": {"chamber.diameter": 20}}, "its range is 3 to 12"),
+    ],
+)
+def test_what_a_program_asks_is_checked_too(asked: dict[str, Any], said: str) -> None:
+    with pytest.raises(DesignError, match=said):
+        sbafab.find("1dof-5mm", **asked)
+
+
+def test_a_requirement_beyond_a_range_that_widens_moves_it() -> None:
+    found = sbafab.find("1dof-5mm", least={"chamber.diameter": 20}, tries=12)
+    assert found.best.values["chamber.diameter"] == 20
+    design = sbafab.load("1dof-5mm")
+    for least, most, ends in (("2", "9", (2.6, 9.0)), ("3", "20", (3.0, 16.0)), ("1", "2", (2, 2))):
+        asked = [f"chamber.diameter={least}"], [f"chamber.diameter={most}"]
+        requirements, goal = read_all(*asked, "mass")
+        free = free_keys(FindRequest(design, requirements, goal))[0]
+        assert (free.low, free.high) == ends
+
+
 def test_a_key_that_is_set_stays(tmp_path: Path) -> None:
     target = tmp_path / "found.toml"
     asked = ["find", "1dof-5mm", "--min", "stroke=4", "--tries", "20", "-o", str(target)]
@@ -387,3 +438,7 @@ def test_a_search_by_optuna_that_is_stopped_goes_on(
     # 0.6 of the tries are Optuna's, each told to the end.
     states = [trial.state.name for trial in kept.trials]
     assert states.count("COMPLETE") == 12
+    # A design that was changed is another search, whatever its name.
+    changed = replace(request, design=sbafab.load("1dof-5mm", "inlet.tab_length=6"))
+    find(changed)
+    assert len(optuna.get_all_study_summaries(request.storage or "")) == 2
