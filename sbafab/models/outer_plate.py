@@ -24,13 +24,17 @@ STEPS = 12
 """Steps that suffice, or another way is tried."""
 FINE = 1e-7
 """A step (mm, rad) that need not be made: a plate lets little of it be."""
+SLIGHT = 1e-4
+"""Out of balance in mN (or mN mm), and as a share of the plate's force, that is none."""
 FIRST = 1e-3
 """A step (mm, rad) as large as the one before the first may have been."""
-ROUNDS, NEARLY = 12, 0.2
+ROUNDS, NEARLY = 24, 0.2
 """How often a step is bettered by springs and touching points at its end, and the share of it that
 is little."""
 TRIES, HELD = 8, 2
 """How often the points that touch are found anew, and how often by rims that meet."""
+SHARES = 0.5 ** np.arange(12)
+"""Of a step to other touching points than it was made with."""
 STRAIGHT = 6e-3
 """A step (mm, rad) along which springs are straight enough."""
 PUSHES = 2.0
@@ -81,8 +85,13 @@ def pressed(
         flat, touch, is_found = step
         move = flat.reshape(-1, 3)
         largest = float(np.abs(move).max())
-        if is_found and ends(largest, before, FINE):
-            return at + move, touch.push, True
+        if ends(largest, before, FINE):
+            if is_found:
+                return at + move, touch.push, True
+            # A rim or a point that just touches is met in one round and parts in the next.
+            end = loaded(springs, pitch, load, at + move)
+            if np.abs(end.gradient).max() < SLIGHT * (1 + end.push):
+                return at + move, end.push, True
         share = float(limited(move).min())
         if share < 1.0 and not wall.sticks:
             return None
@@ -141,7 +150,13 @@ def _more(
     """The step to where the points that touch at its end, and rims that meet, are in balance, and
     whether they are those that the step was made with.
     """
+
+    def energy(step: Array) -> float:
+        after = deep + lines @ step
+        return float((gradient + matrix @ step / 2) @ step + touch.resists(after) @ after / 2)
+
     touches, met, held_off = deep > touch.least, None, 0
+    tried = []
     for _ in range(TRIES):
         stiff = touch.stiff * touches
         against = (lines.T * stiff) @ lines
@@ -159,4 +174,6 @@ def _more(
                 return found[0], met is None
             held_off += 1
         touches = ahead
-    return found[0], False
+        tried.append(found[0])
+    # None is the least: the best place on the ways there, of which the first leads downhill.
+    return min((share * step for step in tried for share in SHARES), key=energy), False
