@@ -74,9 +74,9 @@ def bindings(space: SearchSpace, place: Steps, best: Trial) -> list[Binding]:
     for axis, other in _steps(place):
         if not space.lows[axis] <= other[axis] <= space.highs[axis]:
             continue
-        trial = space.with_rules(space.looked_at(other))
+        trial = space.looked_at(other)
         if _is_nearer(space, place, other, trial, best):
-            broken = misses(space.wanted, trial)
+            broken = misses(space.wanted, space.with_rules(trial))
             if broken:
                 key = space.free[axis].key
                 found.append(Binding(key, trial.values[key], "; ".join(broken)))

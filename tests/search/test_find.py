@@ -277,6 +277,24 @@ def test_a_requirement_beyond_a_range_that_widens_moves_it() -> None:
         assert (free.low, free.high) == ends
 
 
+def test_rules_are_asked_of_few_designs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All nine are tried, each better than the one before: only the best is asked for its rules."""
+    asked: list[int] = []
+
+    def counted(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+        if with_rules:
+            asked.append(values["stack.balloons"])
+        return _made_up(wanted, {"chamber.diameter": 5.0, **values}, with_rules)
+
+    monkeypatch.setattr(module, "tried", counted)
+    requirements, goal = read_all([], [], "stroke@50kPa")
+    free = (Free("stack.balloons", 2, 10, 1),)
+    found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, free))
+    assert found.best.figures["stroke@50kPa"] == pytest.approx(20)
+    # And a step beyond its range, which would be better.
+    assert set(asked) == {10, 11}
+
+
 def test_a_key_that_is_set_stays(tmp_path: Path) -> None:
     target = tmp_path / "found.toml"
     asked = ["find", "1dof-5mm", "--min", "stroke=4", "--tries", "20", "-o", str(target)]
