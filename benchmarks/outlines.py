@@ -44,22 +44,27 @@ def drawing(edges: int, larger: float = 1.0) -> list[tuple[float, float, float]]
     return [(larger * x, larger * y, bulge) for x, y, bulge in vertices]
 
 
+def save(path: Path, edges: int, larger: float = 1.0) -> None:
+    """Writes such an outline as DXF."""
+    import ezdxf
+
+    document = ezdxf.new(units=4)
+    vertices = drawing(edges, larger)
+    document.modelspace().add_lwpolyline(vertices, format="xyb", close=True)
+    document.saveas(path)
+
+
 def built_and_checked(edges: int, turn: int) -> float:
     """Seconds to build a design with such an outline, and for the rules, interfaces too.
 
     Each turn has an outline of its own: what is asked again of the same one is remembered.
     """
-    import ezdxf
-
     from sbafab.actuators import build, load_design
     from sbafab.output.settings import limits
     from sbafab.rules.deck import run_deck
 
     with tempfile.TemporaryDirectory() as name:
         path = Path(name) / "outline.dxf"
-        document = ezdxf.new(units=4)
-        vertices = drawing(edges, 1 + turn / 1000)
-        document.modelspace().add_lwpolyline(vertices, format="xyb", close=True)
-        document.saveas(path)
+        save(path, edges, 1 + turn / 1000)
         design = load_design(DESIGN, [f"chamber.outline={path}"])
         return own_seconds(lambda: run_deck(build(design), limits(design)))

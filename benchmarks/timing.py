@@ -13,6 +13,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -28,14 +29,21 @@ def keep_to_one_core() -> None:
         print("(this system cannot keep a process to one core)")
 
 
-def seconds(command: Sequence[str | Path]) -> float:
-    """Processor time of one run. Raises CalledProcessError with the program's output.
+def environment(root: Path) -> dict[str, str]:
+    """In which a program finds the version in that folder.
 
     Modules are compiled by the first run and kept, as those of an installed program are.
     """
     kept = {name: value for name, value in os.environ.items() if name != UNKEPT}
+    return {**kept, "PYTHONPATH": str(root)}
+
+
+def seconds(command: Sequence[str | Path], root: Path = ROOT) -> float:
+    """Processor time of one run. Raises CalledProcessError with the program's output."""
     began = os.times()
-    subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True, env=kept)
+    subprocess.run(
+        command, cwd=root, check=True, capture_output=True, text=True, env=environment(root)
+    )
     ended = os.times()
     spent = ended.children_user - began.children_user, ended.children_system - began.children_system
     return sum(spent)
@@ -84,8 +92,31 @@ def exponent(times: Mapping[int, Sequence[float]], least: int = 1) -> float:
     return sum((a - x) * (b - y) for a, b in points) / sum((a - x) ** 2 for a, _ in points)
 
 
-def row(name: str, times: Sequence[float], remark: str = "") -> str:
-    return f"  {name:<36}{min(times):8.3f}{statistics.median(times):8.3f}  {remark}".rstrip()
+class Row(NamedTuple):
+    """Processor times in seconds of one piece of work, and what is said of them."""
+
+    name: str
+    times: Sequence[float]
+    remark: str = ""
 
 
-HEAD = f"  {'seconds of processor time':<36}{'least':>8}{'median':>8}"
+class Section(NamedTuple):
+    """What belongs together; ``power`` is that of the size with which time grows."""
+
+    key: str
+    title: str
+    rows: Sequence[Row]
+    notes: Sequence[str] = ()
+    power: float | None = None
+    unit: str = "s"
+    timed: str = "processor time"
+
+    @property
+    def text(self) -> str:
+        """As it is printed: least and median of each row."""
+        each = {"s": 1, "ms": 1000}[self.unit]
+        lines = [self.title, f"  {f'{self.timed}, {self.unit}':<44}{'least':>9}{'median':>9}"]
+        for row in self.rows:
+            least, median = each * min(row.times), each * statistics.median(row.times)
+            lines.append(f"  {row.name:<44}{least:9.3f}{median:9.3f}  {row.remark}".rstrip())
+        return "\n".join([*lines, *(f"  {note}" for note in self.notes)])

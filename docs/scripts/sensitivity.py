@@ -216,16 +216,16 @@ The calibrated 1-DoF, a column of six, likewise:
 | | flat | 25 % | 75 % |
 |---|---|---|---|"""
 READ = """
-* **Force at 75 %.** At 10 kPa the height asks for 10 MPa, at 100 kPa the force at 75 % for twice that. One
+* **Force at 75 %.** At 10 kPa the height asks for 10 to 12 MPa, at 100 kPa the force at 75 % for twice that. One
   modulus does not serve both, and fitting it to the 1-DoF's forces serves none of the held-out rows. So the film
   is likely stiffer where 100 kPa stretch it. The burst pressure says so too: with 10 MPa and Hencky's law a balloon
   would burst below 100 kPa, and the paper's held 367. A full height of 20 mm for 17.5 would be half of the miss.
 * **1-DoF above flat.** A plate that leans takes nothing off as long as the tip sticks to it, and a column that slides
   out from under it keeps a tenth. So neither alone is the reason: likely a column that gives way in part, and a film that
   is stiffer than 10 MPa, as the 3-DoF asks for.
-* **Bend.** Pockets that lost as little as the 3-DoF's own flat force asks for bend by 80 degrees, as measured;
-  that actuator is then 11 % too high at 10 kPa. Necks that the same molten film had widened would bend far less and
-  stand far lower: they did not.
+* **Bend.** Two chambers bend as measured. Pockets that lost as little as the 3-DoF's own flat force asks for bend by 86
+  degrees, and that actuator is 16 % too high at 10 kPa. Necks that the same molten film had widened would bend far less
+  and stand far lower: they did not.
 * **Forces when bent.** What was measured lies between the rows for every angle. At 30 degrees it is as much as two chambers
   have when flat (two thirds of 4.87 N are 3.25 N), so that a third one likely helped, or the tip slid; at 60 degrees the
   tip of a column that may slide gives way. The paper says neither which chambers push nor what holds the tip."""

@@ -79,7 +79,7 @@ class LobedDesign(Design):
 
     @property
     def free(self) -> tuple[Free, ...]:
-        lumen = Free("lumen.diameter", 1.0, 10.0, 0.1, asked="lumen")
+        lumen = Free("lumen.diameter", 1.0, 10.0, 0.1, asked="lumen", widens=True)
         return (*free_diameter(self.chamber), lumen, *super().free)
 
     def fitted(self) -> Self:

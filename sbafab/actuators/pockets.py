@@ -32,7 +32,7 @@ class RoundChamber(Chamber):
 def free_diameter(chamber: RoundChamber) -> tuple[Free, ...]:
     """A search may change one diameter that all balloons share."""
     is_one = chamber.outline is None and isinstance(chamber.diameter, float)
-    return (Free("chamber.diameter", 2.6, 16.0, 0.1),) if is_one else ()
+    return (Free("chamber.diameter", 2.6, 16.0, 0.1, widens=True),) if is_one else ()
 
 
 def diameters(design: Design, chamber: RoundChamber) -> tuple[float, ...]:

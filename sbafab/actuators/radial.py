@@ -129,8 +129,9 @@ class RadialDesign(Design):
     def free(self) -> tuple[Free, ...]:
         if self.chamber.outline is not None:
             return ()
-        sides = Free("chamber.width", 5.0, 20.0, 0.5), Free("chamber.length", 8.0, 60.0, 0.5)
-        return (*sides, Free("stack.balloons", 1, 3, 1), *super().free[1:])
+        width = Free("chamber.width", 5.0, 20.0, 0.5, widens=True)
+        length = Free("chamber.length", 8.0, 60.0, 0.5, widens=True)
+        return (width, length, Free("stack.balloons", 1, 3, 1), *super().free[1:])
 
     def completed(self) -> Self:
         """The same design with inlet and window sizes filled in."""

@@ -106,6 +106,7 @@ def _as_json(found: SweptDesigns) -> dict[str, object]:
         "folder": str(found.folder),
         "designs": found.designs,
         "measured_now": found.measured,
+        "no_longer_asked": found.no_longer_asked,
         "outcomes": found.outcomes,
         "files": list(found.files),
     }
@@ -115,7 +116,13 @@ def _print(wanted: SweepRequest, found: SweptDesigns) -> None:
     said = ", ".join(f"{count} {outcome}" for outcome, count in found.outcomes.items())
     before = found.designs - found.measured
     earlier = f"; {before} were measured by an earlier run" if before else ""
-    click.echo(f"{found.designs} designs of {wanted.design.name}: {said}{earlier}")
+    many = "s" if found.designs > 1 else ""
+    click.echo(f"{found.designs} design{many} of {wanted.design.name}: {said}{earlier}")
     click.echo(f"written to {found.folder}: {', '.join(found.files)}")
+    if found.no_longer_asked:
+        click.echo(
+            f"{found.no_longer_asked} of the designs that an earlier sweep had in these tables are "
+            "not asked for now; its command brings them back from the journal"
+        )
     if "sweep.parquet" not in found.files:
         click.echo('for Parquet as well: pip install "sbafab[parquet]"')

@@ -74,7 +74,8 @@ class Form:
 class Free:
     """A key that a search may change: from ``low`` to ``high`` in steps.
 
-    ``asked``: only where a requirement names this quantity; else it stays as it is.
+    ``asked``: only where a requirement names this quantity; else it stays as it is. ``widens``: the
+    ends are where a search begins to look, and may move.
     """
 
     key: str
@@ -82,6 +83,7 @@ class Free:
     high: float
     step: float
     asked: str = ""
+    widens: bool = False
 
 
 def degrees_of_freedom(stacks: int) -> str:

@@ -5,11 +5,12 @@ computed; the other one mirrors it. A film stretches (plane stress; Saint Venant
 law, or Hencky's) and bends. Where its hoop is compressed it wrinkles, and carries what wrinkles of
 least energy do:
 
-    N = 2 pi / L sqrt(B T)      (after Cerda and Mahadevan, 2003)
+    N = 2 sqrt(B K)    K = T (pi / L)^2 + E t c^2      (after Cerda and Mahadevan, 2003)
 
-with the bending stiffness B, the tension T along the meridian and the length L of the compressed
-zone. The rim, two films thick, does not ripple. Shapes are those of least energy, found by Newton's
-method for many pressures and heights at once. Lengths mm, pressures kPa, volumes ul, forces mN.
+with the bending stiffness B, the tension T along the meridian, the length L of the compressed zone
+and the curvature c of the meridian. The rim, two films thick, ripples (``rim_ripple``). Shapes are
+those of least energy, found by Newton's method for many pressures and heights at once. Lengths mm,
+pressures kPa, volumes ul, forces mN.
 """
 
 from __future__ import annotations
@@ -23,22 +24,31 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.laminate.films import PAPER_TPE
-from sbafab.models.film_elements import Flat, Term, add, air, bending, membrane, strain
+from sbafab.models import banded, rim_ripple
+from sbafab.models.film_elements import (
+    Elements,
+    Flat,
+    air,
+    bending,
+    curvature,
+    gradient,
+    matrix,
+    membrane,
+    strain,
+)
+from sbafab.models.least_energy import Descent, NoBalance, settled
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike, NDArray
 
     from sbafab.models.film_elements import Array
+    from sbafab.models.rim_ripple import Ripple
 
 FILM_ELEMENTS = 24
 RIM_ELEMENTS = 5
 NECK_ELEMENTS = 2
-FARTHEST = 0.7
-"""Share of its length by which an element may change in one step."""
-MOST_STEPS = 400
-ROUNDING = 1e-13
-"""Share of the energy that is lost in its own digits."""
-HALVINGS = 12
 CLOSE = 1e-9
 """Force out of balance, as a share of pressure times pocket area, that is none."""
 LEAST = 0.01
@@ -127,6 +137,18 @@ class Balloon:
         found += [2 * node + 1 for node in nodes[self.held : self.edge]]
         return np.array(sorted(found))
 
+    @cached_property
+    def free(self) -> Array:
+        """1 where a coordinate moves on its own, else 0: (coordinates, 1)."""
+        found = np.zeros((2 * len(self.nodes), 1))
+        found[self.freedoms] = 1.0
+        return found
+
+    @cached_property
+    def packing(self) -> banded.Packing:
+        """How a band by coordinates becomes one by freedoms."""
+        return banded.packing(self.freedoms, 2 * len(self.nodes), 6)
+
     @property
     def level(self) -> int:
         """Number of the height that the neck's others are equal to."""
@@ -158,15 +180,19 @@ class Shapes(NamedTuple):
 
 
 class BalloonLoad(NamedTuple):
-    """Pressure, half the height between the plates, and the stress that wrinkles carry."""
+    """Pressure, half the height between the plates, the stress that wrinkles carry, and how the
+    rim ripples.
+    """
 
     pressure: Array
     half: Array
     cap: Array
     tied: bool
+    ripple: Ripple
 
     def rows(self, these: NDArray[np.int_]) -> BalloonLoad:
-        return BalloonLoad(self.pressure[these], self.half[these], self.cap[these], self.tied)
+        pressure, half, cap = self.pressure[these], self.half[these], self.cap[these]
+        return BalloonLoad(pressure, half, cap, self.tied, self.ripple.rows(these))
 
 
 def inflate(
@@ -186,22 +212,25 @@ def inflate(
         raise DesignError("pressure and height of a balloon must be above 0 kPa and 0 mm")
     elements = len(balloon.nodes) - 1
     smooth = np.where(balloon.may_wrinkle & balloon.inextensible, 0.0, math.inf)
-    load = BalloonLoad(p, high / 2, np.broadcast_to(smooth, (len(p), elements)), tied)
+    cap = np.broadcast_to(smooth, (len(p), elements))
+    load = BalloonLoad(p, high / 2, cap, tied, rim_ripple.smooth(balloon, len(p)))
     if balloon.mate is not None:
         from sbafab.models import two_films
 
         return two_films.inflate((replace(balloon, mate=None), balloon.mate), load)
     # Where no balance is found, elements may shrink to nothing on the way; that is said in the end.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        r, z = _settled(balloon, load, *start(balloon, load))
+        x = _settled(balloon, load, coordinates(*start(balloon, load)))
         if balloon.wrinkles and not balloon.inextensible:
-            zone = compressed(balloon, r, z)
+            zone = compressed(balloon, *places(x))
             for _ in range(ROUNDS):
-                load = load._replace(cap=wrinkling(balloon, r, z, zone))
-                r, z = _settled(balloon, load, r, z)
-    term, force = total(balloon, load, r, z)
-    held = air(balloon.film, balloon.edge, r, z).energy
-    return Shapes(p, 2 * z[:, 0], 2 * held, force, 2 * (term.energy + p * held), r, z)
+                (ripple,) = rippling((balloon,), (places(x),))
+                load = load._replace(cap=wrinkling(balloon, *places(x), zone), ripple=ripple)
+                x = _settled(balloon, load, x)
+    r, z = (np.ascontiguousarray(part) for part in places(x))
+    found = total(balloon, load, x)
+    held = air(balloon.film, balloon.edge, Elements.of(r, z)).energy
+    return Shapes(p, 2 * z[:, 0], 2 * held, found.force, 2 * (found.energy + p * held), r, z)
 
 
 def start(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
@@ -209,114 +238,130 @@ def start(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
     flat, free = balloon.nodes, balloon.pocket - balloon.neck
     rise = 0.3 * free * np.cbrt(load.pressure * balloon.pocket / (balloon.modulus * 0.0025))
     rise = np.clip(rise, 0.05 * free, 0.8 * free)
-    rise = load.half if load.tied else np.minimum(rise, load.half)
+    rise = np.maximum(rise, load.half) if load.tied else rise
     shape = np.clip(1 - ((flat - balloon.neck) / free) ** 2, 0.0, 1.0)
     shape[: balloon.held + 1] = 1.0
-    return np.tile(flat, (len(rise), 1)), rise[:, None] * shape
+    return np.tile(flat, (len(rise), 1)), np.minimum(
+        rise[:, None] * shape, load.half[:, None] + 1 / PLATE
+    )
 
 
-def total(
-    balloon: Balloon, load: BalloonLoad, r: Array, z: Array, slopes: bool = True
-) -> tuple[Term, Array]:
-    """Energy of films and plates less the work of the air, by coordinate, and the plates' force."""
+class Total(NamedTuple):
+    """Energy (rows,) of a film and plates less the work of the air, its derivatives by coordinate,
+    (coordinates, rows) and as a band (coordinates, 6, rows), without what ripples join: that is by
+    the radii of the rim's nodes (nodes, nodes, rows). And the plates' force, (rows,).
+    """
+
+    energy: Array
+    gradient: Array
+    matrix: Array
+    rim: Array
+    force: Array
+
+
+def coordinates(r: Array, z: Array) -> Array:
+    """Coordinates r, z of each node in turn: (coordinates, rows)."""
+    return np.stack([r.T, z.T], 1).reshape(-1, len(r))
+
+
+def places(x: Array) -> tuple[Array, Array]:
+    """The radii and heights of the nodes, a row a film."""
+    return x[0::2].T, x[1::2].T
+
+
+def total(balloon: Balloon, load: BalloonLoad, x: Array) -> Total:
+    """The energy at coordinates."""
     film, edge = balloon.film, balloon.edge
-    bent = slice(balloon.held, edge)
-    total = bending(film, balloon.rigidity, bent, r, z, slopes)
-    stretched = membrane(film, r, z, load.cap, slopes)
-    filled = air(film, edge, r, z, slopes)
+    r, z = places(x)
+    lie = Elements.of(r, z)
     p = load.pressure
+    bent = bending(film, balloon.rigidity, slice(balloon.held, edge), lie)
+    stretched, filled = membrane(film, lie, load.cap), air(film, edge, lie)
+    eased = rim_ripple.eased(film, edge, load.ripple, r)
+    slopes, curves = (
+        [a + b - p[:, None] * c for a, b, c in zip(*parts, strict=True)]
+        for parts in (
+            (bent.term.slopes, stretched.slopes, filled.slopes),
+            (bent.term.curves, stretched.curves, filled.curves),
+        )
+    )
     number = np.arange(len(film.nodes))
     stiff = PLATE * p[:, None] * np.where(number < edge, balloon.widths, 0.0)
     over = np.maximum(z - load.half[:, None], 0.0)
+    touches = over > 0
     if load.tied:
         holds = number <= balloon.held
         stiff = np.where(holds, PLATE * np.maximum(p, 1.0)[:, None] * balloon.widths, stiff)
         over = np.where(holds, z - load.half[:, None], over)
+        touches |= holds
     pressed = stiff * over
-    energy = total.energy + stretched.energy - p * filled.energy + (pressed * over).sum(-1) / 2
-    if not slopes:
-        return total._replace(energy=energy), pressed.sum(-1)
-    add(
-        total,
-        stretched.gradient - p[:, None, None] * filled.gradient,
-        stretched.hessian - p[:, None, None, None] * filled.hessian,
-    )
-    heights = np.arange(1, 2 * len(film.nodes), 2)
-    total.gradient[:, heights] += pressed
-    total.hessian[:, heights, heights] += np.where(over != 0, stiff, 0.0)
-    return total._replace(energy=energy), pressed.sum(-1)
+    energy = bent.term.energy + stretched.energy + eased.energy
+    energy = energy - p * filled.energy + (pressed * over).sum(-1) / 2
+    by_place, band = gradient(slopes), matrix(curves, bent.joined)
+    by_place[1::2] += pressed.T
+    by_place[2 * edge :: 2] += eased.slopes
+    band[1::2, 0] += np.where(touches, stiff, 0.0).T
+    return Total(energy, by_place, band, eased.curves, pressed.sum(-1))
 
 
-def _settled(balloon: Balloon, load: BalloonLoad, r: Array, z: Array) -> tuple[Array, Array]:
-    """The shapes of least energy downhill of these: Newton's method, damped where it climbs.
-
-    Raises DesignError where it does not end.
-    """
-    freedoms = balloon.freedoms
-    r, z, damping = r.copy(), z.copy(), np.zeros(len(r))
-    live = np.arange(len(r))
-    own = np.ix_(freedoms, freedoms)
-    diagonal = np.arange(len(freedoms))
-    for _ in range(MOST_STEPS):
-        part, at = load.rows(live), (r[live], z[live])
-        term, _ = total(balloon, part, *at)
-        for height in range(1, balloon.level, 2):
-            term.gradient[:, balloon.level] += term.gradient[:, height]
-            term.hessian[:, balloon.level] += term.hessian[:, height]
-        for height in range(1, balloon.level, 2):
-            term.hessian[:, :, balloon.level] += term.hessian[:, :, height]
-        gradient = term.gradient[:, freedoms]
-        stiffness = term.hessian[:, own[0], own[1]]
-        stiffness[:, diagonal, diagonal] += damping[live, None] * np.abs(
-            stiffness[:, diagonal, diagonal]
-        )
-        move = -np.linalg.solve(stiffness, gradient[..., None])[..., 0]
-        slope = (move * gradient).sum(-1)
-        small = CLOSE * np.maximum(part.pressure, LEAST) * math.pi * balloon.pocket**2
-        still = np.abs(gradient).max(-1) <= small
-        # Where rounding alone decides whether the energy falls, there is nothing left to gain.
-        digits = ROUNDING * (np.abs(term.energy) + part.pressure * balloon.pocket**3)
-        still |= (np.abs(slope) <= digits) & (damping[live] == 0.0)
-        if still.all():
-            return r, z
-        ahead = np.zeros_like(term.gradient)
-        ahead[:, freedoms] = np.where(still[:, None], 0.0, move)
-        ahead[:, 1 : balloon.level : 2] = ahead[:, balloon.level, None]
-        share = _downhill(balloon, part, at, ahead, term.energy, slope)
-        r[live] += share[:, None] * ahead[:, ::2]
-        z[live] += share[:, None] * ahead[:, 1::2]
-        damped = np.where(share > 0, damping[live] / 10, np.clip(10 * damping[live], 1e-3, 1e9))
-        damping[live] = np.where(damped < 1e-6, 0.0, damped)
-        live = live[~still]
-    raise DesignError(
-        f"a balloon of radius {balloon.pocket:g} mm finds no balance; try another load"
-    )
+def levelled(balloon: Balloon, found: Total) -> Total:
+    """The same with the heights of the neck taken for one, at ``level``."""
+    for height in range(1, balloon.level, 2):
+        found.gradient[balloon.level] += found.gradient[height]
+        banded.join(found.matrix, height, balloon.level)
+    return found
 
 
-def _downhill(
-    balloon: Balloon,
-    load: BalloonLoad,
-    at: tuple[Array, Array],
-    ahead: Array,
-    energy: Array,
-    slope: Array,
-) -> Array:
-    """The share of each step that lowers the energy; 0 where none does or it leads uphill."""
-    # No element is stretched, turned or shortened by more than its own length: none collapses.
-    length = np.hypot(np.diff(at[0]), np.diff(at[1]))
-    change = np.hypot(np.diff(ahead[:, ::2]), np.diff(ahead[:, 1::2]))
-    share = np.minimum(1.0, FARTHEST / np.maximum((change / length).max(-1), 1e-300))
-    share = np.where(slope <= 0, share, 0.0)
-    room = 1e-12 * (np.abs(energy) + load.pressure * balloon.pocket**3)
-    for _ in range(HALVINGS):
-        step = share[:, None] * ahead
-        to = at[0] + step[:, ::2], at[1] + step[:, 1::2]
-        tried = total(balloon, load, *to, slopes=False)[0].energy
-        good = tried <= energy + 1e-4 * share * slope + room
-        if good.all():
-            return share
-        share = np.where(good, share, share / 2)
-    return np.where(good, share, 0.0)
+class Energies:
+    """A balloon's energies under a load, for ``least_energy``."""
+
+    def __init__(self, balloon: Balloon, load: BalloonLoad) -> None:
+        self.balloon, self.load = balloon, load
+        self.scale, self.close = sizes(balloon, load)
+
+    def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
+        found = levelled(self.balloon, total(self.balloon, self.load.rows(rows), x))
+        band = banded.packed(found.matrix, self.balloon.packing)
+        # The rim's radii are the last freedoms, next to each other.
+        ends = len(found.rim)
+        for k in range(ends):
+            number = np.arange(ends - k)
+            band[len(band) - ends + number, k] += found.rim[number, number + k]
+        return Descent(found.energy, found.gradient * self.balloon.free, band)
+
+    def ahead(self, state: Descent, damping: Array) -> Array:
+        band = state.matrix.copy()
+        band[:, 0] += damping * np.abs(band[:, 0])
+        freedoms = self.balloon.freedoms
+        found = np.zeros_like(state.gradient)
+        found[freedoms] = banded.solve(band, -state.gradient[freedoms])
+        found[1 : self.balloon.level : 2] = found[self.balloon.level]
+        return found
+
+    def change(self, x: Array, ahead: Array) -> Array:
+        return change(x, ahead)
+
+
+def sizes(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
+    """An energy of the size of each balloon's, uJ, and the force in mN that counts as none."""
+    force = CLOSE * np.maximum(load.pressure, LEAST) * math.pi * balloon.pocket**2
+    return load.pressure * balloon.pocket**3, force
+
+
+def change(x: Array, ahead: Array) -> Array:
+    """The largest share of its length by which a step changes an element: (rows,)."""
+    length, by = (np.hypot(np.diff(y[0::2], axis=0), np.diff(y[1::2], axis=0)) for y in (x, ahead))
+    return np.asarray((by / length).max(0))
+
+
+def _settled(balloon: Balloon, load: BalloonLoad, x: Array) -> Array:
+    """The shapes of least energy downhill of these. Raises DesignError where none is found."""
+    try:
+        return settled(Energies(balloon, load), x)
+    except NoBalance:
+        raise DesignError(
+            f"a balloon of radius {balloon.pocket:g} mm finds no balance; try another load"
+        ) from None
 
 
 def compressed(balloon: Balloon, r: Array, z: Array) -> Array:
@@ -330,8 +375,22 @@ def compressed(balloon: Balloon, r: Array, z: Array) -> Array:
 
 def wrinkling(balloon: Balloon, r: Array, z: Array, zone: Array) -> Array:
     """The hoop stress in kPa that wrinkles over a zone carry, for each element's tension."""
-    tension = balloon.modulus * balloon.thickness * strain(balloon.film, r, z).meridian
-    force = math.tau / zone[:, None] * np.sqrt(balloon.rigidity * np.maximum(tension, 0.0))
+    film = balloon.film
+    tension = balloon.rigid * strain(film, r, z).meridian
+    # A wrinkle of a curved film stretches the meridian: many short ones cost least.
+    held = np.maximum(tension, 0.0) * (math.pi / zone[:, None]) ** 2
+    held = held + balloon.rigid * curvature(film, r, z) ** 2
+    force = 2 * np.sqrt(balloon.rigidity * held)
     carried: Array = np.full_like(force, math.inf)
     carried[:, balloon.may_wrinkle] = force[:, balloon.may_wrinkle] / balloon.thickness
     return carried
+
+
+def rippling(films: Sequence[Balloon], shapes: Sequence[tuple[Array, Array]]) -> list[Ripple]:
+    """How the rim ripples at the shapes of its one film, which another mirrors, or of both."""
+    strains = [strain(one.film, *shape) for one, shape in zip(films, shapes, strict=True)]
+    pulls = [
+        one.rigid * found.meridian[:, one.edge - 1]
+        for one, found in zip(films, strains, strict=True)
+    ]
+    return rim_ripple.rippling(films, strains[0].hoop[:, films[0].edge :], pulls)

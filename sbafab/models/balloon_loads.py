@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.balloon import Balloon, Shapes, inflate
+from sbafab.models import rim_ripple
+from sbafab.models.balloon import Balloon, Shapes, inflate, rippling
 from sbafab.models.film_elements import strain
 from sbafab.models.paper import BURST
 
@@ -108,7 +109,8 @@ def _crossing(over: Callable[[Array], Array], low: Array, high: Array) -> Array:
 def stresses(balloon: Balloon, shapes: Shapes) -> FilmStress:
     """What the film's elements bear, from the inside outward; round the hoop 0 where it wrinkles.
 
-    Bending, which adds to it at neck and rim, is left out. Raises DesignError for unlike films.
+    A rim that ripples bears the mean round it: more inside, less or pull outside. Bending, which
+    adds to it at neck and rim, is left out. Raises DesignError for unlike films.
     """
     if balloon.mate is not None:
         raise DesignError("stresses of unlike films are not given; ask for each film alone")
@@ -118,6 +120,10 @@ def stresses(balloon: Balloon, shapes: Shapes) -> FilmStress:
     wrinkled = (e2 + nu * e1 < 0) & balloon.may_wrinkle
     s1 = np.where(wrinkled, film.modulus * e1, plane * (e1 + nu * e2))
     s2 = np.where(wrinkled, 0.0, plane * (e2 + nu * e1))
+    if balloon.wrinkles and not balloon.inextensible:
+        (ripple,) = rippling((balloon,), ((shapes.r, shapes.z),))
+        tilt = rim_ripple.amplitude(film, balloon.edge, ripple, shapes.r)
+        s2[:, balloon.edge :] += film.modulus * tilt[:, None] * ripple.relief
     along = np.hypot(np.diff(shapes.r), np.diff(shapes.z)) / film.lengths
     around = (shapes.r[:, 1:] + shapes.r[:, :-1]) / (2 * film.middles)
     power = film.order - 1

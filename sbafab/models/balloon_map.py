@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 DEGREE = 5
 PRESSURE_SPANS, HEIGHT_SPANS = 12, 12
 """Pieces of the spline each way."""
-PRESSURE_POINTS, HEIGHT_POINTS = 16, 18
+PRESSURE_POINTS, HEIGHT_POINTS = 16, 24
 """Balloons computed each way."""
 P0 = 0.1
 """Pressure in kPa below which the spline's pieces are alike in pressure, above alike in ratio."""
@@ -38,6 +38,10 @@ FLATTEST = 0.01
 """Least height in mm that is computed; what lies below is carried on."""
 FLAT = 0.1
 """Weight of balloons that are pressed flat and hold nothing."""
+LOW = 0.1
+"""Pressure in kPa below which forces are fitted all alike, above by their share of it."""
+VOLUMES = 0.6
+"""Weight of volumes beside forces."""
 NEARLY_FLAT = 0.2
 """Height in mm above which volumes are fitted by their share of what they are, below all alike."""
 MOST_STRETCH = 0.15
@@ -125,8 +129,9 @@ class BalloonMap:
         """
         p = np.asarray(pressure, dtype=float)
         if not (p.min() >= 0 and p.max() <= self.most_pressure):
+            worst = p.max() if p.min() >= 0 else p.min()
             raise DesignError(
-                f"a pressure of {float(p.max()):g} kPa is outside the balloon's map; give 0 to "
+                f"a pressure of {float(worst):g} kPa is outside the balloon's map; give 0 to "
                 f"{self.most_pressure:g} kPa"
             )
         x, rate = self._scaled(p)
@@ -226,9 +231,11 @@ def along(table: Array, which: NDArray[np.int_], y: Array) -> Along:
 
 def horner(table: Array, which: NDArray[np.int_], y: Array) -> Array:
     """Polynomials (powers, ..., rows) of splines at places ``y``, in pieces."""
-    first = np.clip(np.floor(y), -1.0, HEIGHT_SPANS)
-    u = y - first
-    powers = table.take(which + 1 + first.astype(np.int_), axis=-1)
+    # Pieces are counted from the one below the spline.
+    after = y + 1.0
+    piece = np.minimum(np.maximum(after, 0.0), PIECES_IN_ALL - 1).astype(np.int_)
+    u = after - piece
+    powers = table.take(which + piece, axis=-1)
     found = powers[DEGREE] * u
     for power in powers[DEGREE - 1 : 0 : -1]:
         found += power
@@ -280,9 +287,11 @@ def _fitted(p: Array, h: Array, found: Shapes, most: float, top: float) -> Array
         rows = by_h[j] if by_height is None else by_height
         return np.asarray((by_p[i][:, :, None] * rows[:, None, :]).reshape(len(p), -1) * scale)
 
+    # ``inflate`` keeps what wrinkles carry while it looks for balance, so that its forces and its
+    # volumes are not quite slopes of one potential. Heights and bends hang on the forces.
     area = found.r[:, -1].max() ** 2 * math.pi
-    push = 1 / (area * (p + 0.5) + 3 * np.abs(found.force))
-    room = 2 / (area * np.minimum(h + NEARLY_FLAT, top) + 3 * np.abs(found.force) / (p + 1.0))
+    push = 1 / (area * (p + LOW) + 3 * np.abs(found.force))
+    room = VOLUMES / (area * np.minimum(h + NEARLY_FLAT, top))
     potential = found.energy - p * found.volume
     scale = push / top
     matrix = np.concatenate(

@@ -7,6 +7,7 @@ curvature within a level does. Arrays have a row a level.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -41,17 +42,15 @@ FELT = _felt()
 
 
 def _turned() -> Array:
-    """Matrix (13, 15) behind ``_rotations``: of 1, x, y, twice xx, xy, yx, yy, then x, y."""
-    found = np.zeros((13, 15))
-    turn, rate = found[:, :9].reshape(13, 3, 3), found[:, 9:].reshape(13, 2, 3)
+    """Matrix (12, 13) behind ``_rotations``: of 1, x, y, xx, xy, yx, yy, 1, then xx, xy, yx, yy."""
+    found = np.zeros((12, 13))
+    turn, rate = found[:, :9].reshape(12, 3, 3), found[:, 9:].reshape(12, 2, 2)
     turn[0] = BASE
     # The vector (x, y, 0) as a cross product, then that twice.
     turn[1:3] = SIGNS[:, :2].transpose(1, 0, 2)
     turn[3:7] = (turn[1:3, None] @ turn[None, 1:3]).reshape(4, 3, 3)
-    rate[0] = BASE[:2] / 2
-    rate[7:11] = turn[3:7, :2] / 2
-    rate[7:11, :, 2] = 0.0
-    rate[11:] = -turn[1:3, :2] / 2
+    rate[7] = BASE[:2, :2]
+    rate[8:] = np.eye(4).reshape(4, 2, 2)
     return found
 
 
@@ -62,12 +61,14 @@ class Chain(NamedTuple):
     """Plates of a chain, the base first: places (n + 1, 3) in mm and axes (n + 1, 3, 3), whose
     columns are the plates' x, y and z; ``rises`` (n, 3) are the levels' directions.
 
-    ``turns`` (n, 2, 2, 3) are what a unit of each tilt turns plates by, before and after the rise.
+    A level's tilt turns all beyond it about its middle: ``middles`` (n, 3) in mm; ``turns``
+    (n, 2, 3) is what a unit of either turns it by.
     """
 
     places: Array
     axes: Array
     rises: Array
+    middles: Array
     turns: Array
 
 
@@ -85,33 +86,40 @@ def chain(freedoms: Array, pitch: float) -> Chain:
         reach *= 2
     middle = axes[:-1] @ turned
     rises = middle[:, :, 2]
-    places = np.zeros((count + 1, 3))
-    np.cumsum(rises * (freedoms[:, :1] + pitch), axis=0, out=places[1:])
-    turns = np.empty((count, 2, 2, 3))
-    np.matmul(rates, axes[:-1].transpose(0, 2, 1), out=turns[:, 0])
-    np.matmul(rates, middle.transpose(0, 2, 1), out=turns[:, 1])
-    return Chain(places, axes, rises, turns)
+    steps = rises * (freedoms[:, :1] + pitch)
+    places = _sums(count) @ steps
+    # What the first half of a tilt turns by and what the second does differ along the plates
+    # between them alone, across which the level rises: together they turn about its middle.
+    turns = rates @ middle[:, :, :2].transpose(0, 2, 1)
+    return Chain(places, axes, rises, places[1:] - steps / 2, turns)
+
+
+@lru_cache(maxsize=16)
+def _sums(count: int) -> Array:
+    """Matrix (count + 1, count) that adds up the rows before each place."""
+    return np.tri(count + 1, count, -1)
 
 
 def _rotations(vectors: Array) -> tuple[Array, Array]:
-    """Rotations (n, 3, 3) by vectors (n, 2) in the xy plane, and half the turn by a unit change of
-    each (n, 2, 3): Rodrigues' formula and the left Jacobian.
+    """Rotations (n, 3, 3) by vectors (n, 2) in the xy plane, and what a unit of each component,
+    half before and half after, turns by in the xy plane between (n, 2, 2): Rodrigues' formula, and
+    the mean of the left and the right Jacobian.
     """
     count = len(vectors)
-    pairs = (vectors[:, :, None] * vectors[:, None]).reshape(count, 4)
-    square = pairs[:, :1] + pairs[:, 3:]
-    safe = np.maximum(square, SMALL)
+    # A column a level: numpy is the faster the longer its last axis.
+    each = vectors.T
+    pairs = (each[:, None] * each).reshape(4, count)
+    safe = np.maximum(pairs[0] + pairs[3], SMALL)
     angle = np.sqrt(safe)
     sine = np.sin(angle) / angle
-    versine = (1 - np.cos(angle)) / safe
-    parts = np.empty((count, 13))
-    parts[:, :1] = 1.0
-    np.multiply(sine, vectors, out=parts[:, 1:3])
-    np.multiply(versine, pairs, out=parts[:, 3:7])
-    np.multiply((1 - sine) / safe, pairs, out=parts[:, 7:11])
-    np.multiply(versine, vectors, out=parts[:, 11:])
-    found = parts @ TURNED
-    return found[:, :9].reshape(count, 3, 3), found[:, 9:].reshape(count, 2, 3)
+    parts = np.empty((12, count))
+    parts[0] = 1.0
+    np.multiply(sine, each, out=parts[1:3])
+    np.multiply((1 - np.cos(angle)) / safe, pairs, out=parts[3:7])
+    parts[7] = sine
+    np.multiply((1 - sine) / safe, pairs, out=parts[8:])
+    found = parts.T @ TURNED
+    return found[:, :9].reshape(count, 3, 3), found[:, 9:].reshape(count, 2, 2)
 
 
 def crossing(vectors: Array) -> Array:
@@ -136,8 +144,6 @@ def twists(at: Chain) -> Array:
     """
     found = np.zeros((len(at.rises), 3, 6))
     found[:, 0, 3:] = at.rises
-    before, after = at.turns[:, 0], at.turns[:, 1]
-    found[:, 1:, :3] = before + after
-    arms = crossing(at.places)
-    found[:, 1:, 3:] = before @ arms[:-1] + after @ arms[1:]
+    found[:, 1:, :3] = at.turns
+    np.matmul(at.turns, crossing(at.middles), out=found[:, 1:, 3:])
     return found

@@ -1,8 +1,9 @@
 """What a film of revolution feels, element by element: stretching, wrinkling, bending, air.
 
 A film is a chain of nodes r, z (mm), many films at once: arrays have a row a film. Each function
-returns an energy (uJ: kPa mm3) a film with its first and second derivatives. Those of elements
-are by their four coordinates r, z, r, z.
+returns an energy (uJ: kPa mm3) a film with its first and second derivatives, by what an element
+feels of its two nodes: how far apart they are in r and in z, and their middle radius. Kinks join
+neighbours. ``matrix`` makes of it derivatives by the coordinates of nodes.
 """
 
 from __future__ import annotations
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-STRETCH = np.array([[1, 0, -1, 0], [0, 1, 0, -1], [-1, 0, 1, 0], [0, -1, 0, 1]], dtype=float)
 ROOT = 0.645
 """Thicknesses by which a film bends on past the edge of its bond: end correction of Williams (1989)
 for a double cantilever beam, isotropic, nu = 0.2.
@@ -46,15 +46,34 @@ class Flat(NamedTuple):
         return (self.nodes[1:] + self.nodes[:-1]) / 2
 
 
+class Elements(NamedTuple):
+    """Elements as they lie, (rows, elements): from node to node in r and z, middle radius, mm; and
+    the square of their length.
+    """
+
+    dr: Array
+    dz: Array
+    middle: Array
+    square: Array
+
+    @classmethod
+    def of(cls, r: Array, z: Array) -> Elements:
+        dr, dz = r[:, 1:] - r[:, :-1], z[:, 1:] - z[:, :-1]
+        return cls(dr, dz, (r[:, 1:] + r[:, :-1]) / 2, dr * dr + dz * dz)
+
+
+Slopes = list["Array"]
+"""Derivatives by dr, dz and the middle radius, each (rows, elements)."""
+SecondSlopes = list["Array"]
+"""Second derivatives: dr dr, dr dz, dz dz, dr middle, dz middle, middle middle."""
+
+
 class Term(NamedTuple):
-    """An energy with its gradient and its matrix of second derivatives."""
+    """An energy, (rows,), with its derivatives."""
 
     energy: Array
-    gradient: Array
-    hessian: Array
-
-
-NOTHING = np.zeros(0)
+    slopes: Slopes
+    curves: SecondSlopes
 
 
 class Strain(NamedTuple):
@@ -64,34 +83,37 @@ class Strain(NamedTuple):
     hoop: Array
 
 
-WIDEN = np.array([[1, 0, 1, 0], [0, 0, 0, 0], [1, 0, 1, 0], [0, 0, 0, 0]], dtype=float) / 4
-
-
-def outer(a: Array, b: Array) -> Array:
-    """Products of all entries of two rows."""
-    return np.asarray(a[..., :, None] * b[..., None, :])
-
-
 def strain(flat: Flat, r: Array, z: Array) -> Strain:
     """Strains of each element."""
-    along, around = _squares(flat, r, z)
+    along, around = _squares(flat, Elements.of(r, z))
     return Strain(_measure(flat, along), _measure(flat, around))
 
 
-def _squares(flat: Flat, r: Array, z: Array) -> tuple[Array, Array]:
+def curvature(flat: Flat, r: Array, z: Array) -> Array:
+    """Curvature of the meridian in 1/mm by element: mean of its two ends."""
+    slope = np.arctan2(-np.diff(z), np.diff(r))
+    bent = np.diff(slope) / ((flat.lengths[1:] + flat.lengths[:-1]) / 2)
+    ends = np.concatenate([bent[:, :1], bent, bent[:, -1:]], axis=1)
+    return np.asarray((ends[:, 1:] + ends[:, :-1]) / 2)
+
+
+def _squares(flat: Flat, at: Elements) -> tuple[Array, Array]:
     """Squared stretches of each element."""
-    length = np.diff(r) ** 2 + np.diff(z) ** 2
-    return length / flat.lengths**2, ((r[:, 1:] + r[:, :-1]) / (2 * flat.middles)) ** 2
+    return at.square / flat.lengths**2, (at.middle / flat.middles) ** 2
 
 
 def _measure(flat: Flat, square: Array) -> Array:
     if flat.order == 0:
         return np.asarray(np.log(square) / 2)
-    return np.asarray((square ** (flat.order / 2) - 1) / flat.order)
+    return np.asarray((_power(square, flat.order / 2) - 1) / flat.order)
 
 
-def membrane(flat: Flat, r: Array, z: Array, cap: Array, slopes: bool = True) -> Term:
-    """Stretching, by element; where the hoop stress falls to ``-cap`` (kPa) the film wrinkles.
+def _power(square: Array, exponent: float) -> Array:
+    return square if exponent == 1.0 else square**exponent
+
+
+def membrane(flat: Flat, at: Elements, cap: Array) -> Term:
+    """Stretching; where the hoop stress falls to ``-cap`` (kPa) the film wrinkles.
 
     Plane stress. With logarithmic strains it is Hencky's (1928) law, good for stretches of 0.7 to
     1.3 (Anand, 1979); with Green's it is Saint Venant's and Kirchhoff's. From there on the hoop
@@ -99,115 +121,167 @@ def membrane(flat: Flat, r: Array, z: Array, cap: Array, slopes: bool = True) ->
     what the wrinkles themselves carry.
     """
     nu, plane = flat.poisson, flat.modulus / (1 - flat.poisson**2)
-    e1, e2 = strain(flat, r, z)
+    sq1, sq2 = _squares(flat, at)
+    e1, e2 = _measure(flat, sq1), _measure(flat, sq2)
     wrinkled = plane * (e2 + nu * e1) < -cap
     # The hoop strain of the film itself, the wrinkles' waste of length left out.
     held = np.where(wrinkled, cap, 0.0)
-    own = np.where(wrinkled, -held / plane - nu * e1, e2)
+    own = np.where(wrinkled, held / -plane - nu * e1, e2)
     s1, s2 = plane * (e1 + nu * own), plane * (own + nu * e1)
-    density = (s1 * e1 + s2 * own) / 2 + held * (own - e2)
     volume = math.tau * flat.middles * flat.lengths * flat.thickness
-    if not slopes:
-        return Term((volume * density).sum(-1), NOTHING, NOTHING)
+    density = (s1 * e1 + s2 * own) / 2 + held * (own - e2)
     c11 = np.where(wrinkled, flat.modulus, plane)
-    c12, c22 = np.where(wrinkled, 0.0, plane * nu), np.where(wrinkled, 0.0, plane)
-    half = flat.order / 2 - 1
-    sq1, sq2 = _squares(flat, r, z)
-    f1, f2 = sq1**half / 2, sq2**half / 2
-    dr, dz, middle = np.diff(r), np.diff(z), (r[:, 1:] + r[:, :-1]) / 2
-    none = np.zeros_like(dr)
-    d1 = np.stack([-dr, -dz, dr, dz], -1) * (2 / flat.lengths**2)[:, None]
-    d2 = np.stack([middle, none, middle, none], -1) / (flat.middles**2)[:, None]
-    gradient = volume[:, None] * ((s1 * f1)[..., None] * d1 + (s2 * f2)[..., None] * d2)
-    both = outer(d1, d2)
-    hessian = volume[:, None, None] * (
-        (2 * s1 * f1 / flat.lengths**2)[..., None, None] * STRETCH
-        + (2 * s2 * f2 / flat.middles**2)[..., None, None] * WIDEN
-        + (c11 * f1 * f1 + s1 * half * f1 / sq1)[..., None, None] * outer(d1, d1)
-        + (c12 * f1 * f2)[..., None, None] * (both + np.swapaxes(both, -1, -2))
-        + (c22 * f2 * f2 + s2 * half * f2 / sq2)[..., None, None] * outer(d2, d2)
+    c12 = np.where(wrinkled, 0.0, plane * nu)
+    c22 = np.where(wrinkled, 0.0, plane)
+    # Strains by the squares of stretches, and those by dr, dz and the middle radius.
+    by1, by2 = 2 * volume / flat.lengths**2, 2 * volume / flat.middles**2
+    if flat.order == 2:
+        g1, g2 = by1 / 2 * s1, by2 / 2 * s2
+        k1, k2 = by1 / flat.lengths**2 / 2 * c11, by2 / flat.middles**2 / 2 * c22
+        k12 = by1 / flat.middles**2 / 2 * c12
+    else:
+        half = flat.order / 2 - 1
+        f1, f2 = sq1**half / 2, sq2**half / 2
+        g1, g2 = by1 * (s1 * f1), by2 * (s2 * f2)
+        k1 = by1 * 2 / flat.lengths**2 * (c11 * f1 * f1 + s1 * half * f1 / sq1)
+        k2 = by2 * 2 / flat.middles**2 * (c22 * f2 * f2 + s2 * half * f2 / sq2)
+        k12 = by1 * 2 / flat.middles**2 * (c12 * f1 * f2)
+    dr, dz, middle = at.dr, at.dz, at.middle
+    k1_dr, k12_middle = k1 * dr, k12 * middle
+    return Term(
+        (volume * density).sum(-1),
+        [g1 * dr, g1 * dz, g2 * middle],
+        [
+            g1 + k1_dr * dr,
+            k1_dr * dz,
+            g1 + k1 * dz * dz,
+            k12_middle * dr,
+            k12_middle * dz,
+            g2 + k2 * middle * middle,
+        ],
     )
-    return Term((volume * density).sum(-1), gradient, hessian)
 
 
-def bending(
-    flat: Flat, rigidity: float, bent: slice, r: Array, z: Array, slopes: bool = True
-) -> Term:
-    """Bending along the meridian and round the hoop, by coordinate, between clamped edges.
+class Bent(NamedTuple):
+    """Bending: its term, and the second derivatives that join elements before and after a kink,
+    by dr dr, dr dz, dz dr and dz dz of the two; each (rows, kinks).
+    """
+
+    term: Term
+    joined: list[Array]
+
+
+def bending(flat: Flat, rigidity: float, bent: slice, at: Elements) -> Bent:
+    """Bending along the meridian and round the hoop between clamped edges.
 
     What lies outside the nodes ``bent`` is bonded face to face with its mirror. It
-    does not bend, but gives way at its root as the arms of a double cantilever beam do. The
-    second derivatives leave out those of the slopes themselves: enough to descend by.
+    does not bend, but gives way at its root as the arms of a double cantilever beam do.
     """
-    dr, dz = np.diff(r), np.diff(z)
-    slope = np.arctan2(-dz, dr)
+    slope = np.arctan2(-at.dz, at.dr)
     held, edge = bent.start, bent.stop
-    inner, beyond = slice(0, edge), slice(1, edge + 1)
-    kink = slope[:, beyond] - slope[:, inner]
+    kink = slope[:, 1 : edge + 1] - slope[:, :edge]
     number = np.arange(len(flat.lengths))
     along = np.where((number >= held) & (number < edge), flat.lengths, 2 * ROOT * flat.thickness)
-    between = (along[inner] + along[beyond]) / 2
-    stiff = math.tau * rigidity * flat.nodes[beyond] / between
+    between = (along[:edge] + along[1 : edge + 1]) / 2
+    stiff = math.tau * rigidity * flat.nodes[1 : edge + 1] / between
     ring = math.tau * rigidity * flat.lengths / flat.middles
-    sine, cosine = np.sin(slope), np.cos(slope)
-    energy = ((stiff * kink**2).sum(-1) + (ring * sine**2).sum(-1)) / 2
-    if not slopes:
-        return Term(energy, NOTHING, NOTHING)
-    turn = np.stack([-dz, dr, dz, -dr], -1) / (dr**2 + dz**2)[..., None]
-    change = np.zeros((*kink.shape, 6))
-    change[..., 2:] += turn[:, beyond]
-    change[..., :4] -= turn[:, inner]
-    count = r.shape[1]
-    total = Term(
-        energy,
-        np.zeros((len(r), 2 * count)),
-        np.zeros((len(r), 2 * count, 2 * count)),
-    )
-    add(total, (stiff * kink)[..., None] * change, stiff[:, None, None] * outer(change, change))
-    by_ring = (ring * cosine**2)[..., None, None] * outer(turn, turn)
-    add(total, (ring * sine * cosine)[..., None] * turn, by_ring)
-    return total
+    moment = stiff * kink
+    # Of the slope: by dr and by dz; and the squares of its sine and cosine.
+    a, b = at.dz / at.square, -at.dr / at.square
+    sine2, cosine2 = a * at.dz, -b * at.dr
+    energy = ((moment * kink).sum(-1) + (ring * sine2).sum(-1)) / 2
+    # The energy by the slope of each element, first and second.
+    turn = -ring * at.dz * at.dr / at.square
+    turn[:, 1 : edge + 1] += moment
+    turn[:, :edge] -= moment
+    stiffness = ring * (cosine2 - sine2)
+    stiffness[:, 1 : edge + 1] += stiff
+    stiffness[:, :edge] += stiff
+    stiff_a, stiff_b = stiffness * a, stiffness * b
+    none, twice = np.zeros_like(a), 2 * turn * a * b
+    curves = [stiff_a * a + twice, stiff_a * b + turn * (b * b - a * a), stiff_b * b - twice]
+    term = Term(energy, [turn * a, turn * b, none], [*curves, none, none, none])
+    before = -stiff * a[:, :edge], -stiff * b[:, :edge]
+    after = a[:, 1 : edge + 1], b[:, 1 : edge + 1]
+    return Bent(term, [x * y for x in before for y in after])
 
 
-def add(total: Term, gradient: Array, hessian: Array) -> None:
-    """Adds to gradient and hessian of the whole film what its elements, in a row, contribute."""
-    width = gradient.shape[-1]
-    for number in range(gradient.shape[1]):
-        at = slice(2 * number, 2 * number + width)
-        total.gradient[:, at] += gradient[:, number]
-        total.hessian[:, at, at] += hessian[:, number]
-
-
-def air(flat: Flat, edge: int, r: Array, z: Array, slopes: bool = True) -> Term:
-    """Air (ul) between the inner face of a film and the plane of its edge, by element.
+def air(flat: Flat, edge: int, at: Elements) -> Term:
+    """Air (ul) between the inner face of a film and the plane of its edge.
 
     The film's middle starts half a thickness above that plane, and its inner face is smaller: what
     the volume of a thick film is by Steiner's formula.
     """
-    r1, r2, drop = r[:, :-1], r[:, 1:], z[:, :-1] - z[:, 1:]
-    dr, mean = r2 - r1, (r1 + r2) / 2
-    area = math.pi / 3 * (r1 * r1 + r1 * r2 + r2 * r2)
-    half = np.where(np.arange(drop.shape[1]) < edge, math.pi * flat.thickness, 0.0)
-    length = np.sqrt(dr**2 + drop**2)
-    volume = (area * drop - half * mean * length).sum(-1)
-    volume = volume + math.pi / 2 * flat.thickness * r[:, edge] ** 2
-    if not slopes:
-        return Term(volume, NOTHING, NOTHING)
-    a, b = math.pi / 3 * (2 * r1 + r2), math.pi / 3 * (2 * r2 + r1)
-    gradient = np.stack([a * drop, area, b * drop, -area], -1)
-    hessian = np.zeros((*drop.shape, 4, 4))
-    hessian[..., 0, 0] = hessian[..., 2, 2] = math.tau / 3 * drop
-    hessian[..., 0, 2] = hessian[..., 2, 0] = math.pi / 3 * drop
-    for i, j, value in ((0, 1, a), (0, 3, -a), (2, 1, b), (2, 3, -b)):
-        hessian[..., i, j] = hessian[..., j, i] = value
-    along = np.stack([-dr, drop, dr, -drop], -1) / length[..., None]
-    across = np.stack([-drop, -dr, drop, dr], -1) / length[..., None]
-    halves = np.broadcast_to(np.array([0.5, 0.0, 0.5, 0.0]), along.shape)
-    both = outer(along, halves)
-    gradient -= half[:, None] * (mean[..., None] * along + length[..., None] * halves)
-    hessian -= half[:, None, None] * (
-        both + np.swapaxes(both, -1, -2) + (mean / length)[..., None, None] * outer(across, across)
-    )
-    gradient[:, edge - 1, 2] += math.pi * flat.thickness * r[:, edge]
-    hessian[:, edge - 1, 2, 2] += math.pi * flat.thickness
-    return Term(volume, gradient, hessian)
+    dr, dz, middle = at.dr, at.dz, at.middle
+    half = np.where(np.arange(dr.shape[1]) < edge, math.pi * flat.thickness, 0.0)
+    length = np.sqrt(at.square)
+    area = math.pi * middle**2 + math.pi / 12 * dr**2
+    volume = -(area * dz + half * middle * length).sum(-1)
+    along_r, along_z = dr / length, dz / length
+    mean, pi_dz, twice = half * middle, math.pi * dz, math.tau * middle
+    bend = mean / length
+    by_dr = -pi_dz * dr / 6 - mean * along_r
+    by_dz = -area - mean * along_z
+    by_middle = -twice * dz - half * length
+    curves = [
+        -pi_dz / 6 - bend * along_z**2,
+        -math.pi / 6 * dr + bend * along_r * along_z,
+        -bend * along_r**2,
+        -half * along_r,
+        -twice - half * along_z,
+        -2 * pi_dz,
+    ]
+    # The disc at the edge, half a thickness high; its radius is middle + dr / 2 of the last one.
+    last, disc = edge - 1, math.pi * flat.thickness
+    rim = middle[:, last] + dr[:, last] / 2
+    by_dr[:, last] += disc / 2 * rim
+    by_middle[:, last] += disc * rim
+    for curve, share in ((0, 0.25), (3, 0.5), (5, 1.0)):
+        curves[curve][:, last] += disc * share
+    return Term(volume + disc / 2 * rim**2, [by_dr, by_dz, by_middle], curves)
+
+
+def gradient(slopes: Slopes) -> Array:
+    """Derivatives by the coordinates r, z of each node in turn: (coordinates, rows)."""
+    by_dr, by_dz, by_middle = (slope.T for slope in slopes)
+    count, rows = by_dr.shape
+    found = np.zeros((2 * count + 2, rows))
+    half = by_middle / 2
+    found[0:-2:2] = half - by_dr
+    found[2::2] += half + by_dr
+    found[1:-2:2] = -by_dz
+    found[3::2] += by_dz
+    return found
+
+
+def matrix(curves: SecondSlopes, joined: list[Array]) -> Array:
+    """Second derivatives by coordinates, as a band: (coordinates, 6, rows), of which ``[i, k]`` is
+    that by coordinates i and i + k.
+    """
+    rr, rz, zz, rm, zm, mm = (curve.T for curve in curves)
+    count, rows = rr.shape
+    found = np.zeros((2 * count + 2, 6, rows))
+    r, z = found[0::2], found[1::2]
+    quarter, half = mm / 4, zm / 2
+    alike = rr + quarter
+    r[:-1, 0] = alike - rm
+    r[1:, 0] += alike + rm
+    r[:-1, 1] = rz - half
+    r[1:, 1] += rz + half
+    z[:-1, 0] = zz
+    z[1:, 0] += zz
+    r[:-1, 2], r[:-1, 3] = quarter - rr, half - rz
+    z[:-1, 1], z[:-1, 2] = -rz - half, -zz
+    # A kink joins three nodes: of those before and after it, and of its own with each of them.
+    c_rr, c_rz, c_zr, c_zz = (each.T for each in joined)
+    before, own = slice(0, len(c_rr)), slice(1, len(c_rr) + 1)
+    for node in (before, own):
+        r[node, 2] += c_rr
+        r[node, 3] += c_rz
+        z[node, 1] += c_zr
+        z[node, 2] += c_zz
+    r[before, 4], r[before, 5], z[before, 3], z[before, 4] = -c_rr, -c_rz, -c_zr, -c_zz
+    r[own, 0] -= 2 * c_rr
+    r[own, 1] -= c_rz + c_zr
+    z[own, 0] -= 2 * c_zz
+    return found

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sbafab.models.balloon_map import DEGREE, PIECES_IN_ALL, along, derivatives, horner
+from sbafab.models.balloon_map import DEGREE, PIECES_IN_ALL, derivatives, horner
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,16 +31,16 @@ class GapPlaces(NamedTuple):
 
     ``begins`` (rows, chambers x points) is where the potential of each point begins in the table of
     springs. ``ring`` (rows, chambers x points, 3) are the gaps there, in pieces of the spline, by
-    rise and tilt, ``squares`` (rows, chambers x points, 9) their products. ``meet`` (rows, points,
-    3) are the gaps at all that may be shut: the same, then the rims in mm; ``stiff`` (rows, points)
-    how hard each resists.
+    rise and tilt, ``squares`` (rows, chambers x points, 9) their products. ``meet`` (rows, 3,
+    points) are the gaps at all that may be shut: the same, then the rims in mm; ``shut`` (rows,
+    points, 9) their products by how hard each resists.
     """
 
     begins: NDArray[np.int_]
     ring: Array
     squares: Array
     meet: Array
-    stiff: Array
+    shut: Array
 
     @classmethod
     def of(cls, maps: Sequence[BalloonMap], gaps: Array, rims: Array) -> GapPlaces:
@@ -51,20 +51,22 @@ class GapPlaces(NamedTuple):
         ring = gaps * spans[..., None]
         stiff = np.full((len(maps), count + rims.shape[1]), SHUT / RING)
         stiff[:, :count] /= spans * spans
+        meet = np.concatenate([ring, rims], axis=1)
+        squares = (meet[..., :, None] * meet[..., None, :]).reshape(*meet.shape[:2], 9)
         return cls(
             np.repeat(begins, RING, axis=1),
             ring,
-            (ring[..., :, None] * ring[..., None, :]).reshape(*gaps.shape[:2], 9),
-            np.concatenate([ring, rims], axis=1),
-            stiff,
+            squares[:, :count],
+            np.ascontiguousarray(meet.transpose(0, 2, 1)),
+            squares * stiff[..., None],
         )
 
     def at(self, levels: NDArray[np.int_]) -> GapPlaces:
         """A row for each of these; one row for all where they are alike."""
         if len(self.begins) == 1:
             return self
-        begins, ring, squares, meet, stiff = self
-        return GapPlaces(begins[levels], ring[levels], squares[levels], meet[levels], stiff[levels])
+        begins, ring, squares, meet, shut = self
+        return GapPlaces(begins[levels], ring[levels], squares[levels], meet[levels], shut[levels])
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,28 +92,35 @@ class Springs:
         which a move closes were shut from where they are; None where it closes none.
         """
         first = self.places.begins.shape[1]
-        rims, stiff = self.places.meet[:, first:], self.places.stiff[:, first:]
-        gaps = (rims @ freedoms[..., None])[..., 0]
-        met = (gaps >= 0) & (gaps + (rims @ move[..., None])[..., 0] < 0)
+        rims = self.places.meet[:, :, first:]
+        ends = ((freedoms + move)[:, None] @ rims)[:, 0]
+        if ends.min() >= 0:
+            return None
+        met = (ends < 0) & ((freedoms[:, None] @ rims)[:, 0] >= 0)
         if not met.any():
             return None
-        each = rims * (met * stiff)[..., None]
-        return (gaps[:, None] @ each)[:, 0], each.transpose(0, 2, 1) @ rims
+        stiffer = self._shut(met, first)
+        return (stiffer @ freedoms[..., None])[..., 0], stiffer
+
+    def _shut(self, met: NDArray[np.bool_], first: int = 0) -> Array:
+        """Second derivatives (rows, 3, 3) of what resists where ``met`` (rows, points)."""
+        each = met.astype(float)[:, None] @ self.places.shut[:, first:]
+        return np.asarray(each.reshape(-1, 3, 3))
 
     def energy(self, freedoms: Array) -> tuple[Array, Array, Array]:
         """Energy (rows) in uJ with its gradient (rows, 3) and second derivatives (rows, 3, 3)."""
-        begins, ring, squares, meet, stiff = self.places
-        gaps = (meet @ freedoms[..., None])[..., 0]
-        found = along(self.table, begins, gaps[:, : begins.shape[1]])
-        value = found.value.sum(-1)
-        gradient = (found.first[:, None] @ ring)[:, 0]
-        matrix = (found.second[:, None] @ squares).reshape(-1, 3, 3)
+        begins, ring, squares, meet, _ = self.places
+        gaps = (freedoms[:, None] @ meet)[:, 0]
+        value, first, second = horner(self.table, begins, gaps[:, : begins.shape[1]])
+        value = value @ np.ones(value.shape[-1])
+        gradient = (first[:, None] @ ring)[:, 0]
+        matrix = (second[:, None] @ squares).reshape(-1, 3, 3)
         if gaps.min() < 0:
-            push = stiff * np.minimum(gaps, 0.0)
-            value += (push * gaps).sum(-1) / 2
-            gradient += (push[:, None] @ meet)[:, 0]
-            touch = np.where(gaps < 0, stiff, 0.0)[..., None] * meet
-            matrix += touch.transpose(0, 2, 1) @ meet
+            stiffer = self._shut(gaps < 0)
+            push = (stiffer @ freedoms[..., None])[..., 0]
+            value += (push * freedoms).sum(-1) / 2
+            gradient += push
+            matrix += stiffer
         return value, gradient, matrix
 
     def contents(self, freedoms: Array) -> tuple[Array, Array]:

@@ -24,7 +24,7 @@ from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import BalloonMap, balloon_map
 from sbafab.models.chain import Chain, chain
-from sbafab.models.loads import Load
+from sbafab.models.loads import Load, directed, outer_plate, three
 from sbafab.models.springs import RING, GapPlaces, Springs
 from sbafab.models.stack_balance import free, held
 
@@ -47,7 +47,6 @@ GRIP = 0.15
 """Radius, as a share of its pocket's, of the disc that a lone balloon's plates hold it by."""
 SHARES = (1.0, 0.5, 0.2, 0.1)
 """Of the pressure asked for, tried one after the other."""
-UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -202,10 +201,13 @@ class Stack:
 
     def springs(self, pressures: Sequence[float]) -> Springs:
         """What kinds of balloons do at pressures, one a chamber. Raises DesignError."""
-        asked = np.array(pressures, dtype=float)
-        if len(asked) != self.chambers:
+        try:
+            asked = np.array(pressures, dtype=float)
+        except (TypeError, ValueError):
+            raise DesignError("pressures must be numbers in kPa, one a chamber") from None
+        if asked.shape != (self.chambers,):
             raise DesignError(
-                f"{len(asked)} pressures are given for {self.chambers} chambers; give one a chamber"
+                f"{asked.size} pressures are given for {self.chambers} chambers; give one a chamber"
             )
         return Springs.pressed(self.maps, asked, self._places)
 
@@ -238,7 +240,7 @@ class Stack:
             start = near.freedoms
         else:
             start = self._risen(pressures)
-            if load.point is not None and not (load.is_level and load.sticks):
+            if load.wall is not None and not (load.wall.is_level and load.wall.sticks):
                 start = free(springs, start)
             start = start[self.levels]
         found, push, stable = held(self.each(springs), self.pitch, load, start, near is not None)
@@ -259,7 +261,7 @@ class Stack:
         from sbafab.models.motion import Motion
         from sbafab.models.pneumatics import Line
 
-        start = self.pose(pressures or (0.0,) * self.chambers, **load)
+        start = self.pose((0.0,) * self.chambers if pressures is None else pressures, **load)
         return Motion(self, line or Line(), load, start)
 
     @cached_property
@@ -283,27 +285,25 @@ class Stack:
         gravity: bool | Sequence[float],
         plate: float | Plate | None,
     ) -> Load | None:
-        force = 1000 * np.asarray(tip_load, dtype=float)
-        if force.shape != (3,) or not np.isfinite(force).all():
-            raise DesignError("tip_load must be three finite numbers in N, such as (0, 0, -0.1)")
-        down = np.zeros(3)
-        if not isinstance(gravity, bool):
-            down = np.asarray(gravity, dtype=float) / np.linalg.norm(gravity)
+        force, weight = 1000 * three(tip_load, "tip_load in N"), None
+        if not isinstance(gravity, (bool, np.bool_)):
+            weight = self.weight * directed(gravity, "the direction of gravity")
         elif gravity:
-            down = np.array([0.0, 0.0, -1.0])
-        if not force.any() and not down.any() and plate is None:
+            weight = np.array([0.0, 0.0, -self.weight])
+        if not force.any() and weight is None and plate is None:
             return None
-        wall = plate if isinstance(plate, Plate) or plate is None else Plate.at(float(plate))
-        if wall is None:
-            return Load(force, down * self.weight, None, UP, False, self.outline)
-        point, normal = np.asarray(wall.point, float), np.asarray(wall.normal, float)
-        normal = normal / np.linalg.norm(normal)
-        if normal[2] > 1 - 1e-9 and point[2] < self.flat_height - 1e-9:
+        if plate is None:
+            return Load(force, weight, None)
+        outer = plate if isinstance(plate, Plate) else Plate.at(plate)
+        point = three(outer.point, "the plate's point in mm")
+        normal = directed(outer.normal, "the plate's normal")
+        wall = outer_plate((*point.tolist(), *normal.tolist()), outer.sticks, self.outline)
+        if wall.normal[2] > 1 - 1e-9 and wall.point[2] < self.flat_height - 1e-9:
             raise DesignError(
-                f"a plate {point[2]:g} mm high is lower than the flat stack; give at least "
+                f"a plate {wall.point[2]:g} mm high is lower than the flat stack; give at least "
                 f"{self.flat_height:.4g} mm"
             )
-        return Load(force, down * self.weight, point, normal, wall.sticks, self.outline)
+        return Load(force, weight, wall)
 
     def _pose(
         self,

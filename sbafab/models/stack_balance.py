@@ -8,21 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.loads import Load, Loaded, loaded, pushed, with_blocks
+from sbafab.models.descent import FARTHEST, FINE, curves_up, ends, limited, towards
+from sbafab.models.loads import Load, Loaded, loaded, with_blocks
+from sbafab.models.outer_plate import below, pressed
 
 if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
+    from sbafab.models.loads import OuterPlate
     from sbafab.models.springs import Springs
 
-WALLS = (1e3, 1e5)
-"""The same on the way there."""
+SOFTER = (1e3, 1e5)
+"""mN/mm of an outer plate on the way to it."""
 MOST_STEPS = 300
 CLOSE = 1e-7
 """Out of balance in mN (or mN mm) that is none."""
-FARTHEST = np.array([0.4, 0.15, 0.15])
-"""The most by which one step moves rise (mm) and tilt (rad)."""
-FINE = 1e-6
-"""A step (mm, rad) that need not be made."""
 FINEST = 5e-8
 """The same where what all levels do adds up: tilts under a load, volumes without."""
 CLOSELY, LITTLE = 3e-5, 1e-7
@@ -32,13 +31,15 @@ ROUGH = 0.01
 """The same on the way to an outer plate."""
 TRIES = 2
 """How often a step is held off by rims that it would meet."""
-ROUNDS, NEARLY = 16, 0.2
-"""How often a step is bettered by the springs at its end, and the share of it that is little."""
+ROUNDS, NEARLY = 16, 0.8
+"""How often a step is bettered by the springs at its end, and the share of it that is little: the
+next step sees to the rest.
+"""
 STRAIGHT = 6e-3
 """A step (mm, rad) along which springs are straight enough."""
-SMALL, ALIKE = 2e-3, 1e-9
-"""A step with whose matrix another one may be made, and what the product of both must be below for
-that one to be the last.
+SMALL, TINY, ALIKE = 2e-3, 1e-9, 0.2
+"""A step with whose matrix another one may be made, what the product of both must be below for that
+one to be the last, and the share by which springs may change between.
 """
 FEW_STEPS = 12
 """Steps in which a start far away meets an outer plate, or never does."""
@@ -51,11 +52,11 @@ def free(springs: Springs, start: Array) -> Array:
     for _ in range(MOST_STEPS):
         if np.abs(gradient).max() < CLOSE:
             return at
-        move, is_firm = _towards(gradient, matrix)
+        move, is_firm = towards(gradient, matrix)
         largest = float(np.abs(move).max())
-        if is_firm and _ends(largest, before, FINEST):
+        if is_firm and ends(largest, before, FINEST):
             return at + move
-        share = _limited(move)
+        share = limited(move)
         slope = (move * gradient).sum(-1)
         for _ in range(12):
             step = share[:, None] * move
@@ -70,31 +71,6 @@ def free(springs: Springs, start: Array) -> Array:
     raise DesignError("the stack finds no balance at these pressures; try others")
 
 
-def _ends(largest: float, before: float, fine: float = FINE) -> bool:
-    """Whether a step is the last: what would follow it, if steps go on to shrink as they did since
-    the whole step before, is none.
-    """
-    return largest * largest < fine * before
-
-
-def _towards(gradient: Array, matrix: Array) -> tuple[Array, bool]:
-    """Newton's step of each row, kept downhill where the energy curves the wrong way, and whether
-    it curves the right way everywhere.
-    """
-    if not _is_firm(matrix):
-        values, vectors = np.linalg.eigh(matrix)
-        least = 1e-6 * np.abs(values).max(-1, keepdims=True) + 1e-9
-        values = np.maximum(np.abs(values), least)
-        within = (vectors.transpose(0, 2, 1) @ gradient[..., None])[..., 0]
-        return np.asarray(-(vectors @ (within / values)[..., None])[..., 0]), False
-    return np.asarray(-np.linalg.solve(matrix, gradient[..., None])[..., 0]), True
-
-
-def _limited(move: Array) -> Array:
-    """Share of each row's step that stays within what one step may do."""
-    return np.asarray(np.minimum(1.0, (FARTHEST / np.maximum(np.abs(move), 1e-12)).min(-1)))
-
-
 def held(
     springs: Springs, pitch: float, load: Load, start: Array, is_near: bool
 ) -> tuple[Array, float, bool]:
@@ -105,52 +81,36 @@ def held(
     run far into it; ``is_near`` tells a start that may be met as it is. Raises DesignError where no
     balance is found.
     """
-    if load.point is None:
+    wall = load.wall
+    if wall is None:
         fine = FINE if is_near else FINEST
         found = _settled(springs, pitch, load, start, FEW_STEPS, quick=fine)
         if found is None:
             found = _settled(springs, pitch, load, start, MOST_STEPS)
     else:
-        at = start if is_near else _under(springs, start, pitch, load, load.point)
-        found = _settled(springs, pitch, load, at, MOST_STEPS if is_near else FEW_STEPS)
+        at = start if is_near else below(springs, start, pitch, wall, load.stiffness)
+        found = pressed(springs, pitch, load, wall, at)
         if found is None:
-            found = _met(springs, pitch, load, at)
+            found = _settled(springs, pitch, load, at, MOST_STEPS if is_near else FEW_STEPS)
+        if found is None:
+            found = _met(springs, pitch, load, wall, at)
     if found is None:
         raise DesignError("the stack finds no balance under this load; try a smaller one")
     return found
 
 
 def _met(
-    springs: Springs, pitch: float, load: Load, start: Array
+    springs: Springs, pitch: float, load: Load, wall: OuterPlate, start: Array
 ) -> tuple[Array, float, bool] | None:
     """What ``held`` gives against a plate that is soft at first."""
     at = start
-    for wall in WALLS:
-        soft = _settled(springs, pitch, load._replace(wall=wall), at, MOST_STEPS, ROUGH)
+    for stiffness in SOFTER:
+        soft = _settled(springs, pitch, load._replace(stiffness=stiffness), at, MOST_STEPS, ROUGH)
         if soft is None:
             return None
         at, _, _ = soft
-    return _settled(springs, pitch, load, at, MOST_STEPS)
-
-
-def _under(springs: Springs, start: Array, pitch: float, load: Load, point: Array) -> Array:
-    """The same start below a level plate, a little past it, so that it is met all round: what is
-    alike on all sides stays so.
-    """
-    at = start.copy()
-    if load.is_level:
-        room = max(point[2] / len(at) - pitch, 0.0)
-        is_high = at[:, 0] > room
-        straight = load.sticks | (np.abs(at[:, 1:]) < 1e-9)
-        at[:, 1:] = np.where(straight, 0.0, at[:, 1:])
-        at[:, 0] = np.where(is_high, room, at[:, 0])
-        past = 1e-4
-        if load.sticks and is_high.all():
-            # As far as the plate gives way to them.
-            push = float(-springs.energy(at)[1][:, 0].mean())
-            past = max(push, 0.0) / load.wall / len(at) + 1e-9
-        at[:, 0] += np.where(is_high, past, 0.0)
-    return at
+    found = pressed(springs, pitch, load, wall, at)
+    return found or _settled(springs, pitch, load, at, MOST_STEPS)
 
 
 def _settled(
@@ -170,45 +130,60 @@ def _settled(
     now = loaded(springs, pitch, load, at)
     for _ in range(most):
         if np.abs(now.gradient).max() < CLOSE * (1 + 1e-3 * now.push):
-            return at, now.push, _is_firm(with_blocks(now.rest(), now.blocks))
+            return at, now.push, curves_up(with_blocks(now.rest(), now.blocks))
         if last is not None:
             # The matrix of a step so small is still good enough for the last one.
             matrix, blocks = last
             flat = -np.linalg.solve(matrix, now.gradient)
-            if np.abs(flat).max() * before < ALIKE and _are_alike(blocks, now.blocks):
+            if np.abs(flat).max() * before < TINY and _are_alike(blocks, now.blocks):
                 return at + flat.reshape(-1, 3), now.push, True
         rest = now.rest()
         matrix = with_blocks(rest, now.blocks)
-        found, is_firm = _towards(now.gradient[None], matrix[None])
-        flat = _held_off(springs, at, found[0], now.gradient, rest, now.blocks)
+        flat, is_firm = (_downhill if quick else _careful)(now.gradient, matrix)
+        flat = _held_off(springs, at, flat, now.gradient, rest, now.blocks)
         if quick and np.abs(flat).max() > STRAIGHT:
             flat = _bettered(springs, at, flat, now, rest)
         move = flat.reshape(-1, 3)
         largest = float(np.abs(move).max())
         slope = float(flat @ now.gradient)
-        fits = load.point is None or (largest < CLOSELY and slope > -LITTLE)
-        if is_firm and (largest <= enough or (fits and _ends(largest, before, fine))):
+        fits = load.wall is None or (largest < CLOSELY and slope > -LITTLE)
+        is_last = largest <= enough or (fits and ends(largest, before, fine))
+        if is_last and (curves_up(matrix) if is_firm is None else is_firm):
             at = at + move
-            return at, 0.0 if load.point is None else pushed(at, pitch, load), True
-        share = float(_limited(move).min())
+            if load.wall is None:
+                return at, 0.0, True
+            return at, loaded(springs, pitch, load, at).push, True
+        share = float(limited(move).min()) if largest > FARTHEST.min() else 1.0
         for _ in range(14):
             tried = loaded(springs, pitch, load, at + share * move)
             if tried.value <= now.value + 1e-4 * share * slope + 1e-11 * (1 + abs(now.value)):
                 break
             share /= 2
         before = largest if share == 1.0 else 0.0
-        may_last = load.point is None and is_firm and 0 < before < SMALL
+        may_last = load.wall is None and 0 < before < SMALL and curves_up(matrix)
         last = (matrix, now.blocks) if may_last else None
         at = at + share * move
         now = tried
         if abs(slope) < 1e-11 * (1 + abs(now.value)):
-            return at, now.push, _is_firm(with_blocks(now.rest(), now.blocks))
+            return at, now.push, curves_up(with_blocks(now.rest(), now.blocks))
     return None
+
+
+def _careful(gradient: Array, matrix: Array) -> tuple[Array, bool]:
+    """Newton's step of all levels, and whether the energy curves the right way."""
+    found, is_firm = towards(gradient[None], matrix[None])
+    return found[0], is_firm
+
+
+def _downhill(gradient: Array, matrix: Array) -> tuple[Array, bool | None]:
+    """The same; where the step leads downhill, it is left open how the energy curves."""
+    flat = -np.linalg.solve(matrix, gradient)
+    return (np.asarray(flat), None) if flat @ gradient < 0 else _careful(gradient, matrix)
 
 
 def _are_alike(one: Array, other: Array) -> bool:
     """Whether the springs of two places are: where rims meet or part they are not."""
-    return float(np.abs(one - other).max()) < NEARLY * float(np.abs(one).max())
+    return float(np.abs(one - other).max()) < ALIKE * float(np.abs(one).max())
 
 
 def _held_off(
@@ -224,7 +199,7 @@ def _held_off(
             break
         push, stiffer = met
         matrix = with_blocks(rest, blocks + stiffer)
-        tried, _ = _towards((gradient + push.ravel())[None], matrix[None])
+        tried, _ = towards((gradient + push.ravel())[None], matrix[None])
         if float((tried @ gradient)[0]) >= 0:
             break  # it would lead uphill
         flat = tried[0]
@@ -253,12 +228,3 @@ def _bettered(springs: Springs, at: Array, flat: Array, now: Loaded, rest: Array
         if np.abs(more).max() < NEARLY * np.abs(best).max():
             return flat
     return best
-
-
-def _is_firm(matrix: Array) -> bool:
-    """Whether the energy rises every way."""
-    try:
-        np.linalg.cholesky(matrix)
-    except np.linalg.LinAlgError:
-        return False
-    return True

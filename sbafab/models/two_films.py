@@ -7,18 +7,25 @@ and tilts as they wring it: as a ring whose section turns. Units as there.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.models import balloon as single
-from sbafab.models.film_elements import air
+from sbafab.models import banded
+from sbafab.models.film_elements import Elements, air
+from sbafab.models.least_energy import Descent, NoBalance, settled
+from sbafab.models.rim_ripple import both_bend
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from sbafab.models.balloon import Balloon, BalloonLoad, Shapes
     from sbafab.models.film_elements import Array
 
+REACH = 5
+"""Coordinates further on that one is joined with."""
 TwoFilms = tuple["Balloon", "Balloon"]
 Loads = tuple["BalloonLoad", "BalloonLoad"]
 
@@ -30,32 +37,36 @@ def inflate(films: TwoFilms, load: BalloonLoad) -> Shapes:
     """
     loads = (load, load)
     basis = _basis(films[0], is_free=bool(np.isinf(load.half).any()))
-    at = [np.stack(single.start(one, load), -1).reshape(len(load.pressure), -1) for one in films]
-    both = np.concatenate(at, axis=1)
-    both = both @ np.linalg.pinv(basis.T) @ basis.T
+    begin = [single.coordinates(*single.start(one, load)) for one in films]
+    y = np.asarray(np.linalg.pinv(basis) @ np.concatenate(begin), dtype=float)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        both = _settled(films, loads, basis, both)
+        y = _settled(films, loads, basis, y)
         if films[0].wrinkles:
             zones = [
-                single.compressed(one, *part) for one, part in zip(films, _parts(both), strict=True)
+                single.compressed(one, *single.places(part))
+                for one, part in zip(films, np.split(basis @ y, 2), strict=True)
             ]
             for _ in range(single.ROUNDS):
+                shapes = [single.places(part) for part in np.split(basis @ y, 2)]
+                ripples = single.rippling(films, shapes)
                 loads = tuple(
-                    load._replace(cap=single.wrinkling(one, *part, zone))
-                    for one, part, zone in zip(films, _parts(both), zones, strict=True)
+                    load._replace(cap=single.wrinkling(one, *shape, zone), ripple=ripple)
+                    for one, shape, zone, ripple in zip(films, shapes, zones, ripples, strict=True)
                 )  # type: ignore[assignment]
-                both = _settled(films, loads, basis, both)
-    parts = _parts(both)
-    energy, volume = (both @ _wringing(films)) ** 2 / 2, np.zeros(len(both))
-    for one, own, part in zip(films, loads, parts, strict=True):
-        term, _ = single.total(one, own, *part, slopes=False)
-        held = air(one.film, one.edge, *part).energy
-        energy, volume = energy + term.energy + load.pressure * held, volume + held
-    force = np.mean(
-        [single.total(o, w, *part)[1] for o, w, part in zip(films, loads, parts, strict=True)], 0
-    )
-    height = parts[0][1][:, 0] + parts[1][1][:, 0]
-    softer = parts[int(films[1].rigid < films[0].rigid)]
+                y = _settled(films, loads, basis, y)
+    x = basis @ y
+    energy = (_wringing(films) @ x) ** 2 / 2
+    volume, force = np.zeros_like(energy), np.zeros_like(energy)
+    shapes = []
+    for one, own, part in zip(films, loads, np.split(x, 2), strict=True):
+        r, z = (np.ascontiguousarray(each) for each in single.places(part))
+        found = single.total(one, own, part)
+        held = air(one.film, one.edge, Elements.of(r, z)).energy
+        energy, volume = energy + found.energy + load.pressure * held, volume + held
+        force = force + found.force / 2
+        shapes.append((r, z))
+    height = shapes[0][1][:, 0] + shapes[1][1][:, 0]
+    softer = shapes[int(films[1].rigid < films[0].rigid)]
     return single.Shapes(load.pressure, height, volume, force, energy, *softer)
 
 
@@ -64,117 +75,121 @@ def _wringing(films: TwoFilms) -> Array:
 
     A ring of both films bonded turns round its middle line: hoops are bent.
     """
-    (e1, t1), (e2, t2) = ((one.modulus, one.thickness) for one in films)
-    mixed = e1 * e2 * t1 * t2 * (4 * t1**2 + 6 * t1 * t2 + 4 * t2**2)
-    bent = (e1**2 * t1**4 + e2**2 * t2**4 + mixed) / (12 * (e1 * t1 + e2 * t2))
     one = films[0]
-    stiff = math.tau * bent * math.log((one.pocket + one.ring) / one.pocket)
+    stiff = math.tau * both_bend(films) * math.log((one.pocket + one.ring) / one.pocket)
     found = np.zeros(4 * len(one.nodes))
     found[[2 * len(one.nodes) - 1, 2 * one.edge + 1]] = 1.0, -1.0
     return np.asarray(found * math.sqrt(stiff) / one.ring)
 
 
-def _parts(both: Array) -> list[tuple[Array, Array]]:
-    """Radii and heights of each film's nodes."""
-    return [(half[:, ::2], half[:, 1::2]) for half in np.split(both, 2, axis=1)]
-
-
 def _basis(one: Balloon, is_free: bool) -> Array:
     """What a unit of each freedom moves: (coordinates of both films, freedoms).
 
-    A free balloon's rim stays in its plane: where it is as a whole does not matter.
+    First come those of each film alone, then those of both: the rim's radii, its tilt, and its
+    height. A free balloon's rim stays in its plane: where it is as a whole does not matter.
     """
-    count, columns = len(one.nodes), []
-
-    def column(*moved: tuple[int, float]) -> None:
-        found = np.zeros(4 * count)
-        for coordinate, by in moved:
-            found[coordinate] = by
-        columns.append(found)
-
-    for film in (0, 2 * count):
-        for node in range(0 if one.bore else 1, one.edge):
-            column((film + 2 * node, 1.0))
-        column(*((film + 2 * node + 1, 1.0) for node in range(one.held + 1)))
-        for node in range(one.held + 1, one.edge):
-            column((film + 2 * node + 1, 1.0))
-    for node in range(one.edge, count):
-        column((2 * node, 1.0), (2 * (count + node), 1.0))
-    away = [(node, float(one.nodes[node]) - one.pocket) for node in range(one.edge + 1, count)]
-    column(
-        *((2 * node + 1, by) for node, by in away),
-        *((2 * (count + node) + 1, -by) for node, by in away),
-    )
-    if not is_free:
-        rim = range(one.edge, count)
-        column(
-            *((2 * node + 1, 1.0) for node in rim),
-            *((2 * (count + node) + 1, -1.0) for node in rim),
-        )
-    return np.stack(columns, -1)
+    count, own = len(one.nodes), _own(one)
+    found = np.zeros((4 * count, 2 * len(own) + count - one.edge + 1 + (not is_free)))
+    for film, start in ((0, 0), (2 * count, len(own))):
+        found[film + own, start + np.arange(len(own))] = 1.0
+        found[film + 1 : film + one.level : 2, start + np.searchsorted(own, one.level)] = 1.0
+    rim, shared = np.arange(one.edge, count), 2 * len(own)
+    for film, side in ((0, 1.0), (2 * count, -1.0)):
+        found[film + 2 * rim, shared + np.arange(len(rim))] = 1.0
+        found[film + 2 * rim + 1, shared + len(rim)] = side * (one.nodes[rim] - one.pocket)
+        found[film + 2 * rim + 1, shared + len(rim) + 1 :] = side
+    return found
 
 
-def _settled(films: TwoFilms, loads: Loads, basis: Array, both: Array) -> Array:
-    """The shapes of least energy: Newton's method, damped where it climbs."""
-    both, damping = both.copy(), np.zeros(len(both))
-    pressure, diagonal = loads[0].pressure, np.arange(basis.shape[1])
-    for _ in range(single.MOST_STEPS):
-        energy, gradient, matrix = _total(films, loads, basis, both)
-        matrix[:, diagonal, diagonal] += damping[:, None] * np.abs(matrix[:, diagonal, diagonal])
-        move = -np.linalg.solve(matrix, gradient[..., None])[..., 0]
-        slope = (move * gradient).sum(-1)
-        area = math.pi * films[0].pocket ** 2
-        still = np.abs(gradient).max(-1) <= single.CLOSE * np.maximum(pressure, single.LEAST) * area
-        digits = single.ROUNDING * (np.abs(energy) + pressure * films[0].pocket ** 3)
-        still |= (np.abs(slope) <= digits) & (damping == 0.0)
-        if still.all():
-            return both
-        ahead = np.where(still[:, None], 0.0, move) @ basis.T
-        share = _downhill(films, loads, both, ahead, energy, slope)
-        both += share[:, None] * ahead
-        damped = np.where(share > 0, damping / 10, np.clip(10 * damping, 1e-3, 1e9))
-        damping = np.where(damped < 1e-6, 0.0, damped)
-    raise DesignError(
-        f"a balloon of radius {films[0].pocket:g} mm with two unlike films finds no balance; try "
-        "another load"
-    )
+def _own(one: Balloon) -> NDArray[np.int_]:
+    """The coordinates that a film moves alone: those inside the pocket's edge."""
+    return one.freedoms[one.freedoms < 2 * one.edge]
 
 
-def _total(films: TwoFilms, loads: Loads, basis: Array, both: Array) -> tuple[Array, Array, Array]:
-    """Energy with its slopes by the freedoms."""
-    size = both.shape[1] // 2
-    wrings = _wringing(films)
-    wrung, by = both @ wrings, wrings @ basis
-    energy, gradient = wrung**2 / 2, wrung[:, None] * by
-    matrix = np.tile(np.multiply.outer(by, by), (len(both), 1, 1))
-    pairs = zip(films, loads, _parts(both), strict=True)
-    for number, (one, load, part) in enumerate(pairs):
-        term, _ = single.total(one, load, *part)
-        rows = basis[number * size : (number + 1) * size]
-        energy = energy + term.energy
-        gradient += term.gradient @ rows
-        matrix += rows.T @ term.hessian @ rows
-    return energy, gradient, matrix
+def _settled(films: TwoFilms, loads: Loads, basis: Array, y: Array) -> Array:
+    """The freedoms (freedoms, rows) of least energy downhill of these."""
+    try:
+        return settled(_Energies(films, loads, basis), y)
+    except (NoBalance, np.linalg.LinAlgError):
+        raise DesignError(
+            f"a balloon of radius {films[0].pocket:g} mm with two unlike films finds no balance; "
+            "try another load"
+        ) from None
 
 
-def _downhill(
-    films: TwoFilms, loads: Loads, both: Array, ahead: Array, energy: Array, slope: Array
-) -> Array:
-    """The share of each step that lowers the energy; 0 where none does."""
-    change = np.zeros(len(both))
-    for (r, z), (dr, dz) in zip(_parts(both), _parts(ahead), strict=True):
-        length = np.hypot(np.diff(r), np.diff(z))
-        change = np.maximum(change, (np.hypot(np.diff(dr), np.diff(dz)) / length).max(-1))
-    share = np.minimum(1.0, single.FARTHEST / np.maximum(change, 1e-300))
-    share = np.where(slope <= 0, share, 0.0)
-    room = 1e-12 * (np.abs(energy) + loads[0].pressure * films[0].pocket ** 3)
-    for _ in range(single.HALVINGS):
-        there = both + share[:, None] * ahead
-        tried = (there @ _wringing(films)) ** 2 / 2
-        for one, load, part in zip(films, loads, _parts(there), strict=True):
-            tried = tried + single.total(one, load, *part, slopes=False)[0].energy
-        good = tried <= energy + 1e-4 * share * slope + room
-        if good.all():
-            return share
-        share = np.where(good, share, share / 2)
-    return np.where(good, share, 0.0)
+class _Matrix(NamedTuple):
+    """Second derivatives, rows last: those of each film's own freedoms as bands (own, 6, 2 rows),
+    the first film's rows before the second's; of its last ones with the shared ones (``REACH``,
+    shared, 2 rows), all others are 0; and of the shared ones (rows, shared, shared).
+    """
+
+    own: Array
+    between: Array
+    shared: Array
+
+
+class _Energies:
+    """The energies of both films under their loads, by freedoms, for ``least_energy``."""
+
+    def __init__(self, films: TwoFilms, loads: Loads, basis: Array) -> None:
+        self.films, self.loads, self.basis = films, loads, basis
+        self.wrings = _wringing(films) @ basis
+        self.scale, self.close = single.sizes(films[0], loads[0])
+        own = _own(films[0])
+        self.packing = banded.packing(own, len(basis) // 2, REACH + 1)
+        self.alone = len(own)
+
+    def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
+        first = 2 * self.alone
+        by = self.wrings[first:]
+        wrung = self.wrings @ x
+        energy, slopes = wrung**2 / 2, wrung * self.wrings[:, None]
+        shared = np.tile(np.multiply.outer(by, by), (x.shape[1], 1, 1))
+        bases, parts = np.split(self.basis, 2), np.split(self.basis @ x, 2)
+        own, between = [], []
+        for one, load, part, basis in zip(self.films, self.loads, parts, bases, strict=True):
+            found = single.total(one, load.rows(rows), part)
+            energy = energy + found.energy
+            slopes += basis.T @ found.gradient
+            single.levelled(one, found)
+            own.append(banded.packed(found.matrix, self.packing))
+            # The rim, and what is near enough to be joined with it.
+            edge = 2 * one.edge
+            end, moved = banded.dense(found.matrix[edge - REACH :]), basis[edge:, first:]
+            rim = np.arange(REACH, end.shape[1], 2)
+            end[:, rim[:, None], rim] += np.moveaxis(found.rim, -1, 0)
+            between.append(np.moveaxis(end[:, :REACH, REACH:] @ moved, 0, -1))
+            shared += moved.T @ end[:, REACH:, REACH:] @ moved
+        matrix = _Matrix(np.concatenate(own, -1), np.concatenate(between, -1), shared)
+        return Descent(energy, slopes, matrix)
+
+    def ahead(self, state: Descent, damping: Array) -> Array:
+        """By the Schur complement of the shared freedoms."""
+        matrix, first = state.matrix, 2 * self.alone
+        several, rows = matrix.shared.shape[1], len(damping)
+        band, shared = matrix.own.copy(), matrix.shared.copy()
+        band[:, 0] += _firmer(band[:, 0], np.tile(damping, 2))
+        number = np.arange(several)
+        shared[:, number, number] += _firmer(shared[:, number, number].T, damping).T
+        wanted = np.zeros((self.alone, several + 1, 2 * rows))
+        wanted[-REACH:, :-1] = matrix.between
+        wanted[:, -1] = -np.concatenate(np.split(state.gradient[:first], 2), -1)
+        alone = banded.solve(band, wanted)
+        passed = np.einsum("iar,ibr->rab", matrix.between, alone[-REACH:])
+        passed = passed[:rows] + passed[rows:]
+        left = -state.gradient[first:].T - passed[..., -1]
+        found = np.linalg.solve(shared - passed[..., :-1], left[..., None])[..., 0].T
+        own = alone[:, -1] - (alone[:, :-1] * np.tile(found, 2)).sum(1)
+        return np.concatenate([own[:, :rows], own[:, rows:], found])
+
+    def change(self, x: Array, ahead: Array) -> Array:
+        parts = zip(np.split(self.basis @ x, 2), np.split(self.basis @ ahead, 2), strict=True)
+        return np.asarray(np.max([single.change(*part) for part in parts], axis=0))
+
+
+def _firmer(diagonal: Array, damping: Array) -> Array:
+    """What is added to a diagonal (n, rows). Slack films without pressure may be held by nothing:
+    rounding's share of the rest is added then.
+    """
+    size = np.abs(diagonal)
+    return np.asarray(damping * size + 1e-15 * size.max(0))

@@ -108,6 +108,7 @@ def _sweep() -> dict[str, Any]:
         folder=TEXT,
         designs=COUNT,
         measured_now=COUNT,
+        no_longer_asked=COUNT,
         outcomes={**counts, "description": "designs by what became of them"},
         files=PATHS,
     )

@@ -221,11 +221,14 @@ def _find() -> dict[str, Any]:
         file={"type": ["string", "null"], "description": "the design file, null where none holds"},
         started_from=TEXT,
         tries=COUNT,
+        is_cut_short={"type": "boolean", "description": "whether more tries might lead further"},
         best=shown,
         missed=array(TEXT),
         binds=array(table(key=TEXT, value={}, breaks=TEXT)),
+        range_ends=array(table(key=TEXT, value={}, low=number(), high=number())),
         without_room=array(table(rule=TEXT, measured=number(), unit=TEXT, place=TEXT)),
         front=array(shown),
+        on_front=COUNT,
     )
 
 

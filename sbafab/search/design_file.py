@@ -20,10 +20,13 @@ from sbafab.design.reading import (
 from sbafab.design.templates import kit_names
 from sbafab.errors import DesignError, OutputError
 from sbafab.search.find import FoundDesign
+from sbafab.search.quantities import shown_value
 
 
-def refuse_present(target: Path) -> None:
-    """Raises DesignError where a file is already: nobody's design is overwritten."""
+def refuse_target(target: Path) -> None:
+    """Raises DesignError where no file can come to be: nobody's design is overwritten."""
+    if not target.parent.is_dir():
+        raise DesignError(f"{target.parent} is no folder; make it first, or name another with -o")
     if target.exists():
         raise DesignError(
             f"{target} exists; name another file with -o, or remove it first: a search may take "
@@ -42,11 +45,12 @@ def found_toml(
     first = {key: value for key, value in data.items() if not isinstance(value, dict)}
     tables = {key: value for key, value in data.items() if isinstance(value, dict)}
     said = [
-        f"# {one.quantity.said} = {found.best.value(one):.4g} {one.quantity.unit} ({one.bound})"
+        f"# {one.quantity.said} = {shown_value(one.quantity, found.best.value(one))} ({one.bound})"
         for one in found.wanted.requirements
     ]
     goal = found.wanted.goal
-    best = f"# {goal.quantity.said} = {found.best.value(goal):.4g} {goal.quantity.unit} (the goal)"
+    value = shown_value(goal.quantity, found.best.value(goal))
+    best = f"# {goal.quantity.said} = {value} (the goal)"
     keys = ", ".join(f"{key} = {value:g}" for key, value in found.best.values.items())
     head = [f"# Found by sbafab find, from {Path(source).name}: {keys}.", *said, best]
     return "\n".join(line.rstrip() for line in head) + "\n\n" + tomli_w.dumps(first | tables)

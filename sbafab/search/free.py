@@ -12,15 +12,24 @@ from sbafab.errors import DesignError
 from sbafab.search.vary import read_varied, refuse_unknown
 
 
-def read_free(design: Design, texts: Sequence[str], fixed: Sequence[str]) -> tuple[Free, ...]:
+def read_free(
+    design: Design, texts: Sequence[str], fixed: Sequence[str] = (), given: Sequence[str] = ()
+) -> tuple[Free, ...]:
     """The family's own keys without those ``fixed``, and those of the ``texts`` in their place.
 
+    Keys that are ``given`` by hand stay as they are; what the design must fit gives its chamber.
     Raises DesignError.
     """
     varied = [_stepped(text) for text in texts]
-    refuse_unknown(design, [read_varied(text) for text in texts])
+    refuse_unknown(design, [read_varied(text, "--free") for text in texts], "--free")
     own = {one.key: one for one in design.free}
-    for key in fixed:
+    if any(key.startswith("fits.") for key in given):
+        own.pop("chamber.diameter", None)
+    for key in given:
+        own.pop(key, None)
+    for key in dict.fromkeys(fixed):
+        if key in given:
+            continue
         if key not in own:
             raise DesignError(
                 f"--fix {shown(key)}: a search changes only {', '.join(own) or 'nothing'} by itself"
@@ -32,7 +41,7 @@ def read_free(design: Design, texts: Sequence[str], fixed: Sequence[str]) -> tup
 
 
 def _stepped(text: str) -> Free:
-    found = read_varied(text)
+    found = read_varied(text, "--free")
     numbers = [one for one in found.values if isinstance(one, int | float)]
     parts = text.partition("=")[2].split(":")
     if len(parts) != 3 or len(numbers) != len(found.values):

@@ -6,6 +6,7 @@ with the same force, and each rises by its share of the stroke.
 
 from __future__ import annotations
 
+import difflib
 import math
 import re
 from collections.abc import Callable, Mapping
@@ -46,8 +47,12 @@ SIZES = (
 )
 PLAIN = {**dict.fromkeys(SIZES, "mm"), "height": "mm", "lumen": "mm", "mass": "g", "yield": ""}
 AT = {"stroke": "mm", "force": "N"}
+UNITS = {"g": {"g": 1.0, "mg": 0.001, "kg": 1000.0}, "N": {"N": 1.0, "mN": 0.001, "kN": 1000.0}}
+"""Of masses and forces; lengths have those of design files."""
+_VALUE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
 KEYS = {"lumen": "lumen.diameter"}
 """Quantities that are keys: they are asked for, and need no model."""
+ROUND_A_TUBE = ("deflated_diameter", "inflated_diameter", "reached_diameter")
 REACHED, WIDEST = "reached_diameter", "inflated_diameter"
 """Inflated round a tube: the lower figure, for a wall that it must reach, and the upper end, for
 one that it must not touch."""
@@ -79,14 +84,16 @@ class AskedQuantity:
 def read_quantity(text: str, kpa: float | None = None) -> AskedQuantity:
     """The quantity of a text; ``kpa`` counts where it names no pressure. Raises DesignError."""
     name, *places = (part.strip() for part in text.split("@"))
-    name = name.replace("-", "_")
+    name = name if "." in name else name.replace("-", "_").lower()
     if name in AT:
         return _at(name, places, text, kpa)
     if places:
         raise DesignError(f"{shown(text)}: only stroke and force are told at a pressure; {HOW}")
     if name not in PLAIN and "." not in name:
-        known = listed([*PLAIN, *AT])
-        raise DesignError(f"{shown(text)} is no quantity; there are {known} and the design's keys")
+        known = [*PLAIN, *AT]
+        near = difflib.get_close_matches(name, known, 1)
+        mends = f"did you mean {near[0]}?" if near else f"there are {listed(known)} and any key"
+        raise DesignError(f"{shown(text)} is no quantity; {mends}")
     return AskedQuantity(name, PLAIN.get(name, ""))
 
 
@@ -98,12 +105,20 @@ def safer(quantity: AskedQuantity, at_least: bool) -> AskedQuantity:
 
 
 def _at(name: str, places: list[str], text: str, kpa: float | None) -> AskedQuantity:
-    pressure, stroke = kpa, None
+    pressure: float | None = None
+    stroke: float | None = None
     for place in places:
-        found = _PRESSURE.fullmatch(place)
-        if found is not None and found[2] in KILOPASCALS:
-            pressure = float(found[1]) * KILOPASCALS[found[2]]
+        kilopascals = _kilopascals(place)
+        if kilopascals is not None:
+            if pressure is not None:
+                raise DesignError(f"{shown(text)} names two pressures; name one")
+            pressure = kilopascals
             continue
+        if place.replace(".", "", 1).isdecimal():
+            raise DesignError(
+                f"{shown(text)}: {shown(place)} has no unit; write {place}kPa"
+                f"{f' or {place}mm' if name == 'force' else ''}"
+            )
         try:
             stroke = millimetres(place)
         except ValueError:
@@ -113,20 +128,72 @@ def _at(name: str, places: list[str], text: str, kpa: float | None) -> AskedQuan
     if (name == "force") != (stroke is not None):
         raise DesignError(f"{shown(text)}: a force is told at a stroke, a stroke is not; {HOW}")
     if pressure is None:
-        pressure = USUAL_KPA
+        pressure = USUAL_KPA if kpa is None else kpa
     force(pressure, 0.0)
     return AskedQuantity(name, AT[name], pressure, stroke)
 
 
 def named_pressure(texts: list[str]) -> float | None:
     """The highest pressure that any of the quantities names, kPa."""
-    named = [
-        float(found[1]) * KILOPASCALS[found[2]]
-        for text in texts
-        for place in text.split("@")[1:]
-        if (found := _PRESSURE.fullmatch(place)) is not None and found[2] in KILOPASCALS
-    ]
+    places = [place for text in texts for place in text.split("@")[1:]]
+    named = [one for place in places if (one := _kilopascals(place)) is not None]
     return max(named, default=None)
+
+
+def _kilopascals(place: str) -> float | None:
+    """The pressure of a text such as 50kPa, its unit in capitals or not; None where it is none.
+
+    MPa and mPa are not the same: a unit that is written like another one is none.
+    """
+    found = _PRESSURE.fullmatch(place)
+    if found is None:
+        return None
+    units = [one for one in KILOPASCALS if one.lower() == found[2].lower()]
+    if len(units) != 1 or (found[2] != units[0] and units[0] == "MPa"):
+        return None
+    return float(found[1]) * KILOPASCALS[units[0]]
+
+
+def read_limit(quantity: AskedQuantity, text: str) -> float:
+    """What a quantity must keep, in its unit. Raises ValueError with the end of a sentence."""
+    if quantity.name == "yield":
+        return _share(text)
+    if quantity.unit in UNITS:
+        limit = _measured(quantity.unit, text)
+    else:
+        try:
+            limit = millimetres(text)
+        except ValueError as error:
+            raise ValueError(str(error) if quantity.unit else "must be a number") from None
+    if not math.isfinite(limit):
+        raise ValueError("must be a finite number")
+    if quantity.key is None and limit < 0:
+        raise ValueError("must be at least 0")
+    return limit
+
+
+def _measured(unit: str, text: str) -> float:
+    found = _VALUE.fullmatch(text)
+    if found is None or (found[2] or unit) not in UNITS[unit]:
+        raise ValueError(f"must be a number, in {unit} or with one of {', '.join(UNITS[unit])}")
+    return float(found[1]) * UNITS[unit][found[2] or unit]
+
+
+def _share(text: str) -> float:
+    found = _VALUE.fullmatch(text)
+    if found is None or found[2] not in ("", "%"):
+        raise ValueError("must be a share such as 0.95 or 95%")
+    limit = float(found[1]) / (100 if found[2] else 1)
+    if not 0 <= limit <= 1:
+        raise ValueError("must be a share from 0 to 1, such as 0.95 or 95%")
+    return limit
+
+
+def shown_value(quantity: AskedQuantity, value: float) -> str:
+    """A figure with its unit, as people read it."""
+    if quantity.name == "force" and value < 0:
+        return "none, it does not rise that far"
+    return f"{value:.4g} {quantity.unit}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -218,6 +285,10 @@ def pressed_force(kind: Balloon, kpa: float, height: float) -> float:
 
 
 def refuse_unknown_key(quantity: AskedQuantity, design: Design) -> None:
-    """Raises DesignError for a key that the design does not have."""
+    """Raises DesignError for a key that the design does not have, with the one that is meant."""
     if "." in quantity.name and quantity.name not in key_paths(type(design)):
         design.with_({quantity.name: 1})
+    if quantity.name == "lumen" and design.form.lumen is None:
+        raise DesignError(f"{design.name} has no lumen; ask for one of a lobed design")
+    if quantity.name in ROUND_A_TUBE and design.form.wrap is None:
+        raise DesignError(f"{design.name} has no {quantity.name}; only radial designs do")

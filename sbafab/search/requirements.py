@@ -6,9 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sbafab.design.messages import shown
-from sbafab.design.units import millimetres
 from sbafab.errors import DesignError
-from sbafab.search.quantities import AskedQuantity, named_pressure, read_quantity, safer
+from sbafab.search.quantities import (
+    AskedQuantity,
+    named_pressure,
+    read_limit,
+    read_quantity,
+    safer,
+)
 
 CLOSE = 1e-9
 
@@ -33,7 +38,7 @@ class Requirement:
     def bound(self) -> str:
         """For example "at least 3 N"."""
         most = "at least" if self.at_least else "at most"
-        return f"{most} {self.limit:g} {self.quantity.unit}".strip()
+        return f"{most} {self.limit:.10g} {self.quantity.unit}".strip()
 
     @property
     def said(self) -> str:
@@ -69,6 +74,7 @@ def read_all(
     pairs = [(text, True) for text in least] + [(text, False) for text in most]
     kpa = named_pressure([text.partition("=")[0] for text, _ in pairs] + [best])
     found = tuple(_read(text, at_least, kpa) for text, at_least in pairs)
+    _refuse_contradictions(found, [text for text, _ in pairs])
     quantity = read_quantity(best, kpa)
     return found, Goal(quantity, quantity.name in GOOD_IF_MORE)
 
@@ -83,8 +89,21 @@ def _read(text: str, at_least: bool, kpa: float | None) -> Requirement:
         )
     quantity = safer(read_quantity(name, kpa), at_least)
     try:
-        limit = millimetres(value) if quantity.unit in ("mm", "") else float(value)
-    except ValueError:
-        unit = quantity.unit or "plain"
-        raise DesignError(f"{option} {shown(text)}: the value must be a number ({unit})") from None
+        limit = read_limit(quantity, value)
+    except ValueError as error:
+        raise DesignError(f"{option} {shown(text)}: the value {error}") from None
     return Requirement(quantity, limit, at_least)
+
+
+def _refuse_contradictions(found: Sequence[Requirement], texts: Sequence[str]) -> None:
+    """Raises DesignError where one quantity must be more than it may be."""
+    for least, said in zip(found, texts, strict=True):
+        for most, other in zip(found, texts, strict=True):
+            if not least.at_least or most.at_least or least.limit <= most.limit:
+                continue
+            # The inflated diameter that must reach is never more than the one that must not touch.
+            if least.quantity == safer(most.quantity, at_least=True):
+                raise DesignError(
+                    f"--min {shown(said)} and --max {shown(other)} contradict each other; no "
+                    "design can meet both, so change one"
+                )

@@ -20,6 +20,7 @@ from sbafab.design.writing import design_sha256, plain_tables
 from sbafab.errors import OutputError
 from sbafab.output.swap import MANIFEST
 from sbafab.progress import Progress, unheard
+from sbafab.search.earlier import no_longer_asked, refuse_foreign
 from sbafab.search.fingerprint import fingerprint
 from sbafab.search.journal import Journal
 from sbafab.search.measure import SweepOutcome, SweepRow
@@ -29,7 +30,7 @@ from sbafab.search.table import Table, write_csv, write_parquet, write_times
 from sbafab.search.vary import Values, Varied, grid, latin_hypercube, refuse_unknown
 from sbafab.search.worker import MeasureJob
 
-JOURNAL = "journal.jsonl"
+JOURNAL, CSV = "journal.jsonl", "sweep.csv"
 SECONDS = 300.0
 """How long one design may take."""
 MEASURED = "measuring designs"
@@ -55,13 +56,17 @@ class SweepRequest:
 
 @dataclass(frozen=True)
 class SweptDesigns:
-    """What a sweep made: its folder, how many designs of each outcome, how many measured now."""
+    """What a sweep made: its folder, how many designs of each outcome, how many measured now.
+
+    ``no_longer_asked`` designs of an earlier sweep stood in the tables that it has replaced.
+    """
 
     folder: Path
     designs: int
     measured: int
     outcomes: dict[SweepOutcome, int]
     files: tuple[str, ...]
+    no_longer_asked: int = 0
 
 
 class SweepStopped(KeyboardInterrupt):
@@ -91,6 +96,7 @@ def sweep(request: SweepRequest, out: Path, tell: Progress = unheard) -> SweptDe
     values = trials(request)
     folder = out / f"{request.design.name}-sweep"
     with _held(folder):
+        refuse_foreign(folder / CSV)
         journal = Journal(folder / JOURNAL, request.seconds)
         try:
             keys = _keys(request, values)
@@ -103,9 +109,10 @@ def sweep(request: SweepRequest, out: Path, tell: Progress = unheard) -> SweptDe
             journal.close()
         tell("writing tables", 0, 1)
         table = Table(lambda: journal.rows(iter(keys)), values)
+        gone = no_longer_asked(folder / CSV, table)
         files = _write(folder, request, table)
     outcomes = Counter(row["outcome"] for row in table.rows())
-    return SweptDesigns(folder, len(values), len(missing), dict(outcomes), files)
+    return SweptDesigns(folder, len(values), len(missing), dict(outcomes), files, gone)
 
 
 def _measure(
@@ -172,9 +179,9 @@ def _from_here(varied: Varied) -> Varied:
 
 
 def _write(folder: Path, request: SweepRequest, table: Table) -> tuple[str, ...]:
-    write_csv(table, folder / "sweep.csv")
+    write_csv(table, folder / CSV)
     write_times(table, folder / "times.csv")
-    files = ["sweep.csv", "times.csv"]
+    files = [CSV, "times.csv"]
     if write_parquet(table, folder / "sweep.parquet"):
         files.append("sweep.parquet")
     page = sweep_html(request.design, request.varied, table)

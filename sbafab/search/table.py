@@ -20,6 +20,8 @@ from sbafab.search.vary import Values
 
 PARTS = (("verdict", 0), ("margin", 1), ("measured", 2), ("limit", 3))
 """Columns of each rule, and where they stand in its list."""
+HEAD = ("number", "sha256", "outcome", "reason")
+"""The first columns, whatever is varied."""
 BATCH = 1000
 """Rows in memory at a time."""
 
@@ -67,12 +69,8 @@ class Table:
 
     def _flat(self) -> Iterator[tuple[dict[str, Any], ...]]:
         for number, (row, values) in enumerate(zip(self.rows(), self.values, strict=True), 1):
-            head = {
-                "number": number,
-                "sha256": row.get("sha256", ""),
-                "outcome": row["outcome"],
-                "reason": row["reason"],
-            }
+            cells = (number, row.get("sha256", ""), row["outcome"], row["reason"])
+            head = dict(zip(HEAD, cells, strict=True))
             # What was asked stands there even where no design came of it.
             yield head, {**values, **row.get("keys", {})}, _rules(row), row.get("figures", {})
 

@@ -10,13 +10,14 @@ from sbafab.actuators import build
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import GeometryError
+from sbafab.laminate.extent import film_mass
 from sbafab.laminate.laminate import Laminate
 from sbafab.output.checking import refuse_undoable
 from sbafab.output.planned import Checked
 from sbafab.output.settings import limits
 from sbafab.rules.deck import run_deck
 from sbafab.search.margins import RuleMargin, margins
-from sbafab.search.quantities import Subject
+from sbafab.search.quantities import AskedQuantity, Subject, shown_value
 from sbafab.search.requirements import CLOSE, Goal, Requirement
 
 YIELD = "registration-yield"
@@ -32,8 +33,8 @@ class Trial:
 
     ``values`` are those of the free keys, ``figures`` by quantity in its unit: mm, N, g or a share.
     ``missed`` is by what share requirements and rules are missed, all together; 0 where none is.
-    ``cost``, in the unit of what is best, is the less the better. ``refused`` says why no such
-    design can be made.
+    ``cost``, in the unit of what is best, is the less the better; ``mass`` is in g. ``refused``
+    says why no such design can be made.
     """
 
     values: Mapping[str, Any]
@@ -41,6 +42,7 @@ class Trial:
     rules: Mapping[str, RuleMargin] | None = None
     missed: float = 0.0
     cost: float = 0.0
+    mass: float = 0.0
     refused: str = ""
     laminate: Laminate | None = field(default=None, repr=False, compare=False)
 
@@ -50,9 +52,9 @@ class Trial:
         return self.missed == 0.0 and not self.refused
 
     @property
-    def rank(self) -> tuple[float, float]:
-        """What is missed as a share, then the cost; the less, the better."""
-        return self.missed, self.cost
+    def rank(self) -> tuple[float, float, float]:
+        """What is missed as a share, then the cost, of equals the mass; the less, the better."""
+        return self.missed, self.cost, self.mass
 
     def value(self, requirement: Requirement | Goal) -> float:
         """The figure that a requirement or the goal is about, in its unit."""
@@ -69,8 +71,12 @@ class Wanted:
 
     @property
     def asks_for_yield(self) -> bool:
-        asked = [*(one.quantity for one in self.requirements), self.goal.quantity]
-        return any(quantity.name == "yield" for quantity in asked)
+        return any(quantity.name == "yield" for quantity in self.quantities)
+
+    @property
+    def quantities(self) -> list[AskedQuantity]:
+        """All that figures are asked of: requirements first, then the goal."""
+        return [*(one.quantity for one in self.requirements), self.goal.quantity]
 
 
 def tried(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
@@ -94,7 +100,7 @@ def tried(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -
     )
     missed += sum(_short(one) for one in (rules or {}).values())
     cost = wanted.goal.cost(figures[wanted.goal.quantity.said])
-    return Trial(values, figures, rules, missed, cost, laminate=laminate)
+    return Trial(values, figures, rules, missed, cost, film_mass(laminate), laminate=laminate)
 
 
 def _short(rule: RuleMargin) -> float:
@@ -113,8 +119,7 @@ def _figures(
             raise DesignError(f"no yield of {subject.design.name} can be counted")
         return found.measured
 
-    asked = [*(one.quantity for one in wanted.requirements), wanted.goal.quantity]
-    return {quantity.said: subject.value(quantity, share_of_good) for quantity in asked}
+    return {quantity.said: subject.value(quantity, share_of_good) for quantity in wanted.quantities}
 
 
 def misses(wanted: Wanted, trial: Trial) -> list[str]:
@@ -122,9 +127,14 @@ def misses(wanted: Wanted, trial: Trial) -> list[str]:
     if trial.refused:
         return [trial.refused]
     said = [
-        f"{one.quantity.said} {trial.value(one):.4g} {one.quantity.unit}, not {one.bound}"
+        f"{one.quantity.said} {shown_value(one.quantity, trial.value(one))}, not {one.bound}"
         for one in wanted.requirements
         if not one.holds(trial.value(one))
     ]
+    return [*said, *broken_rules(trial)]
+
+
+def broken_rules(trial: Trial) -> list[str]:
+    """The rules that a design breaks, a sentence each."""
     failed = [one for one in (trial.rules or {}).values() if one.verdict == "fail"]
-    return [*said, *(f"{one.rule}: {one.message}" for one in failed)]
+    return [f"{one.rule}: {one.message}" for one in failed]

@@ -17,7 +17,6 @@ from sbafab.errors import DesignError
 
 MOST_DESIGNS = 100_000
 MOST_VALUES = 10_000
-HOW = "write for example --vary chamber.diameter=4:8:0.5 or --vary stack.balloons=3,6,9"
 DIGITS = 6
 
 Values = Mapping[str, Any]
@@ -38,44 +37,49 @@ class Varied:
         return not self.values
 
 
-def read_varied(text: str) -> Varied:
+def read_varied(text: str, option: str = "--vary") -> Varied:
     """``KEY=START:STOP:STEP``, ``KEY=START:STOP`` or ``KEY=a,b,c``. Raises DesignError."""
     key, equals, said = text.partition("=")
     key = key.strip()
     if not equals or not key or not said.strip():
-        raise DesignError(f"--vary {shown(text)} is not KEY=VALUES; {HOW}")
+        raise DesignError(f"{option} {shown(text)} is not KEY=VALUES; {_how(option)}")
     if ":" in said:
-        return _range(key, said.split(":"), text)
+        return _range(key, said.split(":"), text, option)
     # A list in brackets is one value; what else a comma parts are several.
     table = override({}, [f"values=[{said}]"])["values"]
     if not isinstance(table, list):
         table = [override({}, [f"value={one.strip()}"])["value"] for one in said.split(",")]
     if any(isinstance(one, float) for one in table):
         table = [float(one) if type(one) is int else one for one in table]
-    return _distinct(Varied(key, tuple(table)), text)
+    return _distinct(Varied(key, tuple(table)), text, option)
 
 
-def _range(key: str, parts: Sequence[str], text: str) -> Varied:
+def _how(option: str) -> str:
+    more = " or --vary stack.balloons=3,6,9" if option == "--vary" else ""
+    return f"write for example {option} chamber.diameter=4:8:0.5{more}"
+
+
+def _range(key: str, parts: Sequence[str], text: str, option: str) -> Varied:
     try:
         ends = [_exact(part) for part in parts]
     except ValueError as error:
-        raise DesignError(f"--vary {shown(text)}: START, STOP and STEP {error}") from None
+        raise DesignError(f"{option} {shown(text)}: START, STOP and STEP {error}") from None
     if len(ends) not in (2, 3):
-        raise DesignError(f"--vary {shown(text)} is not START:STOP:STEP; {HOW}")
+        raise DesignError(f"{option} {shown(text)} is not START:STOP:STEP; {_how(option)}")
     start, stop = ends[:2]
     if stop < start:
         raise DesignError(
-            f"--vary {shown(text)} stops below its start; write the smaller number first"
+            f"{option} {shown(text)} stops below its start; write the smaller number first"
         )
     if len(ends) == 2:
         return Varied(key, (), float(start), float(stop))
     step = ends[2]
     if step <= 0:
-        raise DesignError(f"--vary {shown(text)}: STEP = {step} must be above 0")
+        raise DesignError(f"{option} {shown(text)}: STEP = {step} must be above 0")
     count = int((stop - start) / step) + 1
     if count > MOST_VALUES:
         raise DesignError(
-            f"--vary {shown(text)} gives {count:,} values, and at most {MOST_VALUES:,} are "
+            f"{option} {shown(text)} gives {count:,} values, and at most {MOST_VALUES:,} are "
             "allowed; make STEP larger"
         )
     steps = [start + number * step for number in range(count)]
@@ -88,21 +92,21 @@ def _exact(text: str) -> Decimal:
     return Decimal(repr(millimetres(text)))
 
 
-def _distinct(varied: Varied, text: str) -> Varied:
+def _distinct(varied: Varied, text: str, option: str) -> Varied:
     seen: list[Any] = []
     for value in varied.values:
         if value in seen:
-            raise DesignError(f"--vary {shown(text)} names {shown(value)} twice; once is enough")
+            raise DesignError(f"{option} {shown(text)} names {shown(value)} twice; once is enough")
         seen.append(value)
     return varied
 
 
-def refuse_unknown(design: Design, varied: Sequence[Varied]) -> None:
+def refuse_unknown(design: Design, varied: Sequence[Varied], option: str = "--vary") -> None:
     """Raises DesignError for a key that the design does not know, and for one varied twice."""
     keys = [one.key for one in varied]
     for one in varied:
         if keys.count(one.key) > 1:
-            raise DesignError(f"--vary {one.key} is given twice; put all its values into one")
+            raise DesignError(f"{option} {one.key} is given twice; put all its values into one")
         if one.key not in key_paths(type(design)):
             # Says which key may be meant.
             design.with_({one.key: one.values[0] if one.values else one.low})

@@ -42,7 +42,7 @@ def test_water_fills_a_3dof_in_0_935_s() -> None:
 def test_gas_is_counted_at_the_atmosphere() -> None:
     assert float(seconds(1000, 60)) == pytest.approx(1.0)
     assert float(seconds(1000, 60, gas_at_kpa=101.325)) == pytest.approx(2.0)
-    with pytest.raises(DesignError, match="flow = 0 ml/min must be above 0"):
+    with pytest.raises(DesignError, match="flow = 0 ml/min must be from"):
         seconds(1.0, 0.0)
 
 

@@ -14,7 +14,7 @@ from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import BalloonMap
 from sbafab.models.chain import chain
-from sbafab.models.loads import loaded, with_blocks
+from sbafab.models.loads import RIM, loaded, with_blocks
 from sbafab.models.series import blocked
 from sbafab.models.stack import Plate, Stack
 from sbafab.models.stack_balance import MOST_STEPS, _settled, free
@@ -42,7 +42,7 @@ def test_a_map_is_the_balloon_that_it_was_made_from(balloon: BalloonMap) -> None
     # Places that no balloon of the map was computed at, pushed on and pulled on.
     p, h = np.array([0.7, 3.3, 8.1, 47.0]), np.array([0.33, 0.81, 1.6, 0.52])
     found = inflate(balloon.balloon, p, h, tied=True)
-    assert balloon.force(p, h) == pytest.approx(found.force, rel=0.025, abs=0.5)
+    assert balloon.force(p, h) == pytest.approx(found.force, rel=0.025, abs=1.0)
     assert balloon.volume(p, h) == pytest.approx(found.volume, rel=0.01)
     free = inflate(balloon.balloon, [1.0, 5.0, 20.0])
     assert balloon.free_height([1.0, 5.0, 20.0]) == pytest.approx(free.height, rel=0.01)
@@ -74,6 +74,32 @@ def test_a_pressure_outside_the_map_is_refused(three: Stack) -> None:
         three.pose((111, 0, 0))
     with pytest.raises(DesignError, match="2 pressures are given for 3 chambers"):
         three.pose((1, 1))
+
+
+def test_what_is_no_load_is_refused(three: Stack) -> None:
+    with pytest.raises(DesignError, match="a pressure of -3 kPa"):
+        three.pose((1, 2, -3))
+    with pytest.raises(DesignError, match="one a chamber"):
+        three.pose(5.0)  # type: ignore[arg-type]
+    for gravity in ((0, 0, 0), (0, 0), (0, math.nan, 1)):
+        with pytest.raises(DesignError, match="the direction of gravity"):
+            three.pose((1, 2, 3), gravity=gravity)
+    with pytest.raises(DesignError, match="plate's point"):
+        three.pose((1, 2, 3), plate=math.nan)
+    with pytest.raises(DesignError, match="plate's normal has no direction"):
+        three.pose((1, 2, 3), plate=Plate((0, 0, 12), (0, 0, 0)))
+
+
+def test_a_motion_takes_its_line_and_where_it_begins(three: Stack) -> None:
+    """Water in a tube: Hagen-Poiseuille, dp = 128 mu L Q / (pi d^4)."""
+    moved = sbafab.motion(three, 70.0, fluid="water", pressures=np.array([2.0, 2.0, 2.0]))
+    assert moved.pressures == pytest.approx((2.0, 2.0, 2.0))
+    flow = 35e3 / 60 / 3
+    moved.step(0.01, flows=(flow,) * 3)
+    drop = 128 * 1.002e-6 * 70.0 * flow / (math.pi * 0.635**4)
+    assert moved.sources[0] - moved.pressures[0] == pytest.approx(drop, rel=1e-3)
+    with pytest.raises(DesignError, match="must be one of air, water"):
+        sbafab.motion(three, fluid="oil")
 
 
 def test_equal_pressures_stand_straight(three: Stack) -> None:
@@ -291,6 +317,28 @@ def test_any_start_ends_in_the_same_balance(three: Stack, load: str) -> None:
         places = chain(slow[0], three.pitch).places
         assert pose.frames[0] == pytest.approx(places, abs=1e-5)
         assert pose.stable
+
+
+def test_a_plate_that_is_hardly_met_is_met_from_any_start(three: Stack) -> None:
+    """By one or two points of the rim, or by none: the same balance from a pose nearby, too."""
+    for pressures in (
+        (0.21, 0.18, 1.46),
+        (1.174, 0.91, 0.276),
+        (0.832, 0.167, 0.146),
+        (0.204, 2.438, 0.723),
+        (0.0, 2.628, 0.887),
+    ):
+        pose = three.pose(pressures, plate=12.0)
+        beside = three.pose([each + 0.3 for each in pressures], plate=12.0)
+        again = three.pose(pressures, plate=12.0, near=beside)
+        assert again.frames[0] == pytest.approx(pose.frames[0], abs=1e-5)
+        assert again.force == pytest.approx(pose.force, rel=1e-4, abs=1e-9)
+        # The points of the top's rim lie below the plate, and its middle on the axis.
+        rim = pose.height + three.outline * float((RIM @ pose.frames[1][-1].T)[:, 2].max())
+        assert rim < 12.0 + 1e-4
+        assert pose.tip[:2] == pytest.approx([0.0, 0.0], abs=1e-4)
+        assert pose.stable
+        assert (pose.force > 0) == (rim > 12.0)
 
 
 def test_following_a_path_ends_where_a_fresh_start_does(three: Stack) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.search.quantities import AskedQuantity, Subject, read_quantity
+from sbafab.search.quantities import AskedQuantity, Subject, read_limit, read_quantity
 from sbafab.search.requirements import read_all
 
 
@@ -24,7 +24,9 @@ def _value(text: str, name: str = "1dof-5mm", **tables: Any) -> float:
         ("mass", AskedQuantity("mass", "g")),
         ("overall-diameter", AskedQuantity("overall_diameter", "mm")),
         ("stroke@0.5bar", AskedQuantity("stroke", "mm", 50.0)),
-        ("stroke", AskedQuantity("stroke", "mm", 10.0)),
+        ("Stroke", AskedQuantity("stroke", "mm", 10.0)),
+        ("stroke@50KPA", AskedQuantity("stroke", "mm", 50.0)),
+        ("stroke@0.1MPa", AskedQuantity("stroke", "mm", 100.0)),
         ("force@12.5mm@50kPa", AskedQuantity("force", "N", 50.0, 12.5)),
         ("force@50 kPa@0.5 in", AskedQuantity("force", "N", 50.0, 12.7)),
         ("chamber.diameter", AskedQuantity("chamber.diameter", "")),
@@ -37,7 +39,10 @@ def test_a_quantity_is_read(text: str, found: AskedQuantity) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("masses", "is no quantity"),
+        ("masses", "did you mean mass"),
+        ("weight_of_it", "is no quantity; there are"),
+        ("stroke@5mPa", "neither a pressure nor a length"),
+        ("force@12.5@50kPa", "12.5kPa or 12.5mm"),
         ("mass@50kPa", "only stroke and force"),
         ("force@50kPa", "told at a stroke"),
         ("stroke@5mm@50kPa", "a stroke is not"),
@@ -62,6 +67,21 @@ def test_a_stroke_without_a_pressure_is_at_the_highest_named() -> None:
     for text in ("stroke", "stroke=", "stroke=much"):
         with pytest.raises(DesignError, match="--min"):
             read_all([text], [], "mass")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "limit"),
+    [
+        ("mass", "50 mg", 0.05),
+        ("mass", "0.5", 0.5),
+        ("force@1mm@5kPa", "500mN", 0.5),
+        ("yield", "95%", 0.95),
+        ("stroke", "1in", 25.4),
+        ("chamber.diameter", "5 mm", 5.0),
+    ],
+)
+def test_limits_take_units(name: str, text: str, limit: float) -> None:
+    assert read_limit(read_quantity(name), text) == pytest.approx(limit)
 
 
 def test_sizes_are_those_of_the_geometry() -> None:

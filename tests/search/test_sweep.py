@@ -15,6 +15,7 @@ from pyarrow import parquet
 import sbafab
 from sbafab.cli.sweep import _as_json
 from sbafab.design.writing import design_sha256
+from sbafab.errors import OutputError
 from sbafab.search import sweep as module
 from sbafab.search.measure import measured
 from sbafab.search.plots import Dots, Objective, passes_svg, trades_svg
@@ -155,3 +156,35 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     (folder / "manifest.json").write_text("{}")
     with pytest.raises(OSError, match="holds a design of that name"):
         _swept(tmp_path)
+
+
+def test_tables_of_an_earlier_sweep_are_not_replaced_in_silence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three designs, then two of which one is among them: two are no longer asked for."""
+    monkeypatch.setattr(module, "run_jobs", _here)
+
+    def swept(values: str) -> SweptDesigns:
+        return sbafab.sweep("1dof-5mm", vary=(f"stack.balloons={values}",), out=tmp_path, **QUICK)
+
+    assert swept("2,3,4").no_longer_asked == 0
+    again = swept("4,5")
+    assert again.no_longer_asked == 2
+    assert again.measured == 1
+    back = swept("2,3,4")
+    assert (back.measured, back.no_longer_asked) == (0, 1)
+
+
+def test_a_table_that_no_sweep_wrote_is_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def measuring(*_: object) -> None:
+        raise AssertionError("measured before it was refused")
+
+    monkeypatch.setattr(module, "run_jobs", measuring)
+    folder = tmp_path / "1dof-5mm-sweep"
+    folder.mkdir()
+    (folder / "sweep.csv").write_text("mine")
+    with pytest.raises(OutputError, match="the table of no sweep"):
+        _swept(tmp_path)
+    assert (folder / "sweep.csv").read_text() == "mine"

@@ -1,0 +1,39 @@
+"""Designs a second by the clock, in one process and in several."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+
+from benchmarks.decks import checked
+from benchmarks.timing import ROOT, environment
+
+
+def rate(template: str, processes: int, designs: int) -> float:
+    """Designs built and checked a second, all different; processes are warm before it counts."""
+    # The measuring process may be kept to one core; these have all of the machine.
+    call = f"measured({template!r}, {processes}, {designs})"
+    program = f"from benchmarks.processes import measured; print({call})"
+    run = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=ROOT,
+        env=environment(ROOT),
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    return float(run.stdout)
+
+
+def measured(template: str, processes: int, designs: int) -> float:
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, range(os.cpu_count() or 1))
+    with ProcessPoolExecutor(processes) as pool:
+        list(pool.map(partial(checked, template), range(-4 * processes, 0)))
+        began = time.perf_counter()
+        list(pool.map(partial(checked, template), range(designs), chunksize=4))
+        return designs / (time.perf_counter() - began)
