@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from sbafab.api.designs import load
 from sbafab.api.sources import Source, parted
 from sbafab.design.reading import Change
+from sbafab.errors import DesignError
 
 if TYPE_CHECKING:
     from sbafab.assemblies.build import Assembled
@@ -111,16 +112,32 @@ def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **aske
     return stack_of(design, most_pressure=most_pressure, factors=Factors(**factors))
 
 
-def motion(stack: Stack, length: float = 150.0, diameter: float = 0.635, **load: Any) -> Motion:
-    """A stack that is fed with air through tubes, to call ``motion.step(dt, pressures=...)``.
+def motion(
+    stack: Stack,
+    length: float = 150.0,
+    diameter: float = 0.635,
+    *,
+    fluid: str = "air",
+    dead_volume: float = 0.0,
+    delay: float = 0.0,
+    pressures: Sequence[float] | None = None,
+    **load: Any,
+) -> Motion:
+    """A stack that is fed through tubes, to call ``motion.step(dt, pressures=...)`` with pressures
+    (kPa) at the valves, or ``motion.step(dt, flows=...)`` with flows (ul/s) of the pumps.
 
     ``length`` and inner ``diameter`` of each chamber's tube are mm (the default is the paper's
-    tube, Sec. 2); ``load`` is what ``stack.pose`` takes beside pressures. Flow is laminar
+    tube, Sec. 2); ``fluid`` is air or water; ``dead_volume`` are ul between pump and tube
+    (syringe, valve, fittings), ``delay`` s until they act; ``pressures`` (kPa, by default 0) are
+    those to begin with; ``load`` is what ``stack.pose`` takes beside pressures. Flow is laminar
     (Poiseuille) or turbulent (Blasius), air isothermal. Raises DesignError.
     """
-    from sbafab.models.pneumatics import AIR, Line
+    from sbafab.models.pneumatics import FLUIDS, Line
 
-    return stack.motion(line=Line(AIR, length, diameter), **load)
+    if fluid not in FLUIDS:
+        raise DesignError(f'fluid = "{fluid}" must be one of {", ".join(sorted(FLUIDS))}')
+    line = Line(FLUIDS[fluid], length, diameter, dead_volume, delay)
+    return stack.motion(pressures, line, **load)
 
 
 def find(

@@ -83,6 +83,7 @@ def find(source: str | None, **asked: Any) -> None:
     from sbafab.cli.ending import say
     from sbafab.cli.printing import print_json, shown_progress
     from sbafab.cli.printing_find import as_json, print_found
+    from sbafab.design.templates import name_of
     from sbafab.search.design_file import found_toml, refuse_target, write_found
 
     if asked["storage"] is not None and not asked["optuna"]:
@@ -98,7 +99,9 @@ def find(source: str | None, **asked: Any) -> None:
         say(f"the search was stopped, and no file was written{kept}")
         raise
     if found.holds:
-        write_found(found_toml(started, asked["assignments"], target.stem, found), target)
+        write_found(
+            found_toml(started, asked["assignments"], name_of(target) or started, found), target
+        )
     if asked["as_json"]:
         print_json(as_json(found, started, target))
     else:

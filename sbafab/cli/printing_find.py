@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -65,20 +66,20 @@ def print_found(found: FoundDesign, started: str, target: Path) -> None:
     _say(f"  {said}: {shown_value(goal.quantity, value)}")
     for said in found.broken_rules:
         _say(f"  {said}")
-    if not found.holds:
-        _print_ends(found)
-        _print_miss(found)
-        return
-    if found.binds or found.without_room or found.ends:
-        _say("What binds", "bold")
+    told = found.binds or found.ends or (found.holds and found.without_room)
+    if told:
+        _say("What binds" if found.holds else "What stops it there", "bold")
     for bind in found.binds:
         _say(f"  {bind.key} = {bind.value:g}: {bind.breaks}")
     _print_ends(found)
+    if not found.holds:
+        _print_miss(found)
+        return
     for spare in found.without_room:
         _say(f"  {spare.rule} {spare.place}: {spare.measured:g} {spare.unit}, nothing to spare")
     _print_front(found)
     _print_cut(found)
-    _say(f"Next: sbafab generate {target}")
+    _say(f"Next: sbafab generate {shlex.quote(str(target))}")
 
 
 def _print_cut(found: FoundDesign) -> None:
@@ -89,10 +90,13 @@ def _print_cut(found: FoundDesign) -> None:
 
 def _print_ends(found: FoundDesign) -> None:
     for one in found.ends:
-        ends = f"{one.low:g} to {one.high:g}"
+        span = one.high - one.low
+        low, high = one.low, one.high + span
+        if one.value <= one.low:
+            low, high = max(one.step, one.low - span), one.high
         _say(
-            f"  {one.key} = {one.value:g} is the end of its range, {ends}; --free "
-            f"{one.key}=LOW:HIGH:{one.step:g} lets it go further"
+            f"  {one.key} = {one.value:g} is the end of its range, {one.low:g} to {one.high:g}; "
+            f"--free {one.key}={low:g}:{high:g}:{one.step:g} lets it go further"
         )
 
 

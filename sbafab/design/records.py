@@ -357,7 +357,7 @@ class Design(Section):
         """The keys that a search may change unless it is told otherwise; a family adds its own."""
         most, bond, reach = self.rules.validated_balloons, self.rules.bond_width, self.mask.overhang
         return (
-            Free("stack.balloons", 1, most, 1),
+            Free("stack.balloons", 2, most, 1),
             Free("bond.width", bond, bond + 0.5, 0.05, asked="yield"),
             Free("mask.overhang", reach, reach + 0.5, 0.05, asked="yield"),
         )

@@ -58,10 +58,15 @@ def write_new(template: str, file: Path | None) -> Path:
     return write_copy(templates_folder() / f"{template}.toml", file or Path(f"{template}.toml"))
 
 
+def name_of(file: Path) -> str:
+    """A design's name from that of its file; empty where nothing of it may be in a name."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", file.stem).strip("-._")[:64]
+
+
 def write_copy(source: Path, target: Path) -> Path:
     """Copies a commented file, named after the new one; never over an old one."""
     text = source.read_text(encoding="utf-8")
-    name = re.sub(r"[^A-Za-z0-9._-]+", "-", target.stem).strip("-._") or source.stem
+    name = name_of(target) or source.stem
     text = text.replace(f'name = "{source.stem}"', f'name = "{name}"', 1)
     try:
         with target.open("x", encoding="utf-8", newline="\n") as opened:

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 
 from sbafab.geometry.edges import Arc, Edge, Line, Point, from_end_to_end
 from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.kept import kept
 from sbafab.geometry.nearby import close_pairs, widened
 from sbafab.geometry.region import Contour
 from sbafab.geometry.tidy import LEAST_AREA, tidy
@@ -212,10 +213,10 @@ def alone(contour: Contour) -> Contour | None:
         known["alone"] = found is not None and (found.edges == contour.edges or found)
         if found is not None:
             found.__dict__["alone"] = True
-    kept: Contour | bool = known["alone"]
-    if isinstance(kept, bool):
-        return contour if kept else None
-    return kept
+    whole: Contour | bool = known["alone"]
+    if isinstance(whole, bool):
+        return contour if whole else None
+    return whole
 
 
 def settled(contour: Contour) -> Contour:
@@ -232,14 +233,14 @@ def meets_itself(contour: Contour) -> Contour:
 
 def turned_round(contour: Contour) -> Contour:
     """What a boolean leaves of a contour that is alone where the material is on its other side."""
-    known = contour.__dict__
-    if "turned_round" not in known:
-        turned = contour.reversed()
-        whole = turned if contour.circle is not None else tidy(turned.edges)
-        assert whole is not None
-        known["turned_round"] = settled(whole)
-    found: Contour = known["turned_round"]
-    return found
+    return kept(contour, "turned_round", _turned)
+
+
+def _turned(contour: Contour) -> Contour:
+    turned = contour.reversed()
+    whole = turned if contour.circle is not None else tidy(turned.edges)
+    assert whole is not None
+    return settled(whole)
 
 
 def _keeps_clear(contour: Contour) -> bool:

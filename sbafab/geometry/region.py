@@ -274,8 +274,12 @@ class Region:
             rings.append(ring[first:] + ring[:first])
         return hashlib.sha256(repr(sorted(rings)).encode()).hexdigest()[:16]
 
-    def __hash__(self) -> int:
+    @once
+    def _hash(self) -> int:
         return hash(tuple(sorted(len(contour.marks) for contour in self.contours)))
+
+    def __hash__(self) -> int:
+        return self._hash
 
     def __eq__(self, other: object) -> bool:
         """Whether the same corners and arcs lie within SAME of each other, wherever they start."""

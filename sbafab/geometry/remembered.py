@@ -6,7 +6,8 @@ from collections.abc import Callable
 from functools import lru_cache, wraps
 from typing import Any, ParamSpec, TypeVar
 
-from sbafab.geometry.region import Region
+from sbafab.geometry.kept import kept
+from sbafab.geometry.region import Contour, Region
 
 Asked = ParamSpec("Asked")
 Found = TypeVar("Found")
@@ -22,7 +23,7 @@ class _Exact:
 
     def __init__(self, region: Region) -> None:
         self.region = region
-        self._hash = hash(tuple([contour.edges for contour in region.contours]))
+        self._hash = hash(tuple([kept(one, "edges_hash", _edges_hash) for one in region.contours]))
 
     def __hash__(self) -> int:
         return self._hash
@@ -32,6 +33,10 @@ class _Exact:
             return False
         mine, theirs = self.region.contours, other.region.contours
         return mine is theirs or [own.edges for own in mine] == [one.edges for one in theirs]
+
+
+def _edges_hash(contour: Contour) -> int:
+    return hash(contour.edges)
 
 
 def remembered(ask: Callable[Asked, Found], most: int = MOST) -> Callable[Asked, Found]:

@@ -22,5 +22,5 @@ def write_stl(surface: Surface, path: Path) -> None:
     # "solid" at the start would make readers take it for the text format.
     header = b"binary STL, millimetres".ljust(80)
     with path.open("wb") as file:
-        file.write(header + np.uint32(len(records)).tobytes())
-        records.tofile(file)
+        # Not tofile, which says of a full disk only how much it wrote.
+        file.write(header + np.uint32(len(records)).tobytes() + records.tobytes())

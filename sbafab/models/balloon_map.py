@@ -129,8 +129,9 @@ class BalloonMap:
         """
         p = np.asarray(pressure, dtype=float)
         if not (p.min() >= 0 and p.max() <= self.most_pressure):
+            worst = p.max() if p.min() >= 0 else p.min()
             raise DesignError(
-                f"a pressure of {float(p.max()):g} kPa is outside the balloon's map; give 0 to "
+                f"a pressure of {float(worst):g} kPa is outside the balloon's map; give 0 to "
                 f"{self.most_pressure:g} kPa"
             )
         x, rate = self._scaled(p)

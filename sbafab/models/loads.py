@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from sbafab.errors import DesignError
 from sbafab.models.chain import chain, crossing, felt, twists
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from sbafab.models.chain import Chain
     from sbafab.models.film_elements import Array
     from sbafab.models.springs import Springs
@@ -21,6 +24,26 @@ TOUCHES = 12
 """Points round the top's outline that may touch the outer plate."""
 TURN = np.arange(TOUCHES) * math.tau / TOUCHES
 RIM = np.stack([np.cos(TURN), np.sin(TURN), 0 * TURN], -1)
+
+
+def three(values: Sequence[float], what: str) -> Array:
+    """Three numbers (3,). Raises DesignError where they are not three, or not finite."""
+    try:
+        found = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        found = np.zeros(0)
+    if found.shape != (3,) or not np.isfinite(found).all():
+        raise DesignError(f"{what} must be three finite numbers, such as (0, 0, -0.1)")
+    return found
+
+
+def directed(values: Sequence[float], what: str) -> Array:
+    """The direction (3,) of three numbers. Raises DesignError where they have none."""
+    found = three(values, what)
+    length = float(np.linalg.norm(found))
+    if not length:
+        raise DesignError(f"{what} has no direction; give three numbers that are not all 0")
+    return found / length
 
 
 class OuterPlate(NamedTuple):
@@ -60,6 +83,12 @@ class OuterPlate(NamedTuple):
     def is_level(self) -> bool:
         """Whether it lies level."""
         return float(self.normal[2]) > 0.999
+
+
+@lru_cache(maxsize=256)
+def outer_plate(line: tuple[float, ...], sticks: bool, outline: float) -> OuterPlate:
+    """That on a line: a point in mm, then the normal."""
+    return OuterPlate.of(np.array(line[:3]), np.array(line[3:]), sticks, outline)
 
 
 class Load(NamedTuple):

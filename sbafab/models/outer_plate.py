@@ -24,13 +24,17 @@ STEPS = 12
 """Steps that suffice, or another way is tried."""
 FINE = 1e-7
 """A step (mm, rad) that need not be made: a plate lets little of it be."""
+SLIGHT = 1e-4
+"""Out of balance in mN (or mN mm), and as a share of the plate's force, that is none."""
 FIRST = 1e-3
 """A step (mm, rad) as large as the one before the first may have been."""
-ROUNDS, NEARLY = 12, 0.2
+ROUNDS, NEARLY = 24, 0.2
 """How often a step is bettered by springs and touching points at its end, and the share of it that
 is little."""
 TRIES, HELD = 8, 2
 """How often the points that touch are found anew, and how often by rims that meet."""
+SHARES = 0.5 ** np.arange(12)
+"""Of a step to other touching points than it was made with."""
 STRAIGHT = 6e-3
 """A step (mm, rad) along which springs are straight enough."""
 PUSHES = 2.0
@@ -69,7 +73,8 @@ def pressed(
     now = loaded(springs, pitch, load, at)
     touch = now.touch
     if touch is not None and touch.push > PUSHES * np.abs(now.own[:, 0]).max():
-        # So deep that it says nothing of the force.
+        # So deep that it says nothing of the force, nor the first step of what is stable.
+        before = 0.0
         now = loaded(springs, pitch, load, at, np.zeros(len(touch.deep)))
     for _ in range(STEPS):
         touch = now.touch
@@ -80,8 +85,13 @@ def pressed(
         flat, touch, is_found = step
         move = flat.reshape(-1, 3)
         largest = float(np.abs(move).max())
-        if is_found and ends(largest, before, FINE):
-            return at + move, touch.push, True
+        if ends(largest, before, FINE):
+            if is_found:
+                return at + move, touch.push, True
+            # A rim or a point that just touches is met in one round and parts in the next.
+            end = loaded(springs, pitch, load, at + move)
+            if np.abs(end.gradient).max() < SLIGHT * (1 + end.push):
+                return at + move, end.push, True
         share = float(limited(move).min())
         if share < 1.0 and not wall.sticks:
             return None
@@ -115,12 +125,13 @@ def _step(
                 continue
             best, least = flat, total
         matrix, gradient = with_blocks(turned, blocks), follows + own.ravel()
-        more = _more(springs, at + flat.reshape(-1, 3), matrix, gradient, touch, lines, deep)
-        if more is None:
+        found = _more(springs, at + flat.reshape(-1, 3), matrix, gradient, touch, lines, deep)
+        if found is None:
             return None
+        more, is_settled = found
         flat = best + more
-        largest = np.abs(more).max()
-        is_found = largest < (NEARLY * np.abs(best).max() if number else STRAIGHT)
+        little = NEARLY * np.abs(best).max() if number else STRAIGHT
+        is_found = is_settled and float(np.abs(more).max()) < little
         if is_found:
             break
     deep = touch.deep + lines @ flat
@@ -135,9 +146,17 @@ def _more(
     touch: PlateContact,
     lines: Array,
     deep: Array,
-) -> Array | None:
-    """The step to where the points that touch at its end, and rims that meet, are in balance."""
+) -> tuple[Array, bool] | None:
+    """The step to where the points that touch at its end, and rims that meet, are in balance, and
+    whether they are those that the step was made with.
+    """
+
+    def energy(step: Array) -> float:
+        after = deep + lines @ step
+        return float((gradient + matrix @ step / 2) @ step + touch.resists(after) @ after / 2)
+
     touches, met, held_off = deep > touch.least, None, 0
+    tried = []
     for _ in range(TRIES):
         stiff = touch.stiff * touches
         against = (lines.T * stiff) @ lines
@@ -150,9 +169,11 @@ def _more(
             return None
         ahead = deep + lines @ found[0] > touch.least
         if (ahead == touches).all():
+            met = springs.meeting(at, found[0].reshape(-1, 3))
+            if met is None or held_off == HELD:
+                return found[0], met is None
             held_off += 1
-            met = springs.meeting(at, found[0].reshape(-1, 3)) if held_off <= HELD else None
-            if met is None:
-                break
         touches = ahead
-    return np.asarray(found[0])
+        tried.append(found[0])
+    # None is the least: the best place on the ways there, of which the first leads downhill.
+    return min((share * step for step in tried for share in SHARES), key=energy), False

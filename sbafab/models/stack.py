@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import BalloonMap, balloon_map
 from sbafab.models.chain import Chain, chain
-from sbafab.models.loads import Load, OuterPlate
+from sbafab.models.loads import Load, directed, outer_plate, three
 from sbafab.models.springs import RING, GapPlaces, Springs
 from sbafab.models.stack_balance import free, held
 
@@ -201,10 +201,13 @@ class Stack:
 
     def springs(self, pressures: Sequence[float]) -> Springs:
         """What kinds of balloons do at pressures, one a chamber. Raises DesignError."""
-        asked = np.array(pressures, dtype=float)
-        if len(asked) != self.chambers:
+        try:
+            asked = np.array(pressures, dtype=float)
+        except (TypeError, ValueError):
+            raise DesignError("pressures must be numbers in kPa, one a chamber") from None
+        if asked.shape != (self.chambers,):
             raise DesignError(
-                f"{len(asked)} pressures are given for {self.chambers} chambers; give one a chamber"
+                f"{asked.size} pressures are given for {self.chambers} chambers; give one a chamber"
             )
         return Springs.pressed(self.maps, asked, self._places)
 
@@ -258,7 +261,7 @@ class Stack:
         from sbafab.models.motion import Motion
         from sbafab.models.pneumatics import Line
 
-        start = self.pose(pressures or (0.0,) * self.chambers, **load)
+        start = self.pose((0.0,) * self.chambers if pressures is None else pressures, **load)
         return Motion(self, line or Line(), load, start)
 
     @cached_property
@@ -282,22 +285,19 @@ class Stack:
         gravity: bool | Sequence[float],
         plate: float | Plate | None,
     ) -> Load | None:
-        force = 1000 * np.asarray(tip_load, dtype=float)
-        if force.shape != (3,) or not np.isfinite(force).all():
-            raise DesignError("tip_load must be three finite numbers in N, such as (0, 0, -0.1)")
-        down = np.zeros(3)
-        if not isinstance(gravity, bool):
-            down = np.asarray(gravity, dtype=float) / np.linalg.norm(gravity)
+        force, weight = 1000 * three(tip_load, "tip_load in N"), None
+        if not isinstance(gravity, (bool, np.bool_)):
+            weight = self.weight * directed(gravity, "the direction of gravity")
         elif gravity:
-            down = np.array([0.0, 0.0, -1.0])
-        weight = down * self.weight if down.any() else None
+            weight = np.array([0.0, 0.0, -self.weight])
         if not force.any() and weight is None and plate is None:
             return None
         if plate is None:
             return Load(force, weight, None)
-        outer = plate if isinstance(plate, Plate) else Plate.at(float(plate))
-        line = tuple(float(x) for x in (*outer.point, *outer.normal))
-        wall = _wall(line, outer.sticks, self.outline)
+        outer = plate if isinstance(plate, Plate) else Plate.at(plate)
+        point = three(outer.point, "the plate's point in mm")
+        normal = directed(outer.normal, "the plate's normal")
+        wall = outer_plate((*point.tolist(), *normal.tolist()), outer.sticks, self.outline)
         if wall.normal[2] > 1 - 1e-9 and wall.point[2] < self.flat_height - 1e-9:
             raise DesignError(
                 f"a plate {wall.point[2]:g} mm high is lower than the flat stack; give at least "
@@ -379,13 +379,6 @@ def stack(
         reach,
         grams * GRAVITY / len(row),
     )
-
-
-@lru_cache(maxsize=256)
-def _wall(line: tuple[float, ...], sticks: bool, outline: float) -> OuterPlate:
-    """The outer plate on a line: a point, then the normal."""
-    point, normal = np.array(line[:3]), np.array(line[3:])
-    return OuterPlate.of(point, normal / np.linalg.norm(normal), sticks, outline)
 
 
 def _gripped(one: Balloon) -> Balloon:

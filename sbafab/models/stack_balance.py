@@ -14,6 +14,7 @@ from sbafab.models.outer_plate import below, pressed
 
 if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
+    from sbafab.models.loads import OuterPlate
     from sbafab.models.springs import Springs
 
 SOFTER = (1e3, 1e5)
@@ -92,14 +93,14 @@ def held(
         if found is None:
             found = _settled(springs, pitch, load, at, MOST_STEPS if is_near else FEW_STEPS)
         if found is None:
-            found = _met(springs, pitch, load, at)
+            found = _met(springs, pitch, load, wall, at)
     if found is None:
         raise DesignError("the stack finds no balance under this load; try a smaller one")
     return found
 
 
 def _met(
-    springs: Springs, pitch: float, load: Load, start: Array
+    springs: Springs, pitch: float, load: Load, wall: OuterPlate, start: Array
 ) -> tuple[Array, float, bool] | None:
     """What ``held`` gives against a plate that is soft at first."""
     at = start
@@ -108,7 +109,8 @@ def _met(
         if soft is None:
             return None
         at, _, _ = soft
-    return _settled(springs, pitch, load, at, MOST_STEPS)
+    found = pressed(springs, pitch, load, wall, at)
+    return found or _settled(springs, pitch, load, at, MOST_STEPS)
 
 
 def _settled(

@@ -89,9 +89,13 @@ class DrawnBuilds(NamedTuple):
         """Numbers from 0 to 1, a row each, from the ``first`` of the seed's stream on."""
         return numbers(*self)
 
-    def lowest(self, pairs: tuple[Pair, ...]) -> LowestSums:
-        """The lowest sums of two rows each."""
-        return _lowest(self, pairs)
+    def lowest(self, pairs: tuple[Pair, ...]) -> LowestSums | None:
+        """The lowest sums of two rows each; None when they are asked for the first time.
+
+        Laminates with the same layers and contours ask for the same, whatever their sizes; for one
+        alone it is not worth the sorting.
+        """
+        return _sorted_out(self, pairs).again()
 
 
 class Pair(NamedTuple):
@@ -120,17 +124,35 @@ class LowestSums(NamedTuple):
     below: Floats
 
 
-@lru_cache(maxsize=4)
-def _lowest(batch: DrawnBuilds, pairs: tuple[Pair, ...]) -> LowestSums:
-    """Laminates with the same layers and contours ask for the same, whatever their sizes."""
+class _SortedOut:
+    """The lowest sums of pairs, worked out when they are asked for once more."""
+
+    def __init__(self, drawn: DrawnBuilds, pairs: tuple[Pair, ...]) -> None:
+        self.drawn = drawn
+        self.pairs = pairs
+        self.is_first = True
+        self.found: LowestSums | None = None
+
+    def again(self) -> LowestSums | None:
+        if self.is_first:
+            self.is_first = False
+        elif self.found is None:
+            self.found = _lowest(self.drawn, self.pairs)
+        return self.found
+
+
+_sorted_out = lru_cache(maxsize=4)(_SortedOut)
+
+
+def _lowest(drawn: DrawnBuilds, pairs: tuple[Pair, ...]) -> LowestSums:
     import numpy as np
 
-    drawn, count = batch.numbers, max(1, batch.builds // LOWEST)
+    numbers, count = drawn.numbers, max(1, drawn.builds // LOWEST)
     builds, totals = np.empty((len(pairs), count), dtype=np.intp), np.empty((len(pairs), count))
     below = np.full(len(pairs), math.inf)
     for line, pair in enumerate(pairs):
-        total = pair.total(drawn)
-        if count < batch.builds:
+        total = pair.total(numbers)
+        if count < drawn.builds:
             parted = np.argpartition(total, count)
             builds[line] = np.sort(parted[:count])
             below[line] = total[parted[count]]

@@ -234,12 +234,17 @@ class RandomBuilds:
 
     def _cut(self, batch: DrawnBuilds, numbers: Floats) -> tuple[Indices, Indices, Floats]:
         """Where cutting errors may take enough, and the sums of their numbers, signs kept."""
-        lowest, line = batch.lowest(self.pairs), self.line
-        within = self.share <= lowest.below[line]
-        limit = np.where(within, self.share, -math.inf)
-        place = np.flatnonzero(lowest.totals.take(line, axis=0) < limit[:, None])
-        asked, place = np.divmod(place, lowest.builds.shape[1])
-        found = [(asked, lowest.builds[line[asked], place], lowest.totals[line[asked], place])]
+        line, lowest = self.line, batch.lowest(self.pairs)
+        found = [(np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp), np.zeros(0))]
+        within = np.zeros(len(line), dtype=bool)
+        if lowest is not None:
+            within = self.share <= lowest.below[line]
+            limit = np.where(within, self.share, -math.inf)
+            place = np.flatnonzero(lowest.totals.take(line, axis=0) < limit[:, None])
+            asked, place = np.divmod(place, lowest.builds.shape[1])
+            found.append(
+                (asked, lowest.builds[line[asked], place], lowest.totals[line[asked], place])
+            )
         # More may come short than the lowest sums tell of.
         for number in _picked(~within).tolist():
             total = self.pairs[line[number]].total(numbers)

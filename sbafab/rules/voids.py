@@ -89,6 +89,7 @@ def void_graph(laminate: Laminate) -> VoidGraph:
         for pattern, layers in laminate.patterns.items()
         if not layers[0].is_mask
     }
+    outside = {pattern: _outside(pieces, frame) for pattern, pieces in openings.items()}
     gaps: dict[tuple[str, ...], _Gap] = {}
     homes: dict[tuple[tuple[str, ...], str], list[tuple[int, Point]]] = {}
     for interface in laminate.interfaces:
@@ -101,11 +102,11 @@ def void_graph(laminate: Laminate) -> VoidGraph:
             if key not in homes:
                 homes[key] = [_home(piece, gap.missing) for piece in openings[layer.pattern]]
             for number, (home, p) in enumerate(homes[key]):
-                opening = _opening(layer.index, number, openings[layer.pattern], frame)
+                opening = _opening(layer.index, number, outside[layer.pattern])
                 graph.join(opening, _missing(interface, home, gap), p)
     for layer in (laminate.tpe_layers[0], laminate.tpe_layers[-1]):
         for number, piece in enumerate(openings[layer.pattern]):
-            opening = _opening(layer.index, number, openings[layer.pattern], frame)
+            opening = _opening(layer.index, number, outside[layer.pattern])
             if opening != OUTSIDE:
                 graph.join(opening, OUTSIDE, _middle(piece.bounds))
     return graph
@@ -187,8 +188,8 @@ def _missing(interface: Interface, number: int, gap: _Gap) -> Void:
     return OUTSIDE if number == gap.outside else Void("gap", interface.index, number)
 
 
-def _opening(layer: int, number: int, pieces: tuple[Region, ...], frame: Region) -> Void:
-    return OUTSIDE if number == _outside(pieces, frame) else Void("opening", layer, number)
+def _opening(layer: int, number: int, outside: int) -> Void:
+    return OUTSIDE if number == outside else Void("opening", layer, number)
 
 
 def _outside(pieces: tuple[Region, ...], frame: Region) -> int:

@@ -6,11 +6,12 @@ from the best that was found. Rules are asked of what would become the best.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from sbafab.design.form import Free
 from sbafab.design.records import Design
+from sbafab.design.writing import keys_of
 from sbafab.errors import DesignError
 from sbafab.progress import Progress, unheard
 from sbafab.search.quantities import refuse_unknown_key
@@ -29,7 +30,7 @@ from sbafab.search.trial import Trial, Wanted, broken_rules, misses
 from sbafab.search.walks import every_design, explored, refined
 from sbafab.search.widening import widened
 
-TRIES = 240
+TRIES, LEAST_TRIES = 240, 4
 
 
 @dataclass(frozen=True)
@@ -95,9 +96,12 @@ def free_keys(request: FindRequest) -> tuple[Free, ...]:
     """
     for quantity in Wanted(request.design, request.requirements, request.goal).quantities:
         refuse_unknown_key(quantity, request.design)
+    keys = {key: value for key, value, _ in keys_of(request.design)}
     asked = {one.quantity.name for one in request.requirements} | {request.goal.quantity.name}
     every = request.design.free if request.free is None else request.free
     own = [one for one in every if not one.asked or one.asked in asked]
+    for one in request.requirements:
+        _refuse_fixed(one, keys, own)
     found = [_within(one, request.requirements) for one in own]
     if not found:
         raise DesignError(
@@ -107,17 +111,47 @@ def free_keys(request: FindRequest) -> tuple[Free, ...]:
     return tuple(found)
 
 
+def _refuse_fixed(
+    requirement: Requirement, keys: Mapping[str, object], own: Sequence[Free]
+) -> None:
+    """Raises DesignError for a key that is asked to be what it is not, and may not change."""
+    key = requirement.quantity.key
+    value = keys.get(key or "")
+    if key in [one.key for one in own] or not isinstance(value, int | float):
+        return
+    if not requirement.holds(value):
+        raise DesignError(
+            f"{key} = {value:g}, not {requirement.bound}, and the search does not change it; give "
+            f"it a range with --free {key}=LOW:HIGH:STEP"
+        )
+
+
 def _within(free: Free, requirements: Sequence[Requirement]) -> Free:
+    """The range within what requirements say of the key itself. Raises DesignError for none."""
     for one in requirements:
-        if one.quantity.key == free.key:
-            low = max(free.low, one.limit) if one.at_least else free.low
-            high = free.high if one.at_least else min(free.high, one.limit)
-            free = replace(free, low=low, high=max(high, low))
+        if one.quantity.key != free.key:
+            continue
+        is_beyond = one.limit > free.high if one.at_least else one.limit < free.low
+        if is_beyond and not free.widens:
+            raise DesignError(
+                f"{free.key} must be {one.bound}, and its range is {free.low:g} to {free.high:g}; "
+                f"give it another one with --free {free.key}=LOW:HIGH:STEP"
+            )
+        if one.at_least:
+            low = max(free.low, one.limit)
+            free = replace(free, low=low, high=max(free.high, low))
+        else:
+            high = min(free.high, one.limit)
+            free = replace(free, low=min(free.low, high), high=high)
     return free
 
 
 def find(request: FindRequest, tell: Progress = unheard) -> FoundDesign:
     """The best design, or the nearest miss. Raises DesignError for what cannot be asked."""
+    if request.tries < LEAST_TRIES:
+        raise DesignError(f"tries = {request.tries} must be at least {LEAST_TRIES}")
+    if request.storage is not None and not request.optuna:
+        raise DesignError("storage is Optuna's; search with optuna = True, or leave it out")
     wanted = Wanted(request.design, request.requirements, request.goal)
     space = SearchSpace(wanted, free_keys(request), request.tries, tell)
     if request.optuna:
@@ -133,11 +167,11 @@ def find(request: FindRequest, tell: Progress = unheard) -> FoundDesign:
     place, best = space.best()
     if best.refused:
         raise DesignError(f"no design could be made: {best.refused}")
-    shown, count = pareto_front(space) if best.holds else ([], 0)
+    shown, count = pareto_front(space, best) if best.holds else ([], 0)
     return FoundDesign(
         wanted,
         best,
-        tuple(bindings(space, place, best)) if best.holds else (),
+        tuple(bindings(space, place, best)),
         tuple(range_ends(space, place, best)),
         tuple(shown),
         count,

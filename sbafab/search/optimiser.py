@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError
 from sbafab.search.space import SearchSpace
 from sbafab.search.trial import IMPOSSIBLE
@@ -58,4 +59,7 @@ def with_optuna(search: SearchSpace, storage: str | None) -> None:
 def _name(search: SearchSpace) -> str:
     asked = [one.said for one in search.wanted.requirements]
     keys = [f"{one.key} {one.low:g} to {one.high:g} by {one.step:g}" for one in search.free]
-    return "; ".join([search.wanted.design.name, *asked, search.wanted.goal.said, *keys])
+    design = search.wanted.design
+    return "; ".join(
+        [f"{design.name} {design_sha256(design)[:12]}", *asked, search.wanted.goal.said, *keys]
+    )

@@ -191,6 +191,8 @@ def _share(text: str) -> float:
 
 def shown_value(quantity: AskedQuantity, value: float) -> str:
     """A figure with its unit, as people read it."""
+    if quantity.name == "force" and value < 0:
+        return "none, it does not rise that far"
     return f"{value:.4g} {quantity.unit}".rstrip()
 
 

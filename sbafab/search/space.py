@@ -70,13 +70,16 @@ class SearchSpace:
             for at, low, high in zip(place, self.lows, self.highs, strict=True)
         )
 
-    def trial(self, place: Steps) -> Trial:
-        """What is found there; a design that would be the best so far is asked for its rules."""
+    def trial(self, place: Steps, asks: bool = True) -> Trial:
+        """What is found there; a design that would be the best so far is asked for its rules.
+
+        Not where nothing hangs on it yet (``asks``): rules take most of the time.
+        """
         if place not in self.trials:
             self._tell(TRYING, len(self.trials), self.tries)
             found = tried(self.wanted, self.values(place))
             so_far = min((one.rank for one in self.trials.values() if one.rules), default=None)
-            if not found.refused and (so_far is None or found.rank < so_far):
+            if asks and not found.refused and (so_far is None or found.rank < so_far):
                 found = self.with_rules(found)
             self.trials[place] = found
         return self.trials[place]

@@ -40,7 +40,9 @@ class Spare:
 
 @dataclass(frozen=True)
 class RangeEnd:
-    """A key at the end of its range, ``low`` to ``high``, that would be better beyond."""
+    """A key at the end of its range that would be better beyond: ``low`` to ``high`` in steps of
+    ``step``, mm or a number of balloons, as the key is.
+    """
 
     key: str
     value: Any
@@ -64,18 +66,31 @@ def without_room(best: Trial) -> list[Spare]:
 
 
 def bindings(space: SearchSpace, place: Steps, best: Trial) -> list[Binding]:
-    """What stops every single step that would come nearer the goal."""
+    """What stops every single step that would come nearer the goal.
+
+    Of the nearest miss: the steps to designs that cannot be made, or that no model knows.
+    """
     found = []
     for axis, other in _steps(place):
         if not space.lows[axis] <= other[axis] <= space.highs[axis]:
             continue
-        trial = space.with_rules(space.looked_at(other))
-        if trial.cost < best.cost or (trial.refused and trial.rank > best.rank):
-            broken = misses(space.wanted, trial)
+        trial = space.looked_at(other)
+        if _is_nearer(space, place, other, trial, best):
+            broken = misses(space.wanted, space.with_rules(trial))
             if broken:
                 key = space.free[axis].key
                 found.append(Binding(key, trial.values[key], "; ".join(broken)))
     return found
+
+
+def _is_nearer(space: SearchSpace, place: Steps, other: Steps, trial: Trial, best: Trial) -> bool:
+    """Whether a step would come nearer the goal; where nothing comes of it, by the step back."""
+    if not trial.refused:
+        return best.holds and trial.cost < best.cost
+    if not best.holds:
+        return True
+    back = space.looked_at(tuple(2 * at - to for at, to in zip(place, other, strict=True)))
+    return not back.refused and back.cost > best.cost
 
 
 def range_ends(space: SearchSpace, place: Steps, best: Trial) -> list[RangeEnd]:
@@ -106,10 +121,11 @@ def _steps(place: Steps) -> list[tuple[int, Steps]]:
     ]
 
 
-def pareto_front(space: SearchSpace) -> tuple[list[Trial], int]:
+def pareto_front(space: SearchSpace, best: Trial) -> tuple[list[Trial], int]:
     """Designs that hold, rules included, and that none of those tried betters in everything.
 
-    In the order of the goal; where they are many the ends and some between, and how many there are.
+    The best first, also where another one equals it in the goal, then in the order of the goal;
+    where they are many the ends and some between. With it how many there are.
     """
     wanted = space.wanted
     sides = [
@@ -118,15 +134,17 @@ def pareto_front(space: SearchSpace) -> tuple[list[Trial], int]:
         if one.quantity.key is None and one.quantity != wanted.goal.quantity
     ]
     left = [trial for trial in space.trials.values() if trial.holds]
+    first = left.index(best)
     more = [False, *(one.at_least for one in sides)]
     while True:
         rows = [[trial.cost, *(trial.value(one) for one in sides)] for trial in left]
-        numbers = sorted(front(rows, more), key=lambda number: left[number].rank)
+        numbers = sorted({first, *front(rows, more)}, key=lambda number: left[number].rank)
         chosen = _spread(numbers)
         checked = {number: space.with_rules(left[number]) for number in chosen}
         failed = [number for number, trial in checked.items() if not trial.holds]
         if not failed:
             return [checked[number] for number in chosen], len(numbers)
+        first -= sum(number < first for number in failed)
         left = [
             checked.get(number, trial) for number, trial in enumerate(left) if number not in failed
         ]

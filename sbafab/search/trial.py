@@ -10,6 +10,7 @@ from sbafab.actuators import build
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import GeometryError
+from sbafab.laminate.extent import film_mass
 from sbafab.laminate.laminate import Laminate
 from sbafab.output.checking import refuse_undoable
 from sbafab.output.planned import Checked
@@ -32,8 +33,8 @@ class Trial:
 
     ``values`` are those of the free keys, ``figures`` by quantity in its unit: mm, N, g or a share.
     ``missed`` is by what share requirements and rules are missed, all together; 0 where none is.
-    ``cost``, in the unit of what is best, is the less the better. ``refused`` says why no such
-    design can be made.
+    ``cost``, in the unit of what is best, is the less the better; ``mass`` is in g. ``refused``
+    says why no such design can be made.
     """
 
     values: Mapping[str, Any]
@@ -41,6 +42,7 @@ class Trial:
     rules: Mapping[str, RuleMargin] | None = None
     missed: float = 0.0
     cost: float = 0.0
+    mass: float = 0.0
     refused: str = ""
     laminate: Laminate | None = field(default=None, repr=False, compare=False)
 
@@ -50,9 +52,9 @@ class Trial:
         return self.missed == 0.0 and not self.refused
 
     @property
-    def rank(self) -> tuple[float, float]:
-        """What is missed as a share, then the cost; the less, the better."""
-        return self.missed, self.cost
+    def rank(self) -> tuple[float, float, float]:
+        """What is missed as a share, then the cost, of equals the mass; the less, the better."""
+        return self.missed, self.cost, self.mass
 
     def value(self, requirement: Requirement | Goal) -> float:
         """The figure that a requirement or the goal is about, in its unit."""
@@ -98,7 +100,7 @@ def tried(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -
     )
     missed += sum(_short(one) for one in (rules or {}).values())
     cost = wanted.goal.cost(figures[wanted.goal.quantity.said])
-    return Trial(values, figures, rules, missed, cost, laminate=laminate)
+    return Trial(values, figures, rules, missed, cost, film_mass(laminate), laminate=laminate)
 
 
 def _short(rule: RuleMargin) -> float:

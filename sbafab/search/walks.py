@@ -29,7 +29,7 @@ def every_design(space: SearchSpace) -> None:
     """Tries all that there are."""
     ranges = zip(space.lows, space.highs, strict=True)
     for place in itertools.product(*(range(low, high + 1) for low, high in ranges)):
-        space.trial(place)
+        space.trial(place, asks=False)
 
 
 def explored(space: SearchSpace) -> None:
@@ -94,7 +94,7 @@ def _grid(space: SearchSpace) -> None:
     for place in itertools.product(*axes):
         if space.is_over:
             return
-        space.trial(place)
+        space.trial(place, asks=False)
 
 
 def _starts(space: SearchSpace) -> list[Steps]:

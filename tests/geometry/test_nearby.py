@@ -49,6 +49,19 @@ def test_an_index_gives_the_edges_whose_boxes_meet_each_once(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
+def test_few_edges_come_in_the_order_of_many(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    edges = scattered(seed)
+    index, draw = EdgeIndex(edges), random.Random(seed + 300)
+    for _ in range(40):
+        x, y, size = draw.uniform(-5, 25), draw.uniform(-5, 15), draw.choice([0.0, 3.0, 30.0])
+        box = (x, y, x + size, y + size)
+        monkeypatch.setattr(nearby, "FEW_EDGES", 100)
+        few = index.numbers(box)
+        monkeypatch.setattr(nearby, "FEW_EDGES", 0)
+        assert index.numbers(box) == few
+
+
+@pytest.mark.parametrize("seed", range(4))
 def test_the_distance_is_that_of_the_nearest_edge(seed: int) -> None:
     edges = scattered(seed)
     index = EdgeIndex(edges)
@@ -72,6 +85,8 @@ def test_pairs_of_many_boxes_come_as_those_of_few(
     monkeypatch.setattr(nearby, "AT_ONCE", 100)
     assert list(close_pairs(boxes, reach)) == found
     monkeypatch.setattr(nearby, "MANY_BOXES", math.inf)
+    assert list(close_pairs(boxes, reach)) == found
+    monkeypatch.setattr(nearby, "FEW_BOXES", math.inf)
     assert list(close_pairs(boxes, reach)) == found
     assert len(found) > 500
 

@@ -76,6 +76,32 @@ def test_a_pressure_outside_the_map_is_refused(three: Stack) -> None:
         three.pose((1, 1))
 
 
+def test_what_is_no_load_is_refused(three: Stack) -> None:
+    with pytest.raises(DesignError, match="a pressure of -3 kPa"):
+        three.pose((1, 2, -3))
+    with pytest.raises(DesignError, match="one a chamber"):
+        three.pose(5.0)  # type: ignore[arg-type]
+    for gravity in ((0, 0, 0), (0, 0), (0, math.nan, 1)):
+        with pytest.raises(DesignError, match="the direction of gravity"):
+            three.pose((1, 2, 3), gravity=gravity)
+    with pytest.raises(DesignError, match="plate's point"):
+        three.pose((1, 2, 3), plate=math.nan)
+    with pytest.raises(DesignError, match="plate's normal has no direction"):
+        three.pose((1, 2, 3), plate=Plate((0, 0, 12), (0, 0, 0)))
+
+
+def test_a_motion_takes_its_line_and_where_it_begins(three: Stack) -> None:
+    """Water in a tube: Hagen-Poiseuille, dp = 128 mu L Q / (pi d^4)."""
+    moved = sbafab.motion(three, 70.0, fluid="water", pressures=np.array([2.0, 2.0, 2.0]))
+    assert moved.pressures == pytest.approx((2.0, 2.0, 2.0))
+    flow = 35e3 / 60 / 3
+    moved.step(0.01, flows=(flow,) * 3)
+    drop = 128 * 1.002e-6 * 70.0 * flow / (math.pi * 0.635**4)
+    assert moved.sources[0] - moved.pressures[0] == pytest.approx(drop, rel=1e-3)
+    with pytest.raises(DesignError, match="must be one of air, water"):
+        sbafab.motion(three, fluid="oil")
+
+
 def test_equal_pressures_stand_straight(three: Stack) -> None:
     pose = three.pose((5, 5, 5))
     assert pose.bend == pytest.approx(0.0, abs=1e-6)
@@ -295,7 +321,13 @@ def test_any_start_ends_in_the_same_balance(three: Stack, load: str) -> None:
 
 def test_a_plate_that_is_hardly_met_is_met_from_any_start(three: Stack) -> None:
     """By one or two points of the rim, or by none: the same balance from a pose nearby, too."""
-    for pressures in ((0.21, 0.18, 1.46), (1.174, 0.91, 0.276), (0.832, 0.167, 0.146)):
+    for pressures in (
+        (0.21, 0.18, 1.46),
+        (1.174, 0.91, 0.276),
+        (0.832, 0.167, 0.146),
+        (0.204, 2.438, 0.723),
+        (0.0, 2.628, 0.887),
+    ):
         pose = three.pose(pressures, plate=12.0)
         beside = three.pose([each + 0.3 for each in pressures], plate=12.0)
         again = three.pose(pressures, plate=12.0, near=beside)

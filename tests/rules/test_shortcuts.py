@@ -64,6 +64,9 @@ def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float
     ]
     good = np.ones((2, BUILDS), dtype=bool)
     good[RandomBuilds(both, 0.1).short(batch)] = False
+    again = np.ones((2, BUILDS), dtype=bool)
+    again[RandomBuilds(both, 0.1).short(batch)] = False
+    assert (again == good).all()
     levers = asked.moves[2][2]
     assert levers is not None
     for interface in (0, 1):
@@ -135,8 +138,10 @@ def test_places_left_out_are_neither_the_worst_nor_short(
     assert told() == few
 
 
-def test_edges_aside_of_a_band_are_none_of_the_nearest() -> None:
-    draw = random.Random(4)
+def test_edges_aside_of_a_band_or_farther_off_are_none_of_the_nearest(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    draw, heights = random.Random(4), boundary._heights
     for _ in range(20):
         region = union(
             disc((draw.uniform(-3, 3), draw.uniform(-3, 3)), draw.uniform(0.05, 2))
@@ -146,8 +151,41 @@ def test_edges_aside_of_a_band_are_none_of_the_nearest() -> None:
             for one in (edge, edge.reversed()):
                 band = boundary._line_band(one) if len(one) == 2 else boundary._arc_band(one)
                 found = outward_reach(one, region.index)
+                monkeypatch.setattr(boundary, "_heights", lambda *_: (-math.inf, math.inf))
                 plain = boundary._nearest(band, region.edges)
-                assert (found and found.value) == (plain and plain.value)
+                monkeypatch.setattr(boundary, "_heights", heights)
+                assert found == plain
+
+
+def test_sums_of_cuts_beyond_the_lowest_are_asked_for_as_well(
+    monkeypatch: pytest.MonkeyPatch, good: Good
+) -> None:
+    laminate = good("1dof-5mm", "stack.balloons=3")
+    hand = replace(Tolerances(), placement=0.3, turn=2.0)
+    limits = replace(Limits(), tolerances=hand, yield_builds=600)
+    found = simulate(laminate, limits)
+    for share in (1, 5, 600):
+        monkeypatch.setattr(draws, "LOWEST", share)
+        draws._sorted_out.cache_clear()
+        # Nothing is sorted out when it is asked for the first time.
+        assert [simulate(laminate, limits) for _ in range(2)] == [found, found]
+    draws._sorted_out.cache_clear()
+    assert 0 < found.whole.good < 600
+
+
+def test_the_lowest_sums_are_those_of_all() -> None:
+    draws._sorted_out.cache_clear()
+    drawn = DrawnBuilds(3, 40, 4, 80)
+    for pair in (draws.Pair(0, 1, 1.0, 1.0), draws.Pair(2, 3, 1.0, -1.0), draws.Pair(3, 0, -1, -1)):
+        one, other = drawn.numbers[pair.row], drawn.numbers[pair.other]
+        sums = (pair.sign * one + pair.other_sign * other).tolist()
+        assert drawn.lowest((pair,)) is None
+        lowest = drawn.lowest((pair,))
+        assert lowest is not None
+        order = sorted(range(80), key=sums.__getitem__)
+        assert lowest.builds[0].tolist() == sorted(order[:10])
+        assert lowest.totals[0].tolist() == [sums[build] for build in sorted(order[:10])]
+        assert lowest.below[0] == sums[order[10]]
 
 
 FRAME = rectangle((-20, -20), (20, 20))

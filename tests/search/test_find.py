@@ -17,10 +17,10 @@ from sbafab.cli import app
 from sbafab.design.form import Free
 from sbafab.errors import DesignError
 from sbafab.search import space as module
-from sbafab.search.find import FindRequest, find
+from sbafab.search.find import FindRequest, find, free_keys
 from sbafab.search.free import read_free
 from sbafab.search.requirements import read_all
-from sbafab.search.trial import Trial, Wanted
+from sbafab.search.trial import Trial, Wanted, tried
 
 FREE = (Free("chamber.diameter", 3.0, 12.0, 0.1), Free("stack.balloons", 2, 20, 1))
 
@@ -167,6 +167,7 @@ def test_where_nothing_meets_all_the_nearest_miss_is_said(tmp_path: Path) -> Non
         (["--min", "force@1mm@5kPa@6kPa=1"], "names two pressures"),
         (["--min", "chamber.diamter=5"], "did you mean chamber.diameter?"),
         (["--min", "lumen=3"], "1dof-5mm has no lumen"),
+        (["--min", "inlet.tab_length=6"], "--free inlet.tab_length=LOW:HIGH:STEP"),
         (["--max", "deflated_diameter=3"], "only radial designs"),
         (["--free", "chamber.diameter=6:3:1"], "--free 'chamber.diameter=6:3:1' stops below"),
     ],
@@ -190,6 +191,108 @@ def test_a_file_in_no_folder_is_refused_before_the_search(tmp_path: Path) -> Non
     assert ended.exit_code == 2
     assert "is no folder" in ended.output
     assert "trying designs" not in ended.output
+
+
+def test_a_file_with_a_space_in_its_name_names_a_design_that_loads(tmp_path: Path) -> None:
+    target = tmp_path / "my file.toml"
+    asked = ["find", "1dof-5mm", "--min", "stroke=4", "--tries", "20", "-o", str(target)]
+    ended = CliRunner().invoke(app, asked)
+    assert ended.exit_code == 0, ended.output
+    assert sbafab.load(target).name == "my-file"
+    assert f"sbafab generate '{target}'" in ended.output
+
+
+def test_what_equals_the_best_is_told_by_its_mass(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every design has the same width; more balloons weigh more, and give more stroke."""
+
+    def flat(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+        n = values["stack.balloons"]
+        figures = {"width": 5.0, "stroke@10kPa": 1.0 * n}
+        missed = max(0.0, 4 - n)
+        return Trial(values, figures, {} if with_rules else None, missed, 5.0, 10.0 + n)
+
+    monkeypatch.setattr(module, "tried", flat)
+    requirements, goal = read_all(["stroke=4"], [], "width")
+    free = (Free("stack.balloons", 2, 9, 1),)
+    found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, free))
+    assert found.best.values == {"stack.balloons": 4}
+    assert [one.values["stack.balloons"] for one in found.front] == [4, 9]
+
+
+def test_a_force_where_nothing_rises_is_none(tmp_path: Path) -> None:
+    asked = ["find", "1dof-5mm", "--min", "force@200mm@1kPa=1", "--tries", "6"]
+    ended = CliRunner().invoke(app, [*asked, "-o", str(tmp_path / "found.toml")])
+    assert ended.exit_code == 1
+    assert "force@200mm@1kPa none, it does not rise that far, not at least 1 N" in ended.output
+
+
+def test_what_stops_the_nearest_miss_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Least width of what can be made is 3.4 + 1.5; smaller pockets cannot be."""
+    monkeypatch.setattr(module, "tried", _made_up)
+    requirements, goal = read_all([], ["width=4"], "mass")
+    found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, FREE))
+    assert not found.holds
+    assert found.best.values["chamber.diameter"] == 3.4
+    assert [(one.key, one.value, one.breaks) for one in found.binds] == [
+        ("chamber.diameter", 3.3, "too small")
+    ]
+
+
+def test_what_cannot_be_made_binds_on_the_way_to_the_goal_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Pockets of 3.3 cannot be made: that stops the least pocket, and not one that is to grow."""
+    monkeypatch.setattr(module, "tried", _made_up)
+    design = sbafab.load("1dof-5mm")
+    for low, high, bound in ((3.3, 5.0, ["chamber.diameter"]), (3.0, 3.4, [])):
+        free = (Free("chamber.diameter", low, high, 0.1), Free("stack.balloons", 5, 5, 1))
+        requirements, goal = read_all([], [], "mass" if bound else "stroke@50kPa")
+        found = find(FindRequest(design, requirements, goal, free))
+        assert found.best.values["chamber.diameter"] == 3.4
+        assert [one.key for one in found.binds] == bound
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"tries": 0}, "at least 4"),
+        ({"storage": "sqlite:///search.db"}, "optuna = True"),
+        ({"free": ()}, "no key of 1dof-5mm"),
+        ({"free": FREE, "least": {"chamber.diameter": 20}}, "its range is 3 to 12"),
+    ],
+)
+def test_what_a_program_asks_is_checked_too(asked: dict[str, Any], said: str) -> None:
+    with pytest.raises(DesignError, match=said):
+        sbafab.find("1dof-5mm", **asked)
+
+
+def test_a_requirement_beyond_a_range_that_widens_moves_it() -> None:
+    found = sbafab.find("1dof-5mm", least={"chamber.diameter": 20}, tries=12)
+    assert found.best.values["chamber.diameter"] == 20
+    design = sbafab.load("1dof-5mm")
+    for least, most, ends in (("2", "9", (2.6, 9.0)), ("3", "20", (3.0, 16.0)), ("1", "2", (2, 2))):
+        asked = [f"chamber.diameter={least}"], [f"chamber.diameter={most}"]
+        requirements, goal = read_all(*asked, "mass")
+        free = free_keys(FindRequest(design, requirements, goal))[0]
+        assert (free.low, free.high) == ends
+
+
+def test_rules_are_asked_of_few_designs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All nine are tried, each better than the one before: only the best is asked for its rules."""
+    asked: list[int] = []
+
+    def counted(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+        if with_rules:
+            asked.append(values["stack.balloons"])
+        return _made_up(wanted, {"chamber.diameter": 5.0, **values}, with_rules)
+
+    monkeypatch.setattr(module, "tried", counted)
+    requirements, goal = read_all([], [], "stroke@50kPa")
+    free = (Free("stack.balloons", 2, 10, 1),)
+    found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, free))
+    assert found.best.figures["stroke@50kPa"] == pytest.approx(20)
+    # And a step beyond its range, which would be better.
+    assert set(asked) == {10, 11}
 
 
 def test_a_key_that_is_set_stays(tmp_path: Path) -> None:
@@ -282,6 +385,27 @@ def test_a_tip_with_lumen_stroke_and_force() -> None:
 
 
 @pytest.mark.long
+@pytest.mark.parametrize(
+    ("least", "best"),
+    [({"stroke@10kPa": 10}, "mass"), ({"stroke@10kPa": 8, "force@4mm@20kPa": 0.4}, "height")],
+)
+def test_no_real_design_is_better(least: dict[str, float], best: str) -> None:
+    free = (Free("chamber.diameter", 4.0, 9.0, 0.1), Free("stack.balloons", 2, 12, 1))
+    found = sbafab.find("1dof-5mm", least=least, best=best, free=free)
+    asked = [f"{name}={value}" for name, value in least.items()]
+    requirements, goal = read_all(asked, [], best)
+    wanted = Wanted(sbafab.load("1dof-5mm"), requirements, goal)
+    every = (
+        tried(wanted, {"chamber.diameter": round(4 + step / 10, 1), "stack.balloons": n})
+        for step, n in itertools.product(range(51), range(2, 13))
+    )
+    lightest = min(trial.rank for trial in every)
+    assert found.holds
+    assert found.best.rank == lightest
+    assert found.tries < 51 * 11
+
+
+@pytest.mark.long
 def test_optuna_finds_it_too_and_goes_on_from_its_storage(tmp_path: Path) -> None:
     pytest.importorskip("optuna")
     storage = f"sqlite:///{tmp_path / 'search.db'}"
@@ -332,3 +456,7 @@ def test_a_search_by_optuna_that_is_stopped_goes_on(
     # 0.6 of the tries are Optuna's, each told to the end.
     states = [trial.state.name for trial in kept.trials]
     assert states.count("COMPLETE") == 12
+    # A design that was changed is another search, whatever its name.
+    changed = replace(request, design=sbafab.load("1dof-5mm", "inlet.tab_length=6"))
+    find(changed)
+    assert len(optuna.get_all_study_summaries(request.storage or "")) == 2
