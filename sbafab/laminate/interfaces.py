@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from sbafab.geometry.boolean import divided, union
+from sbafab.geometry.once import once
 from sbafab.geometry.region import Region
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ class Interface:
     def layer_indices(self) -> tuple[int, ...]:
         return (self.below.index, *(mask.index for mask in self.masks), self.above.index)
 
-    @property
+    @once
     def pattern(self) -> tuple[str, ...]:
         """Equal for interfaces made of equal profiles."""
         return (

@@ -237,6 +237,10 @@ def start(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
     """Bulged films to begin with, as high as their pressure may lift them."""
     flat, free = balloon.nodes, balloon.pocket - balloon.neck
     rise = 0.3 * free * np.cbrt(load.pressure * balloon.pocket / (balloon.modulus * 0.0025))
+    if balloon.rigidity > 0:
+        # A thick film rises as a plate that is clamped all round: by less.
+        plate = load.pressure * free**4 / ((384 if balloon.neck else 64) * balloon.rigidity)
+        rise = np.minimum(rise, plate)
     rise = np.clip(rise, 0.05 * free, 0.8 * free)
     rise = np.maximum(rise, load.half) if load.tied else rise
     shape = np.clip(1 - ((flat - balloon.neck) / free) ** 2, 0.0, 1.0)

@@ -15,17 +15,25 @@ SIZES = {
     "d = 3": Balloon(1.5, neck=0.75, bore=0.3),
     "d = 5": Balloon(2.5, neck=1.27, bore=0.52),
     "d = 8": Balloon(4.0, neck=1.0, bore=0.3),
+    "d = 12": Balloon(6.0, neck=1.0, bore=0.4),
 }
 SIZES["unlike films"] = replace(
     SIZES["d = 5"], mate=replace(SIZES["d = 5"], thickness=0.05, modulus=40_000.0)
 )
+FREE = {"d = 3": 0.006, "d = 5": 0.006, "d = 8": 0.013, "d = 12": 0.017, "unlike films": 0.01}
+"""How near free heights are, as shares."""
 PULLED = 1.3
 """The height to which balloons are pulled here, as a share of where they stand freely."""
 
 
 @pytest.fixture(scope="module", params=SIZES)
-def made(request: pytest.FixtureRequest) -> BalloonMap:
-    return balloon_map(SIZES[request.param], 110.0)
+def name(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture(scope="module")
+def made(name: str) -> BalloonMap:
+    return balloon_map(SIZES[name], 110.0)
 
 
 @pytest.mark.parametrize(("least", "most"), [(0.05, 1.0), (1.0, PULLED)], ids=["pressed", "pulled"])
@@ -42,11 +50,11 @@ def test_forces_are_within_two_percent(made: BalloonMap, least: float, most: flo
     assert made.volume(p, h) == pytest.approx(found.volume, rel=0.02)
 
 
-def test_free_heights_are_within_a_hundredth(made: BalloonMap) -> None:
-    p = np.geomspace(0.2, 40.0, 25)
+def test_free_heights_are_near(name: str, made: BalloonMap) -> None:
+    p = np.geomspace(0.06, 100.0, 40)
     free = inflate(made.balloon, p).height
     inside = free < 0.95 * made.most_height
-    assert made.free_height(p[inside]) == pytest.approx(free[inside], rel=0.011)
+    assert made.free_height(p[inside]) == pytest.approx(free[inside], rel=FREE[name])
 
 
 def test_without_pressure_it_holds_and_widens_as_its_films_do(made: BalloonMap) -> None:

@@ -1,0 +1,53 @@
+"""The deck makes no objects that hold each other: it may keep Python from looking for them."""
+
+from __future__ import annotations
+
+import gc
+
+import pytest
+
+from sbafab.actuators import build, load_design
+from sbafab.laminate.laminate import Laminate
+from sbafab.output.settings import limits
+from sbafab.rules import deck
+from sbafab.rules.deck import run_deck
+from sbafab.rules.limits import Limits
+
+
+@pytest.mark.parametrize("method", ["channel-pin", "ears"])
+@pytest.mark.parametrize("template", ["1dof-5mm", "3dof-15mm", "radial-15mm"])
+def test_a_deck_leaves_no_rings(template: str, method: str) -> None:
+    def asked(overhang: float) -> tuple[Laminate, Limits]:
+        made = load_design(
+            template, [f'registration.method="{method}"', f"mask.overhang={overhang}"]
+        )
+        return build(made), limits(made)
+
+    # Once before, for what is loaded and compiled at the first time.
+    run_deck(*asked(0.53))
+    other = asked(0.57)
+    gc.collect()
+    gc.disable()
+    try:
+        run_deck(*other)
+        assert not gc.isenabled()
+        assert gc.collect() == 0
+    finally:
+        gc.enable()
+
+
+def test_python_looks_for_rings_again_whatever_ends_the_deck(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made = load_design("1dof-5mm", ["stack.balloons=1"])
+    seen = []
+
+    def stopped(*_: object) -> None:
+        seen.append(gc.isenabled())
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(deck, "run_rule", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        run_deck(build(made), limits(made))
+    assert seen == [False]
+    assert gc.isenabled()
