@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -88,28 +86,11 @@ def run_deck(
     """What every rule finds, in the deck's order; failures the user waived say so."""
     findings: list[Finding] = []
     measures = Measures(laminate, limits)
-    with _no_search_for_rings():
-        for number, rule in enumerate(RULES):
-            if progress is not None:
-                progress(rule.name, number, len(RULES))
-            findings += run_rule(rule, laminate, limits, measures)
+    for number, rule in enumerate(RULES):
+        if progress is not None:
+            progress(rule.name, number, len(RULES))
+        findings += run_rule(rule, laminate, limits, measures)
     return tuple(findings)
-
-
-@contextmanager
-def _no_search_for_rings() -> Iterator[None]:
-    """Keeps Python from looking for objects that hold each other, a sixth of the deck's time.
-
-    The rules make many records, and no such rings (a test looks for them): all that is not kept is
-    freed as ever.
-    """
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
 
 
 def run_rule(

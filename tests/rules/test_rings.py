@@ -1,4 +1,6 @@
-"""The deck makes no objects that hold each other: it may keep Python from looking for them."""
+"""The deck makes no objects that hold each other: what it leaves is freed at once, and memory stays
+flat however seldom Python looks for rings.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,6 @@ import pytest
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
 from sbafab.output.settings import limits
-from sbafab.rules import deck
 from sbafab.rules.deck import run_deck
 from sbafab.rules.limits import Limits
 
@@ -30,24 +31,6 @@ def test_a_deck_leaves_no_rings(template: str, method: str) -> None:
     gc.disable()
     try:
         run_deck(*other)
-        assert not gc.isenabled()
         assert gc.collect() == 0
     finally:
         gc.enable()
-
-
-def test_python_looks_for_rings_again_whatever_ends_the_deck(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    made = load_design("1dof-5mm", ["stack.balloons=1"])
-    seen = []
-
-    def stopped(*_: object) -> None:
-        seen.append(gc.isenabled())
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(deck, "run_rule", stopped)
-    with pytest.raises(KeyboardInterrupt):
-        run_deck(build(made), limits(made))
-    assert seen == [False]
-    assert gc.isenabled()
