@@ -17,9 +17,9 @@ Inflated = Mapping[Balloon, Shapes]
 ELASTIC = Model(
     "elastic balloon",
     "membrane of revolution, the film's modulus",
-    "one balloon to 10 kPa: within 1.2 % of an axisymmetric mesh; d = 5 to 6 kPa within 3 % of a "
-    "solid one that wrinkles, while d = 10, whose rim then ripples, rises up to a quarter more; "
-    "all balloons of a stack are taken for inner ones, inlets left out",
+    "one balloon to 10 kPa: within 1.2 % of an axisymmetric mesh; of a solid one that ripples, "
+    "d = 5 within 3 %, d = 10 within 7 %, but 9 to 23 % low where a lone one's rim rolls to one "
+    "side; all balloons of a stack are taken for inner ones, inlets left out",
 )
 
 

@@ -300,6 +300,12 @@ def _calibrated_bent(found: Prediction) -> Iterator[Row]:
         )
 
 
+def aim(measured: paper.Measured) -> float:
+    """How near a held-out figure was to come, in its unit."""
+    within = {"N": 0.1 * measured.value, "mm": 0.05 * measured.value, "deg": 6.0, "s": 0.08}
+    return within[measured.unit]
+
+
 def _calibrated_motion(three: Stack) -> Iterator[Row]:
     """What 10 kPa in the chambers do, tubes left out: the paper speaks of the SBA's internal
     pressure.
