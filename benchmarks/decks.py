@@ -14,6 +14,11 @@ STEP = 0.001
 """mm from one design to the next."""
 
 
+def other_height(template: str, turn: int) -> float:
+    """Seconds for a design of an outline that was checked before, one balloon higher or lower."""
+    return checked(template, -1, f"stack.balloons={2 + turn % 12}")
+
+
 def checked(template: str, turn: int, *settings: str) -> float:
     """Seconds from a design to its findings: laminate, interfaces and all rules."""
     from sbafab.actuators import build, load_design

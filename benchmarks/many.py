@@ -7,6 +7,7 @@ import resource
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import NamedTuple
 
 DESIGN = "1dof-5mm"
@@ -43,5 +44,10 @@ def measured(designs: int) -> Iterator[Reached]:
 
 def _most_memory() -> float:
     """The most memory that this process has held, MB."""
+    status = Path("/proc/self/status")
+    if status.exists():
+        # What the system counts for a process begins with what held it: this does not.
+        (line,) = (one for one in status.read_text().splitlines() if one.startswith("VmHWM"))
+        return int(line.split()[1]) / 1e3
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return most / (1e6 if sys.platform == "darwin" else 1e3)

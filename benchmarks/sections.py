@@ -91,6 +91,10 @@ def rule_decks(rounds: int) -> Section:
         decks.checked(template, -1)
         taken = [decks.checked(template, turn) for turn in range(3 * rounds)]
         rows.append(Row(template, taken, f"{len(taken) / sum(taken):.1f} designs a second"))
+    for template in ("1dof-5mm", "3dof-15mm"):
+        taken = [decks.other_height(template, turn) for turn in range(12)]
+        told = f"{len(taken) / sum(taken):.1f} designs a second"
+        rows.append(Row(f"{template}, other heights", taken, told))
     return Section("decks", "A design built, and all rules", rows)
 
 

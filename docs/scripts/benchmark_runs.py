@@ -60,7 +60,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m docs.scripts.benchmark_runs")
     parser.add_argument("--before", type=Path, required=True)
     parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--designs", type=int, default=2000)
+    parser.add_argument("--designs", type=int, default=10_000)
     arguments = parser.parse_args()
     keep_to_one_core()
     rivals = python_of(ROOT / ".benchmarks" / "venv")
