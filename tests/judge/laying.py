@@ -29,7 +29,10 @@ COVER = 0.11
 LAID = re.compile(r"\b(TPE|PTFE) ([a-z ]+?) (P\d+)")
 ALONG = r"(?:([\d.]+) mm )?(on|outside|inside) that of the (?:TPE|PTFE) [a-z ]+ below"
 WHOLE = r", (all round(?: but for the tabs)?)"
-BY_HAND = re.compile(rf"No pin holds (P\d+): lay by eye, (?:its|each) edge {ALONG}{WHOLE}")
+BY_HAND = re.compile(
+    r"No pin holds (P\d+)(?: in layers? ([^:]+))?: "
+    rf"lay by eye, (?:its|each) edge {ALONG}{WHOLE}"
+)
 NUMBERED = re.compile(rf"Lay (?:its|each) edge (?:\(layer (\d+)\) )?(.*? below \(layer.*?){WHOLE}")
 STACK = re.compile(r"Lay the (?:stack|\d+ stacks) from step \d+ \(layers? ([^)]*)\)")
 BESIDE = re.compile(rf"{ALONG} \(layer (\d+)\)")
@@ -176,8 +179,9 @@ def _by_hand(
     folder: Folder, said: str, lying: list[int], indices: list[int], of: dict[int, str]
 ) -> Iterator[Disagreement]:
     """Edges that are laid along others lie so in the files, wherever this line lays them."""
-    for pattern, far, way, whole in BY_HAND.findall(said):
-        for index in (index for index in indices if of[index] == pattern):
+    for pattern, those, far, way, whole in BY_HAND.findall(said):
+        named = listed(those) if those else indices
+        for index in (index for index in named if of[index] == pattern):
             below = [other for other in lying if other < index]
             if below:
                 yield from _beside(folder, (index, max(below)), far, way, whole)

@@ -143,8 +143,23 @@ def test_pins_are_drawn_filled_where_they_are_in(sheet_files: Any) -> None:
 
 def test_what_no_pin_holds_is_laid_by_eye(sheet_files: Any) -> None:
     # One chamber has no lumen, and its separators open wider than the only pin.
-    assert page_of(work_of(sheet_files, "1dof-5mm")).count("No pin holds P04: lay by eye") == 2
+    page = page_of(work_of(sheet_files, "1dof-5mm"))
+    edge = "lay by eye, its edge 0.5 mm outside that of the TPE wall"
+    # The lowest of its step has nothing below it.
+    assert f"No pin holds P04 in layer 4: {edge} above" in page
+    assert f"No pin holds P04 in layers 8, 12, 16: {edge} below" in page
+    assert f"No pin holds P04: {edge} below" in page
+    assert page.count("No pin holds P") == 3
     assert "No pin holds P" not in page_of(work_of(sheet_files, "3dof-15mm"))
+
+
+def test_one_pattern_on_films_of_two_sizes_is_laid_along_each(sheet_files: Any) -> None:
+    """A separator reaches 0.5 mm out of the smaller wall, and so 0.3 out of one 0.4 wider."""
+    sizes = ("chamber.diameter=[5.4, 3, 5.4, 5, 5]", "stack.balloons=5")
+    page = page_of(work_of(sheet_files, "1dof-5mm", *sizes))
+    said = "No pin holds P10 in layer {}: lay by eye, its edge {} mm outside that of the TPE wall"
+    assert said.format(12, 0.3) in page
+    assert said.format(16, 0.5) in page
 
 
 @pytest.mark.parametrize(("balloons", "turns"), [(3, 1), (4, 2), (15, 13), (20, 18)])

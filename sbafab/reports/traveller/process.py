@@ -192,7 +192,7 @@ def _lay_round(things: Things, turn: Round, pins: Sequence[Pin]) -> Action:
     order = ", then ".join(_named(layer) for layer in turn.turns[0])
     return Action(
         f"Lay layers {turn.first.index} to {turn.last.index}, {turn.count} times the same "
-        f"{len(turn.places)}, lowest first: {order}." + _by_eye(things, turn.turns[-1], pins),
+        f"{len(turn.places)}, lowest first: {order}." + _by_eye(things, turn.layers, pins),
         tuple(layer.index for layer in turn.layers),
         tuple(layer_numbers([layer.index for layer in part]) for part in turn.turns),
     )
@@ -212,15 +212,18 @@ def _by_eye(things: Things, layers: Sequence[Layer], pins: Sequence[Pin]) -> str
     """Sentences on those of the layers that none of the pins in the plate holds."""
     if not pins:
         return "".join(_along(things, layer) for layer in layers[:1])
-    loose = {
-        layer.pattern: layer
-        for layer in layers
-        if not set(pins).intersection(things.laminate.pins_holding(layer))
-    }
+    # A pattern may lie on a larger film here and on a smaller one there.
+    lines: dict[str, dict[str, list[int]]] = {}
+    for layer in layers:
+        if not set(pins).intersection(things.laminate.pins_holding(layer)):
+            line = things.line_up(layer.index, numbered=False)
+            lines.setdefault(layer.pattern, {}).setdefault(line, []).append(layer.index)
     said = []
-    for pattern, layer in loose.items():
-        line = things.line_up(layer.index, numbered=False)
-        said.append(f" No pin holds {pattern}: lay by eye{', ' if line else ''}{line}.")
+    for pattern, found in lines.items():
+        for line, indices in found.items():
+            many = "layers" if len(indices) > 1 else "layer"
+            where = f" in {many} {layer_numbers(indices)}" if len(found) > 1 else ""
+            said.append(f" No pin holds {pattern}{where}: lay by eye{', ' if line else ''}{line}.")
     return "".join(said)
 
 
