@@ -20,8 +20,10 @@ HOLE = 0.012
 """mm by which a hole's middle or its diameter may differ from what the page says."""
 SHOWN = 0.0051
 """mm by which a figure with two digits behind the point may be off."""
-EDGE = 0.03
+EDGE = 0.04
 """mm by which an edge may lie elsewhere than said, so that no hand sees it."""
+TABS = 0.6
+"""Share of an outline of many chambers that may be tabs, where the rest is laid along."""
 APART = 0.2
 """mm between the points at which edges are held against each other."""
 COVER = 0.11
@@ -201,7 +203,7 @@ def _beside(
     wanted = float(far or 0) * (-1 if way == "inside" else 1)
     gaps = _outside(own, other)
     off = np.abs(gaps - wanted) > EDGE + folder.chord_error
-    if np.mean(off) > (0.5 if "tabs" in whole else 0.0):
+    if np.mean(off) > (TABS if "tabs" in whole else 0.0):
         yield Disagreement(
             "traveller",
             f"layer {pair[0]} is to lie {far} {way} layer {pair[1]} {whole}, and lies "
