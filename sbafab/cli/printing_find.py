@@ -6,9 +6,7 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from rich.text import Text
-
-from sbafab.cli.lines import console
+from sbafab.cli.lines import print_line
 from sbafab.output.schemas import FIND_SCHEMA
 from sbafab.search.find import FoundDesign
 from sbafab.search.quantities import shown_value
@@ -53,39 +51,43 @@ def print_found(found: FoundDesign, started: str, target: Path) -> None:
     """The design with its figures, what binds and the front; or the nearest miss."""
     keys = _keys(found.best)
     if found.holds:
-        _say(f"{target}: {keys}, from {started}", "bold")
+        print_line(f"{target}: {keys}, from {started}", "bold")
     else:
-        _say(f"Nearest miss: {keys}, from {started}", "bold red")
+        print_line(f"Nearest miss: {keys}, from {started}", "bold red")
     for one in found.wanted.requirements:
         value = found.best.value(one)
         said = f"  {one.quantity.said} {shown_value(one.quantity, value)}"
-        _say(f"{said}; {one.bound}" if one.holds(value) else f"{said}, not {one.bound}  MISSED")
+        print_line(
+            f"{said}; {one.bound}" if one.holds(value) else f"{said}, not {one.bound}  MISSED"
+        )
     goal = found.wanted.goal
     value = found.best.value(goal)
     said = goal.said if found.holds else goal.quantity.said
-    _say(f"  {said}: {shown_value(goal.quantity, value)}")
+    print_line(f"  {said}: {shown_value(goal.quantity, value)}")
     for said in found.broken_rules:
-        _say(f"  {said}")
+        print_line(f"  {said}")
     told = found.binds or found.ends or (found.holds and found.without_room)
     if told:
-        _say("What binds" if found.holds else "What stops it there", "bold")
+        print_line("What binds" if found.holds else "What stops it there", "bold")
     for bind in found.binds:
-        _say(f"  {bind.key} = {bind.value:g}: {bind.breaks}")
+        print_line(f"  {bind.key} = {bind.value:g}: {bind.breaks}")
     _print_ends(found)
     if not found.holds:
         _print_miss(found)
         return
     for spare in found.without_room:
-        _say(f"  {spare.rule} {spare.place}: {spare.measured:g} {spare.unit}, nothing to spare")
+        print_line(
+            f"  {spare.rule} {spare.place}: {spare.measured:g} {spare.unit}, nothing to spare"
+        )
     _print_front(found)
     _print_cut(found)
-    _say(f"Next: sbafab generate {shlex.quote(str(target))}")
+    print_line(f"Next: sbafab generate {shlex.quote(str(target))}")
 
 
 def _print_cut(found: FoundDesign) -> None:
     if found.is_cut_short:
         more = 2 * found.tries
-        _say(f"All {found.tries} tries are used up; --tries {more} may lead to a better one")
+        print_line(f"All {found.tries} tries are used up; --tries {more} may lead to a better one")
 
 
 def _print_ends(found: FoundDesign) -> None:
@@ -94,7 +96,7 @@ def _print_ends(found: FoundDesign) -> None:
         low, high = one.low, one.high + span
         if one.value <= one.low:
             low, high = max(one.step, one.low - span), one.high
-        _say(
+        print_line(
             f"  {one.key} = {one.value:g} is the end of its range, {one.low:g} to {one.high:g}; "
             f"--free {one.key}={low:g}:{high:g}:{one.step:g} lets it go further"
         )
@@ -108,24 +110,20 @@ def _print_miss(found: FoundDesign) -> None:
     }
     is_free = any(one.key == "inlet.tab_length" for one in found.free)
     if "overall_diameter" in missed and not is_free:
-        _say(TABS)
+        print_line(TABS)
     _print_cut(found)
     words = f"None of {found.tries} designs meets all, and nothing was written: ask for less, "
-    _say(words + "or free more with --free KEY=LOW:HIGH:STEP")
+    print_line(words + "or free more with --free KEY=LOW:HIGH:STEP")
 
 
 def _print_front(found: FoundDesign) -> None:
     if len(found.front) < 2:
         return
     some = f"{len(found.front)} of " if found.on_front > len(found.front) else ""
-    _say(f"Pareto front, {some}{found.on_front} of the {found.tries} designs tried", "bold")
+    print_line(f"Pareto front, {some}{found.on_front} of the {found.tries} designs tried", "bold")
     for trial in found.front:
         figures = ", ".join(f"{name} {value:.4g}" for name, value in trial.figures.items())
-        _say(f"  {_keys(trial)}: {figures}")
-
-
-def _say(text: str, style: str = "") -> None:
-    console().print(Text(text, style=style), soft_wrap=True)
+        print_line(f"  {_keys(trial)}: {figures}")
 
 
 def _keys(trial: Trial) -> str:
