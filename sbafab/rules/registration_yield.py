@@ -210,8 +210,10 @@ def _counted(
         for quantity in QUANTITIES:
             quantities[quantity] += _different(bad[is_of[quantity][asked]])
         every = np.sort(own_index[asked] * builds + bad)
-        for place in every[np.diff(every, prepend=-1) > 0].tolist():
-            interfaces[place // builds] += 1
+        short = every[np.diff(every, prepend=-1) > 0] // builds
+        for index, number in enumerate(np.bincount(short).tolist()):
+            if number:
+                interfaces[index] += number
     return Yield(
         Share(wanted - whole, wanted),
         {index: Share(wanted - bad, wanted) for index, bad in interfaces.items()},
