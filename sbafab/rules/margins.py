@@ -244,35 +244,49 @@ class Felt(NamedTuple):
 
 
 def narrow_places(
-    felt: Felt,
-    widest: float,
+    every: Sequence[Felt],
     pins: tuple[Pin, ...],
     limits: Limits,
-    reaches: Sequence[tuple[Edge, Reach]],
-) -> dict[Quantity, Places]:
+    reaches: Sequence[Sequence[tuple[Edge, Reach]]],
+) -> list[dict[Quantity, Places]]:
     """All margins that could become the least under the tolerances, or come short of a limit.
 
-    ``widest`` is the greatest slack of all with the same bond, ``reaches`` is how far masks reach
-    past film edges.
+    ``reaches`` is how far masks reach past film edges, for each of the interfaces that are alike.
     """
-    from sbafab.rules.narrow_places import bond_places, overhang_places
+    from sbafab.rules.narrow_places import BondAsked, OverhangAsked, places_of, profiles_of
 
-    interface, loss = felt.alike[0], felt.loss
-    if interface.contact.is_empty:
-        return {}
-    found: dict[Quantity, Places] = {}
-    if felt.bond is not None:
-        found["bond"] = bond_places(interface, felt.bond, felt.slack(limits), widest)
+    slacks = [felt.slack(limits) for felt in every]
+    # Of one bond all interfaces ask for the same places.
+    widest: dict[Region, float] = {}
+    for felt, slack in zip(every, slacks, strict=True):
+        bond = felt.alike[0].bond
+        widest[bond] = max(slack, widest.get(bond, 0.0))
+    asked: list[tuple[int, Quantity, BondAsked | OverhangAsked]] = []
     flush = limits.mask_overhang
-    free = [
-        (edge, reach)
-        for edge, reach in reaches
-        if holds(reach.value, flush) or not pin_at(edge, pins)
-    ]
-    if free:
-        least = min(reach.value for _, reach in free)
-        slack = loss.slack(least, flush, limits.worst_mask_overhang)
-        found["overhang"] = overhang_places(interface, free, slack)
+    for number, (felt, slack) in enumerate(zip(every, slacks, strict=True)):
+        interface = felt.alike[0]
+        if interface.contact.is_empty:
+            continue
+        profiles = profiles_of(interface)
+        if felt.bond is not None:
+            bond = interface.bond
+            asked.append(
+                (number, "bond", BondAsked(bond, felt.bond, slack, widest[bond], profiles))
+            )
+        free = tuple(
+            (edge, reach)
+            for edge, reach in reaches[number]
+            if holds(reach.value, flush) or not pin_at(edge, pins)
+        )
+        if free:
+            least = min(reach.value for _, reach in free)
+            farther = felt.loss.slack(least, flush, limits.worst_mask_overhang)
+            overhang = OverhangAsked(interface.mask, free, farther, profiles)
+            asked.append((number, "overhang", overhang))
+    found: list[dict[Quantity, Places]] = [{} for _ in every]
+    told = places_of([one for *_, one in asked])
+    for (number, quantity, _), places in zip(asked, told, strict=True):
+        found[number][quantity] = places
     return found
 
 

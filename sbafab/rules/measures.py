@@ -74,22 +74,10 @@ class Measures:
             Felt.of(alike, limits, self.moves, self.bond(alike[0]))
             for alike in felt_alike(self.laminate, self.facing, self.moves)
         ]
-        widest: dict[Region, float] = {}
-        for felt in every:
-            bond = felt.alike[0].bond
-            widest[bond] = max(felt.slack(limits), widest.get(bond, 0.0))
+        reaches = [self.reaches(felt.alike[0]) for felt in every]
+        found = narrow_places(every, self.laminate.pins, limits, reaches)
         return [
-            InterfaceMargins(
-                felt.alike,
-                narrow_places(
-                    felt,
-                    widest[felt.alike[0].bond],
-                    self.laminate.pins,
-                    limits,
-                    self.reaches(felt.alike[0]),
-                ),
-            )
-            for felt in every
+            InterfaceMargins(felt.alike, places) for felt, places in zip(every, found, strict=True)
         ]
 
     @cached_property
