@@ -47,7 +47,7 @@ class FacingPlaces(NamedTuple):
 NOWHERE = FacingPlaces(np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0))
 
 
-Asked = tuple[Region, float, float, Width | None]
+FacingAsked = tuple[Region, float, float, Width | None]
 """What is asked of a region: the slack (mm), what is sharp (degrees), the least width if known."""
 
 
@@ -65,7 +65,7 @@ def facing_places(
 
 
 @remembered_together
-def facing_places_of(asked: Sequence[Asked]) -> Sequence[FacingPlaces]:
+def facing_places_of(asked: Sequence[FacingAsked]) -> Sequence[FacingPlaces]:
     """The same of several regions."""
     found = [NOWHERE] * len(asked)
     searched: dict[int, Gathered] = {}
