@@ -50,8 +50,9 @@ class ErrorsAsked(NamedTuple):
 class LikelyBuilds(NamedTuple):
     """Builds by the number of what asks, in rising order: what cuts and shifts leave, mm.
 
-    Shifts count by the length of all together, which no normal loses more than. ``moves`` are x and
-    y of each shift, 0 and 0 where a move turns. What asks has no other builds below its ``level``.
+    Shifts count by the length of all together, which no normal loses more than. ``moves`` has a
+    row a build, with x and y of each shift, 0 and 0 where a move turns. What asks has no other
+    builds below its ``level``.
     """
 
     asked: Indices
@@ -110,19 +111,19 @@ def _found(batch: DrawnBuilds, errors: ErrorsAsked, level: Floats) -> LikelyBuil
         some = picked(left < (level + rest).take(asked))
         asked, builds = asked.take(some), builds.take(some)
         held, left = held.take(some), left.take(some)
-    moves = np.zeros((2 * len(shift), len(asked)))
+    moves = np.zeros((len(asked), 2 * len(shift)))
     together = np.zeros((2, len(asked)))
     for line, most in enumerate(shift):
         own = picked(most.take(asked) > 0)
         place = errors.first[2 + line].take(asked[own]) * count + builds[own]
         radius = most.take(asked[own]) * np.sqrt(drawn.take(place))
         angle = math.tau * drawn.take(place + count)
-        moves[2 * line, own] = radius * np.cos(angle)
-        moves[2 * line + 1, own] = radius * np.sin(angle)
-        together += errors.sign[line].take(asked) * moves[2 * line : 2 * line + 2]
+        moves[own, 2 * line] = radius * np.cos(angle)
+        moves[own, 2 * line + 1] = radius * np.sin(angle)
+        together += errors.sign[line].take(asked) * moves[:, 2 * line : 2 * line + 2].T
     left = held - np.hypot(*together)
     some = picked(left < level.take(asked))
-    return LikelyBuilds(asked[some], builds[some], left[some], moves.take(some, axis=1), level)
+    return LikelyBuilds(asked[some], builds[some], left[some], moves.take(some, axis=0), level)
 
 
 def _cut(numbers: Floats, errors: ErrorsAsked, level: Floats) -> tuple[Indices, Indices, Floats]:

@@ -13,7 +13,7 @@ from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.boundary import Reach, edges_along, outward_reach
 from sbafab.rules.facing import Facing, facing_films
-from sbafab.rules.forms import LinearForm, linear_forms
+from sbafab.rules.forms import LinearForms, linear_forms
 from sbafab.rules.freedoms import Freedoms, Laid, freedoms, lay_up
 from sbafab.rules.limits import Limits
 from sbafab.rules.margins import SHARP, Felt, InterfaceMargins, felt_alike, narrow_places
@@ -81,7 +81,7 @@ class Measures:
         ]
 
     @cached_property
-    def forms(self) -> list[tuple[LinearForm, ...]]:
+    def forms(self) -> list[tuple[LinearForms, ...]]:
         """The same as linear forms."""
         return [linear_forms(own, self.moves) for own in self.margins]
 

@@ -108,8 +108,8 @@ def _of_kinds(which: np.ufunc, rows: Floats, begins: Indices) -> Floats:
 class _Drawn(NamedTuple):
     """Builds of what is asked: by number of what asks, of its kind and of the build.
 
-    ``cuts`` are both cutting errors by their signs, ``moves`` x and y of each shift, or a turn
-    and 0.
+    ``cuts`` are both cutting errors by their signs; ``moves`` has a row a build, with x and y of
+    each shift, or a turn and 0.
     """
 
     asked: Indices
@@ -124,7 +124,7 @@ class _Drawn(NamedTuple):
             self.kind[some],
             self.build[some],
             self.cuts[:, some],
-            self.moves[:, some],
+            self.moves[some],
         )
 
 
@@ -186,10 +186,10 @@ class RandomBuilds:
                 turns.append((line, number))
         own = picked(left < SURE)
         asked, builds = asked.take(own), builds.take(own)
-        kind, moves = self.kind.take(asked), likely.moves.take(some.take(own), axis=1)
+        kind, moves = self.kind.take(asked), likely.moves.take(some.take(own), axis=0)
         for line, number in turns:
             most = table.turn[line].take(kind)
-            moves[2 * line] += np.where(most > 0, -most + (most + most) * number.take(own), 0.0)
+            moves[:, 2 * line] += np.where(most > 0, -most + (most + most) * number.take(own), 0.0)
         cutting = self.errors.cutting
         number = drawn.take(first[:2].take(asked, axis=1) * count + builds)
         cuts = self.errors.signs.take(asked, axis=1) * (-cutting + (cutting + cutting) * number)
@@ -205,7 +205,7 @@ class RandomBuilds:
             step = max(1, AT_ONCE // (own.stop - own.start))
             for first in range(start, stop, step):
                 builds = slice(first, min(stop, first + step))
-                left = table.factors[:, own].T @ drawn.moves[:, builds]
+                left = table.factors[:, own].T @ drawn.moves[builds].T
                 left += table.room[own, None]
                 least[builds] = left.min(axis=0)
         found: Floats = least + drawn.cuts[0] + drawn.cuts[1]
@@ -222,7 +222,7 @@ class RandomBuilds:
             left = table.room[own]
             for cut in drawn.cuts[:, number]:
                 left = left + cut
-            for factor, moved in zip(table.factors[:, own], drawn.moves[:, number], strict=True):
+            for factor, moved in zip(table.factors[:, own], drawn.moves[number], strict=True):
                 left = left + factor * moved
             bad[number] = bool((left < -TOLERANCE).any())
         return bad

@@ -102,9 +102,9 @@ def test_forms_lose_what_their_pushes_cost(good: Good) -> None:
     laminate = good("3dof-15mm", "stack.balloons=2")
     measures = Measures(laminate, Limits())
     for group in measures.margins:
-        for form in linear_forms(group, measures.moves):
-            for number, whole, pinned in zip(
-                form.numbers, form.loss(), form.loss(by_hand=False), strict=True
+        for forms in linear_forms(group, measures.moves):
+            for number, (whole, pinned) in enumerate(
+                zip(forms.loss(), forms.loss(by_hand=False), strict=True), forms.first
             ):
                 found = pushes(group[number], group.first, measures.moves)
                 assert whole == pytest.approx(sum(push.cost for push in found))
