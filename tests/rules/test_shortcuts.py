@@ -13,9 +13,9 @@ import pytest
 
 from sbafab.geometry.boolean import divided, union
 from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
-from sbafab.laminate.laminate import Laminate
-from sbafab.rules import boundary, draws, freedoms, likely_builds, margins
+from sbafab.geometry.shapes import disc, polygon, rectangle, strip
+from sbafab.laminate.laminate import Inlet, Laminate
+from sbafab.rules import boundary, draws, freedoms, likely_builds, margins, tube_fit
 from sbafab.rules.boundary import outward_reach
 from sbafab.rules.draws import CutContour, DrawnBuilds, numbers, rows_by_error
 from sbafab.rules.forms import linear_forms
@@ -212,6 +212,48 @@ def test_likely_builds_are_those_of_plain_sums(need: float) -> None:
             if left < need:
                 assert found[asked, build] == pytest.approx(left, abs=1e-12)
     assert 0 < len(found) < 400
+
+
+RUN = Inlet("chamber1", (9.0, 0.5), (1.0, 0.0), 1.6, 3.0, 0.8)
+STRIP = rectangle((0.0, -0.3), (9.0, 1.3))
+"""A strip that opens at the inlet of that run."""
+
+
+@pytest.mark.parametrize("degrees", [0, 90, 120, 263])
+def test_a_straight_run_is_what_a_boolean_leaves_of_it(degrees: float) -> None:
+    pocket = (STRIP | disc((0.0, 0.5), 2.5)).turned(degrees)
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    mouth = 9.0 * c - 0.5 * s, 9.0 * s + 0.5 * c
+    inlet = replace(RUN, mouth=mouth, direction=(c, s))
+    inner = mouth[0] - 3.0 * c, mouth[1] - 3.0 * s
+    beside = strip(inner, mouth, 2 * inlet.width)
+    run = tube_fit._straight_run(pocket, inlet, beside)
+    assert run is not None
+    assert run.area == pytest.approx(3.0 * 1.6)
+    assert [edge.start for edge in run.edges] == [
+        pytest.approx(edge.start) for edge in (pocket & beside).edges
+    ]
+
+
+@pytest.mark.parametrize(
+    "unbonded",
+    [
+        # A hole in the run, a waist, sides aslant, a shape beside it, wider than is looked at.
+        STRIP - disc((7.5, 0.5), 0.1),
+        STRIP - rectangle((7.0, -1.0), (7.5, 0.0)),
+        polygon([(0, -0.3), (9, -0.2), (9, 1.3), (0, 1.3)]),
+        STRIP | rectangle((7.0, 1.5), (7.5, 2.0)),
+        rectangle((0.0, -1.2), (9.0, 2.2)),
+        # It ends before the mouth, goes on past it, or begins after the run does.
+        rectangle((0.0, -0.3), (8.9, 1.3)),
+        rectangle((0.0, -0.3), (9.5, 1.3)),
+        rectangle((6.5, -0.3), (9.0, 1.3)),
+    ],
+)
+def test_any_other_run_is_left_to_the_boolean(unbonded: Region) -> None:
+    beside = strip((6.0, 0.5), (9.0, 0.5), 3.2)
+    assert tube_fit._straight_run(STRIP, RUN, beside) is not None
+    assert tube_fit._straight_run(unbonded, RUN, beside) is None
 
 
 FRAME = rectangle((-20, -20), (20, 20))
