@@ -72,7 +72,8 @@ def outward_reach(edge: Edge, others: EdgeIndex) -> Reach | None:
     band = _line_band(edge) if isinstance(edge, Line) else _arc_band(edge)
     margin = 1.0
     while True:
-        best = _nearest(band, _across(edge, margin, others.touching(_swept(edge, margin))))
+        moved = edge.offset(margin)
+        best = _nearest(band, _across(edge, moved, others.touching(_swept(edge, moved))))
         if best is not None and best.value <= margin:
             return best
         if others.all_within(widened(edge.bounds, margin)):
@@ -80,19 +81,23 @@ def outward_reach(edge: Edge, others: EdgeIndex) -> Reach | None:
         margin *= 4
 
 
-def _swept(edge: Edge, distance: float) -> Bounds:
-    """A box round what the edge sweeps when it moves ``distance`` along its right-hand normal."""
-    moved = edge.offset(distance)
+def _swept(edge: Edge, moved: Edge | None) -> Bounds:
+    """A box round what the edge sweeps when it moves along its right-hand normal.
+
+    An arc that shrinks to nothing on its way sweeps what lies between it and its centre.
+    """
+    one = edge.bounds
     if moved is None:
-        return widened(edge.bounds, distance)
-    one, other = edge.bounds, moved.bounds
+        assert isinstance(edge, Arc)
+        other = (*edge.centre, *edge.centre)
+    else:
+        other = moved.bounds
     low = min(one[0], other[0]), min(one[1], other[1])
     return widened((*low, max(one[2], other[2]), max(one[3], other[3])), END_ROOM)
 
 
-def _across(edge: Edge, distance: float, others: Iterable[Edge]) -> Iterable[Edge]:
+def _across(edge: Edge, moved: Edge | None, others: Iterable[Edge]) -> Iterable[Edge]:
     """Those that may lie in the band beside an edge; all where it turns too far to tell quickly."""
-    moved = edge.offset(distance)
     if moved is None or (isinstance(edge, Arc) and abs(edge.sweep) > 1.0):
         return others
     ux, uy = edge.direction(edge.at(0.5))
