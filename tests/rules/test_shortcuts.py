@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from sbafab.geometry.boolean import divided, union
-from sbafab.geometry.region import Region
+from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import disc, polygon, rectangle, strip
 from sbafab.laminate.laminate import Inlet, Laminate
-from sbafab.rules import boundary, draws, freedoms, likely_builds, margins, tube_fit
+from sbafab.rules import boundary, draws, facing, freedoms, likely_builds, margins, tube_fit
 from sbafab.rules.boundary import outward_reach
 from sbafab.rules.draws import CutContour, DrawnBuilds, numbers, rows_by_error
+from sbafab.rules.facing import facing_films
 from sbafab.rules.forms import linear_forms
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.likely_builds import ErrorsAsked
@@ -212,6 +213,37 @@ def test_likely_builds_are_those_of_plain_sums(need: float) -> None:
             if left < need:
                 assert found[asked, build] == pytest.approx(left, abs=1e-12)
     assert 0 < len(found) < 400
+
+
+TAPERED = ("1dof-5mm", "stack.balloons=4", "chamber.diameter=[5, 8, 6, 8]")
+
+
+@pytest.mark.parametrize("design", [*DESIGNS, TAPERED])
+@pytest.mark.parametrize("hole", [None, disc((0.0, 0.0), 1.5)])
+def test_films_outside_an_outline_face_nothing_within_it(
+    design: tuple[str, ...],
+    hole: Region | None,
+    good: Good,
+    spoil: Good,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    laminate = good(*design)
+    if hole is not None:
+        # A film with a wide opening, through which others face each other.
+        layer = laminate.tpe_layers[1]
+        laminate = spoil(laminate, layer.index, layer.profile - hole)
+    asked: list[bool] = []
+
+    def fits_in(film: Region, outlines: tuple[Contour, ...]) -> bool:
+        asked.append(plain(film, outlines))
+        return asked[-1]
+
+    plain = facing._fits_in
+    monkeypatch.setattr(facing, "_fits_in", fits_in)
+    found = facing_films(laminate)
+    assert any(asked) or len(laminate.tpe_layers) < 4
+    monkeypatch.setattr(facing, "_fits_in", lambda *_: False)
+    assert facing_films(laminate) == found
 
 
 RUN = Inlet("chamber1", (9.0, 0.5), (1.0, 0.0), 1.6, 3.0, 0.8)
