@@ -105,22 +105,26 @@ class EdgeTable:
 
 
 class CellOrder:
-    """In which order an ``EdgeIndex`` of the same edges tells of those that a box touches."""
+    """In which order an ``EdgeIndex`` of the same edges tells of those that a box touches.
 
-    def __init__(self, box: Floats) -> None:
-        self.low = box[:2].min(axis=1)
-        high = box[2:].max(axis=1)
-        across = float((high - self.low).max())
-        self.cell = across / max(1.0, float(box.shape[1]) ** 0.5) or 1.0
-        self.own = self._cells(box[:2])
+    ``parts`` are the numbers of edges in each of several indices, one after the other.
+    """
 
-    def _cells(self, corner: Floats) -> Floats:
-        cells: Floats = np.floor((corner - self.low[:, None]) / self.cell)
-        return cells
+    def __init__(self, box: Floats, parts: Sequence[int]) -> None:
+        count = np.array([own for own in parts if own])
+        begins = np.cumsum(count) - count
+        low = np.minimum.reduceat(box[:2], begins, axis=1)
+        high = np.maximum.reduceat(box[2:], begins, axis=1)
+        cell = (high - low).max(axis=0) / np.sqrt(count)
+        self.low = np.repeat(low, count, axis=1)
+        self.cell = np.repeat(np.where(cell == 0, 1.0, cell), count)
+        self.own: Floats = np.floor((box[:2] - self.low) / self.cell)
 
     def sorted(self, asked: Floats, places: Indices, edges: Indices) -> Indices:
         """Which of the pairs of places and edges comes when; ``asked`` are the places' boxes."""
-        first = np.maximum(self._cells(asked[:2])[:, places], self.own[:, edges])
+        corner = asked[:2].take(places, axis=1) - self.low.take(edges, axis=1)
+        cells = np.floor(corner / self.cell.take(edges))
+        first = np.maximum(cells, self.own.take(edges, axis=1))
         return np.lexsort((edges, first[1], first[0], places))
 
 
@@ -141,6 +145,23 @@ def touching(asked: Floats, boxes: Floats) -> tuple[Indices, Indices]:
         own, other = _touching(some, boxes[:, near])
         found.append((own + first, near[other]))
     return tuple(np.concatenate(one) for one in zip(*found, strict=True))  # type: ignore[return-value]
+
+
+def touching_in_parts(
+    asked: Floats, parts: Sequence[int], boxes: Floats, box_parts: Sequence[int]
+) -> tuple[Indices, Indices]:
+    """The same for so many boxes at a time, each part with its own boxes alone."""
+    found = []
+    first = box_first = 0
+    for count, box_count in zip(parts, box_parts, strict=True):
+        last, box_last = first + count, box_first + box_count
+        own, other = touching(asked[:, first:last], boxes[:, box_first:box_last])
+        found.append((own + first, other + box_first))
+        first, box_first = last, box_last
+    if len(found) == 1:
+        return found[0]
+    own, other = (np.concatenate(one) for one in zip(*found, strict=True))
+    return own, other
 
 
 def _touching(asked: Floats, boxes: Floats) -> tuple[Indices, Indices]:

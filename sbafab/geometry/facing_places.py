@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sbafab.geometry.edge_table import EdgeTable, boxes_round, crossings, dot, touching
+from sbafab.geometry.edge_table import boxes_round, crossings, dot, touching_in_parts
 from sbafab.geometry.edges import Arc, Edge, Point
 from sbafab.geometry.region import Region
-from sbafab.geometry.remembered import remembered
+from sbafab.geometry.remembered import remembered_together
 from sbafab.geometry.side_table import SideTable
 from sbafab.geometry.width import (
     ASIDE,
@@ -37,11 +39,18 @@ class FacingPlaces(NamedTuple):
     end: Floats
     value: Floats
 
+    def at(self, some: Bools) -> FacingPlaces:
+        """Some of them."""
+        return FacingPlaces(self.start[:, some], self.end[:, some], self.value[some])
+
 
 NOWHERE = FacingPlaces(np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0))
 
 
-@remembered
+FacingAsked = tuple[Region, float, float, Width | None]
+"""What is asked of a region: the slack (mm), what is sharp (degrees), the least width if known."""
+
+
 def facing_places(
     region: Region, slack: float, sharp: float = 90.0, least: Width | None = None
 ) -> FacingPlaces:
@@ -51,25 +60,52 @@ def facing_places(
     nearly alongside: where a layer turns, those may become the narrowest. ``least`` is the least
     width, where it is known.
     """
-    boundary = boundary_of(region, sharp)
-    least = least or least_of(boundary, math.inf)
-    if least is None:
-        return NOWHERE
-    if least.value == 0.0:
-        return FacingPlaces(np.array([least.start]).T, np.array([least.end]).T, np.zeros(1))
-    gathered = Gathered(boundary, least.value + slack)
-    search(gathered)
-    found = np.array([(*p, *q) for p, q in gathered.offered]).reshape(-1, 4).T
-    sides = boundary.table
-    p, q = (
-        np.concatenate(both, axis=1)
-        for both in zip((found[:2], found[2:]), _from_samples(sides, gathered.value), strict=True)
-    )
-    first = _first_of_each(p, q)
-    p, q = p[:, first], q[:, first]
-    clear = _clear(p, q, sides.table, gathered)
-    p, q = p[:, clear], q[:, clear]
-    return FacingPlaces(p, q, _length(q - p))
+    (found,) = facing_places_of([(region, slack, sharp, least)])
+    return found
+
+
+@remembered_together
+def facing_places_of(asked: Sequence[FacingAsked]) -> Sequence[FacingPlaces]:
+    """The same of several regions."""
+    found = [NOWHERE] * len(asked)
+    searched: dict[int, Gathered] = {}
+    for number, (region, slack, sharp, known) in enumerate(asked):
+        boundary = boundary_of(region, sharp)
+        least = known or least_of(boundary, math.inf)
+        if least is None:
+            continue
+        if least.value == 0.0:
+            place = np.array([least.start]).T, np.array([least.end]).T
+            found[number] = FacingPlaces(*place, np.zeros(1))
+            continue
+        searched[number] = Gathered(boundary, least.value + slack)
+        search(searched[number])
+    if searched:
+        for number, places in zip(searched, _together(list(searched.values())), strict=True):
+            found[number] = places
+    return found
+
+
+def _together(searched: Sequence[Gathered]) -> list[FacingPlaces]:
+    """What was gathered of each boundary, and samples of its sides, without what is crossed."""
+    boundaries = [one.boundary for one in searched]
+    parts = [len(one.sides) for one in boundaries]
+    sides = SideTable([side for one in boundaries for side in one.sides], parts)
+    of_side = np.repeat(np.arange(len(parts)), parts)
+    within = np.array([one.value for one in searched])
+    offered = np.array([(*p, *q) for one in searched for p, q in one.offered]).reshape(-1, 4).T
+    p, q, side = _from_samples(sides, within[of_side])
+    counts = [len(one.offered) for one in searched]
+    home = np.concatenate([np.repeat(np.arange(len(parts)), counts), of_side[side]])
+    p, q = np.concatenate([offered[:2], p], axis=1), np.concatenate([offered[2:], q], axis=1)
+    first = _first_of_each(p, q, home)
+    # Of each boundary by itself, in the order in which they were found.
+    first = first[np.argsort(home[first], kind="stable")]
+    p, q, home = p[:, first], q[:, first], home[first]
+    clear = _clear(p, q, home, sides, searched)
+    p, q, home = p[:, clear], q[:, clear], home[clear]
+    value, ends = _length(q - p), np.searchsorted(home, np.arange(len(parts) + 1)).tolist()
+    return [FacingPlaces(p[:, a:b], q[:, a:b], value[a:b]) for a, b in pairwise(ends)]
 
 
 def spread_along(edge: Edge) -> list[float]:
@@ -93,8 +129,11 @@ def places_along(edge: Edge, shares: list[float]) -> list[Point]:
     return found
 
 
-def _from_samples(sides: SideTable, within: float) -> tuple[Floats, Floats]:
-    """Samples of each side and the feet of their normals on the sides they face."""
+def _from_samples(sides: SideTable, within: Floats) -> tuple[Floats, Floats, Indices]:
+    """Samples of each side and the feet of their normals on the sides they face, and the side.
+
+    ``within`` is how far off these may be, mm, for each side.
+    """
     a, b = sides.pairs(ASIDE, within)
     shares = [spread_along(edge) for edge in sides.edges]
     counts = np.array([len(own) for own in shares])
@@ -108,15 +147,16 @@ def _from_samples(sides: SideTable, within: float) -> tuple[Floats, Floats]:
     starts = (np.cumsum(counts) - counts)[a]
     row = np.arange(own.sum()) - np.repeat(np.cumsum(own) - own, own) + np.repeat(starts, own)
     p, n = samples[:, row], normals[:, row]
-    other = np.repeat(b, own)
-    feet, inward, there = _feet(p, sides, other)
+    feet, inward, there = _feet(p, sides, np.repeat(b, own))
+    side = np.repeat(a, own)
     # Rows of samples, a column a foot.
     p, n = p[:, :, None], n[:, :, None]
     off = feet - p
     square = dot(n, inward) < -math.cos(ASIDE)
     faces = (dot(off, n) > TOUCH) & (dot(off, inward) < -TOUCH)
-    kept = there & square & faces & (_length(off) <= within)
-    return np.broadcast_to(p, feet.shape)[:, kept], feet[:, kept]
+    kept = there & square & faces & (_length(off) <= within[side][:, None])
+    place, _ = kept.nonzero()
+    return p[:, place, 0], feet[:, kept], side[place]
 
 
 def _feet(p: Floats, sides: SideTable, numbers: Indices) -> tuple[Floats, Floats, Bools]:
@@ -151,11 +191,11 @@ def _feet(p: Floats, sides: SideTable, numbers: Indices) -> tuple[Floats, Floats
     return np.stack(points, axis=2), np.stack(normals, axis=2), np.stack(there, axis=1)
 
 
-def _first_of_each(p: Floats, q: Floats) -> Indices:
-    """Which segments are the first with their ends, in either order, to 10 nm."""
+def _first_of_each(p: Floats, q: Floats, home: Indices) -> Indices:
+    """Which segments of each home are the first with their ends, in either order, to 10 nm."""
     ends = np.rint(np.concatenate([p, q]) * 1e5)
     turned = (ends[0] > ends[2]) | ((ends[0] == ends[2]) & (ends[1] > ends[3]))
-    ends[:, turned] = ends[:, turned][[2, 3, 0, 1]]
+    ends = np.concatenate([np.where(turned, ends[[2, 3, 0, 1]], ends), home[None]])
     # A stable order, so that the first of those that are alike comes first.
     order = np.lexsort(ends)
     ends = ends[:, order]
@@ -164,10 +204,14 @@ def _first_of_each(p: Floats, q: Floats) -> Indices:
     return np.sort(order[is_new])
 
 
-def _clear(p: Floats, q: Floats, table: EdgeTable, gathered: Gathered) -> Bools:
+def _clear(
+    p: Floats, q: Floats, home: Indices, sides: SideTable, searched: Sequence[Gathered]
+) -> Bools:
     """Which segments no edge crosses; those that an edge may cross are looked at one by one."""
-    segment, number = touching(boxes_round(p, q, NEAR), table.box)
-    edges = table.at(number)
+    counts = np.bincount(home, minlength=len(searched)).tolist()
+    boxes = boxes_round(p, q, NEAR)
+    segment, number = touching_in_parts(boxes, counts, sides.table.box, sides.parts)
+    edges = sides.table.at(number)
     start, off = p[:, segment], (q - p)[:, segment]
     length = _length(off)
     unit = off / length
@@ -187,7 +231,7 @@ def _clear(p: Floats, q: Floats, table: EdgeTable, gathered: Gathered) -> Bools:
     # Not np.unique, which loads masked arrays.
     for asked in sorted(set(segment[doubtful].tolist())):
         (px, py), (qx, qy) = p[:, asked].tolist(), q[:, asked].tolist()
-        clear[asked] = gathered.is_clear((px, py), (qx, qy))
+        clear[asked] = searched[home[asked]].is_clear((px, py), (qx, qy))
     return clear
 
 

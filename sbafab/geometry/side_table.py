@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sbafab.geometry.edge_table import CellOrder, EdgeTable, dot, touching
+from sbafab.geometry.edge_table import CellOrder, EdgeTable, dot, touching_in_parts
 from sbafab.geometry.width import BESIDE, BoundarySide
 
 if TYPE_CHECKING:
@@ -19,9 +19,13 @@ ROOM = 1e-9
 
 
 class SideTable:
-    """What the search knows of a boundary's sides."""
+    """What the search knows of the sides of a boundary, or of several one after the other.
 
-    def __init__(self, sides: Sequence[BoundarySide]) -> None:
+    ``parts`` are the numbers of sides in each boundary; none faces a side of another.
+    """
+
+    def __init__(self, sides: Sequence[BoundarySide], parts: Sequence[int] = ()) -> None:
+        self.parts = parts or [len(sides)]
         self.edges = [side.edge for side in sides]
         self.table = EdgeTable.of(self.edges, [side.box for side in sides])
         rows = [
@@ -31,12 +35,15 @@ class SideTable:
         self.middle, self.normal = columns[0:2], columns[2:4]
         self.half_turn, self.half, self.lean = columns[4:7]
 
-    def pairs(self, aside: float, within: float) -> tuple[Indices, Indices]:
-        """Sides and those that their normals may meet no farther off, as ``near`` tells them."""
+    def pairs(self, aside: float, within: Floats) -> tuple[Indices, Indices]:
+        """Sides and those that their normals may meet no farther off, as ``near`` tells them.
+
+        ``within`` is so many mm for each side.
+        """
         asked, a, b = self._near(within)
-        chosen = self._opposed(a, b, aside) & self._may_hold_feet(b, a, within) & (a != b)
+        chosen = self._opposed(a, b, aside) & self._may_hold_feet(b, a, within[a]) & (a != b)
         a, b = a[chosen], b[chosen]
-        order = CellOrder(self.table.box).sorted(asked, a, b)
+        order = CellOrder(self.table.box, self.parts).sorted(asked, a, b)
         return a[order], b[order]
 
     def later(self, aside: float, within: float) -> list[list[int]]:
@@ -51,12 +58,12 @@ class SideTable:
             found[one].append(other)
         return found
 
-    def _near(self, within: float) -> tuple[Floats, Indices, Indices]:
+    def _near(self, within: float | Floats) -> tuple[Floats, Indices, Indices]:
         """The boxes of sides widened by ``within``, and the sides whose boxes these touch."""
         asked, box = self.table.box.copy(), self.table.box
         asked[:2] -= within
         asked[2:] += within
-        return asked, *touching(asked, box)
+        return asked, *touching_in_parts(asked, self.parts, box, self.parts)
 
     def _opposed(self, a: Indices, b: Indices, aside: float) -> Bools:
         """Whether their normals are opposed somewhere, to within ``aside`` radians."""
@@ -65,7 +72,7 @@ class SideTable:
         found: Bools = opposed | (room > math.pi)
         return found
 
-    def _may_hold_feet(self, a: Indices, b: Indices, within: float) -> Bools:
+    def _may_hold_feet(self, a: Indices, b: Indices, within: float | Floats) -> Bools:
         """Whether normals of sides ``a`` may meet sides ``b`` no farther off than ``within``."""
         off, normal = self.middle[:, b] - self.middle[:, a], self.normal[:, a]
         missed = np.abs(off[0] * normal[1] - off[1] * normal[0])

@@ -19,6 +19,7 @@ from sbafab.geometry.kept import kept
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.remembered import remembered
+from sbafab.geometry.rings import across_a_ring, bound_a_ring
 from sbafab.geometry.width_bounds import may_be_narrower, widest_least
 
 if TYPE_CHECKING:
@@ -365,6 +366,10 @@ def _may_face(a: Arc, b: Edge, within: float) -> bool:
 
 
 def _along_each_other(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> None:
+    if bound_a_ring(a.edge, b.edge):
+        for p, q in across_a_ring(a, b):
+            narrowest.offer(p, q)
+        return
     for one, other in ((a, b), (b, a)):
         for p in (one.middle, one.edge.start, one.edge.end):
             here = _Foot(p, left_normal(one.edge, p))

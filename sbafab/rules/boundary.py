@@ -111,19 +111,16 @@ def _across(edge: Edge, distance: float, others: Iterable[Edge]) -> Iterable[Edg
 
 def _nearest(within: _Band, others: Iterable[Edge]) -> Reach | None:
     best: Reach | None = None
+    nearer = math.inf
     for other in others:
         least, most = _heights(within.edge, other)
-        if most < -EPSILON or (best is not None and least >= best.value - NEARER):
+        if most < -EPSILON or least >= nearer:
             continue
         for p in within.nearest_candidates(other):
             height = within.height(p)
-            if (
-                height is not None
-                and not within.is_passed_by(other, p)
-                and height > -EPSILON
-                and (best is None or height < best.value - NEARER)
-            ):
+            if -EPSILON < height < nearer and within.holds(p) and not within.is_passed_by(other, p):
                 best = Reach(max(0.0, height), p)
+                nearer = best.value - NEARER
     return best
 
 
@@ -155,12 +152,14 @@ class _Band(NamedTuple):
     edge: Edge
     rays: tuple[tuple[Point, Point], tuple[Point, Point]]
 
-    def height(self, p: Point) -> float | None:
-        """Distance of ``p`` from the edge along the normal; None beside the band."""
+    def holds(self, p: Point) -> bool:
+        """Whether ``p`` lies in the band or behind the edge, and not beside it."""
+        room = 0.5 * END_ROOM / self.edge.length
+        return room <= self.edge.parameter(p) <= 1 - room
+
+    def height(self, p: Point) -> float:
+        """Distance of ``p`` from the edge along the normal."""
         edge = self.edge
-        room = 0.5 * END_ROOM / edge.length
-        if not room <= edge.parameter(p) <= 1 - room:
-            return None
         if isinstance(edge, Arc):
             outward = math.dist(p, edge.centre) - edge.radius
             return outward if edge.ccw else -outward

@@ -7,7 +7,6 @@ for it again.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
@@ -19,14 +18,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
-    Indices = NDArray[np.intp]
 
 KEPT = 4_000_000
 """Numbers at the stream's beginning that are kept: 32 MB at most, of which a page is taken up when
 it is first written.
-"""
-LOWEST = 8
-"""Of the sums of two rows of numbers an eighth is kept, the lowest: what comes short is among them.
 """
 
 
@@ -88,78 +83,6 @@ class DrawnBuilds(NamedTuple):
     def numbers(self) -> Floats:
         """Numbers from 0 to 1, a row each, from the ``first`` of the seed's stream on."""
         return numbers(*self)
-
-    def lowest(self, pairs: tuple[Pair, ...]) -> LowestSums | None:
-        """The lowest sums of two rows each; None when they are asked for the first time.
-
-        Laminates with the same layers and contours ask for the same, whatever their sizes; for one
-        alone it is not worth the sorting.
-        """
-        return _sorted_out(self, pairs).again()
-
-
-class Pair(NamedTuple):
-    """Two rows of numbers, and with which sign each counts in their sum."""
-
-    row: int
-    other: int
-    sign: float
-    other_sign: float
-
-    def total(self, drawn: Floats) -> Floats:
-        """The sums, one a build."""
-        one, two = drawn[self.row], drawn[self.other]
-        total: Floats = one + two if self.sign == self.other_sign else one - two
-        return -total if self.sign < 0 else total
-
-
-class LowestSums(NamedTuple):
-    """Of each pair, a line each: builds in rising order, and the sums of their numbers.
-
-    Of all other builds none has a sum ``below`` that of its line.
-    """
-
-    builds: Indices
-    totals: Floats
-    below: Floats
-
-
-class _SortedOut:
-    """The lowest sums of pairs, worked out when they are asked for once more."""
-
-    def __init__(self, drawn: DrawnBuilds, pairs: tuple[Pair, ...]) -> None:
-        self.drawn = drawn
-        self.pairs = pairs
-        self.is_first = True
-        self.found: LowestSums | None = None
-
-    def again(self) -> LowestSums | None:
-        if self.is_first:
-            self.is_first = False
-        elif self.found is None:
-            self.found = _lowest(self.drawn, self.pairs)
-        return self.found
-
-
-_sorted_out = lru_cache(maxsize=4)(_SortedOut)
-
-
-def _lowest(drawn: DrawnBuilds, pairs: tuple[Pair, ...]) -> LowestSums:
-    import numpy as np
-
-    numbers, count = drawn.numbers, max(1, drawn.builds // LOWEST)
-    builds, totals = np.empty((len(pairs), count), dtype=np.intp), np.empty((len(pairs), count))
-    below = np.full(len(pairs), math.inf)
-    for line, pair in enumerate(pairs):
-        total = pair.total(numbers)
-        if count < drawn.builds:
-            parted = np.argpartition(total, count)
-            builds[line] = np.sort(parted[:count])
-            below[line] = total[parted[count]]
-        else:
-            builds[line] = np.arange(count)
-        totals[line] = total[builds[line]]
-    return LowestSums(builds, totals, below)
 
 
 def numbers(seed: int, first: int, rows: int, builds: int) -> Floats:

@@ -6,7 +6,7 @@ drawn, in their normal, and in the levers of what turns. Worst case and yield re
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -25,22 +25,25 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class LinearForm:
-    """Margins between edges of the same two parts, in the order they were found.
+class LinearForms:
+    """The margins of one quantity of an interface, in the order they were found.
 
-    ``numbers`` are their places among all margins of the interface, ``nominal`` (mm) and ``normal``
-    (2 rows) one column each; ``between`` is the number of the owners of both edges among
-    ``owners``. ``felt`` is what one of the parts does and the other not, whether it acts at the
-    end, and the levers (mm per radian) of what turns, None for what shifts.
+    ``first`` is the place of the first among all margins of the interface. ``nominal`` (mm) and
+    ``normal`` (2 rows) have a column each; ``between`` is the number of the owners of both edges
+    among ``owners``, ``parts`` that of their two parts among ``felt``: what one of these does and
+    the other not, and whether it acts at the end. ``levers`` has a line for each of these: mm per
+    radian of what turns, 1 of what shifts, 0 where less is felt.
     """
 
     quantity: Quantity
+    first: int
     owners: Sequence[tuple[Owner, Owner]]
     between: Indices
-    numbers: Indices
     nominal: Floats
     normal: Floats
-    felt: tuple[tuple[Freedom, bool, Floats | None], ...]
+    parts: Indices
+    felt: Sequence[Sequence[tuple[Freedom, bool]]]
+    levers: Floats
 
     def loss(self, by_hand: bool = True) -> Floats:
         """The most that all of it takes from each margin, mm; or all but what the hand does."""
@@ -53,60 +56,69 @@ class LinearForm:
     def _lost(self, by_hand: bool) -> Floats:
         import numpy as np
 
+        most = np.zeros((len(self.levers), len(self.felt)))
+        for part, own in enumerate(self.felt):
+            for line, (freedom, _) in enumerate(own):
+                if by_hand or not freedom.by_hand:
+                    most[line, part] = freedom.most
         total = np.zeros(len(self.nominal))
-        for freedom, _, levers in self.felt:
-            if by_hand or not freedom.by_hand:
-                total += freedom.most if levers is None else freedom.most * np.abs(levers)
+        for reach, levers in zip(most, self.levers, strict=True):
+            total += reach.take(self.parts) * np.abs(levers)
         return total
 
 
-def linear_forms(group: InterfaceMargins, moves: Freedoms) -> tuple[LinearForm, ...]:
-    """The margins of an interface by quantity and parts."""
-    found: list[LinearForm] = []
-    before = 0
+def linear_forms(group: InterfaceMargins, moves: Freedoms) -> tuple[LinearForms, ...]:
+    """The margins of an interface by quantity."""
+    found: list[LinearForms] = []
+    first = 0
     for quantity, places in group.places.items():
-        for first, own in _by_parts(places):
-            start, end = places.start[:, own], places.end[:, own]
-            normal = places.normal[:, own]
-            form = LinearForm(
-                quantity,
-                places.owners,
-                places.between[own],
-                own + before,
-                places.nominal[own],
-                normal,
-                tuple(
-                    (freedom, at_end, _levers(freedom, end if at_end else start, normal))
-                    for freedom, at_end in felt(first, group.first, moves)
-                ),
-            )
-            found.append(form)
-        before += len(places.nominal)
+        if len(places.nominal):
+            found.append(_forms(quantity, first, places, group, moves))
+        first += len(places.nominal)
     return tuple(found)
 
 
-def _by_parts(places: Places) -> Iterator[tuple[tuple[Owner, Owner], Indices]]:
-    """The numbers of places between the same two parts, with the first of their owners."""
+def _forms(
+    quantity: Quantity, first: int, places: Places, group: InterfaceMargins, moves: Freedoms
+) -> LinearForms:
     import numpy as np
 
-    parts: dict[object, list[int]] = {}
-    for number, (one, other) in enumerate(places.owners):
-        key = one.seat, one.piece, other.seat, other.piece
-        parts.setdefault(key, []).append(number)
-    home = np.empty(len(places.owners), dtype=np.intp)
-    for part, numbers in enumerate(parts.values()):
-        home[numbers] = part
-    of_place = home[places.between]
-    for part, numbers in enumerate(parts.values()):
-        (own,) = (of_place == part).nonzero()
-        if len(own):
-            yield places.owners[numbers[0]], own
-
-
-def _levers(freedom: Freedom, p: Floats, normal: Floats) -> Floats | None:
-    """What ``Freedom.lever`` says, for many points and normals."""
-    if freedom.centre is None:
-        return None
-    x, y = freedom.centre
-    levers: Floats = (p[0] - x) * normal[1] - (p[1] - y) * normal[0]
-    return levers
+    numbers: dict[object, int] = {}
+    some: list[tuple[Owner, Owner]] = []
+    home = []
+    for both in places.owners:
+        one, other = both
+        number = numbers.setdefault((one.seat, one.piece, other.seat, other.piece), len(numbers))
+        if number == len(some):
+            some.append(both)
+        home.append(number)
+    acting = [felt(owners, group.first, moves) for owners in some]
+    parts = np.array(home)[places.between]
+    count = max(map(len, acting), default=0)
+    x, y = np.zeros((2, count, len(acting)))
+    at_end = np.zeros((count, len(acting)), dtype=bool)
+    # How its lever counts, and what is added to it.
+    turns, shifts = np.zeros((2, count, len(acting)))
+    for part, own in enumerate(acting):
+        for line, (freedom, is_end) in enumerate(own):
+            at_end[line, part] = is_end
+            if freedom.centre is None:
+                shifts[line, part] = 1.0
+            else:
+                turns[line, part] = 1.0
+                x[line, part], y[line, part] = freedom.centre
+    p = np.where(at_end[:, parts], places.end[:, None], places.start[:, None])
+    nx, ny = places.normal
+    levers = (p[0] - x[:, parts]) * ny - (p[1] - y[:, parts]) * nx
+    levers = turns[:, parts] * levers + shifts[:, parts]
+    return LinearForms(
+        quantity,
+        first,
+        places.owners,
+        places.between,
+        places.nominal,
+        places.normal,
+        parts,
+        acting,
+        levers,
+    )

@@ -70,7 +70,27 @@ class Freedom(NamedTuple):
         return self.most, centre, self.pins, self.in_sheet
 
 
-Freedoms = Mapping[Part, tuple[Freedom, ...]]
+class Freedoms(dict[Part, tuple[Freedom, ...]]):
+    """What each piece of each layer can do. A freedom is one object wherever it is felt."""
+
+    def __init__(self, found: Mapping[Part, tuple[Freedom, ...]]) -> None:
+        super().__init__(found)
+        self._of_layer: dict[int, list[tuple[Freedom, ...]]] = {}
+        for part, own in found.items():
+            self._of_layer.setdefault(part.layer, []).append(own)
+        self._unshared: dict[tuple[int, ...], list[tuple[Freedom, ...]]] = {}
+
+    def unshared(self, layers: tuple[int, ...]) -> list[tuple[Freedom, ...]]:
+        """What each piece of these layers, one layer after the other, can do that not all can."""
+        known = self._unshared.get(layers)
+        if known is None:
+            every = [own for layer in layers for own in self._of_layer[layer]]
+            shared = set(map(id, every[0]))
+            for own in every[1:]:
+                shared.intersection_update(map(id, own))
+            known = [tuple([one for one in own if id(one) not in shared]) for own in every]
+            self._unshared[layers] = known
+        return known
 
 
 class Laid(NamedTuple):
@@ -132,7 +152,7 @@ def freedoms(
             own = (*found[one.under], *own)
         for part in one.body:
             found[part] += own
-    return found
+    return Freedoms(found)
 
 
 def _in_sheets(laminate: Laminate, tolerances: Tolerances) -> Freedoms:
@@ -154,7 +174,7 @@ def _in_sheets(laminate: Laminate, tolerances: Tolerances) -> Freedoms:
             under = own
         for piece in range(len(layer.profile.pieces)):
             found[Part(layer.index, piece)] = own
-    return found
+    return Freedoms(found)
 
 
 def _own(laid: Laid, number: int, tolerances: Tolerances) -> tuple[Freedom, ...]:
@@ -268,7 +288,10 @@ class _Shapes:
 
     def joined(self, present: Sequence[list[Part]]) -> list[list[Part]]:
         """The bodies after a step: parts that lie on each other have become one."""
-        home = {part: index for index, body in enumerate(present) for part in body}
+        home: dict[int, dict[int, int]] = {}
+        for index, body in enumerate(present):
+            for layer, piece in body:
+                home.setdefault(layer, {})[piece] = index
         leader = list(range(len(present)))
 
         def first(index: int) -> int:
@@ -276,14 +299,17 @@ class _Shapes:
                 index = leader[index]
             return index
 
-        layers = sorted({part.layer for part in home})
-        for lower, upper in pairwise(layers):
+        for lower, upper in pairwise(sorted(home)):
+            ours, theirs = home[lower], home[upper]
             for a, b in self.meet(lower, upper):
-                one, other = sorted((first(home[Part(lower, a)]), first(home[Part(upper, b)])))
-                leader[other] = one
+                one, other = first(ours[a]), first(theirs[b])
+                if one < other:
+                    leader[other] = one
+                else:
+                    leader[one] = other
         merged: dict[int, list[Part]] = {}
-        for part in sorted(home):
-            merged.setdefault(first(home[part]), []).append(part)
+        for part in sorted(part for body in present for part in body):
+            merged.setdefault(first(home[part.layer][part.piece]), []).append(part)
         return list(merged.values())
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sbafab.rules.draws import CutContour, Error
-from sbafab.rules.forms import LinearForm
+from sbafab.rules.forms import LinearForms
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.margins import Quantity
@@ -46,7 +46,7 @@ class MarginRows:
 
 
 def rows_of(
-    form: LinearForm, layers: Sequence[int], limit: float, cutting: float
+    forms: LinearForms, layers: Sequence[int], limit: float, cutting: float
 ) -> Iterator[tuple[int, MarginRows]]:
     """The margins that can come short at all, by the two contours whose edges they join; of those
     that feel all errors alike, the least.
@@ -55,55 +55,64 @@ def rows_of(
     """
     import numpy as np
 
-    room = form.nominal - limit
-    (short,) = np.nonzero(room - 2 * cutting - form.loss() < -TOLERANCE)
+    room = forms.nominal - limit
+    (short,) = np.nonzero(room - 2 * cutting - forms.loss() < -TOLERANCE)
     if not len(short):
         return
-    for between, alike in _least_alike(form, room, short).items():
+    for between, alike in _least_alike(forms, room, short).items():
         first, chosen = short[alike[0]], short[alike[1]]
-        owners = form.owners[between]
+        owners = forms.owners[between]
         # More film widens a bond, more mask an overhang.
-        signs = (1.0 if one.is_film == (form.quantity == "bond") else -1.0 for one in owners)
+        signs = (1.0 if one.is_film == (forms.quantity == "bond") else -1.0 for one in owners)
         contours = (CutContour(layers[one.seat], one.contour) for one in owners)
+        levers = forms.levers[:, chosen]
         yield (
-            int(form.numbers[first]),
+            forms.first + int(first),
             MarginRows(
-                form.quantity,
+                forms.quantity,
                 room[chosen],
-                form.normal[:, chosen],
+                forms.normal[:, chosen],
                 tuple(zip(contours, signs, strict=True)),
                 tuple(
-                    (freedom, 1.0 if at_end else -1.0, None if levers is None else levers[chosen])
-                    for freedom, at_end, levers in form.felt
+                    [
+                        (freedom, 1.0 if at_end else -1.0, own if freedom.centre else None)
+                        for (freedom, at_end), own in zip(
+                            forms.felt[forms.parts[first]], levers, strict=False
+                        )
+                    ]
                 ),
             ),
         )
 
 
 def _least_alike(
-    form: LinearForm, room: Floats, short: Indices
+    forms: LinearForms, room: Floats, short: Indices
 ) -> dict[int, tuple[int, list[int]]]:
     """Of the short margins between each two owners the first, and which have the least room of all
     with the same factors, rounded.
     """
     import numpy as np
 
-    columns: list[Floats] = []
-    if any(levers is None for _, _, levers in form.felt):
-        columns += list(form.normal)
-    columns += [levers for _, _, levers in form.felt if levers is not None]
-    # Where nothing but cutting is felt there is no column, and all are alike.
-    every = np.array(columns).reshape(len(columns), len(form.nominal))
-    keys = np.ascontiguousarray(_parts(every[:, short]).astype(np.int64).T)
+    parts = forms.parts[short]
+    shifts = np.array([any(one.centre is None for one, _ in own) for own in forms.felt])
+    turns = np.zeros((len(forms.levers), len(forms.felt)))
+    for part, own in enumerate(forms.felt):
+        for line, (freedom, _) in enumerate(own):
+            turns[line, part] = freedom.centre is not None
+    # Where nothing but cutting is felt all factors are 0, and all are alike.
+    factors = np.concatenate(
+        [forms.normal[:, short] * shifts[parts], forms.levers[:, short] * turns[:, parts]]
+    )
+    keys = np.ascontiguousarray(_parts(factors).astype(np.int64).T)
     found: dict[int, tuple[int, dict[bytes, int]]] = {}
     left = room[short].tolist()
-    for place, (between, key) in enumerate(zip(form.between[short].tolist(), keys, strict=True)):
-        name = key.tobytes()
-        _, own = found.setdefault(between, (place, {}))
-        known = own.get(name)
+    names = keys.view(f"V{keys.itemsize * keys.shape[1]}").ravel().tolist()
+    for place, (between, name) in enumerate(zip(forms.between[short].tolist(), names, strict=True)):
+        _, alike = found.setdefault(between, (place, {}))
+        known = alike.get(name)
         if known is None or left[place] < left[known]:
-            own[name] = place
-    return {between: (first, list(own.values())) for between, (first, own) in found.items()}
+            alike[name] = place
+    return {between: (first, list(alike.values())) for between, (first, alike) in found.items()}
 
 
 def _parts(factors: Floats) -> Floats:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point
@@ -117,9 +118,10 @@ def felt(
     """The freedoms that one of two edges has and the other not, and whether it is the end's."""
     layers = seated(interface)
     start, end = (moves[Part(layers[o.seat], o.piece)] for o in owners)
+    at_start, at_end = set(map(id, start)), set(map(id, end))
     return [
-        *((freedom, False) for freedom in start if freedom not in end),
-        *((freedom, True) for freedom in end if freedom not in start),
+        *[(freedom, False) for freedom in start if id(freedom) not in at_end],
+        *[(freedom, True) for freedom in end if id(freedom) not in at_start],
     ]
 
 
@@ -152,24 +154,12 @@ def felt_alike(
     return list(groups.values())
 
 
-def own_freedoms(interface: Interface, moves: Freedoms) -> list[tuple[Freedom, ...]]:
-    """What each part of the interface's layers, by seat and piece, can do that not all can."""
-    found = []
-    for layer in seated(interface):
-        piece = 0
-        while (part := Part(layer, piece)) in moves:
-            found.append(moves[part])
-            piece += 1
-    shared = set(found[0]).intersection(*found[1:])
-    return [tuple(freedom for freedom in own if freedom not in shared) for own in found]
-
-
 def _signature(interface: Interface, moves: Freedoms) -> tuple[object, ...]:
     """Equal for interfaces whose parts can do the same, whatever the bodies are called."""
-    names: dict[Freedom, int] = {}
+    names: dict[int, int] = {}
     return tuple(
-        tuple((names.setdefault(freedom, len(names)), freedom.like()) for freedom in own)
-        for own in own_freedoms(interface, moves)
+        tuple([(names.setdefault(id(freedom), len(names)), freedom.like()) for freedom in own])
+        for own in moves.unshared(seated(interface))
     )
 
 
@@ -194,18 +184,20 @@ class _Loss(NamedTuple):
 
 def _loss(interface: Interface, limits: Limits, moves: Freedoms) -> _Loss:
     parts = _parts(interface)
-    own = own_freedoms(interface, moves)
-    reach = [
-        {freedom: freedom.most * _farthest(freedom, region.bounds) for freedom in found}
-        for region, found in zip(parts, own, strict=True)
-    ]
+    own = moves.unshared(seated(interface))
+    reach = []
+    for region, found in zip(parts, own, strict=True):
+        box = region.bounds
+        reach.append({id(freedom): freedom.most * _farthest(freedom, box) for freedom in found})
     most = max(
-        sum(cost for freedom, cost in one.items() if freedom not in other)
-        + sum(cost for freedom, cost in other.items() if freedom not in one)
-        for one in reach
-        for other in reach
+        (
+            sum([cost for freedom, cost in one.items() if freedom not in other])
+            + sum([cost for freedom, cost in other.items() if freedom not in one])
+            for one, other in combinations(reach, 2)
+        ),
+        default=0.0,
     )
-    loose = dict.fromkeys(freedom for found in own for freedom in found)
+    loose = {id(freedom): freedom for found in own for freedom in found}.values()
     box = interface.contact.bounds
     cutting = 2 * limits.tolerances.cutting
     together = sum(freedom.most * _farthest(freedom, box) for freedom in loose)
@@ -244,35 +236,49 @@ class Felt(NamedTuple):
 
 
 def narrow_places(
-    felt: Felt,
-    widest: float,
+    every: Sequence[Felt],
     pins: tuple[Pin, ...],
     limits: Limits,
-    reaches: Sequence[tuple[Edge, Reach]],
-) -> dict[Quantity, Places]:
+    reaches: Sequence[Sequence[tuple[Edge, Reach]]],
+) -> list[dict[Quantity, Places]]:
     """All margins that could become the least under the tolerances, or come short of a limit.
 
-    ``widest`` is the greatest slack of all with the same bond, ``reaches`` is how far masks reach
-    past film edges.
+    ``reaches`` is how far masks reach past film edges, for each of the interfaces that are alike.
     """
-    from sbafab.rules.narrow_places import bond_places, overhang_places
+    from sbafab.rules.narrow_places import BondAsked, OverhangAsked, places_of, profiles_of
 
-    interface, loss = felt.alike[0], felt.loss
-    if interface.contact.is_empty:
-        return {}
-    found: dict[Quantity, Places] = {}
-    if felt.bond is not None:
-        found["bond"] = bond_places(interface, felt.bond, felt.slack(limits), widest)
+    slacks = [felt.slack(limits) for felt in every]
+    # Of one bond all interfaces ask for the same places.
+    widest: dict[Region, float] = {}
+    for felt, slack in zip(every, slacks, strict=True):
+        bond = felt.alike[0].bond
+        widest[bond] = max(slack, widest.get(bond, 0.0))
+    asked: list[tuple[int, Quantity, BondAsked | OverhangAsked]] = []
     flush = limits.mask_overhang
-    free = [
-        (edge, reach)
-        for edge, reach in reaches
-        if holds(reach.value, flush) or not pin_at(edge, pins)
-    ]
-    if free:
-        least = min(reach.value for _, reach in free)
-        slack = loss.slack(least, flush, limits.worst_mask_overhang)
-        found["overhang"] = overhang_places(interface, free, slack)
+    for number, (felt, slack) in enumerate(zip(every, slacks, strict=True)):
+        interface = felt.alike[0]
+        if interface.contact.is_empty:
+            continue
+        profiles = profiles_of(interface)
+        if felt.bond is not None:
+            bond = interface.bond
+            asked.append(
+                (number, "bond", BondAsked(bond, felt.bond, slack, widest[bond], profiles))
+            )
+        free = tuple(
+            (edge, reach)
+            for edge, reach in reaches[number]
+            if holds(reach.value, flush) or not pin_at(edge, pins)
+        )
+        if free:
+            least = min(reach.value for _, reach in free)
+            farther = felt.loss.slack(least, flush, limits.worst_mask_overhang)
+            overhang = OverhangAsked(interface.mask, free, farther, profiles)
+            asked.append((number, "overhang", overhang))
+    found: list[dict[Quantity, Places]] = [{} for _ in every]
+    told = places_of([one for *_, one in asked])
+    for (number, quantity, _), places in zip(asked, told, strict=True):
+        found[number][quantity] = places
     return found
 
 

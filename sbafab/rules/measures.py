@@ -13,7 +13,7 @@ from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.boundary import Reach, edges_along, outward_reach
 from sbafab.rules.facing import Facing, facing_films
-from sbafab.rules.forms import LinearForm, linear_forms
+from sbafab.rules.forms import LinearForms, linear_forms
 from sbafab.rules.freedoms import Freedoms, Laid, freedoms, lay_up
 from sbafab.rules.limits import Limits
 from sbafab.rules.margins import SHARP, Felt, InterfaceMargins, felt_alike, narrow_places
@@ -74,26 +74,14 @@ class Measures:
             Felt.of(alike, limits, self.moves, self.bond(alike[0]))
             for alike in felt_alike(self.laminate, self.facing, self.moves)
         ]
-        widest: dict[Region, float] = {}
-        for felt in every:
-            bond = felt.alike[0].bond
-            widest[bond] = max(felt.slack(limits), widest.get(bond, 0.0))
+        reaches = [self.reaches(felt.alike[0]) for felt in every]
+        found = narrow_places(every, self.laminate.pins, limits, reaches)
         return [
-            InterfaceMargins(
-                felt.alike,
-                narrow_places(
-                    felt,
-                    widest[felt.alike[0].bond],
-                    self.laminate.pins,
-                    limits,
-                    self.reaches(felt.alike[0]),
-                ),
-            )
-            for felt in every
+            InterfaceMargins(felt.alike, places) for felt, places in zip(every, found, strict=True)
         ]
 
     @cached_property
-    def forms(self) -> list[tuple[LinearForm, ...]]:
+    def forms(self) -> list[tuple[LinearForms, ...]]:
         """The same as linear forms."""
         return [linear_forms(own, self.moves) for own in self.margins]
 

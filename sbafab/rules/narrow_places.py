@@ -6,7 +6,7 @@ Every place is asked for at once; what bounds them is filed once a profile.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -17,12 +17,12 @@ from sbafab.geometry.edge_table import (
     boxes_round,
     crossings,
     dot,
-    touching,
+    touching_in_parts,
 )
 from sbafab.geometry.edges import EPSILON, Edge, Point, left_normal
-from sbafab.geometry.facing_places import facing_places, places_along, spread_along
+from sbafab.geometry.facing_places import facing_places_of, places_along, spread_along
 from sbafab.geometry.region import Region
-from sbafab.geometry.remembered import remembered
+from sbafab.geometry.remembered import remembered, remembered_together
 from sbafab.geometry.width import Width
 from sbafab.laminate.interfaces import Interface
 from sbafab.rules.boundary import END_ROOM, STEEP, Reach
@@ -62,123 +62,219 @@ class Places(NamedTuple):
         )
 
 
-def bond_places(interface: Interface, least: Width, slack: float, widest: float) -> Places:
-    """Where its bond is at most ``slack`` mm wider than at its narrowest.
+class BondAsked(NamedTuple):
+    """Where a bond is at most ``slack`` mm wider than at its narrowest.
 
-    ``widest`` is the most that is asked for of any interface with the same bond.
+    ``widest`` is the most that is asked for of any interface with the same bond; ``profiles`` are
+    those of the layers, by seat.
     """
-    return _bond_places(interface.bond, least, slack, widest, *_profiles(interface))
+
+    bond: Region
+    least: Width
+    slack: float
+    widest: float
+    profiles: tuple[Region, ...]
 
 
-@remembered
-def _bond_places(
-    bond: Region, least: Width, slack: float, widest: float, *profiles: Region
-) -> Places:
-    p, q, value = facing_places(bond, widest, SHARP, least)
-    if slack < widest:
-        (kept,) = (value <= least.value + slack).nonzero()
-        p, q, value = p[:, kept], q[:, kept], value[kept]
-    off = q - p
-    length = np.sqrt(dot(off, off))
-    normal = off / np.where(length > 0, length, 1.0)
-    every = _filed(profiles, films=True, masks=True)
-    both = every.at(np.concatenate([p, q], axis=1), np.concatenate([normal, normal], axis=1))
-    return _owned(value, p, q, normal, both.parted(len(value)))
-
-
-def overhang_places(
-    interface: Interface, free: Sequence[tuple[Edge, Reach]], slack: float
-) -> Places:
+class OverhangAsked(NamedTuple):
     """From film edges to the mask's, wherever it is at most ``slack`` farther than the nearest."""
-    return _overhang_places(interface.mask, tuple(free), slack, *_profiles(interface))
+
+    mask: Region
+    free: tuple[tuple[Edge, Reach], ...]
+    slack: float
+    profiles: tuple[Region, ...]
 
 
-@remembered
-def _overhang_places(
-    mask: Region, free: tuple[tuple[Edge, Reach], ...], slack: float, *profiles: Region
-) -> Places:
-    within = min(reach.value for _, reach in free) + slack + ROOM
-    near = [(edge, reach) for edge, reach in free if reach.value <= within]
+PlacesAsked = BondAsked | OverhangAsked
+
+
+def profiles_of(interface: Interface) -> tuple[Region, ...]:
+    """Its layers' profiles by seat."""
+    return tuple([one.profile for one in (interface.below, interface.above, *interface.masks)])
+
+
+@remembered_together
+def places_of(asked: Sequence[PlacesAsked]) -> Sequence[Places]:
+    """The narrow places of each bond and overhang, found together."""
+    bonds = [one for one in asked if isinstance(one, BondAsked)]
+    overhangs = [one for one in asked if isinstance(one, OverhangAsked)]
+    of_bonds = iter(_of_bonds(bonds))
+    of_overhangs = iter(_of_overhangs(overhangs))
+    segments = [next(of_bonds if isinstance(one, BondAsked) else of_overhangs) for one in asked]
+    found = _owned(segments, [one.profiles for one in asked])
+    return [
+        own if isinstance(one, BondAsked) or not len(own.nominal) else _nearest(own, one.slack)
+        for one, own in zip(asked, found, strict=True)
+    ]
+
+
+def _nearest(places: Places, slack: float) -> Places:
+    """Those that are at most ``slack`` wider than the narrowest."""
+    (kept,) = np.nonzero(places.nominal <= places.nominal.min() + slack)
+    return places.at(kept)
+
+
+class _Segments(NamedTuple):
+    """Places before it is known whose edges they join.
+
+    ``from_films``: they go from films to masks; else either may lie at both ends.
+    """
+
+    nominal: Floats
+    start: Floats
+    end: Floats
+    normal: Floats
+    from_films: bool
+
+
+def _of_bonds(asked: Sequence[BondAsked]) -> list[_Segments]:
+    facing = facing_places_of([(one.bond, one.widest, SHARP, one.least) for one in asked])
+    found = []
+    for one, every in zip(asked, facing, strict=True):
+        narrow = every
+        if one.slack < one.widest:
+            narrow = every.at(every.value <= one.least.value + one.slack)
+        off = narrow.end - narrow.start
+        length = np.sqrt(dot(off, off))
+        normal = off / np.where(length > 0, length, 1.0)
+        found.append(_Segments(narrow.value, narrow.start, narrow.end, normal, False))
+    return found
+
+
+def _of_overhangs(asked: Sequence[OverhangAsked]) -> list[_Segments]:
+    """Each edge's own reach, then its samples."""
+    if not asked:
+        return []
+    withins = [min(reach.value for _, reach in one.free) + one.slack + ROOM for one in asked]
+    nears = [
+        [(edge, reach) for edge, reach in one.free if reach.value <= within]
+        for one, within in zip(asked, withins, strict=True)
+    ]
+    near = [one for own in nears for one in own]
+    # The ask that each edge is of.
+    home = np.repeat(np.arange(len(asked)), [len(own) for own in nears])
     rays = Rays.of([edge for edge, _ in near])
-    ray, value, end = first_met(rays, _profile(mask).table, within)
-    # Each edge's own reach, then its samples.
+    masks = [_profile(one.mask).table for one in asked]
+    counts = np.bincount(home[rays.edge], minlength=len(asked)).tolist()
+    parts = [(count, len(mask.radius)) for count, mask in zip(counts, masks, strict=True)]
+    within = np.array(withins)[home[rays.edge]]
+    ray, value, end = first_met(rays, EdgeTable.joined(masks), within, parts)
     feet = [edge.nearest(reach.at) for edge, reach in near]
     outward = [left_normal(edge, p) for (edge, _), p in zip(near, feet, strict=True)]
-    own = np.arange(len(near))
-    order = np.argsort(np.concatenate([own, rays.edge[ray]]), kind="stable")
+    edge = np.concatenate([np.arange(len(near)), rays.edge[ray]])
+    order = np.argsort(edge, kind="stable")
     nominal = np.concatenate([[reach.value for _, reach in near], value])[order]
     start = np.concatenate([np.array(feet).T, rays.start[:, ray]], axis=1)[:, order]
     ends = np.concatenate([np.array([reach.at for _, reach in near]).T, end], axis=1)[:, order]
     normal = np.concatenate([-np.array(outward).T, rays.outward[:, ray]], axis=1)[:, order]
-    films, masks = _filed(profiles, films=True), _filed(profiles, masks=True)
-    found = _owned(nominal, start, ends, normal, (films.at(start, normal), masks.at(ends, normal)))
-    if not len(found.nominal):
-        return found
-    widest = found.nominal.min() + slack
-    (kept,) = np.nonzero(found.nominal <= widest)
-    return found.at(kept)
+    stops = np.searchsorted(home[edge[order]], np.arange(len(asked) + 1)).tolist()
+    return [
+        _Segments(nominal[a:b], start[:, a:b], ends[:, a:b], normal[:, a:b], True)
+        for a, b in pairwise(stops)
+    ]
 
 
-class _Owned(NamedTuple):
-    """Whose edges run through places: the place in rising order, and a number of ``owners``."""
-
-    place: Indices
-    owner: Indices
-    owners: list[Owner]
-
-    def parted(self, place: int) -> tuple[_Owned, _Owned]:
-        """Those of the places before this one, and of the others, counted from it on."""
-        cut = int(np.searchsorted(self.place, place))
-        rest = _Owned(self.place[cut:] - place, self.owner[cut:], self.owners)
-        return _Owned(self.place[:cut], self.owner[:cut], self.owners), rest
-
-
-def _owned(
-    nominal: Floats, start: Floats, end: Floats, normal: Floats, both: tuple[_Owned, _Owned]
-) -> Places:
+def _owned(segments: Sequence[_Segments], profiles: Sequence[Sequence[Region]]) -> list[Places]:
     """Places once for every two owners of their edges."""
-    ours, theirs = both
-    counts = np.bincount(theirs.place, minlength=len(nominal))
-    begins = np.cumsum(counts) - counts
-    own = counts[ours.place]
-    rows = np.repeat(ours.place, own)
+    counts = [len(one.nominal) for one in segments]
+    total, home = sum(counts), np.repeat(np.arange(len(counts)), counts)
+    nominal = np.concatenate([one.nominal for one in segments])
+    start, end, normal = (
+        np.concatenate(column, axis=1)
+        for column in zip(*(one[1:4] for one in segments), strict=True)
+    )
+    # Of each ask its starts, then its ends.
+    order = np.argsort(np.concatenate([home, home]), kind="stable")
+    points, square_to = (
+        np.concatenate(both, axis=1).take(order, axis=1)
+        for both in ((start, end), (normal, normal))
+    )
+    place, owner, owners = _owners(points, square_to, _blocks(segments, profiles))
+    segment, is_start = order[place] % total, order[place] < total
+    ours, theirs = segment[is_start], segment[~is_start]
+    others = np.bincount(theirs, minlength=total)
+    begins = np.cumsum(others) - others
+    own = others[ours]
+    rows = np.repeat(ours, own)
     within = np.arange(len(rows)) - np.repeat(np.cumsum(own) - own, own)
-    others = len(theirs.owners)
-    pairs = np.repeat(ours.owner, own) * others + theirs.owner[begins[rows] + within]
+    pairs = np.repeat(owner[is_start], own) * len(owners)
+    pairs += owner[~is_start][begins[rows] + within]
     names = sorted(set(pairs.tolist()))
-    owners = [(ours.owners[one // others], theirs.owners[one % others]) for one in names]
     between = np.searchsorted(names, pairs)
-    return Places(nominal[rows], start[:, rows], end[:, rows], normal[:, rows], between, owners)
+    named = [(owners[one // len(owners)], owners[one % len(owners)]) for one in names]
+    stops = np.searchsorted(home[rows], np.arange(len(counts) + 1)).tolist()
+    nominal, start, end = nominal[rows], start[:, rows], end[:, rows]
+    normal = normal[:, rows]
+    found = []
+    for a, b in pairwise(stops):
+        # Owners are numbered ask by ask.
+        low, high = (int(between[a:b].min()), int(between[a:b].max()) + 1) if a < b else (0, 0)
+        own = between[a:b] - low
+        found.append(
+            Places(nominal[a:b], start[:, a:b], end[:, a:b], normal[:, a:b], own, named[low:high])
+        )
+    return found
 
 
-@dataclass(frozen=True)
-class _Filed:
-    """Edges of several layers, and whose they are: ``owner`` is a number of ``owners``."""
+class _Block(NamedTuple):
+    """So many points, and the edges that may run through them with whose they are."""
 
-    table: EdgeTable
-    owner: Indices
-    owners: list[Owner]
+    points: int
+    edges: Sequence[tuple[int, _Profile]]
 
-    def at(self, p: Floats, normal: Floats) -> _Owned:
-        """Whose edges run through each point: of those square to its normal, if any, else all."""
-        asked = boxes_round(p, p, ON_EDGE)
-        place, number = touching(asked, self.table.box)
-        here = self.table.at(number).distance(p[:, place]) < ON_EDGE
-        place, number = place[here], number[here]
-        aside = dot(self.table.at(number).normal(p[:, place]), normal[:, place])
-        square = np.abs(aside) > SQUARE
-        has_square = np.zeros(p.shape[1], dtype=bool)
-        has_square[place[square]] = True
-        chosen = square | ~has_square[place]
-        place, number = place[chosen], number[chosen]
-        order = CellOrder(self.table.box).sorted(asked, place, number)
-        place, owner = place[order], self.owner[number[order]]
-        # Each owner once a place, where it comes first.
-        key = place * len(self.owners) + owner
-        by_key = np.argsort(key, kind="stable")
-        is_first = np.ones(len(key), dtype=bool)
-        is_first[by_key[1:]] = key[by_key[1:]] != key[by_key[:-1]]
-        return _Owned(place[is_first], owner[is_first], self.owners)
+
+def _blocks(segments: Sequence[_Segments], profiles: Sequence[Sequence[Region]]) -> list[_Block]:
+    """Starts and ends of each ask: from films to masks, or anywhere."""
+    known: dict[int, _Profile] = {}
+    found = []
+    for one, own in zip(segments, profiles, strict=True):
+        seated = [
+            (seat, known.get(id(profile)) or known.setdefault(id(profile), _profile(profile)))
+            for seat, profile in enumerate(own)
+        ]
+        count = len(one.nominal)
+        if one.from_films:
+            found += [_Block(count, seated[:2]), _Block(count, seated[2:])]
+        else:
+            found.append(_Block(2 * count, seated))
+    return found
+
+
+def _owners(
+    p: Floats, normal: Floats, blocks: Sequence[_Block]
+) -> tuple[Indices, Indices, list[Owner]]:
+    """Whose edges run through each point: of those square to its normal, if any, else all.
+
+    Points in rising order, for each the numbers of its owners, and these.
+    """
+    owners: list[Owner] = []
+    numbers: list[Indices] = []
+    for block in blocks:
+        for seat, own in block.edges:
+            numbers.append(own.contour + len(owners))
+            owners += [Owner(seat, number, piece) for number, piece in enumerate(own.pieces)]
+    table = EdgeTable.joined([own.table for block in blocks for _, own in block.edges])
+    parts = [sum(len(own.contour) for _, own in block.edges) for block in blocks]
+    asked = boxes_round(p, p, ON_EDGE)
+    counts = [block.points for block in blocks]
+    place, number = touching_in_parts(asked, counts, table.box, parts)
+    edges = table.at(number)
+    (here,) = (edges.distance(p[:, place]) < ON_EDGE).nonzero()
+    place, number = place[here], number[here]
+    aside = dot(table.at(number).normal(p[:, place]), normal[:, place])
+    square = np.abs(aside) > SQUARE
+    has_square = np.zeros(p.shape[1], dtype=bool)
+    has_square[place[square]] = True
+    chosen = square | ~has_square[place]
+    place, number = place[chosen], number[chosen]
+    order = CellOrder(table.box, parts).sorted(asked, place, number)
+    place, owner = place[order], np.concatenate(numbers)[number[order]]
+    # Each owner once a place, where it comes first.
+    key = place * len(owners) + owner
+    by_key = np.argsort(key, kind="stable")
+    is_first = np.ones(len(key), dtype=bool)
+    is_first[by_key[1:]] = key[by_key[1:]] != key[by_key[:-1]]
+    return place[is_first], owner[is_first], owners
 
 
 class _Profile(NamedTuple):
@@ -202,24 +298,6 @@ def _profile(profile: Region) -> _Profile:
     )
 
 
-def _profiles(interface: Interface) -> list[Region]:
-    """Its layers' profiles by seat."""
-    return [one.profile for one in (interface.below, interface.above, *interface.masks)]
-
-
-def _filed(profiles: Sequence[Region], films: bool = False, masks: bool = False) -> _Filed:
-    tables: list[EdgeTable] = []
-    numbers: list[Indices] = []
-    owners: list[Owner] = []
-    for seat, profile in enumerate(profiles):
-        if films if seat < 2 else masks:
-            own = _profile(profile)
-            tables.append(own.table)
-            numbers.append(own.contour + len(owners))
-            owners += [Owner(seat, number, piece) for number, piece in enumerate(own.pieces)]
-    return _Filed(EdgeTable.joined(tables), np.concatenate(numbers), owners)
-
-
 class Rays(NamedTuple):
     """Points spread over edges, the outward unit normals there, and the numbers of their edges."""
 
@@ -240,13 +318,17 @@ class Rays(NamedTuple):
         return Rays(start, -EdgeTable.of(edges).at(own).normal(start), own)
 
 
-def first_met(rays: Rays, table: EdgeTable, within: float) -> tuple[Indices, Floats, Floats]:
+def first_met(
+    rays: Rays, table: EdgeTable, within: float | Floats, parts: Sequence[tuple[int, int]] = ()
+) -> tuple[Indices, Floats, Floats]:
     """The first edge along each ray that meets one: which ray, how far off, and where.
 
-    Edges farther off than ``within`` may be left out.
+    Edges farther off than ``within`` may be left out. ``parts``: so many rays each meet none but so
+    many edges.
     """
+    counts, edge_counts = zip(*parts or [(len(rays.edge), len(table.radius))], strict=True)
     boxes = boxes_round(rays.start, rays.start + within * rays.outward, END_ROOM)
-    ray, number = touching(boxes, table.box)
+    ray, number = touching_in_parts(boxes, counts, table.box, edge_counts)
     start, outward, edges = rays.start[:, ray], rays.outward[:, ray], table.at(number)
     height, there = crossings(start, outward, edges)
     found = []

@@ -7,14 +7,14 @@ holds by what a hand may misplace and turn it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.alike import Alike, interface_name
 from sbafab.rules.finding import Finding, Place, Verdict
-from sbafab.rules.forms import LinearForm
+from sbafab.rules.forms import LinearForms
 from sbafab.rules.freedoms import Freedom, Freedoms
 from sbafab.rules.limits import Limits, Tolerances, at, holds, least_held
 from sbafab.rules.margins import InterfaceMargins, Margin, Push, Quantity, pushes
@@ -53,10 +53,7 @@ def least_remaining(
     measures = measures or Measures(laminate, limits)
     found: list[Remaining] = []
     for group, forms in zip(measures.margins, measures.forms, strict=True):
-        for quantity in WHAT:
-            own = [form for form in forms if form.quantity == quantity]
-            if own:
-                found.append(_least(group, own, measures.moves, limits))
+        found += [_least(group, own, measures.moves, limits) for own in forms]
     return found
 
 
@@ -70,26 +67,20 @@ def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) 
 
 
 def _least(
-    group: InterfaceMargins, forms: Sequence[LinearForm], moves: Freedoms, limits: Limits
+    group: InterfaceMargins, forms: LinearForms, moves: Freedoms, limits: Limits
 ) -> Remaining:
     """What is left at the worst of one quantity's margins; the first of those that are equal."""
-    drawn = limits.bond_width if forms[0].quantity == "bond" else limits.mask_overhang
-    pinned = math.inf
-    places: list[tuple[float, int, float]] = []
-    for form in forms:
-        # Both edges are cut: two contours, or one that is off on either side.
-        cut = form.nominal - 2 * limits.tolerances.cutting
-        held = (cut - form.loss(by_hand=False))[form.nominal >= least_held(drawn)]
-        pinned = min(pinned, held.min(initial=math.inf))
-        worst = cut - form.loss()
-        places += [
-            (round(float(worst[i]), 9), int(form.numbers[i]), float(worst[i]))
-            for i in (worst <= worst.min() + SAME).nonzero()[0]
-        ]
-    _, number, value = min(places)
-    margin = group[number]
+    drawn = limits.bond_width if forms.quantity == "bond" else limits.mask_overhang
+    # Both edges are cut: two contours, or one that is off on either side.
+    cut = forms.nominal - 2 * limits.tolerances.cutting
+    held = (cut - forms.loss(by_hand=False))[forms.nominal >= least_held(drawn)]
+    worst = cut - forms.loss()
+    (near,) = (worst <= worst.min() + SAME).nonzero()
+    number = min(near.tolist(), key=lambda i: round(float(worst[i]), 9))
+    margin = group[forms.first + number]
     found = pushes(margin, group.first, moves)
-    return Remaining(value, float(pinned), margin, group.interfaces, tuple(found))
+    pinned = float(held.min(initial=math.inf))
+    return Remaining(float(worst[number]), pinned, margin, group.interfaces, tuple(found))
 
 
 def _finding(

@@ -7,7 +7,7 @@ assumed: every cutting error and turn uniform within its most, every shift unifo
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,15 +15,15 @@ from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.draws import CutContour, DrawnBuilds, Error, rows_by_error
 from sbafab.rules.finding import Finding, Place, Verdict
-from sbafab.rules.forms import LinearForm
+from sbafab.rules.forms import LinearForms
 from sbafab.rules.freedoms import Freedom, Freedoms
 from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.margin_rows import MarginRows, rows_of
-from sbafab.rules.margins import QUANTITIES, Quantity, own_freedoms, seated
+from sbafab.rules.margins import QUANTITIES, Quantity, seated
 from sbafab.rules.measures import Measures
 
 if TYPE_CHECKING:
-    from sbafab.rules.random_builds import Indices
+    from sbafab.rules.random_builds import Indices, RowsAsked
 
 NAME = "registration-yield"
 
@@ -68,10 +68,12 @@ class Yield:
 
 @dataclass(frozen=True)
 class _Group:
-    """Rows of the first of some alike interfaces; for each, its own errors by the first's."""
+    """Rows of the first of some alike interfaces, each with the numbers of its errors; and for
+    every interface, by index, its own errors by number.
+    """
 
-    rows: dict[Quantity, tuple[MarginRows, ...]]
-    own: dict[int, dict[Error, Error]]
+    rows: dict[Quantity, list[tuple[MarginRows, list[int]]]]
+    own: dict[int, list[Error]]
 
 
 def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
@@ -141,17 +143,25 @@ def simulate(
     groups = []
     for alike, forms in zip(measures.margins, measures.forms, strict=True):
         rows = _rows(forms, seated(alike.first), limits)
-        errors = _in_order(rows)
+        # In the order in which they are drawn.
+        numbers: dict[Error, int] = {}
+        numbered = {
+            quantity: [
+                (one, [numbers.setdefault(error, len(numbers)) for error in one.errors])
+                for one in some
+            ]
+            for quantity, some in rows.items()
+        }
         own = {
-            interface.index: _renamed(errors, alike.first, interface, measures.moves)
+            interface.index: _renamed(list(numbers), alike.first, interface, measures.moves)
             for interface in alike.interfaces
         }
-        groups.append(_Group(rows, own))
+        groups.append(_Group(numbered, own))
     return _counted(groups, limits, seed, measures.pause)
 
 
 def _rows(
-    forms: Iterable[LinearForm], layers: Sequence[int], limits: Limits
+    forms: Iterable[LinearForms], layers: Sequence[int], limits: Limits
 ) -> dict[Quantity, tuple[MarginRows, ...]]:
     """The rows of an interface by quantity, those of the first margins first."""
     limit = {"bond": limits.worst_bond_width, "overhang": limits.worst_mask_overhang}
@@ -167,35 +177,19 @@ def _rows(
     }
 
 
-def _in_order(rows: Mapping[Quantity, Iterable[MarginRows]]) -> list[Error]:
-    """All errors, in the order in which they are drawn."""
-    return list(
-        dict.fromkeys(error for some in rows.values() for one in some for error in one.errors)
-    )
-
-
 def _counted(
     groups: Sequence[_Group], limits: Limits, seed: int, pause: Callable[[], None]
 ) -> Yield:
     """Draws the builds, in batches, and counts those in which all rows keep room."""
     import numpy as np
 
-    from sbafab.rules.random_builds import RandomBuilds, RowsAsked
+    from sbafab.rules.random_builds import RandomBuilds
 
     interfaces = dict.fromkeys(sorted(index for group in groups for index in group.own), 0)
     wanted = limits.yield_builds or _quick_number(len(interfaces))
     whole = 0
     quantities = dict.fromkeys(QUANTITIES, 0)
-    rows, count = rows_by_error(
-        error for group in groups for own in group.own.values() for error in own.values()
-    )
-    told = [
-        (quantity, index, RowsAsked(some, tuple(rows[own[error]] for error in some.errors)))
-        for group in groups
-        for quantity, asked in group.rows.items()
-        for some in asked
-        for index, own in group.own.items()
-    ]
+    told, count = _told(groups)
     of_builds = RandomBuilds([asked for *_, asked in told], limits.tolerances.cutting)
     own_index = np.array([index for _, index, _ in told], dtype=np.intp)
     is_of = {
@@ -210,13 +204,33 @@ def _counted(
         for quantity in QUANTITIES:
             quantities[quantity] += _different(bad[is_of[quantity][asked]])
         every = np.sort(own_index[asked] * builds + bad)
-        for place in every[np.diff(every, prepend=-1) > 0].tolist():
-            interfaces[place // builds] += 1
+        short = every[np.diff(every, prepend=-1) > 0] // builds
+        for index, number in enumerate(np.bincount(short).tolist()):
+            if number:
+                interfaces[index] += number
     return Yield(
         Share(wanted - whole, wanted),
         {index: Share(wanted - bad, wanted) for index, bad in interfaces.items()},
         {quantity: Share(wanted - bad, wanted) for quantity, bad in quantities.items()},
     )
+
+
+def _told(groups: Sequence[_Group]) -> tuple[list[tuple[Quantity, int, RowsAsked]], int]:
+    """What is asked of each interface, by quantity and index; and how many rows are drawn."""
+    from sbafab.rules.random_builds import RowsAsked
+
+    rows, count = rows_by_error(
+        error for group in groups for own in group.own.values() for error in own
+    )
+    found = []
+    for group in groups:
+        first = [(index, [rows[error] for error in own]) for index, own in group.own.items()]
+        for quantity, asked in group.rows.items():
+            for some, numbers in asked:
+                for index, own in first:
+                    places = tuple([own[number] for number in numbers])
+                    found.append((quantity, index, RowsAsked(some, places)))
+    return found, count
 
 
 def _different(builds: Indices) -> int:
@@ -230,20 +244,22 @@ def _quick_number(interfaces: int) -> int:
 
 
 def _renamed(
-    errors: Iterable[Error], first: Interface, other: Interface, moves: Freedoms
-) -> dict[Error, Error]:
+    errors: list[Error], first: Interface, other: Interface, moves: Freedoms
+) -> list[Error]:
     """Which errors of an interface stand where those of an alike one do."""
+    if other is first:
+        return errors
     layers = dict(zip(seated(first), seated(other), strict=True))
-    twins: dict[Error, Freedom] = {}
-    pairs = zip(own_freedoms(first, moves), own_freedoms(other, moves), strict=True)
+    twins: dict[int, Freedom] = {}
+    pairs = zip(moves.unshared(seated(first)), moves.unshared(seated(other)), strict=True)
     for ours, theirs in pairs:
-        twins.update(zip(ours, theirs, strict=True))
-    return {
-        error: twins[error]
+        twins.update(zip(map(id, ours), theirs, strict=True))
+    return [
+        twins[id(error)]
         if isinstance(error, Freedom)
         else CutContour(layers[error.layer], error.contour)
         for error in errors
-    }
+    ]
 
 
 def _by_interface(found: Yield) -> str:

@@ -102,6 +102,8 @@ def void_graph(laminate: Laminate) -> VoidGraph:
             if key not in homes:
                 homes[key] = [_home(piece, gap.missing) for piece in openings[layer.pattern]]
             for number, (home, p) in enumerate(homes[key]):
+                if number == outside[layer.pattern] and home == gap.outside:
+                    continue
                 opening = _opening(layer.index, number, outside[layer.pattern])
                 graph.join(opening, _missing(interface, home, gap), p)
     for layer in (laminate.tpe_layers[0], laminate.tpe_layers[-1]):
@@ -121,7 +123,12 @@ def _gap(unbonded: Region, contact: Region, frame: Region) -> _Gap:
         home = _holding(missing, beside(edge, -INSET))
         touching.append((_bounded(pieces, edge.at(0.5)), home, edge.at(0.5)))
     touching.sort(key=lambda one: one[0])
-    return _Gap(pieces, missing, tuple(touching), _outside(missing, frame))
+    outside = _outside(missing, frame)
+    # Inlets open to the outside; of any other two voids it counts that they join, and first where.
+    joins: dict[tuple[int, int, Point | None], tuple[int, int, Point]] = {}
+    for number, home, p in touching:
+        joins.setdefault((number, home, p if home == outside else None), (number, home, p))
+    return _Gap(pieces, missing, tuple(joins.values()), outside)
 
 
 def _bounded(pieces: tuple[Region, ...], p: Point) -> int:
@@ -204,8 +211,10 @@ def _home(opening: Region, missing: tuple[Region, ...]) -> tuple[int, Point]:
 
 
 def _holding(pieces: tuple[Region, ...], p: Point) -> int:
+    x, y = p
     for number, piece in enumerate(pieces):
-        if piece.contains(p):
+        left, low, right, high = piece.bounds
+        if left <= x <= right and low <= y <= high and piece.contains(p):
             return number
     return min(range(len(pieces)), key=lambda number: pieces[number].distance_to_edge(p))
 

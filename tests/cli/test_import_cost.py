@@ -55,7 +55,7 @@ ARRAYS = {
     f"sbafab.{name}"
     for name in (
         *("geometry.edge_table", "geometry.facing_places", "geometry.side_table"),
-        *("rules.narrow_places", "rules.random_builds"),
+        *("rules.likely_builds", "rules.narrow_places", "rules.random_builds"),
     )
 }
 """What the registration rules fetch when they measure; no other rule needs them."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 import random
 from collections.abc import Callable
@@ -12,13 +13,14 @@ import pytest
 
 from sbafab.geometry.boolean import divided, union
 from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
-from sbafab.laminate.laminate import Laminate
-from sbafab.rules import boundary, draws, freedoms, margins
+from sbafab.geometry.shapes import disc, polygon, rectangle, strip
+from sbafab.laminate.laminate import Inlet, Laminate
+from sbafab.rules import boundary, draws, freedoms, likely_builds, margins, tube_fit
 from sbafab.rules.boundary import outward_reach
 from sbafab.rules.draws import CutContour, DrawnBuilds, numbers, rows_by_error
 from sbafab.rules.forms import linear_forms
 from sbafab.rules.freedoms import Freedom
+from sbafab.rules.likely_builds import ErrorsAsked
 from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
 from sbafab.rules.margin_rows import MarginRows
 from sbafab.rules.margins import pushes
@@ -100,9 +102,9 @@ def test_forms_lose_what_their_pushes_cost(good: Good) -> None:
     laminate = good("3dof-15mm", "stack.balloons=2")
     measures = Measures(laminate, Limits())
     for group in measures.margins:
-        for form in linear_forms(group, measures.moves):
-            for number, whole, pinned in zip(
-                form.numbers, form.loss(), form.loss(by_hand=False), strict=True
+        for forms in linear_forms(group, measures.moves):
+            for number, (whole, pinned) in enumerate(
+                zip(forms.loss(), forms.loss(by_hand=False), strict=True), forms.first
             ):
                 found = pushes(group[number], group.first, measures.moves)
                 assert whole == pytest.approx(sum(push.cost for push in found))
@@ -157,35 +159,101 @@ def test_edges_aside_of_a_band_or_farther_off_are_none_of_the_nearest(
                 assert found == plain
 
 
-def test_sums_of_cuts_beyond_the_lowest_are_asked_for_as_well(
+def test_builds_found_for_another_laminate_serve_this_one(
     monkeypatch: pytest.MonkeyPatch, good: Good
 ) -> None:
     laminate = good("1dof-5mm", "stack.balloons=3")
-    hand = replace(Tolerances(), placement=0.3, turn=2.0)
-    limits = replace(Limits(), tolerances=hand, yield_builds=600)
-    found = simulate(laminate, limits)
-    for share in (1, 5, 600):
-        monkeypatch.setattr(draws, "LOWEST", share)
-        draws._sorted_out.cache_clear()
-        # Nothing is sorted out when it is asked for the first time.
-        assert [simulate(laminate, limits) for _ in range(2)] == [found, found]
-    draws._sorted_out.cache_clear()
-    assert 0 < found.whole.good < 600
+    hand = replace(Tolerances(), placement=0.1, turn=1.0)
+    # Each asks for more, or for less, than what is kept of the one before.
+    limits = [
+        replace(Limits(), tolerances=hand, yield_builds=600, worst_bond_width=least)
+        for least in (0.4, 0.5, 0.3, 0.51, 0.6)
+    ]
+    found = []
+    for own in limits:
+        likely_builds._kept.cache_clear()
+        found.append(simulate(laminate, own))
+    assert len({one.whole.good for one in found}) == 5
+    for most, slack in ((likely_builds.MOST_KEPT, likely_builds.SLACK), (0, 0.02), (300, 0.5)):
+        monkeypatch.setattr(likely_builds, "MOST_KEPT", most)
+        monkeypatch.setattr(likely_builds, "SLACK", slack)
+        likely_builds._kept.cache_clear()
+        assert [simulate(laminate, own) for own in limits] == found
 
 
-def test_the_lowest_sums_are_those_of_all() -> None:
-    draws._sorted_out.cache_clear()
-    drawn = DrawnBuilds(3, 40, 4, 80)
-    for pair in (draws.Pair(0, 1, 1.0, 1.0), draws.Pair(2, 3, 1.0, -1.0), draws.Pair(3, 0, -1, -1)):
-        one, other = drawn.numbers[pair.row], drawn.numbers[pair.other]
-        sums = (pair.sign * one + pair.other_sign * other).tolist()
-        assert drawn.lowest((pair,)) is None
-        lowest = drawn.lowest((pair,))
-        assert lowest is not None
-        order = sorted(range(80), key=sums.__getitem__)
-        assert lowest.builds[0].tolist() == sorted(order[:10])
-        assert lowest.totals[0].tolist() == [sums[build] for build in sorted(order[:10])]
-        assert lowest.below[0] == sums[order[10]]
+@pytest.mark.parametrize("need", [-0.4, -0.1, 0.0])
+def test_likely_builds_are_those_of_plain_sums(need: float) -> None:
+    batch = DrawnBuilds(3, 40, 8, 200)
+    first = np.array([[0, 1], [1, 0], [2, 4], [4, 2], [6, 7]])
+    errors = ErrorsAsked(
+        first,
+        signs=np.array([[1.0, -1.0], [1.0, 1.0]]),
+        shift=np.array([[0.2, 0.1], [0.0, 0.3], [0.0, 0.0]]),
+        sign=np.array([[1.0, -1.0], [0.0, 1.0], [0.0, 0.0]]),
+        cutting=0.1,
+    )
+    drawn = batch.numbers
+    likely = likely_builds._found(batch, errors, np.full(2, need))
+    told = zip(likely.asked.tolist(), likely.build.tolist(), strict=True)
+    found = dict(zip(told, likely.left, strict=True))
+    for asked in (0, 1):
+        for build in range(200):
+            left, moved = 0.0, 0j
+            for row, sign in zip(first[:2, asked], errors.signs[:, asked], strict=True):
+                left += sign * 0.1 * (2 * drawn[row, build] - 1)
+            for line, most in enumerate(errors.shift[:, asked]):
+                row = first[2 + line, asked]
+                if most:
+                    moved += errors.sign[line, asked] * cmath.rect(
+                        most * math.sqrt(drawn[row, build]), math.tau * drawn[row + 1, build]
+                    )
+            left -= abs(moved)
+            assert ((asked, build) in found) == (left < need)
+            if left < need:
+                assert found[asked, build] == pytest.approx(left, abs=1e-12)
+    assert 0 < len(found) < 400
+
+
+RUN = Inlet("chamber1", (9.0, 0.5), (1.0, 0.0), 1.6, 3.0, 0.8)
+STRIP = rectangle((0.0, -0.3), (9.0, 1.3))
+"""A strip that opens at the inlet of that run."""
+
+
+@pytest.mark.parametrize("degrees", [0, 90, 120, 263])
+def test_a_straight_run_is_what_a_boolean_leaves_of_it(degrees: float) -> None:
+    pocket = (STRIP | disc((0.0, 0.5), 2.5)).turned(degrees)
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    mouth = 9.0 * c - 0.5 * s, 9.0 * s + 0.5 * c
+    inlet = replace(RUN, mouth=mouth, direction=(c, s))
+    inner = mouth[0] - 3.0 * c, mouth[1] - 3.0 * s
+    beside = strip(inner, mouth, 2 * inlet.width)
+    run = tube_fit._straight_run(pocket, inlet, beside)
+    assert run is not None
+    assert run.area == pytest.approx(3.0 * 1.6)
+    assert [edge.start for edge in run.edges] == [
+        pytest.approx(edge.start) for edge in (pocket & beside).edges
+    ]
+
+
+@pytest.mark.parametrize(
+    "unbonded",
+    [
+        # A hole in the run, a waist, sides aslant, a shape beside it, wider than is looked at.
+        STRIP - disc((7.5, 0.5), 0.1),
+        STRIP - rectangle((7.0, -1.0), (7.5, 0.0)),
+        polygon([(0, -0.3), (9, -0.2), (9, 1.3), (0, 1.3)]),
+        STRIP | rectangle((7.0, 1.5), (7.5, 2.0)),
+        rectangle((0.0, -1.2), (9.0, 2.2)),
+        # It ends before the mouth, goes on past it, or begins after the run does.
+        rectangle((0.0, -0.3), (8.9, 1.3)),
+        rectangle((0.0, -0.3), (9.5, 1.3)),
+        rectangle((6.5, -0.3), (9.0, 1.3)),
+    ],
+)
+def test_any_other_run_is_left_to_the_boolean(unbonded: Region) -> None:
+    beside = strip((6.0, 0.5), (9.0, 0.5), 3.2)
+    assert tube_fit._straight_run(STRIP, RUN, beside) is not None
+    assert tube_fit._straight_run(unbonded, RUN, beside) is None
 
 
 FRAME = rectangle((-20, -20), (20, 20))
