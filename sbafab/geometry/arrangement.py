@@ -23,16 +23,12 @@ from sbafab.geometry.edges import (
     left_normal,
     turns_round,
 )
+from sbafab.geometry.inconsistent import InconsistentError
 from sbafab.geometry.nearby import EdgeIndex, widened
-from sbafab.geometry.once import once
 from sbafab.geometry.pieces import Overlay
 
 NEAR = 0.05
 """Radians: edges that leave a point at less than this angle are compared farther on."""
-
-
-class InconsistentError(ArithmeticError):
-    """Two ways to a face do not agree; the argument is the point where they meet."""
 
 
 class _Leaving(NamedTuple):
@@ -79,6 +75,7 @@ class Arrangement:
         rings: dict[Point, list[int]] = defaultdict(list)
         for half, p in enumerate(self.origin):
             rings[p].append(half)
+        self._by_place: EdgeIndex | None = None
         self.tangled: set[Point] = set()
         """Where pieces leave in nearly one direction, so that rounding could order them wrongly;
         every point, where pieces were bent and may cross between their ends.
@@ -124,9 +121,11 @@ class Arrangement:
                 start = stop
         return ring
 
-    @once
+    @property
     def _index(self) -> EdgeIndex:
-        return EdgeIndex(self._drawn)
+        if self._by_place is None:
+            self._by_place = EdgeIndex(self._drawn)
+        return self._by_place
 
     def _around(self, p: Point, left: Sequence[int | None]) -> int:
         """How often the pieces that are told in ``left`` wind round a point."""

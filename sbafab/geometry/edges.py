@@ -8,24 +8,24 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import NamedTuple
-
-from sbafab.geometry.once import once
+from typing import Final
 
 Point = tuple[float, float]
 Bounds = tuple[float, float, float, float]
 
-EPSILON = 2e-6
+EPSILON: Final = 2e-6
 """mm: a point nearer to an edge than this, 2 nm, lies on it."""
-SAME = 2 * EPSILON
+SAME: Final = 2 * EPSILON
 """mm: points nearer to each other than this, 4 nm, are one point, and so are all that hang together
 by such steps. Far below the 1 um that the cut files promise.
 """
 
-BENT = EPSILON / 4
+BENT: Final = EPSILON / 4
 """mm: an edge whose points were moved off its line or circle by more may run where none was looked
 for. Two edges bent by less still are within EPSILON of each other where they meet.
 """
+UNKNOWN: Final = 1e9
+"""Radians: an angle that has not been worked out."""
 
 
 def unit(degrees: float) -> Point:
@@ -39,11 +39,26 @@ def _along(p: Point, origin: Point, unit: Point) -> float:
     return (p[0] - origin[0]) * unit[0] + (p[1] - origin[1]) * unit[1]
 
 
-class Line(NamedTuple):
+class Line:
     """A straight edge from ``start`` to ``end``."""
 
-    start: Point
-    end: Point
+    __slots__ = ("end", "start")
+
+    def __init__(self, start: Point, end: Point) -> None:
+        self.start: Final[Point] = start
+        self.end: Final[Point] = end
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Line) and self.start == other.start and self.end == other.end
+
+    def __hash__(self) -> int:
+        return hash((self.start, self.end))
+
+    def __repr__(self) -> str:
+        return f"Line(start={self.start}, end={self.end})"
+
+    def __reduce__(self) -> tuple[type[Line], tuple[Point, Point]]:
+        return Line, (self.start, self.end)
 
     @property
     def length(self) -> float:
@@ -112,57 +127,100 @@ class Line(NamedTuple):
         return Line((x0 + nx, y0 + ny), (x1 + nx, y1 + ny))
 
 
-class _Arc(NamedTuple):
-    start: Point
-    end: Point
-    centre: Point
-    radius: float
-    ccw: bool
-
-
-class Arc(_Arc):
+class Arc:
     """A circular edge round ``centre``, counter-clockwise if ``ccw``; at most half a turn.
 
-    Rules ask for its values again and again: they are worked out once.
+    Rules ask for its sweep and bounds again and again: they are worked out once.
     """
 
-    @once
+    __slots__ = ("_bounds", "_start_angle", "_sweep", "ccw", "centre", "end", "radius", "start")
+
+    def __init__(self, start: Point, end: Point, centre: Point, radius: float, ccw: bool) -> None:
+        self.start: Final[Point] = start
+        self.end: Final[Point] = end
+        self.centre: Final[Point] = centre
+        self.radius: Final[float] = radius
+        self.ccw: Final[bool] = ccw
+        self._start_angle = UNKNOWN
+        self._sweep = UNKNOWN
+        self._bounds: Bounds | None = None
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, Arc)
+            and self.start == other.start
+            and self.end == other.end
+            and self.centre == other.centre
+            and self.radius == other.radius
+            and self.ccw == other.ccw
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.start, self.end, self.centre, self.radius, self.ccw))
+
+    def __repr__(self) -> str:
+        return (
+            f"Arc(start={self.start}, end={self.end}, centre={self.centre}, "
+            f"radius={self.radius}, ccw={self.ccw})"
+        )
+
+    def __reduce__(self) -> tuple[type[Arc], tuple[Point, Point, Point, float, bool]]:
+        return Arc, (self.start, self.end, self.centre, self.radius, self.ccw)
+
+    @property
     def ends_lie_on_circle(self) -> bool:
         """Whether both ends lie on the circle, to within BENT."""
-        off = [math.dist(p, self.centre) - self.radius for p in (self.start, self.end)]
-        return min(off) > -BENT and max(off) < BENT
+        first = math.dist(self.start, self.centre) - self.radius
+        last = math.dist(self.end, self.centre) - self.radius
+        return -BENT < first < BENT and -BENT < last < BENT
 
-    @once
+    @property
     def start_angle(self) -> float:
-        return math.atan2(self.start[1] - self.centre[1], self.start[0] - self.centre[0])
+        angle = self._start_angle
+        if angle == UNKNOWN:
+            (x, y), (cx, cy) = self.start, self.centre
+            angle = self._start_angle = math.atan2(y - cy, x - cx)
+        return angle
 
-    @once
+    @property
     def sweep(self) -> float:
         """Signed angle turned through: positive counter-clockwise."""
+        sweep = self._sweep
+        if sweep == UNKNOWN:
+            sweep = self._sweep = self._turned()
+        return sweep
+
+    def _turned(self) -> float:
         cx, cy = self.centre
-        ax, ay = self.start[0] - cx, self.start[1] - cy
-        bx, by = self.end[0] - cx, self.end[1] - cy
+        (x0, y0), (x1, y1) = self.start, self.end
+        ax, ay, bx, by = x0 - cx, y0 - cy, x1 - cx, y1 - cy
         turn = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
         if self.ccw:
             return turn if turn > -1e-9 else turn + math.tau
         return turn if turn < 1e-9 else turn - math.tau
 
-    @once
+    @property
     def length(self) -> float:
         return self.radius * abs(self.sweep)
 
-    @once
+    @property
     def bulge(self) -> float:
         return math.tan(self.sweep / 4)
 
-    @once
+    @property
     def segment_area(self) -> float:
         """Signed area between the chord and the arc: positive when counter-clockwise."""
         sweep = self.sweep
         return 0.5 * self.radius**2 * (sweep - math.sin(sweep))
 
-    @once
+    @property
     def bounds(self) -> Bounds:
+        found = self._bounds
+        if found is None:
+            found = self._bounds = self._box()
+        return found
+
+    def _box(self) -> Bounds:
         (cx, cy), r = self.centre, self.radius
         (x0, y0), (x1, y1) = (self.start, self.end) if self.ccw else (self.end, self.start)
         left, right = (x0, x1) if x0 < x1 else (x1, x0)
@@ -249,10 +307,10 @@ class Arc(_Arc):
         scale = radius / self.radius
         cx, cy = self.centre
 
-        def moved(p: Point) -> Point:
-            return cx + (p[0] - cx) * scale, cy + (p[1] - cy) * scale
-
-        return Arc(moved(self.start), moved(self.end), self.centre, radius, self.ccw)
+        (x0, y0), (x1, y1) = self.start, self.end
+        start = cx + (x0 - cx) * scale, cy + (y0 - cy) * scale
+        end = cx + (x1 - cx) * scale, cy + (y1 - cy) * scale
+        return Arc(start, end, self.centre, radius, self.ccw)
 
 
 Edge = Line | Arc

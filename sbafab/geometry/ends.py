@@ -77,7 +77,8 @@ def _between_flanks(
     """
     if stop - start + 3 > len(runs):
         return
-    turn = sum(runs[i % len(runs)].sweep for i in range(start, stop + 1))
-    turn += sum(corners[i % len(runs)] for i in range(start, stop + 2))
+    count = len(runs)
+    turn: float = sum([runs[i % count].sweep for i in range(start, stop + 1)])
+    turn += sum([corners[i % count] for i in range(start, stop + 2)])
     if abs(turn - math.pi) < math.radians(taper):
         yield runs[start % len(runs)].first.start, runs[stop % len(runs)].last.end

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 
 from sbafab.geometry.edges import EPSILON, Bounds, Edge, Point, distance_to
-from sbafab.geometry.once import once
 
 MANY_BOXES = 500
 """From which on comparing all at once is worth fetching numpy."""
@@ -40,7 +39,7 @@ def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, in
         yield from _close_among_few(boxes, reach)
         return
     order = sorted(range(len(boxes)), key=lambda i: boxes[i][0])
-    height = reach + sum(box[3] - box[1] for box in boxes) / max(1, len(boxes)) or 1.0
+    height = reach + sum([box[3] - box[1] for box in boxes]) / max(1, len(boxes)) or 1.0
     active: dict[int, list[tuple[int, int, int]]] = {}
     for rank, i in enumerate(order):
         left, low, _, high = boxes[i]
@@ -69,7 +68,8 @@ def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, in
 def _close_among_few(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
     """The same pairs in the same order."""
     active: list[tuple[float, float, float, int]] = []
-    for i in sorted(range(len(boxes)), key=lambda i: boxes[i][0]):
+    lefts = [box[0] for box in boxes]
+    for i in sorted(range(len(boxes)), key=lefts.__getitem__):
         left, low, right, high = boxes[i]
         first, bottom, top = left - reach, low - reach, high + reach
         active = [one for one in active if one[0] >= first]
@@ -124,10 +124,17 @@ class EdgeIndex:
         self.across = max(self._high[0] - self._low[0], self._high[1] - self._low[1])
         self.cell = self.across / max(1.0, math.sqrt(len(edges))) or 1.0
         self._reach = self._places((*self._low, *self._high))
+        self._by_cell: dict[tuple[int, int], list[int]] | None = None
+        self._first_cells: list[tuple[int, int]] | None = None
 
-    @once
+    @property
     def _filed(self) -> dict[tuple[int, int], list[int]]:
         """The numbers of edges in each cell."""
+        if self._by_cell is None:
+            self._by_cell = self._file()
+        return self._by_cell
+
+    def _file(self) -> dict[tuple[int, int], list[int]]:
         filed: dict[tuple[int, int], list[int]] = {}
         for number, box in enumerate(self._boxes):
             x0, y0, x1, y1 = self._places(box)
@@ -139,10 +146,16 @@ class EdgeIndex:
                     filed.setdefault((x, y), []).append(number)
         return filed
 
-    @once
+    @property
     def _cells(self) -> list[tuple[int, int]]:
         """The first cell of each edge."""
-        return [self._places(box)[:2] for box in self._boxes]
+        if self._first_cells is None:
+            (x, y), cell = self._low, self.cell
+            self._first_cells = [
+                (math.floor((box[0] - x) / cell), math.floor((box[1] - y) / cell))
+                for box in self._boxes
+            ]
+        return self._first_cells
 
     def _places(self, box: Bounds) -> tuple[int, int, int, int]:
         (x, y), cell = self._low, self.cell

@@ -77,7 +77,7 @@ def _joined_up(edges: Sequence[Edge]) -> Iterator[Edge]:
             starts[i] = end
     for edge, start, following in zip(edges, starts, (*starts[1:], *starts[:1]), strict=True):
         end = following if math.dist(edge.end, following) < EPSILON else edge.end
-        yield edge if start is edge.start and end == edge.end else edge.part(start, end)
+        yield edge if start == edge.start and end == edge.end else edge.part(start, end)
 
 
 def _moved(contour: Contour, distance: float) -> Iterator[Edge]:

@@ -126,7 +126,7 @@ def split_edges(
     return Split(
         [
             [edge]
-            if len(own) == 2 and own[0] is edge.start and own[1] is edge.end and own[0] != own[1]
+            if len(own) == 2 and own[0] == edge.start and own[1] == edge.end and own[0] != own[1]
             else [edge.part(a, b) for a, b in pairwise(own) if a != b]
             for edge, own in zip(whole, stops, strict=True)
         ],

@@ -17,7 +17,6 @@ from sbafab.geometry.ends import tapered_ends
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.kept import kept
 from sbafab.geometry.nearby import EdgeIndex, widened
-from sbafab.geometry.once import once
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.remembered import remembered
 from sbafab.geometry.rings import across_a_ring, bound_a_ring
@@ -106,7 +105,7 @@ class BoundarySide(NamedTuple):
         """Points of the edge where its normal passes through ``p``."""
         edge = self.edge
         if isinstance(edge, Line):
-            (x0, y0), (x1, y1) = edge
+            (x0, y0), (x1, y1) = edge.start, edge.end
             dx, dy = x1 - x0, y1 - y0
             square = dx * dx + dy * dy
             t = ((p[0] - x0) * dx + (p[1] - y0) * dy) / square
@@ -149,13 +148,16 @@ class Boundary:
         )
         self.known_clear: dict[tuple[Point, Point], bool] = {}
         """Of segments that were asked: whether no edge crosses them."""
+        self._table: SideTable | None = None
 
-    @once
+    @property
     def table(self) -> SideTable:
         """The sides in arrays."""
         from sbafab.geometry.side_table import SideTable
 
-        return SideTable(self.sides)
+        if self._table is None:
+            self._table = SideTable(self.sides)
+        return self._table
 
 
 def _made_ready(region: Region, sharp: float) -> Boundary:
