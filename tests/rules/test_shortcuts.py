@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from sbafab.geometry.boolean import divided, union
+from sbafab.geometry.edges import Line
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import disc, polygon, rectangle, strip
 from sbafab.laminate.laminate import Inlet, Laminate
@@ -152,7 +153,9 @@ def test_edges_aside_of_a_band_or_farther_off_are_none_of_the_nearest(
         )
         for edge in region.edges:
             for one in (edge, edge.reversed()):
-                band = boundary._line_band(one) if len(one) == 2 else boundary._arc_band(one)
+                band = (
+                    boundary._line_band(one) if isinstance(one, Line) else boundary._arc_band(one)
+                )
                 found = outward_reach(one, region.index)
                 monkeypatch.setattr(boundary, "_heights", lambda *_: (-math.inf, math.inf))
                 plain = boundary._nearest(band, region.edges)
