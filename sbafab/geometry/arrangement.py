@@ -11,7 +11,7 @@ import math
 from collections import defaultdict
 from collections.abc import Container, Iterator, Sequence
 from functools import cmp_to_key
-from typing import NamedTuple
+from typing import Final
 
 from sbafab.geometry.edges import (
     EPSILON,
@@ -31,18 +31,18 @@ NEAR = 0.05
 """Radians: edges that leave a point at less than this angle are compared farther on."""
 
 
-class _Leaving(NamedTuple):
+class _Leaving:
     """A piece as it leaves a point: its direction there, its chord, how it bends, where it ends."""
 
-    half: int
-    edge: Edge
-    heading: float
-    chord: float
-    bend: float
+    __slots__ = ("bend", "chord", "edge", "end", "half", "heading")
 
-    @property
-    def end(self) -> Point:
-        return self.edge.start if self.half & 1 else self.edge.end
+    def __init__(self, half: int, edge: Edge, heading: float, chord: float, bend: float) -> None:
+        self.half: Final[int] = half
+        self.edge: Final[Edge] = edge
+        self.heading: Final[float] = heading
+        self.chord: Final[float] = chord
+        self.bend: Final[float] = bend
+        self.end: Final[Point] = edge.start if half & 1 else edge.end
 
     def to_left(self, p: Point) -> float:
         """How far ``p`` lies to the left of the line or circle the piece is a part of."""

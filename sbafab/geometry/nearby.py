@@ -26,18 +26,21 @@ def boxes_meet(a: Bounds, b: Bounds) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
-def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
+def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterable[tuple[int, int]]:
     """Numbers of the boxes that come within ``reach`` of each other, by a sweep along x.
 
     The sweep runs in bands along y as high as a box is on average, so its time grows with the boxes
     and the pairs alone. Of many boxes, all are compared at once with those that they meet along x.
     """
     if len(boxes) >= MANY_BOXES:
-        yield from _close_among_many(boxes, reach)
-        return
+        return _close_among_many(boxes, reach)
     if len(boxes) <= FEW_BOXES:
-        yield from _close_among_few(boxes, reach)
-        return
+        return _close_among_few(boxes, reach)
+    return _close_in_bands(boxes, reach)
+
+
+def _close_in_bands(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
+    """The same pairs in the same order."""
     order = sorted(range(len(boxes)), key=lambda i: boxes[i][0])
     height = reach + sum([box[3] - box[1] for box in boxes]) / max(1, len(boxes)) or 1.0
     active: dict[int, list[tuple[int, int, int]]] = {}
@@ -65,8 +68,9 @@ def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, in
             active.setdefault(band, []).append((rank, i, bottom))
 
 
-def _close_among_few(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
+def _close_among_few(boxes: Sequence[Bounds], reach: float) -> list[tuple[int, int]]:
     """The same pairs in the same order."""
+    found: list[tuple[int, int]] = []
     active: list[tuple[float, float, float, int]] = []
     lefts = [box[0] for box in boxes]
     for i in sorted(range(len(boxes)), key=lefts.__getitem__):
@@ -75,8 +79,9 @@ def _close_among_few(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[in
         active = [one for one in active if one[0] >= first]
         for _, other_low, other_high, j in active:
             if other_low <= top and other_high >= bottom:
-                yield j, i
+                found.append((j, i))
         active.append((right, low, high, i))
+    return found
 
 
 def _close_among_many(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
+from sbafab.geometry.boundary_side import BoundarySide
 from sbafab.geometry.edges import Arc, Edge, Point
-
-if TYPE_CHECKING:
-    from sbafab.geometry.width import BoundarySide
 
 WIDE = 1e-5
 """mm: in narrower rings rounding may decide which edges face each other."""

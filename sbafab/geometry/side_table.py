@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sbafab.geometry.boundary_side import BESIDE, BoundarySide
 from sbafab.geometry.edge_table import CellOrder, EdgeTable, dot, touching_in_parts
-from sbafab.geometry.width import ALONGSIDE, BESIDE, BoundarySide
+from sbafab.geometry.width import ALONGSIDE
 
 if TYPE_CHECKING:
     from sbafab.geometry.edge_table import Bools, Floats, Indices

@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from sbafab.geometry.boundary_side import BoundarySide, Foot
 from sbafab.geometry.corners import Corner, corners_of, pinch
 from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, left_normal
 from sbafab.geometry.ends import tapered_ends
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
 
 ALONGSIDE = 1e-3
 """Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
-BESIDE = 1e-5
-"""mm that an edge may miss another's normals by, for rounding."""
 SHORTER = 1e-9
 """mm by which a segment must be shorter than another to be the narrowest."""
 ROUNDING = 1e-12
@@ -74,59 +73,6 @@ def least_gap(region: Region, sharp: float = 90.0, below: float = math.inf) -> W
     """The narrowest slot, hole or gap between pieces, likewise."""
     outside = [kept(one, "from_outside", Contour.reversed) for one in region.contours]
     return least_of(Boundary(may_be_narrower(outside, below), sharp), below)
-
-
-class _Foot(NamedTuple):
-    point: Point
-    normal: Point
-
-
-class BoundarySide(NamedTuple):
-    """An edge with what the search asks of it again and again.
-
-    ``half`` is how far its ends lie from its middle, ``lean`` the sine of its half turn.
-    """
-
-    edge: Edge
-    box: Bounds
-    middle: Point
-    normal: Point
-    half_turn: float
-    half: float
-    lean: float
-
-    def may_hold_feet(self, other: BoundarySide, within: float) -> bool:
-        """Whether a normal of this edge may meet the other no farther off than ``within``."""
-        (x, y), (nx, ny) = self.middle, self.normal
-        aside = abs((other.middle[0] - x) * ny - (other.middle[1] - y) * nx)
-        return aside <= self.half + other.half + within * self.lean + BESIDE
-
-    def feet(self, p: Point) -> list[_Foot]:
-        """Points of the edge where its normal passes through ``p``."""
-        edge = self.edge
-        if isinstance(edge, Line):
-            (x0, y0), (x1, y1) = edge.start, edge.end
-            dx, dy = x1 - x0, y1 - y0
-            square = dx * dx + dy * dy
-            t = ((p[0] - x0) * dx + (p[1] - y0) * dy) / square
-            if not -1e-9 <= t <= 1 + 1e-9:
-                return []
-            length = math.sqrt(square)
-            return [_Foot((x0 + t * dx, y0 + t * dy), (-dy / length, dx / length))]
-        (cx, cy), r = edge.centre, edge.radius
-        ux, uy = p[0] - cx, p[1] - cy
-        distance = math.hypot(ux, uy)
-        if distance < 1e-12:
-            return [_Foot(self.middle, left_normal(edge, self.middle))]
-        inward = -1.0 if edge.ccw else 1.0
-        mx, my = self.middle[0] - cx, self.middle[1] - cy
-        least = r * (math.cos(self.half_turn) - 1e-9)
-        found = []
-        for sign in (1.0, -1.0):
-            vx, vy = sign * ux / distance, sign * uy / distance
-            if vx * mx + vy * my >= least:
-                found.append(_Foot((cx + r * vx, cy + r * vy), (inward * vx, inward * vy)))
-        return found
 
 
 class Boundary:
@@ -185,9 +131,9 @@ class _Narrowest:
         if value < self.value - SHORTER and self.is_clear(p, q):
             self.value, self.best = value, Width(value, p, q)
 
-    def offer_facing(self, a: _Foot, b: _Foot) -> None:
-        (px, py), (nx, ny) = a
-        (qx, qy), (mx, my) = b
+    def offer_facing(self, a: Foot, b: Foot) -> None:
+        (px, py), (nx, ny) = a.point, a.normal
+        (qx, qy), (mx, my) = b.point, b.normal
         dx, dy = qx - px, qy - py
         if dx * nx + dy * ny > TOUCH and dx * mx + dy * my < -TOUCH:
             self.offer((px, py), (qx, qy))
@@ -300,8 +246,7 @@ def _side(edge: Edge, box: Bounds) -> BoundarySide:
     else:
         middle, half_turn = edge.at(0.5), 0.0
     half = max(math.dist(middle, edge.start), math.dist(middle, edge.end))
-    lean = math.sin(min(half_turn, math.pi / 2))
-    return BoundarySide(edge, box, middle, left_normal(edge, middle), half_turn, half, lean)
+    return BoundarySide(edge, box, middle, half_turn, half)
 
 
 def _between_edges(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> None:
@@ -372,7 +317,7 @@ def _along_each_other(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -
         return
     for one, other in ((a, b), (b, a)):
         for p in (one.middle, one.edge.start, one.edge.end):
-            here = _Foot(p, left_normal(one.edge, p))
+            here = Foot(p, left_normal(one.edge, p))
             for foot in other.feet(p):
                 narrowest.offer_facing(here, foot)
 
@@ -397,7 +342,7 @@ def _between_corners(a: Corner, b: Corner, narrowest: _Narrowest) -> None:
         narrowest.offer(a.point, b.point)
 
 
-def _corner_to_edge(corner: Corner, side: BoundarySide, foot: _Foot, narrowest: _Narrowest) -> None:
+def _corner_to_edge(corner: Corner, side: BoundarySide, foot: Foot, narrowest: _Narrowest) -> None:
     d = (foot.point[0] - corner.point[0], foot.point[1] - corner.point[1])
     if _dot(d, foot.normal) > -TOUCH:
         return
