@@ -20,6 +20,7 @@ from sbafab.geometry.chain_sums import (
     times_round,
 )
 from sbafab.geometry.edges import (
+    EPSILON,
     SAME,
     Arc,
     Bounds,
