@@ -20,6 +20,7 @@ from sbafab.geometry.chain_sums import (
     times_round,
 )
 from sbafab.geometry.edges import (
+    EPSILON,
     SAME,
     Arc,
     Bounds,
@@ -286,9 +287,21 @@ class Region:
 
     def distance_to_edge(self, p: Point) -> float:
         """Least distance in mm from ``p`` to any edge."""
-        if len(self.edges) < MANY:
-            return min((distance_to(edge, p) for edge in self.edges), default=math.inf)
-        return self.index.distance(p)
+        if len(self.edges) >= 2 * MANY:
+            return self.index.distance(p)
+        x, y = p
+        least = math.inf
+        for contour in self.contours:
+            left, low, right, high = contour.bounds
+            room = least + EPSILON
+            if left - x > room or x - right > room or low - y > room or y - high > room:
+                continue
+            for edge, (left, low, right, high) in zip(contour.edges, contour.boxes, strict=True):
+                room = least + EPSILON
+                if left - x > room or x - right > room or low - y > room or y - high > room:
+                    continue
+                least = min(least, distance_to(edge, p))
+        return least
 
     def __or__(self, other: Region) -> Region:
         from sbafab.geometry.boolean import union
