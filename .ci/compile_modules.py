@@ -28,6 +28,7 @@ GEOMETRY = (
     "pool",
     "rings",
     "runs",
+    "samples",
     "tidy",
     "width",
     "width_bounds",

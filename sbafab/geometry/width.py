@@ -34,8 +34,6 @@ ROUNDING = 1e-12
 """mm: more than what distances are rounded by."""
 TOUCH = 1e-6
 """mm within which two points are one."""
-STEP = math.radians(15)
-"""Widest step of samples along an arc: 7.5 degrees aside a shift counts 0.99 of its length."""
 ASIDE = math.acos(0.9)
 """Radians (25 degrees) that the normals of samples which still face each other may turn aside."""
 SQUARE = 0.05
