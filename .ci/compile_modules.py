@@ -32,7 +32,11 @@ GEOMETRY = (
     "width",
     "width_bounds",
 )
-COMPILED = tuple(f"sbafab/geometry/{name}.py" for name in GEOMETRY)
+RULES = ("boundary", "freedoms", "voids")
+COMPILED = (
+    *(f"sbafab/geometry/{name}.py" for name in GEOMETRY),
+    *(f"sbafab/rules/{name}.py" for name in RULES),
+)
 """Without what numpy does, and what keeps values in the dictionary of a record."""
 NEEDS = ("mypy[mypyc]>=2.4,<3", "setuptools>=65")
 TYPES = (
