@@ -9,7 +9,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks import checking, copies, decks, many, outlines, processes, scaling, simulators
+from benchmarks import (
+    checking,
+    compiled,
+    copies,
+    decks,
+    many,
+    outlines,
+    processes,
+    scaling,
+    simulators,
+)
 from benchmarks import stacks as equilibria
 from benchmarks.timing import (
     ROOT,
@@ -19,6 +29,7 @@ from benchmarks.timing import (
     exponent,
     sizes_by_turns,
 )
+from benchmarks.versions import compared
 
 RIVALS = {"foldable": "foldable-robotics==0.0.37", "build123d": "build123d"}
 MODULES = {"foldable": "foldable_robotics", "build123d": "build123d"}
@@ -37,6 +48,7 @@ def sections(asked: Asked) -> Iterator[Section]:
     """All of them, each when it has been measured."""
     yield plates(asked.rivals, asked.rounds)
     yield rule_decks(asked.rounds)
+    yield compiled_beside_plain(asked.rounds)
     yield side_by_side(asked.rounds)
     yield many_designs(asked.designs)
     yield stacks(asked.rounds)
@@ -96,6 +108,22 @@ def rule_decks(rounds: int) -> Section:
         told = f"{len(taken) / sum(taken):.1f} designs a second"
         rows.append(Row(f"{template}, other heights", taken, told))
     return Section("decks", "A design built, and all rules", rows)
+
+
+def compiled_beside_plain(rounds: int) -> Section:
+    """What the wheel gains that has the geometry of edges compiled."""
+    key, title = "compiled", "With geometry compiled, beside plain Python"
+    with tempfile.TemporaryDirectory() as place:
+        folder = compiled.made(Path(place))
+        if folder is None:
+            return Section(key, title, [], ["skipped: no compiler, or no mypyc"])
+        found = compared(ROOT, rounds, folder, compiled.WORKS)
+    rows = []
+    for one in found:
+        plain, least = min(one.before), min(one.now)
+        told = f"{plain:.4f} plain, {1 - least / plain:.0%} less"
+        rows.append(Row(one.name, one.now, told))
+    return Section(key, title, rows)
 
 
 def side_by_side(rounds: int) -> Section:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -44,16 +44,23 @@ class Compared(NamedTuple):
         return min(self.before) / min(self.now)
 
 
-def compared(before: Path, rounds: int) -> list[Compared]:
-    """Every piece of work, by turns; ``before`` is the folder of the earlier version."""
+def compared(
+    before: Path, rounds: int, now: Path = ROOT, only: Container[str] = ()
+) -> list[Compared]:
+    """Every piece of work, by turns; ``before`` and ``now`` are the folders of the versions.
+
+    ``only``: the names of what is measured, of all if empty.
+    """
     found = []
     with tempfile.TemporaryDirectory() as place:
         for name, work in works(Path(place)).items():
-            times: dict[Path, list[float]] = {before: [], ROOT: []}
+            if only and name not in only:
+                continue
+            times: dict[Path, list[float]] = {before: [], now: []}
             for _ in range(rounds):
                 for root, taken in times.items():
                     taken.extend(work(root))
-            found.append(Compared(name, times[before], times[ROOT]))
+            found.append(Compared(name, times[before], times[now]))
     return found
 
 

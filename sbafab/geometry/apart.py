@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from sbafab.geometry.edges import Arc, Edge, Line, Point, from_end_to_end
+from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, from_end_to_end
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.kept import kept
 from sbafab.geometry.nearby import close_pairs, widened
@@ -162,24 +162,30 @@ def _first(home: list[int], number: int) -> int:
 def _meet(a: ClosedChain, b: ClosedChain) -> bool:
     """Whether two chains may come within FAR of each other."""
     if a.circle is not None and b.circle is not None:
-        (one, r), (other, s) = a.circle, b.circle
+        one, r = a.circle
+        other, s = b.circle
         gap = math.dist(one, other)
         return not max(gap - r - s, abs(r - s) - gap) > FAR
-    pairs = _close(a.contour, b.contour)
-    return not all(_clear(one, other) for one, other in pairs)
-
-
-def _close(a: Contour, b: Contour) -> Iterable[tuple[Edge, Edge]]:
-    """Edges of two contours whose boxes come within FAR of each other."""
-    low_x, low_y, high_x, high_y = widened(b.bounds, FAR)
-    others = list(zip(b.edges, b.boxes, strict=True))
-    for edge, own in zip(a.edges, a.boxes, strict=True):
+    edges, boxes = b.contour.edges, b.contour.boxes
+    low_x, low_y, high_x, high_y = widened(b.contour.bounds, FAR)
+    for edge, own in zip(a.contour.edges, a.contour.boxes, strict=True):
         if own[0] > high_x or own[2] < low_x or own[1] > high_y or own[3] < low_y:
             continue
-        left, low, right, high = widened(own, FAR)
-        for other, box in others:
-            if box[0] <= right and box[2] >= left and box[1] <= high and box[3] >= low:
-                yield edge, other
+        if not _clear_of_all(edge, own, edges, boxes):
+            return True
+    return False
+
+
+def _clear_of_all(
+    edge: Edge, box: Bounds, others: tuple[Edge, ...], boxes: tuple[Bounds, ...]
+) -> bool:
+    """Whether an edge surely stays farther than FAR from all others."""
+    left, low, right, high = widened(box, FAR)
+    for other, own in zip(others, boxes, strict=True):
+        meets = own[0] <= right and own[2] >= left and own[1] <= high and own[3] >= low
+        if meets and not _clear(edge, other):
+            return False
+    return True
 
 
 def _clear(a: Edge, b: Edge) -> bool:

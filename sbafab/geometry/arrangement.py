@@ -11,7 +11,7 @@ import math
 from collections import defaultdict
 from collections.abc import Container, Iterator, Sequence
 from functools import cmp_to_key
-from typing import NamedTuple
+from typing import Final, final
 
 from sbafab.geometry.edges import (
     EPSILON,
@@ -23,30 +23,27 @@ from sbafab.geometry.edges import (
     left_normal,
     turns_round,
 )
+from sbafab.geometry.inconsistent import InconsistentError
 from sbafab.geometry.nearby import EdgeIndex, widened
-from sbafab.geometry.once import once
 from sbafab.geometry.pieces import Overlay
 
 NEAR = 0.05
 """Radians: edges that leave a point at less than this angle are compared farther on."""
 
 
-class InconsistentError(ArithmeticError):
-    """Two ways to a face do not agree; the argument is the point where they meet."""
-
-
-class _Leaving(NamedTuple):
+@final
+class _Leaving:
     """A piece as it leaves a point: its direction there, its chord, how it bends, where it ends."""
 
-    half: int
-    edge: Edge
-    heading: float
-    chord: float
-    bend: float
+    __slots__ = ("bend", "chord", "edge", "end", "half", "heading")
 
-    @property
-    def end(self) -> Point:
-        return self.edge.start if self.half & 1 else self.edge.end
+    def __init__(self, half: int, edge: Edge, heading: float, chord: float, bend: float) -> None:
+        self.half: Final[int] = half
+        self.edge: Final[Edge] = edge
+        self.heading: Final[float] = heading
+        self.chord: Final[float] = chord
+        self.bend: Final[float] = bend
+        self.end: Final[Point] = edge.start if half & 1 else edge.end
 
     def to_left(self, p: Point) -> float:
         """How far ``p`` lies to the left of the line or circle the piece is a part of."""
@@ -59,7 +56,9 @@ class _Leaving(NamedTuple):
 
 
 def _leaving(half: int, edge: Edge) -> _Leaving:
-    (x0, y0), (x1, y1) = (edge.end, edge.start) if half & 1 else (edge.start, edge.end)
+    start, end = (edge.end, edge.start) if half & 1 else (edge.start, edge.end)
+    x0, y0 = start
+    x1, y1 = end
     chord = math.hypot(x1 - x0, y1 - y0)
     straight = math.atan2(y1 - y0, x1 - x0)
     if not isinstance(edge, Arc):
@@ -79,6 +78,7 @@ class Arrangement:
         rings: dict[Point, list[int]] = defaultdict(list)
         for half, p in enumerate(self.origin):
             rings[p].append(half)
+        self._by_place: EdgeIndex | None = None
         self.tangled: set[Point] = set()
         """Where pieces leave in nearly one direction, so that rounding could order them wrongly;
         every point, where pieces were bent and may cross between their ends.
@@ -124,9 +124,11 @@ class Arrangement:
                 start = stop
         return ring
 
-    @once
+    @property
     def _index(self) -> EdgeIndex:
-        return EdgeIndex(self._drawn)
+        if self._by_place is None:
+            self._by_place = EdgeIndex(self._drawn)
+        return self._by_place
 
     def _around(self, p: Point, left: Sequence[int | None]) -> int:
         """How often the pieces that are told in ``left`` wind round a point."""

@@ -21,8 +21,9 @@ from sbafab.geometry.apart import (
     settled,
     turned_round,
 )
-from sbafab.geometry.arrangement import Arrangement, InconsistentError
+from sbafab.geometry.arrangement import Arrangement
 from sbafab.geometry.edges import EPSILON, Edge, Point
+from sbafab.geometry.inconsistent import InconsistentError
 from sbafab.geometry.pieces import DIGIT, by_owner, overlaid, overlay
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.remembered import MOST, remembered

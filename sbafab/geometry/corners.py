@@ -4,34 +4,33 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from typing import Final, final
 
 from sbafab.geometry.edges import Bounds, Edge, Line, Point
 from sbafab.geometry.ends import ROUNDED, SMOOTH
 from sbafab.geometry.region import Contour
 
 
-class Corner(NamedTuple):
-    """A vertex with the directions of travel into and out of it; ``turn`` > 0 is convex."""
+@final
+class Corner:
+    """A vertex with the directions of travel into and out of it; ``turn`` > 0 is convex.
 
-    point: Point
-    arriving: Point
-    leaving: Point
-    turn: float
+    ``normal`` is the unit vector halfway between the normals of the two edges.
+    """
 
-    @property
-    def box(self) -> Bounds:
-        return (*self.point, *self.point)
+    __slots__ = ("arriving", "box", "half_turn", "leaving", "normal", "point", "turn")
 
-    @property
-    def normal(self) -> Point:
-        """The unit vector halfway between the normals of the two edges."""
-        (ux, uy), half = self.arriving, self.turn / 2
-        return -ux * math.sin(half) - uy * math.cos(half), ux * math.cos(half) - uy * math.sin(half)
-
-    @property
-    def half_turn(self) -> float:
-        return abs(self.turn) / 2
+    def __init__(self, point: Point, arriving: Point, leaving: Point, turn: float) -> None:
+        self.point: Final[Point] = point
+        self.arriving: Final[Point] = arriving
+        self.leaving: Final[Point] = leaving
+        self.turn: Final[float] = turn
+        self.half_turn: Final[float] = abs(turn) / 2
+        self.box: Final[Bounds] = (point[0], point[1], point[0], point[1])
+        ux, uy = arriving
+        half = turn / 2
+        c, s = math.cos(half), math.sin(half)
+        self.normal: Final[Point] = (-ux * s - uy * c, ux * c - uy * s)
 
     def squarely(self, d: Point) -> bool:
         """Whether a reflex corner lies nearest, among its neighbours, to what ``d`` points at."""

@@ -8,24 +8,24 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import NamedTuple
-
-from sbafab.geometry.once import once
+from typing import Final, final
 
 Point = tuple[float, float]
 Bounds = tuple[float, float, float, float]
 
-EPSILON = 2e-6
+EPSILON: Final = 2e-6
 """mm: a point nearer to an edge than this, 2 nm, lies on it."""
-SAME = 2 * EPSILON
+SAME: Final = 2 * EPSILON
 """mm: points nearer to each other than this, 4 nm, are one point, and so are all that hang together
 by such steps. Far below the 1 um that the cut files promise.
 """
 
-BENT = EPSILON / 4
+BENT: Final = EPSILON / 4
 """mm: an edge whose points were moved off its line or circle by more may run where none was looked
 for. Two edges bent by less still are within EPSILON of each other where they meet.
 """
+UNKNOWN: Final = 1e9
+"""Radians: an angle that has not been worked out."""
 
 
 def unit(degrees: float) -> Point:
@@ -39,15 +39,35 @@ def _along(p: Point, origin: Point, unit: Point) -> float:
     return (p[0] - origin[0]) * unit[0] + (p[1] - origin[1]) * unit[1]
 
 
-class Line(NamedTuple):
+@final
+class Line:
     """A straight edge from ``start`` to ``end``."""
 
-    start: Point
-    end: Point
+    __slots__ = ("_length", "end", "start")
+
+    def __init__(self, start: Point, end: Point) -> None:
+        self.start: Final[Point] = start
+        self.end: Final[Point] = end
+        self._length = 0.0
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Line) and self.start == other.start and self.end == other.end
+
+    def __hash__(self) -> int:
+        return hash((self.start, self.end))
+
+    def __repr__(self) -> str:
+        return f"Line(start={self.start}, end={self.end})"
+
+    def __reduce__(self) -> tuple[type[Line], tuple[Point, Point]]:
+        return Line, (self.start, self.end)
 
     @property
     def length(self) -> float:
-        return math.dist(self.start, self.end)
+        length = self._length
+        if length == 0.0:
+            length = self._length = math.dist(self.start, self.end)
+        return length
 
     @property
     def bulge(self) -> float:
@@ -60,7 +80,8 @@ class Line(NamedTuple):
 
     @property
     def bounds(self) -> Bounds:
-        (x0, y0), (x1, y1) = self.start, self.end
+        x0, y0 = self.start
+        x1, y1 = self.end
         return min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1)
 
     def reversed(self) -> Line:
@@ -68,18 +89,21 @@ class Line(NamedTuple):
 
     def at(self, t: float) -> Point:
         """Point at fraction ``t`` of the length."""
-        (x0, y0), (x1, y1) = self.start, self.end
+        x0, y0 = self.start
+        x1, y1 = self.end
         return x0 + t * (x1 - x0), y0 + t * (y1 - y0)
 
     def direction(self, p: Point) -> Point:
         """Unit direction of travel (the same at every ``p``)."""
-        (x0, y0), (x1, y1) = self.start, self.end
-        length = math.hypot(x1 - x0, y1 - y0)
+        x0, y0 = self.start
+        x1, y1 = self.end
+        length = self._length or self.length
         return (x1 - x0) / length, (y1 - y0) / length
 
     def parameter(self, p: Point) -> float:
         """Fraction of the length at the foot of ``p``."""
-        (x0, y0), (x1, y1) = self.start, self.end
+        x0, y0 = self.start
+        x1, y1 = self.end
         dx, dy = x1 - x0, y1 - y0
         return ((p[0] - x0) * dx + (p[1] - y0) * dy) / (dx * dx + dy * dy)
 
@@ -97,7 +121,8 @@ class Line(NamedTuple):
 
     def to_left(self, p: Point) -> float:
         """How far ``p`` lies to the left of the infinite line."""
-        (x, y), (ux, uy) = self.start, self.direction(self.start)
+        x, y = self.start
+        ux, uy = self.direction(self.start)
         return ux * (p[1] - y) - uy * (p[0] - x)
 
     def part(self, start: Point, end: Point) -> Line:
@@ -108,63 +133,113 @@ class Line(NamedTuple):
         """The parallel edge ``distance`` to the right of the direction of travel."""
         ux, uy = self.direction(self.start)
         nx, ny = uy * distance, -ux * distance
-        (x0, y0), (x1, y1) = self.start, self.end
+        x0, y0 = self.start
+        x1, y1 = self.end
         return Line((x0 + nx, y0 + ny), (x1 + nx, y1 + ny))
 
 
-class _Arc(NamedTuple):
-    start: Point
-    end: Point
-    centre: Point
-    radius: float
-    ccw: bool
-
-
-class Arc(_Arc):
+@final
+class Arc:
     """A circular edge round ``centre``, counter-clockwise if ``ccw``; at most half a turn.
 
-    Rules ask for its values again and again: they are worked out once.
+    Rules ask for its sweep and bounds again and again: they are worked out once.
     """
 
-    @once
+    __slots__ = ("_bounds", "_start_angle", "_sweep", "ccw", "centre", "end", "radius", "start")
+
+    def __init__(self, start: Point, end: Point, centre: Point, radius: float, ccw: bool) -> None:
+        self.start: Final[Point] = start
+        self.end: Final[Point] = end
+        self.centre: Final[Point] = centre
+        self.radius: Final[float] = radius
+        self.ccw: Final[bool] = ccw
+        self._start_angle = UNKNOWN
+        self._sweep = UNKNOWN
+        self._bounds: Bounds | None = None
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, Arc)
+            and self.start == other.start
+            and self.end == other.end
+            and self.centre == other.centre
+            and self.radius == other.radius
+            and self.ccw == other.ccw
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.start, self.end, self.centre, self.radius, self.ccw))
+
+    def __repr__(self) -> str:
+        return (
+            f"Arc(start={self.start}, end={self.end}, centre={self.centre}, "
+            f"radius={self.radius}, ccw={self.ccw})"
+        )
+
+    def __reduce__(self) -> tuple[type[Arc], tuple[Point, Point, Point, float, bool]]:
+        return Arc, (self.start, self.end, self.centre, self.radius, self.ccw)
+
+    @property
     def ends_lie_on_circle(self) -> bool:
         """Whether both ends lie on the circle, to within BENT."""
-        off = [math.dist(p, self.centre) - self.radius for p in (self.start, self.end)]
-        return min(off) > -BENT and max(off) < BENT
+        first = math.dist(self.start, self.centre) - self.radius
+        last = math.dist(self.end, self.centre) - self.radius
+        return -BENT < first < BENT and -BENT < last < BENT
 
-    @once
+    @property
     def start_angle(self) -> float:
-        return math.atan2(self.start[1] - self.centre[1], self.start[0] - self.centre[0])
+        angle = self._start_angle
+        if angle == UNKNOWN:
+            x, y = self.start
+            cx, cy = self.centre
+            angle = self._start_angle = math.atan2(y - cy, x - cx)
+        return angle
 
-    @once
+    @property
     def sweep(self) -> float:
         """Signed angle turned through: positive counter-clockwise."""
+        sweep = self._sweep
+        if sweep == UNKNOWN:
+            sweep = self._sweep = self._turned()
+        return sweep
+
+    def _turned(self) -> float:
         cx, cy = self.centre
-        ax, ay = self.start[0] - cx, self.start[1] - cy
-        bx, by = self.end[0] - cx, self.end[1] - cy
+        x0, y0 = self.start
+        x1, y1 = self.end
+        ax, ay, bx, by = x0 - cx, y0 - cy, x1 - cx, y1 - cy
         turn = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
         if self.ccw:
             return turn if turn > -1e-9 else turn + math.tau
         return turn if turn < 1e-9 else turn - math.tau
 
-    @once
+    @property
     def length(self) -> float:
         return self.radius * abs(self.sweep)
 
-    @once
+    @property
     def bulge(self) -> float:
         return math.tan(self.sweep / 4)
 
-    @once
+    @property
     def segment_area(self) -> float:
         """Signed area between the chord and the arc: positive when counter-clockwise."""
         sweep = self.sweep
         return 0.5 * self.radius**2 * (sweep - math.sin(sweep))
 
-    @once
+    @property
     def bounds(self) -> Bounds:
-        (cx, cy), r = self.centre, self.radius
-        (x0, y0), (x1, y1) = (self.start, self.end) if self.ccw else (self.end, self.start)
+        found = self._bounds
+        if found is None:
+            found = self._bounds = self._box()
+        return found
+
+    def _box(self) -> Bounds:
+        cx, cy = self.centre
+        r = self.radius
+        first, last = (self.start, self.end) if self.ccw else (self.end, self.start)
+        x0, y0 = first
+        x1, y1 = last
         left, right = (x0, x1) if x0 < x1 else (x1, x0)
         low, high = (y0, y1) if y0 < y1 else (y1, y0)
         # The ends may lie off the circle by a rounding: they are within the box, too.
@@ -207,7 +282,9 @@ class Arc(_Arc):
 
     def nearest(self, p: Point) -> Point:
         """Point of the edge nearest to ``p``."""
-        (cx, cy), (x0, y0), (x1, y1) = self.centre, self.start, self.end
+        cx, cy = self.centre
+        x0, y0 = self.start
+        x1, y1 = self.end
         x, y = p[0] - cx, p[1] - cy
         after_start = (x0 - cx) * y - (y0 - cy) * x
         before_end = x * (y1 - cy) - y * (x1 - cx)
@@ -227,7 +304,8 @@ class Arc(_Arc):
 
     def farthest_along(self, origin: Point, unit: Point) -> float:
         """How far the edge reaches from ``origin`` along a unit direction."""
-        (cx, cy), r = self.centre, self.radius
+        cx, cy = self.centre
+        r = self.radius
         top = (cx + unit[0] * r, cy + unit[1] * r)
         ends = max(_along(self.start, origin, unit), _along(self.end, origin, unit))
         return _along(top, origin, unit) if 0.0 <= self.parameter(top) <= 1.0 else ends
@@ -249,10 +327,11 @@ class Arc(_Arc):
         scale = radius / self.radius
         cx, cy = self.centre
 
-        def moved(p: Point) -> Point:
-            return cx + (p[0] - cx) * scale, cy + (p[1] - cy) * scale
-
-        return Arc(moved(self.start), moved(self.end), self.centre, radius, self.ccw)
+        x0, y0 = self.start
+        x1, y1 = self.end
+        start = cx + (x0 - cx) * scale, cy + (y0 - cy) * scale
+        end = cx + (x1 - cx) * scale, cy + (y1 - cy) * scale
+        return Arc(start, end, self.centre, radius, self.ccw)
 
 
 Edge = Line | Arc
@@ -262,7 +341,8 @@ def edge_from_bulge(start: Point, end: Point, bulge: float) -> Edge:
     """The line (bulge 0) or arc that a polyline vertex with this bulge starts."""
     if bulge == 0.0:
         return Line(start, end)
-    (x0, y0), (x1, y1) = start, end
+    x0, y0 = start
+    x1, y1 = end
     lean = (1 / bulge - bulge) / 4
     cx = (x0 + x1) / 2 - lean * (y1 - y0)
     cy = (y0 + y1) / 2 + lean * (x1 - x0)
@@ -291,7 +371,8 @@ def from_end_to_end(edge: Edge) -> Edge:
 
 def left_turn(before: Edge, after: Edge) -> float:
     """Angle between -pi and pi that a path turns to the left from one edge to the next."""
-    (ux, uy), (vx, vy) = before.direction(before.end), after.direction(after.start)
+    ux, uy = before.direction(before.end)
+    vx, vy = after.direction(after.start)
     return math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
 
 
@@ -308,7 +389,9 @@ def distance_to(edge: Edge, p: Point) -> float:
 
 def turns_round(edge: Edge, p: Point) -> int:
     """What an edge adds to the times its contour runs counter-clockwise round ``p``."""
-    (px, py), (x0, y0), (x1, y1) = p, edge.start, edge.end
+    px, py = p
+    x0, y0 = edge.start
+    x1, y1 = edge.end
     side = (x1 - x0) * (py - y0) - (px - x0) * (y1 - y0)
     turns = 0
     if y0 <= py < y1 and side > 0:
@@ -320,7 +403,7 @@ def turns_round(edge: Edge, p: Point) -> int:
         dx, dy = x1 - x0, y1 - y0
         # Beside its chord alone: that of a short arc with snapped ends may lean either way.
         beside = 0 <= (px - x0) * dx + (py - y0) * dy <= dx * dx + dy * dy
-        if beside and (px - cx) ** 2 + (py - cy) ** 2 < edge.radius**2:
+        if beside and (px - cx) * (px - cx) + (py - cy) * (py - cy) < edge.radius * edge.radius:
             # A point exactly on the chord belongs to the side the count above gave it.
             left = side > 0 or (side == 0 and (y0 > y1 or (y0 == y1 and x1 > x0)))
             if edge.ccw and not left:

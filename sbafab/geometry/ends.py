@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Final
 
 from sbafab.geometry.edges import Arc, Edge, Point, left_turn
 from sbafab.geometry.facets import run_sweep
@@ -23,16 +23,16 @@ ROUNDED = 0.1
 """Degrees a corner may miss its angle by: coordinates read from a file are rounded."""
 
 
-class _Run(NamedTuple):
+class _Run:
     """Consecutive edges on one line or circle, and how far they turn (radians, left positive)."""
 
-    first: Edge
-    last: Edge
-    sweep: float
+    __slots__ = ("first", "last", "radius", "sweep")
 
-    @property
-    def radius(self) -> float:
-        return self.first.radius if isinstance(self.first, Arc) else math.inf
+    def __init__(self, first: Edge, last: Edge, sweep: float) -> None:
+        self.first: Final[Edge] = first
+        self.last: Final[Edge] = last
+        self.sweep: Final[float] = sweep
+        self.radius: Final[float] = first.radius if isinstance(first, Arc) else math.inf
 
     def corner(self, after: _Run) -> float:
         """How far the path turns from this run to the next."""
@@ -77,7 +77,8 @@ def _between_flanks(
     """
     if stop - start + 3 > len(runs):
         return
-    turn = sum(runs[i % len(runs)].sweep for i in range(start, stop + 1))
-    turn += sum(corners[i % len(runs)] for i in range(start, stop + 2))
+    count = len(runs)
+    turn: float = sum([runs[i % count].sweep for i in range(start, stop + 1)])
+    turn += sum([corners[i % count] for i in range(start, stop + 2)])
     if abs(turn - math.pi) < math.radians(taper):
         yield runs[start % len(runs)].first.start, runs[stop % len(runs)].last.end

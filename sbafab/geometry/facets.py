@@ -40,7 +40,7 @@ def ticks(run: Sequence[Edge], step: float, room: float) -> list[float]:
 
 def run_sweep(run: Sequence[Edge]) -> float:
     """The angle that a run of arcs of one circle turns through, positive counter-clockwise."""
-    return sum(edge.sweep for edge in run if isinstance(edge, Arc))
+    return sum([edge.sweep for edge in run if isinstance(edge, Arc)])
 
 
 def facets(contour: Contour, sagitta: float, keeps_area: bool = True) -> list[Point]:
@@ -68,7 +68,7 @@ def facets(contour: Contour, sagitta: float, keeps_area: bool = True) -> list[Po
         else:
             angles = ticks(run, chord_step(half, 8), 1e-7)
             radius = first.radius
-        circle = first._replace(radius=radius)
+        circle = Arc(first.start, first.end, first.centre, radius, first.ccw)
         points += [circle.on_circle(math.remainder(angle, math.tau)) for angle in angles]
     if len(points) < 3:
         return [edge.at(t) for edge in contour.edges for t in (0.0, 0.5)]

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.geometry.edge_table import boxes_round, crossings, dot, touching_in_parts
-from sbafab.geometry.edges import Arc, Edge, Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.remembered import remembered_together
+from sbafab.geometry.samples import sampled
 from sbafab.geometry.side_table import SideTable
 from sbafab.geometry.width import (
     ASIDE,
-    STEP,
     TOUCH,
     Gathered,
     Width,
@@ -108,38 +107,14 @@ def _together(searched: Sequence[Gathered]) -> list[FacingPlaces]:
     return [FacingPlaces(p[:, a:b], q[:, a:b], value[a:b]) for a, b in pairwise(ends)]
 
 
-def spread_along(edge: Edge) -> list[float]:
-    """Shares of an edge's length: both ends, the middle of a line, an arc every 15 degrees."""
-    count = max(2, math.ceil(abs(edge.sweep) / STEP)) if isinstance(edge, Arc) else 2
-    return [i / count for i in range(count + 1)]
-
-
-def places_along(edge: Edge, shares: list[float]) -> list[Point]:
-    """The points at these shares of an edge's length; its very ends at 0 and 1."""
-    if not isinstance(edge, Arc):
-        return [edge.start if t == 0 else edge.end if t == 1 else edge.at(t) for t in shares]
-    first, sweep = edge.start_angle, edge.sweep
-    (x, y), r = edge.centre, edge.radius
-    angles = [first + t * sweep for t in shares]
-    found = [(x + r * math.cos(a), y + r * math.sin(a)) for a in angles]
-    if shares[0] == 0:
-        found[0] = edge.start
-    if shares[-1] == 1:
-        found[-1] = edge.end
-    return found
-
-
 def _from_samples(sides: SideTable, within: Floats) -> tuple[Floats, Floats, Indices]:
     """Samples of each side and the feet of their normals on the sides they face, and the side.
 
     ``within`` is how far off these may be, mm, for each side.
     """
     a, b = sides.pairs(ASIDE, within)
-    shares = [spread_along(edge) for edge in sides.edges]
-    counts = np.array([len(own) for own in shares])
-    samples = np.array(
-        [p for edge, own in zip(sides.edges, shares, strict=True) for p in places_along(edge, own)]
-    ).T
+    points, numbers = sampled(sides.edges)
+    counts, samples = np.array(numbers), np.array(points).T
     owner = np.repeat(np.arange(len(counts)), counts)
     normals = sides.table.at(owner).normal(samples)
     # Each pair has a row a sample of its first side.

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 
 from sbafab.geometry.edges import EPSILON, Bounds, Edge, Point, distance_to
-from sbafab.geometry.once import once
 
 MANY_BOXES = 500
 """From which on comparing all at once is worth fetching numpy."""
@@ -27,20 +26,23 @@ def boxes_meet(a: Bounds, b: Bounds) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
-def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
+def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterable[tuple[int, int]]:
     """Numbers of the boxes that come within ``reach`` of each other, by a sweep along x.
 
     The sweep runs in bands along y as high as a box is on average, so its time grows with the boxes
     and the pairs alone. Of many boxes, all are compared at once with those that they meet along x.
     """
     if len(boxes) >= MANY_BOXES:
-        yield from _close_among_many(boxes, reach)
-        return
+        return _close_among_many(boxes, reach)
     if len(boxes) <= FEW_BOXES:
-        yield from _close_among_few(boxes, reach)
-        return
+        return _close_among_few(boxes, reach)
+    return _close_in_bands(boxes, reach)
+
+
+def _close_in_bands(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
+    """The same pairs in the same order."""
     order = sorted(range(len(boxes)), key=lambda i: boxes[i][0])
-    height = reach + sum(box[3] - box[1] for box in boxes) / max(1, len(boxes)) or 1.0
+    height = reach + sum([box[3] - box[1] for box in boxes]) / max(1, len(boxes)) or 1.0
     active: dict[int, list[tuple[int, int, int]]] = {}
     for rank, i in enumerate(order):
         left, low, _, high = boxes[i]
@@ -66,17 +68,20 @@ def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, in
             active.setdefault(band, []).append((rank, i, bottom))
 
 
-def _close_among_few(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
+def _close_among_few(boxes: Sequence[Bounds], reach: float) -> list[tuple[int, int]]:
     """The same pairs in the same order."""
+    found: list[tuple[int, int]] = []
     active: list[tuple[float, float, float, int]] = []
-    for i in sorted(range(len(boxes)), key=lambda i: boxes[i][0]):
+    lefts = [box[0] for box in boxes]
+    for i in sorted(range(len(boxes)), key=lefts.__getitem__):
         left, low, right, high = boxes[i]
         first, bottom, top = left - reach, low - reach, high + reach
         active = [one for one in active if one[0] >= first]
         for _, other_low, other_high, j in active:
             if other_low <= top and other_high >= bottom:
-                yield j, i
+                found.append((j, i))
         active.append((right, low, high, i))
+    return found
 
 
 def _close_among_many(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
@@ -124,10 +129,17 @@ class EdgeIndex:
         self.across = max(self._high[0] - self._low[0], self._high[1] - self._low[1])
         self.cell = self.across / max(1.0, math.sqrt(len(edges))) or 1.0
         self._reach = self._places((*self._low, *self._high))
+        self._by_cell: dict[tuple[int, int], list[int]] | None = None
+        self._first_cells: list[tuple[int, int]] | None = None
 
-    @once
+    @property
     def _filed(self) -> dict[tuple[int, int], list[int]]:
         """The numbers of edges in each cell."""
+        if self._by_cell is None:
+            self._by_cell = self._file()
+        return self._by_cell
+
+    def _file(self) -> dict[tuple[int, int], list[int]]:
         filed: dict[tuple[int, int], list[int]] = {}
         for number, box in enumerate(self._boxes):
             x0, y0, x1, y1 = self._places(box)
@@ -139,13 +151,21 @@ class EdgeIndex:
                     filed.setdefault((x, y), []).append(number)
         return filed
 
-    @once
+    @property
     def _cells(self) -> list[tuple[int, int]]:
         """The first cell of each edge."""
-        return [self._places(box)[:2] for box in self._boxes]
+        if self._first_cells is None:
+            x, y = self._low
+            cell = self.cell
+            self._first_cells = [
+                (math.floor((box[0] - x) / cell), math.floor((box[1] - y) / cell))
+                for box in self._boxes
+            ]
+        return self._first_cells
 
     def _places(self, box: Bounds) -> tuple[int, int, int, int]:
-        (x, y), cell = self._low, self.cell
+        x, y = self._low
+        cell = self.cell
         return (
             math.floor((box[0] - x) / cell),
             math.floor((box[1] - y) / cell),
@@ -178,7 +198,9 @@ class EdgeIndex:
     def in_order(self, box: Bounds, found: list[int]) -> list[int]:
         """Edges that meet a box, in rising order, sorted by the first cell that they share."""
         if len(found) > 1:
-            (x, y), cell, first = self._low, self.cell, self._cells
+            x, y = self._low
+            cell = self.cell
+            first = self._cells
             x0, y0 = math.floor((box[0] - x) / cell), math.floor((box[1] - y) / cell)
             found.sort(key=lambda n: (max(x0, first[n][0]), max(y0, first[n][1])))
         return found
@@ -207,7 +229,8 @@ class EdgeIndex:
 
     def all_within(self, box: Bounds) -> bool:
         """Whether no edge reaches out of the box."""
-        (low_x, low_y), (high_x, high_y) = self._low, self._high
+        low_x, low_y = self._low
+        high_x, high_y = self._high
         return box[0] <= low_x and box[1] <= low_y and box[2] >= high_x and box[3] >= high_y
 
     def distance(self, p: Point) -> float:

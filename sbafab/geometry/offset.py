@@ -77,7 +77,7 @@ def _joined_up(edges: Sequence[Edge]) -> Iterator[Edge]:
             starts[i] = end
     for edge, start, following in zip(edges, starts, (*starts[1:], *starts[:1]), strict=True):
         end = following if math.dist(edge.end, following) < EPSILON else edge.end
-        yield edge if start is edge.start and end == edge.end else edge.part(start, end)
+        yield edge if start == edge.start and end == edge.end else edge.part(start, end)
 
 
 def _moved(contour: Contour, distance: float) -> Iterator[Edge]:
@@ -133,7 +133,8 @@ def _corner_arcs(before: Edge, after: Edge, distance: float) -> Iterator[Arc]:
     turn = left_turn(before, after)
     if -CUSP < turn < EPSILON / distance:
         return
-    (x, y), (ux, uy) = after.start, before.direction(after.start)
+    x, y = after.start
+    ux, uy = before.direction(after.start)
     heading, sweep = math.atan2(-ux, uy), turn % math.tau
     count = 2 if sweep > CUSP else 1
     vx, vy = after.direction(after.start)

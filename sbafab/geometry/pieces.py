@@ -126,7 +126,7 @@ def split_edges(
     return Split(
         [
             [edge]
-            if len(own) == 2 and own[0] is edge.start and own[1] is edge.end and own[0] != own[1]
+            if len(own) == 2 and own[0] == edge.start and own[1] == edge.end and own[0] != own[1]
             else [edge.part(a, b) for a, b in pairwise(own) if a != b]
             for edge, own in zip(whole, stops, strict=True)
         ],
@@ -232,7 +232,8 @@ def _offset(edge: Edge, a: Point, b: Point) -> float:
     """How far the middle of an edge lies to the left of the chord from ``a`` to ``b``."""
     if not isinstance(edge, Arc):
         return 0.0
-    (x, y), (dx, dy) = edge.at(0.5), (b[0] - a[0], b[1] - a[1])
+    x, y = edge.at(0.5)
+    dx, dy = (b[0] - a[0], b[1] - a[1])
     return (dx * (y - a[1]) - dy * (x - a[0])) / math.hypot(dx, dy)
 
 

@@ -53,9 +53,10 @@ class PointPool:
 
     def snapped(self, p: Point) -> Point:
         """The point that stands for ``p``, one of those that were pooled."""
-        while (leader := self._leader[p]) is not p:
-            p = leader
-        return p
+        leader = self._leader[p]
+        while leader != p:
+            p, leader = leader, self._leader[leader]
+        return leader
 
     def _add(self, p: Point) -> None:
         self._rank[p] = len(self._rank)

@@ -8,10 +8,17 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from sbafab.geometry.chain_sums import (
+    box_round,
+    boxes_of,
+    enclosed_area,
+    length_of,
+    times_round,
+)
 from sbafab.geometry.edges import (
     EPSILON,
     SAME,
@@ -34,14 +41,6 @@ if TYPE_CHECKING:
 Mark = tuple[float, float, float]
 MANY = 32
 """Edges from which on filing them by place is worth its cost."""
-NOWHERE: Bounds = (math.inf, math.inf, -math.inf, -math.inf)
-
-
-def _join(boxes: Sequence[Bounds]) -> Bounds:
-    if not boxes:
-        return NOWHERE
-    left, bottom, right, top = zip(*boxes, strict=True)
-    return min(left), min(bottom), max(right), max(top)
 
 
 @dataclass(frozen=True)
@@ -53,27 +52,20 @@ class Contour:
     @once
     def area(self) -> float:
         """Enclosed area in mm2: positive counter-clockwise, negative for a hole."""
-        (ox, oy) = self.edges[0].start
-        twice = 0.0
-        bulges = 0.0
-        for edge in self.edges:
-            (x0, y0), (x1, y1) = edge.start, edge.end
-            twice += (x0 - ox) * (y1 - oy) - (x1 - ox) * (y0 - oy)
-            bulges += edge.segment_area
-        return twice / 2 + bulges
+        return enclosed_area(self.edges)
 
     @once
     def length(self) -> float:
-        return sum(edge.length for edge in self.edges)
+        return length_of(self.edges)
 
     @once
     def boxes(self) -> tuple[Bounds, ...]:
         """The bounds of each edge."""
-        return tuple([edge.bounds for edge in self.edges])
+        return boxes_of(self.edges)
 
     @once
     def bounds(self) -> Bounds:
-        return _join(self.boxes)
+        return box_round(self.boxes)
 
     @once
     def is_hole(self) -> bool:
@@ -157,18 +149,12 @@ class Contour:
             room = radius - math.hypot(px - cx, py - cy)
             if abs(room) > SAME:
                 return turns if room > 0 else 0
-        return sum(turns_round(edge, p) for edge in self._level_with(py))
-
-    def _level_with(self, y: float) -> Sequence[Edge]:
-        """The edges that a level line at ``y`` can meet, and perhaps some more."""
         if len(self.edges) < MANY:
-            return [
-                edge
-                for edge, (_, bottom, _, top) in zip(self.edges, self.boxes, strict=True)
-                if bottom - EPSILON <= y <= top + EPSILON
-            ]
+            return times_round(self.edges, self.boxes, p)
         low, step, rows = self._rows
-        return rows[min(len(rows) - 1, int((y - low) / step))]
+        return sum(
+            [turns_round(edge, p) for edge in rows[min(len(rows) - 1, int((py - low) / step))]]
+        )
 
     @once
     def _rows(self) -> tuple[float, float, list[list[Edge]]]:
@@ -209,7 +195,7 @@ class Region:
     @once
     def bounds(self) -> Bounds:
         """Least x, least y, largest x, largest y, mm."""
-        return _join([contour.bounds for contour in self.contours])
+        return box_round([contour.bounds for contour in self.contours])
 
     @property
     def is_empty(self) -> bool:
@@ -301,9 +287,21 @@ class Region:
 
     def distance_to_edge(self, p: Point) -> float:
         """Least distance in mm from ``p`` to any edge."""
-        if len(self.edges) < MANY:
-            return min((distance_to(edge, p) for edge in self.edges), default=math.inf)
-        return self.index.distance(p)
+        if len(self.edges) >= 2 * MANY:
+            return self.index.distance(p)
+        x, y = p
+        least = math.inf
+        for contour in self.contours:
+            left, low, right, high = contour.bounds
+            room = least + EPSILON
+            if left - x > room or x - right > room or low - y > room or y - high > room:
+                continue
+            for edge, (left, low, right, high) in zip(contour.edges, contour.boxes, strict=True):
+                room = least + EPSILON
+                if left - x > room or x - right > room or low - y > room or y - high > room:
+                    continue
+                least = min(least, distance_to(edge, p))
+        return least
 
     def __or__(self, other: Region) -> Region:
         from sbafab.geometry.boolean import union

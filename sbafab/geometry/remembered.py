@@ -24,7 +24,11 @@ class _Exact:
 
     def __init__(self, region: Region) -> None:
         self.region = region
-        self._hash = hash(tuple([kept(one, "edges_hash", _edges_hash) for one in region.contours]))
+        known = region.__dict__
+        if "exact_hash" not in known:
+            hashes = [kept(one, "edges_hash", _edges_hash) for one in region.contours]
+            known["exact_hash"] = hash(tuple(hashes))
+        self._hash: int = known["exact_hash"]
 
     def __hash__(self) -> int:
         return self._hash
@@ -52,7 +56,7 @@ def remembered(ask: Callable[Asked, Found], most: int = MOST) -> Callable[Asked,
 
     @wraps(ask)
     def answer(*asked: Asked.args, **named: Asked.kwargs) -> Found:
-        exact = (_Exact(one) if isinstance(one, Region) else one for one in asked)
+        exact = [_Exact(one) if isinstance(one, Region) else one for one in asked]
         return known(*exact, **named)  # type: ignore[arg-type]
 
     return answer

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sbafab.geometry.boundary_side import BESIDE, BoundarySide
 from sbafab.geometry.edge_table import CellOrder, EdgeTable, dot, touching_in_parts
-from sbafab.geometry.width import BESIDE, BoundarySide
+from sbafab.geometry.width import ALONGSIDE
 
 if TYPE_CHECKING:
     from sbafab.geometry.edge_table import Bools, Floats, Indices
@@ -43,6 +44,8 @@ class SideTable:
         asked, a, b = self._near(within)
         chosen = self._opposed(a, b, aside) & self._may_hold_feet(b, a, within[a]) & (a != b)
         a, b = a[chosen], b[chosen]
+        faces = self._may_face(a, b, within[a])
+        a, b = a[faces], b[faces]
         order = CellOrder(self.table.box, self.parts).sorted(asked, a, b)
         return a[order], b[order]
 
@@ -70,6 +73,19 @@ class SideTable:
         room = self.half_turn[a] + aside + self.half_turn[b]
         opposed = dot(self.normal[:, a], self.normal[:, b]) < ROOM - np.cos(room)
         found: Bools = opposed | (room > math.pi)
+        return found
+
+    def _may_face(self, a: Indices, b: Indices, within: Floats) -> Bools:
+        """Whether they may face each other no farther off, as ``width._may_face`` tells of arcs of
+        nearly one centre that both have the material inside, or both outside.
+        """
+        table = self.table
+        off, turn = table.centre[:, a] - table.centre[:, b], table.turn[a]
+        r, s = table.radius[a], table.radius[b]
+        alike = (np.hypot(off[0], off[1]) < ALONGSIDE) & (turn == table.turn[b]) & (turn != 0)
+        alike &= np.minimum(r, s) >= 10 * ALONGSIDE
+        across = (turn > 0) & (r + s <= within + 2 * ALONGSIDE)
+        found: Bools = ~alike | across
         return found
 
     def _may_hold_feet(self, a: Indices, b: Indices, within: float | Floats) -> Bools:

@@ -11,15 +11,16 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from sbafab.geometry.boundary_side import BoundarySide, Foot
 from sbafab.geometry.corners import Corner, corners_of, pinch
 from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, left_normal
 from sbafab.geometry.ends import tapered_ends
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.kept import kept
 from sbafab.geometry.nearby import EdgeIndex, widened
-from sbafab.geometry.once import once
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.remembered import remembered
+from sbafab.geometry.rings import across_a_ring, bound_a_ring
 from sbafab.geometry.width_bounds import may_be_narrower, widest_least
 
 if TYPE_CHECKING:
@@ -27,16 +28,12 @@ if TYPE_CHECKING:
 
 ALONGSIDE = 1e-3
 """Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
-BESIDE = 1e-5
-"""mm that an edge may miss another's normals by, for rounding."""
 SHORTER = 1e-9
 """mm by which a segment must be shorter than another to be the narrowest."""
 ROUNDING = 1e-12
 """mm: more than what distances are rounded by."""
 TOUCH = 1e-6
 """mm within which two points are one."""
-STEP = math.radians(15)
-"""Widest step of samples along an arc: 7.5 degrees aside a shift counts 0.99 of its length."""
 ASIDE = math.acos(0.9)
 """Radians (25 degrees) that the normals of samples which still face each other may turn aside."""
 SQUARE = 0.05
@@ -76,59 +73,6 @@ def least_gap(region: Region, sharp: float = 90.0, below: float = math.inf) -> W
     return least_of(Boundary(may_be_narrower(outside, below), sharp), below)
 
 
-class _Foot(NamedTuple):
-    point: Point
-    normal: Point
-
-
-class BoundarySide(NamedTuple):
-    """An edge with what the search asks of it again and again.
-
-    ``half`` is how far its ends lie from its middle, ``lean`` the sine of its half turn.
-    """
-
-    edge: Edge
-    box: Bounds
-    middle: Point
-    normal: Point
-    half_turn: float
-    half: float
-    lean: float
-
-    def may_hold_feet(self, other: BoundarySide, within: float) -> bool:
-        """Whether a normal of this edge may meet the other no farther off than ``within``."""
-        (x, y), (nx, ny) = self.middle, self.normal
-        aside = abs((other.middle[0] - x) * ny - (other.middle[1] - y) * nx)
-        return aside <= self.half + other.half + within * self.lean + BESIDE
-
-    def feet(self, p: Point) -> list[_Foot]:
-        """Points of the edge where its normal passes through ``p``."""
-        edge = self.edge
-        if isinstance(edge, Line):
-            (x0, y0), (x1, y1) = edge
-            dx, dy = x1 - x0, y1 - y0
-            square = dx * dx + dy * dy
-            t = ((p[0] - x0) * dx + (p[1] - y0) * dy) / square
-            if not -1e-9 <= t <= 1 + 1e-9:
-                return []
-            length = math.sqrt(square)
-            return [_Foot((x0 + t * dx, y0 + t * dy), (-dy / length, dx / length))]
-        (cx, cy), r = edge.centre, edge.radius
-        ux, uy = p[0] - cx, p[1] - cy
-        distance = math.hypot(ux, uy)
-        if distance < 1e-12:
-            return [_Foot(self.middle, left_normal(edge, self.middle))]
-        inward = -1.0 if edge.ccw else 1.0
-        mx, my = self.middle[0] - cx, self.middle[1] - cy
-        least = r * (math.cos(self.half_turn) - 1e-9)
-        found = []
-        for sign in (1.0, -1.0):
-            vx, vy = sign * ux / distance, sign * uy / distance
-            if vx * mx + vy * my >= least:
-                found.append(_Foot((cx + r * vx, cy + r * vy), (inward * vx, inward * vy)))
-        return found
-
-
 class Boundary:
     """Contours with the material on their left, made ready for the search."""
 
@@ -148,13 +92,16 @@ class Boundary:
         )
         self.known_clear: dict[tuple[Point, Point], bool] = {}
         """Of segments that were asked: whether no edge crosses them."""
+        self._table: SideTable | None = None
 
-    @once
+    @property
     def table(self) -> SideTable:
         """The sides in arrays."""
         from sbafab.geometry.side_table import SideTable
 
-        return SideTable(self.sides)
+        if self._table is None:
+            self._table = SideTable(self.sides)
+        return self._table
 
 
 def _made_ready(region: Region, sharp: float) -> Boundary:
@@ -182,9 +129,11 @@ class _Narrowest:
         if value < self.value - SHORTER and self.is_clear(p, q):
             self.value, self.best = value, Width(value, p, q)
 
-    def offer_facing(self, a: _Foot, b: _Foot) -> None:
-        (px, py), (nx, ny) = a
-        (qx, qy), (mx, my) = b
+    def offer_facing(self, a: Foot, b: Foot) -> None:
+        px, py = a.point
+        nx, ny = a.normal
+        qx, qy = b.point
+        mx, my = b.normal
         dx, dy = qx - px, qy - py
         if dx * nx + dy * ny > TOUCH and dx * mx + dy * my < -TOUCH:
             self.offer((px, py), (qx, qy))
@@ -201,7 +150,8 @@ class _Narrowest:
         Their normals are opposed somewhere, to within ``aside`` radians, and their numbers come
         ``after`` this one. ``among``: no others come into question.
         """
-        (nx, ny), turn = a.normal, a.half_turn + aside
+        nx, ny = a.normal
+        turn = a.half_turn + aside
         sides, index = self.boundary.sides, self.boundary.index
         straight = -math.cos(turn)
         box = widened(a.box, self.value)
@@ -297,8 +247,7 @@ def _side(edge: Edge, box: Bounds) -> BoundarySide:
     else:
         middle, half_turn = edge.at(0.5), 0.0
     half = max(math.dist(middle, edge.start), math.dist(middle, edge.end))
-    lean = math.sin(min(half_turn, math.pi / 2))
-    return BoundarySide(edge, box, middle, left_normal(edge, middle), half_turn, half, lean)
+    return BoundarySide(edge, box, middle, half_turn, half)
 
 
 def _between_edges(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> None:
@@ -363,9 +312,13 @@ def _may_face(a: Arc, b: Edge, within: float) -> bool:
 
 
 def _along_each_other(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> None:
+    if bound_a_ring(a.edge, b.edge):
+        for p, q in across_a_ring(a, b):
+            narrowest.offer(p, q)
+        return
     for one, other in ((a, b), (b, a)):
         for p in (one.middle, one.edge.start, one.edge.end):
-            here = _Foot(p, left_normal(one.edge, p))
+            here = Foot(p, left_normal(one.edge, p))
             for foot in other.feet(p):
                 narrowest.offer_facing(here, foot)
 
@@ -390,7 +343,7 @@ def _between_corners(a: Corner, b: Corner, narrowest: _Narrowest) -> None:
         narrowest.offer(a.point, b.point)
 
 
-def _corner_to_edge(corner: Corner, side: BoundarySide, foot: _Foot, narrowest: _Narrowest) -> None:
+def _corner_to_edge(corner: Corner, side: BoundarySide, foot: Foot, narrowest: _Narrowest) -> None:
     d = (foot.point[0] - corner.point[0], foot.point[1] - corner.point[1])
     if _dot(d, foot.normal) > -TOUCH:
         return

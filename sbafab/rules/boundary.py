@@ -72,7 +72,8 @@ def outward_reach(edge: Edge, others: EdgeIndex) -> Reach | None:
     band = _line_band(edge) if isinstance(edge, Line) else _arc_band(edge)
     margin = 1.0
     while True:
-        best = _nearest(band, _across(edge, margin, others.touching(_swept(edge, margin))))
+        moved = edge.offset(margin)
+        best = _nearest(band, _across(edge, moved, others.touching(_swept(edge, moved))))
         if best is not None and best.value <= margin:
             return best
         if others.all_within(widened(edge.bounds, margin)):
@@ -80,19 +81,23 @@ def outward_reach(edge: Edge, others: EdgeIndex) -> Reach | None:
         margin *= 4
 
 
-def _swept(edge: Edge, distance: float) -> Bounds:
-    """A box round what the edge sweeps when it moves ``distance`` along its right-hand normal."""
-    moved = edge.offset(distance)
+def _swept(edge: Edge, moved: Edge | None) -> Bounds:
+    """A box round what the edge sweeps when it moves along its right-hand normal.
+
+    An arc that shrinks to nothing on its way sweeps what lies between it and its centre.
+    """
+    one = edge.bounds
     if moved is None:
-        return widened(edge.bounds, distance)
-    one, other = edge.bounds, moved.bounds
+        assert isinstance(edge, Arc)
+        other = (*edge.centre, *edge.centre)
+    else:
+        other = moved.bounds
     low = min(one[0], other[0]), min(one[1], other[1])
     return widened((*low, max(one[2], other[2]), max(one[3], other[3])), END_ROOM)
 
 
-def _across(edge: Edge, distance: float, others: Iterable[Edge]) -> Iterable[Edge]:
+def _across(edge: Edge, moved: Edge | None, others: Iterable[Edge]) -> Iterable[Edge]:
     """Those that may lie in the band beside an edge; all where it turns too far to tell quickly."""
-    moved = edge.offset(distance)
     if moved is None or (isinstance(edge, Arc) and abs(edge.sweep) > 1.0):
         return others
     ux, uy = edge.direction(edge.at(0.5))
@@ -111,19 +116,16 @@ def _across(edge: Edge, distance: float, others: Iterable[Edge]) -> Iterable[Edg
 
 def _nearest(within: _Band, others: Iterable[Edge]) -> Reach | None:
     best: Reach | None = None
+    nearer = math.inf
     for other in others:
         least, most = _heights(within.edge, other)
-        if most < -EPSILON or (best is not None and least >= best.value - NEARER):
+        if most < -EPSILON or least >= nearer:
             continue
         for p in within.nearest_candidates(other):
             height = within.height(p)
-            if (
-                height is not None
-                and not within.is_passed_by(other, p)
-                and height > -EPSILON
-                and (best is None or height < best.value - NEARER)
-            ):
+            if -EPSILON < height < nearer and within.holds(p) and not within.is_passed_by(other, p):
                 best = Reach(max(0.0, height), p)
+                nearer = best.value - NEARER
     return best
 
 
@@ -155,12 +157,14 @@ class _Band(NamedTuple):
     edge: Edge
     rays: tuple[tuple[Point, Point], tuple[Point, Point]]
 
-    def height(self, p: Point) -> float | None:
-        """Distance of ``p`` from the edge along the normal; None beside the band."""
+    def holds(self, p: Point) -> bool:
+        """Whether ``p`` lies in the band or behind the edge, and not beside it."""
+        room = 0.5 * END_ROOM / self.edge.length
+        return room <= self.edge.parameter(p) <= 1 - room
+
+    def height(self, p: Point) -> float:
+        """Distance of ``p`` from the edge along the normal."""
         edge = self.edge
-        room = 0.5 * END_ROOM / edge.length
-        if not room <= edge.parameter(p) <= 1 - room:
-            return None
         if isinstance(edge, Arc):
             outward = math.dist(p, edge.centre) - edge.radius
             return outward if edge.ccw else -outward

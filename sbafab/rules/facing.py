@@ -11,7 +11,8 @@ from functools import cache
 from typing import NamedTuple
 
 from sbafab.geometry.boolean import divided, union
-from sbafab.geometry.region import Region
+from sbafab.geometry.nearby import widened
+from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import disc
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer
@@ -31,10 +32,11 @@ class Facing(NamedTuple):
 
 
 class _Seen(NamedTuple):
-    """The part of a film that no film covers yet."""
+    """The part of a film that no film covers yet, and outlines that it lies outside of."""
 
     film: Layer
     region: Region
+    outlines: tuple[Contour, ...] = ()
 
 
 def facing_films(laminate: Laminate) -> tuple[Facing, ...]:
@@ -48,21 +50,43 @@ def facing_films(laminate: Laminate) -> tuple[Facing, ...]:
     films = laminate.tpe_layers
     for index, film in enumerate(films):
         left: list[_Seen] = []
-        for below, region in seen:
+        for one in seen:
+            below, region, outlines = one
             if below is films[index - 1]:
                 rest = shapes.left_by_next(index, below, film)
                 if rest.contours:
-                    left.append(_Seen(below, rest))
+                    left.append(_Seen(below, rest, _outlines_of(film.profile, rest)))
+                continue
+            if _fits_in(film.profile, outlines):
+                left.append(one)
                 continue
             shared, rest = shapes.laid(region, film.profile)
             if rest.contours:
-                left.append(_Seen(below, rest))
+                left.append(_Seen(below, rest, _outlines_of(film.profile, rest)))
             if shared.contours:
                 faced = shapes.kept_apart(shared, index, below, film)
                 if faced is not None:
                     found.append(faced)
         seen = [*left, _Seen(film, film.profile)]
     return tuple(found)
+
+
+def _outlines_of(film: Region, rest: Region) -> tuple[Contour, ...]:
+    """The outlines of a film, if what it leaves of another lies outside them, and not in holes."""
+    for hole in film.holes:
+        left, low, right, high = widened(hole.bounds, TOLERANCE)
+        for outer in rest.outers:
+            box = outer.bounds
+            if box[0] >= left and box[1] >= low and box[2] <= right and box[3] <= high:
+                return ()
+    return film.outers
+
+
+def _fits_in(film: Region, outlines: tuple[Contour, ...]) -> bool:
+    """Whether a film's outlines are among these."""
+    return bool(outlines) and all(
+        any(own is other or own.edges == other.edges for other in outlines) for own in film.outers
+    )
 
 
 class _Shapes:

@@ -56,15 +56,13 @@ class LinearForms:
     def _lost(self, by_hand: bool) -> Floats:
         import numpy as np
 
-        most = np.zeros((len(self.levers), len(self.felt)))
-        for part, own in enumerate(self.felt):
-            for line, (freedom, _) in enumerate(own):
-                if by_hand or not freedom.by_hand:
-                    most[line, part] = freedom.most
-        total = np.zeros(len(self.nominal))
-        for reach, levers in zip(most, self.levers, strict=True):
-            total += reach.take(self.parts) * np.abs(levers)
-        return total
+        most = np.zeros((len(self.felt), len(self.levers)))
+        for own, reach in zip(self.felt, most, strict=True):
+            reach[: len(own)] = [
+                freedom.most if by_hand or not freedom.by_hand else 0.0 for freedom, _ in own
+            ]
+        lost: Floats = (most[self.parts].T * np.abs(self.levers)).sum(axis=0)
+        return lost
 
 
 def linear_forms(group: InterfaceMargins, moves: Freedoms) -> tuple[LinearForms, ...]:

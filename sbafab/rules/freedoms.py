@@ -328,12 +328,19 @@ def _held(laminate: Laminate, part: Region) -> dict[str, float]:
 
 def _plainly_meet(a: Region, b: Region) -> bool:
     """Whether a point beside one of some edges lies well inside both, so that they surely meet."""
-    for region in (a, b):
+    # What lies beside an edge of the smaller one is rather within the other than the other way.
+    for region, other in sorted(((a, b), (b, a)), key=lambda both: _size(both[0])):
         for edge in region.edges[:: max(1, len(region.edges) // BESIDE)]:
             p = beside(edge, INSIDE)
-            if all(one.contains(p) and not _has_edge_near(one, p) for one in (a, b)):
+            if all(one.contains(p) and not _has_edge_near(one, p) for one in (other, region)):
                 return True
     return False
+
+
+def _size(region: Region) -> float:
+    """Half the way round its box, mm."""
+    left, low, right, high = region.bounds
+    return right - left + high - low
 
 
 def _has_edge_near(region: Region, p: Point) -> bool:

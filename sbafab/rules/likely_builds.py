@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Indices = NDArray[np.intp]
 
-SLACK = 0.02
+SLACK = 0.01
 """mm: how much more than it asks for is kept from the second laminate on, for those after it."""
 MOST_KEPT = 40_000
 """Builds of all that ask which are kept, a few MB; where there are more, none are."""
@@ -48,17 +48,18 @@ class ErrorsAsked(NamedTuple):
 
 
 class LikelyBuilds(NamedTuple):
-    """Builds by the number of what asks, in rising order: what cuts and shifts leave, mm.
+    """Builds by the number of what asks, in rising order.
 
-    Shifts count by the length of all together, which no normal loses more than. ``moves`` has a
-    row a build, with x and y of each shift, 0 and 0 where a move turns. What asks has no other
-    builds below its ``level``.
+    ``cuts`` (mm) is what both cuts leave, ``shifts`` x and y of all shifts together, as they count.
+    ``left`` is what the cuts leave less the length of these, which no normal loses more than. What
+    asks has no other builds below its ``level``.
     """
 
     asked: Indices
     build: Indices
+    cuts: Floats
+    shifts: Floats
     left: Floats
-    moves: Floats
     level: Floats
 
     def covers(self, need: Floats) -> bool:
@@ -111,19 +112,18 @@ def _found(batch: DrawnBuilds, errors: ErrorsAsked, level: Floats) -> LikelyBuil
         some = picked(left < (level + rest).take(asked))
         asked, builds = asked.take(some), builds.take(some)
         held, left = held.take(some), left.take(some)
-    moves = np.zeros((len(asked), 2 * len(shift)))
-    together = np.zeros((2, len(asked)))
+    shifts = np.zeros((2, len(asked)))
     for line, most in enumerate(shift):
         own = picked(most.take(asked) > 0)
-        place = errors.first[2 + line].take(asked[own]) * count + builds[own]
-        radius = most.take(asked[own]) * np.sqrt(drawn.take(place))
+        some = asked.take(own)
+        place = errors.first[2 + line].take(some) * count + builds[own]
+        reached = (errors.sign[line] * most).take(some) * np.sqrt(drawn.take(place))
         angle = math.tau * drawn.take(place + count)
-        moves[own, 2 * line] = radius * np.cos(angle)
-        moves[own, 2 * line + 1] = radius * np.sin(angle)
-        together += errors.sign[line].take(asked) * moves[:, 2 * line : 2 * line + 2].T
-    left = held - np.hypot(*together)
+        shifts[0, own] += reached * np.cos(angle)
+        shifts[1, own] += reached * np.sin(angle)
+    left = held - np.hypot(*shifts)
     some = picked(left < level.take(asked))
-    return LikelyBuilds(asked[some], builds[some], left[some], moves.take(some, axis=0), level)
+    return LikelyBuilds(asked[some], builds[some], held[some], shifts[:, some], left[some], level)
 
 
 def _cut(numbers: Floats, errors: ErrorsAsked, level: Floats) -> tuple[Indices, Indices, Floats]:

@@ -19,10 +19,11 @@ from sbafab.geometry.edge_table import (
     dot,
     touching_in_parts,
 )
-from sbafab.geometry.edges import EPSILON, Edge, Point, left_normal
-from sbafab.geometry.facing_places import facing_places_of, places_along, spread_along
+from sbafab.geometry.edges import EPSILON, Edge, left_normal
+from sbafab.geometry.facing_places import facing_places_of
 from sbafab.geometry.region import Region
 from sbafab.geometry.remembered import remembered, remembered_together
+from sbafab.geometry.samples import sampled
 from sbafab.geometry.width import Width
 from sbafab.laminate.interfaces import Interface
 from sbafab.rules.boundary import END_ROOM, STEEP, Reach
@@ -307,14 +308,8 @@ class Rays(NamedTuple):
 
     @staticmethod
     def of(edges: Sequence[Edge]) -> Rays:
-        starts: list[Point] = []
-        numbers: list[int] = []
-        for number, edge in enumerate(edges):
-            room = END_ROOM / edge.length
-            shares = [min(1 - room, max(room, share)) for share in spread_along(edge)]
-            starts += places_along(edge, shares)
-            numbers += [number] * len(shares)
-        start, own = np.array(starts).T, np.array(numbers)
+        points, counts = sampled(edges, END_ROOM)
+        start, own = np.array(points).T, np.repeat(np.arange(len(edges)), counts)
         return Rays(start, -EdgeTable.of(edges).at(own).normal(start), own)
 
 

@@ -9,6 +9,7 @@ at once, in arrays.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
@@ -23,7 +24,6 @@ from sbafab.rules.margin_rows import MarginRows
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Bools = NDArray[np.bool_]
     Floats = NDArray[np.float64]
     Indices = NDArray[np.intp]
 
@@ -108,8 +108,8 @@ def _of_kinds(which: np.ufunc, rows: Floats, begins: Indices) -> Floats:
 class _Drawn(NamedTuple):
     """Builds of what is asked: by number of what asks, of its kind and of the build.
 
-    ``cuts`` are both cutting errors by their signs; ``moves`` has a row a build, with x and y of
-    each shift, or a turn and 0.
+    ``cuts`` (mm) is what both cuts leave; ``moves`` are x and y of all shifts together, as they
+    count, and a line for each turn (radians).
     """
 
     asked: Indices
@@ -117,15 +117,6 @@ class _Drawn(NamedTuple):
     build: Indices
     cuts: Floats
     moves: Floats
-
-    def at(self, some: Indices) -> _Drawn:
-        return _Drawn(
-            self.asked[some],
-            self.kind[some],
-            self.build[some],
-            self.cuts[:, some],
-            self.moves[some],
-        )
 
 
 class RandomBuilds:
@@ -155,7 +146,11 @@ class RandomBuilds:
         """What asks may come short where cuts and shifts leave less than this, mm."""
         self.least = table.least[kind]
         low, high = table.turned()
-        self.turned = low[:, kind], high[:, kind]
+        self.low, self.high = low[:, kind], high[:, kind]
+        self.turning = [line for line, most in enumerate(table.turn) if most.any()]
+        """The lines of moves that turn a kind; others are turned by nothing there."""
+        normal = np.concatenate([np.zeros((2, 0)), *(rows.normal for rows in every)], axis=1)
+        self.factors = np.concatenate([normal, table.factors[::2][self.turning]])
 
     def short(self, batch: DrawnBuilds) -> tuple[Indices, Indices]:
         """What was asked for, by number, and the builds in which it comes short."""
@@ -164,9 +159,10 @@ class RandomBuilds:
             return drawn.asked, drawn.build
         least = self._least(drawn)
         # What is so near to the limit that it hangs on rounding is summed up in one order.
-        near = picked(abs(least + TOLERANCE) < NEAR)
         is_short = least < -TOLERANCE
-        is_short[near] = self._is_short(drawn.at(near))
+        for near in picked(abs(least + TOLERANCE) < NEAR).tolist():
+            place = int(drawn.asked[near]), int(drawn.build[near])
+            is_short[near] = self._is_short(batch.numbers, *place)
         return drawn.asked[is_short], drawn.build[is_short]
 
     def _drawn(self, batch: DrawnBuilds) -> _Drawn:
@@ -175,54 +171,63 @@ class RandomBuilds:
         some = picked(likely.left < self.need.take(likely.asked))
         asked, builds = likely.asked.take(some), likely.build.take(some)
         left = likely.left.take(some) + self.least.take(asked)
-        numbers, table, first = batch.numbers, self.table, self.errors.first
+        numbers, first = batch.numbers, self.errors.first
         drawn, count = numbers.ravel(), numbers.shape[1]
         turns = []
-        for line, (low, high) in enumerate(zip(*self.turned, strict=True)):
-            if table.turn[line].any():
-                number = drawn.take(first[2 + line].take(asked) * count + builds)
-                turn = 2 * number - 1
-                left += np.minimum(low.take(asked) * turn, high.take(asked) * turn)
-                turns.append((line, number))
+        for line in self.turning:
+            number = drawn.take(first[2 + line].take(asked) * count + builds)
+            turn = 2 * number - 1
+            low, high = self.low[line].take(asked), self.high[line].take(asked)
+            left += np.minimum(low * turn, high * turn)
+            turns.append(turn)
         own = picked(left < SURE)
-        asked, builds = asked.take(own), builds.take(own)
-        kind, moves = self.kind.take(asked), likely.moves.take(some.take(own), axis=0)
-        for line, number in turns:
-            most = table.turn[line].take(kind)
-            moves[:, 2 * line] += np.where(most > 0, -most + (most + most) * number.take(own), 0.0)
-        cutting = self.errors.cutting
-        number = drawn.take(first[:2].take(asked, axis=1) * count + builds)
-        cuts = self.errors.signs.take(asked, axis=1) * (-cutting + (cutting + cutting) * number)
-        return _Drawn(asked, kind, builds, cuts, moves)
+        asked, builds, some = asked.take(own), builds.take(own), some.take(own)
+        kind = self.kind.take(asked)
+        moves = np.empty((2 + len(turns), len(own)))
+        moves[0], moves[1] = likely.shifts[0].take(some), likely.shifts[1].take(some)
+        for row, (line, turn) in enumerate(zip(self.turning, turns, strict=True), 2):
+            moves[row] = self.table.turn[line].take(kind) * turn.take(own)
+        return _Drawn(asked, kind, builds, likely.cuts.take(some), moves)
 
     def _least(self, drawn: _Drawn) -> Floats:
         """What is left at the worst row of each, but for rounding."""
         table, least = self.table, np.zeros(len(drawn.kind))
         kinds = range(len(table.begins))
         begins = np.searchsorted(drawn.kind, kinds).tolist()
+        rows = table.begins.tolist()
         for number, (start, stop) in enumerate(pairwise(begins)):
-            own = slice(*table.begins[number : number + 2])
+            if start == stop:
+                continue
+            own = slice(rows[number], rows[number + 1])
             step = max(1, AT_ONCE // (own.stop - own.start))
             for first in range(start, stop, step):
                 builds = slice(first, min(stop, first + step))
-                left = table.factors[:, own].T @ drawn.moves[builds].T
+                left = self.factors[:, own].T @ drawn.moves[:, builds]
                 left += table.room[own, None]
                 least[builds] = left.min(axis=0)
-        found: Floats = least + drawn.cuts[0] + drawn.cuts[1]
+        found: Floats = least + drawn.cuts
         return found
 
-    def _is_short(self, drawn: _Drawn) -> Bools:
+    def _is_short(self, numbers: Floats, asked: int, build: int) -> bool:
         """Whether a row comes short when all is summed up in one order, the same everywhere.
 
         A matrix product would round differently on another machine.
         """
-        table, bad = self.table, np.zeros(len(drawn.kind), dtype=bool)
-        for number, kind in enumerate(drawn.kind.tolist()):
-            own = slice(*table.begins[kind : kind + 2])
-            left = table.room[own]
-            for cut in drawn.cuts[:, number]:
-                left = left + cut
-            for factor, moved in zip(table.factors[:, own], drawn.moves[number], strict=True):
-                left = left + factor * moved
-            bad[number] = bool((left < -TOLERANCE).any())
-        return bad
+        table, kind, errors = self.table, int(self.kind[asked]), self.errors
+        own = slice(*table.begins[kind : kind + 2])
+        left, cutting = table.room[own], errors.cutting
+        first = errors.first[:, asked].tolist()
+        for row, sign in zip(first, errors.signs[:, asked].tolist(), strict=False):
+            left = left + sign * (-cutting + (cutting + cutting) * float(numbers[row, build]))
+        for line, row in enumerate(first[2:]):
+            x, y = table.factors[2 * line : 2 * line + 2, own]
+            number = float(numbers[row, build])
+            if table.shift[line, kind] > 0:
+                radius = float(table.shift[line, kind]) * math.sqrt(number)
+                angle = math.tau * float(numbers[row + 1, build])
+                left = left + x * (radius * math.cos(angle))
+                left = left + y * (radius * math.sin(angle))
+            elif table.turn[line, kind] > 0:
+                most = float(table.turn[line, kind])
+                left = left + x * (-most + (most + most) * number)
+        return bool((left < -TOLERANCE).any())

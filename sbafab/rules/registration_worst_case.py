@@ -76,7 +76,8 @@ def _least(
     held = (cut - forms.loss(by_hand=False))[forms.nominal >= least_held(drawn)]
     worst = cut - forms.loss()
     (near,) = (worst <= worst.min() + SAME).nonzero()
-    number = min(near.tolist(), key=lambda i: round(float(worst[i]), 9))
+    values = [round(value, 9) for value in worst[near].tolist()]
+    number = int(near[values.index(min(values))])
     margin = group[forms.first + number]
     found = pushes(margin, group.first, moves)
     pinned = float(held.min(initial=math.inf))

@@ -54,17 +54,18 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
 
 def _owners(laminate: Laminate, graph: VoidGraph) -> dict[Void, frozenset[str]]:
     """The chambers whose centres each pocket holds; equal pockets are looked at once."""
-    known: dict[Region, frozenset[str]] = {}
+    known: dict[int, frozenset[str]] = {}
     owners = {}
     for void, piece in graph.pieces.items():
         if void.kind == "pocket":
-            if piece not in known:
-                known[piece] = frozenset(
+            # Equal interfaces have the very same pieces.
+            if id(piece) not in known:
+                known[id(piece)] = frozenset(
                     chamber.name
                     for chamber in laminate.chambers
                     if any(_holds(piece, centre) for centre in chamber.centres)
                 )
-            owners[void] = known[piece]
+            owners[void] = known[id(piece)]
     return owners
 
 

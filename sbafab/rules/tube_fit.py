@@ -11,10 +11,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sbafab.geometry.edges import Edge, Point
-from sbafab.geometry.nearby import EdgeIndex, boxes_meet
+from sbafab.geometry.edges import Edge, Line, Point
+from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.nearby import EdgeIndex, boxes_meet, widened
 from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import strip
+from sbafab.geometry.shapes import polygon, strip
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.rules.alike import distinct_interfaces
@@ -25,6 +26,8 @@ from sbafab.rules.limits import TOLERANCE, Limits, at, holds
 NAME = "tube-fit"
 BOND = "the bond beside the strip"
 REMEDY = "widen inlet.width"
+ROOM = 1e-9
+"""mm by which what is straight, parallel or at the mouth may be off for rounding."""
 
 
 class _Fit(NamedTuple):
@@ -101,7 +104,8 @@ def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits
     inner = (x - dx * inlet.length, y - dy * inlet.length)
     beside = strip(inner, inlet.mouth, 2 * inlet.width)
     near = [one for one in interface.unbonded.pieces if boxes_meet(one.bounds, beside.bounds)]
-    run = Region(tuple(contour for one in near for contour in one.contours)) & beside
+    every = Region(tuple(contour for one in near for contour in one.contours))
+    run = _straight_run(every, inlet, beside) or every & beside
     sides = [edge for edge in run.edges if _is_side(edge, inlet)]
     widths = [
         outward_reach(edge.reversed(), EdgeIndex([e for e in run.edges if e is not edge]))
@@ -119,6 +123,55 @@ def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits
             fit = _Fit(inlet, interface, what, cut, limit, least.at, remedy, least.value)
             found.append(fit)
     return found
+
+
+def _straight_run(unbonded: Region, inlet: Inlet, beside: Region) -> Region | None:
+    """What lies beside the inlet's run, where that is a strip between two straight edges, and
+    nothing else comes near; None where it is not.
+    """
+    sides: list[Edge] = []
+    for edge in unbonded.edges:
+        if not boxes_meet(widened(edge.bounds, ROOM), beside.bounds) or _is_off(edge, inlet):
+            continue
+        if not isinstance(edge, Line):
+            return None
+        near, far = sorted((_depth(inlet, edge.start), _depth(inlet, edge.end)))
+        if far > ROOM:
+            aside = abs(_offset(inlet, edge.start) - _offset(inlet, edge.end))
+            if abs(near) > ROOM or far < inlet.length + ROOM or aside > ROOM:
+                return None
+            sides.append(edge)
+    if len(sides) != 2:
+        return None
+    # The inlet's direction leads outward along the one that has the strip on its left.
+    out, back = sorted(sides, key=lambda edge: _depth(inlet, edge.end))
+    right, left = _offset(inlet, out.end), _offset(inlet, back.start)
+    if max(_depth(inlet, out.end), _depth(inlet, back.start)) > ROOM or not left < right:
+        return None
+    if max(right, -left) > inlet.width - ROOM:
+        return None
+    (inner,) = (edge for edge in beside.edges if _depth(inlet, edge.at(0.5)) > inlet.length - ROOM)
+    crossed = []
+    for edge in (out, back):
+        # In the order, and so with the rounding, in which booleans ask where edges meet.
+        one, other = sorted((edge, inner), key=lambda one: one.bounds[0])
+        crossed += meeting_points(one, other)
+    if len(crossed) != 2:
+        return None
+    begin, end = crossed
+    corners = [begin, out.end, back.start, end]
+    # As a boolean hands it out.
+    first = min(range(4), key=lambda i: (round(corners[i][0], 6), round(corners[i][1], 6)))
+    return polygon(corners[first:] + corners[:first])
+
+
+def _is_off(edge: Edge, inlet: Inlet) -> bool:
+    """Whether an edge lies deeper than the run, or beside what is looked at."""
+    (dx, dy), mouth = inlet.direction, inlet.mouth
+    if -edge.farthest_along(mouth, (dx, dy)) > inlet.length + ROOM:
+        return True
+    aside = (dy, -dx), (-dy, dx)
+    return any(-edge.farthest_along(mouth, way) > inlet.width + ROOM for way in aside)
 
 
 def _needed(inlet: Inlet, interface: Interface) -> float:

@@ -92,18 +92,25 @@ def void_graph(laminate: Laminate) -> VoidGraph:
     outside = {pattern: _outside(pieces, frame) for pattern, pieces in openings.items()}
     gaps: dict[tuple[str, ...], _Gap] = {}
     homes: dict[tuple[tuple[str, ...], str], list[tuple[int, Point]]] = {}
+    opened: dict[int, list[Void]] = {}
     for interface in laminate.interfaces:
         gap = gaps.get(interface.pattern)
         if gap is None:
             gap = gaps[interface.pattern] = _gap(interface.unbonded, interface.contact, frame)
-        _add_gap(graph, interface, gap, laminate.inlets)
+        missing = [_missing(interface, home, gap) for home in range(len(gap.missing))]
+        _add_gap(graph, interface, gap, missing, laminate.inlets)
         for layer in (interface.below, interface.above):
             key = interface.pattern, layer.pattern
             if key not in homes:
                 homes[key] = [_home(piece, gap.missing) for piece in openings[layer.pattern]]
-            for number, (home, p) in enumerate(homes[key]):
-                opening = _opening(layer.index, number, outside[layer.pattern])
-                graph.join(opening, _missing(interface, home, gap), p)
+            if layer.index not in opened:
+                opened[layer.index] = [
+                    _opening(layer.index, number, outside[layer.pattern])
+                    for number in range(len(openings[layer.pattern]))
+                ]
+            for opening, (home, p) in zip(opened[layer.index], homes[key], strict=True):
+                if opening is not OUTSIDE or missing[home] is not OUTSIDE:
+                    graph.join(opening, missing[home], p)
     for layer in (laminate.tpe_layers[0], laminate.tpe_layers[-1]):
         for number, piece in enumerate(openings[layer.pattern]):
             opening = _opening(layer.index, number, outside[layer.pattern])
@@ -121,7 +128,12 @@ def _gap(unbonded: Region, contact: Region, frame: Region) -> _Gap:
         home = _holding(missing, beside(edge, -INSET))
         touching.append((_bounded(pieces, edge.at(0.5)), home, edge.at(0.5)))
     touching.sort(key=lambda one: one[0])
-    return _Gap(pieces, missing, tuple(touching), _outside(missing, frame))
+    outside = _outside(missing, frame)
+    # Inlets open to the outside; of any other two voids it counts that they join, and first where.
+    joins: dict[tuple[int, int, Point | None], tuple[int, int, Point]] = {}
+    for number, home, p in touching:
+        joins.setdefault((number, home, p if home == outside else None), (number, home, p))
+    return _Gap(pieces, missing, tuple(joins.values()), outside)
 
 
 def _bounded(pieces: tuple[Region, ...], p: Point) -> int:
@@ -156,7 +168,13 @@ def _to_nm(value: float) -> float:
     return round(value, 6)
 
 
-def _add_gap(graph: VoidGraph, interface: Interface, gap: _Gap, inlets: tuple[Inlet, ...]) -> None:
+def _add_gap(
+    graph: VoidGraph,
+    interface: Interface,
+    gap: _Gap,
+    missing: list[Void],
+    inlets: tuple[Inlet, ...],
+) -> None:
     voids = [_unbonded(interface, number) for number in range(len(gap.unbonded))]
     graph.pieces.update(zip(voids, gap.unbonded, strict=True))
     for number, home, p in gap.touching:
@@ -164,7 +182,7 @@ def _add_gap(graph: VoidGraph, interface: Interface, gap: _Gap, inlets: tuple[In
         if interface.kind == "chamber" and home == gap.outside:
             inlet = _inlet_at(p, inlets)
         if inlet is None:
-            graph.join(voids[number], _missing(interface, home, gap), p)
+            graph.join(voids[number], missing[home], p)
         else:
             graph.mouths.setdefault(inlet, []).append(voids[number])
 
@@ -204,8 +222,10 @@ def _home(opening: Region, missing: tuple[Region, ...]) -> tuple[int, Point]:
 
 
 def _holding(pieces: tuple[Region, ...], p: Point) -> int:
+    x, y = p
     for number, piece in enumerate(pieces):
-        if piece.contains(p):
+        left, low, right, high = piece.bounds
+        if left <= x <= right and low <= y <= high and piece.contains(p):
             return number
     return min(range(len(pieces)), key=lambda number: pieces[number].distance_to_edge(p))
 

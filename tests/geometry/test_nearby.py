@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+import sys
 
 import pytest
 
@@ -84,9 +85,9 @@ def test_pairs_of_many_boxes_come_as_those_of_few(
     found = list(close_pairs(boxes, reach))
     monkeypatch.setattr(nearby, "AT_ONCE", 100)
     assert list(close_pairs(boxes, reach)) == found
-    monkeypatch.setattr(nearby, "MANY_BOXES", math.inf)
+    monkeypatch.setattr(nearby, "MANY_BOXES", sys.maxsize)
     assert list(close_pairs(boxes, reach)) == found
-    monkeypatch.setattr(nearby, "FEW_BOXES", math.inf)
+    monkeypatch.setattr(nearby, "FEW_BOXES", sys.maxsize)
     assert list(close_pairs(boxes, reach)) == found
     assert len(found) > 500
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import pickle
 from dataclasses import dataclass
 
-from sbafab.geometry.edges import Arc
+from sbafab.geometry.edges import Arc, Line
 from sbafab.geometry.once import once
 
 
@@ -27,9 +28,15 @@ def test_a_value_is_worked_out_once_for_each_record() -> None:
     assert Asked.value.__doc__ == "A value."
 
 
-def test_an_arc_with_another_radius_keeps_nothing_of_the_first() -> None:
-    arc = Arc((1.0, 0.0), (0.0, 1.0), (0.0, 0.0), 1.0, True)
+def test_what_was_asked_of_an_edge_changes_nothing_of_it() -> None:
+    arc, line = Arc((1.0, 0.0), (0.0, 1.0), (0.0, 0.0), 1.0, True), Line((1.0, 0.0), (0.0, 2.0))
+    fresh = Arc((1.0, 0.0), (0.0, 1.0), (0.0, 0.0), 1.0, True)
     assert math.isclose(arc.length, math.pi / 2)
-    assert math.isclose(arc._replace(radius=2.0).length, math.pi)
+    assert arc.bounds == (0.0, 0.0, 1.0, 1.0)
     assert math.isclose(arc.reversed().sweep, -math.pi / 2)
-    assert arc == Arc((1.0, 0.0), (0.0, 1.0), (0.0, 0.0), 1.0, True)
+    assert arc == fresh
+    assert hash(arc) == hash(fresh)
+    assert arc != arc.reversed()
+    assert len({arc, fresh, line, line.reversed()}) == 3
+    assert pickle.loads(pickle.dumps([arc, line])) == [fresh, line]
+    assert repr(line) == "Line(start=(1.0, 0.0), end=(0.0, 2.0))"

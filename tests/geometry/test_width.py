@@ -236,3 +236,36 @@ def test_arcs_of_nearly_one_centre_that_are_left_out_face_each_other_nowhere(see
         _along_each_other(_side(a, a.bounds), _side(b, b.bounds), gathered)
         assert gathered.offered == []
     assert 50 < left_out < 250
+
+
+def test_across_a_ring_lies_what_every_foot_tells(monkeypatch: pytest.MonkeyPatch) -> None:
+    draw = random.Random(8)
+    offered = 0
+    for _ in range(200):
+        centre = draw.uniform(-9, 9), draw.uniform(-9, 9)
+        outer, inner = (
+            Arc(
+                (centre[0] + r * math.cos(t), centre[1] + r * math.sin(t)),
+                (centre[0] + r * math.cos(t + turn), centre[1] + r * math.sin(t + turn)),
+                centre,
+                r,
+                True,
+            )
+            for r in (draw.uniform(2, 4), draw.uniform(1, 2))
+            for t in [draw.choice([0.0, draw.uniform(-3, 3)])]
+            for turn in [draw.choice([math.pi / 2, draw.uniform(0.1, 3)])]
+        )
+        sides = [_side(arc, arc.bounds) for arc in (outer, inner.reversed())]
+        if draw.random() < 0.5:
+            sides.reverse()
+        told = []
+        for is_known in (True, False):
+            gathered = Gathered(Boundary([], 30.0), 9.0)
+            if not is_known:
+                monkeypatch.setattr("sbafab.geometry.width.bound_a_ring", lambda *_: False)
+            _along_each_other(*sides, gathered)
+            monkeypatch.undo()
+            told.append(gathered.offered)
+        assert told[0] == told[1]
+        offered += len(told[0])
+    assert offered > 300

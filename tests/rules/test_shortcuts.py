@@ -12,12 +12,14 @@ import numpy as np
 import pytest
 
 from sbafab.geometry.boolean import divided, union
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
-from sbafab.laminate.laminate import Laminate
-from sbafab.rules import boundary, draws, freedoms, likely_builds, margins
+from sbafab.geometry.edges import Line
+from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.shapes import disc, polygon, rectangle, strip
+from sbafab.laminate.laminate import Inlet, Laminate
+from sbafab.rules import boundary, draws, facing, freedoms, likely_builds, margins, tube_fit
 from sbafab.rules.boundary import outward_reach
 from sbafab.rules.draws import CutContour, DrawnBuilds, numbers, rows_by_error
+from sbafab.rules.facing import facing_films
 from sbafab.rules.forms import linear_forms
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.likely_builds import ErrorsAsked
@@ -151,7 +153,9 @@ def test_edges_aside_of_a_band_or_farther_off_are_none_of_the_nearest(
         )
         for edge in region.edges:
             for one in (edge, edge.reversed()):
-                band = boundary._line_band(one) if len(one) == 2 else boundary._arc_band(one)
+                band = (
+                    boundary._line_band(one) if isinstance(one, Line) else boundary._arc_band(one)
+                )
                 found = outward_reach(one, region.index)
                 monkeypatch.setattr(boundary, "_heights", lambda *_: (-math.inf, math.inf))
                 plain = boundary._nearest(band, region.edges)
@@ -212,6 +216,79 @@ def test_likely_builds_are_those_of_plain_sums(need: float) -> None:
             if left < need:
                 assert found[asked, build] == pytest.approx(left, abs=1e-12)
     assert 0 < len(found) < 400
+
+
+TAPERED = ("1dof-5mm", "stack.balloons=4", "chamber.diameter=[5, 8, 6, 8]")
+
+
+@pytest.mark.parametrize("design", [*DESIGNS, TAPERED])
+@pytest.mark.parametrize("hole", [None, disc((0.0, 0.0), 1.5)])
+def test_films_outside_an_outline_face_nothing_within_it(
+    design: tuple[str, ...],
+    hole: Region | None,
+    good: Good,
+    spoil: Good,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    laminate = good(*design)
+    if hole is not None:
+        # A film with a wide opening, through which others face each other.
+        layer = laminate.tpe_layers[1]
+        laminate = spoil(laminate, layer.index, layer.profile - hole)
+    asked: list[bool] = []
+
+    def fits_in(film: Region, outlines: tuple[Contour, ...]) -> bool:
+        asked.append(plain(film, outlines))
+        return asked[-1]
+
+    plain = facing._fits_in
+    monkeypatch.setattr(facing, "_fits_in", fits_in)
+    found = facing_films(laminate)
+    assert any(asked) or len(laminate.tpe_layers) < 4
+    monkeypatch.setattr(facing, "_fits_in", lambda *_: False)
+    assert facing_films(laminate) == found
+
+
+RUN = Inlet("chamber1", (9.0, 0.5), (1.0, 0.0), 1.6, 3.0, 0.8)
+STRIP = rectangle((0.0, -0.3), (9.0, 1.3))
+"""A strip that opens at the inlet of that run."""
+
+
+@pytest.mark.parametrize("degrees", [0, 90, 120, 263])
+def test_a_straight_run_is_what_a_boolean_leaves_of_it(degrees: float) -> None:
+    pocket = (STRIP | disc((0.0, 0.5), 2.5)).turned(degrees)
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    mouth = 9.0 * c - 0.5 * s, 9.0 * s + 0.5 * c
+    inlet = replace(RUN, mouth=mouth, direction=(c, s))
+    inner = mouth[0] - 3.0 * c, mouth[1] - 3.0 * s
+    beside = strip(inner, mouth, 2 * inlet.width)
+    run = tube_fit._straight_run(pocket, inlet, beside)
+    assert run is not None
+    assert run.area == pytest.approx(3.0 * 1.6)
+    assert [edge.start for edge in run.edges] == [
+        pytest.approx(edge.start) for edge in (pocket & beside).edges
+    ]
+
+
+@pytest.mark.parametrize(
+    "unbonded",
+    [
+        # A hole in the run, a waist, sides aslant, a shape beside it, wider than is looked at.
+        STRIP - disc((7.5, 0.5), 0.1),
+        STRIP - rectangle((7.0, -1.0), (7.5, 0.0)),
+        polygon([(0, -0.3), (9, -0.2), (9, 1.3), (0, 1.3)]),
+        STRIP | rectangle((7.0, 1.5), (7.5, 2.0)),
+        rectangle((0.0, -1.2), (9.0, 2.2)),
+        # It ends before the mouth, goes on past it, or begins after the run does.
+        rectangle((0.0, -0.3), (8.9, 1.3)),
+        rectangle((0.0, -0.3), (9.5, 1.3)),
+        rectangle((6.5, -0.3), (9.0, 1.3)),
+    ],
+)
+def test_any_other_run_is_left_to_the_boolean(unbonded: Region) -> None:
+    beside = strip((6.0, 0.5), (9.0, 0.5), 3.2)
+    assert tube_fit._straight_run(STRIP, RUN, beside) is not None
+    assert tube_fit._straight_run(unbonded, RUN, beside) is None
 
 
 FRAME = rectangle((-20, -20), (20, 20))

@@ -1,0 +1,82 @@
+"""Compiles the modules that most time is spent in: ``python .ci/compile_modules.py FOLDER``.
+
+mypyc makes C of them as they stand, and the compiler of this machine what Python imports; both come
+to lie in the folder, by package. What is compiled gives the same results, and the same bytes.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+GEOMETRY = (
+    "apart",
+    "arrangement",
+    "boundary_side",
+    "chain_sums",
+    "corners",
+    "edges",
+    "ends",
+    "facets",
+    "intersect",
+    "nearby",
+    "offset",
+    "pieces",
+    "pool",
+    "rings",
+    "runs",
+    "samples",
+    "tidy",
+    "width",
+    "width_bounds",
+)
+RULES = ("boundary", "freedoms", "voids")
+COMPILED = (
+    *(f"sbafab/geometry/{name}.py" for name in GEOMETRY),
+    *(f"sbafab/rules/{name}.py" for name in RULES),
+)
+"""Without what numpy does, and what keeps values in the dictionary of a record."""
+NEEDS = ("mypy[mypyc]>=2.4,<3", "setuptools>=65")
+TYPES = (
+    "--config-file=",
+    "--follow-imports=skip",
+    "--ignore-missing-imports",
+    "--disable-error-code=var-annotated",
+)
+"""The types of other modules are not asked for, which saves minutes; the checks ask for all."""
+# As Python rounds: products and sums are not made one step.
+ROUNDING = () if os.name == "nt" else ("-ffp-contract=off",)
+
+
+def compile_into(folder: Path) -> list[Path]:
+    """The modules, compiled: their files in the folder, relative to it.
+
+    Raises SystemExit where there is no compiler or mypy objects.
+    """
+    from mypyc.build import mypycify
+    from setuptools import Distribution
+
+    os.chdir(ROOT)
+    with tempfile.TemporaryDirectory() as scratch:
+        modules = mypycify(
+            [*TYPES, *COMPILED],
+            opt_level="2",
+            debug_level="0",
+            target_dir=scratch,
+            group_name="sbafab",
+        )
+        for module in modules:
+            module.extra_compile_args += ROUNDING
+        work = Distribution({"name": "sbafab", "ext_modules": modules}).get_command_obj("build_ext")
+        work.build_lib, work.build_temp = str(folder), scratch
+        work.ensure_finalized()
+        work.run()
+    return sorted(path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
+
+
+if __name__ == "__main__":
+    for path in compile_into(Path(sys.argv[1]).resolve()):
+        print(path.as_posix())
