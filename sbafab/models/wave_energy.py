@@ -55,7 +55,7 @@ class Slices(NamedTuple):
     arounds: Array
 
 
-class Total(NamedTuple):
+class WaveTotal(NamedTuple):
     """Energy less the air's work of one film and its share of the rim, (rows,); its derivatives by
     coordinate (coordinates, rows), and second ones as a band of freedoms. What films store, uJ; the
     air on the film's side of the middle plane, ul.
@@ -104,7 +104,7 @@ class Waves:
         held = self.of.balloon.held
         return np.asarray((by[held:] / length[held:]).max(0))
 
-    def total(self, x: Array, rows: NDArray[np.int_]) -> Total:
+    def total(self, x: Array, rows: NDArray[np.int_]) -> WaveTotal:
         """The energy at coordinates ``x`` of these rows."""
         of, one = self.of, self.of.balloon
         p, held, edge = self.pressure[rows], one.held, one.edge
@@ -129,7 +129,7 @@ class Waves:
         sums.by_node[:, edge, EDGE] += 2 * down * end
         sums.own[:, edge, EDGE, EDGE] += 2 * down
         energy = stored - p * volume + down * end**2
-        return Total(energy, *sums.by_freedoms(), stored, volume)
+        return WaveTotal(energy, *sums.by_freedoms(), stored, volume)
 
     def _slices(self, change: Array, mean: Array) -> Slices:
         """What each slice feels, with derivatives of nothing."""

@@ -46,7 +46,7 @@ def first_of(overtone: int) -> int:
     return 3 * overtone - 1
 
 
-class Packing(NamedTuple):
+class BlockPacking(NamedTuple):
     """Which entries of blocks go where in a band of that size."""
 
     from_: NDArray[np.int_]
@@ -141,7 +141,7 @@ class Waving:
         return found.reshape(-1, found.shape[-1])
 
     @cached_property
-    def packing(self) -> Packing:
+    def packing(self) -> BlockPacking:
         """Where entries of blocks go: of each node, with the next, and with the one after that."""
         nodes = len(self.kept)
         number = np.full(self.kept.size, -1)
@@ -158,7 +158,7 @@ class Waving:
             begin += first.size
         width = max(int(each.max()) for each in off) + 1
         into = np.concatenate(row) * width + np.concatenate(off)
-        return Packing(np.concatenate(from_), into, (len(self.freedoms), width))
+        return BlockPacking(np.concatenate(from_), into, (len(self.freedoms), width))
 
     @cached_property
     def plate(self) -> Array:
