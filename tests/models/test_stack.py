@@ -305,8 +305,10 @@ def test_a_plate_is_met_from_any_pressures(three: Stack) -> None:
 
 @pytest.mark.parametrize("load", sorted(LOADS))
 def test_any_start_ends_in_the_same_balance(three: Stack, load: str) -> None:
-    """Quick steps from nothing, and Newton's own from the free stack: against a plate that is soft at
-    first, for how steps into a hard one end hangs on the last digits of the machine.
+    """Quick steps from nothing, and Newton's own from the free stack.
+
+    Against a plate that is soft at first: how steps into a hard one end hangs on a machine's last
+    digits.
     """
     loads = LOADS[load]
     acting = three._load(**{**NO_LOAD, **loads})
