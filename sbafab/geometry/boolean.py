@@ -137,7 +137,7 @@ def _enclosed(chains: Iterable[Wound], wanted: Sequence[WantedTurns]) -> list[Re
             own = _cut(group, wanted)
         for contours, more in zip(found, own, strict=True):
             contours.extend(more)
-    return [Region(tuple(sorted(contours, key=_reading_order))) for contours in found]
+    return [Region(_in_reading_order(contours)) for contours in found]
 
 
 def _whole(chain: ClosedChain, outside: int, wanted: WantedTurns) -> list[Contour]:
@@ -172,7 +172,7 @@ def _contours(loops: Iterable[Sequence[Edge]]) -> list[Contour]:
 
 def _region(loops: Iterable[Sequence[Edge]]) -> Region:
     """The region inside closed chains that meet nowhere."""
-    return Region(tuple(sorted(_contours(loops), key=_reading_order)))
+    return Region(_in_reading_order(_contours(loops)))
 
 
 def arranged(owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Found]) -> Found:
@@ -196,6 +196,11 @@ def _in_some_way(read: Callable[[float], Found]) -> Found:
         f"edges that nearly meet at x {x:.6f}, y {y:.6f} cannot be told apart; change a size "
         "there by 0.001 mm"
     )
+
+
+def _in_reading_order(contours: Sequence[Contour]) -> tuple[Contour, ...]:
+    # Most regions have one or two.
+    return tuple(sorted(contours, key=_reading_order) if len(contours) > 1 else contours)
 
 
 def _reading_order(contour: Contour) -> tuple[bool, float, float, float]:
