@@ -6,6 +6,7 @@ input ends, because whoever started it is gone, so does it, in the middle of a j
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import queue
@@ -14,6 +15,7 @@ import sys
 import threading
 from typing import IO, Any
 
+from sbafab.entry import YOUNG
 from sbafab.search.fingerprint import fingerprint
 
 
@@ -21,6 +23,8 @@ def main() -> None:
     """Measures until standard input ends."""
     # Ctrl-C goes to all processes of a terminal; the one that started this ends it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Designs leave no rings of records to be found.
+    gc.set_threshold(YOUNG, *gc.get_threshold()[1:])
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8", newline="\n")
     # What a library prints must not stand among the answers.
     os.dup2(2, 1)
