@@ -19,8 +19,9 @@ import sbafab
 from docs.scripts.ripple_sector import Sector, sector_states
 from sbafab.actuators import load_design
 from sbafab.meshing.conforming.settings import MeshSettings
-from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.balloon import Balloon
 from sbafab.models.balloons import balloons_of
+from sbafab.models.rippled import resolved, rippled, risen
 from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_states
 from sbafab.simulators.calculix.job import simulate
 from sbafab.simulators.calculix.settings import deck_settings
@@ -48,7 +49,8 @@ class Run(NamedTuple):
 
 
 class Case(NamedTuple):
-    """A row: the balloon of a template, alone or an inner one of a stack.
+    """A row: the balloon of a template, alone or an inner one of a stack, or one like it of another
+    ``diameter`` in mm.
 
     ``h`` mm is the solid mesh's; with ``waves`` it is one even ripple of that many; without either
     it is a section through the axis.
@@ -59,6 +61,7 @@ class Case(NamedTuple):
     h: float = 0.0
     runs: tuple[Run, ...] = ()
     waves: int = 0
+    diameter: float | None = None
 
     @property
     def pressures(self) -> tuple[float, ...]:
@@ -68,6 +71,7 @@ class Case(NamedTuple):
     @property
     def name(self) -> str:
         size = self.template.removeprefix("1dof-").removesuffix("mm")
+        size = f"{self.diameter:g}" if self.diameter else size
         where = "alone" if self.alone else "in a stack"
         how = f"{self.waves} {RIPPLES}" if self.waves else FREE if self.runs else SMOOTH
         return f"d = {size}, {where}, {how}"
@@ -75,9 +79,9 @@ class Case(NamedTuple):
     @property
     def balloon(self) -> Balloon:
         design = load_design(self.template, (f"stack.balloons={1 if self.alone else 3}",))
-        return replace(
-            balloons_of(design, sbafab.build(design))[0], wrinkles=bool(self.runs or self.waves)
-        )
+        found = balloons_of(design, sbafab.build(design))[0]
+        pocket = self.diameter / 2 if self.diameter else found.pocket
+        return replace(found, pocket=pocket, wrinkles=bool(self.runs or self.waves))
 
 
 CASES = (
@@ -92,13 +96,21 @@ CASES = (
     Case("1dof-5mm", alone=False, waves=7),
     Case("1dof-10mm", alone=True, waves=12),
     Case("1dof-10mm", alone=False, waves=12),
+    Case("1dof-10mm", alone=True, waves=9, diameter=7),
+    Case("1dof-10mm", alone=True, waves=18, diameter=15),
+    Case("1dof-10mm", alone=False, waves=18, diameter=15),
+    Case("1dof-10mm", alone=True, waves=24, diameter=20),
 )
 """Quarters of d = 10 whose rims ripple would be hours."""
 
 
 def elastic(case: Case) -> Found:
     """What the elastic balloon says."""
-    found = inflate(case.balloon, case.pressures)
+    one = case.balloon
+    if case.waves and resolved(one):
+        found = rippled(one, case.pressures, case.waves).shapes
+    else:
+        found = risen(one, case.pressures)
     return found.height, found.volume
 
 

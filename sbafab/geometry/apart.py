@@ -162,7 +162,8 @@ def _first(home: list[int], number: int) -> int:
 def _meet(a: ClosedChain, b: ClosedChain) -> bool:
     """Whether two chains may come within FAR of each other."""
     if a.circle is not None and b.circle is not None:
-        (one, r), (other, s) = a.circle, b.circle
+        one, r = a.circle
+        other, s = b.circle
         gap = math.dist(one, other)
         return not max(gap - r - s, abs(r - s) - gap) > FAR
     edges, boxes = b.contour.edges, b.contour.boxes

@@ -11,7 +11,7 @@ import math
 from collections import defaultdict
 from collections.abc import Container, Iterator, Sequence
 from functools import cmp_to_key
-from typing import Final
+from typing import Final, final
 
 from sbafab.geometry.edges import (
     EPSILON,
@@ -31,6 +31,7 @@ NEAR = 0.05
 """Radians: edges that leave a point at less than this angle are compared farther on."""
 
 
+@final
 class _Leaving:
     """A piece as it leaves a point: its direction there, its chord, how it bends, where it ends."""
 
@@ -55,7 +56,9 @@ class _Leaving:
 
 
 def _leaving(half: int, edge: Edge) -> _Leaving:
-    (x0, y0), (x1, y1) = (edge.end, edge.start) if half & 1 else (edge.start, edge.end)
+    start, end = (edge.end, edge.start) if half & 1 else (edge.start, edge.end)
+    x0, y0 = start
+    x1, y1 = end
     chord = math.hypot(x1 - x0, y1 - y0)
     straight = math.atan2(y1 - y0, x1 - x0)
     if not isinstance(edge, Arc):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, final
 
 from sbafab.geometry.edges import Bounds, Edge, Line, Point, left_normal
 
@@ -11,6 +11,7 @@ BESIDE = 1e-5
 """mm that an edge may miss another's normals by, for rounding."""
 
 
+@final
 class Foot:
     """A point of an edge, and the unit normal into the material there."""
 
@@ -21,6 +22,7 @@ class Foot:
         self.normal: Final[Point] = normal
 
 
+@final
 class BoundarySide:
     """An edge with what the search asks of it again and again.
 
@@ -42,7 +44,8 @@ class BoundarySide:
 
     def may_hold_feet(self, other: BoundarySide, within: float) -> bool:
         """Whether a normal of this edge may meet the other no farther off than ``within``."""
-        (x, y), (nx, ny) = self.middle, self.normal
+        x, y = self.middle
+        nx, ny = self.normal
         aside = abs((other.middle[0] - x) * ny - (other.middle[1] - y) * nx)
         return aside <= self.half + other.half + within * self.lean + BESIDE
 
@@ -50,7 +53,8 @@ class BoundarySide:
         """Points of the edge where its normal passes through ``p``."""
         edge = self.edge
         if isinstance(edge, Line):
-            (x0, y0), (x1, y1) = edge.start, edge.end
+            x0, y0 = edge.start
+            x1, y1 = edge.end
             dx, dy = x1 - x0, y1 - y0
             square = dx * dx + dy * dy
             t = ((p[0] - x0) * dx + (p[1] - y0) * dy) / square
@@ -58,7 +62,8 @@ class BoundarySide:
                 return []
             length = math.sqrt(square)
             return [Foot((x0 + t * dx, y0 + t * dy), (-dy / length, dx / length))]
-        (cx, cy), r = edge.centre, edge.radius
+        cx, cy = edge.centre
+        r = edge.radius
         ux, uy = p[0] - cx, p[1] - cy
         distance = math.hypot(ux, uy)
         if distance < 1e-12:

@@ -14,7 +14,8 @@ def enclosed_area(edges: tuple[Edge, ...]) -> float:
     twice = 0.0
     bulges = 0.0
     for edge in edges:
-        (x0, y0), (x1, y1) = edge.start, edge.end
+        x0, y0 = edge.start
+        x1, y1 = edge.end
         twice += (x0 - ox) * (y1 - oy) - (x1 - ox) * (y0 - oy)
         bulges += edge.segment_area
     return twice / 2 + bulges

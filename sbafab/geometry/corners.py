@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import Final
+from typing import Final, final
 
 from sbafab.geometry.edges import Bounds, Edge, Line, Point
 from sbafab.geometry.ends import ROUNDED, SMOOTH
 from sbafab.geometry.region import Contour
 
 
+@final
 class Corner:
     """A vertex with the directions of travel into and out of it; ``turn`` > 0 is convex.
 
@@ -26,7 +27,8 @@ class Corner:
         self.turn: Final[float] = turn
         self.half_turn: Final[float] = abs(turn) / 2
         self.box: Final[Bounds] = (point[0], point[1], point[0], point[1])
-        (ux, uy), half = arriving, turn / 2
+        ux, uy = arriving
+        half = turn / 2
         c, s = math.cos(half), math.sin(half)
         self.normal: Final[Point] = (-ux * s - uy * c, ux * c - uy * s)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Final
+from typing import Final, final
 
 Point = tuple[float, float]
 Bounds = tuple[float, float, float, float]
@@ -39,14 +39,16 @@ def _along(p: Point, origin: Point, unit: Point) -> float:
     return (p[0] - origin[0]) * unit[0] + (p[1] - origin[1]) * unit[1]
 
 
+@final
 class Line:
     """A straight edge from ``start`` to ``end``."""
 
-    __slots__ = ("end", "start")
+    __slots__ = ("_length", "end", "start")
 
     def __init__(self, start: Point, end: Point) -> None:
         self.start: Final[Point] = start
         self.end: Final[Point] = end
+        self._length = 0.0
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Line) and self.start == other.start and self.end == other.end
@@ -62,7 +64,10 @@ class Line:
 
     @property
     def length(self) -> float:
-        return math.dist(self.start, self.end)
+        length = self._length
+        if length == 0.0:
+            length = self._length = math.dist(self.start, self.end)
+        return length
 
     @property
     def bulge(self) -> float:
@@ -75,7 +80,8 @@ class Line:
 
     @property
     def bounds(self) -> Bounds:
-        (x0, y0), (x1, y1) = self.start, self.end
+        x0, y0 = self.start
+        x1, y1 = self.end
         return min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1)
 
     def reversed(self) -> Line:
@@ -83,18 +89,21 @@ class Line:
 
     def at(self, t: float) -> Point:
         """Point at fraction ``t`` of the length."""
-        (x0, y0), (x1, y1) = self.start, self.end
+        x0, y0 = self.start
+        x1, y1 = self.end
         return x0 + t * (x1 - x0), y0 + t * (y1 - y0)
 
     def direction(self, p: Point) -> Point:
         """Unit direction of travel (the same at every ``p``)."""
-        (x0, y0), (x1, y1) = self.start, self.end
-        length = math.hypot(x1 - x0, y1 - y0)
+        x0, y0 = self.start
+        x1, y1 = self.end
+        length = self._length or self.length
         return (x1 - x0) / length, (y1 - y0) / length
 
     def parameter(self, p: Point) -> float:
         """Fraction of the length at the foot of ``p``."""
-        (x0, y0), (x1, y1) = self.start, self.end
+        x0, y0 = self.start
+        x1, y1 = self.end
         dx, dy = x1 - x0, y1 - y0
         return ((p[0] - x0) * dx + (p[1] - y0) * dy) / (dx * dx + dy * dy)
 
@@ -112,7 +121,8 @@ class Line:
 
     def to_left(self, p: Point) -> float:
         """How far ``p`` lies to the left of the infinite line."""
-        (x, y), (ux, uy) = self.start, self.direction(self.start)
+        x, y = self.start
+        ux, uy = self.direction(self.start)
         return ux * (p[1] - y) - uy * (p[0] - x)
 
     def part(self, start: Point, end: Point) -> Line:
@@ -123,10 +133,12 @@ class Line:
         """The parallel edge ``distance`` to the right of the direction of travel."""
         ux, uy = self.direction(self.start)
         nx, ny = uy * distance, -ux * distance
-        (x0, y0), (x1, y1) = self.start, self.end
+        x0, y0 = self.start
+        x1, y1 = self.end
         return Line((x0 + nx, y0 + ny), (x1 + nx, y1 + ny))
 
 
+@final
 class Arc:
     """A circular edge round ``centre``, counter-clockwise if ``ccw``; at most half a turn.
 
@@ -178,7 +190,8 @@ class Arc:
     def start_angle(self) -> float:
         angle = self._start_angle
         if angle == UNKNOWN:
-            (x, y), (cx, cy) = self.start, self.centre
+            x, y = self.start
+            cx, cy = self.centre
             angle = self._start_angle = math.atan2(y - cy, x - cx)
         return angle
 
@@ -192,7 +205,8 @@ class Arc:
 
     def _turned(self) -> float:
         cx, cy = self.centre
-        (x0, y0), (x1, y1) = self.start, self.end
+        x0, y0 = self.start
+        x1, y1 = self.end
         ax, ay, bx, by = x0 - cx, y0 - cy, x1 - cx, y1 - cy
         turn = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
         if self.ccw:
@@ -221,8 +235,11 @@ class Arc:
         return found
 
     def _box(self) -> Bounds:
-        (cx, cy), r = self.centre, self.radius
-        (x0, y0), (x1, y1) = (self.start, self.end) if self.ccw else (self.end, self.start)
+        cx, cy = self.centre
+        r = self.radius
+        first, last = (self.start, self.end) if self.ccw else (self.end, self.start)
+        x0, y0 = first
+        x1, y1 = last
         left, right = (x0, x1) if x0 < x1 else (x1, x0)
         low, high = (y0, y1) if y0 < y1 else (y1, y0)
         # The ends may lie off the circle by a rounding: they are within the box, too.
@@ -265,7 +282,9 @@ class Arc:
 
     def nearest(self, p: Point) -> Point:
         """Point of the edge nearest to ``p``."""
-        (cx, cy), (x0, y0), (x1, y1) = self.centre, self.start, self.end
+        cx, cy = self.centre
+        x0, y0 = self.start
+        x1, y1 = self.end
         x, y = p[0] - cx, p[1] - cy
         after_start = (x0 - cx) * y - (y0 - cy) * x
         before_end = x * (y1 - cy) - y * (x1 - cx)
@@ -285,7 +304,8 @@ class Arc:
 
     def farthest_along(self, origin: Point, unit: Point) -> float:
         """How far the edge reaches from ``origin`` along a unit direction."""
-        (cx, cy), r = self.centre, self.radius
+        cx, cy = self.centre
+        r = self.radius
         top = (cx + unit[0] * r, cy + unit[1] * r)
         ends = max(_along(self.start, origin, unit), _along(self.end, origin, unit))
         return _along(top, origin, unit) if 0.0 <= self.parameter(top) <= 1.0 else ends
@@ -307,7 +327,8 @@ class Arc:
         scale = radius / self.radius
         cx, cy = self.centre
 
-        (x0, y0), (x1, y1) = self.start, self.end
+        x0, y0 = self.start
+        x1, y1 = self.end
         start = cx + (x0 - cx) * scale, cy + (y0 - cy) * scale
         end = cx + (x1 - cx) * scale, cy + (y1 - cy) * scale
         return Arc(start, end, self.centre, radius, self.ccw)
@@ -320,7 +341,8 @@ def edge_from_bulge(start: Point, end: Point, bulge: float) -> Edge:
     """The line (bulge 0) or arc that a polyline vertex with this bulge starts."""
     if bulge == 0.0:
         return Line(start, end)
-    (x0, y0), (x1, y1) = start, end
+    x0, y0 = start
+    x1, y1 = end
     lean = (1 / bulge - bulge) / 4
     cx = (x0 + x1) / 2 - lean * (y1 - y0)
     cy = (y0 + y1) / 2 + lean * (x1 - x0)
@@ -349,7 +371,8 @@ def from_end_to_end(edge: Edge) -> Edge:
 
 def left_turn(before: Edge, after: Edge) -> float:
     """Angle between -pi and pi that a path turns to the left from one edge to the next."""
-    (ux, uy), (vx, vy) = before.direction(before.end), after.direction(after.start)
+    ux, uy = before.direction(before.end)
+    vx, vy = after.direction(after.start)
     return math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
 
 
@@ -366,7 +389,9 @@ def distance_to(edge: Edge, p: Point) -> float:
 
 def turns_round(edge: Edge, p: Point) -> int:
     """What an edge adds to the times its contour runs counter-clockwise round ``p``."""
-    (px, py), (x0, y0), (x1, y1) = p, edge.start, edge.end
+    px, py = p
+    x0, y0 = edge.start
+    x1, y1 = edge.end
     side = (x1 - x0) * (py - y0) - (px - x0) * (y1 - y0)
     turns = 0
     if y0 <= py < y1 and side > 0:
@@ -378,7 +403,7 @@ def turns_round(edge: Edge, p: Point) -> int:
         dx, dy = x1 - x0, y1 - y0
         # Beside its chord alone: that of a short arc with snapped ends may lean either way.
         beside = 0 <= (px - x0) * dx + (py - y0) * dy <= dx * dx + dy * dy
-        if beside and (px - cx) ** 2 + (py - cy) ** 2 < edge.radius**2:
+        if beside and (px - cx) * (px - cx) + (py - cy) * (py - cy) < edge.radius * edge.radius:
             # A point exactly on the chord belongs to the side the count above gave it.
             left = side > 0 or (side == 0 and (y0 > y1 or (y0 == y1 and x1 > x0)))
             if edge.ccw and not left:

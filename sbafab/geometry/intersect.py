@@ -23,21 +23,20 @@ def meeting_points(
     one, two = boxes
     left, low = max(one[0], two[0]), max(one[1], two[1])
     right, high = min(one[2], two[2]), min(one[3], two[3])
-    of_a, of_b = (a.start, a.end), (b.start, b.end)
-    found = [
-        p
-        for p in of_a
-        if p in of_b
-        or (left <= p[0] <= right and low <= p[1] <= high and distance_to(b, p) < tolerance)
-    ]
-    found += [
-        p
-        for p in of_b
-        if left <= p[0] <= right
-        and low <= p[1] <= high
-        and p not in of_a
-        and distance_to(a, p) < tolerance
-    ]
+    a0, a1, b0, b1 = a.start, a.end, b.start, b.end
+    found: list[Point] = []
+    if a0 in (b0, b1) or (
+        left <= a0[0] <= right and low <= a0[1] <= high and distance_to(b, a0) < tolerance
+    ):
+        found.append(a0)
+    if a1 in (b0, b1) or (
+        left <= a1[0] <= right and low <= a1[1] <= high and distance_to(b, a1) < tolerance
+    ):
+        found.append(a1)
+    for p in (b0, b1):
+        within = left <= p[0] <= right and low <= p[1] <= high
+        if within and p not in (a0, a1) and distance_to(a, p) < tolerance:
+            found.append(p)
     if found and _holds(found[0], 2 * tolerance, left, low, right, high):
         return found
     for p in _support_crossings(a, b, tolerance):
@@ -67,7 +66,8 @@ def _support_crossings(a: Edge, b: Edge, tolerance: float) -> list[Point]:
 
 
 def _line_line(a: Line, b: Line) -> list[Point]:
-    (ax, ay), (bx, by) = a.start, b.start
+    ax, ay = a.start
+    bx, by = b.start
     ux, uy = a.direction(a.start)
     vx, vy = b.direction(b.start)
     cross = ux * vy - uy * vx
@@ -81,7 +81,9 @@ def line_circle(
     origin: Point, unit: Point, centre: Point, radius: float, tolerance: float = EPSILON
 ) -> list[Point]:
     """Crossings of the infinite line through ``origin`` with a circle; a touch counts once."""
-    (ox, oy), (ux, uy), (cx, cy) = origin, unit, centre
+    ox, oy = origin
+    ux, uy = unit
+    cx, cy = centre
     along = (cx - ox) * ux + (cy - oy) * uy
     across = (cx - ox) * uy - (cy - oy) * ux
     foot = (ox + along * ux, oy + along * uy)
@@ -99,7 +101,8 @@ def line_circle(
 
 
 def _circle_circle(a: Arc, b: Arc, tolerance: float) -> list[Point]:
-    (ax, ay), (bx, by) = a.centre, b.centre
+    ax, ay = a.centre
+    bx, by = b.centre
     gap = math.hypot(bx - ax, by - ay)
     if gap < 1e-12:
         return []

@@ -155,7 +155,8 @@ class EdgeIndex:
     def _cells(self) -> list[tuple[int, int]]:
         """The first cell of each edge."""
         if self._first_cells is None:
-            (x, y), cell = self._low, self.cell
+            x, y = self._low
+            cell = self.cell
             self._first_cells = [
                 (math.floor((box[0] - x) / cell), math.floor((box[1] - y) / cell))
                 for box in self._boxes
@@ -163,7 +164,8 @@ class EdgeIndex:
         return self._first_cells
 
     def _places(self, box: Bounds) -> tuple[int, int, int, int]:
-        (x, y), cell = self._low, self.cell
+        x, y = self._low
+        cell = self.cell
         return (
             math.floor((box[0] - x) / cell),
             math.floor((box[1] - y) / cell),
@@ -196,7 +198,9 @@ class EdgeIndex:
     def in_order(self, box: Bounds, found: list[int]) -> list[int]:
         """Edges that meet a box, in rising order, sorted by the first cell that they share."""
         if len(found) > 1:
-            (x, y), cell, first = self._low, self.cell, self._cells
+            x, y = self._low
+            cell = self.cell
+            first = self._cells
             x0, y0 = math.floor((box[0] - x) / cell), math.floor((box[1] - y) / cell)
             found.sort(key=lambda n: (max(x0, first[n][0]), max(y0, first[n][1])))
         return found
@@ -225,7 +229,8 @@ class EdgeIndex:
 
     def all_within(self, box: Bounds) -> bool:
         """Whether no edge reaches out of the box."""
-        (low_x, low_y), (high_x, high_y) = self._low, self._high
+        low_x, low_y = self._low
+        high_x, high_y = self._high
         return box[0] <= low_x and box[1] <= low_y and box[2] >= high_x and box[3] >= high_y
 
     def distance(self, p: Point) -> float:

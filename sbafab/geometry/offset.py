@@ -133,7 +133,8 @@ def _corner_arcs(before: Edge, after: Edge, distance: float) -> Iterator[Arc]:
     turn = left_turn(before, after)
     if -CUSP < turn < EPSILON / distance:
         return
-    (x, y), (ux, uy) = after.start, before.direction(after.start)
+    x, y = after.start
+    ux, uy = before.direction(after.start)
     heading, sweep = math.atan2(-ux, uy), turn % math.tau
     count = 2 if sweep > CUSP else 1
     vx, vy = after.direction(after.start)

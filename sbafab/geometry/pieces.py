@@ -232,7 +232,8 @@ def _offset(edge: Edge, a: Point, b: Point) -> float:
     """How far the middle of an edge lies to the left of the chord from ``a`` to ``b``."""
     if not isinstance(edge, Arc):
         return 0.0
-    (x, y), (dx, dy) = edge.at(0.5), (b[0] - a[0], b[1] - a[1])
+    x, y = edge.at(0.5)
+    dx, dy = (b[0] - a[0], b[1] - a[1])
     return (dx * (y - a[1]) - dy * (x - a[0])) / math.hypot(dx, dy)
 
 

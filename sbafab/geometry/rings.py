@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 from sbafab.geometry.boundary_side import BoundarySide
 from sbafab.geometry.edges import Arc, Edge, Point
@@ -21,12 +20,14 @@ def bound_a_ring(a: Edge, b: Edge) -> bool:
     return (a.radius - b.radius if a.ccw else b.radius - a.radius) > WIDE
 
 
-def across_a_ring(a: BoundarySide, b: BoundarySide) -> Iterator[tuple[Point, Point]]:
+def across_a_ring(a: BoundarySide, b: BoundarySide) -> list[tuple[Point, Point]]:
     """From middle and ends of each of two such arcs to the other one, where it lies across."""
+    found: list[tuple[Point, Point]] = []
     for one, other in ((a, b), (b, a)):
         arc = other.edge
         assert isinstance(arc, Arc)
-        (cx, cy), r = arc.centre, arc.radius
+        cx, cy = arc.centre
+        r = arc.radius
         mx, my = other.middle[0] - cx, other.middle[1] - cy
         least = r * (math.cos(other.half_turn) - 1e-9)
         for p in (one.middle, one.edge.start, one.edge.end):
@@ -34,4 +35,5 @@ def across_a_ring(a: BoundarySide, b: BoundarySide) -> Iterator[tuple[Point, Poi
             distance = math.hypot(ux, uy)
             vx, vy = ux / distance, uy / distance
             if vx * mx + vy * my >= least:
-                yield p, (cx + r * vx, cy + r * vy)
+                found.append((p, (cx + r * vx, cy + r * vy)))
+    return found

@@ -31,7 +31,8 @@ def same_support(a: Edge, b: Edge) -> bool:
             and math.dist(a.centre, b.centre) < EPSILON
         )
     if isinstance(a, Line) and isinstance(b, Line):
-        (ux, uy), (vx, vy) = a.direction(a.start), b.direction(b.start)
+        ux, uy = a.direction(a.start)
+        vx, vy = b.direction(b.start)
         return ux * vx + uy * vy > 0 and abs(ux * vy - uy * vx) * (a.length + b.length) < EPSILON
     return False
 

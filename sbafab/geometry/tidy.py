@@ -9,7 +9,6 @@ from sbafab.geometry.edges import (
     EPSILON,
     Edge,
     Line,
-    Point,
     distance_to,
     left_normal,
     quarter_arcs,
@@ -25,6 +24,8 @@ they are on average where no place in them is ROOM wide.
 ROOM = 50 * EPSILON
 """mm: a tenth of a micrometre."""
 QUARTER = math.pi / 2
+NANOMETRE = 1e-6
+"""mm."""
 
 
 def tidy(loop: Sequence[Edge]) -> Contour | None:
@@ -38,7 +39,7 @@ def tidy(loop: Sequence[Edge]) -> Contour | None:
         whole = circle(*contour.circle)
         return whole if contour.area > 0 else whole.reversed()
     edges = [edge for run in contour.runs for edge in _joined(run)]
-    first = min(range(len(edges)), key=lambda i: _rounded(edges[i].start))
+    first = _first(edges)
     return Contour((*edges[first:], *edges[:first]))
 
 
@@ -62,8 +63,16 @@ def _has_room(contour: Contour) -> bool:
     return False
 
 
-def _rounded(p: Point) -> Point:
-    return round(p[0], 6), round(p[1], 6)
+def _first(edges: Sequence[Edge]) -> int:
+    """The first edge of those that start at the least x, and of these at the least y, to 1 nm."""
+    left = min([edge.start[0] for edge in edges]) + 2 * NANOMETRE
+    found, least = 0, (math.inf, math.inf)
+    for i, edge in enumerate(edges):
+        x, y = edge.start
+        # What lies farther to the right is not rounded to the least x.
+        if x <= left and (round(x, 6), round(y, 6)) < least:
+            found, least = i, (round(x, 6), round(y, 6))
+    return found
 
 
 def _joined(run: Sequence[Edge]) -> Sequence[Edge]:

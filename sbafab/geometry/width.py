@@ -130,8 +130,10 @@ class _Narrowest:
             self.value, self.best = value, Width(value, p, q)
 
     def offer_facing(self, a: Foot, b: Foot) -> None:
-        (px, py), (nx, ny) = a.point, a.normal
-        (qx, qy), (mx, my) = b.point, b.normal
+        px, py = a.point
+        nx, ny = a.normal
+        qx, qy = b.point
+        mx, my = b.normal
         dx, dy = qx - px, qy - py
         if dx * nx + dy * ny > TOUCH and dx * mx + dy * my < -TOUCH:
             self.offer((px, py), (qx, qy))
@@ -148,7 +150,8 @@ class _Narrowest:
         Their normals are opposed somewhere, to within ``aside`` radians, and their numbers come
         ``after`` this one. ``among``: no others come into question.
         """
-        (nx, ny), turn = a.normal, a.half_turn + aside
+        nx, ny = a.normal
+        turn = a.half_turn + aside
         sides, index = self.boundary.sides, self.boundary.index
         straight = -math.cos(turn)
         box = widened(a.box, self.value)

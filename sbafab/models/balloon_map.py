@@ -2,7 +2,7 @@
 
 Both come from one potential, the films' energy less the work of the air: force -dW/dh, volume
 -dW/dp. It is a quintic spline in the height and in asinh(p / P0), fitted by least squares to W and
-both derivatives of balloons from ``inflate``. So the map keeps energy: what the air gives on any
+both derivatives of balloons between plates. So the map keeps energy: what the air gives on any
 way round comes back. Lengths mm, pressures kPa, volumes ul, forces mN, energies uJ.
 """
 
@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.balloon import Balloon, Shapes, inflate
+from sbafab.models.balloon import Balloon, Shapes
+from sbafab.models.rippled import pressed, risen
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -253,7 +254,7 @@ def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
     even = _spread(HEIGHT_POINTS)
     h = FLATTEST + (top - FLATTEST) * (even + even**2) / 2
     pressures, heights = (grid.ravel() for grid in np.meshgrid(p, h))
-    found = inflate(balloon, pressures, heights, tied=True)
+    found = pressed(balloon, pressures, heights, tied=True)
     return BalloonMap(
         balloon, most_pressure, top, _fitted(pressures, heights, found, most_pressure, top)
     )
@@ -262,7 +263,7 @@ def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
 def highest(balloon: Balloon, most_pressure: float) -> float:
     """Height in mm to which it may rise freely: at a pressure, or where its films stretch most."""
     pressures = np.linspace(most_pressure / 8, most_pressure, 8)
-    free = inflate(balloon, pressures)
+    free = risen(balloon, pressures)
     longer = stretch(balloon, free)
     return float(np.interp(MOST_STRETCH, longer, free.height))
 

@@ -50,6 +50,44 @@ def solve(band: Array, wanted: Array) -> Array:
     return found[:size].reshape(wanted.shape)
 
 
+def solve_positive(band: Array, wanted: Array) -> Array | None:
+    """The ``x`` of A x = ``wanted`` (n, rows) as ``solve`` has it; None unless all A are positive
+    definite. Block by block as wide as the band: quicker where that is wide and rows are few.
+    """
+    size, width, rows = band.shape
+    count = -(-size // width)
+    # Beyond the end A is 1, so that all blocks are whole.
+    whole = np.zeros((rows, count * width, width))
+    whole[:, size:, 0] = 1.0
+    whole[:, :size] = band.transpose(2, 0, 1)
+    whole = whole.reshape(rows, count, width, width)
+    number = np.arange(width)
+    off = number - number[:, None]
+    row = np.broadcast_to(number[:, None], off.shape)
+    upper = np.where(off >= 0, whole[:, :, row, off.clip(0)], 0.0)
+    own = upper + np.triu(upper, 1).swapaxes(2, 3)
+    beside = np.where(off < 0, whole[:, :, row, (off + width).clip(max=width - 1)], 0.0)
+    right = np.zeros((rows, count * width, 1))
+    right[:, :size, 0] = wanted.T
+    right = right.reshape(rows, count, width, 1)
+    share = np.empty_like(beside)
+    for k in range(count):
+        if k:
+            own[:, k] -= beside[:, k - 1].swapaxes(1, 2) @ share[:, k - 1]
+            right[:, k] -= share[:, k - 1].swapaxes(1, 2) @ right[:, k - 1]
+        try:
+            np.linalg.cholesky(own[:, k])
+        except np.linalg.LinAlgError:
+            return None
+        share[:, k] = np.linalg.solve(own[:, k], beside[:, k])
+    found = np.empty_like(right)
+    for k in reversed(range(count)):
+        found[:, k] = np.linalg.solve(own[:, k], right[:, k])
+        if k < count - 1:
+            found[:, k] -= share[:, k] @ found[:, k + 1]
+    return np.asarray(found.reshape(rows, -1)[:, :size].T)
+
+
 def join(band: Array, from_: int, to: int) -> None:
     """Adds the row and column of one unknown to another's, further on, that it is equal to."""
     size, width = band.shape[:2]

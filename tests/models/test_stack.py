@@ -15,9 +15,10 @@ from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import BalloonMap
 from sbafab.models.chain import chain
 from sbafab.models.loads import RIM, loaded, with_blocks
+from sbafab.models.rippled import risen
 from sbafab.models.series import blocked
 from sbafab.models.stack import Plate, Stack
-from sbafab.models.stack_balance import MOST_STEPS, _settled, free
+from sbafab.models.stack_balance import MOST_STEPS, _met, _settled, free
 
 LOADS: dict[str, dict[str, Any]] = {
     "7 mN on the tip": {"tip_load": (0.0, 0.005, -0.005)},
@@ -270,7 +271,7 @@ def test_wide_pockets_are_mapped_as_far_as_they_hold() -> None:
     assert 10 < wide.most_pressure < 110
     with pytest.raises(DesignError, match="outside the balloon's map"):
         wide.pose((110,))
-    free = inflate(wide.maps[0].balloon, 1.0)
+    free = risen(wide.maps[0].balloon, 1.0)
     assert wide.pose((1,)).gaps[0, 0] == pytest.approx(free.height[0], rel=0.03)
 
 
@@ -304,7 +305,11 @@ def test_a_plate_is_met_from_any_pressures(three: Stack) -> None:
 
 @pytest.mark.parametrize("load", sorted(LOADS))
 def test_any_start_ends_in_the_same_balance(three: Stack, load: str) -> None:
-    """Quick steps from nothing, and Newton's own from the free stack."""
+    """Quick steps from nothing, and Newton's own from the free stack.
+
+    Against a plate that is soft at first: how steps into a hard one end hangs on a machine's last
+    digits.
+    """
     loads = LOADS[load]
     acting = three._load(**{**NO_LOAD, **loads})
     for pressures in ((4.26, 0.56, 8.7), (0.21, 0.18, 1.46), (0.5, 8.0, 0.2), (6.0, 3.0, 1.0)):
@@ -312,7 +317,11 @@ def test_any_start_ends_in_the_same_balance(three: Stack, load: str) -> None:
         assert acting is not None
         springs = three.springs(pressures)
         start = free(springs, three._risen(pressures))[three.levels]
-        slow = _settled(three.each(springs), three.pitch, acting, start, MOST_STEPS)
+        each, wall = three.each(springs), acting.wall
+        if wall is None:
+            slow = _settled(each, three.pitch, acting, start, MOST_STEPS)
+        else:
+            slow = _met(each, three.pitch, acting, wall, start)
         assert slow is not None
         places = chain(slow[0], three.pitch).places
         assert pose.frames[0] == pytest.approx(places, abs=1e-5)

@@ -14,10 +14,9 @@ from sbafab.models.balloon import Balloon, inflate
 LIMITS = {"held smooth": 1.5, "free to wrinkle": 3.0, "even ripples": 3.0}
 """Per cent in stroke and air."""
 MISSED = {
-    "d = 10, alone, free to wrinkle": 4.5,
+    "d = 10, alone, free to wrinkle": 4.0,
     "d = 5, in a stack, free to wrinkle": 5.5,
-    "d = 10, alone, 12 even ripples": 7.0,
-    "d = 10, in a stack, 12 even ripples": 6.5,
+    "d = 20, alone, 24 even ripples": 5.0,
 }
 """Rows that do not keep their limit, and by how much they miss it at most; the page says why."""
 

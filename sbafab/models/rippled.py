@@ -1,0 +1,270 @@
+"""Free balloons with wide pockets, whose films wrinkle in step with the rim's ripples.
+
+``balloon`` holds the pocket's edge while its rim ripples, and smears out the films' wrinkles. Where
+a pocket is wide beside its ring, CalculiX shows films whose waves fall in step with the rim's, and
+an edge that goes along. ``rippled`` resolves those waves (``waving``, ``wave_energy``): nothing is
+smeared, nothing fitted. Rims stay level as a whole. Lengths mm, pressures kPa, volumes ul.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from sbafab.errors import DesignError
+from sbafab.models.balloon import Balloon, Shapes, inflate, rippling
+from sbafab.models.least_energy import NoBalance, settled
+from sbafab.models.wave_energy import Waves
+from sbafab.models.waving import EDGE, PLACES, UP, R, Waving, Z
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from sbafab.models.film_elements import Array
+
+WIDE = 4.0
+"""Rings' widths in a pocket's radius from which on films fall in step with the rim: strokes of
+narrower ones are within 0.5 % with either model.
+"""
+START = 0.0005
+"""Film strain, p R / (E t), at which ripples are first looked for: they come from 0.001 on."""
+USUAL = 0.013
+"""Film strain at which the number of waves is taken, where none is given."""
+END = 0.256
+"""Film strain from which on films are stretched so far that it is all the same."""
+STEP = 2.0
+"""Ratio of the pressures through which ripples are followed."""
+SEED = 0.02
+"""Tilt in rad that a level rim is given to begin with."""
+LEVEL = 0.001
+"""Tilt in rad of a rim that does not ripple."""
+KICK = 0.02
+"""Share of the radius by which films are pushed in step with the rim, to see whether they stay."""
+CLEARLY = 1e-5
+"""Share of its energy by which a balloon must be better off in step."""
+LATEST = 0.02
+"""Film strain by which films have fallen in step where they ever do."""
+ALIKE = 0.9
+"""Cosine of the angle between waves that are those of one branch."""
+ROUNDS = 2
+"""How often the way out of the film is taken from the shape, and the shape from that."""
+
+
+class Rippled(NamedTuple):
+    """Free balloons: ``shapes`` with r and z of the mean meridian, their rims' ``waves``, and by
+    how much the pocket's edge and the rim's outside go up and down, in mm, a row each.
+    """
+
+    shapes: Shapes
+    waves: int
+    edge: Array
+    outside: Array
+
+
+def risen(balloon: Balloon, pressure: ArrayLike) -> Shapes:
+    """Free balloons at pressures (kPa): with waves in step where the pocket is wide and its rim
+    ripples, else as ``inflate`` has them.
+    """
+    found = inflate(balloon, pressure)
+    rows = np.flatnonzero(found.pressure < _first(balloon) * END / START)
+    if not resolved(balloon) or not len(rows):
+        return found
+    own = rippled(balloon, found.pressure[rows])
+    grown = np.abs(own.outside - own.edge) > LEVEL * balloon.ring
+    parts = [part.copy() for part in found]
+    for part, other in zip(parts, own.shapes, strict=True):
+        part[rows[grown]] = other[grown]
+    return Shapes(*parts)
+
+
+def pressed(balloon: Balloon, pressure: ArrayLike, height: ArrayLike, tied: bool = False) -> Shapes:
+    """Balloons between plates at heights (mm), as ``inflate`` has them.
+
+    Where waves are in step with the rim a balloon is taken for one that is lower, by the share by
+    which it would rise higher: W(p, h) = W'(p, h / share), with force and volume its slopes. Shapes
+    r and z are the lower one's.
+    """
+    p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
+    share, rate = taller(balloon, p)
+    found = inflate(balloon, p, h / share, tied=tied)
+    less = found.force * h * rate / share**2
+    return found._replace(
+        height=found.height * share,
+        force=found.force / share,
+        volume=found.volume - less,
+        energy=found.energy - found.pressure * less,
+    )
+
+
+class Taller(NamedTuple):
+    """A ratio of heights, and its rate by pressure in 1/kPa."""
+
+    share: Array
+    rate: Array
+
+
+def taller(balloon: Balloon, pressure: Array) -> Taller:
+    """Free heights at pressures (kPa) over those of ``inflate``: 1 where waves are not in step with
+    the rim. Between rungs a cubic of the pressure's logarithm.
+    """
+    first, rungs = _first(balloon), round(math.log(END / START) / math.log(STEP))
+    at = np.log(np.maximum(pressure, first) / first) / math.log(STEP)
+    inside = (at > 0) & (at < rungs)
+    if not resolved(balloon) or not inside.any():
+        return Taller(np.ones_like(pressure), np.zeros_like(pressure))
+    waves = usual_waves(balloon)
+    x = np.array([_rung(balloon, waves, k).x for k in range(rungs)])
+    high = inflate(balloon, first * STEP ** np.arange(rungs)).height
+    ratio = 2 * x[:, PLACES * balloon.held + Z] / high
+    ratio = np.append(np.where([_ripples(balloon, one) for one in x], ratio, 1.0), 1.0)
+    ratio[0] = 1.0
+    slopes = np.gradient(ratio)
+    slopes[[0, -1]] = 0.0
+    k = np.clip(at.astype(np.int_), 0, rungs - 1)
+    u = np.clip(at - k, 0.0, 1.0)
+    a, b, rise = ratio[k], slopes[k], ratio[k + 1] - ratio[k]
+    c, d = 3 * rise - 2 * b - slopes[k + 1], b + slopes[k + 1] - 2 * rise
+    rate = (b + u * (2 * c + 3 * u * d)) * inside / (np.maximum(pressure, first) * math.log(STEP))
+    return Taller(a + u * (b + u * (c + u * d)), rate)
+
+
+def resolved(balloon: Balloon) -> bool:
+    """Whether its waves are resolved: a wide pocket, both films alike and of the usual law."""
+    usual = balloon.wrinkles and not balloon.inextensible and balloon.order == 2
+    return usual and balloon.mate is None and balloon.pocket >= WIDE * balloon.ring
+
+
+def rippled(balloon: Balloon, pressure: ArrayLike, waves: int | None = None) -> Rippled:
+    """Free balloons at pressures in kPa, all with as many ``waves`` round the rim; else with those
+    that cost least where ripples are well grown.
+
+    A balloon with a bore is pulled on by the air in it. Raises DesignError for pressures that are
+    not above 0, or where no balance is found.
+    """
+    p = np.atleast_1d(np.asarray(pressure, dtype=float))
+    if not (np.isfinite(p) & (p > 0)).all():
+        raise DesignError("pressure of a balloon must be above 0 kPa")
+    n = waves or usual_waves(balloon)
+    of = _waving(balloon, n)
+    at = np.maximum(np.log(p / _first(balloon)) / math.log(STEP), 0.0)
+    starts = [_starts(of, float(one)) for one in at]
+    x = np.stack([start for several in starts for start in several], 1)
+    row = np.repeat(np.arange(len(p)), [len(several) for several in starts])
+    for _ in range(ROUNDS):
+        problem = Waves(of, p[row], _normals(of, x))
+        x = _settled(problem, x)
+    energy = problem.total(x, np.arange(len(row))).energy
+    x = x[:, [min(np.flatnonzero(row == i), key=energy.__getitem__) for i in range(len(p))]]
+    found = Waves(of, p, _normals(of, x)).total(x, np.arange(len(p)))
+    r, z = (np.ascontiguousarray(x[k::PLACES].T) for k in (R, Z))
+    z[:, : balloon.held] = z[:, balloon.held, None]
+    shapes = Shapes(p, 2 * z[:, 0], 2 * found.volume, np.zeros(len(p)), 2 * found.stored, r, z)
+    edge = x[PLACES * balloon.edge + UP]
+    return Rippled(shapes, n, edge, edge + balloon.ring * _tilt(balloon, x))
+
+
+@lru_cache(maxsize=256)
+def usual_waves(balloon: Balloon) -> int:
+    """The number of waves of least energy where ripples are well grown, by ``rim_ripple``."""
+    shape = inflate(balloon, _first(balloon) * USUAL / START)
+    (found,) = rippling((balloon,), ((shape.r, shape.z),))
+    return int(found.waves[0])
+
+
+def _starts(of: Waving, at: float) -> list[Array]:
+    """Where to begin at a place among rungs: between two where waves are alike, else at each."""
+    k = int(at)
+    low, high = (_rung(of.balloon, of.waves, each).x for each in (k, k + 1))
+    waves = of.kept.copy()
+    waves[:, :2] = False
+    a, b = (each[waves.ravel()] for each in (low, high))
+    if a @ b > ALIKE * math.sqrt((a @ a) * (b @ b)):
+        return [low + (at - k) * (high - low)]
+    return [low, high]
+
+
+def _first(balloon: Balloon) -> float:
+    """Pressure in kPa of the first rung."""
+    return START * balloon.rigid / balloon.pocket
+
+
+@lru_cache(maxsize=32)
+def _waving(balloon: Balloon, waves: int) -> Waving:
+    return Waving(balloon, waves)
+
+
+class Rung(NamedTuple):
+    """Coordinates at a pressure, and whether films have fallen in step with the rim by then."""
+
+    x: Array
+    in_step: bool
+
+
+@lru_cache(maxsize=512)
+def _rung(balloon: Balloon, waves: int, k: int) -> Rung:
+    """A balloon at the pressure of rung ``k``, followed from the rung below."""
+    of, p = _waving(balloon, waves), np.array([_first(balloon) * STEP**k])
+    if k == 0:
+        shape = inflate(balloon, p)
+        x, in_step = np.zeros((of.kept.size, 1)), False
+        x[R::PLACES], x[Z::PLACES] = shape.r.T, shape.z.T
+    else:
+        below = _rung(balloon, waves, k - 1)
+        x, in_step = below.x[:, None].copy(), below.in_step
+    if not _ripples(balloon, x[:, 0]):
+        x[PLACES * balloon.edge + EDGE] = -SEED * balloon.thickness / 2
+        x[PLACES * balloon.edge + UP] = SEED * balloon.ring / 3
+    if not in_step and START * STEP**k <= LATEST:
+        # Also from there with films pushed in step with the rim.
+        x = np.repeat(x, 2, axis=1)
+        x[UP::PLACES, 1] += math.copysign(KICK, x[PLACES * balloon.edge + UP, 1]) * _in_step(of)
+    rows = np.arange(x.shape[1])
+    problem = Waves(of, np.repeat(p, len(rows)), _normals(of, x))
+    x = _settled(problem, x)
+    energy = problem.total(x, rows).energy
+    best = int(energy.argmin())
+    return Rung(x[:, best], in_step or energy[best] < energy[0] * (1 + CLEARLY))
+
+
+def _in_step(of: Waving) -> Array:
+    """A film's wave beside the rim, one arch long, mm for each mm of radius: (nodes,)."""
+    one = of.balloon
+    off = np.clip((one.pocket - one.nodes) / (0.4 * one.pocket), 0.0, 1.0)
+    wave = np.where(of.kept[:, UP], one.pocket * np.sin(math.pi * off), 0.0)
+    wave[one.edge :] = 0.0
+    return wave
+
+
+def _tilt(balloon: Balloon, x: Array) -> Array:
+    """By how much the rim tilts, in rad."""
+    return np.asarray(-2 / balloon.thickness * x[PLACES * balloon.edge + EDGE])
+
+
+def _ripples(balloon: Balloon, x: Array) -> bool:
+    return bool(np.abs(_tilt(balloon, x)) > LEVEL)
+
+
+def _normals(of: Waving, x: Array) -> Array:
+    """Ways out of the mean film, in r and z, and its stretch: (rows, elements, 3)."""
+    one = of.balloon
+    r, z = x[R::PLACES].T, x[Z::PLACES].T.copy()
+    z[:, : one.held] = z[:, one.held, None]
+    dr, dz = np.diff(r), np.diff(z)
+    length = np.hypot(dr, dz)
+    return np.stack([-dz / length, dr / length, length / one.film.lengths], -1)
+
+
+def _settled(problem: Waves, x: Array) -> Array:
+    """The shapes of least energy downhill. Raises DesignError where none is found."""
+    try:
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            return settled(problem, x)
+    except NoBalance:
+        of = problem.of
+        raise DesignError(
+            f"a balloon of radius {of.balloon.pocket:g} mm with {of.waves} waves round its rim "
+            "finds no balance; try another load"
+        ) from None

@@ -1,0 +1,179 @@
+"""Films that wave in step with the rim: their energy's own slopes, its symmetries, its limits."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from docs.scripts.ripple_sector import Sector, sector_states
+from sbafab.errors import DesignError
+from sbafab.models import banded
+from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.balloon_map import balloon_map
+from sbafab.models.film_elements import Elements, air, bending, membrane
+from sbafab.models.rippled import pressed, resolved, rippled, risen, taller
+from sbafab.models.wave_energy import Waves
+from sbafab.models.waving import EDGE, OVERTONES, PLACES, UP, R, Waving, Z, first_of
+
+WIDE = Balloon(5.0)
+INNER = Balloon(5.0, neck=1.27, bore=0.52)
+
+
+def at(one: Balloon, pressure: float, waves: int) -> tuple[Waves, np.ndarray]:
+    """The energy of a balloon, and its coordinates as ``inflate`` has it: without waves."""
+    of, shape = Waving(one, waves), inflate(one, pressure)
+    x = np.zeros((of.kept.size, 1))
+    x[R::PLACES], x[Z::PLACES] = shape.r.T, shape.z.T
+    dr, dz = np.diff(shape.r), np.diff(shape.z)
+    length = np.hypot(dr, dz)
+    normals = np.stack([-dz / length, dr / length, length / one.film.lengths], -1)
+    return Waves(of, np.array([pressure]), normals), x
+
+
+def waved(problem: Waves, x: np.ndarray, size: float, seed: int = 3) -> np.ndarray:
+    draw = np.random.default_rng(seed).standard_normal(x.shape)
+    return x + size * draw * problem.of.kept.ravel()[:, None]
+
+
+@pytest.mark.parametrize("one", [WIDE, INNER, Balloon(2.5, thickness=0.1)])
+def test_slopes_are_those_of_the_energy(one: Balloon) -> None:
+    problem, x = at(one, 1.5, 9)
+    x, row, step = waved(problem, x, 0.003), np.array([0]), 1e-6
+    ahead = waved(problem, np.zeros_like(x), 1.0, seed=4)
+    found = problem.total(x, row)
+    more, less = (problem.total(x + sign * step * ahead, row) for sign in (1, -1))
+    slope = (more.energy - less.energy) / (2 * step)
+    assert (found.gradient * ahead).sum() == pytest.approx(slope[0], rel=1e-6)
+    free = problem.of.freedoms
+    turned = ((more.gradient - less.gradient) / (2 * step))[free, 0]
+    own = banded.dense(found.band)[0] @ ahead[free, 0]
+    assert own == pytest.approx(turned, abs=1e-6 * np.abs(turned).max())
+
+
+def test_without_waves_it_is_the_smooth_balloon() -> None:
+    """A membrane of revolution that may not wrinkle, on a rim that stays flat."""
+    for one in (WIDE, INNER):
+        problem, x = at(one, 2.0, 12)
+        found = problem.total(x, np.array([0]))
+        lie = Elements.of(x[R::PLACES].T, x[Z::PLACES].T)
+        never = np.full((1, len(one.nodes) - 1), math.inf)
+        stored = membrane(one.film, lie, never).energy
+        stored = (
+            stored + bending(one.film, one.rigidity, slice(one.held, one.edge), lie).term.energy
+        )
+        assert found.stored == pytest.approx(stored, rel=1e-9)
+        assert found.volume == pytest.approx(air(one.film, one.edge, lie).energy, rel=1e-3)
+        assert np.abs(found.gradient.reshape(-1, PLACES)[:, 2:]).max() < 1e-9
+
+
+def test_half_a_wave_further_on_it_is_the_same() -> None:
+    problem, x = at(INNER, 1.0, 11)
+    x, row = waved(problem, x, 0.003), np.array([0])
+    other = x.copy()
+    for k in range(1, OVERTONES + 1, 2):
+        for place in range(first_of(k), first_of(k) + 3):
+            other[place::PLACES] *= -1
+    assert problem.total(other, row).energy == pytest.approx(problem.total(x, row).energy)
+
+
+def test_a_rim_bends_as_a_plate_ring_does() -> None:
+    """Tilted as a whole by cos(n turn) about the edge, small enough that nothing stretches.
+
+    Timoshenko and Woinowsky-Krieger, energy of a plate in polar coordinates, of which the films
+    have half: 1/2 int D ((w'/r - n2 w/r2)^2 + 2 (1 - nu) n2 (w'/r - w/r2)^2) cos2 dA.
+    """
+    one, n, tilt = WIDE, 14, 1e-6
+    problem, _ = at(one, 1.0, n)
+    of = problem.of
+    x = np.zeros((of.kept.size, 1))
+    x[R::PLACES, 0] = one.nodes
+    flat = problem.total(x, np.array([0])).stored[0]
+    x[PLACES * one.edge + EDGE] = -tilt * one.thickness / 2
+    x[PLACES * one.edge + UP] = 0.0
+    plate = of.plate[one.edge :]
+    low, high = (one.nodes[one.edge + k : len(one.nodes) - 1 + k] - one.pocket for k in (0, 1))
+    w = np.stack([np.full(len(low), tilt), tilt * (low + high) / 2], -1)
+    told = np.einsum("ei,eij,ej->", w, plate, w) / 2
+    s = np.linspace(0, one.ring, 20001)
+    r, rise = one.pocket + s, tilt * s
+    rigid = one.modulus * (2 * one.thickness) ** 3 / 12 / (1 - one.poisson**2)
+    bent = tilt / r - n**2 * rise / r**2
+    wrung = n * (tilt / r - rise / r**2)
+    density = bent**2 + 2 * (1 - one.poisson) * wrung**2
+    closed = math.pi * rigid / 2 / 2 * np.trapezoid(density * r, s)
+    assert told == pytest.approx(closed, rel=0.03)
+    # What the whole energy has more than that is the film's, which the edge turns and pulls.
+    assert problem.total(x, np.array([0])).stored[0] - flat > told
+
+
+def test_wide_pockets_rise_as_in_calculix() -> None:
+    """An even ripple of d = 15 with 18 waves, a size that the model was not made with: stroke in
+    mm, air in ul, and from crest to trough of the rim's outside in mm (``python -m
+    docs.scripts.ripple_sector 15 18 even``).
+    """
+    pressures = [0.5, 1.0, 2.0]
+    wide = Balloon(7.5)
+    found = rippled(wide, pressures, 18)
+    assert found.shapes.height == pytest.approx([4.379, 5.286, 6.081], rel=0.03)
+    assert found.shapes.volume == pytest.approx([382.45, 444.93, 496.81], rel=0.03)
+    assert 2 * np.abs(found.outside) == pytest.approx([0.486, 0.586, 0.655], rel=0.1)
+    # The edge goes with the rim, to the same side.
+    assert (found.edge / found.outside > 0.1).all()
+    assert (inflate(wide, pressures).height < 0.96 * found.shapes.height).all()
+
+
+def test_the_way_to_a_pressure_does_not_matter() -> None:
+    together = rippled(INNER, [0.3, 1.1, 5.0]).shapes
+    for row, pressure in enumerate((0.3, 1.1, 5.0)):
+        alone = rippled(INNER, pressure).shapes
+        assert alone.height[0] == pytest.approx(together.height[row], rel=1e-5)
+
+
+def test_narrow_pockets_unlike_films_and_other_laws_are_as_before() -> None:
+    for one in (
+        Balloon(2.5),
+        replace(WIDE, order=0),
+        replace(WIDE, wrinkles=False),
+        replace(WIDE, mate=Balloon(5.0, thickness=0.05)),
+    ):
+        assert not resolved(one)
+        assert risen(one, 1.0).height == inflate(one, 1.0).height
+    assert risen(WIDE, 30.0).height == inflate(WIDE, 30.0).height
+    with pytest.raises(DesignError, match="above 0 kPa"):
+        rippled(WIDE, [1.0, 0.0])
+
+
+def test_between_plates_force_and_volume_are_slopes_of_one_energy() -> None:
+    """Of W(p, h), beside a smaller share of what waves themselves keep (see ``balloon_map``)."""
+    p, h, step = np.array([0.4, 1.5, 6.0]), np.array([1.0, 2.0, 3.0]), 1e-4
+    found = pressed(WIDE, p, h)
+
+    def potential(dp: float, dh: float) -> np.ndarray:
+        one = pressed(WIDE, p + dp, h + dh)
+        return np.asarray(one.energy - (p + dp) * one.volume)
+
+    force = -(potential(0, step) - potential(0, -step)) / (2 * step)
+    volume = -(potential(step, 0) - potential(-step, 0)) / (2 * step)
+    assert found.force == pytest.approx(force, rel=0.03)
+    assert found.volume == pytest.approx(volume, rel=0.03)
+
+
+def test_free_heights_of_the_map_are_those_with_waves() -> None:
+    p = np.array([0.5, 1.0, 3.0, 8.0])
+    assert (taller(INNER, p).share > 1.005).all()
+    found = balloon_map(INNER, 50.0).free_height(p)
+    assert found == pytest.approx(risen(INNER, p).height, rel=0.015)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+def test_a_wide_pocket_that_ripples_in_calculix() -> None:
+    pressures = [0.5, 1.0, 2.0, 4.0]
+    own = rippled(Balloon(3.5), pressures, 9)
+    found = sector_states(Sector(7.0, 9, round=5, even=True), pressures)
+    assert own.shapes.height == pytest.approx([state.stroke for state in found], rel=0.03)
+    assert own.shapes.volume == pytest.approx([state.air for state in found], rel=0.03)
