@@ -18,8 +18,8 @@ from typing import IO, Any
 from sbafab.search.fingerprint import fingerprint
 
 MANY = 200_000
-"""Records after which they are looked through for rings that nothing holds: measuring makes many, and
-hardly any ring.
+"""Records after which they are looked through for rings that nothing holds: measuring a design
+makes many, and hardly any ring.
 """
 
 
