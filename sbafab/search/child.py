@@ -15,16 +15,19 @@ import sys
 import threading
 from typing import IO, Any
 
-from sbafab.entry import YOUNG
 from sbafab.search.fingerprint import fingerprint
+
+MANY = 200_000
+"""Records after which they are looked through for rings that nothing holds: measuring a design
+makes many, and hardly any ring.
+"""
 
 
 def main() -> None:
     """Measures until standard input ends."""
     # Ctrl-C goes to all processes of a terminal; the one that started this ends it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # Designs leave no rings of records to be found.
-    gc.set_threshold(YOUNG, *gc.get_threshold()[1:])
+    gc.set_threshold(MANY, *gc.get_threshold()[1:])
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8", newline="\n")
     # What a library prints must not stand among the answers.
     os.dup2(2, 1)
