@@ -70,9 +70,7 @@ def overlay(
         split, bent = split_edges([edge for edge, _ in entries], tolerance, chain)
         chain = None
         entries = [
-            (part, turns)
-            for parts, (_, turns) in zip(split, entries, strict=True)
-            for part in parts
+            (part, entry[1]) for parts, entry in zip(split, entries, strict=True) for part in parts
         ]
         if not bent:
             break
@@ -211,15 +209,17 @@ def _stops(edge: Edge, points: Sequence[Point], pool: PointPool) -> list[Point]:
 def _merged(edges: Iterable[tuple[Edge, int]], tolerance: float) -> list[Piece]:
     """Cut edges, those that coincide as one; none where the chains wind alike on both sides."""
     between: dict[tuple[Point, Point], list[tuple[int, Edge, int]]] = defaultdict(list)
-    for number, (edge, turns) in enumerate(edges):
+    for number, entry in enumerate(edges):
+        edge, turns = entry
         a, b = edge.start, edge.end
         between[(a, b) if a < b else (b, a)].append((number, edge, turns))
     pieces: list[Piece] = []
-    for (a, b), own in between.items():
+    for ends, own in between.items():
         if len(own) == 1:
             _, edge, turns = own[0]
             pieces.append(Piece(edge, turns))
         else:
+            a, b = ends
             entries = [
                 (_offset(edge, a, b), number, edge, turns if edge.start == a else -turns)
                 for number, edge, turns in own

@@ -28,12 +28,14 @@ class PointPool:
     ) -> None:
         self._same = same
         self._rank: dict[Point, int] = {}
-        self._leader: dict[Point, Point] = {}
         self._cells: dict[tuple[int, int], list[Point]] = {}
         first = set(ends)
         rest = set(others) - first
-        near = self._maybe_near([*first, *rest])
-        self._leader.update((p, p) for group in (first, rest) for p in group if p not in near)
+        every = [*first, *rest]
+        near = self._maybe_near(every)
+        self._leader = dict(zip(every, every, strict=True))
+        if not near:
+            return
         for p in (*sorted(first & near), *sorted(rest & near)):
             self._add(p)
 
@@ -42,13 +44,16 @@ class PointPool:
 
         They are told by how far they lie along a line at an angle that drawings hardly have.
         """
-        along = sorted([(p[0] + ASLANT * p[1], p) for p in points])
         reach = 1.01 * math.hypot(1, ASLANT) * self._same
         near: set[Point] = set()
-        for (t, p), (u, q) in pairwise(along):
-            if u - t < reach:
-                near.add(p)
-                near.add(q)
+        along = [p[0] + ASLANT * p[1] for p in points]
+        # Mostly there is none.
+        if all(u - t >= reach for t, u in pairwise(sorted(along))):
+            return near
+        for one, other in pairwise(sorted(zip(along, points, strict=True))):
+            if other[0] - one[0] < reach:
+                near.add(one[1])
+                near.add(other[1])
         return near
 
     def snapped(self, p: Point) -> Point:

@@ -36,7 +36,8 @@ def _places_along(edge: Edge, shares: list[float]) -> list[Point]:
     if not isinstance(edge, Arc):
         return [edge.start if t == 0 else edge.end if t == 1 else edge.at(t) for t in shares]
     first, sweep = edge.start_angle, edge.sweep
-    (x, y), r = edge.centre, edge.radius
+    x, y = edge.centre
+    r = edge.radius
     angles = [first + t * sweep for t in shares]
     found = [(x + r * math.cos(a), y + r * math.sin(a)) for a in angles]
     if shares[0] == 0:

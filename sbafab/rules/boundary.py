@@ -105,7 +105,8 @@ def _across(edge: Edge, moved: Edge | None, others: Iterable[Edge]) -> Iterable[
     low, high = min(ends) - END_ROOM, max(ends) + END_ROOM
 
     def may_lie_in(other: Edge) -> bool:
-        (x0, y0), (x1, y1) = other.start, other.end
+        x0, y0 = other.start
+        x1, y1 = other.end
         one, two = ux * x0 + uy * y0, ux * x1 + uy * y1
         # An arc of at most half a turn reaches past its ends by half its chord at most.
         room = math.dist((x0, y0), (x1, y1)) / 2 if isinstance(other, Arc) else 0.0
@@ -193,7 +194,8 @@ def _runs_along(edge: Edge, p: Point, normal: Point) -> bool:
 
 def _line_band(line: Line) -> _Band:
     ux, uy = line.direction(line.start)
-    (x0, y0), (x1, y1) = line.start, line.end
+    x0, y0 = line.start
+    x1, y1 = line.end
     first = (x0 + ux * END_ROOM, y0 + uy * END_ROOM)
     last = (x1 - ux * END_ROOM, y1 - uy * END_ROOM)
     return _Band(line, ((first, (uy, -ux)), (last, (uy, -ux))))
@@ -224,7 +226,8 @@ def _extremes(edge: Edge, other: Edge) -> Sequence[Point]:
         if gap < EPSILON:
             return ()
         nx, ny = dx / gap, dy / gap
-    (cx, cy), r = other.centre, other.radius
+    cx, cy = other.centre
+    r = other.radius
     feet = ((cx + r * nx, cy + r * ny), (cx - r * nx, cy - r * ny))
     return [foot for foot in feet if 0 <= other.parameter(foot) <= 1]
 
@@ -238,7 +241,8 @@ def _on_ray(origin: Point, unit: Point, edge: Edge) -> list[Point]:
         cross = unit[0] * uy - unit[1] * ux
         if abs(cross) < 1e-12:
             return []
-        (x, y), (ox, oy) = edge.start, origin
+        x, y = edge.start
+        ox, oy = origin
         t = ((x - ox) * uy - (y - oy) * ux) / cross
         found = [(ox + t * unit[0], oy + t * unit[1])]
     return [p for p in found if -1e-12 <= edge.parameter(p) <= 1 + 1e-12]
