@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 from sbafab.geometry.apart import alone, turned_round
-from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.edges import Arc, Bounds, Edge, Point
 from sbafab.geometry.nearby import widened
 from sbafab.geometry.region import Region
 from sbafab.geometry.remembered import remembered
@@ -123,10 +123,18 @@ def void_graph(laminate: Laminate) -> VoidGraph:
 def _gap(unbonded: Region, contact: Region, frame: Region) -> _Gap:
     pieces = unbonded.pieces
     missing = _around(contact, frame).pieces
-    touching = []
+    touching: list[tuple[int, int, Point]] = []
+    # Where no contours touch, one side of a circle is one void as far as edges go on along it.
+    goes_on = not (_touches_itself(unbonded) or _touches_itself(contact))
+    before: Edge | None = None
+    number = home = 0
     for edge in edges_along(unbonded, contact):
-        home = _holding(missing, beside(edge, -INSET))
-        touching.append((_bounded(pieces, edge.at(0.5)), home, edge.at(0.5)))
+        p = edge.at(0.5)
+        if not (goes_on and _follows(before, edge)):
+            home = _holding(missing, beside(edge, -INSET))
+            number = _bounded(pieces, p)
+        touching.append((number, home, p))
+        before = edge
     touching.sort(key=lambda one: one[0])
     outside = _outside(missing, frame)
     # Inlets open to the outside; of any other two voids it counts that they join, and first where.
@@ -134,6 +142,23 @@ def _gap(unbonded: Region, contact: Region, frame: Region) -> _Gap:
     for number, home, p in touching:
         joins.setdefault((number, home, p if home == outside else None), (number, home, p))
     return _Gap(pieces, missing, tuple(joins.values()), outside)
+
+
+def _touches_itself(region: Region) -> bool:
+    """Whether contours meet at a point."""
+    return len({edge.start for edge in region.edges}) < len(region.edges)
+
+
+def _follows(before: Edge | None, edge: Edge) -> bool:
+    """Whether an arc begins where the one before it, of the same circle, ends."""
+    return (
+        isinstance(before, Arc)
+        and isinstance(edge, Arc)
+        and before.end == edge.start
+        and before.centre == edge.centre
+        and before.radius == edge.radius
+        and before.ccw == edge.ccw
+    )
 
 
 def _bounded(pieces: tuple[Region, ...], p: Point) -> int:
@@ -152,8 +177,7 @@ def _bounded(pieces: tuple[Region, ...], p: Point) -> int:
 
 def _around(region: Region, frame: Region) -> Region:
     """What is left of a frame that lies well outside the region: the contours, turned round."""
-    starts = {edge.start for edge in region.edges}
-    if len(starts) < len(region.edges):
+    if _touches_itself(region):
         # Where contours touch at a point, what they leave may hang together otherwise.
         return frame - region
     turned = (

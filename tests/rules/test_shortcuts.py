@@ -16,7 +16,7 @@ from sbafab.geometry.edges import Line
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import disc, polygon, rectangle, strip
 from sbafab.laminate.laminate import Inlet, Laminate
-from sbafab.rules import boundary, draws, facing, freedoms, likely_builds, margins, tube_fit
+from sbafab.rules import boundary, draws, facing, freedoms, likely_builds, margins, tube_fit, voids
 from sbafab.rules.boundary import outward_reach
 from sbafab.rules.draws import CutContour, DrawnBuilds, numbers, rows_by_error
 from sbafab.rules.facing import facing_films
@@ -216,6 +216,20 @@ def test_likely_builds_are_those_of_plain_sums(need: float) -> None:
             if left < need:
                 assert found[asked, build] == pytest.approx(left, abs=1e-12)
     assert 0 < len(found) < 400
+
+
+@pytest.mark.parametrize("design", DESIGNS)
+def test_voids_beside_one_circle_are_those_beside_each_of_its_arcs(
+    design: tuple[str, ...], good: Good, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    laminate = good(*design)
+    frame = rectangle((-50, -50), (50, 50))
+    gaps = [(one.unbonded, one.contact, frame) for one in laminate.interfaces]
+    gap = voids._gap.__wrapped__  # type: ignore[attr-defined]
+    found = [gap(*one) for one in gaps]
+    monkeypatch.setattr(voids, "_follows", lambda *_: False)
+    assert [gap(*one) for one in gaps] == found
+    assert any(len(one.touching) > 3 for one in found)
 
 
 TAPERED = ("1dof-5mm", "stack.balloons=4", "chamber.diameter=[5, 8, 6, 8]")
