@@ -31,8 +31,11 @@ BEGIN, END = "<!-- written by docs.scripts.balloon_runs -->", "<!-- to here -->"
 PRESSURES = (0.5, 2.0, 6.0, 10.0)
 """kPa."""
 HOUR = 3600.0
+RAMP, SLOW = 0.2, 1.0
+"""s to the last pressure of a ripple."""
 RIPPLED = (0.25, 0.5, 1.0, 2.0, 4.0, 6.0, 10.0)
-SMOOTH, FREE, RIPPLES = "held smooth", "free to wrinkle", "even ripples"
+SMOOTH, FREE = "held smooth", "free to wrinkle"
+RIPPLES, HALF = "even ripples", "ripples, half a wave"
 Found = tuple["np.ndarray", "np.ndarray"]
 """Strokes in mm and air in ul at the pressures."""
 
@@ -62,6 +65,8 @@ class Case(NamedTuple):
     runs: tuple[Run, ...] = ()
     waves: int = 0
     diameter: float | None = None
+    half: bool = False
+    """Half a wave, which may roll, inflated slowly; else a quarter."""
 
     @property
     def pressures(self) -> tuple[float, ...]:
@@ -73,7 +78,8 @@ class Case(NamedTuple):
         size = self.template.removeprefix("1dof-").removesuffix("mm")
         size = f"{self.diameter:g}" if self.diameter else size
         where = "alone" if self.alone else "in a stack"
-        how = f"{self.waves} {RIPPLES}" if self.waves else FREE if self.runs else SMOOTH
+        ripples = HALF if self.half else RIPPLES
+        how = f"{self.waves} {ripples}" if self.waves else FREE if self.runs else SMOOTH
         return f"d = {size}, {where}, {how}"
 
     @property
@@ -100,6 +106,7 @@ CASES = (
     Case("1dof-10mm", alone=True, waves=18, diameter=15),
     Case("1dof-10mm", alone=False, waves=18, diameter=15),
     Case("1dof-10mm", alone=True, waves=24, diameter=20),
+    Case("1dof-10mm", alone=True, waves=12, half=True),
 )
 """Quarters of d = 10 whose rims ripple would be hours."""
 
@@ -118,7 +125,7 @@ def measured(case: Case) -> Found:
     """What CalculiX says."""
     one = case.balloon
     if case.waves:
-        return _rippled(one, case.waves)
+        return _rippled(one, case)
     if not case.runs:
         section = MeridianSection(
             2 * one.pocket, one.ring, one.thickness, 2 * one.neck, 2 * one.bore
@@ -129,14 +136,15 @@ def measured(case: Case) -> Found:
     return np.concatenate([one[0] for one in found]), np.concatenate([one[1] for one in found])
 
 
-def _rippled(one: Balloon, waves: int) -> Found:
+def _rippled(one: Balloon, case: Case) -> Found:
     sector = Sector(
         2 * one.pocket,
-        waves,
+        case.waves,
         one.ring,
         one.thickness,
-        round=5,
-        even=True,
+        round=8 if case.half else 5,
+        ramp=SLOW if case.half else RAMP,
+        even=not case.half,
         neck=2 * one.neck,
         bore=2 * one.bore,
     )
