@@ -70,21 +70,22 @@ def solve_positive(band: Array, wanted: Array) -> Array | None:
     right = np.zeros((rows, count * width, 1))
     right[:, :size, 0] = wanted.T
     right = right.reshape(rows, count, width, 1)
-    share = np.empty_like(beside)
+    turned = np.ascontiguousarray(beside.swapaxes(2, 3))
+    # Of each block what it hands on, and its own part of the answer.
+    both = np.concatenate([beside, right], 3)
     for k in range(count):
         if k:
-            own[:, k] -= beside[:, k - 1].swapaxes(1, 2) @ share[:, k - 1]
-            right[:, k] -= share[:, k - 1].swapaxes(1, 2) @ right[:, k - 1]
+            lower = turned[:, k - 1] @ both[:, k - 1]
+            own[:, k] -= lower[..., :-1]
+            both[:, k, :, -1] -= lower[..., -1]
         try:
             np.linalg.cholesky(own[:, k])
         except np.linalg.LinAlgError:
             return None
-        share[:, k] = np.linalg.solve(own[:, k], beside[:, k])
-    found = np.empty_like(right)
-    for k in reversed(range(count)):
-        found[:, k] = np.linalg.solve(own[:, k], right[:, k])
-        if k < count - 1:
-            found[:, k] -= share[:, k] @ found[:, k + 1]
+        both[:, k] = np.linalg.solve(own[:, k], both[:, k])
+    found = both[..., -1].copy()
+    for k in reversed(range(count - 1)):
+        found[:, k] -= (both[:, k, :, :-1] @ found[:, k + 1, :, None])[..., 0]
     return np.asarray(found.reshape(rows, -1)[:, :size].T)
 
 

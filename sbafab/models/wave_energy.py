@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from sbafab.models.film_elements import Array
 
-CLOSE = 1e-8
+CLOSE = 1e-6
 """Force out of balance, as a share of pressure times pocket area, that is none."""
 MORE = (0.001, 0.01, 0.1, 1.0)
 """Shares of the diagonal that are added in turn where second derivatives are not those of a dip."""
