@@ -49,6 +49,8 @@ LATEST = 0.02
 """Film strain by which films have fallen in step where they ever do."""
 ALIKE = 0.9
 """Cosine of the angle between waves that are those of one branch."""
+HALVINGS = 3
+"""How often a step between rungs is halved where it finds no balance."""
 ROUNDS = 2
 """How often the way out of the film is taken from the shape, and the shape from that."""
 
@@ -155,7 +157,13 @@ def rippled(balloon: Balloon, pressure: ArrayLike, waves: int | None = None) -> 
     row = np.repeat(np.arange(len(p)), [len(several) for several in starts])
     for _ in range(ROUNDS):
         problem = Waves(of, p[row], _normals(of, x))
-        x = _settled(problem, x)
+        try:
+            x = _settled(problem, x)
+        except DesignError:
+            # One by one, and on smaller steps.
+            rungs = _first(balloon) * STEP ** at.astype(np.int_)
+            each = (_followed(of, x[:, [i]], rungs[which], p[which]) for i, which in enumerate(row))
+            x = np.concatenate(list(each), 1)
     energy = problem.total(x, np.arange(len(row))).energy
     x = x[:, [min(np.flatnonzero(row == i), key=energy.__getitem__) for i in range(len(p))]]
     found = Waves(of, p, _normals(of, x)).total(x, np.arange(len(p)))
@@ -221,10 +229,9 @@ def _rung(balloon: Balloon, waves: int, k: int) -> Rung:
         # Also from there with films pushed in step with the rim.
         x = np.repeat(x, 2, axis=1)
         x[UP::PLACES, 1] += math.copysign(KICK, x[PLACES * balloon.edge + UP, 1]) * _in_step(of)
+    x = _followed(of, x, p[0] / STEP, p[0])
     rows = np.arange(x.shape[1])
-    problem = Waves(of, np.repeat(p, len(rows)), _normals(of, x))
-    x = _settled(problem, x)
-    energy = problem.total(x, rows).energy
+    energy = Waves(of, np.repeat(p, len(rows)), _normals(of, x)).total(x, rows).energy
     best = int(energy.argmin())
     return Rung(x[:, best], in_step or energy[best] < energy[0] * (1 + CLEARLY))
 
@@ -255,6 +262,18 @@ def _normals(of: Waving, x: Array) -> Array:
     dr, dz = np.diff(r), np.diff(z)
     length = np.hypot(dr, dz)
     return np.stack([-dz / length, dr / length, length / one.film.lengths], -1)
+
+
+def _followed(of: Waving, x: Array, low: float, high: float, halvings: int = HALVINGS) -> Array:
+    """From a balance at a pressure to that at another, on smaller steps where one finds none."""
+    try:
+        return _settled(Waves(of, np.full(x.shape[1], high), _normals(of, x)), x)
+    except DesignError:
+        if not halvings:
+            raise
+    middle = math.sqrt(low * high)
+    x = _followed(of, x, low, middle, halvings - 1)
+    return _followed(of, x, middle, high, halvings - 1)
 
 
 def _settled(problem: Waves, x: Array) -> Array:
