@@ -51,8 +51,6 @@ ALIKE = 0.9
 """Cosine of the angle between waves that are those of one branch."""
 HALVINGS = 3
 """How often a step between rungs is halved where it finds no balance."""
-ROUNDS = 2
-"""How often the way out of the film is taken from the shape, and the shape from that."""
 
 
 class Rippled(NamedTuple):
@@ -155,15 +153,14 @@ def rippled(balloon: Balloon, pressure: ArrayLike, waves: int | None = None) -> 
     starts = [_starts(of, float(one)) for one in at]
     x = np.stack([start for several in starts for start in several], 1)
     row = np.repeat(np.arange(len(p)), [len(several) for several in starts])
-    for _ in range(ROUNDS):
-        problem = Waves(of, p[row], _normals(of, x))
-        try:
-            x = _settled(problem, x)
-        except DesignError:
-            # One by one, and on smaller steps.
-            rungs = _first(balloon) * STEP ** at.astype(np.int_)
-            each = (_followed(of, x[:, [i]], rungs[which], p[which]) for i, which in enumerate(row))
-            x = np.concatenate(list(each), 1)
+    problem = Waves(of, p[row], _normals(of, x))
+    try:
+        x = _settled(problem, x)
+    except DesignError:
+        # One by one, and on smaller steps.
+        rungs = _first(balloon) * STEP ** at.astype(np.int_)
+        each = (_followed(of, x[:, [i]], rungs[which], p[which]) for i, which in enumerate(row))
+        x = np.concatenate(list(each), 1)
     energy = problem.total(x, np.arange(len(row))).energy
     x = x[:, [min(np.flatnonzero(row == i), key=energy.__getitem__) for i in range(len(p))]]
     found = Waves(of, p, _normals(of, x)).total(x, np.arange(len(p)))
@@ -185,13 +182,27 @@ def usual_waves(balloon: Balloon) -> int:
 def _starts(of: Waving, at: float) -> list[Array]:
     """Where to begin at a place among rungs: between two where waves are alike, else at each."""
     k = int(at)
-    low, high = (_rung(of.balloon, of.waves, each).x for each in (k, k + 1))
+    near = [_rung(of.balloon, of.waves, each).x for each in (k, k + 1)]
+    if not _are_alike(of, *near):
+        return near
+    for each, front in ((k - 1, True), (k + 2, False)):
+        if each >= 0 and START * STEP**each < END:
+            more = _rung(of.balloon, of.waves, each).x
+            if _are_alike(of, more, near[0 if front else -1]):
+                near = [more, *near] if front else [*near, more]
+                k -= front
+    # The polynomial through them (Lagrange).
+    u, places = at - k, range(len(near))
+    shares = [math.prod((u - j) / (i - j) for j in places if j != i) for i in places]
+    return [sum((share * x for share, x in zip(shares, near, strict=True)), np.zeros_like(near[0]))]
+
+
+def _are_alike(of: Waving, one: Array, other: Array) -> bool:
+    """Whether the waves of two balances are those of one branch."""
     waves = of.kept.copy()
     waves[:, :2] = False
-    a, b = (each[waves.ravel()] for each in (low, high))
-    if a @ b > ALIKE * math.sqrt((a @ a) * (b @ b)):
-        return [low + (at - k) * (high - low)]
-    return [low, high]
+    a, b = (each[waves.ravel()] for each in (one, other))
+    return bool(a @ b > ALIKE * math.sqrt((a @ a) * (b @ b)))
 
 
 def _first(balloon: Balloon) -> float:
