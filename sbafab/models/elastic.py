@@ -19,7 +19,7 @@ ELASTIC = Model(
     "elastic balloon",
     "membrane of revolution, the film's modulus",
     "one balloon to 10 kPa: within 1.2 % of an axisymmetric mesh; of a solid one that ripples, "
-    "d = 5 to 15 within 3 %, d = 20 within 5 %, but d = 10 is 8 to 19 % low where a lone one's rim "
+    "d = 5 to 15 within 3 %, d = 20 within 5 %, but d = 10 is 6 to 19 % low where a lone one's rim "
     "rolls to one side; all balloons of a stack are taken for inner ones, inlets left out",
 )
 
