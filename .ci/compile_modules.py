@@ -40,12 +40,14 @@ COMPILED = (
 )
 """Without what numpy does, and what keeps values in the dictionary of a record."""
 NEEDS = ("mypy[mypyc]>=2.4,<3", "setuptools>=65")
-TYPES = (
-    "--config-file=",
-    "--follow-imports=skip",
-    "--ignore-missing-imports",
-    "--disable-error-code=var-annotated",
-)
+TYPES = """
+[mypy]
+follow_imports = skip
+ignore_missing_imports = True
+disable_error_code = var-annotated
+[mypy-numpy.*]
+follow_imports_for_stubs = True
+"""
 """The types of other modules are not asked for, which saves minutes; the checks ask for all."""
 # As Python rounds: products and sums are not made one step.
 ROUNDING = () if os.name == "nt" else ("-ffp-contract=off",)
@@ -61,8 +63,10 @@ def compile_into(folder: Path) -> list[Path]:
 
     os.chdir(ROOT)
     with tempfile.TemporaryDirectory() as scratch:
+        types = Path(scratch, "types.ini")
+        types.write_text(TYPES)
         modules = mypycify(
-            [*TYPES, *COMPILED],
+            [f"--config-file={types}", *COMPILED],
             opt_level="2",
             debug_level="0",
             target_dir=scratch,

@@ -10,7 +10,7 @@ from sbafab.as_built.uncut import uncut
 from sbafab.cutting.chaining import check_clear
 from sbafab.cutting.properties import CutSettings
 from sbafab.errors import DesignError, OutputError
-from sbafab.geometry.boolean import GeometryError
+from sbafab.geometry.inconsistent import GeometryError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import registration_yield

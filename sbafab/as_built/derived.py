@@ -24,7 +24,7 @@ from sbafab.cutting.lightburn import ENDING
 from sbafab.cutting.properties import curves_of
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DesignError, OutputError
-from sbafab.geometry.boolean import GeometryError
+from sbafab.geometry.inconsistent import GeometryError
 from sbafab.geometry.region import Region
 from sbafab.nesting.parts import parts_of
 from sbafab.nesting.records import NestPart

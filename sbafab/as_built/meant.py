@@ -12,7 +12,7 @@ from sbafab.cutting.properties import CutSettings, curves_of
 from sbafab.cutting.verify import TOLERANCE, check_contours
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError
-from sbafab.geometry.boolean import GeometryError
+from sbafab.geometry.inconsistent import GeometryError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 from sbafab.output.settings import cut_settings

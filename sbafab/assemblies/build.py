@@ -22,7 +22,7 @@ from sbafab.assemblies.tree import building_order
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import GeometryError
+from sbafab.geometry.inconsistent import GeometryError
 from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.meshing.surface import Vector
 from sbafab.meshing.wrap import bent_point

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sbafab.cutting.properties import kerf_text
 from sbafab.errors import DesignError
 from sbafab.geometry.beam import Kerf, Lost, beam_path, place_of, widths
-from sbafab.geometry.boolean import GeometryError
+from sbafab.geometry.inconsistent import GeometryError
 from sbafab.geometry.region import Region
 
 

@@ -14,8 +14,9 @@ from itertools import pairwise
 from typing import Literal, NamedTuple
 
 from sbafab.geometry.biarc import biarc, ellipse
-from sbafab.geometry.boolean import GeometryError, wound
+from sbafab.geometry.boolean import wound
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, distance_to, left_turn
+from sbafab.geometry.inconsistent import GeometryError
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
 from sbafab.geometry.offset import grow

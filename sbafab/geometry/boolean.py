@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
 from typing import TypeVar
 
-from sbafab.errors import SbafabError
 from sbafab.geometry.apart import (
     ChainGroup,
     ClosedChain,
@@ -23,7 +22,7 @@ from sbafab.geometry.apart import (
 )
 from sbafab.geometry.arrangement import Arrangement
 from sbafab.geometry.edges import EPSILON, Edge, Point
-from sbafab.geometry.inconsistent import InconsistentError
+from sbafab.geometry.inconsistent import GeometryError, InconsistentError
 from sbafab.geometry.pieces import DIGIT, by_owner, overlaid, overlay
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.remembered import MOST, remembered
@@ -37,10 +36,6 @@ WAYS = (1, 4, 16, 64)
 """With how many EPSILON edges are cut where they meet, tried in turn; by the last, points within a
 quarter of a micrometre are one.
 """
-
-
-class GeometryError(SbafabError, ArithmeticError):
-    """An operation on regions came out inconsistent; the message says where."""
 
 
 def union(regions: Iterable[Region]) -> Region:

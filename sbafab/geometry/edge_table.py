@@ -10,11 +10,7 @@ import numpy as np
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Indices = NDArray[np.intp]
-    Bools = NDArray[np.bool_]
+    from sbafab.geometry.arrays import Bools, Floats, Indices
 
 FEW = 20_000
 """Pairs of boxes up to which all are compared at once."""

@@ -25,7 +25,7 @@ from sbafab.geometry.width import (
 )
 
 if TYPE_CHECKING:
-    from sbafab.geometry.edge_table import Bools, Floats, Indices
+    from sbafab.geometry.arrays import Bools, Floats, Indices
 
 NEAR = 10 * TOUCH
 """mm from its ends within which what meets a segment does not cross it."""

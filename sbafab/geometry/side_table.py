@@ -13,7 +13,7 @@ from sbafab.geometry.edge_table import CellOrder, EdgeTable, dot, touching_in_pa
 from sbafab.geometry.width import ALONGSIDE
 
 if TYPE_CHECKING:
-    from sbafab.geometry.edge_table import Bools, Floats, Indices
+    from sbafab.geometry.arrays import Bools, Floats, Indices
 
 ROOM = 1e-9
 """More than the rounding of what is asked once more of each pair."""

@@ -11,7 +11,7 @@ from sbafab.actuators import build
 from sbafab.design.form import Slots, Wrap
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import GeometryError
+from sbafab.geometry.inconsistent import GeometryError
 from sbafab.geometry.region import Region
 from sbafab.laminate.extent import film_mass
 from sbafab.laminate.laminate import Laminate

@@ -17,7 +17,7 @@ from sbafab.assemblies.writing import DESIGN_FILE, assembly_sha256, assembly_tom
 from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import GeometryError
+from sbafab.geometry.inconsistent import GeometryError
 from sbafab.meshing.write_glb import Node, write_scene
 from sbafab.output.batch import Batch, plan_batch, refuse_other_film, write_batch
 from sbafab.output.checking import checks

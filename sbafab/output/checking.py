@@ -9,7 +9,7 @@ from sbafab.actuators import build
 from sbafab.design.kits import citation
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import GeometryError
+from sbafab.geometry.inconsistent import GeometryError
 from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.nest import refuse_unfit
 from sbafab.output.planned import Checked, plan

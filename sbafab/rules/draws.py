@@ -14,10 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from sbafab.rules.freedoms import Freedom
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+    from sbafab.geometry.arrays import Floats
 
 KEPT = 4_000_000
 """Numbers at the stream's beginning that are kept: 32 MB at most, of which a page is taken up when

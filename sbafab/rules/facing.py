@@ -167,4 +167,4 @@ def without_slivers(region: Region) -> Region:
 
 
 def _is_wide(piece: Region) -> bool:
-    return 2 * piece.area > TOLERANCE * sum(contour.length for contour in piece.contours)
+    return 2 * piece.area > TOLERANCE * sum([contour.length for contour in piece.contours], 0.0)

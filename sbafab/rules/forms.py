@@ -10,18 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from sbafab.geometry.once import once
 from sbafab.rules.freedoms import Freedom, Freedoms
 from sbafab.rules.margins import InterfaceMargins, Owner, Quantity, felt
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from sbafab.geometry.arrays import Floats, Indices
     from sbafab.rules.narrow_places import Places
-
-    Floats = NDArray[np.float64]
-    Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -32,7 +26,8 @@ class LinearForms:
     ``normal`` (2 rows) have a column each; ``between`` is the number of the owners of both edges
     among ``owners``, ``parts`` that of their two parts among ``felt``: what one of these does and
     the other not, and whether it acts at the end. ``levers`` has a line for each of these: mm per
-    radian of what turns, 1 of what shifts, 0 where less is felt.
+    radian of what turns, 1 of what shifts, 0 where less is felt. ``loss`` is the most that all of
+    it takes from each margin, mm; ``pinned_loss`` that of all but what the hand does.
     """
 
     quantity: Quantity
@@ -44,25 +39,8 @@ class LinearForms:
     parts: Indices
     felt: Sequence[Sequence[tuple[Freedom, bool]]]
     levers: Floats
-
-    def loss(self, by_hand: bool = True) -> Floats:
-        """The most that all of it takes from each margin, mm; or all but what the hand does."""
-        return self._loss if by_hand else self._lost(False)
-
-    @once
-    def _loss(self) -> Floats:
-        return self._lost(True)
-
-    def _lost(self, by_hand: bool) -> Floats:
-        import numpy as np
-
-        most = np.zeros((len(self.felt), len(self.levers)))
-        for own, reach in zip(self.felt, most, strict=True):
-            reach[: len(own)] = [
-                freedom.most if by_hand or not freedom.by_hand else 0.0 for freedom, _ in own
-            ]
-        lost: Floats = (most[self.parts].T * np.abs(self.levers)).sum(axis=0)
-        return lost
+    loss: Floats
+    pinned_loss: Floats
 
 
 def linear_forms(group: InterfaceMargins, moves: Freedoms) -> tuple[LinearForms, ...]:
@@ -119,4 +97,21 @@ def _forms(
         parts,
         acting,
         levers,
+        _lost(parts, acting, levers, True),
+        _lost(parts, acting, levers, False),
     )
+
+
+def _lost(
+    parts: Indices, acting: Sequence[Sequence[tuple[Freedom, bool]]], levers: Floats, by_hand: bool
+) -> Floats:
+    """The most that all moves take from each margin, mm; without the hand's if not ``by_hand``."""
+    import numpy as np
+
+    most = np.zeros((len(acting), len(levers)))
+    for own, reach in zip(acting, most, strict=True):
+        reach[: len(own)] = [
+            freedom.most if by_hand or not freedom.by_hand else 0.0 for freedom, _ in own
+        ]
+    lost: Floats = (most[parts].T * np.abs(levers)).sum(axis=0)
+    return lost

@@ -16,11 +16,7 @@ import numpy as np
 from sbafab.rules.draws import DrawnBuilds
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Bools = NDArray[np.bool_]
-    Floats = NDArray[np.float64]
-    Indices = NDArray[np.intp]
+    from sbafab.geometry.arrays import Bools, Floats, Indices
 
 SLACK = 0.01
 """mm: how much more than it asks for is kept from the second laminate on, for those after it."""

@@ -16,11 +16,7 @@ from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.margins import Quantity
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Indices = NDArray[np.intp]
+    from sbafab.geometry.arrays import Floats, Indices
 
 UNITS = 1000
 """Factors that are equal to so many parts are one: rows that feel all errors alike."""
@@ -56,7 +52,7 @@ def rows_of(
     import numpy as np
 
     room = forms.nominal - limit
-    (short,) = np.nonzero(room - 2 * cutting - forms.loss() < -TOLERANCE)
+    (short,) = np.nonzero(room - 2 * cutting - forms.loss < -TOLERANCE)
     if not len(short):
         return
     for between, alike in _least_alike(forms, room, short).items():

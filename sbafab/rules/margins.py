@@ -185,14 +185,13 @@ class _Loss(NamedTuple):
 def _loss(interface: Interface, limits: Limits, moves: Freedoms) -> _Loss:
     parts = _parts(interface)
     own = moves.unshared(seated(interface))
-    reach = []
+    reach: list[dict[int, float]] = []
     for region, found in zip(parts, own, strict=True):
         box = region.bounds
         reach.append({id(freedom): freedom.most * _farthest(freedom, box) for freedom in found})
     most = max(
         (
-            sum([cost for freedom, cost in one.items() if freedom not in other])
-            + sum([cost for freedom, cost in other.items() if freedom not in one])
+            _cost_without(other, one) + _cost_without(one, other)
             for one, other in combinations(reach, 2)
         ),
         default=0.0,
@@ -200,8 +199,13 @@ def _loss(interface: Interface, limits: Limits, moves: Freedoms) -> _Loss:
     loose = {id(freedom): freedom for found in own for freedom in found}.values()
     box = interface.contact.bounds
     cutting = 2 * limits.tolerances.cutting
-    together = sum(freedom.most * _farthest(freedom, box) for freedom in loose)
+    together = sum([freedom.most * _farthest(freedom, box) for freedom in loose], 0.0)
     return _Loss(most, cutting + together, cutting)
+
+
+def _cost_without(shared: Mapping[int, float], costs: Mapping[int, float]) -> float:
+    """What all freedoms cost together but those that are shared."""
+    return sum([cost for freedom, cost in costs.items() if freedom not in shared], 0.0)
 
 
 def _parts(interface: Interface) -> list[Region]:

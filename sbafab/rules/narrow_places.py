@@ -30,7 +30,7 @@ from sbafab.rules.boundary import END_ROOM, STEEP, Reach
 from sbafab.rules.margins import ROOM, SHARP, Owner
 
 if TYPE_CHECKING:
-    from sbafab.geometry.edge_table import Bools, Floats, Indices
+    from sbafab.geometry.arrays import Bools, Floats, Indices
 
 ON_EDGE = 1e-5
 """mm within which a point lies on an edge: booleans keep points to 4 nm, files to 1 nm."""

@@ -22,10 +22,7 @@ from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.margin_rows import MarginRows
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Indices = NDArray[np.intp]
+    from sbafab.geometry.arrays import Floats, Indices
 
 SURE = 1e-9 - TOLERANCE
 """mm: what is bounded to be left so far above what holds is so, however the sum is rounded."""

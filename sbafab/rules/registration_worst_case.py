@@ -73,8 +73,8 @@ def _least(
     drawn = limits.bond_width if forms.quantity == "bond" else limits.mask_overhang
     # Both edges are cut: two contours, or one that is off on either side.
     cut = forms.nominal - 2 * limits.tolerances.cutting
-    held = (cut - forms.loss(by_hand=False))[forms.nominal >= least_held(drawn)]
-    worst = cut - forms.loss()
+    held = (cut - forms.pinned_loss)[forms.nominal >= least_held(drawn)]
+    worst = cut - forms.loss
     (near,) = (worst <= worst.min() + SAME).nonzero()
     values = [round(value, 9) for value in worst[near].tolist()]
     number = int(near[values.index(min(values))])

@@ -23,7 +23,8 @@ from sbafab.rules.margins import QUANTITIES, Quantity, seated
 from sbafab.rules.measures import Measures
 
 if TYPE_CHECKING:
-    from sbafab.rules.random_builds import Indices, RowsAsked
+    from sbafab.geometry.arrays import Indices
+    from sbafab.rules.random_builds import RowsAsked
 
 NAME = "registration-yield"
 

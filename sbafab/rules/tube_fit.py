@@ -87,7 +87,7 @@ def _fits(inlet: Inlet, laminate: Laminate, limits: Limits) -> list[_Fit]:
             and abs(_offset(inlet, edge.at(0.5))) < inlet.width / 2
         ]
         if mouth:
-            width = sum(edge.length for edge in mouth)
+            width = sum([edge.length for edge in mouth], 0.0)
             cut = max(0.0, width - _lost(interface, limits))
             opening = _Fit(inlet, interface, "the mouth", cut, needed, inlet.mouth, REMEDY, width)
             return [opening, *_along_run(inlet, interface, needed, limits)]

@@ -9,7 +9,7 @@ from typing import Any
 from sbafab.actuators import build
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import GeometryError
+from sbafab.geometry.inconsistent import GeometryError
 from sbafab.laminate.extent import film_mass
 from sbafab.laminate.laminate import Laminate
 from sbafab.output.checking import refuse_undoable

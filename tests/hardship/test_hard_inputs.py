@@ -11,8 +11,9 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.errors import SbafabError
-from sbafab.geometry.boolean import GeometryError, wound
+from sbafab.geometry.boolean import wound
 from sbafab.geometry.edges import Line
+from sbafab.geometry.inconsistent import GeometryError
 from sbafab.output import checking
 
 if TYPE_CHECKING:

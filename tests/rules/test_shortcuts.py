@@ -106,7 +106,7 @@ def test_forms_lose_what_their_pushes_cost(good: Good) -> None:
     for group in measures.margins:
         for forms in linear_forms(group, measures.moves):
             for number, (whole, pinned) in enumerate(
-                zip(forms.loss(), forms.loss(by_hand=False), strict=True), forms.first
+                zip(forms.loss, forms.pinned_loss, strict=True), forms.first
             ):
                 found = pushes(group[number], group.first, measures.moves)
                 assert whole == pytest.approx(sum(push.cost for push in found))
