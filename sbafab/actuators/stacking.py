@@ -171,12 +171,12 @@ def used_films(design: Design) -> dict[str, Film]:
 
 def layers(cuts: Iterable[CutFilm], design: Design) -> tuple[Layer, ...]:
     """The films in their order, with heights and pattern names."""
-    used_films(design)
+    films = {role: film_of(design, role) for role in ROLES}
     patterns: dict[tuple[str, Region], str] = {}
     placed: list[Layer] = []
     z = 0.0
     for index, cut in enumerate(cuts, start=1):
-        film = film_of(design, cut.role)
+        film = films[cut.role]
         shape = (film.material, cut.profile)
         pattern = patterns.setdefault(shape, f"P{len(patterns) + 1:02d}")
         placed.append(

@@ -6,6 +6,12 @@ from collections.abc import Callable
 from typing import Any, Generic, TypeVar, overload
 
 Made = TypeVar("Made")
+Record = TypeVar("Record")
+
+
+def keeping(kind: type[Record]) -> type[Record]:
+    """Says that records of this class keep values: compiled, too, each has its dictionary."""
+    return kind
 
 
 class once(Generic[Made]):  # noqa: N801
@@ -16,8 +22,10 @@ class once(Generic[Made]):  # noqa: N801
 
     def __init__(self, make: Callable[[Any], Made]) -> None:
         self.make = make
-        self.name = make.__name__
         self.__doc__ = make.__doc__
+
+    def __set_name__(self, kind: type, name: str) -> None:
+        self.name = name
 
     @overload
     def __get__(self, record: None, kind: type) -> once[Made]: ...

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from sbafab.geometry import similarity
 from sbafab.geometry.chain_sums import (
     box_round,
     boxes_of,
@@ -32,8 +32,9 @@ from sbafab.geometry.edges import (
     unit,
 )
 from sbafab.geometry.nearby import EdgeIndex, close_pairs
-from sbafab.geometry.once import once
+from sbafab.geometry.once import keeping, once
 from sbafab.geometry.runs import runs, same_support
+from sbafab.geometry.similarity import Similarity
 
 if TYPE_CHECKING:
     import shapely
@@ -43,6 +44,7 @@ MANY = 32
 """Edges from which on filing them by place is worth its cost."""
 
 
+@keeping
 @dataclass(frozen=True)
 class Contour:
     """One closed chain of edges; each edge starts where the one before it ends."""
@@ -128,6 +130,32 @@ class Contour:
             turned.__dict__["bounds"] = known["bounds"]
         return turned
 
+    def mapped(self, point: Similarity, scale: float, mirror: bool) -> Contour:
+        """The contour under a similarity given by its effect on points."""
+        # Each edge starts where the one before it ends.
+        starts = [point(edge.start) for edge in self.edges]
+        ends = [*starts[1:], starts[0]]
+        edges = tuple(
+            [
+                Line(start, end)
+                if isinstance(edge, Line)
+                else Arc(start, end, point(edge.centre), edge.radius * scale, edge.ccw ^ mirror)
+                for edge, start, end in zip(self.edges, starts, ends, strict=True)
+            ]
+        )
+        image = Contour(edges)
+        known = self.__dict__
+        if "length" in known:
+            image.__dict__["length"] = scale * known["length"]
+        if "area" in known:
+            # A mirrored image keeps the material on its left once it is reversed.
+            image.__dict__["area"] = scale * scale * known["area"] * (-1 if mirror else 1)
+        if self.circle is not None:
+            (x, y), radius = point(self.circle[0]), self.circle[1] * scale
+            image.__dict__["circle"] = (x, y), radius
+            image.__dict__["bounds"] = x - radius, y - radius, x + radius, y + radius
+        return image.reversed() if mirror else image
+
     @once
     def _round_once(self) -> tuple[Point, float, int] | None:
         """Centre, radius and direction of a full circle that runs round once."""
@@ -181,6 +209,7 @@ def _same(a: Edge, b: Edge) -> bool:
     return math.dist(a.start, b.start) < SAME and math.dist(a.at(0.5), b.at(0.5)) < SAME
 
 
+@keeping
 @dataclass(frozen=True)
 class Region:
     """A planar region, possibly of several pieces, possibly empty."""
@@ -271,7 +300,7 @@ class Region:
         """Whether the same corners and arcs lie within SAME of each other, wherever they start."""
         if not isinstance(other, Region) or len(self.contours) != len(other.contours):
             return False
-        if self is other or self.key == other.key:
+        if self is other:
             return True
         left = list(other.contours)
         for contour in self.contours:
@@ -318,59 +347,24 @@ class Region:
 
         return difference(self, other)
 
-    def mapped(self, point: Callable[[Point], Point], scale: float, mirror: bool) -> Region:
+    def mapped(self, point: Similarity, scale: float, mirror: bool) -> Region:
         """The region under a similarity given by its effect on points."""
-
-        def mapped_contour(contour: Contour) -> Contour:
-            # Each edge starts where the one before it ends.
-            starts = [point(edge.start) for edge in contour.edges]
-            ends = [*starts[1:], starts[0]]
-            edges = tuple(
-                [
-                    Line(start, end)
-                    if isinstance(edge, Line)
-                    else Arc(start, end, point(edge.centre), edge.radius * scale, edge.ccw ^ mirror)
-                    for edge, start, end in zip(contour.edges, starts, ends, strict=True)
-                ]
-            )
-            image = Contour(edges)
-            known = contour.__dict__
-            if "length" in known:
-                image.__dict__["length"] = scale * known["length"]
-            if "area" in known:
-                # A mirrored image keeps the material on its left once it is reversed.
-                image.__dict__["area"] = scale * scale * known["area"] * (-1 if mirror else 1)
-            if contour.circle is not None:
-                (x, y), radius = point(contour.circle[0]), contour.circle[1] * scale
-                image.__dict__["circle"] = (x, y), radius
-                image.__dict__["bounds"] = x - radius, y - radius, x + radius, y + radius
-            return image.reversed() if mirror else image
-
-        return Region(tuple(map(mapped_contour, self.contours)))
+        return Region(tuple([one.mapped(point, scale, mirror) for one in self.contours]))
 
     def moved(self, dx: float, dy: float) -> Region:
         """The region moved by so many mm along x and y."""
-        return self.mapped(lambda p: (p[0] + dx, p[1] + dy), 1.0, False)
+        return self.mapped(similarity.shift(dx, dy), 1.0, False)
 
     def turned(self, degrees: float, about: Point = (0.0, 0.0)) -> Region:
         """The region turned counter-clockwise; quarter turns are exact."""
-        c, s = unit(degrees)
-        ax, ay = about
-        return self.mapped(
-            lambda p: (
-                ax + (p[0] - ax) * c - (p[1] - ay) * s,
-                ay + (p[0] - ax) * s + (p[1] - ay) * c,
-            ),
-            1.0,
-            False,
-        )
+        return self.mapped(similarity.turn(unit(degrees), about), 1.0, False)
 
     def scaled(self, factor: float) -> Region:
-        return self.mapped(lambda p: (p[0] * factor, p[1] * factor), factor, False)
+        return self.mapped(similarity.scale(factor), factor, False)
 
     def mirrored(self) -> Region:
         """The region flipped over: x becomes -x."""
-        return self.mapped(lambda p: (-p[0], p[1]), 1.0, True)
+        return self.mapped(similarity.flip, 1.0, True)
 
     def shapely(self, chord_error: float = 0.001) -> shapely.MultiPolygon:
         """The region for shapely; chords stay within ``chord_error`` mm of the arcs."""

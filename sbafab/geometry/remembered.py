@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache, wraps
 from typing import Any, ParamSpec, TypeVar
 
-from sbafab.geometry.kept import kept
-from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.exact import Exact
+from sbafab.geometry.region import Region
 
 Asked = ParamSpec("Asked")
 Found = TypeVar("Found")
@@ -15,34 +15,6 @@ Question = TypeVar("Question", bound=tuple[object, ...])
 
 MOST = 256
 """Answers that a function keeps, which bounds the memory over any number of designs."""
-
-
-class _Exact:
-    """A region that only the same numbers equal; regions themselves equal within SAME."""
-
-    __slots__ = ("_hash", "region")
-
-    def __init__(self, region: Region) -> None:
-        self.region = region
-        known = region.__dict__
-        if "exact_hash" not in known:
-            hashes = [kept(one, "edges_hash", _edges_hash) for one in region.contours]
-            known["exact_hash"] = hash(tuple(hashes))
-        self._hash: int = known["exact_hash"]
-
-    def __hash__(self) -> int:
-        return self._hash
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, _Exact):
-            return False
-        mine, theirs = self.region.contours, other.region.contours
-        return mine is theirs or [own.edges for own in mine] == [one.edges for one in theirs]
-
-
-def _edges_hash(contour: Contour) -> int:
-    """Alike for equal edges: where they start tells nearly all others apart."""
-    return hash(tuple([edge.start for edge in contour.edges]))
 
 
 def remembered(ask: Callable[Asked, Found], most: int = MOST) -> Callable[Asked, Found]:
@@ -57,7 +29,7 @@ def remembered(ask: Callable[Asked, Found], most: int = MOST) -> Callable[Asked,
 
     @wraps(ask)
     def answer(*asked: Asked.args, **named: Asked.kwargs) -> Found:
-        exact = [_Exact(one) if isinstance(one, Region) else one for one in asked]
+        exact = [Exact(one) if isinstance(one, Region) else one for one in asked]
         return known(*exact, **named)  # type: ignore[arg-type]
 
     return answer
@@ -91,11 +63,11 @@ def remembered_together(
 def _named(asked: object) -> object:
     """What stands for a value, or for several regions, in the name of a question."""
     if isinstance(asked, Region):
-        return _Exact(asked)
+        return Exact(asked)
     if isinstance(asked, tuple) and asked and isinstance(asked[0], Region):
-        return tuple(map(_Exact, asked))
+        return tuple(map(Exact, asked))
     return asked
 
 
 def _own(asked: Any) -> Any:
-    return asked.region if isinstance(asked, _Exact) else asked
+    return asked.region if isinstance(asked, Exact) else asked
