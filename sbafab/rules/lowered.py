@@ -50,7 +50,7 @@ def lowered(limits: Limits, rule: str | None = None) -> tuple[str, ...]:
     return tuple(
         weakened(key.name, key.value(limits), key.value(USUAL), key.source)
         for key in KEYS
-        if rule in (None, *key.rules) and _is_weaker(key, limits)
+        if (rule is None or rule in key.rules) and _is_weaker(key, limits)
     )
 
 
