@@ -31,6 +31,7 @@ from sbafab.cli.simulate import simulate
 from sbafab.cli.studio import studio
 from sbafab.cli.sweep import sweep
 from sbafab.cli.templates import templates
+from sbafab.process import prepare
 
 COMMANDS = (
     templates,
@@ -112,6 +113,9 @@ def app() -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Runs the command line; bad input ends in one sentence and exit code 2."""
+    if arguments is None:
+        # The command is all that the process does, by whatever door it came.
+        prepare()
     prepared_streams()
     if any("\0" in argument for argument in arguments or ()):
         say("an argument holds a NUL character; no path or value can")
