@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from sbafab.rules.narrow_places import Places
 
 
-class Run(NamedTuple):
+class MarginRun(NamedTuple):
     """The margins of one quantity of an interface: the number of its group, and the place of the
     first among all margins of the interface.
     """
@@ -51,7 +51,7 @@ class LinearForms(NamedTuple):
     mm; ``pinned_loss`` that of all but what the hand does.
     """
 
-    runs: Sequence[Run]
+    runs: Sequence[MarginRun]
     begins: Indices
     run: Indices
     nominal: Floats
@@ -74,7 +74,7 @@ def linear_forms(groups: Sequence[InterfaceMargins], moves: Freedoms) -> LinearF
     """The margins of all interfaces."""
     import numpy as np
 
-    runs: list[Run] = []
+    runs: list[MarginRun] = []
     every: list[Places] = []
     owners: list[tuple[Owner, Owner]] = []
     acting: list[Sequence[tuple[Freedom, bool]]] = []
@@ -87,7 +87,7 @@ def linear_forms(groups: Sequence[InterfaceMargins], moves: Freedoms) -> LinearF
         for quantity, places in group.places.items():
             if not len(places.nominal):
                 continue
-            runs.append(Run(number, quantity, begins[-1] - first))
+            runs.append(MarginRun(number, quantity, begins[-1] - first))
             begins.append(begins[-1] + len(places.nominal))
             every.append(places)
             between.append(places.between + len(owners))

@@ -20,7 +20,7 @@ UNITS = 1000
 """Factors that are equal to so many parts are one: rows that feel all errors alike."""
 
 
-class Kind(NamedTuple):
+class RowKind(NamedTuple):
     """The rows between the edges of two contours, of the interfaces of a group.
 
     They feel the ``errors``: two contours, which count by their ``signs``, then moves.
@@ -40,7 +40,7 @@ class MarginRows(NamedTuple):
     ``turn`` (radians) and ``sign`` are how far it goes and how it counts, by kind.
     """
 
-    kinds: Sequence[Kind]
+    kinds: Sequence[RowKind]
     begins: Indices
     room: Floats
     normal: Floats
@@ -77,7 +77,7 @@ def rows_of(forms: LinearForms, layers: Sequence[Sequence[int]], limits: Limits)
         one, other = forms.owners[both]
         cuts = [CutContour(layers[group][own.seat], own.contour) for own in (one, other)]
         signs = _sign(quantity, one), _sign(quantity, other)
-        kinds.append(Kind(group, quantity, [*cuts, *forms.moves.freedoms[both]], signs))
+        kinds.append(RowKind(group, quantity, [*cuts, *forms.moves.freedoms[both]], signs))
     return MarginRows(
         kinds,
         begins,

@@ -36,7 +36,7 @@ AT_ONCE = 200_000
 
 class RowsAsked(NamedTuple):
     """Rows of an interface: the number of their kind, and where the numbers of each of its errors
-    begin, as ``Kind.errors`` names them. They are asked for kind by kind.
+    begin, as ``RowKind.errors`` names them. They are asked for kind by kind.
     """
 
     kind: int

@@ -17,7 +17,7 @@ from sbafab.rules.draws import CutContour, DrawnBuilds, Error, rows_by_error
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.freedoms import Freedom, Freedoms
 from sbafab.rules.limits import Limits, Tolerances
-from sbafab.rules.margin_rows import Kind, MarginRows, rows_of
+from sbafab.rules.margin_rows import MarginRows, RowKind, rows_of
 from sbafab.rules.margins import QUANTITIES, Quantity, seated
 from sbafab.rules.measures import Measures
 
@@ -143,7 +143,7 @@ class _Asked(NamedTuple):
     drawn: int
 
 
-def _asked(kinds: Sequence[Kind], measures: Measures) -> _Asked:
+def _asked(kinds: Sequence[RowKind], measures: Measures) -> _Asked:
     """The rows of every interface, each with its own errors."""
     from sbafab.rules.random_builds import RowsAsked
 

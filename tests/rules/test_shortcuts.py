@@ -24,7 +24,7 @@ from sbafab.rules.forms import linear_forms
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.likely_builds import ErrorsAsked
 from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
-from sbafab.rules.margin_rows import Kind, MarginRows, rows_of
+from sbafab.rules.margin_rows import MarginRows, RowKind, rows_of
 from sbafab.rules.margins import pushes
 from sbafab.rules.measures import Measures
 from sbafab.rules.random_builds import RandomBuilds, RowsAsked
@@ -48,7 +48,7 @@ def rows(number: int, least: float, seed: int) -> MarginRows:
     generator = np.random.default_rng(seed)
     angle = generator.uniform(-math.pi, math.pi, number)
     moves = SHIFT, OTHER, TURN
-    kind = Kind(0, "bond", (CUT, AGAIN, *moves), (1.0, -1.0))
+    kind = RowKind(0, "bond", (CUT, AGAIN, *moves), (1.0, -1.0))
     room = generator.uniform(least, least + 0.1, number)
     turned = generator.uniform(-9, 9, number)
     return MarginRows(
