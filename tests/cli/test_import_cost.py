@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+from sbafab.cli.fetching import NAMES
+
 HEAVY = {
     "PIL",
     "ezdxf",
@@ -42,9 +44,16 @@ def modules_after(*arguments: str) -> set[str]:
 @pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["generate", "--help"]])
 def test_help_loads_neither_geometry_nor_pydantic(arguments: list[str]) -> None:
     loaded = modules_after(*arguments)
-    assert "sbafab.cli.generate" in loaded
+    assert ("sbafab.cli.generate" in loaded) == ("--version" not in arguments)
     assert not loaded & (HEAVY | {"pydantic"})
     assert not {name for name in loaded if name.startswith("sbafab.geometry")}
+
+
+def test_a_command_loads_no_other_command() -> None:
+    loaded = modules_after("templates")
+    others = {f"sbafab.cli.{name}" for name in NAMES if name != "templates"}
+    assert not loaded & others
+    assert others < modules_after("--help")
 
 
 def test_listing_the_templates_loads_no_heavy_library() -> None:
