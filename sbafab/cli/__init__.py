@@ -9,53 +9,11 @@ from typing import Any
 import click
 
 from sbafab import __version__
-from sbafab.cli.check import check
-from sbafab.cli.cut import cut
 from sbafab.cli.ending import BAD_INPUT, ended_plainly, prepared_streams, say
-from sbafab.cli.explain import explain
-from sbafab.cli.find import find
-from sbafab.cli.generate import generate
-from sbafab.cli.kerf import kerf
-from sbafab.cli.map import map_
-from sbafab.cli.mesh import mesh
-from sbafab.cli.nest import nest
-from sbafab.cli.new import new
-from sbafab.cli.picture import picture
-from sbafab.cli.predict import predict
-from sbafab.cli.press import press
-from sbafab.cli.progress_line import add_verbosity
-from sbafab.cli.record import record
-from sbafab.cli.reproduce import reproduce
-from sbafab.cli.schema import schema
-from sbafab.cli.simulate import simulate
-from sbafab.cli.studio import studio
-from sbafab.cli.sweep import sweep
-from sbafab.cli.templates import templates
+from sbafab.cli.fetching import Fetched
+from sbafab.process import prepare
 
-COMMANDS = (
-    templates,
-    new,
-    generate,
-    check,
-    explain,
-    cut,
-    press,
-    mesh,
-    nest,
-    kerf,
-    predict,
-    map_,
-    picture,
-    simulate,
-    sweep,
-    find,
-    record,
-    reproduce,
-    studio,
-    schema,
-)
-for _command in COMMANDS:
-    add_verbosity(_command)
+COMMANDS = Fetched()
 
 
 EXTRAS = {
@@ -112,6 +70,9 @@ def app() -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Runs the command line; bad input ends in one sentence and exit code 2."""
+    if arguments is None:
+        # The command is all that the process does, by whatever door it came.
+        prepare()
     prepared_streams()
     if any("\0" in argument for argument in arguments or ()):
         say("an argument holds a NUL character; no path or value can")

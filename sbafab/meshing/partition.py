@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.geometry.facets import facets
-from sbafab.geometry.region import Region
+from sbafab.geometry.region import Contour, Region
 
 if TYPE_CHECKING:
     import numpy as np
@@ -83,13 +83,18 @@ def partition(regions: Sequence[Region], sagitta: float) -> Partition:
 
 
 def _polygons(region: Region, sagitta: float) -> shapely.MultiPolygon:
-    from shapely import MultiPolygon
+    import numpy as np
+    import shapely
+
+    def ring(contour: Contour) -> shapely.LinearRing:
+        # As an array, which shapely takes without a look at every number of it.
+        return shapely.linearrings(np.array(facets(contour, sagitta)))
 
     pieces = []
     for piece in region.pieces:
         (outer,) = piece.outers
-        pieces.append((facets(outer, sagitta), [facets(hole, sagitta) for hole in piece.holes]))
-    return MultiPolygon(pieces)
+        pieces.append(shapely.polygons(ring(outer), [ring(hole) for hole in piece.holes] or None))
+    return shapely.multipolygons(pieces)
 
 
 def _loops(edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:

@@ -36,6 +36,8 @@ SHADOW = 70
 SMALLEST = 15
 """Pixels of the words, at least: a picture on a page is often shown smaller than it is."""
 BLUR = 8
+STRIP = 64
+"""Rows of the picture that are reduced at once: enlarged and in full colour they are large."""
 
 
 class Canvas:
@@ -70,25 +72,33 @@ class Canvas:
 
     def png(self, footprint: Sequence[Sequence[Point]], caption: str, films: str) -> bytes:
         """The picture over the soft shadow of ``footprint``, with caption and key of ``films``."""
-        from PIL import ImageChops
-
         self._image.putpalette([part for colour in self._index for part in colour])
         picture = self._backdrop(footprint).convert("RGB")
         # What nothing is painted on is backdrop.
         whole = self._enlarged
         left, top, right, bottom = self._image.getbbox() or (0, 0, *self._image.size)
-        box = left // whole, top // whole, -(-right // whole), -(-bottom // whole)
-        inside = self._image.crop((whole * box[0], whole * box[1], whole * box[2], whole * box[3]))
-        painted = inside.convert("RGB").reduce(whole)
-        empty = inside.point([255] + [0] * 255, "L").reduce(whole).convert("RGB")
-        # Where the canvas is empty it is white: taking off what the backdrop lacks of white,
-        # in proportion, leaves no bright rim round the solid.
-        lack = ImageChops.multiply(ImageChops.invert(picture.crop(box)), empty)
-        picture.paste(ImageChops.subtract(painted, lack), box[:2])
+        last = -(-bottom // whole)
+        for row in range(top // whole, last, STRIP):
+            strip = left // whole, row, -(-right // whole), min(row + STRIP, last)
+            picture.paste(self._reduced(strip, picture.crop(strip)), strip[:2])
         self._write(picture, caption, films)
         out = BytesIO()
         picture.save(out, "PNG", compress_level=6)
         return out.getvalue()
+
+    def _reduced(self, box: tuple[int, int, int, int], behind: Image) -> Image:
+        """What is painted within the ``box`` of the picture, over what lies ``behind`` it there."""
+        from PIL import ImageChops
+
+        whole = self._enlarged
+        left, top, right, bottom = box
+        inside = self._image.crop((whole * left, whole * top, whole * right, whole * bottom))
+        painted = inside.convert("RGB").reduce(whole)
+        empty = inside.point([255] + [0] * 255, "L").reduce(whole).convert("RGB")
+        # Where the canvas is empty it is white: taking off what the backdrop lacks of white,
+        # in proportion, leaves no bright rim round the solid.
+        lack = ImageChops.multiply(ImageChops.invert(behind), empty)
+        return ImageChops.subtract(painted, lack)
 
     def _backdrop(self, footprint: Sequence[Sequence[Point]]) -> Image:
         from PIL import Image, ImageDraw, ImageFilter

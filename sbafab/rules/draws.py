@@ -42,8 +42,7 @@ def rows_by_error(errors: Iterable[Error]) -> tuple[dict[Error, int], int]:
     rows: dict[Error, int] = {}
     count = 0
     for error in errors:
-        if error not in rows:
-            rows[error] = count
+        if rows.setdefault(error, count) == count:
             count += 2 if is_shift(error) else 1
     return rows, count
 

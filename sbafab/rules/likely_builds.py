@@ -29,32 +29,35 @@ class ErrorsAsked(NamedTuple):
 
     ``first`` are the numbers of their first rows: two cuts, then moves. ``signs`` is how the cuts
     count, ``shift`` (mm) how far each move shifts, 0 where it turns, and ``sign`` how it counts.
+    ``turning`` are the lines of moves that turn anything.
     """
 
     first: Indices
     signs: Floats
     shift: Floats
     sign: Floats
+    turning: Indices
     cutting: float
 
     @property
     def name(self) -> bytes:
         """Equal for equal errors."""
-        return b"".join([np.float64(self.cutting).tobytes(), *(one.tobytes() for one in self[:4])])
+        return b"".join([np.float64(self.cutting).tobytes(), *(one.tobytes() for one in self[:5])])
 
 
 class LikelyBuilds(NamedTuple):
     """Builds by the number of what asks, in rising order.
 
-    ``cuts`` (mm) is what both cuts leave, ``shifts`` x and y of all shifts together, as they count.
-    ``left`` is what the cuts leave less the length of these, which no normal loses more than. What
-    asks has no other builds below its ``level``.
+    ``cuts`` (mm) is what both cuts leave, ``moves`` are x and y of all shifts together, as they
+    count, and how far each line turns that turns anything, -1 to 1 of its most. ``left`` is what
+    the cuts leave less the length of the shifts, which no normal loses more than. What asks has no
+    other builds below its ``level``.
     """
 
     asked: Indices
     build: Indices
     cuts: Floats
-    shifts: Floats
+    moves: Floats
     left: Floats
     level: Floats
 
@@ -119,7 +122,12 @@ def _found(batch: DrawnBuilds, errors: ErrorsAsked, level: Floats) -> LikelyBuil
         shifts[1, own] += reached * np.sin(angle)
     left = held - np.hypot(*shifts)
     some = picked(left < level.take(asked))
-    return LikelyBuilds(asked[some], builds[some], held[some], shifts[:, some], left[some], level)
+    asked, builds = asked.take(some), builds.take(some)
+    moves = np.empty((2 + len(errors.turning), len(some)))
+    moves[:2] = shifts[:, some]
+    for row, line in enumerate(errors.turning.tolist(), 2):
+        moves[row] = 2 * drawn.take(errors.first[2 + line].take(asked) * count + builds) - 1
+    return LikelyBuilds(asked, builds, held.take(some), moves, left.take(some), level)
 
 
 def _cut(numbers: Floats, errors: ErrorsAsked, level: Floats) -> tuple[Indices, Indices, Floats]:

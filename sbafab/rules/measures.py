@@ -81,9 +81,9 @@ class Measures:
         ]
 
     @cached_property
-    def forms(self) -> list[tuple[LinearForms, ...]]:
+    def forms(self) -> LinearForms:
         """The same as linear forms."""
-        return [linear_forms(own, self.moves) for own in self.margins]
+        return linear_forms(self.margins, self.moves)
 
 
 def _bond(bond: Region) -> Width | None:

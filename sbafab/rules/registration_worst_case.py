@@ -7,15 +7,14 @@ holds by what a hand may misplace and turn it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.alike import Alike, interface_name
 from sbafab.rules.finding import Finding, Place, Verdict
-from sbafab.rules.forms import LinearForms
-from sbafab.rules.freedoms import Freedom, Freedoms
+from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import Limits, Tolerances, at, holds, least_held
 from sbafab.rules.margins import InterfaceMargins, Margin, Push, Quantity, pushes
 from sbafab.rules.measures import Measures
@@ -27,19 +26,30 @@ REMEDY: dict[Quantity, str] = {"bond": "bond.width", "overhang": "mask.overhang"
 SAME = 1e-8
 """mm: of values that differ by less, the first is the worst if they are equal when rounded."""
 
+Cost = tuple[Freedom, float]
+
 
 class Remaining(NamedTuple):
     """What is left at the worst margin of an interface, mm; it may be negative.
 
     ``pinned`` is the least that is left anywhere in it without what is laid by hand. Places that
-    are short as drawn do not count for it: bond-width and mask-overhang tell of those.
+    are short as drawn do not count for it: bond-width and mask-overhang tell of those. ``number``
+    is the place of the margin in its ``group``.
     """
 
     worst: float
     pinned: float
-    margin: Margin
-    interfaces: tuple[Interface, ...]
-    pushes: tuple[Push, ...]
+    quantity: Quantity
+    group: InterfaceMargins
+    number: int
+
+    @property
+    def margin(self) -> Margin:
+        return self.group[self.number]
+
+    @property
+    def interfaces(self) -> tuple[Interface, ...]:
+        return self.group.interfaces
 
     @property
     def alike(self) -> Alike:
@@ -50,48 +60,58 @@ def least_remaining(
     laminate: Laminate, limits: Limits, measures: Measures | None = None
 ) -> list[Remaining]:
     """The worst place of every interface (one of each that are alike) for bond and overhang."""
+    import numpy as np
+
     measures = measures or Measures(laminate, limits)
-    found: list[Remaining] = []
-    for group, forms in zip(measures.margins, measures.forms, strict=True):
-        found += [_least(group, own, measures.moves, limits) for own in forms]
-    return found
+    forms = measures.forms
+    begins = forms.begins[:-1]
+    drawn = forms.by_quantity(
+        {"bond": least_held(limits.bond_width), "overhang": least_held(limits.mask_overhang)}
+    )
+    # Both edges are cut: two contours, or one that is off on either side.
+    cut = forms.nominal - 2 * limits.tolerances.cutting
+    held = np.where(forms.nominal >= drawn, cut - forms.pinned_loss, math.inf)
+    pinned = np.minimum.reduceat(held, begins).tolist()
+    worst = cut - forms.loss
+    (near,) = (worst <= np.minimum.reduceat(worst, begins)[forms.run] + SAME).nonzero()
+    values = worst[near].tolist()
+    # Many are equal, and rounding takes time.
+    rounded = {value: round(value, 9) for value in set(values)}
+    least = [math.inf] * len(forms.runs)
+    first = [0] * len(forms.runs)
+    for run, value, number in zip(forms.run[near].tolist(), values, near.tolist(), strict=True):
+        if rounded[value] < least[run]:
+            least[run], first[run] = rounded[value], number
+    return [
+        Remaining(
+            float(worst[number]),
+            own,
+            run.quantity,
+            measures.margins[run.group],
+            run.first + number - begin,
+        )
+        for run, begin, own, number in zip(forms.runs, begins.tolist(), pinned, first, strict=True)
+    ]
 
 
 def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
     """The least remaining bond and overhang, each with its place and the largest contribution."""
+    measures = measures or Measures(laminate, limits)
     found = least_remaining(laminate, limits, measures)
     return [
-        _finding("bond", limits.worst_bond_width, found, limits, laminate),
-        _finding("overhang", limits.worst_mask_overhang, found, limits, laminate),
+        _finding("bond", limits.worst_bond_width, found, measures, limits),
+        _finding("overhang", limits.worst_mask_overhang, found, measures, limits),
     ]
-
-
-def _least(
-    group: InterfaceMargins, forms: LinearForms, moves: Freedoms, limits: Limits
-) -> Remaining:
-    """What is left at the worst of one quantity's margins; the first of those that are equal."""
-    drawn = limits.bond_width if forms.quantity == "bond" else limits.mask_overhang
-    # Both edges are cut: two contours, or one that is off on either side.
-    cut = forms.nominal - 2 * limits.tolerances.cutting
-    held = (cut - forms.pinned_loss)[forms.nominal >= least_held(drawn)]
-    worst = cut - forms.loss
-    (near,) = (worst <= worst.min() + SAME).nonzero()
-    values = [round(value, 9) for value in worst[near].tolist()]
-    number = int(near[values.index(min(values))])
-    margin = group[forms.first + number]
-    found = pushes(margin, group.first, moves)
-    pinned = float(held.min(initial=math.inf))
-    return Remaining(float(worst[number]), pinned, margin, group.interfaces, tuple(found))
 
 
 def _finding(
     quantity: Quantity,
     limit: float,
     found: Iterable[Remaining],
+    measures: Measures,
     limits: Limits,
-    laminate: Laminate,
 ) -> Finding:
-    own = [place for place in found if place.margin.quantity == quantity]
+    own = [place for place in found if place.quantity == quantity]
     if not own:
         return Finding(NAME, "pass", limit, None, "mm", Place(), f"no {WHAT[quantity]} to measure")
     worst = min(own, key=lambda place: round(place.worst, 9))
@@ -102,7 +122,9 @@ def _finding(
     elif not holds(worst.worst, limit):
         verdict = "warn"
     interface = worst.interfaces[0]
-    message = _message(worst, limits.tolerances)
+    margin = worst.margin
+    dearest = costs(pushes(margin, worst.group.first, measures.moves))
+    message = _message(worst, margin, dearest, limits.tolerances)
     remedy = ""
     if verdict == "fail":
         message += (
@@ -112,31 +134,32 @@ def _finding(
         )
     elif verdict == "warn":
         short = sum(len(place.interfaces) for place in own if not holds(place.worst, limit))
-        remedy = _remedy(worst, laminate)
+        remedy = _remedy(quantity, dearest, measures.laminate)
         message = (
             f"{remedy}: {message}; that is short of {limit:g} at {short} "
             f"interface{'s' if short > 1 else ''}, {_why(least_pinned.pinned)}"
         )
-    place = Place(interface.index, interface.layer_indices, *worst.margin.middle)
+    place = Place(interface.index, interface.layer_indices, *margin.middle)
     left = max(0.0, worst.worst)
     return Finding(NAME, verdict, limit, left, "mm", place, message, remedy=remedy)
 
 
-def _message(worst: Remaining, tolerances: Tolerances) -> str:
+def _message(
+    worst: Remaining, margin: Margin, dearest: Sequence[Cost], tolerances: Tolerances
+) -> str:
     """The value, its place and the largest contribution there."""
     where = f"{interface_name(worst.interfaces[0])}{worst.alike.others}"
     text = (
-        f"at worst {_mm(worst.worst)} is left of the {worst.margin.nominal:.3f} mm "
-        f"{WHAT[worst.margin.quantity]} at {where}, {at(worst.margin.middle)}"
+        f"at worst {_mm(worst.worst)} is left of the {margin.nominal:.3f} mm "
+        f"{WHAT[margin.quantity]} at {where}, {at(margin.middle)}"
     )
-    bodies = costs(worst.pushes)
-    if not bodies:
+    if not dearest:
         return f"{text}; cutting takes {2 * tolerances.cutting:.3f} mm and nothing can move"
-    freedom, cost = bodies[0]
+    freedom, cost = dearest[0]
     return f"{text}; largest contribution: {_source(freedom)}, {cost:.3f} mm"
 
 
-def costs(found: Iterable[Push]) -> list[tuple[Freedom, float]]:
+def costs(found: Iterable[Push]) -> list[Cost]:
     """What each body costs, shift and turn together, the dearest first."""
     total: dict[tuple[int, int], tuple[Freedom, float]] = {}
     for push in found:
@@ -167,11 +190,11 @@ def _why(pinned: float) -> str:
     return f"though pins and cutting alone leave {_mm(pinned)}"
 
 
-def _remedy(worst: Remaining, laminate: Laminate) -> str:
+def _remedy(quantity: Quantity, dearest: Iterable[Cost], laminate: Laminate) -> str:
     """What to do about what the hand may take."""
-    loose = next((freedom for freedom, _ in costs(worst.pushes) if freedom.pins < 2), None)
+    loose = next((freedom for freedom, _ in dearest if freedom.pins < 2), None)
     if loose is None:
-        return f"make {REMEDY[worst.margin.quantity]} larger"
+        return f"make {REMEDY[quantity]} larger"
     where = f"{_moved(loose)} in step {loose.step}"
     on_its_own = loose.lowest == loose.highest
     masks_pocket = on_its_own and laminate.layer(loose.lowest).role == "chamber-mask"
@@ -179,7 +202,7 @@ def _remedy(worst: Remaining, laminate: Laminate) -> str:
         return f'align {where} with care, or set registration.method = "ears", which pins it'
     return (
         f"align {where} with care (registration.hand_placement, registration.hand_turn), or make "
-        f"{REMEDY[worst.margin.quantity]} larger"
+        f"{REMEDY[quantity]} larger"
     )
 
 

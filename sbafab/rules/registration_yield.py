@@ -15,10 +15,9 @@ from sbafab.laminate.interfaces import Interface
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.draws import CutContour, DrawnBuilds, Error, rows_by_error
 from sbafab.rules.finding import Finding, Place, Verdict
-from sbafab.rules.forms import LinearForms
 from sbafab.rules.freedoms import Freedom, Freedoms
 from sbafab.rules.limits import Limits, Tolerances
-from sbafab.rules.margin_rows import MarginRows, rows_of
+from sbafab.rules.margin_rows import MarginRows, RowKind, rows_of
 from sbafab.rules.margins import QUANTITIES, Quantity, seated
 from sbafab.rules.measures import Measures
 
@@ -65,16 +64,6 @@ class Yield:
     whole: Share
     interfaces: dict[int, Share]
     quantities: dict[Quantity, Share]
-
-
-@dataclass(frozen=True)
-class _Group:
-    """Rows of the first of some alike interfaces, each with the numbers of its errors; and for
-    every interface, by index, its own errors by number.
-    """
-
-    rows: dict[Quantity, list[tuple[MarginRows, list[int]]]]
-    own: dict[int, list[Error]]
 
 
 def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
@@ -141,74 +130,82 @@ def simulate(
 ) -> Yield:
     """Random builds of a laminate; the same seed gives the same shares."""
     measures = measures or Measures(laminate, limits)
-    groups = []
-    for alike, forms in zip(measures.margins, measures.forms, strict=True):
-        rows = _rows(forms, seated(alike.first), limits)
-        # In the order in which they are drawn.
-        numbers: dict[Error, int] = {}
-        numbered = {
-            quantity: [
-                (one, [numbers.setdefault(error, len(numbers)) for error in one.errors])
-                for one in some
-            ]
-            for quantity, some in rows.items()
-        }
-        own = {
-            interface.index: _renamed(list(numbers), alike.first, interface, measures.moves)
-            for interface in alike.interfaces
-        }
-        groups.append(_Group(numbered, own))
-    return _counted(groups, limits, seed, measures.pause)
+    layers = [seated(alike.first) for alike in measures.margins]
+    rows = rows_of(measures.forms, layers, limits)
+    indices = sorted(one.index for alike in measures.margins for one in alike.interfaces)
+    return _counted(rows, _asked(rows.kinds, measures), indices, limits, seed, measures.pause)
 
 
-def _rows(
-    forms: Iterable[LinearForms], layers: Sequence[int], limits: Limits
-) -> dict[Quantity, tuple[MarginRows, ...]]:
-    """The rows of an interface by quantity, those of the first margins first."""
-    limit = {"bond": limits.worst_bond_width, "overhang": limits.worst_mask_overhang}
-    found = (
-        one
-        for form in forms
-        for one in rows_of(form, layers, limit[form.quantity], limits.tolerances.cutting)
-    )
-    ordered = sorted(found, key=lambda one: one[0])
-    return {
-        quantity: tuple(rows for _, rows in ordered if rows.quantity == quantity)
-        for quantity in QUANTITIES
-    }
+class _Asked(NamedTuple):
+    """What is asked: rows of a kind for an interface, by index, and how many rows are drawn."""
+
+    of: list[tuple[int, RowsAsked]]
+    drawn: int
+
+
+def _asked(kinds: Sequence[RowKind], measures: Measures) -> _Asked:
+    """The rows of every interface, each with its own errors."""
+    from sbafab.rules.random_builds import RowsAsked
+
+    # In the order in which they are drawn.
+    errors: list[dict[Error, int]] = [{} for _ in measures.margins]
+    places = []
+    for kind in kinds:
+        own = errors[kind.group]
+        places.append([own.setdefault(error, len(own)) for error in kind.errors])
+    felt = [
+        [
+            (one.index, _renamed(list(own), alike.first, one, measures.moves))
+            for one in alike.interfaces
+        ]
+        for alike, own in zip(measures.margins, errors, strict=True)
+    ]
+    rows, drawn = rows_by_error(error for group in felt for _, own in group for error in own)
+    first = [[(index, [rows[error] for error in own]) for index, own in group] for group in felt]
+    found = [
+        (index, RowsAsked(number, [own[place] for place in places[number]]))
+        for number, kind in enumerate(kinds)
+        for index, own in first[kind.group]
+    ]
+    return _Asked(found, drawn)
 
 
 def _counted(
-    groups: Sequence[_Group], limits: Limits, seed: int, pause: Callable[[], None]
+    rows: MarginRows,
+    asked: _Asked,
+    indices: Iterable[int],
+    limits: Limits,
+    seed: int,
+    pause: Callable[[], None],
 ) -> Yield:
     """Draws the builds, in batches, and counts those in which all rows keep room."""
     import numpy as np
 
     from sbafab.rules.random_builds import RandomBuilds
 
-    interfaces = dict.fromkeys(sorted(index for group in groups for index in group.own), 0)
+    interfaces = dict.fromkeys(indices, 0)
     wanted = limits.yield_builds or _quick_number(len(interfaces))
     whole = 0
     quantities = dict.fromkeys(QUANTITIES, 0)
-    told, count = _told(groups)
-    of_builds = RandomBuilds([asked for *_, asked in told], limits.tolerances.cutting)
-    own_index = np.array([index for _, index, _ in told], dtype=np.intp)
+    of_builds = RandomBuilds(rows, [one for _, one in asked.of], limits.tolerances.cutting)
+    place_of = {index: place for place, index in enumerate(interfaces)}
+    own_place = np.array([place_of[index] for index, _ in asked.of], dtype=np.intp)
     is_of = {
-        quantity: np.array([one == quantity for one, *_ in told], dtype=bool)
+        quantity: np.array([one.quantity == quantity for one in rows.kinds], dtype=bool)
         for quantity in QUANTITIES
     }
     for first in range(0, wanted, BATCH):
         pause()
         builds = min(BATCH, wanted - first)
-        asked, bad = of_builds.short(DrawnBuilds(seed, first * count, count, builds))
-        whole += _different(bad)
+        drawn = DrawnBuilds(seed, first * asked.drawn, asked.drawn, builds)
+        number, bad = of_builds.short(drawn)
+        whole += _different(bad, builds)
         for quantity in QUANTITIES:
-            quantities[quantity] += _different(bad[is_of[quantity][asked]])
-        every = np.sort(own_index[asked] * builds + bad)
-        short = every[np.diff(every, prepend=-1) > 0] // builds
-        for index, number in enumerate(np.bincount(short).tolist()):
-            if number:
-                interfaces[index] += number
+            quantities[quantity] += _different(bad[is_of[quantity][of_builds.kind[number]]], builds)
+        is_short = np.zeros((len(interfaces), builds), dtype=bool)
+        is_short[own_place[number], bad] = True
+        for index, short in zip(interfaces, is_short, strict=True):
+            interfaces[index] += int(np.count_nonzero(short))
     return Yield(
         Share(wanted - whole, wanted),
         {index: Share(wanted - bad, wanted) for index, bad in interfaces.items()},
@@ -216,27 +213,13 @@ def _counted(
     )
 
 
-def _told(groups: Sequence[_Group]) -> tuple[list[tuple[Quantity, int, RowsAsked]], int]:
-    """What is asked of each interface, by quantity and index; and how many rows are drawn."""
-    from sbafab.rules.random_builds import RowsAsked
+def _different(named: Indices, builds: int) -> int:
+    """How many of the builds are named, some more than once."""
+    import numpy as np
 
-    rows, count = rows_by_error(
-        error for group in groups for own in group.own.values() for error in own
-    )
-    found = []
-    for group in groups:
-        first = [(index, [rows[error] for error in own]) for index, own in group.own.items()]
-        for quantity, asked in group.rows.items():
-            for some, numbers in asked:
-                for index, own in first:
-                    places = tuple([own[number] for number in numbers])
-                    found.append((quantity, index, RowsAsked(some, places)))
-    return found, count
-
-
-def _different(builds: Indices) -> int:
-    """How many builds are named, some more than once."""
-    return len(set(builds.tolist()))
+    is_named = np.zeros(builds, dtype=bool)
+    is_named[named] = True
+    return int(np.count_nonzero(is_named))
 
 
 def _quick_number(interfaces: int) -> int:
@@ -250,9 +233,10 @@ def _renamed(
     """Which errors of an interface stand where those of an alike one do."""
     if other is first:
         return errors
-    layers = dict(zip(seated(first), seated(other), strict=True))
+    from_layers, to_layers = seated(first), seated(other)
+    layers = dict(zip(from_layers, to_layers, strict=True))
     twins: dict[int, Freedom] = {}
-    pairs = zip(moves.unshared(seated(first)), moves.unshared(seated(other)), strict=True)
+    pairs = zip(moves.unshared(from_layers), moves.unshared(to_layers), strict=True)
     for ours, theirs in pairs:
         twins.update(zip(map(id, ours), theirs, strict=True))
     return [

@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+from sbafab.cli.fetching import NAMES
+
 HEAVY = {
     "PIL",
     "ezdxf",
@@ -42,9 +44,16 @@ def modules_after(*arguments: str) -> set[str]:
 @pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["generate", "--help"]])
 def test_help_loads_neither_geometry_nor_pydantic(arguments: list[str]) -> None:
     loaded = modules_after(*arguments)
-    assert "sbafab.cli.generate" in loaded
+    assert ("sbafab.cli.generate" in loaded) == ("--version" not in arguments)
     assert not loaded & (HEAVY | {"pydantic"})
     assert not {name for name in loaded if name.startswith("sbafab.geometry")}
+
+
+def test_a_command_loads_no_other_command() -> None:
+    loaded = modules_after("templates")
+    others = {f"sbafab.cli.{name}" for name in NAMES if name != "templates"}
+    assert not loaded & others
+    assert others < modules_after("--help")
 
 
 def test_listing_the_templates_loads_no_heavy_library() -> None:
@@ -54,11 +63,12 @@ def test_listing_the_templates_loads_no_heavy_library() -> None:
 ARRAYS = {
     f"sbafab.{name}"
     for name in (
-        *("geometry.edge_table", "geometry.facing_places", "geometry.side_table"),
+        *("geometry.arrays", "geometry.edge_table"),
+        *("geometry.facing_places", "geometry.side_table"),
         *("rules.likely_builds", "rules.narrow_places", "rules.random_builds"),
     )
 }
-"""What the registration rules fetch when they measure; no other rule needs them."""
+"""What the registration rules fetch when they measure, and types that only checks of them read."""
 
 
 def test_geometry_laminate_and_rules_run_on_the_standard_library() -> None:

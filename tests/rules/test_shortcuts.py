@@ -24,7 +24,7 @@ from sbafab.rules.forms import linear_forms
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.likely_builds import ErrorsAsked
 from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
-from sbafab.rules.margin_rows import MarginRows
+from sbafab.rules.margin_rows import MarginRows, RowKind, rows_of
 from sbafab.rules.margins import pushes
 from sbafab.rules.measures import Measures
 from sbafab.rules.random_builds import RandomBuilds, RowsAsked
@@ -42,15 +42,24 @@ DESIGNS = [("1dof-5mm", "stack.balloons=3"), ("3dof-15mm", "stack.balloons=2"), 
 
 
 def rows(number: int, least: float, seed: int) -> MarginRows:
-    """Rows of random normals, rooms and levers that feel two cuts, two shifts and a turn."""
+    """Rows of random normals, rooms and levers that feel two cuts, two shifts and a turn; and as
+    many of another kind, which never come short.
+    """
     generator = np.random.default_rng(seed)
     angle = generator.uniform(-math.pi, math.pi, number)
+    moves = SHIFT, OTHER, TURN
+    kind = RowKind(0, "bond", (CUT, AGAIN, *moves), (1.0, -1.0))
+    room = generator.uniform(least, least + 0.1, number)
+    turned = generator.uniform(-9, 9, number)
     return MarginRows(
-        "bond",
-        generator.uniform(least, least + 0.1, number),
-        np.vstack([np.cos(angle), np.sin(angle)]),
-        ((CUT, 1.0), (AGAIN, -1.0)),
-        ((SHIFT, -1.0, None), (OTHER, 1.0, None), (TURN, 1.0, generator.uniform(-9, 9, number))),
+        [kind, kind],
+        np.array([0, number, 2 * number]),
+        np.concatenate([room, room + 1.0]),
+        np.tile([np.cos(angle), np.sin(angle)], 2),
+        np.tile([0 * turned, 0 * turned, turned], 2),
+        shift=np.array([[SHIFT.most] * 2, [OTHER.most] * 2, [0, 0]]),
+        turn=np.array([[0, 0], [0, 0], [TURN.most] * 2]),
+        sign=np.array([[-1.0] * 2, [1.0] * 2, [1.0] * 2]),
     )
 
 
@@ -58,21 +67,23 @@ def rows(number: int, least: float, seed: int) -> MarginRows:
 @pytest.mark.parametrize("number", [1, 7, 8, 30])
 def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float) -> None:
     asked = rows(number, least, number)
-    first, count = rows_by_error(asked.errors)
+    errors = asked.kinds[0].errors
+    first, count = rows_by_error(errors)
     # Two interfaces, of which the second one's errors are drawn after the first one's.
     batch = DrawnBuilds(5, 0, 2 * count, BUILDS)
     drawn = batch.numbers
-    both = [
-        RowsAsked(asked, tuple(count * interface + first[error] for error in asked.errors))
+    every = [
+        RowsAsked(kind, [count * interface + first[error] for error in errors])
+        for kind in (0, 1)
         for interface in (0, 1)
     ]
-    good = np.ones((2, BUILDS), dtype=bool)
-    good[RandomBuilds(both, 0.1).short(batch)] = False
-    again = np.ones((2, BUILDS), dtype=bool)
-    again[RandomBuilds(both, 0.1).short(batch)] = False
+    good = np.ones((4, BUILDS), dtype=bool)
+    good[RandomBuilds(asked, every, 0.1).short(batch)] = False
+    again = np.ones((4, BUILDS), dtype=bool)
+    again[RandomBuilds(asked, every, 0.1).short(batch)] = False
     assert (again == good).all()
-    levers = asked.moves[2][2]
-    assert levers is not None
+    assert good[2:].all()
+    room, levers = asked.room[:number], asked.levers[2, :number]
     for interface in (0, 1):
         own = {error: drawn[count * interface + row :] for error, row in first.items()}
         cut, again = (-0.1 + 0.2 * own[error][0] for error in (CUT, AGAIN))
@@ -83,11 +94,11 @@ def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float
             * np.array([np.cos(math.tau * own[one][1]), np.sin(math.tau * own[one][1])])
             for one in (SHIFT, OTHER)
         )
-        (nx, ny), moved = asked.normal, other - shift
-        left = asked.room[:, None] + cut - again + levers[:, None] * turn
+        (nx, ny), moved = asked.normal[:, :number], other - shift
+        left = room[:, None] + cut - again + levers[:, None] * turn
         left = left + nx[:, None] * moved[0] + ny[:, None] * moved[1]
         assert list(good[interface]) == list((left >= -TOLERANCE).all(axis=0))
-    assert 0 < good.sum() < 2 * BUILDS
+    assert 0 < good[:2].sum() < 2 * BUILDS
 
 
 def test_numbers_are_those_of_one_stream_kept_or_not(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -103,15 +114,25 @@ def test_numbers_are_those_of_one_stream_kept_or_not(monkeypatch: pytest.MonkeyP
 def test_forms_lose_what_their_pushes_cost(good: Good) -> None:
     laminate = good("3dof-15mm", "stack.balloons=2")
     measures = Measures(laminate, Limits())
-    for group in measures.margins:
-        for forms in linear_forms(group, measures.moves):
-            for number, (whole, pinned) in enumerate(
-                zip(forms.loss, forms.pinned_loss, strict=True), forms.first
-            ):
-                found = pushes(group[number], group.first, measures.moves)
-                assert whole == pytest.approx(sum(push.cost for push in found))
-                held = [push.cost for push in found if not push.freedom.by_hand]
-                assert pinned == pytest.approx(sum(held))
+    forms = linear_forms(measures.margins, measures.moves)
+    assert len(forms.loss) == sum(len(group) for group in measures.margins)
+    for number, (whole, pinned) in enumerate(zip(forms.loss, forms.pinned_loss, strict=True)):
+        run = forms.runs[forms.run[number]]
+        group = measures.margins[run.group]
+        margin = group[number - int(forms.begins[forms.run[number]]) + run.first]
+        assert margin.quantity == run.quantity
+        found = pushes(margin, group.first, measures.moves)
+        assert whole == pytest.approx(sum(push.cost for push in found))
+        held = [push.cost for push in found if not push.freedom.by_hand]
+        assert pinned == pytest.approx(sum(held))
+
+
+def test_a_laminate_without_margins_has_neither_forms_nor_rows() -> None:
+    forms = linear_forms([], freedoms.Freedoms({}))
+    asked = rows_of(forms, [], Limits())
+    assert (forms.loss.shape, asked.room.shape, len(asked.kinds)) == ((0,), (0,), 0)
+    number, builds = RandomBuilds(asked, [], 0.1).short(DrawnBuilds(5, 0, 0, BUILDS))
+    assert len(number) == len(builds) == 0
 
 
 @pytest.mark.parametrize("design", DESIGNS)
@@ -194,12 +215,14 @@ def test_likely_builds_are_those_of_plain_sums(need: float) -> None:
         signs=np.array([[1.0, -1.0], [1.0, 1.0]]),
         shift=np.array([[0.2, 0.1], [0.0, 0.3], [0.0, 0.0]]),
         sign=np.array([[1.0, -1.0], [0.0, 1.0], [0.0, 0.0]]),
+        turning=np.array([2]),
         cutting=0.1,
     )
     drawn = batch.numbers
     likely = likely_builds._found(batch, errors, np.full(2, need))
     told = zip(likely.asked.tolist(), likely.build.tolist(), strict=True)
     found = dict(zip(told, likely.left, strict=True))
+    places = {one: place for place, one in enumerate(found)}
     for asked in (0, 1):
         for build in range(200):
             left, moved = 0.0, 0j
@@ -215,6 +238,8 @@ def test_likely_builds_are_those_of_plain_sums(need: float) -> None:
             assert ((asked, build) in found) == (left < need)
             if left < need:
                 assert found[asked, build] == pytest.approx(left, abs=1e-12)
+                turned = 2 * drawn[first[4, asked], build] - 1
+                assert likely.moves[2, places[asked, build]] == turned
     assert 0 < len(found) < 400
 
 

@@ -54,7 +54,7 @@ def test_every_record_is_shown_whole_with_its_day_and_command() -> None:
 
 
 def test_every_command_on_the_pages_exists() -> None:
-    own = {command.name for command in COMMANDS}
+    own = {*COMMANDS}
     asked = set()
     for path, said in TEXTS.items():
         asked |= {(path.stem, name) for name in re.findall(r"python -m ([\w.]+)", said)}

@@ -22,7 +22,7 @@ LINK = re.compile(r"\]\((?!https?://|#|mailto:)([^)#\s]+)")
 
 def test_the_page_of_commands_has_every_command_and_option() -> None:
     page = reference_cli.page()
-    for command in COMMANDS:
+    for command in COMMANDS.values():
         assert f"## sbafab {command.name}\n" in page
         for param in command.params:
             if param.param_type_name == "option":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Bounds, Point
@@ -16,6 +17,8 @@ LED = 1.5
 """mm from which on a thin line leads from the name to its place."""
 ASIDE, FAR = 0.4, 0.25
 """What a name out of its direction costs, and a mm of distance, in mm2 of covering."""
+ROUNDED = 1e-6
+"""mm2, far more than sums of costs are off."""
 
 
 class PlanName(NamedTuple):
@@ -31,53 +34,58 @@ def named(names: list[PlanName], size: float, room: Bounds, taken: list[Bounds])
     """The names as SVG, each where it covers least of ``taken`` and of those before it."""
     taken, drawn = list(taken), []
     for name in names:
-        middle, away = min(
-            _places(name, size), key=lambda place: _cost(name, place, size, room, taken)
-        )
-        taken.append(_box(name, middle, size))
+        half = draw.text_width(name.words, size) / 2, size / 2
+        middle, away = _best(name, half, room, taken)
+        taken.append(_box(middle, half))
         if away >= LED:
             drawn.append(draw.line([name.at, middle], width=0.12))
         drawn.append(label((middle[0], middle[1] + 0.35 * size), name.words, size))
     return drawn
 
 
-def _places(name: PlanName, size: float) -> list[tuple[Point, float]]:
-    """Middles of the name, each with how far it stands off."""
-    half = draw.text_width(name.words, size) / 2
-    found = []
+def _best(
+    name: PlanName, half: Point, room: Bounds, taken: Sequence[Bounds]
+) -> tuple[Point, float]:
+    """The middle of the place that costs least, and how far it stands off; the first of several.
+
+    ``half`` of the name's width and height.
+    """
+    least, best = math.inf, (name.at, 0.0)
     for away in STEPS:
-        for step in range(DIRECTIONS):
-            turn = 2 * math.pi * step / DIRECTIONS + math.atan2(name.out[1], name.out[0])
-            u, v = math.cos(turn), math.sin(turn)
-            reach = name.clear + away
-            found.append(
-                (
-                    (
-                        name.at[0] + (reach + half) * u,
-                        name.at[1] + (reach + size / 2) * v,
-                    ),
-                    away,
-                )
-            )
-    return found
+        # Nothing costs less than the distance alone, but for rounding.
+        if FAR * away > least + ROUNDED:
+            break
+        for middle in _places(name, half, away):
+            cost = _cost(name, middle, half, room, taken) + FAR * away
+            if cost < least:
+                least, best = cost, (middle, away)
+    return best
 
 
-def _box(name: PlanName, middle: Point, size: float) -> Bounds:
-    half = draw.text_width(name.words, size) / 2
+def _places(name: PlanName, half: Point, away: float) -> Iterator[Point]:
+    """Middles of the name that stand so far off, from its own direction round."""
+    reach = name.clear + away
+    for step in range(DIRECTIONS):
+        turn = 2 * math.pi * step / DIRECTIONS + math.atan2(name.out[1], name.out[0])
+        u, v = math.cos(turn), math.sin(turn)
+        yield name.at[0] + (reach + half[0]) * u, name.at[1] + (reach + half[1]) * v
+
+
+def _box(middle: Point, half: Point) -> Bounds:
     x, y = middle
-    return x - half, y - size / 2, x + half, y + size / 2
+    return x - half[0], y - half[1], x + half[0], y + half[1]
 
 
 def _cost(
-    name: PlanName, place: tuple[Point, float], size: float, room: Bounds, taken: list[Bounds]
+    name: PlanName, middle: Point, half: Point, room: Bounds, taken: Sequence[Bounds]
 ) -> float:
-    middle, away = place
-    box = _box(name, middle, size)
-    covered = sum(_shared(box, other) for other in taken)
+    """What a place costs but for its distance."""
+    box = _box(middle, half)
+    covered = sum([_shared(box, other) for other in taken])
     outside = _area(box) - _shared(box, room)
     u, v = middle[0] - name.at[0], middle[1] - name.at[1]
     along = (u * name.out[0] + v * name.out[1]) / (math.hypot(u, v) or 1.0)
-    return covered + 4 * outside + ASIDE * (1 - along) + FAR * away
+    return covered + 4 * outside + ASIDE * (1 - along)
 
 
 def _area(box: Bounds) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
-from heapq import heapify, heappop, heappush
+from heapq import heappop, heappush, merge
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Bounds, Point
@@ -49,40 +49,55 @@ def labels(words: str, part: Region) -> Iterator[PlacedLabel]:
     holes = [hole.bounds for hole in part.holes]
     em = draw.text_width(words, 1.0)
     middles = list(_middles(part.bounds))
-    waiting = [
-        _Candidate(far + (1 - share), _label(em, middle, share * most), far + (1 - share))
-        for share in SIZES
-        if share * most >= LEGIBLE
-        for far, middle in middles
-    ]
-    heapify(waiting)
-    while waiting:
+    sizes = [(1 - share, share * most) for share in SIZES if share * most >= LEGIBLE]
+    # Nearest first for each size, so labels are made only as far as their turn comes.
+    fresh = merge(*([(far + less, at, size) for far, at in middles] for less, size in sizes))
+    ahead = next(fresh, None)
+    waiting: list[_Candidate] = []
+    while waiting or ahead is not None:
+        while ahead is not None and (not waiting or ahead[0] <= waiting[0].cost):
+            far, middle, size = ahead
+            heappush(waiting, _Candidate(far, _label(em, middle, size), far))
+            ahead = next(fresh, None)
         best = heappop(waiting)
-        box = best.label.box
-        if best.off is not None:
-            yield best.label
-        elif best.covered is None:
-            covered = sum(_meet(box, hole) for hole in holes)
-            heappush(waiting, best.measured(covered, None))
+        if best.sides is None:
+            covered = [hole for hole in holes if _meet(best.label.box, hole)]
+            heappush(waiting, best.covering(len(covered), _sides(best.label.box, covered)))
+        elif best.sides:
+            heappush(waiting, best.beside(part))
         else:
-            off = sum(not part.contains(p) for p in _sides(box, holes))
-            heappush(waiting, best.measured(best.covered, off))
+            yield best.label
 
 
 class _Candidate(NamedTuple):
     """A label with the least that it costs, as far as is known: ``far`` off the middle and small,
-    ``covered`` holes, points ``off`` the part; what is quickly told is asked first.
+    holes ``covered``, points ``off`` the part; what is quickly told is asked first.
+
+    ``sides``: points of its box that have not been looked for on the part yet; None where the holes
+    have not been counted either.
     """
 
     cost: float
     label: PlacedLabel
     far: float
-    covered: int | None = None
-    off: int | None = None
+    covered: int = 0
+    off: int = 0
+    sides: tuple[Point, ...] | None = None
 
-    def measured(self, covered: int, off: int | None) -> _Candidate:
-        cost = self.far + (HOLE * covered + OUTSIDE * (off or 0))
-        return _Candidate(cost, self.label, self.far, covered, off)
+    def covering(self, covered: int, sides: tuple[Point, ...]) -> _Candidate:
+        return self._measured(covered, 0, sides)
+
+    def beside(self, part: Region) -> _Candidate:
+        """With the points up to the first one that is off the part, which costs much."""
+        assert self.sides is not None
+        for number, point in enumerate(self.sides):
+            if not part.contains(point):
+                return self._measured(self.covered, self.off + 1, self.sides[number + 1 :])
+        return self._measured(self.covered, self.off, ())
+
+    def _measured(self, covered: int, off: int, sides: tuple[Point, ...]) -> _Candidate:
+        cost = self.far + (HOLE * covered + OUTSIDE * off)
+        return _Candidate(cost, self.label, self.far, covered, off, sides)
 
 
 def first_free(
@@ -124,10 +139,10 @@ def _grid() -> list[tuple[float, float, float]]:
     return [(((u**2 + v**2) / 2) ** 0.5, u, v) for u, v in nearest]
 
 
-def _sides(box: Bounds, holes: Sequence[Bounds]) -> list[Point]:
+def _sides(box: Bounds, holes: Sequence[Bounds]) -> tuple[Point, ...]:
     """Corners and middles of the words' box, but for what stands on a hole of the part."""
     points = [(x, y) for y in (box[1], box[3]) for x in (box[0], (box[0] + box[2]) / 2, box[2])]
-    return [p for p in points if not any(_meet((*p, *p), hole) for hole in holes)]
+    return tuple([p for p in points if not any(_meet((*p, *p), hole) for hole in holes)])
 
 
 def _meet(a: Bounds, b: Bounds) -> bool:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
+from sbafab.geometry.remembered import remembered
 from sbafab.laminate.assembly import AssemblyStep, distinct_layers
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.reports.features import layer_numbers
@@ -107,6 +108,7 @@ def over_tab(laminate: Laminate, layers: Sequence[int]) -> Layer | None:
     return None
 
 
+@remembered
 def lip(region: Region, other: Region) -> Lip | None:
     """How the outline of a region follows another's; None where it mostly does not."""
     outline = Region(other.outers)

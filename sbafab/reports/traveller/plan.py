@@ -8,6 +8,7 @@ from typing import NamedTuple
 from sbafab.cutting.fixture import shown
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
+from sbafab.geometry.remembered import remembered
 from sbafab.geometry.section import section
 from sbafab.geometry.svg import number, path_data
 from sbafab.laminate.assembly import AssemblyStep, distinct_layers
@@ -28,6 +29,10 @@ FREE = 6.0
 PLATE = "#f1f1ef"
 AT_DATUM = 1e-3
 """mm from the datum within which a pin hides it."""
+
+
+_section = remembered(section)
+"""Every step of a laminate asks for the same."""
 
 
 class _View(NamedTuple):
@@ -141,7 +146,7 @@ def _pin(at: Point, r: float, is_in: bool) -> str:
 def _reach(laminate: Laminate, inlet: Inlet) -> float:
     """How far past its mouth an inlet's strip goes at most, mm."""
     shapes = (layers[0].profile for layers in laminate.patterns.values())
-    spans = [span for shape in shapes for span in section(shape, inlet.mouth, inlet.direction)]
+    spans = [span for shape in shapes for span in _section(shape, inlet.mouth, inlet.direction)]
     return max((end for _, end in spans), default=0.0)
 
 
