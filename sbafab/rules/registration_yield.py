@@ -68,7 +68,11 @@ class Yield:
 
 def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
     """The share of good builds, against ``target_yield`` if one is asked for."""
-    found = simulate(laminate, limits, SEED, measures)
+    return [finding_of(simulate(laminate, limits, SEED, measures), laminate, limits)]
+
+
+def finding_of(found: Yield, laminate: Laminate, limits: Limits) -> Finding:
+    """What is said of a yield."""
     low, high = found.whole.interval
     target = limits.target_yield
     verdict: Verdict = "pass"
@@ -95,7 +99,7 @@ def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) 
     if worst is not None and found.interfaces[worst].good < found.whole.builds:
         place = Place(worst, laminate.interfaces[worst - 1].layer_indices)
     share = found.whole.value
-    return [Finding(NAME, verdict, target, share, "", place, message, remedy=remedy)]
+    return Finding(NAME, verdict, target, share, "", place, message, remedy=remedy)
 
 
 def _remedy(laminate: Laminate) -> str:

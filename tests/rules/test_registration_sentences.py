@@ -9,13 +9,13 @@ from dataclasses import replace
 import pytest
 
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules import registration_worst_case, registration_yield
+from sbafab.rules import registration_worst_case
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.margins import Push
 from sbafab.rules.registration_worst_case import costs
-from sbafab.rules.registration_yield import Share, Yield, simulate
+from sbafab.rules.registration_yield import Share, Yield, finding_of, simulate
 
 ONE = ("1dof-5mm", "stack.balloons=3")
 NONE = Tolerances(0, 0, 0, 0)
@@ -220,10 +220,9 @@ def shares(*good_builds: int) -> Yield:
     ],
 )
 def test_the_interfaces_that_lose_most_are_told_first(
-    found: Yield, says: str, place: Place, good: Good, monkeypatch: pytest.MonkeyPatch
+    found: Yield, says: str, place: Place, good: Good
 ) -> None:
-    monkeypatch.setattr(registration_yield, "simulate", lambda *_: found)
-    (told,) = registration_yield.check(good(*ONE), Limits(tolerances=Tolerances(0, 0, 0.3, 2)))
+    told = finding_of(found, good(*ONE), Limits(tolerances=Tolerances(0, 0, 0.3, 2)))
     low, high = found.whole.interval
     share = found.whole.value
     assert told == Finding(
@@ -243,13 +242,10 @@ def test_the_interfaces_that_lose_most_are_told_first(
     ("count", "target", "verdict"),
     [(349, None, "pass"), (348, None, "warn"), (400, 0.99, "pass"), (400, 0.995, "fail")],
 )
-def test_a_yields_verdict(
-    count: int, target: float | None, verdict: str, good: Good, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_yields_verdict(count: int, target: float | None, verdict: str, good: Good) -> None:
     # All of 400: 1 - 3.8415 / 403.8415 = 0.9905 at least. Of 348 the interval ends at 0.8995,
     # of 349 at 0.9017 (Wilson): below 0.9 for sure is what warns.
-    monkeypatch.setattr(registration_yield, "simulate", lambda *_: shares(count))
-    (told,) = registration_yield.check(good(*ONE), Limits(target_yield=target))
+    told = finding_of(shares(count), good(*ONE), Limits(target_yield=target))
     assert (told.verdict, told.limit) == (verdict, target)
     assert ("; no least share is asked for" in told.message) == (target is None)
     asked = "; the lower end of the interval must be 99.5% at least: `sbafab check --target-yield`"
