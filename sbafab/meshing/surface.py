@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from sbafab.errors import DesignError
+from sbafab.geometry.once import once
 
 if TYPE_CHECKING:
     import numpy as np
@@ -15,7 +17,8 @@ Vector = tuple[float, float, float]
 """A point or a way in space, mm, or a direction."""
 
 
-class Surface(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Surface:
     """A triangulated surface.
 
     ``points`` (n, 3) float64 in mm; ``faces`` (m, 3) int64 indices of points, counter-clockwise
@@ -25,7 +28,7 @@ class Surface(NamedTuple):
     points: NDArray[np.float64]
     faces: NDArray[np.int64]
 
-    @property
+    @once
     def volume(self) -> float:
         """Enclosed volume in mm3."""
         import numpy as np

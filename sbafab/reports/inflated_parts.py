@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -63,7 +64,7 @@ def solids(placed: PlacedSba, found: Stack, pose: Pose, lift: NDArray[np.float64
     pieces = []
     for part in inflated(placed.made.laminate, found, pose, COARSE):
         points = placed.upright(part.surface.points) + lift
-        pieces += manifold(part.surface._replace(points=points)).decompose()
+        pieces += manifold(replace(part.surface, points=points)).decompose()
     return pieces
 
 
@@ -83,7 +84,7 @@ def as_it_is(placed: PlacedPart, lift: NDArray[np.float64]) -> Solids:
         widest = inflated_diameter(placed.made.design.form, placed.made.laminate)
     if widest is None:
         surface = placed_surface(placed, filled=True)
-        return [manifold(surface._replace(points=surface.points + lift))]
+        return [manifold(replace(surface, points=surface.points + lift))]
     import manifold3d
 
     assert placed.made is not None

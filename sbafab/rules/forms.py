@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.rules.freedoms import Freedom, Freedoms
-from sbafab.rules.margins import InterfaceMargins, Owner, Quantity, felt
+from sbafab.rules.margins import InterfaceMargins, Owner, Quantity, felt, seated
 
 if TYPE_CHECKING:
     from sbafab.geometry.arrays import Floats, Indices
@@ -82,7 +82,7 @@ def linear_forms(groups: Sequence[InterfaceMargins], moves: Freedoms) -> LinearF
     begins = [0]
     between = [np.zeros(0, dtype=np.intp)]
     for number, group in enumerate(groups):
-        first = begins[-1]
+        first, layers = begins[-1], seated(group.first)
         known: dict[tuple[int, ...], int] = {}
         for quantity, places in group.places.items():
             if not len(places.nominal):
@@ -96,7 +96,7 @@ def linear_forms(groups: Sequence[InterfaceMargins], moves: Freedoms) -> LinearF
                 both = one.seat, one.piece, other.seat, other.piece
                 if both not in known:
                     known[both] = len(acting)
-                    acting.append(felt((one, other), group.first, moves))
+                    acting.append(felt((one, other), layers, moves))
                 parts.append(known[both])
     none = np.zeros((2, 0))
     nominal = np.concatenate([none[0], *[places.nominal for places in every]])

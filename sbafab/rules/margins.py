@@ -113,10 +113,12 @@ def seated(interface: Interface) -> tuple[int, ...]:
 
 
 def felt(
-    owners: tuple[Owner, Owner], interface: Interface, moves: Freedoms
+    owners: tuple[Owner, Owner], layers: Sequence[int], moves: Freedoms
 ) -> list[tuple[Freedom, bool]]:
-    """The freedoms that one of two edges has and the other not, and whether it is the end's."""
-    layers = seated(interface)
+    """The freedoms that one of two edges has and the other not, and whether it is the end's.
+
+    ``layers`` are those of the interface, by seat.
+    """
     start, end = (moves[Part(layers[o.seat], o.piece)] for o in owners)
     at_start, at_end = set(map(id, start)), set(map(id, end))
     return [
@@ -134,7 +136,7 @@ def pushes(margin: Margin, interface: Interface, moves: Freedoms) -> list[Push]:
             * abs(freedom.lever(margin.end if at_end else margin.start, margin.normal)),
             at_end,
         )
-        for freedom, at_end in felt(margin.owners, interface, moves)
+        for freedom, at_end in felt(margin.owners, seated(interface), moves)
     ]
 
 
