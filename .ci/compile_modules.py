@@ -74,7 +74,7 @@ COMPILED = (
     *(f"sbafab/geometry/{name}.py" for name in GEOMETRY),
     *(f"sbafab/rules/{name}.py" for name in RULES),
 )
-"""Without what numpy does, and what keeps values in the dictionary of a record."""
+"""Not those whose tests put other functions in their place, nor what decorates functions."""
 NEEDS = ("mypy[mypyc]>=2.4,<3", "setuptools>=65")
 TYPES = """
 [mypy]
