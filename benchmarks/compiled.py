@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-from benchmarks.timing import ROOT
+from benchmarks.timing import ROOT, environment
 
 SCRIPT = ROOT / ".ci" / "compile_modules.py"
 WORKS = (
@@ -17,6 +18,20 @@ WORKS = (
     "generate 3dof-15mm",
 )
 """What is measured compiled and plain, by the names of ``versions``."""
+DECKS = ("1dof-5mm", "3dof-15mm")
+"""Templates of which one design after the other is checked, compiled and plain by turns."""
+DESIGNS = 60
+"""Designs in one process, all of different sizes."""
+PROGRAM = """
+import sys
+from benchmarks.decks import checked
+template, count, total = sys.argv[1], int(sys.argv[2]), 0.0
+for turn in range(-3, count):
+    taken = checked(template, turn)
+    if turn >= 0:  # those before fetch what is imported
+        total += taken
+print(total / count)
+"""
 
 
 def made(folder: Path) -> Path | None:
@@ -25,3 +40,16 @@ def made(folder: Path) -> Path | None:
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     run = subprocess.run([sys.executable, SCRIPT, folder], check=False, capture_output=True)
     return None if run.returncode else folder
+
+
+def deck_time(root: Path, template: str) -> float:
+    """Processor time of a deck of the package in a folder, where one design follows the other."""
+    kept = environment(root)
+    run = subprocess.run(
+        [sys.executable, "-P", "-c", PROGRAM, template, str(DESIGNS)],
+        env={**kept, "PYTHONPATH": os.pathsep.join([str(root), str(ROOT)])},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    return float(run.stdout)

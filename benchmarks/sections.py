@@ -111,19 +111,33 @@ def rule_decks(rounds: int) -> Section:
 
 
 def compiled_beside_plain(rounds: int) -> Section:
-    """What the wheel gains that has the geometry of edges compiled."""
-    key, title = "compiled", "With geometry compiled, beside plain Python"
+    """What the wheel gains that has geometry and rules compiled."""
+    key, title = "compiled", "With geometry and rules compiled, beside plain Python"
     with tempfile.TemporaryDirectory() as place:
         folder = compiled.made(Path(place))
         if folder is None:
             return Section(key, title, [], ["skipped: no compiler, or no mypyc"])
         found = compared(ROOT, rounds, folder, compiled.WORKS)
+        decks = {name: _decks_by_turns(folder, name, rounds) for name in compiled.DECKS}
     rows = []
     for one in found:
         plain, least = min(one.before), min(one.now)
         told = f"{plain:.4f} plain, {1 - least / plain:.0%} less"
         rows.append(Row(one.name, one.now, told))
+    for name, (before, now) in decks.items():
+        told = f"{1 / min(now):.0f} designs a second, {1 / min(before):.0f} plain"
+        rows.append(Row(f"{name}, built and all rules", now, told))
     return Section(key, title, rows)
+
+
+def _decks_by_turns(folder: Path, template: str, rounds: int) -> tuple[list[float], list[float]]:
+    """Times of a deck, plain and of the folder."""
+    taken = [
+        (compiled.deck_time(ROOT, template), compiled.deck_time(folder, template))
+        for _ in range(rounds)
+    ]
+    plain, other = zip(*taken, strict=True)
+    return list(plain), list(other)
 
 
 def side_by_side(rounds: int) -> Section:

@@ -7,6 +7,8 @@ import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from copy import deepcopy
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -99,7 +101,7 @@ def toml_tables(text: str, path: str | Path) -> dict[str, Any]:
             f"{text.count(chr(10), 0, deep.start()) + 1}; write [table] and key = value"
         )
     try:
-        return tomllib.loads(text)
+        return deepcopy(_parsed(text))
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
         reason = str(error) or "nested too deeply"
         # The parser names no key, but its line shows it.
@@ -111,6 +113,12 @@ def toml_tables(text: str, path: str | Path) -> dict[str, Any]:
             f"{path} is not valid TOML: {reason[:1].lower()}{reason[1:]}, "
             f"{shown(line.strip())}{hint}"
         ) from None
+
+
+@lru_cache(maxsize=8)
+def _parsed(text: str) -> dict[str, Any]:
+    """The tables of a text; a file that is varied is read again and again."""
+    return tomllib.loads(text)
 
 
 def override(data: Mapping[str, Any], changes: Iterable[Change]) -> dict[str, Any]:

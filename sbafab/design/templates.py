@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+from functools import cache
 from pathlib import Path
 
 from sbafab.design.messages import shown
@@ -13,6 +14,7 @@ KITS = "kits"
 """The folder of the kits that ship, among the templates."""
 
 
+@cache
 def templates_folder() -> Path:
     """The designs that ship: in the installed package, or beside it in a source checkout."""
     packaged = Path(__file__).parents[1] / "templates"
@@ -20,12 +22,18 @@ def templates_folder() -> Path:
 
 
 def template_names() -> list[str]:
-    return sorted(path.stem for path in templates_folder().glob("*.toml"))
+    return list(_designs_in(templates_folder()))
 
 
 def kit_names() -> list[str]:
     """The kits that ship."""
-    return sorted(path.stem for path in (templates_folder() / KITS).glob("*.toml"))
+    return list(_designs_in(templates_folder() / KITS))
+
+
+@cache
+def _designs_in(folder: Path) -> tuple[str, ...]:
+    """Names of what ships in a folder, which stays as it is while a process runs."""
+    return tuple(sorted(path.stem for path in folder.glob("*.toml")))
 
 
 def template_text(name: str) -> str:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal, get_args
 
 from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.once import once
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Film, in_order
 from sbafab.laminate.interfaces import Interface, InterfaceKind, interface_regions
@@ -153,7 +153,7 @@ class Laminate:
     def __repr__(self) -> str:
         return f"Laminate({self.name!r}, {self.family!r}, {len(self.layers)} layers)"
 
-    @cached_property
+    @once
     def interfaces(self) -> tuple[Interface, ...]:
         """One between every two consecutive TPE layers, bottom to top."""
         known: dict[tuple[str, str, tuple[str, ...]], tuple[Region, Region, Region, Region]] = {}
@@ -174,7 +174,7 @@ class Laminate:
             below, masks = layer, []
         return tuple(found)
 
-    @cached_property
+    @once
     def tpe_layers(self) -> tuple[Layer, ...]:
         """The layers that bond: all of structural films, TPE or further ones."""
         return tuple(layer for layer in self.layers if not layer.is_mask)
@@ -184,7 +184,7 @@ class Laminate:
         """The materials of the films that bond, in words."""
         return ", ".join(in_order(layer.film.material for layer in self.tpe_layers))
 
-    @cached_property
+    @once
     def patterns(self) -> dict[str, tuple[Layer, ...]]:
         """The layers of every distinct pattern, in stacking order."""
         groups: dict[str, list[Layer]] = {}
@@ -198,7 +198,7 @@ class Laminate:
         top = self.layers[-1]
         return top.z + top.film.thickness
 
-    @cached_property
+    @once
     def bounds(self) -> Bounds:
         """Least x, least y, largest x, largest y of all layers, mm."""
         boxes = [layers[0].profile.bounds for layers in self.patterns.values()]
