@@ -89,7 +89,8 @@ class EdgeTable:
         """Least distance of each edge from its own point."""
         chord, off = self.end - self.start, p - self.start
         square = dot(chord, chord)
-        t = np.clip(dot(chord, off) / np.where(square == 0, 1.0, square), 0.0, 1.0)
+        t = dot(chord, off) / np.where(square == 0, 1.0, square)
+        t = np.minimum(np.maximum(t, 0.0), 1.0)
         along = off - t * chord
         to_line = np.sqrt(dot(along, along))
         out, beyond = p - self.centre, p - self.end
@@ -108,12 +109,12 @@ class CellOrder:
 
     def __init__(self, box: Floats, parts: Sequence[int]) -> None:
         count = np.array([own for own in parts if own])
-        begins = np.cumsum(count) - count
+        begins = count.cumsum() - count
         low = np.minimum.reduceat(box[:2], begins, axis=1)
         high = np.maximum.reduceat(box[2:], begins, axis=1)
         cell = (high - low).max(axis=0) / np.sqrt(count)
-        self.low = np.repeat(low, count, axis=1)
-        self.cell = np.repeat(np.where(cell == 0, 1.0, cell), count)
+        self.low = low.repeat(count, axis=1)
+        self.cell = np.where(cell == 0, 1.0, cell).repeat(count)
         self.own: Floats = np.floor((box[:2] - self.low) / self.cell)
 
     def sorted(self, asked: Floats, places: Indices, edges: Indices) -> Indices:
@@ -163,9 +164,12 @@ def touching_in_parts(
 def _touching(asked: Floats, boxes: Floats) -> tuple[Indices, Indices]:
     """The same, every box with every other."""
     left, low, right, high = asked[:, :, None]
-    meets = (boxes[0] <= right) & (boxes[2] >= left) & (boxes[1] <= high) & (boxes[3] >= low)
+    meets = boxes[0] <= right
+    meets &= boxes[2] >= left
+    meets &= boxes[1] <= high
+    meets &= boxes[3] >= low
     # Of a flat array the few that are true are found sooner.
-    own, other = np.divmod(np.flatnonzero(meets), boxes.shape[1] or 1)
+    own, other = np.divmod(meets.ravel().nonzero()[0], boxes.shape[1] or 1)
     return own, other
 
 

@@ -90,20 +90,21 @@ def _together(searched: Sequence[Gathered]) -> list[FacingPlaces]:
     boundaries = [one.boundary for one in searched]
     parts = [len(one.sides) for one in boundaries]
     sides = SideTable([side for one in boundaries for side in one.sides], parts)
-    of_side = np.repeat(np.arange(len(parts)), parts)
+    of_side = np.arange(len(parts)).repeat(parts)
     within = np.array([one.value for one in searched])
     offered = np.array([(*p, *q) for one in searched for p, q in one.offered]).reshape(-1, 4).T
     p, q, side = _from_samples(sides, within[of_side])
     counts = [len(one.offered) for one in searched]
-    home = np.concatenate([np.repeat(np.arange(len(parts)), counts), of_side[side]])
+    home = np.concatenate([np.arange(len(parts)).repeat(counts), of_side.take(side)])
     p, q = np.concatenate([offered[:2], p], axis=1), np.concatenate([offered[2:], q], axis=1)
     first = _first_of_each(p, q, home)
     # Of each boundary by itself, in the order in which they were found.
-    first = first[np.argsort(home[first], kind="stable")]
-    p, q, home = p[:, first], q[:, first], home[first]
+    first = first.take(home.take(first).argsort(kind="stable"))
+    p, q, home = p.take(first, axis=1), q.take(first, axis=1), home.take(first)
     clear = _clear(p, q, home, sides, searched)
-    p, q, home = p[:, clear], q[:, clear], home[clear]
-    value, ends = _length(q - p), np.searchsorted(home, np.arange(len(parts) + 1)).tolist()
+    if not clear.all():
+        p, q, home = p[:, clear], q[:, clear], home[clear]
+    value, ends = _length(q - p), home.searchsorted(np.arange(len(parts) + 1)).tolist()
     return [FacingPlaces(p[:, a:b], q[:, a:b], value[a:b]) for a, b in pairwise(ends)]
 
 
@@ -115,23 +116,23 @@ def _from_samples(sides: SideTable, within: Floats) -> tuple[Floats, Floats, Ind
     a, b = sides.pairs(ASIDE, within)
     points, numbers = sampled(sides.edges)
     counts, samples = np.array(numbers), np.array(points).T
-    owner = np.repeat(np.arange(len(counts)), counts)
+    owner = np.arange(len(counts)).repeat(counts)
     normals = sides.table.at(owner).normal(samples)
     # Each pair has a row a sample of its first side.
-    own = counts[a]
-    starts = (np.cumsum(counts) - counts)[a]
-    row = np.arange(own.sum()) - np.repeat(np.cumsum(own) - own, own) + np.repeat(starts, own)
-    p, n = samples[:, row], normals[:, row]
-    feet, inward, there = _feet(p, sides, np.repeat(b, own))
-    side = np.repeat(a, own)
+    own = counts.take(a)
+    starts = (counts.cumsum() - counts).take(a)
+    row = np.arange(own.sum()) + (starts - own.cumsum() + own).repeat(own)
+    p, n = samples.take(row, axis=1), normals.take(row, axis=1)
+    feet, inward, there = _feet(p, sides, b.repeat(own))
+    side = a.repeat(own)
     # Rows of samples, a column a foot.
     p, n = p[:, :, None], n[:, :, None]
     off = feet - p
     square = dot(n, inward) < -math.cos(ASIDE)
     faces = (dot(off, n) > TOUCH) & (dot(off, inward) < -TOUCH)
-    kept = there & square & faces & (_length(off) <= within[side][:, None])
+    kept = there & square & faces & (_length(off) <= within.take(side)[:, None])
     place, _ = kept.nonzero()
-    return p[:, place, 0], feet[:, kept], side[place]
+    return p[:, :, 0].take(place, axis=1), feet[:, kept], side.take(place)
 
 
 def _feet(p: Floats, sides: SideTable, numbers: Indices) -> tuple[Floats, Floats, Bools]:
@@ -147,9 +148,10 @@ def _feet(p: Floats, sides: SideTable, numbers: Indices) -> tuple[Floats, Floats
     distance = _length(out)
     central = distance < 1e-12
     unit = out / np.where(central, 1.0, distance)
-    middle = sides.middle[:, numbers]
-    least = edges.radius * (np.cos(sides.half_turn[numbers]) - 1e-9)
+    middle = sides.middle.take(numbers, axis=1)
+    least = edges.radius * (np.cos(sides.half_turn.take(numbers)) - 1e-9)
     ahead = dot(unit, middle - edges.centre)
+    normal = sides.normal.take(numbers, axis=1)
     line = edges.turn == 0
     points = []
     normals = []
@@ -157,7 +159,7 @@ def _feet(p: Floats, sides: SideTable, numbers: Indices) -> tuple[Floats, Floats
     for sign in (1.0, -1.0):
         at_middle = central & (sign > 0)
         on_arc = np.where(at_middle, middle, edges.centre + edges.radius * (sign * unit))
-        inward = np.where(at_middle, sides.normal[:, numbers], -edges.turn * sign * unit)
+        inward = np.where(at_middle, normal, -edges.turn * sign * unit)
         points.append(np.where(line, on_line, on_arc))
         normals.append(np.where(line, aside, inward))
         is_on_arc = at_middle | (~central & (sign * ahead >= least))
@@ -173,7 +175,7 @@ def _first_of_each(p: Floats, q: Floats, home: Indices) -> Indices:
     ends = np.concatenate([np.where(turned, ends[[2, 3, 0, 1]], ends), home[None]])
     # A stable order, so that the first of those that are alike comes first.
     order = np.lexsort(ends)
-    ends = ends[:, order]
+    ends = ends.take(order, axis=1)
     is_new = np.ones(len(order), dtype=bool)
     is_new[1:] = (ends[:, 1:] != ends[:, :-1]).any(axis=0)
     return np.sort(order[is_new])
@@ -187,7 +189,7 @@ def _clear(
     boxes = boxes_round(p, q, NEAR)
     segment, number = touching_in_parts(boxes, counts, sides.table.box, sides.parts)
     edges = sides.table.at(number)
-    start, off = p[:, segment], (q - p)[:, segment]
+    start, off = p.take(segment, axis=1), (q - p).take(segment, axis=1)
     length = _length(off)
     unit = off / length
     along, there = crossings(start, unit, edges, NEAR)

@@ -42,12 +42,13 @@ class SideTable:
         ``within`` is so many mm for each side.
         """
         asked, a, b = self._near(within)
-        chosen = self._opposed(a, b, aside) & self._may_hold_feet(b, a, within[a]) & (a != b)
+        far = within.take(a)
+        chosen = self._opposed(a, b, aside) & self._may_hold_feet(b, a, far) & (a != b)
         a, b = a[chosen], b[chosen]
-        faces = self._may_face(a, b, within[a])
+        faces = self._may_face(a, b, within.take(a))
         a, b = a[faces], b[faces]
         order = CellOrder(self.table.box, self.parts).sorted(asked, a, b)
-        return a[order], b[order]
+        return a.take(order), b.take(order)
 
     def later(self, aside: float, within: float) -> list[list[int]]:
         """For each side the later ones that it may face square no farther off, and few others."""
@@ -70,8 +71,9 @@ class SideTable:
 
     def _opposed(self, a: Indices, b: Indices, aside: float) -> Bools:
         """Whether their normals are opposed somewhere, to within ``aside`` radians."""
-        room = self.half_turn[a] + aside + self.half_turn[b]
-        opposed = dot(self.normal[:, a], self.normal[:, b]) < ROOM - np.cos(room)
+        room = self.half_turn.take(a) + aside + self.half_turn.take(b)
+        facing = dot(self.normal.take(a, axis=1), self.normal.take(b, axis=1))
+        opposed = facing < ROOM - np.cos(room)
         found: Bools = opposed | (room > math.pi)
         return found
 
@@ -80,9 +82,9 @@ class SideTable:
         nearly one centre that both have the material inside, or both outside.
         """
         table = self.table
-        off, turn = table.centre[:, a] - table.centre[:, b], table.turn[a]
-        r, s = table.radius[a], table.radius[b]
-        alike = (np.hypot(off[0], off[1]) < ALONGSIDE) & (turn == table.turn[b]) & (turn != 0)
+        off = table.centre.take(a, axis=1) - table.centre.take(b, axis=1)
+        turn, r, s = table.turn.take(a), table.radius.take(a), table.radius.take(b)
+        alike = (np.hypot(off[0], off[1]) < ALONGSIDE) & (turn == table.turn.take(b)) & (turn != 0)
         alike &= np.minimum(r, s) >= 10 * ALONGSIDE
         across = (turn > 0) & (r + s <= within + 2 * ALONGSIDE)
         found: Bools = ~alike | across
@@ -90,7 +92,11 @@ class SideTable:
 
     def _may_hold_feet(self, a: Indices, b: Indices, within: float | Floats) -> Bools:
         """Whether normals of sides ``a`` may meet sides ``b`` no farther off than ``within``."""
-        off, normal = self.middle[:, b] - self.middle[:, a], self.normal[:, a]
+        off, normal = (
+            self.middle.take(b, axis=1) - self.middle.take(a, axis=1),
+            self.normal.take(a, axis=1),
+        )
         missed = np.abs(off[0] * normal[1] - off[1] * normal[0])
-        may: Bools = missed <= self.half[a] + self.half[b] + within * self.lean[a] + BESIDE + ROOM
+        half = self.half.take(a) + self.half.take(b)
+        may: Bools = missed <= half + within * self.lean.take(a) + BESIDE + ROOM
         return may

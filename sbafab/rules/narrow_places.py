@@ -54,11 +54,11 @@ class Places(NamedTuple):
 
     def at(self, numbers: Indices) -> Places:
         return Places(
-            self.nominal[numbers],
-            self.start[:, numbers],
-            self.end[:, numbers],
-            self.normal[:, numbers],
-            self.between[numbers],
+            self.nominal.take(numbers),
+            self.start.take(numbers, axis=1),
+            self.end.take(numbers, axis=1),
+            self.normal.take(numbers, axis=1),
+            self.between.take(numbers),
             self.owners,
         )
 
@@ -111,7 +111,7 @@ def places_of(asked: Sequence[PlacesAsked]) -> Sequence[Places]:
 
 def _nearest(places: Places, slack: float) -> Places:
     """Those that are at most ``slack`` wider than the narrowest."""
-    (kept,) = np.nonzero(places.nominal <= places.nominal.min() + slack)
+    (kept,) = (places.nominal <= places.nominal.min() + slack).nonzero()
     return places.at(kept)
 
 
@@ -153,22 +153,25 @@ def _of_overhangs(asked: Sequence[OverhangAsked]) -> list[_Segments]:
     ]
     near = [one for own in nears for one in own]
     # The ask that each edge is of.
-    home = np.repeat(np.arange(len(asked)), [len(own) for own in nears])
+    home = np.arange(len(asked)).repeat([len(own) for own in nears])
     rays = Rays.of([edge for edge, _ in near])
     masks = [_profile(one.mask).table for one in asked]
-    counts = np.bincount(home[rays.edge], minlength=len(asked)).tolist()
+    home_of_ray = home.take(rays.edge)
+    counts = np.bincount(home_of_ray, minlength=len(asked)).tolist()
     parts = [(count, len(mask.radius)) for count, mask in zip(counts, masks, strict=True)]
-    within = np.array(withins)[home[rays.edge]]
+    within = np.array(withins).take(home_of_ray)
     ray, value, end = first_met(rays, EdgeTable.joined(masks), within, parts)
     feet = [edge.nearest(reach.at) for edge, reach in near]
     outward = [left_normal(edge, p) for (edge, _), p in zip(near, feet, strict=True)]
-    edge = np.concatenate([np.arange(len(near)), rays.edge[ray]])
-    order = np.argsort(edge, kind="stable")
+    edge = np.concatenate([np.arange(len(near)), rays.edge.take(ray)])
+    order = edge.argsort(kind="stable")
     nominal = np.concatenate([[reach.value for _, reach in near], value])[order]
-    start = np.concatenate([np.array(feet).T, rays.start[:, ray]], axis=1)[:, order]
+    start = np.concatenate([np.array(feet).T, rays.start.take(ray, axis=1)], axis=1)[:, order]
     ends = np.concatenate([np.array([reach.at for _, reach in near]).T, end], axis=1)[:, order]
-    normal = np.concatenate([-np.array(outward).T, rays.outward[:, ray]], axis=1)[:, order]
-    stops = np.searchsorted(home[edge[order]], np.arange(len(asked) + 1)).tolist()
+    normal = np.concatenate([-np.array(outward).T, rays.outward.take(ray, axis=1)], axis=1)[
+        :, order
+    ]
+    stops = home.take(edge.take(order)).searchsorted(np.arange(len(asked) + 1)).tolist()
     return [
         _Segments(nominal[a:b], start[:, a:b], ends[:, a:b], normal[:, a:b], True)
         for a, b in pairwise(stops)
@@ -178,34 +181,35 @@ def _of_overhangs(asked: Sequence[OverhangAsked]) -> list[_Segments]:
 def _owned(segments: Sequence[_Segments], profiles: Sequence[Sequence[Region]]) -> list[Places]:
     """Places once for every two owners of their edges."""
     counts = [len(one.nominal) for one in segments]
-    total, home = sum(counts), np.repeat(np.arange(len(counts)), counts)
+    total, home = sum(counts), np.arange(len(counts)).repeat(counts)
     nominal = np.concatenate([one.nominal for one in segments])
     start, end, normal = (
         np.concatenate(column, axis=1)
         for column in zip(*(one[1:4] for one in segments), strict=True)
     )
     # Of each ask its starts, then its ends.
-    order = np.argsort(np.concatenate([home, home]), kind="stable")
+    order = np.concatenate([home, home]).argsort(kind="stable")
     points, square_to = (
         np.concatenate(both, axis=1).take(order, axis=1)
         for both in ((start, end), (normal, normal))
     )
     place, owner, owners = _owners(points, square_to, _blocks(segments, profiles))
-    segment, is_start = order[place] % total, order[place] < total
+    numbered = order.take(place)
+    segment, is_start = numbered % total, numbered < total
     ours, theirs = segment[is_start], segment[~is_start]
     others = np.bincount(theirs, minlength=total)
-    begins = np.cumsum(others) - others
-    own = others[ours]
-    rows = np.repeat(ours, own)
-    within = np.arange(len(rows)) - np.repeat(np.cumsum(own) - own, own)
-    pairs = np.repeat(owner[is_start], own) * len(owners)
-    pairs += owner[~is_start][begins[rows] + within]
+    begins = others.cumsum() - others
+    own = others.take(ours)
+    rows = ours.repeat(own)
+    within = np.arange(len(rows)) - (own.cumsum() - own).repeat(own)
+    pairs = owner[is_start].repeat(own) * len(owners)
+    pairs += owner[~is_start].take(begins.take(rows) + within)
     names = sorted(set(pairs.tolist()))
     between = np.searchsorted(names, pairs)
     named = [(owners[one // len(owners)], owners[one % len(owners)]) for one in names]
-    stops = np.searchsorted(home[rows], np.arange(len(counts) + 1)).tolist()
-    nominal, start, end = nominal[rows], start[:, rows], end[:, rows]
-    normal = normal[:, rows]
+    stops = home.take(rows).searchsorted(np.arange(len(counts) + 1)).tolist()
+    nominal, normal = nominal.take(rows), normal.take(rows, axis=1)
+    start, end = start.take(rows, axis=1), end.take(rows, axis=1)
     found = []
     for a, b in pairwise(stops):
         # Owners are numbered ask by ask.
@@ -260,21 +264,23 @@ def _owners(
     counts = [block.points for block in blocks]
     place, number = touching_in_parts(asked, counts, table.box, parts)
     edges = table.at(number)
-    (here,) = (edges.distance(p[:, place]) < ON_EDGE).nonzero()
-    place, number = place[here], number[here]
-    aside = dot(table.at(number).normal(p[:, place]), normal[:, place])
+    (here,) = (edges.distance(p.take(place, axis=1)) < ON_EDGE).nonzero()
+    place, number = place.take(here), number.take(here)
+    edges = edges.at(here)
+    aside = dot(edges.normal(p.take(place, axis=1)), normal.take(place, axis=1))
     square = np.abs(aside) > SQUARE
     has_square = np.zeros(p.shape[1], dtype=bool)
     has_square[place[square]] = True
-    chosen = square | ~has_square[place]
+    chosen = square | ~has_square.take(place)
     place, number = place[chosen], number[chosen]
     order = CellOrder(table.box, parts).sorted(asked, place, number)
-    place, owner = place[order], np.concatenate(numbers)[number[order]]
+    place, owner = place.take(order), np.concatenate(numbers).take(number.take(order))
     # Each owner once a place, where it comes first.
     key = place * len(owners) + owner
-    by_key = np.argsort(key, kind="stable")
+    by_key = key.argsort(kind="stable")
+    in_order = key.take(by_key)
     is_first = np.ones(len(key), dtype=bool)
-    is_first[by_key[1:]] = key[by_key[1:]] != key[by_key[:-1]]
+    is_first[by_key[1:]] = in_order[1:] != in_order[:-1]
     return place[is_first], owner[is_first], owners
 
 
@@ -294,7 +300,7 @@ def _profile(profile: Region) -> _Profile:
             [edge for _, contour in numbered for edge in contour.edges],
             [box for _, contour in numbered for box in contour.boxes],
         ),
-        np.repeat(np.arange(len(numbered)), [len(contour.edges) for _, contour in numbered]),
+        np.arange(len(numbered)).repeat([len(contour.edges) for _, contour in numbered]),
         [piece for piece, _ in numbered],
     )
 
@@ -309,7 +315,7 @@ class Rays(NamedTuple):
     @staticmethod
     def of(edges: Sequence[Edge]) -> Rays:
         points, counts = sampled(edges, END_ROOM)
-        start, own = np.array(points).T, np.repeat(np.arange(len(edges)), counts)
+        start, own = np.array(points).T, np.arange(len(edges)).repeat(counts)
         return Rays(start, -EdgeTable.of(edges).at(own).normal(start), own)
 
 
@@ -324,7 +330,8 @@ def first_met(
     counts, edge_counts = zip(*parts or [(len(rays.edge), len(table.radius))], strict=True)
     boxes = boxes_round(rays.start, rays.start + within * rays.outward, END_ROOM)
     ray, number = touching_in_parts(boxes, counts, table.box, edge_counts)
-    start, outward, edges = rays.start[:, ray], rays.outward[:, ray], table.at(number)
+    start, outward = rays.start.take(ray, axis=1), rays.outward.take(ray, axis=1)
+    edges = table.at(number)
     height, there = crossings(start, outward, edges)
     found = []
     for along, is_there in zip(height, there, strict=True):
@@ -338,9 +345,11 @@ def first_met(
     value = np.concatenate([one[1] for one in found])
     q = np.concatenate([one[2] for one in found], axis=1)
     order = np.lexsort((value, rows))
-    _, first = np.unique(rows[order], return_index=True)
-    chosen = order[first]
-    return rows[chosen], np.maximum(value[chosen], 0.0), q[:, chosen]
+    sorted_rows = rows.take(order)
+    is_first = np.ones(len(rows), dtype=bool)
+    is_first[1:] = sorted_rows[1:] != sorted_rows[:-1]
+    chosen = order[is_first]
+    return rows.take(chosen), np.maximum(value.take(chosen), 0.0), q.take(chosen, axis=1)
 
 
 def _on(edges: EdgeTable, q: Floats) -> Bools:
