@@ -191,9 +191,11 @@ def test_an_assembly_moves_and_says_how_it_grips(brace: Watched) -> None:
     brace.until(
         f"document.querySelector('#view-swing').textContent.includes('{pose.height:.2f} mm')"
     )
-    readings = page.locator("#view-swing .reading").all_inner_texts()
     held = api.predict_assembly("brace", pressure_kpa=20)
     push = next(f.value for f in held.figures if f.name.startswith("push of each stack"))
+    # Arm and grip answer each by itself.
+    brace.until(f"document.querySelector('#view-swing').textContent.includes('{push:.3f} N')")
+    readings = page.locator("#view-swing .reading").all_inner_texts()
     assert "25.40 mm" in readings[0]
     assert f"{push:.3f} N" in readings[0]
     assert f"{pose.bend:.1f}°" in readings[1]
