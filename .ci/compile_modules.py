@@ -15,6 +15,7 @@ ROOT = Path(__file__).resolve().parent.parent
 GEOMETRY = (
     "apart",
     "arrangement",
+    "boolean",
     "boundary_side",
     "centroid",
     "chain_sums",
@@ -26,6 +27,7 @@ GEOMETRY = (
     "facing_places",
     "intersect",
     "kept",
+    "nanometres",
     "nearby",
     "offset",
     "once",

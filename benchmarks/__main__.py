@@ -14,6 +14,7 @@ from pathlib import Path
 from benchmarks.sections import RIVALS, Asked, sections
 from benchmarks.timing import ROOT, Row, Section, keep_to_one_core
 from benchmarks.versions import Compared, compared
+from sbafab.process import prepare
 
 
 def main() -> None:
@@ -21,6 +22,7 @@ def main() -> None:
     if arguments.install:
         install(arguments.rivals)
     keep_to_one_core()
+    prepare()
     if arguments.before is not None:
         print(beside(compared(arguments.before.resolve(), arguments.rounds)).text)
         return

@@ -24,6 +24,8 @@ DESIGNS = 60
 """Designs in one process, all of different sizes."""
 PROGRAM = """
 import sys
+from sbafab.process import prepare
+prepare()
 from benchmarks.decks import checked
 template, count, total = sys.argv[1], int(sys.argv[2]), 0.0
 for turn in range(-3, count):

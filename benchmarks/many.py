@@ -27,8 +27,10 @@ def measured(designs: int) -> Iterator[Reached]:
     """Builds and checks designs of other sizes and heights; seeded, so the same every time."""
     from sbafab.actuators import build, load_design
     from sbafab.output.settings import limits
+    from sbafab.process import prepare
     from sbafab.rules.deck import run_deck
 
+    prepare()
     draw = random.Random(1)
     base = load_design(DESIGN)
     began, before = time.process_time(), 0

@@ -11,6 +11,7 @@ from functools import partial
 
 from benchmarks.decks import checked
 from benchmarks.timing import ROOT, environment
+from sbafab.process import prepare
 
 
 def rate(template: str, processes: int, designs: int) -> float:
@@ -32,7 +33,7 @@ def rate(template: str, processes: int, designs: int) -> float:
 def measured(template: str, processes: int, designs: int) -> float:
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, range(os.cpu_count() or 1))
-    with ProcessPoolExecutor(processes) as pool:
+    with ProcessPoolExecutor(processes, initializer=prepare) as pool:
         list(pool.map(partial(checked, template), range(-4 * processes, 0)))
         began = time.perf_counter()
         list(pool.map(partial(checked, template), range(designs), chunksize=4))

@@ -7,6 +7,7 @@ with, and a machine that does nothing else; it takes a quarter of an hour.
 from __future__ import annotations
 
 import argparse
+import platform
 from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
@@ -16,6 +17,7 @@ from benchmarks.sections import Asked, sections
 from benchmarks.timing import ROOT, Section, keep_to_one_core
 from benchmarks.versions import Compared, compared
 from docs.scripts.measured import Record, Table, keep, versions
+from sbafab.process import prepare
 
 COMMAND = "python -m docs.scripts.benchmark_runs --before FOLDER"
 AIMS = {
@@ -63,12 +65,13 @@ def main() -> None:
     parser.add_argument("--designs", type=int, default=10_000)
     arguments = parser.parse_args()
     keep_to_one_core()
+    prepare()
     rivals = python_of(ROOT / ".benchmarks" / "venv")
     made = list(sections(Asked(arguments.rounds, arguments.designs, rivals)))
     tables = {one.key: told(one) for one in made if one.power is None}
     tables["growth"] = growth(made)
     tables["versions"] = beside(compared(arguments.before.resolve(), arguments.rounds))
-    used = versions(numpy="numpy", MuJoCo="mujoco")
+    used = {"Python": platform.python_version(), **versions(numpy="numpy", MuJoCo="mujoco")}
     keep("benchmarks", Record(COMMAND, date.today().isoformat(), used, tables))
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import Final
 
 from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, from_end_to_end
 from sbafab.geometry.intersect import meeting_points
@@ -17,7 +18,7 @@ from sbafab.geometry.nearby import close_pairs, widened
 from sbafab.geometry.region import Contour
 from sbafab.geometry.tidy import LEAST_AREA, tidy
 
-FAR = 1e-3
+FAR: Final = 1e-3
 """mm: chains that stay so far from each other are not cut, however coarsely points are made one."""
 
 Wound = tuple[Contour, int]

@@ -27,7 +27,7 @@ from sbafab.geometry.inconsistent import InconsistentError
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.pieces import Overlay
 
-NEAR = 0.05
+NEAR: Final = 0.05
 """Radians: edges that leave a point at less than this angle are compared farther on."""
 
 

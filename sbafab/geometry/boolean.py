@@ -8,7 +8,8 @@ it only; the pieces that stay are chained into contours. Those that meet no othe
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
+from operator import lt
 from typing import TypeVar
 
 from sbafab.geometry.apart import (
@@ -23,6 +24,7 @@ from sbafab.geometry.apart import (
 from sbafab.geometry.arrangement import Arrangement
 from sbafab.geometry.edges import EPSILON, Edge, Point
 from sbafab.geometry.inconsistent import GeometryError, InconsistentError
+from sbafab.geometry.nanometres import in_reading_order
 from sbafab.geometry.pieces import DIGIT, by_owner, overlaid, overlay
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.remembered import MOST, remembered
@@ -70,7 +72,7 @@ def difference(a: Region, b: Region) -> Region:
 @remembered
 def _difference(a: Region, b: Region) -> Region:
     own, other = ((contour, 1) for contour in a.contours), ((c, -1) for c in b.contours)
-    (found,) = _enclosed([*own, *other], [lambda turns: turns > 0])
+    (found,) = _enclosed([*own, *other], [partial(lt, 0)])
     return found
 
 
@@ -110,15 +112,16 @@ def wound(edges: Sequence[Edge], above: int) -> Region:
 
     Raises GeometryError where no way to cut the edges where they meet gives one answer.
     """
-    return arranged(
-        [edges],
-        lambda found: _region(_loops(found, lambda turns: turns > above)),
-    )
+    return arranged([edges], partial(_wound, above))
+
+
+def _wound(above: int, found: Arrangement) -> Region:
+    return _region(_loops(found, partial(lt, above)))
 
 
 def enclosed(contours: Iterable[Contour], above: int = 0) -> Region:
     """The same for contours, each a closed chain by itself."""
-    (found,) = _enclosed([(contour, 1) for contour in contours], [lambda turns: turns > above])
+    (found,) = _enclosed([(contour, 1) for contour in contours], [partial(lt, above)])
     return found
 
 
@@ -132,7 +135,7 @@ def _enclosed(chains: Iterable[Wound], wanted: Sequence[WantedTurns]) -> list[Re
             own = _cut(group, wanted)
         for contours, more in zip(found, own, strict=True):
             contours.extend(more)
-    return [Region(_in_reading_order(contours)) for contours in found]
+    return [Region(in_reading_order(contours)) for contours in found]
 
 
 def _whole(chain: ClosedChain, outside: int, wanted: WantedTurns) -> list[Contour]:
@@ -146,12 +149,14 @@ def _whole(chain: ClosedChain, outside: int, wanted: WantedTurns) -> list[Contou
 
 def _cut(group: ChainGroup, wanted: Sequence[WantedTurns]) -> list[list[Contour]]:
     """The contours of each region, where chains meet each other."""
+    return _in_some_way(partial(_cut_with, group, wanted))
 
-    def read(found: Arrangement) -> list[list[Contour]]:
-        return [_contours(_loops(found, is_in, group.outside)) for is_in in wanted]
 
-    edges, clear = group.edges, group.clear
-    return _in_some_way(lambda tolerance: read(Arrangement(overlay(edges, tolerance, clear))))
+def _cut_with(
+    group: ChainGroup, wanted: Sequence[WantedTurns], tolerance: float
+) -> list[list[Contour]]:
+    found = Arrangement(overlay(group.edges, tolerance, group.clear))
+    return [_contours(_loops(found, is_in, group.outside)) for is_in in wanted]
 
 
 def _loops(found: Arrangement, wanted: WantedTurns, outside: int = 0) -> Iterable[Sequence[Edge]]:
@@ -167,7 +172,7 @@ def _contours(loops: Iterable[Sequence[Edge]]) -> list[Contour]:
 
 def _region(loops: Iterable[Sequence[Edge]]) -> Region:
     """The region inside closed chains that meet nowhere."""
-    return Region(_in_reading_order(_contours(loops)))
+    return Region(in_reading_order(_contours(loops)))
 
 
 def arranged(owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Found]) -> Found:
@@ -175,7 +180,13 @@ def arranged(owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Fou
 
     Raises GeometryError where no way to cut the edges where they meet gives one answer.
     """
-    return _in_some_way(lambda tolerance: read(Arrangement(overlaid(owners, tolerance))))
+    return _in_some_way(partial(_arranged_with, owners, read))
+
+
+def _arranged_with(
+    owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Found], tolerance: float
+) -> Found:
+    return read(Arrangement(overlaid(owners, tolerance)))
 
 
 def _in_some_way(read: Callable[[float], Found]) -> Found:
@@ -191,13 +202,3 @@ def _in_some_way(read: Callable[[float], Found]) -> Found:
         f"edges that nearly meet at x {x:.6f}, y {y:.6f} cannot be told apart; change a size "
         "there by 0.001 mm"
     )
-
-
-def _in_reading_order(contours: Sequence[Contour]) -> tuple[Contour, ...]:
-    # Most regions have one or two.
-    return tuple(sorted(contours, key=_reading_order) if len(contours) > 1 else contours)
-
-
-def _reading_order(contour: Contour) -> tuple[bool, float, float, float]:
-    low_x, low_y, high_x, _ = contour.bounds
-    return contour.is_hole, round(low_x, 6), round(low_y, 6), round(high_x, 6)

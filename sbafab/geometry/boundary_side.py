@@ -7,7 +7,7 @@ from typing import Final, final
 
 from sbafab.geometry.edges import Bounds, Edge, Line, Point, left_normal
 
-BESIDE = 1e-5
+BESIDE: Final = 1e-5
 """mm that an edge may miss another's normals by, for rounding."""
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from itertools import chain
+from operator import mul
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
 
 FEW = 20_000
 """Pairs of boxes up to which all are compared at once."""
-TOGETHER = 64
+TOGETHER: Final = 64
 """Boxes that are compared together with those about them, where there are more."""
 
 
@@ -22,6 +24,11 @@ def dot(a: Floats, b: Floats) -> Floats:
     """The products of vectors with a row a coordinate."""
     found: Floats = a[0] * b[0] + a[1] * b[1]
     return found
+
+
+def columns_of(rows: Iterable[Iterable[float]], width: int) -> Floats:
+    """Rows of so many numbers as columns; one by one is sooner than ``np.array``."""
+    return np.fromiter(chain.from_iterable(rows), dtype=float).reshape(-1, width).T
 
 
 class EdgeTable:
@@ -52,7 +59,7 @@ class EdgeTable:
             else (*e.start, *e.end, *e.start, 0.0, 0.0, *box)
             for e, box in zip(edges, known, strict=True)
         ]
-        return EdgeTable(np.array(rows, dtype=float).reshape(-1, 12).T.copy())
+        return EdgeTable(columns_of(rows, 12).copy())
 
     @staticmethod
     def joined(tables: Sequence[EdgeTable]) -> EdgeTable:
@@ -77,12 +84,10 @@ class EdgeTable:
 
         ``room`` is a share of the radius by which the point may lie past an end.
         """
-        x, y = p - self.centre
-        ax, ay = self.start - self.centre
-        bx, by = self.end - self.centre
+        out, a, b = p - self.centre, self.start - self.centre, self.end - self.centre
         least = -room * self.radius * self.radius
-        ahead: Bools = self.turn * (ax * y - ay * x) >= least
-        ahead &= self.turn * (x * by - y * bx) >= least
+        ahead: Bools = self.turn * (a[0] * out[1] - a[1] * out[0]) >= least
+        ahead &= self.turn * (out[0] * b[1] - out[1] * b[0]) >= least
         return ahead
 
     def distance(self, p: Floats) -> Floats:
@@ -148,6 +153,8 @@ def touching_in_parts(
     asked: Floats, parts: Sequence[int], boxes: Floats, box_parts: Sequence[int]
 ) -> tuple[Indices, Indices]:
     """The same for so many boxes at a time, each part with its own boxes alone."""
+    if len(parts) > 1 and sum(map(mul, parts, box_parts)) <= FEW:
+        return _touching_in_parts(asked, parts, boxes, box_parts)
     found = []
     first = box_first = 0
     for count, box_count in zip(parts, box_parts, strict=True):
@@ -161,13 +168,31 @@ def touching_in_parts(
     return own, other
 
 
+def _touching_in_parts(
+    asked: Floats, parts: Sequence[int], boxes: Floats, box_parts: Sequence[int]
+) -> tuple[Indices, Indices]:
+    """The same, all pairs of all parts one after the other."""
+    each = np.array(box_parts)
+    begins = (each.cumsum() - each).repeat(parts)
+    each = each.repeat(parts)
+    own = np.arange(len(each)).repeat(each)
+    other = np.arange(len(own)) - (each.cumsum() - each - begins).repeat(each)
+    # Few that lie one above the other are left for the second step.
+    for low, high in ((0, 2), (1, 3)):
+        meets = boxes[low].take(other) <= asked[high].take(own)
+        meets &= boxes[high].take(other) >= asked[low].take(own)
+        (met,) = meets.nonzero()
+        own, other = own.take(met), other.take(met)
+    return own, other
+
+
 def _touching(asked: Floats, boxes: Floats) -> tuple[Indices, Indices]:
     """The same, every box with every other."""
-    left, low, right, high = asked[:, :, None]
-    meets = boxes[0] <= right
-    meets &= boxes[2] >= left
-    meets &= boxes[1] <= high
-    meets &= boxes[3] >= low
+    one = asked[:, :, None]
+    meets = boxes[0] <= one[2]
+    meets &= boxes[2] >= one[0]
+    meets &= boxes[1] <= one[3]
+    meets &= boxes[3] >= one[1]
     # Of a flat array the few that are true are found sooner.
     own, other = np.divmod(meets.ravel().nonzero()[0], boxes.shape[1] or 1)
     return own, other

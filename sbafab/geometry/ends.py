@@ -14,12 +14,12 @@ from sbafab.geometry.edges import Arc, Edge, Point, left_turn
 from sbafab.geometry.facets import run_sweep
 from sbafab.geometry.region import Contour
 
-SMOOTH = 1e-4
+SMOOTH: Final = 1e-4
 """Corners that turn by less, in radians, are none."""
-TAPER = 30.0
+TAPER: Final = 30.0
 """Degrees; flanks at a wider angle are two sides of a corner, not of an arm."""
-LEAST_TURN = math.pi - math.radians(TAPER + 1)
-ROUNDED = 0.1
+LEAST_TURN: Final = math.pi - math.radians(TAPER + 1)
+ROUNDED: Final = 0.1
 """Degrees a corner may miss its angle by: coordinates read from a file are rounded."""
 
 

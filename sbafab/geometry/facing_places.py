@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from sbafab.geometry.edge_table import boxes_round, crossings, dot, touching_in_parts
+from sbafab.geometry.edge_table import boxes_round, columns_of, crossings, dot, touching_in_parts
 from sbafab.geometry.region import Region
 from sbafab.geometry.remembered import remembered_together
 from sbafab.geometry.samples import sampled
@@ -27,7 +27,7 @@ from sbafab.geometry.width import (
 if TYPE_CHECKING:
     from sbafab.geometry.arrays import Bools, Floats, Indices
 
-NEAR = 10 * TOUCH
+NEAR: Final = 10 * TOUCH
 """mm from its ends within which what meets a segment does not cross it."""
 
 
@@ -92,7 +92,7 @@ def _together(searched: Sequence[Gathered]) -> list[FacingPlaces]:
     sides = SideTable([side for one in boundaries for side in one.sides], parts)
     of_side = np.arange(len(parts)).repeat(parts)
     within = np.array([one.value for one in searched])
-    offered = np.array([(*p, *q) for one in searched for p, q in one.offered]).reshape(-1, 4).T
+    offered = columns_of([(*p, *q) for one in searched for p, q in one.offered], 4)
     p, q, side = _from_samples(sides, within[of_side])
     counts = [len(one.offered) for one in searched]
     home = np.concatenate([np.arange(len(parts)).repeat(counts), of_side.take(side)])
@@ -115,7 +115,7 @@ def _from_samples(sides: SideTable, within: Floats) -> tuple[Floats, Floats, Ind
     """
     a, b = sides.pairs(ASIDE, within)
     points, numbers = sampled(sides.edges)
-    counts, samples = np.array(numbers), np.array(points).T
+    counts, samples = np.array(numbers), columns_of(points, 2)
     owner = np.arange(len(counts)).repeat(counts)
     normals = sides.table.at(owner).normal(samples)
     # Each pair has a row a sample of its first side.

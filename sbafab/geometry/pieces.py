@@ -6,7 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from sbafab.geometry.edges import (
     BENT,
@@ -24,9 +24,9 @@ from sbafab.geometry.pool import PointPool
 
 _Entry = tuple[float, int, Edge, int]
 """How far the middle of an edge is off its chord, the edge's number, the edge, its turns."""
-DIGIT = 16
+DIGIT: Final = 16
 """Bits: how often the edges of several owners wind stands in one whole number, a digit an owner."""
-ROUNDS = 4
+ROUNDS: Final = 4
 """Most times that edges are cut over again."""
 
 

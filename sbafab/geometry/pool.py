@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
+from typing import Final
 
 from sbafab.geometry.edges import SAME, Point
 
-CELLS = 16
+CELLS: Final = 16
 """Cells of the grid are so many times as wide as points are pooled: most points touch one only."""
 
 
-ASLANT = 0.7548776662466927
+ASLANT: Final = 0.7548776662466927
 """Slope of a line along which points of drawings hardly ever lie side by side."""
 
 

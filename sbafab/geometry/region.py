@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from sbafab.geometry import similarity
 from sbafab.geometry.chain_sums import (
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     import shapely
 
 Mark = tuple[float, float, float]
-MANY = 32
+MANY: Final = 32
 """Edges from which on filing them by place is worth its cost."""
 
 

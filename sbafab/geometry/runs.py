@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Final
 
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line
 
 _Run = tuple[Edge, ...]
-DRIFT = 4 * EPSILON
+DRIFT: Final = 4 * EPSILON
 """mm that edges which follow each other along one line or circle may leave it by, together."""
 
 

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from sbafab.geometry.boundary_side import BESIDE, BoundarySide
-from sbafab.geometry.edge_table import CellOrder, EdgeTable, dot, touching_in_parts
+from sbafab.geometry.edge_table import CellOrder, EdgeTable, columns_of, dot, touching_in_parts
 from sbafab.geometry.width import ALONGSIDE
 
 if TYPE_CHECKING:
     from sbafab.geometry.arrays import Bools, Floats, Indices
 
-ROOM = 1e-9
+ROOM: Final = 1e-9
 """More than the rounding of what is asked once more of each pair."""
 
 
@@ -32,7 +32,7 @@ class SideTable:
         rows = [
             (*side.middle, *side.normal, side.half_turn, side.half, side.lean) for side in sides
         ]
-        columns = np.array(rows).T
+        columns = columns_of(rows, 7)
         self.middle, self.normal = columns[0:2], columns[2:4]
         self.half_turn, self.half, self.lean = columns[4:7]
 

@@ -14,6 +14,7 @@ from sbafab.geometry.edges import (
     quarter_arcs,
 )
 from sbafab.geometry.facets import run_sweep
+from sbafab.geometry.nanometres import nanometres
 from sbafab.geometry.region import Contour
 from sbafab.geometry.shapes import circle
 
@@ -70,8 +71,8 @@ def _first(edges: Sequence[Edge]) -> int:
     for i, edge in enumerate(edges):
         x, y = edge.start
         # What lies farther to the right is not rounded to the least x.
-        if x <= left and (round(x, 6), round(y, 6)) < least:
-            found, least = i, (round(x, 6), round(y, 6))
+        if x <= left and (nanometres(x), nanometres(y)) < least:
+            found, least = i, (nanometres(x), nanometres(y))
     return found
 
 

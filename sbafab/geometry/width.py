@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from sbafab.geometry.boundary_side import BoundarySide, Foot
 from sbafab.geometry.corners import Corner, corners_of, pinch
@@ -26,19 +26,19 @@ from sbafab.geometry.width_bounds import may_be_narrower, widest_least
 if TYPE_CHECKING:
     from sbafab.geometry.side_table import SideTable
 
-ALONGSIDE = 1e-3
+ALONGSIDE: Final = 1e-3
 """Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
-SHORTER = 1e-9
+SHORTER: Final = 1e-9
 """mm by which a segment must be shorter than another to be the narrowest."""
-ROUNDING = 1e-12
+ROUNDING: Final = 1e-12
 """mm: more than what distances are rounded by."""
-TOUCH = 1e-6
+TOUCH: Final = 1e-6
 """mm within which two points are one."""
-ASIDE = math.acos(0.9)
+ASIDE: Final = math.acos(0.9)
 """Radians (25 degrees) that the normals of samples which still face each other may turn aside."""
-SQUARE = 0.05
+SQUARE: Final = 0.05
 """The same for edges square on each other: room for rounding, and for those alongside."""
-MANY_SIDES = 100
+MANY_SIDES: Final = 100
 """From which on looking at all pairs in arrays is worth it."""
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from sbafab.geometry.apart import ChainGroup, chains_of, grouped
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal
@@ -14,17 +14,17 @@ from sbafab.geometry.pieces import DIGIT, Piece, by_owner, overlay
 from sbafab.geometry.region import Region
 from sbafab.geometry.remembered import remembered
 
-END_ROOM = 1e-5
+END_ROOM: Final = 1e-5
 """mm left out at both ends of an edge: what starts at a corner does not lie beside the edge."""
-LEANING = 4e-3
+LEANING: Final = 4e-3
 """mm from its ends, beside which an edge that leaves the corner along the normal may lean in: both
 are read from files, whose coordinates are off by up to 1 um."""
-STEEP = 0.01
+STEEP: Final = 0.01
 """Sine of the angle to the normal up to which an edge runs along it."""
 
-NEARER = 1e-9
+NEARER: Final = 1e-9
 """mm by which a place must be nearer than the nearest so far."""
-ROUNDING = 1e-12
+ROUNDING: Final = 1e-12
 """mm: more than what heights are rounded by."""
 
 

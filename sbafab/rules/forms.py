@@ -106,8 +106,8 @@ def linear_forms(groups: Sequence[InterfaceMargins], moves: Freedoms) -> LinearF
     own = np.concatenate(between)
     columns = _columns(acting).take(np.array(parts, dtype=np.intp), axis=2)
     shift, turn, sign, pinned, x, y = columns.take(own, axis=2)
-    (px, py), (nx, ny) = np.where(sign > 0, end[:, None], start[:, None]), normal
-    levers = np.where(turn > 0, sign, 0.0) * ((px - x) * ny - (py - y) * nx)
+    p = np.where(sign > 0, end[:, None], start[:, None])
+    levers = np.where(turn > 0, sign, 0.0) * ((p[0] - x) * normal[1] - (p[1] - y) * normal[0])
     return LinearForms(
         runs,
         np.array(begins),

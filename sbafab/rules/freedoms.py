@@ -11,10 +11,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations, pairwise
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from sbafab.geometry.centroid import centroid
 from sbafab.geometry.edges import Point, distance_to
+from sbafab.geometry.nanometres import nanometres
 from sbafab.geometry.nearby import boxes_meet, widened
 from sbafab.geometry.region import Region
 from sbafab.laminate.assembly import AssemblyStep, assembly
@@ -22,9 +23,9 @@ from sbafab.laminate.laminate import LOOSE, Laminate
 from sbafab.rules.boundary import beside
 from sbafab.rules.limits import Tolerances
 
-INSIDE = 0.05
+INSIDE: Final = 0.05
 """mm from an edge at which it is looked whether two shapes meet, before they are laid over."""
-BESIDE = 4
+BESIDE: Final = 4
 """Beside so many edges of each shape, about."""
 
 
@@ -66,7 +67,7 @@ class Freedom(NamedTuple):
 
     def like(self) -> tuple[object, ...]:
         """Equal for freedoms that differ in step and body only."""
-        centre = self.centre and (round(self.centre[0], 6), round(self.centre[1], 6))
+        centre = self.centre and (nanometres(self.centre[0]), nanometres(self.centre[1]))
         return self.most, centre, self.pins, self.in_sheet
 
 

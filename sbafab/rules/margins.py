@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point
 from sbafab.geometry.region import Region
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 Quantity = Literal["bond", "overhang"]
 QUANTITIES: tuple[Quantity, ...] = ("bond", "overhang")
 
-SHARP = 30.0
+SHARP: Final = 30.0
 """Degrees: a sharper corner is a bond that tapers to nothing. Blunter ones are where a strip leaves
 its pocket aslant, between two edges of one void, and no way for a leak."""
-ROOM = 1e-6
+ROOM: Final = 1e-6
 """mm: far more than the rounding of what is compared."""
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from sbafab.geometry.edge_table import (
     CellOrder,
     EdgeTable,
     boxes_round,
+    columns_of,
     crossings,
     dot,
     touching_in_parts,
@@ -32,9 +33,9 @@ from sbafab.rules.margins import ROOM, SHARP, Owner
 if TYPE_CHECKING:
     from sbafab.geometry.arrays import Bools, Floats, Indices
 
-ON_EDGE = 1e-5
+ON_EDGE: Final = 1e-5
 """mm within which a point lies on an edge: booleans keep points to 4 nm, files to 1 nm."""
-SQUARE = 0.9
+SQUARE: Final = 0.9
 """Cosine above which an edge counts as square to a direction (within 25 degrees)."""
 
 
@@ -166,9 +167,9 @@ def _of_overhangs(asked: Sequence[OverhangAsked]) -> list[_Segments]:
     edge = np.concatenate([np.arange(len(near)), rays.edge.take(ray)])
     order = edge.argsort(kind="stable")
     nominal = np.concatenate([[reach.value for _, reach in near], value])[order]
-    start = np.concatenate([np.array(feet).T, rays.start.take(ray, axis=1)], axis=1)[:, order]
-    ends = np.concatenate([np.array([reach.at for _, reach in near]).T, end], axis=1)[:, order]
-    normal = np.concatenate([-np.array(outward).T, rays.outward.take(ray, axis=1)], axis=1)[
+    start = np.concatenate([columns_of(feet, 2), rays.start.take(ray, axis=1)], axis=1)[:, order]
+    ends = np.concatenate([columns_of([reach.at for _, reach in near], 2), end], axis=1)[:, order]
+    normal = np.concatenate([-columns_of(outward, 2), rays.outward.take(ray, axis=1)], axis=1)[
         :, order
     ]
     stops = home.take(edge.take(order)).searchsorted(np.arange(len(asked) + 1)).tolist()
@@ -315,7 +316,7 @@ class Rays(NamedTuple):
     @staticmethod
     def of(edges: Sequence[Edge]) -> Rays:
         points, counts = sampled(edges, END_ROOM)
-        start, own = np.array(points).T, np.arange(len(edges)).repeat(counts)
+        start, own = columns_of(points, 2), np.arange(len(edges)).repeat(counts)
         return Rays(start, -EdgeTable.of(edges).at(own).normal(start), own)
 
 

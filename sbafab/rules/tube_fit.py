@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from sbafab.geometry.edges import Edge, Line, Point
 from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.nanometres import nanometres
 from sbafab.geometry.nearby import EdgeIndex, boxes_meet, widened
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import polygon, strip
@@ -161,7 +162,7 @@ def _straight_run(unbonded: Region, inlet: Inlet, beside: Region) -> Region | No
     begin, end = crossed
     corners = [begin, out.end, back.start, end]
     # As a boolean hands it out.
-    first = min(range(4), key=lambda i: (round(corners[i][0], 6), round(corners[i][1], 6)))
+    first = min(range(4), key=lambda i: (nanometres(corners[i][0]), nanometres(corners[i][1])))
     return polygon(corners[first:] + corners[:first])
 
 

@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 from sbafab.geometry.apart import alone, turned_round
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point
+from sbafab.geometry.nanometres import in_reading_order
 from sbafab.geometry.nearby import widened
 from sbafab.geometry.region import Region
 from sbafab.geometry.remembered import remembered
@@ -24,7 +25,7 @@ from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.rules.boundary import beside, edges_along
 from sbafab.rules.limits import TOLERANCE
 
-INSET = 1e-5
+INSET: Final = 1e-5
 """mm from an edge at which a point surely lies on one side of it."""
 
 
@@ -184,12 +185,9 @@ def _around(region: Region, frame: Region) -> Region:
         turned_round(contour) if alone(contour) is contour else tidy(contour.reversed().edges)
         for contour in region.contours
     )
-    contours = [*frame.contours, *(contour for contour in turned if contour is not None)]
-    return Region(tuple(sorted(contours, key=lambda c: (c.is_hole, *map(_to_nm, c.bounds[:3])))))
-
-
-def _to_nm(value: float) -> float:
-    return round(value, 6)
+    return Region(
+        in_reading_order([*frame.contours, *(contour for contour in turned if contour is not None)])
+    )
 
 
 def _add_gap(

@@ -6,7 +6,6 @@ input ends, because whoever started it is gone, so does it, in the middle of a j
 
 from __future__ import annotations
 
-import gc
 import json
 import os
 import queue
@@ -15,19 +14,15 @@ import sys
 import threading
 from typing import IO, Any
 
+from sbafab.process import prepare
 from sbafab.search.fingerprint import fingerprint
-
-MANY = 200_000
-"""Records after which they are looked through for rings that nothing holds: measuring a design
-makes many, and hardly any ring.
-"""
 
 
 def main() -> None:
     """Measures until standard input ends."""
     # Ctrl-C goes to all processes of a terminal; the one that started this ends it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    gc.set_threshold(MANY, *gc.get_threshold()[1:])
+    prepare()
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8", newline="\n")
     # What a library prints must not stand among the answers.
     os.dup2(2, 1)
