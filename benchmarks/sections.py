@@ -118,7 +118,7 @@ def compiled_beside_plain(rounds: int) -> Section:
         if folder is None:
             return Section(key, title, [], ["skipped: no compiler, or no mypyc"])
         found = compared(ROOT, rounds, folder, compiled.WORKS)
-        decks = {name: _decks_by_turns(folder, name, 3 * rounds) for name in compiled.DECKS}
+        decks = {name: _decks_by_turns(folder, name, 8 * rounds) for name in compiled.DECKS}
     rows = []
     for one in found:
         plain, least = min(one.before), min(one.now)
