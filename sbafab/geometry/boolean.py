@@ -72,7 +72,7 @@ def difference(a: Region, b: Region) -> Region:
 @remembered
 def _difference(a: Region, b: Region) -> Region:
     own, other = ((contour, 1) for contour in a.contours), ((c, -1) for c in b.contours)
-    (found,) = _enclosed([*own, *other], [partial(lt, 0)])
+    (found,) = _enclosed([*own, *other], [_more_than(0)])
     return found
 
 
@@ -107,6 +107,11 @@ def _is_inside(turns: int) -> bool:
     return own > 0 and other > 0
 
 
+def _more_than(turns: int) -> WantedTurns:
+    """Wanted is what chains wind round more often than so."""
+    return partial(lt, turns)
+
+
 def wound(edges: Sequence[Edge], above: int) -> Region:
     """The points that closed chains of edges wind round more than ``above`` times.
 
@@ -116,12 +121,12 @@ def wound(edges: Sequence[Edge], above: int) -> Region:
 
 
 def _wound(above: int, found: Arrangement) -> Region:
-    return _region(_loops(found, partial(lt, above)))
+    return _region(_loops(found, _more_than(above)))
 
 
 def enclosed(contours: Iterable[Contour], above: int = 0) -> Region:
     """The same for contours, each a closed chain by itself."""
-    (found,) = _enclosed([(contour, 1) for contour in contours], [partial(lt, above)])
+    (found,) = _enclosed([(contour, 1) for contour in contours], [_more_than(above)])
     return found
 
 

@@ -177,7 +177,7 @@ def _touching_in_parts(
     each = each.repeat(parts)
     own = np.arange(len(each)).repeat(each)
     other = np.arange(len(own)) - (each.cumsum() - each - begins).repeat(each)
-    # Few that lie one above the other are left for the second step.
+    # Side by side most are left out, so that few are compared in height.
     for low, high in ((0, 2), (1, 3)):
         meets = boxes[low].take(other) <= asked[high].take(own)
         meets &= boxes[high].take(other) >= asked[low].take(own)
