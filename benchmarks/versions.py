@@ -8,6 +8,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Container, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -17,6 +18,8 @@ from benchmarks.timing import ROOT, environment, seconds
 
 DESIGNS = 8
 """Decks in one process, all of different designs."""
+LEAST_TIME = 30
+"""Seconds of turns at least: a machine is seldom quiet for long, and short work is soon redone."""
 EDGES = 300
 MANY = 50
 DECK = """
@@ -57,9 +60,11 @@ def compared(
             if only and name not in only:
                 continue
             times: dict[Path, list[float]] = {before: [], now: []}
-            for _ in range(rounds):
+            turns, ends = 0, time.monotonic() + LEAST_TIME
+            while turns < rounds or time.monotonic() < ends:
                 for root, taken in times.items():
                     taken.extend(work(root))
+                turns += 1
             found.append(Compared(name, times[before], times[now]))
     return found
 

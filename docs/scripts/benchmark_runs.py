@@ -16,7 +16,7 @@ from benchmarks.__main__ import python_of
 from benchmarks.sections import Asked, sections
 from benchmarks.timing import ROOT, Section, keep_to_one_core
 from benchmarks.versions import Compared, compared
-from docs.scripts.measured import Record, Table, keep, versions
+from docs.scripts.measured import Record, Table, keep, record, versions
 from sbafab.process import prepare
 
 COMMAND = "python -m docs.scripts.benchmark_runs --before FOLDER"
@@ -30,6 +30,18 @@ AIMS = {
 }
 """Seconds that were aimed at."""
 GROWN = ("balloons", "chambers", "edges", "copies")
+"""Sections whose growth is told, in one table."""
+TABLES = (
+    "plates",
+    "decks",
+    "compiled",
+    "processes",
+    "memory",
+    "poses",
+    "commands",
+    "growth",
+    "versions",
+)
 
 
 def beside(found: Sequence[Compared]) -> Table:
@@ -63,16 +75,34 @@ def main() -> None:
     parser.add_argument("--before", type=Path, required=True)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--designs", type=int, default=10_000)
+    parser.add_argument(
+        "--tables",
+        nargs="+",
+        choices=TABLES,
+        default=[],
+        help="measured again; the others stay as they are",
+    )
     arguments = parser.parse_args()
     keep_to_one_core()
     prepare()
     rivals = python_of(ROOT / ".benchmarks" / "venv")
-    made = list(sections(Asked(arguments.rounds, arguments.designs, rivals)))
-    tables = {one.key: told(one) for one in made if one.power is None}
-    tables["growth"] = growth(made)
-    tables["versions"] = beside(compared(arguments.before.resolve(), arguments.rounds))
     used = {"Python": platform.python_version(), **versions(numpy="numpy", MuJoCo="mujoco")}
-    keep("benchmarks", Record(COMMAND, date.today().isoformat(), used, tables))
+    day, again = date.today().isoformat(), arguments.tables
+    tables: dict[str, Table] = {}
+    if again:
+        kept = record("benchmarks")
+        if (kept.day, kept.versions) != (day, used):
+            parser.error("the record is of another day or of other versions: measure all tables")
+        tables = dict(kept.tables)
+    if again != ["versions"]:
+        only = [key for one in again for key in (GROWN if one == "growth" else [one])]
+        made = list(sections(Asked(arguments.rounds, arguments.designs, rivals), only))
+        tables |= {one.key: told(one) for one in made if one.power is None}
+        if any(one.power is not None for one in made):
+            tables["growth"] = growth(made)
+    if not again or "versions" in again:
+        tables["versions"] = beside(compared(arguments.before.resolve(), arguments.rounds))
+    keep("benchmarks", Record(COMMAND, day, used, tables))
 
 
 if __name__ == "__main__":
