@@ -194,7 +194,7 @@ def test_a_file_in_no_folder_is_refused_before_the_search(tmp_path: Path) -> Non
 
 def test_a_file_with_a_space_in_its_name_names_a_design_that_loads(tmp_path: Path) -> None:
     target = tmp_path / "my file.toml"
-    asked = ["find", "1dof-5mm", "--min", "stroke=4", "--tries", "20", "-o", str(target)]
+    asked = ["find", "1dof-5mm", "--max", "mass=1", "--tries", "6", "-o", str(target)]
     ended = CliRunner().invoke(app, asked)
     assert ended.exit_code == 0, ended.output
     assert sbafab.load(target).name == "my-file"
@@ -296,7 +296,7 @@ def test_rules_are_asked_of_few_designs(monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_a_key_that_is_set_stays(tmp_path: Path) -> None:
     target = tmp_path / "found.toml"
-    asked = ["find", "1dof-5mm", "--min", "stroke=4", "--tries", "20", "-o", str(target)]
+    asked = ["find", "1dof-5mm", "--max", "mass=1", "--tries", "6", "-o", str(target)]
     ended = CliRunner().invoke(app, [*asked, "--set", "stack.balloons=4"])
     assert ended.exit_code == 0, ended.output
     assert "stack.balloons" not in ended.output.partition("from 1dof-5mm")[0]
