@@ -33,8 +33,8 @@ from benchmarks.versions import compared
 
 RIVALS = {"foldable": "foldable-robotics==0.0.37", "build123d": "build123d"}
 MODULES = {"foldable": "foldable_robotics", "build123d": "build123d"}
-TWELVE = 12
-"""Designs of which a rate is told: that of the quickest twelve, one after the other."""
+BATCH = 12
+"""Designs of which a rate is told: that of the quickest so many in a row."""
 HEAVY = ("ezdxf", "manifold3d", "numpy", "pydantic", "rich", "shapely", "trimesh")
 
 
@@ -109,11 +109,11 @@ def rule_decks(rounds: int) -> Section:
     rows = []
     for template in decks.VARIED:
         decks.checked(template, -1)
-        taken = [decks.checked(template, turn) for turn in range(TWELVE * rounds)]
-        best = min(sum(taken[first : first + TWELVE]) for first in range(0, len(taken), TWELVE))
-        rows.append(Row(template, taken, f"{TWELVE / best:.1f} designs a second"))
+        taken = [decks.checked(template, turn) for turn in range(BATCH * rounds)]
+        best = min(sum(taken[first : first + BATCH]) for first in range(0, len(taken), BATCH))
+        rows.append(Row(template, taken, f"{BATCH / best:.1f} designs a second"))
     for template in ("1dof-5mm", "3dof-15mm"):
-        taken = [decks.other_height(template, turn) for turn in range(TWELVE)]
+        taken = [decks.other_height(template, turn) for turn in range(BATCH)]
         told = f"{len(taken) / sum(taken):.1f} designs a second"
         rows.append(Row(f"{template}, other heights", taken, told))
     return Section("decks", "A design built, and all rules", rows)

@@ -71,8 +71,8 @@ def _first(edges: Sequence[Edge]) -> int:
     for i, edge in enumerate(edges):
         x, y = edge.start
         # What lies farther to the right is not rounded to the least x.
-        if x <= left and (nanometres(x), nanometres(y)) < least:
-            found, least = i, (nanometres(x), nanometres(y))
+        if x <= left and (place := (nanometres(x), nanometres(y))) < least:
+            found, least = i, place
     return found
 
 
