@@ -228,7 +228,7 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
         force = run.schedule.steps[0].force_n / 1000
         yield (
             "press",
-            f"{len(run.schedule.steps)} steps, {run.schedule.total_press_minutes:g} min at "
+            f"{len(run.schedule.steps)} steps, {_minutes(run.schedule.total_press_minutes)} at "
             f"{run.schedule.steps[0].temperature_c:g} C, {force:.3f} kN; press.json, press.csv",
         )
         runs = design_runs(run.design, lam)
@@ -238,7 +238,7 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
             yield (
                 "batch",
                 f"{runs.copies} copies in {runs.count} press cycle{'s' if runs.count > 1 else ''} "
-                f"of {sizes}: {took.press:g} min in the press, {took.total:g} min in all",
+                f"of {sizes}: {_minutes(took.press)} in the press, {_minutes(took.total)} in all",
             )
     yield from _for_simulation(run)
     if cut:
@@ -249,6 +249,10 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
     for warning in run.schedule.warnings if run.schedule is not None else ():
         yield "warning", warning
     yield "folder", str(run.folder)
+
+
+def _minutes(value: float | None) -> str:
+    return "minutes not stated" if value is None else f"{value:g} min"
 
 
 def replaced(dropped: Sequence[str]) -> Iterator[tuple[str, str]]:

@@ -8,14 +8,22 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from sbafab.design.section import Section
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
 from sbafab.geometry.beam import Kerf
-from sbafab.laminate.films import PAPER_TPE, PTFE_WARNING, Film, FilmKind, Material
+from sbafab.laminate.films import (
+    PAPER_PRODUCT,
+    PAPER_THICKNESS,
+    PAPER_TPE,
+    PTFE_WARNING,
+    Film,
+    FilmKind,
+    Material,
+)
 
 UNCALIBRATED: Literal["uncalibrated"] = "uncalibrated"
 FILM_NAME = re.compile(r"[a-z][a-z0-9]{0,15}")
@@ -74,17 +82,41 @@ class Sheet(Section):
     """Sheets that may be used."""
 
 
-class TpeFilm(Section):
-    """The structural film that is bonded."""
+OF_THE_PRODUCT = ("density", "melting_point", "modulus", "poisson")
+"""Keys of a film that another product does not share."""
 
-    product: str = Field(default="Stretchlon 200", max_length=80)
+
+class TpeFilm(Section):
+    """The structural film that is bonded. Defaults are those of the paper's film; another product
+    has none of them: what its table leaves out is not known."""
+
+    product: str = Field(default=PAPER_PRODUCT, max_length=80)
     """What to order."""
-    thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.038
-    """Thickness of the structural film."""
-    density: float = Field(default=1122.0, gt=0, le=20000)
-    """kg/m3, measured (paper Sec. 3.2.1)."""
-    melting_point: float = Field(default=120.0, gt=0, le=HOTTEST)
+    thickness: Annotated[float, Millimetres(SHORTEST, 1)] = PAPER_THICKNESS
+    """Thickness of the structural film; another product than the paper's must give it."""
+    density: float | None = Field(default=1122.0, gt=0, le=20000)
+    """kg/m3, measured (paper Sec. 3.2.1); mass and weight need it."""
+    melting_point: float | None = Field(default=120.0, gt=0, le=HOTTEST)
     """C; the press must be hotter."""
+    modulus: float | None = Field(default=PAPER_TPE[0], gt=0, le=1e6)
+    """MPa, Young's (paper Sec. 3.2.1); elastic models and simulators need it."""
+    poisson: float | None = Field(default=PAPER_TPE[1], ge=0, lt=0.5)
+    """Poisson's ratio (paper Sec. 3.2.1), likewise."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _another_product_is_another_film(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        product = data.get("product", PAPER_PRODUCT)
+        if product == PAPER_PRODUCT or not isinstance(product, str):
+            return data
+        if "thickness" not in data:
+            raise ValueError(
+                f"names another product than {PAPER_PRODUCT} and no thickness; add thickness, for "
+                f'instance "50 um", and what is known of {", ".join(OF_THE_PRODUCT)}'
+            )
+        return {**dict.fromkeys(OF_THE_PRODUCT), **data}
 
 
 class PtfeFilm(Section):
@@ -109,17 +141,17 @@ class OtherFilm(Section):
     """What to order."""
     thickness: Annotated[float, Millimetres(SHORTEST, 1)]
     """Its thickness."""
-    density: float = Field(gt=0, le=20000)
-    """kg/m3."""
+    density: float | None = Field(default=None, gt=0, le=20000)
+    """kg/m3; mass and weight need it."""
     melting_point: float | None = Field(default=None, gt=0, le=HOTTEST)
     """C; the press must be hotter. A structural film without one stays solid in the press and
     bonds only to films that melt on it."""
     temperature_limit: float | None = Field(default=None, gt=0, le=HOTTEST)
     """C; the press must stay below. A mask has one."""
     modulus: float | None = Field(default=None, gt=0, le=1e6)
-    """MPa, Young's; CalculiX needs it. TPE has the paper's 10."""
-    poisson: float = Field(default=0.3, ge=0, lt=0.5)
-    """Poisson's ratio, for CalculiX too; TPE has the paper's 0.2."""
+    """MPa, Young's; elastic models and simulators need it."""
+    poisson: float | None = Field(default=None, ge=0, lt=0.5)
+    """Poisson's ratio, likewise."""
     warning: str = Field(default="", max_length=200)
     """What every cut file of it says, for instance of its fumes."""
     kerf: KerfWidth = UNCALIBRATED
@@ -175,7 +207,7 @@ class Films(Section):
                 tpe.density,
                 tpe.melting_point,
                 limit,
-                elastic=PAPER_TPE,
+                elastic=_elastic(tpe),
             ),
             "ptfe": Film(
                 "PTFE",
@@ -198,10 +230,37 @@ class Films(Section):
                 limit=HOTTEST if film.temperature_limit is None else film.temperature_limit,
                 kind=film.kind,
                 warning=film.warning,
-                elastic=None if film.modulus is None else (film.modulus, film.poisson),
+                elastic=_elastic(film),
                 shade=sum(known.kind == film.kind for known in found.values()),
+                stays_solid=film.kind == "structural" and film.melting_point is None,
             )
         return found
+
+
+def _elastic(film: TpeFilm | OtherFilm) -> tuple[float, float] | None:
+    """Young's modulus in MPa and Poisson's ratio, where both are known."""
+    if film.modulus is None or film.poisson is None:
+        return None
+    return film.modulus, film.poisson
+
+
+def without_other_products(
+    table: Mapping[str, Any], changed: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return ``table``, tables of films by name, as far as it holds for ``changed``.
+
+    A film of which ``changed`` names another product loses all that ``table`` says of it but its
+    kind, sheet and kerf: thickness, density and the rest are those of the first product. PTFE is
+    one polymer under any name, and keeps them.
+    """
+    left = dict(table)
+    for name, film in table.items():
+        own = changed.get(name)
+        if name == "ptfe" or not (isinstance(film, Mapping) and isinstance(own, Mapping)):
+            continue
+        if own.get("product", film.get("product")) != film.get("product"):
+            left[name] = {key: film[key] for key in ("kind", "sheet", "kerf") if key in film}
+    return left
 
 
 def material(name: str) -> Material:

@@ -1,7 +1,7 @@
 """Kits: what a lab works with, in one file with a source for every number.
 
-A kit gives a design every key of films, registration, press, laser, sheets and rules that the
-design itself leaves out, and the tube and adhesive of its inlets.
+A kit gives a design every key of films, layup, registration, press, acceptance, laser, sheets and
+rules that the design itself leaves out, and the tube and adhesive of its inlets.
 """
 
 from __future__ import annotations
@@ -16,10 +16,19 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from sbafab.design.films import Films
+from sbafab.design.films import Films, LayerFilms, without_other_products
 from sbafab.design.messages import listed, shown
 from sbafab.design.reading import checked, read_toml
-from sbafab.design.records import NAME_PATTERN, Design, Laser, Press, Registration, Rules, Sheets
+from sbafab.design.records import (
+    NAME_PATTERN,
+    Acceptance,
+    Design,
+    Laser,
+    Press,
+    Registration,
+    Rules,
+    Sheets,
+)
 from sbafab.design.section import Section, writable
 from sbafab.design.templates import KITS, kit_names, templates_folder, write_copy
 from sbafab.design.units import Length, millimetres
@@ -33,11 +42,13 @@ FILE = "kit.toml"
 OTHER_TUBE = "tubing of your choice"
 """What a tube is called whose name stands for another size in the kit."""
 VALUE, SOURCE = "value", "source"
-SECTIONS = ("films", "registration", "press", "laser", "sheets", "rules")
+SECTIONS = (
+    *("films", "layup", "registration", "press", "acceptance", "laser", "sheets", "rules"),
+)
 """Sections of a design that a kit fills in."""
 OF_A_DESIGN = ("registration.method", "rules.waive", "rules.target_yield", "rules.yield_builds")
 """Keys in them that are no lab's to say."""
-TEXTS = ("product", "use", "warning", "plate_material", "release_film")
+TEXTS = ("product", "use", "warning", "plate_material", "release_film", "fitting")
 """Keys that are no numbers, whatever they say."""
 Product = Annotated[str, Field(min_length=1, max_length=120)]
 
@@ -68,8 +79,10 @@ class _File(Section):
     version: str = Field(min_length=1, max_length=40)
     about: str = Field(default="", max_length=400)
     films: Films = Films.model_construct()
+    layup: LayerFilms = LayerFilms.model_construct()
     registration: Registration = Registration.model_construct()
     press: Press = Press.model_construct()
+    acceptance: Acceptance = Acceptance.model_construct()
     laser: Laser = Laser.model_construct()
     sheets: Sheets = Sheets.model_construct()
     rules: Rules = Rules.model_construct()
@@ -210,6 +223,8 @@ def under_kit(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     filled = {**data}
     for section, table in kit.tables.items():
         own = data.get(section, {})
+        if section == "films" and isinstance(own, dict):
+            table = without_other_products(table, own)
         # What is no table is refused later, in the words for it.
         filled[section] = _merged(table, own) if isinstance(own, dict) else own
     inlet = data.get("inlet", {})

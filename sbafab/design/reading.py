@@ -14,6 +14,7 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
+from sbafab.design.films import without_other_products
 from sbafab.design.messages import listed, sentence, shown
 from sbafab.design.records import Design, RuleName
 from sbafab.design.templates import kit_names, template_names, templates_folder
@@ -202,6 +203,9 @@ def changed(design: AnyDesign, changes: Iterable[Change]) -> AnyDesign:
     data = plain_tables(design)
     if KIT in changed_keys(changes):
         data = without_kit(data, design)
+    films = override({"films": {}}, changes).get("films")
+    if isinstance(films, dict):
+        data["films"] = without_other_products(data.get("films", {}), films)
     data = override(data, changes)
     start_where_the_user_stands(data, changes)
     open_what_fits(data, changes)

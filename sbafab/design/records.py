@@ -12,14 +12,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, PrivateAttr
+from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
 from sbafab.design.films import UNCALIBRATED, Films, KerfWidth, LayerFilms, Sheet
 from sbafab.design.form import Form, Free
 from sbafab.design.section import Section
-from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres
+from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
+from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, film_name
 from sbafab.notebook import table_html
 
+PAPER_FILM = film_name(PAPER_PRODUCT, PAPER_THICKNESS)
+FITTING = "blunt dispensing needle, 22 G (outer diameter 0.718 mm), Luer lock"
+"""For the paper's tube of 0.635 mm bore, which it stretches by 13 %; 23 G (0.641 mm) by 1 %."""
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
 RuleName = Literal[
     "bond-width",
@@ -162,6 +166,49 @@ class PanelSection(Section):
     """The most by which the second cut lies off the first."""
 
 
+NOT_MEASURED: Literal["not measured"] = "not measured"
+LONGEST_CONSTANT = 120.0
+"""Minutes, of a plate between platens."""
+
+
+def named_film(text: str) -> tuple[str, float]:
+    """Return product and thickness (mm) of a text such as "Stretchlon 200, 0.038 mm".
+
+    Raises ValueError with a sentence that says what is allowed.
+    """
+    product, _, thickness = text.rpartition(",")
+    try:
+        thick = millimetres(thickness)
+    except ValueError:
+        thick = 0.0
+    if not product.strip() or not SHORTEST <= thick <= 1:
+        raise ValueError(
+            f'must be product and thickness of a film, such as "{PAPER_FILM}"'
+        )
+    return product.strip(), thick
+
+
+def _named_film(text: str) -> str:
+    named_film(text)
+    return text
+
+
+def _time_constant(value: object) -> object:
+    if value == NOT_MEASURED:
+        return value
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not is_number or not 0 < float(str(value)) <= LONGEST_CONSTANT:
+        raise ValueError(
+            f"must be minutes, more than 0 and at most {LONGEST_CONSTANT:g}, or "
+            f'"{NOT_MEASURED}"'
+        )
+    return float(str(value))
+
+
+TimeConstant = Annotated[float | Literal["not measured"], BeforeValidator(_time_constant)]
+"""Minutes, or "not measured"."""
+
+
 class Press(Section):
     """The heat press: temperature, pressure, minutes, platen."""
 
@@ -196,6 +243,31 @@ class Press(Section):
     """Step 3: all layers between the bottom balloon and the top layer."""
     bond_all_minutes: float = Field(default=20.0, gt=0, le=600)
     """Step 4: the whole laminate, full bond."""
+    minutes_for: tuple[
+        Annotated[str, Field(max_length=120), AfterValidator(_named_film)], ...
+    ] = Field(default=(PAPER_FILM,), max_length=20, strict=False)
+    """Films that the minutes above were stated for, each as "product, thickness". A laminate of any
+    other structural film gets no minutes: blanks on the traveller, null in press.json."""
+    time_constant: TimeConstant = NOT_MEASURED
+    """Minutes in which the edge of the base plate, laid cold between the hot platens with the pad on
+    it, makes 63 % of its way; measured once at the bench (docs: In the press)."""
+
+
+class Acceptance(Section):
+    """What an actuator must stand before it is handed on: all ours but the burst that it stays
+    below."""
+
+    leak_pressure_kpa: float = Field(default=5.0, gt=0, le=1000)
+    """Leak test under water: enough to open every balloon (a stack of d = 5 unfolds up to 0.95)."""
+    leak_seconds: float = Field(default=60.0, gt=0, le=36000)
+    """How long it is held."""
+    proof_pressure_kpa: float = Field(default=150.0, gt=0, le=10000)
+    """Proof test: 1.5 times the 100 kPa at which the paper gives forces. Lower where 60 % of the
+    estimated burst pressure is less."""
+    proof_seconds: float = Field(default=60.0, gt=0, le=36000)
+    """How long it is held."""
+    fitting: str = Field(default=FITTING, min_length=1, max_length=200)
+    """What joins the tube to a syringe, regulator or gauge."""
 
 
 class Laser(Section):
@@ -304,6 +376,7 @@ class Design(Section):
     registration: Registration = Registration.model_construct()
     panel: PanelSection = PanelSection.model_construct()
     press: Press = Press.model_construct()
+    acceptance: Acceptance = Acceptance.model_construct()
     laser: Laser = Laser.model_construct()
     sheets: Sheets = Sheets.model_construct()
     order: Order = Order.model_construct()

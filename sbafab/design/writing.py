@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from sbafab.design.films import LayerFilms
-from sbafab.design.records import Design, Inlet
+from sbafab.design.records import Acceptance, Design, Inlet, Press
+from sbafab.laminate.films import PAPER_PRODUCT, PAPER_TPE
 
 FITS = "fits"
 
@@ -80,6 +81,15 @@ def _as_first_hashed(table: dict[str, Any], design: Design) -> dict[str, Any]:
         table["layup"] = None
     if design.inlet.adhesive == Inlet().adhesive:
         table["inlet"]["adhesive"] = None
+    # What came later, where it says what was always so.
+    if design.acceptance == Acceptance():
+        table["acceptance"] = None
+    for key in ("minutes_for", "time_constant"):
+        if getattr(design.press, key) == getattr(Press(), key):
+            table["press"][key] = None
+    tpe = design.films.tpe
+    if (tpe.product, tpe.modulus, tpe.poisson) == (PAPER_PRODUCT, *PAPER_TPE):
+        table["films"]["tpe"] |= {"modulus": None, "poisson": None}
     return _without_none(table)
 
 

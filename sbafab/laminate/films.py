@@ -20,34 +20,76 @@ PTFE_WARNING = (
 
 PAPER_TPE = (10.0, 0.2)
 """Young's modulus in MPa and Poisson's ratio of the paper's model (Sec. 3.2.1)."""
+PAPER_PRODUCT, PAPER_THICKNESS = "Stretchlon 200", 0.038
+"""The film that the paper bonded, and its thickness in mm (Sec. 2)."""
+GAUGE = 0.1
+"""Share by which a film's thickness may differ from the one named: what films are sold to, ours."""
 
 
 @dataclass(frozen=True)
 class Film:
     """A film as it comes off the roll.
 
-    ``thickness`` mm, ``density`` kg/m3. ``softens_above`` is the temperature in C at which the film
-    bonds (the melting point of a TPE; None for one that stays solid and bonds to what melts on it),
-    ``limit`` the one in C that it must not exceed. ``shade`` counts the films of a kind,
-    for colours; ``warning`` is what its cut files say; ``elastic`` are Young's modulus in MPa and
-    Poisson's ratio, for simulators.
+    ``thickness`` mm, ``density`` kg/m3 (None where it is not known). ``softens_above`` is the
+    temperature in C at which the film bonds: the melting point of a TPE, None where it is not known
+    or where it ``stays_solid`` in the press and bonds to what melts on it. ``limit`` is the one in
+    C that it must not exceed. ``shade`` counts the films of a kind, for colours; ``warning`` is
+    what its cut files say; ``elastic`` are Young's modulus in MPa and Poisson's ratio, None where
+    one of them is not known.
     """
 
     material: Material
     product: str
     thickness: float
-    density: float
+    density: float | None
     softens_above: float | None
     limit: float
     kind: FilmKind = "structural"
     shade: int = 0
     warning: str = ""
     elastic: tuple[float, float] | None = None
+    stays_solid: bool = False
+
+    @property
+    def table(self) -> str:
+        """The table of a design or kit that describes it: "films.tpe"."""
+        return f"films.{self.material.lower()}"
+
+    @property
+    def said(self) -> str:
+        """Product and thickness in one text: "Stretchlon 200, 0.038 mm"."""
+        return film_name(self.product, self.thickness)
+
+    def is_a(self, product: str, thickness: float) -> bool:
+        """Return True for this product of this thickness in mm, as far as films keep theirs."""
+        return self.product == product and abs(self.thickness - thickness) <= GAUGE * thickness
+
+    @property
+    def is_the_papers(self) -> bool:
+        """True for the film whose actuators the paper measured, as thick and as stiff."""
+        return self.is_a(PAPER_PRODUCT, PAPER_THICKNESS) and self.elastic == PAPER_TPE
 
     @property
     def is_mask(self) -> bool:
         """Whether nothing bonds to it."""
         return self.kind == "mask"
+
+
+def film_name(product: str, thickness: float) -> str:
+    """Return product and thickness (mm) as one text: "Stretchlon 200, 0.038 mm"."""
+    return f"{product}, {thickness:g} mm"
+
+
+def unstated(films: Iterable[Film], stated: Iterable[tuple[str, float]]) -> list[Film]:
+    """Return the structural films, each once, that are none of the ``stated``: products and
+    thicknesses (mm) that a number was stated for.
+    """
+    known = tuple(stated)
+    return [
+        film
+        for film in dict.fromkeys(films)
+        if not film.is_mask and not any(film.is_a(*one) for one in known)
+    ]
 
 
 def in_order(materials: Iterable[Material]) -> list[Material]:

@@ -148,15 +148,16 @@ def _batch() -> dict[str, Any]:
     pattern = table(pattern=TEXT, each=COUNT, cycles=array(COUNT))
     place = {**array(number()), "minItems": 2, "maxItems": 2}
     times = ("press_minutes", "hands_minutes", "total_minutes")
+    count_or_null = {**COUNT, "type": ["integer", "null"]}
     return table(
         copies=COUNT,
         at_once=COUNT,
         at_once_at_most=COUNT,
         cycles={**array(COUNT), "description": "copies pressed in each cycle"},
         places_mm=array(place),
-        **dict.fromkeys(times, number()),
-        a_day_one_by_one=COUNT,
-        a_day_in_batches=COUNT,
+        **{name: number() if name == "hands_minutes" else number("null") for name in times},
+        a_day_one_by_one=count_or_null,
+        a_day_in_batches=count_or_null,
         patterns=array(pattern),
     )
 

@@ -9,7 +9,7 @@ from sbafab.actuators.stacking import used_films
 from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.cutting.properties import CutSettings
 from sbafab.design.films import KerfWidth, Sheet, material
-from sbafab.design.records import Design
+from sbafab.design.records import NOT_MEASURED, Design, named_film
 from sbafab.design.writing import design_sha256
 from sbafab.geometry.beam import Kerf
 from sbafab.laminate.films import Material
@@ -64,6 +64,7 @@ def limits(design: Design) -> Limits:
         worst_mask_overhang=design.rules.worst_mask_overhang,
         target_yield=design.rules.target_yield,
         yield_builds=design.rules.yield_builds,
+        minutes_for=tuple(map(named_film, design.press.minutes_for)),
         waive=frozenset(design.rules.waive),
     )
 
@@ -103,6 +104,8 @@ def press_settings(design: Design) -> PressSettings:
         pin_standard=design.registration.pin_standard,
         pin_lengths=design.registration.pin_lengths,
         tack=design.panel.tack_minutes,
+        minutes_for=tuple(map(named_film, press.minutes_for)),
+        time_constant=None if press.time_constant == NOT_MEASURED else press.time_constant,
     )
 
 

@@ -56,7 +56,7 @@ class Pad:
 
 @dataclass(frozen=True)
 class BuildUpPart:
-    """A part of the build-up: what it is of, its thickness and size in mm (0: as the laminate)."""
+    """A part of the build-up: what it is of, its thickness and size in mm."""
 
     part: str
     material: str

@@ -12,6 +12,7 @@ from sbafab.laminate.films import FIRST
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing import build_up, sheets
 from sbafab.pressing.dowels import is_sold
+from sbafab.pressing.heating import films_without_minutes, unstated_minutes
 from sbafab.pressing.words import listed, named
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
             )
     for interface in laminate.interfaces:
         below, above = interface.below, interface.above
-        if below.film.softens_above is None and above.film.softens_above is None:
+        if below.film.stays_solid and above.film.stays_solid:
             roles = " or the ".join(dict.fromkeys((below.role, above.role)))
             raise DesignError(
                 f"layers {below.index} and {above.index} are of {below.film.material} and "
@@ -73,6 +74,14 @@ def warnings(
 ) -> Iterator[str]:
     if laminate.panel is not None:
         yield sheets.UNTRIED
+    if words := unstated_minutes(films_without_minutes(laminate, press), press):
+        yield words
+    for film in dict.fromkeys(layer.film for layer in laminate.layers):
+        if not film.is_mask and film.softens_above is None and not film.stays_solid:
+            yield (
+                f"no melting point of {film.product} is known, so nobody has checked that "
+                f"{press.temperature_c:g} C bonds it; add {film.table}.melting_point, in C"
+            )
     if press.temperature_c > HOTTEST_TRIED:
         yield (
             f"{press.temperature_c:g} C is hotter than the {HOTTEST_TRIED:g} C of earlier work, "

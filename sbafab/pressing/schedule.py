@@ -15,13 +15,16 @@ from sbafab.laminate.assembly import (
     BondState,
     StepName,
     assembly,
+    distinct_layers,
     stack_count,
 )
+from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing import build_up, sheets
 from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, RELEASE, BuildUpPart, Footprint, Pad
 from sbafab.pressing.cautions import refuse_temperature, warnings
 from sbafab.pressing.dowels import PinSetting, Standard, plate_thickness, settings_by_step
+from sbafab.pressing.heating import Heating, HeatPoint, films_without_minutes, heating
 from sbafab.pressing.words import listed, named
 
 TITLES: dict[StepName, str] = {
@@ -70,6 +73,10 @@ class PressSettings:
     pin_standard: Standard = "ISO 8734"
     pin_lengths: tuple[float, ...] = ()
     tack: float = 1.0
+    minutes_for: tuple[tuple[str, float], ...] = ((PAPER_PRODUCT, PAPER_THICKNESS),)
+    """Products and thicknesses (mm) of the films that the minutes were stated for."""
+    time_constant: float | None = None
+    """Minutes in which the edge of the cold plate makes 63 % of its way; None: not measured."""
 
     @property
     def force_n(self) -> float:
@@ -96,6 +103,8 @@ class Step:
     index; ``pins`` names the dowel pins that are in, ``pin_settings`` how long they are and how
     deep they sit. ``pressure_kpa`` is the force on the whole platen, ``film_kpa`` and the others
     what the pad makes of it (``build_up.Pressures``). ``build_up`` goes from the lower platen up.
+    ``minutes`` are None where nobody stated any for the film; they count from the start of the
+    clock in ``time_temperature``.
     """
 
     step: int
@@ -108,7 +117,7 @@ class Step:
     pressure_kpa: float
     force_n: float
     platen_mm: tuple[float, float]
-    minutes: float
+    minutes: float | None
     film_kpa: float
     edge_kpa: float
     bond_kpa: float
@@ -117,6 +126,7 @@ class Step:
     build_up: tuple[BuildUpPart, ...]
     pin_settings: tuple[PinSetting, ...]
     instructions: str
+    time_temperature: tuple[HeatPoint, ...]
 
     @property
     def stack_mm(self) -> float:
@@ -132,13 +142,19 @@ class Step:
 
 @dataclass(frozen=True)
 class Schedule:
-    """All steps, the time they take, and what the technician should know beforehand."""
+    """All steps, the time they take, and what the technician should know beforehand.
+
+    The two totals are None where the minutes of a step are; warming up is not in them.
+    ``hands_minutes`` are what the estimate has beside those in the press.
+    """
 
     steps: tuple[Step, ...]
-    total_press_minutes: float
-    estimated_build_minutes: float
+    total_press_minutes: float | None
+    estimated_build_minutes: float | None
     estimate_basis: str
     warnings: tuple[str, ...]
+    heating: Heating
+    hands_minutes: float
 
 
 def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] = (1,)) -> Schedule:
@@ -167,26 +183,33 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
         press.pin_lengths,
     )
     plate = plate_thickness(press.plate_thickness, pins)
+    warming = heating(laminate, press)
+    has_minutes = not films_without_minutes(laminate, press)
     steps = tuple(
         _step(
             laminate,
             part,
             press,
-            _Setting(pad, plate, stack, own),
+            _Setting(
+                pad, plate, stack, own, warming, press.minutes(part.name) if has_minutes else None
+            ),
             f" {SNIP}" if laminate.registration == "ears" and part is parts[-1] else "",
         )
         for part, stack, own in zip(parts, under, pins, strict=True)
     )
-    total = sum(step.minutes for step in steps)
+    total = sum(step.minutes or 0.0 for step in steps) if has_minutes else None
     tacking = press.tack * sheets.tackings(laminate)
+    pressed = "no minutes stated for this film" if total is None else f"{total:g} min"
     return Schedule(
         steps,
         total,
-        total + tacking + HANDLING_MINUTES,
-        f"{total:g} min in the press{_tacked(tacking)} and {HANDLING_MINUTES:g} min to cut, lay "
+        None if total is None else total + tacking + HANDLING_MINUTES,
+        f"{pressed} in the press{_tacked(tacking)} and {HANDLING_MINUTES:g} min to cut, lay "
         "up, pin and fit the tubing; the latter is assumed the same for every design (paper: "
         "1.75 h in all)",
         tuple(warnings(laminate, press, parts, steps)),
+        warming,
+        tacking + HANDLING_MINUTES,
     )
 
 
@@ -204,12 +227,15 @@ def _tacked(minutes: float) -> str:
 
 
 class _Setting(NamedTuple):
-    """Thickness of pad and plate, mm, and what one step's stack and pins are like."""
+    """Thickness of pad and plate, mm, what one step's stack and pins are like, how the plate warms
+    and how long it is pressed."""
 
     pad: float
     plate: float
     under: Footprint
     pins: tuple[PinSetting, ...]
+    heating: Heating
+    minutes: float | None
 
 
 def _step(
@@ -232,17 +258,29 @@ def _step(
         pressure_kpa=press.pressure_kpa,
         force_n=round(press.force_n, 1),
         platen_mm=press.platen,
-        minutes=press.minutes(part.name),
+        minutes=own.minutes,
         film_kpa=found.film,
         edge_kpa=found.edge,
         bond_kpa=found.bond,
         plate_kpa=found.plate,
         pressure_basis=build_up.said(press.pressure_kpa, press.pad, own.pad, own.under, found)
         + _round_pins(press, own),
-        build_up=tuple(_items(press, own)),
+        build_up=tuple(_items(press, own, _size(laminate, part))),
         pin_settings=own.pins,
         instructions=words,
+        time_temperature=own.heating.line(own.minutes),
     )
+
+
+def _size(laminate: Laminate, part: AssemblyStep) -> tuple[float, float]:
+    """Extent along x and y, mm, of the films of a step: of all its stacks, tabs and ears included,
+    or of the registered sheets that they are part of.
+    """
+    profiles = [layer.profile for layer in distinct_layers(laminate, part.layers)]
+    if laminate.panel is not None:
+        profiles = [laminate.panel.outline]
+    low_x, low_y, high_x, high_y = zip(*(profile.bounds for profile in profiles), strict=True)
+    return round(max(high_x) - min(low_x), 6), round(max(high_y) - min(low_y), 6)
 
 
 def _round_pins(press: PressSettings, own: _Setting) -> str:
@@ -254,13 +292,15 @@ def _round_pins(press: PressSettings, own: _Setting) -> str:
     return f"; up to {free:.1f} mm round a pin none"
 
 
-def _items(press: PressSettings, own: _Setting) -> Iterator[BuildUpPart]:
-    """From the lower platen up; the films take the size that they have."""
+def _items(
+    press: PressSettings, own: _Setting, size: tuple[float, float]
+) -> Iterator[BuildUpPart]:
+    """From the lower platen up; ``size`` in mm is that of the films."""
     release = BuildUpPart(RELEASE, press.release_film, press.release_thickness, press.platen)
     pad = f"{press.pad.material}, {press.pad.hardness:g} Shore A"
     yield BuildUpPart(BASE_PLATE, press.plate_material, own.plate, press.platen)
     yield release
-    yield BuildUpPart(LAMINATE, "films of this step", round(own.under.height, 6), (0.0, 0.0))
+    yield BuildUpPart(LAMINATE, "films of this step", round(own.under.height, 6), size)
     yield release
     yield BuildUpPart(PAD, pad, own.pad, press.platen)
 

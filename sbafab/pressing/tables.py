@@ -8,6 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from sbafab.pressing.dowels import PinSetting
+from sbafab.pressing.heating import HeatPoint
 from sbafab.pressing.schedule import Schedule
 from sbafab.pressing.words import named
 
@@ -33,6 +34,7 @@ COLUMNS = (
     "build_up",
     "pin_settings",
     "instructions",
+    "time_temperature",
 )
 
 
@@ -45,6 +47,8 @@ def press_json(plan: Schedule) -> dict[str, Any]:
         "estimated_build_minutes": plan.estimated_build_minutes,
         "estimate_basis": plan.estimate_basis,
         "warnings": list(plan.warnings),
+        "heating": asdict(plan.heating),
+        "hands_minutes": plan.hands_minutes,
     }
 
 
@@ -73,7 +77,7 @@ def press_csv(plan: Schedule) -> str:
                 f"{step.pressure_kpa:g}",
                 f"{step.force_n:.1f}",
                 *(f"{size:g}" for size in step.platen_mm),
-                f"{step.minutes:g}",
+                "" if step.minutes is None else f"{step.minutes:g}",
                 f"{step.film_kpa:g}",
                 f"{step.edge_kpa:g}",
                 f"{step.bond_kpa:g}",
@@ -82,9 +86,18 @@ def press_csv(plan: Schedule) -> str:
                 "; ".join(f"{i.part} {i.thickness_mm:g} mm ({i.material})" for i in step.build_up),
                 "; ".join(map(pin_words, step.pin_settings)),
                 step.instructions,
+                "; ".join(map(heat_words, step.time_temperature)),
             ]
         )
     return table.getvalue()
+
+
+def heat_words(point: HeatPoint) -> str:
+    """Return one point of the time-temperature line as the table has it."""
+    edge = "" if point.edge_c is None else f", {point.edge_c:g} C"
+    after = "" if point.after_constants is None else f", after {point.after_constants:g} tau"
+    minutes = "" if point.after_minutes is None else f", {point.after_minutes:g} min"
+    return f"{point.point}{edge}{after}{minutes}"
 
 
 def pin_words(pin: PinSetting) -> str:

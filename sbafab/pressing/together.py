@@ -106,14 +106,15 @@ def are_apart(places: tuple[Point, ...], bounds: Bounds, room: float) -> bool:
 
 @dataclass(frozen=True)
 class BatchTimes:
-    """Minutes that a batch takes: in the press, by hand, and both after each other."""
+    """Minutes that a batch takes: in the press (None: not stated), by hand, and both after each
+    other."""
 
-    press: float
+    press: float | None
     hands: float
 
     @property
-    def total(self) -> float:
-        return self.press + self.hands
+    def total(self) -> float | None:
+        return None if self.press is None else self.press + self.hands
 
 
 def batch_times(runs: Runs, plan: Schedule) -> BatchTimes:
@@ -121,17 +122,22 @@ def batch_times(runs: Runs, plan: Schedule) -> BatchTimes:
 
     Nothing is taken off for hands that work while the press is closed.
     """
-    by_hand = plan.estimated_build_minutes - plan.total_press_minutes
-    return BatchTimes(runs.count * plan.total_press_minutes, runs.copies * by_hand)
+    pressed = plan.total_press_minutes
+    return BatchTimes(
+        None if pressed is None else runs.count * pressed, runs.copies * plan.hands_minutes
+    )
 
 
-def a_day(plan: Schedule, together: int, minutes: float = WORKING_DAY) -> int:
-    """Actuators that one person finishes in a working day with one press, ``together`` at once."""
-    by_hand = plan.estimated_build_minutes - plan.total_press_minutes
+def a_day(plan: Schedule, together: int, minutes: float = WORKING_DAY) -> int | None:
+    """Actuators that one person finishes in a working day with one press, ``together`` at once;
+    None where the minutes in the press are not stated.
+    """
+    if plan.total_press_minutes is None:
+        return None
     made = 0
     while True:
         cycles = math.ceil((made + 1) / together)
-        if (made + 1) * by_hand + cycles * plan.total_press_minutes > minutes:
+        if (made + 1) * plan.hands_minutes + cycles * plan.total_press_minutes > minutes:
             return made
         made += 1
 

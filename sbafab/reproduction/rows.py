@@ -15,6 +15,7 @@ from sbafab.reproduction.records import NONE, Row, exact, predicted
 def process() -> Iterator[Row]:
     design = load_design("3dof-15mm").completed()
     plan = schedule(build(design), press_settings(design))
+    assert plan.estimated_build_minutes is not None, "the paper states minutes for its film"
     yield Row(
         "time to build, 3-DoF",
         exact(1.75, "h", "Sec. 2"),

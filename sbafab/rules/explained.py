@@ -95,10 +95,17 @@ DECK: Mapping[str, Explanation] = {
         ("laser.least_feature", "laser.kerf_tpe", "laser.kerf_ptfe"),
     ),
     "press-fit": Explanation(
-        "the laminate lies in the heated area; more than 20 balloons draw a warning",
+        "the laminate lies in the heated area; more than 20 balloons, and films whose minutes "
+        "nobody stated, draw a warning",
         "What lies outside the platen is not bonded; heat may not reach a tall stack's middle.",
-        "Make the actuator smaller, tell press.platen_width of a larger press, stack fewer.",
-        ("press.platen_width", "press.platen_length", "rules.validated_balloons"),
+        "Make the actuator smaller, tell press.platen_width of a larger press, stack fewer; try "
+        "another film on a sample and name it in press.minutes_for.",
+        (
+            "press.platen_width",
+            "press.platen_length",
+            "rules.validated_balloons",
+            "press.minutes_for",
+        ),
     ),
     "registration-nominal": Explanation(
         "bores are coaxial and the two outlines of a balloon congruent, to 1 um",

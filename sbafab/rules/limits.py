@@ -39,7 +39,8 @@ class Limits:
     not calibrated, and up to ``unknown_kerf``), ``waive`` the rules whose failure the user accepts
     by name. The ``worst_`` limits are for what is left of bond and overhang under the
     ``tolerances``; ``target_yield`` is the share of ``yield_builds`` random builds that must keep
-    them (None: none asked for; for the builds: as many as are quick).
+    them (None: none asked for; for the builds: as many as are quick). ``minutes_for``: product and
+    thickness of the films that the press minutes were stated for (None: nobody asks).
     """
 
     bond_width: float = 0.75
@@ -57,6 +58,7 @@ class Limits:
     worst_mask_overhang: float = 0.25
     target_yield: float | None = None
     yield_builds: int | None = None
+    minutes_for: tuple[tuple[str, float], ...] | None = None
     waive: frozenset[str] = frozenset()
 
 

@@ -1,7 +1,9 @@
-"""press-fit: the laminate lies within the heated area; few enough balloons to be validated."""
+"""press-fit: the laminate lies within the heated area; few enough balloons to be validated; press
+minutes that somebody stated for its films."""
 
 from __future__ import annotations
 
+from sbafab.laminate.films import unstated
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits
@@ -49,7 +51,21 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
                 remedy=remedy,
             )
         )
+    if limits.minutes_for is not None:
+        found += _unstated(laminate, limits.minutes_for)
     return found
+
+
+def _unstated(laminate: Laminate, stated: tuple[tuple[str, float], ...]) -> list[Finding]:
+    """A warning for films whose press minutes nobody stated."""
+    films = unstated((layer.film for layer in laminate.layers), stated)
+    if not films:
+        return []
+    names = " and ".join(film.said for film in films)
+    remedy = "try the bond on a sample, state the minutes and name the film in press.minutes_for"
+    message = f"{remedy}: nobody stated press minutes for {names}, and the schedule leaves them out"
+    count = float(len(films))
+    return [Finding(NAME, "warn", 0.0, count, "films", Place(), message, remedy=remedy)]
 
 
 def _extent(box: tuple[float, float, float, float]) -> float:

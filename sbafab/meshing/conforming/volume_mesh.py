@@ -86,7 +86,7 @@ def _materials(stack: Layup) -> dict[str, str]:
     found = {ply.name: ply.layer.film.material for ply in stack.plies}
     for k, (below, above) in enumerate(pairwise(stack.plies), start=1):
         films = [ply.layer.film for ply in (below, above)]
-        molten = [film for film in films if film.softens_above is not None]
+        molten = [film for film in films if not film.stays_solid]
         found[bond_name(k)] = (molten or films)[0].material
     return found
 

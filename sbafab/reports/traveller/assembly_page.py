@@ -225,11 +225,12 @@ def _press_words(one: DesignWork) -> str:
             f"{say.count(runs.count, 'lamination')}, {at_once}, side by side within the heated "
             f"{say.size(width, length)}: copies are alike layer by layer, so they share the "
             f"pressure evenly (ours: the paper does not say how many it pressed at once). "
-            f"{runs.count * minutes:g} min in the press instead of "
-            f"{runs.copies * minutes:g}"
+            f"{say.plain(say.product(runs.count, minutes))} min in the press instead of "
+            f"{say.plain(say.product(runs.copies, minutes))}"
         )
     else:
-        words += f"{say.count(runs.count, 'lamination')}, {runs.count * minutes:g} min in the press"
+        pressed = say.plain(say.product(runs.count, minutes))
+        words += f"{say.count(runs.count, 'lamination')}, {pressed} min in the press"
     if design.form.wrap is not None and design.form.stacks > 1:
         words += f". Its {design.form.stacks} SBAs lie on one sheet and are laminated at once"
         words += ", as in the paper"
@@ -255,24 +256,26 @@ def _not_together(job: AssemblyJob) -> str:
 
 
 def _times(job: AssemblyJob) -> list[times.Time]:
-    rows, total = [], 0.0
+    rows: list[times.Time] = []
+    total: float | None = 0.0
     for one in job.works:
         plan, runs = one.work.schedule, one.runs
-        pressed = runs.count * plan.total_press_minutes
-        handled = runs.copies * (plan.estimated_build_minutes - plan.total_press_minutes)
-        total += pressed + handled
+        pressed = say.product(runs.count, plan.total_press_minutes)
+        handled = runs.copies * plan.hands_minutes
+        whole = None if pressed is None else pressed + handled
+        total = None if total is None or whole is None else total + whole
         made_of = (
-            f"{say.count(runs.count, 'lamination')} of {plan.total_press_minutes:g} min; "
+            f"{say.count(runs.count, 'lamination')} of {say.plain(plan.total_press_minutes)} min; "
             f"{handled:g} min to cut, lay up, pin and fit tubes"
         )
-        rows.append(times.Time(f"Making {one.name}", say.minutes(pressed + handled), made_of))
+        rows.append(times.Time(f"Making {one.name}", say.minutes(whole), made_of))
     laser = say.minutes(times.laser_minutes(job.works[0].work))
     basis = times.laser_basis(job.works[0].work)
     rows.append(times.Time("Laser (within making)", laser, f"{basis}; all sheets"))
     rows.append(
         times.Time(
             "Total, without joining",
-            f"{total:.0f} min = {say.hours(total)}",
+            say.whole_minutes(total),
             "without heating the press up, leak tests, gluing and curing, of which the paper gives "
             "no times",
         )

@@ -90,8 +90,8 @@ def _said(work: Work, runs: Runs) -> str:
     cycles = say.count(runs.count, "press cycle")
     sizes = ", ".join(str(size) for size in dict.fromkeys(runs.cycles))
     return (
-        f"{runs.copies} copies in {cycles} of {sizes} at once: {times.press:g} min in the press "
-        f"instead of {runs.copies * one:g}."
+        f"{runs.copies} copies in {cycles} of {sizes} at once: {say.plain(times.press)} min in the "
+        f"press instead of {say.plain(say.product(runs.copies, one))}."
     )
 
 

@@ -264,15 +264,17 @@ def _cuts(work: Work, panel: SheetPanel) -> list[Cut]:
 def _times(work: Work, panel: SheetPanel) -> list[Time]:
     """How long a batch takes; the paper's handling is of one actuator, and is not known of many."""
     plan, copies = work.schedule, len(panel.places)
-    steps = " + ".join(f"{step.minutes:g}" for step in plan.steps)
+    steps = " + ".join(say.plain(step.minutes) for step in plan.steps)
     tacking = work.design.panel.tack_minutes * tackings(work.laminate)
-    pressing = plan.total_press_minutes + tacking
+    pressed = plan.total_press_minutes
+    pressing = None if pressed is None else pressed + tacking
+    each = None if pressing is None else pressing / copies
     return [
         Time(
             "In the press",
             say.minutes(pressing),
             f"{steps} min, and {tacking:g} min to tack masks; one batch of "
-            f"{say.count(copies, 'actuator')}, {say.minutes(pressing / copies)} each",
+            f"{say.count(copies, 'actuator')}, {say.minutes(each)} each",
         ),
         Time(
             "Handling",

@@ -9,6 +9,8 @@ from sbafab.laminate.laminate import Inlet
 from sbafab.reports.drawing import TIMES
 
 NEWTONS_PER_POUND = 4.4482216152605
+BLANK = "________"
+"""What is written in by hand."""
 ROUND = 10.0
 """Minutes above which tenths say nothing."""
 
@@ -37,13 +39,32 @@ def force(newtons: float) -> str:
     return f"{newtons:.0f} N = {newtons / 1000:.3f} kN = {pounds:.0f} lbf"
 
 
-def minutes(value: float) -> str:
-    """Minutes to the tenth below ten, whole ones above: 3 min, 2.4 min, 47 min."""
+def minutes(value: float | None) -> str:
+    """Minutes to the tenth below ten, whole ones above: 3 min, 2.4 min, 47 min; a blank for None,
+    which nobody stated.
+    """
+    if value is None:
+        return f"{BLANK} min"
     return f"{round(value, 1):g} min" if value < ROUND else f"{value:.0f} min"
 
 
-def hours(value: float) -> str:
-    return f"{value / 60:.2f} h"
+def plain(value: float | None) -> str:
+    """Return a number without its unit, a blank for None."""
+    return BLANK if value is None else f"{value:g}"
+
+
+def hours(value: float | None) -> str:
+    return f"{BLANK} h" if value is None else f"{value / 60:.2f} h"
+
+
+def whole_minutes(value: float | None) -> str:
+    """Return minutes and hours, "105 min = 1.75 h"; a blank for None."""
+    return minutes(None) if value is None else f"{value:.0f} min = {hours(value)}"
+
+
+def product(number: int, value: float | None) -> float | None:
+    """Return a value so many times, None for None."""
+    return None if value is None else number * value
 
 
 def millimetres(value: float) -> str:

@@ -42,19 +42,19 @@ def _batch(work: Work) -> list[Time]:
         return []
     took = batch_times(runs, plan)
     made_of = (
-        f"{say.count(runs.count, 'press cycle')} of {plan.total_press_minutes:g} min, "
+        f"{say.count(runs.count, 'press cycle')} of {say.plain(plan.total_press_minutes)} min, "
         f"{runs.copies} times the handling below, one after the other; one by one "
-        f"{runs.copies * plan.estimated_build_minutes:.0f} min"
+        f"{say.minutes(say.product(runs.copies, plan.estimated_build_minutes))}"
     )
     row = f"All {runs.copies} copies"
-    return [Time(row, f"{took.total:.0f} min = {say.hours(took.total)}", made_of)]
+    return [Time(row, say.whole_minutes(took.total), made_of)]
 
 
 def times(work: Work) -> list[Time]:
     """Rows of the time table, the total last but for the paper's."""
     plan = work.schedule
-    handling = plan.estimated_build_minutes - plan.total_press_minutes
-    steps = " + ".join(f"{step.minutes:g}" for step in plan.steps)
+    handling = plan.hands_minutes
+    steps = " + ".join(say.plain(step.minutes) for step in plan.steps)
     rows = [
         Time("In the press", say.minutes(plan.total_press_minutes), f"{steps} min, one actuator")
     ]
@@ -78,8 +78,9 @@ def times(work: Work) -> list[Time]:
         ),
         Time(
             "Total, one actuator",
-            f"{plan.estimated_build_minutes:.0f} min = {say.hours(plan.estimated_build_minutes)}",
-            "without heating the press up, curing of the adhesive and the leak test",
+            say.whole_minutes(plan.estimated_build_minutes),
+            "without heating the press up, warming the plate before each clock starts, curing of "
+            "the adhesive and the leak test",
         ),
         Time("The paper", f"{PAPER_MINUTES:g} min = {say.hours(PAPER_MINUTES)}", "1-DoF or 3-DoF"),
     ]
