@@ -7,18 +7,16 @@ from collections.abc import Iterable, Sequence
 from sbafab.laminate.assembly import AssemblyStep, distinct_layers, laying_pins
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate
+from sbafab.pressing.heating import Heating
 from sbafab.pressing.schedule import Step
 from sbafab.pressing.words import listed
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
 from sbafab.reports.traveller.job import Work
+from sbafab.reports.traveller.warming import closing_words
 from sbafab.reports.underlay import guides
 from sbafab.rules.pin_fit import NAME as PIN_FIT
 from sbafab.rules.pin_fit import most_on_a_pin
-
-WARM = 5.0
-"""C by which a plate may be colder than the platens when the timer starts."""
-
 
 def before_cutting(films: Iterable[Film]) -> list[Action]:
     """How films come clean and flat under the beam."""
@@ -138,12 +136,6 @@ def reseat(laminate: Laminate, adds: Sequence[int], pinned: bool) -> list[Action
     ]
 
 
-def closing(step: Step, cycles: tuple[str, ...] = ()) -> Action:
-    """When the timer starts, as the plate goes in cold; a box for each of the ``cycles``."""
-    return Action(
-        f"Close the press. The plate goes in cold: start the timer, {say.minutes(step.minutes)}, "
-        f"when a thermocouple at its edge reads {step.temperature_c - WARM:g} °C, not before. How "
-        "long it warms is not known: measure it.",
-        (),
-        cycles,
-    )
+def closing(step: Step, heating: Heating, cycles: tuple[str, ...] = ()) -> Action:
+    """When the clock starts, as the plate goes in cold; a box for each of the ``cycles``."""
+    return Action(closing_words(step, heating), (), cycles)

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from sbafab.pressing.words import listed
+from sbafab.reports.traveller import gauges, warming
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
-from sbafab.reports.traveller.bench import WARM
 from sbafab.reports.traveller.bill import kerf_states
 from sbafab.reports.traveller.job import Work
 
@@ -49,17 +49,14 @@ def _before(works: Sequence[Work]) -> Iterator[str]:
         yield "Underlay printed at 100 %, its bars measured."
     yield "Clean and dry: base plate, pad, release films, film as it comes off the roll."
     first = works[0].schedule.steps[0]
-    hot, ready = (say.temperature(t) for t in (first.temperature_c, first.temperature_c - WARM))
+    hot = say.temperature(first.temperature_c)
     yield (
-        f"Pressure of {first.pressure_kpa:g} kPa found once, cold, with pressure-indicating film "
-        f"in the whole build-up, at {say.force(first.force_n)}."
+        f"Pressure of {first.pressure_kpa:g} kPa found once, cold, with {gauges.film_words(works)} "
+        f"in the whole build-up, at {say.force(first.force_n)}; division of the press's gauge: "
+        "________."
     )
     yield f"Warming the platens from cold to {hot}: {UNKNOWN}"
-    steps = sum(work.runs.count * len(work.schedule.steps) for work in works)
-    yield (
-        f"Warming the cold plate with the pad on it, between platens at {hot}, to {ready} at its "
-        f"edge: {UNKNOWN} It comes on top of each of the {say.count(steps, 'press step')}."
-    )
+    yield from warming.before_the_day(works[0].schedule.heating)
     yield f"Cooling the plate until it can be touched: {UNKNOWN} It comes after each step."
     if any(work.laminate.inlets for work in works):
         yield "Adhesive in date; how long it cures stands on its package: ________ h."
@@ -92,8 +89,8 @@ def tools(works: Sequence[Work]) -> list[Tool]:
             f"Heat press, {say.size(width, length)}",
             f"both platens to {say.temperature(first.temperature_c)}, {say.force(first.force_n)}",
         ),
-        Tool("Thermocouple with a reader, timer", "edge of the base plate: when a step begins"),
-        Tool("Pressure-indicating film", "once, to find the pressure"),
+        Tool("Thermocouple with a reader, clock", "edge of the base plate: when a step begins"),
+        Tool(f"{gauges.film_words(works)[:1].upper()}{gauges.film_words(works)[1:]}", gauges.COLD),
         Tool("Heat-proof gloves", "the plate comes out as hot as the platens"),
     ]
     if any(one.inlets for one in laminates):
@@ -102,7 +99,8 @@ def tools(works: Sequence[Work]) -> list[Tool]:
             Tool("Fine scissors, razor blade, pen", f"{ears}strips, tubes; marks on tabs"),
             Tool(
                 "Regulator or syringe with a gauge, water or soapy water, eye protection",
-                "leak test",
+                "leak and proof test",
             ),
+            Tool(works[0].design.acceptance.fitting, "joins each tube to the supply"),
         ]
     return found

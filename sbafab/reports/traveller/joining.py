@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
@@ -14,7 +14,6 @@ from sbafab.pressing.words import listed
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
 from sbafab.reports.traveller.bill import Item
-from sbafab.reports.traveller.process import LEAK_KILOPASCALS
 
 
 @dataclass(frozen=True)
@@ -306,13 +305,19 @@ def _supply(placed: PlacedPart, other: PlacedPart | None, assembled: Assembled) 
         )
 
 
+def _leak_pressures(made: Sequence[PlacedSba]) -> str:
+    """The leak tests' pressures, one number where the designs agree."""
+    pressures = {one.made.design.acceptance.leak_pressure_kpa for one in made}
+    return " or ".join(f"{pressure:g}" for pressure in sorted(pressures))
+
+
 def final_checks(assembled: Assembled) -> list[Action]:
     """What the finished assembly must do; figures are predictions."""
     made = [placed for placed in assembled.parts if isinstance(placed, PlacedSba)]
     deploy = assembled.assembly.deploy
     actions = [
         Action(
-            f"Raise each actuator to {LEAK_KILOPASCALS:g} kPa again: no leak, no joint opens.",
+            f"Raise each actuator to {_leak_pressures(made)} kPa again: no leak, no joint opens.",
             (),
             tuple(placed.name for placed in made) if len(made) > 1 else (),
         )

@@ -20,14 +20,24 @@ from sbafab.design.records import Design
 from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.films import Film, Material
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.models.paper import BURST
 from sbafab.models.sizes import sizes
 from sbafab.pressing.schedule import Schedule
 from sbafab.pressing.words import listed
 from sbafab.reports.canvas import COLOURS, KEY
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.features import balloons, layer_numbers
-from sbafab.reports.traveller import base_plate, bench, bill, notes, panel, process, times
+from sbafab.reports.traveller import (
+    acceptance,
+    base_plate,
+    bench,
+    bill,
+    gauges,
+    notes,
+    panel,
+    process,
+    times,
+    warming,
+)
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.batch import batch_page
 from sbafab.reports.traveller.cautions import cautions, for_the_designer
@@ -111,7 +121,7 @@ def context(work: Work) -> dict[str, Any]:
         "laser_minutes": times.laser_minutes(work),
         "laser_basis": times.laser_basis(work),
         "lay_up": _lay_up(work),
-        "force_notes": base_plate.build_up_notes(work),
+        "force_notes": (*base_plate.build_up_notes(work), *gauges.notes(work), warming.note(work)),
         "plate_holes": base_plate.holes(work),
         "plate_places": base_plate.places(work),
         "plate_grid": base_plate.grid(work),
@@ -121,8 +131,8 @@ def context(work: Work) -> dict[str, Any]:
         "tubing": process.tubing(work),
         "leak_test": process.leak_test(work),
         "wrapping": wrapping(work),
-        "leak_kilopascals": process.LEAK_KILOPASCALS,
-        "burst": f"{BURST.value:g} ± {BURST.error:g}",
+        "leak_words": acceptance.leak_words(work),
+        "proof_words": acceptance.proof_words(work),
         "times": times.times(work),
         "kerf_notes": notes.kerf_notes(work),
         "expected_sizes": notes.expected_sizes(work),

@@ -13,6 +13,7 @@ from sbafab.pressing.schedule import Step
 from sbafab.pressing.together import Runs
 from sbafab.pressing.words import listed
 from sbafab.reports.features import layer_numbers
+from sbafab.reports.traveller import acceptance, warming
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
 from sbafab.reports.traveller.bench import closing, on_the_lumen, reseat, underlay
@@ -22,10 +23,8 @@ from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.layup import Bed, Round, beds, inlets_in, rounds
 from sbafab.reports.traveller.placing import PiecePlace, Things, over_tab, pitch, places
 from sbafab.reports.traveller.plan import plan
+from sbafab.reports.traveller.warming import HeatRow
 
-LEAK_KILOPASCALS = 5.0
-"""Our choice, far below the paper's burst pressure and enough to open every balloon."""
-LEAK_SECONDS = 60
 COVER = (
     "Cover with a release film and the press pad, flush with the platen all round. No second plate "
     "on top."
@@ -50,6 +49,7 @@ class StepPage:
     step: Step
     bond: str
     dials: tuple[tuple[str, str], ...]
+    heat: tuple[HeatRow, ...]
     build_up: str
     pins: str
     notes: tuple[str, ...]
@@ -73,6 +73,7 @@ def step_pages(work: Work) -> list[StepPage]:
                 step,
                 BONDS[step.bond],
                 _dials(step),
+                tuple(warming.rows(step, work.schedule.heating)),
                 build_up_svg(step, f"build-up-{step.step}"),
                 pin_lines(step),
                 _place_notes(runs),
@@ -93,7 +94,7 @@ def _dials(step: Step) -> tuple[tuple[str, str], ...]:
         ("Force on the whole platen", say.force(step.force_n)),
         (f"Pressure on {say.size(width, length)}", say.pressure(step.pressure_kpa)),
         ("On the films (estimate)", f"about {step.film_kpa:.0f} kPa"),
-        ("Timer", say.minutes(step.minutes)),
+        ("Clock", say.minutes(step.minutes)),
         ("Pins", f"{len(step.pins)} in" if step.pins else "none"),
     )
 
@@ -114,7 +115,7 @@ def _bench_actions(
     work: Work, part: AssemblyStep, step: Step, lying: Sequence[Bed], runs: Runs
 ) -> tuple[Action, ...]:
     """A step's actions; what it is laid up on comes between base plate and release film."""
-    heat, *others = _actions(work.laminate, part, step, lying, runs)
+    heat, *others = _actions(work, part, step, lying, runs)
     laid = underlay(work, part)
     plate = _plate(part, bool(laid))
     # One whole stack that is laid down again has nothing to be aligned with.
@@ -134,8 +135,9 @@ def _plate(part: AssemblyStep, has_underlay: bool) -> Action:
 
 
 def _actions(
-    laminate: Laminate, part: AssemblyStep, step: Step, lying: Sequence[Bed], runs: Runs
+    work: Work, part: AssemblyStep, step: Step, lying: Sequence[Bed], runs: Runs
 ) -> Iterator[Action]:
+    laminate = work.laminate
     things = Things(laminate, lying)
     yield Action(
         f"Heat both platens to {say.temperature(step.temperature_c)}; set the force to "
@@ -154,7 +156,7 @@ def _actions(
         yield Action("Check: every pin reaches through the highest layer that has its hole.")
     yield Action(COVER)
     cycles = tuple(f"cycle {n}" for n in range(1, runs.count + 1))
-    yield closing(step, cycles if 1 < len(cycles) <= MOST_LINES else ())
+    yield closing(step, work.schedule.heating, cycles if 1 < len(cycles) <= MOST_LINES else ())
     yield Action("Take it out: it is as hot as the platens. Let it cool flat before you touch it.")
     if part.pins:
         names = listed([pin.name for pin in part.pins])
@@ -334,7 +336,7 @@ def _apart(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def leak_test(work: Work) -> list[Action]:
-    """The paper's way to find leaks; the pressure and the time are ours."""
+    """The paper's way to find leaks, then the proof test; pressures and times are ours."""
     names = _apart([chamber.name for chamber in work.laminate.chambers])
     lumen = ["lumen"] if work.laminate.lumen else []
     alone = work.job.copies == 1
@@ -352,15 +354,19 @@ def leak_test(work: Work) -> list[Action]:
     )
     return [
         *_each_copy(work, "Test the chambers"),
-        Action("Connect a regulator or a syringe with a gauge. Wear eye protection."),
+        Action(
+            f"Fit to each tube: {acceptance.fitting(work)}; push it in by 5 mm or more. Connect a "
+            "regulator or a syringe with a gauge. Wear eye protection."
+        ),
         Action(
             f"Under water, or brushed with soapy water, raise each chamber slowly to "
-            f"{LEAK_KILOPASCALS:g} kPa and hold for {LEAK_SECONDS} s.",
+            f"{acceptance.leak_words(work).replace(' for ', ' and hold for ')}.",
             (),
             names,
         ),
         Action("All balloons open evenly. One that stays shut was over-melted."),
         Action(f"No stream of bubbles anywhere; look at {places}."),
         *several,
-        Action(f"Let the pressure out, dry it, write the result {where}."),
+        Action("Let the pressure out, dry it."),
+        *acceptance.proof_test(work, names, where),
     ]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
 from sbafab.reports.traveller.job import Work
-from sbafab.reports.traveller.process import LEAK_KILOPASCALS
 
 
 def wrapping(work: Work) -> list[Action]:
@@ -38,7 +37,7 @@ def wrapping(work: Work) -> list[Action]:
             "a turn of thread behind the tabs, so that no pull reaches them."
         ),
         Action(
-            f"Raise each chamber to {LEAK_KILOPASCALS:g} kPa once more: balloons open evenly round "
-            "the tube, and no edge of the sheet lifts."
+            f"Raise each chamber to {work.design.acceptance.leak_pressure_kpa:g} kPa once more: "
+            "balloons open evenly round the tube, and no edge of the sheet lifts."
         ),
     ]
