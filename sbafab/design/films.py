@@ -88,7 +88,8 @@ OF_THE_PRODUCT = ("density", "melting_point", "modulus", "poisson")
 
 class TpeFilm(Section):
     """The structural film that is bonded. Defaults are those of the paper's film; another product
-    has none of them: what its table leaves out is not known."""
+    has none of them: what its table leaves out is not known.
+    """
 
     product: str = Field(default=PAPER_PRODUCT, max_length=80)
     """What to order."""
@@ -111,12 +112,16 @@ class TpeFilm(Section):
         product = data.get("product", PAPER_PRODUCT)
         if product == PAPER_PRODUCT or not isinstance(product, str):
             return data
-        if "thickness" not in data:
+        return {**dict.fromkeys(OF_THE_PRODUCT), **data}
+
+    @model_validator(mode="after")
+    def _another_product_has_its_thickness(self) -> Self:
+        if self.product != PAPER_PRODUCT and "thickness" not in self.model_fields_set:
             raise ValueError(
                 f"names another product than {PAPER_PRODUCT} and no thickness; add thickness, for "
                 f'instance "50 um", and what is known of {", ".join(OF_THE_PRODUCT)}'
             )
-        return {**dict.fromkeys(OF_THE_PRODUCT), **data}
+        return self
 
 
 class PtfeFilm(Section):
@@ -244,9 +249,7 @@ def _elastic(film: TpeFilm | OtherFilm) -> tuple[float, float] | None:
     return film.modulus, film.poisson
 
 
-def without_other_products(
-    table: Mapping[str, Any], changed: Mapping[str, Any]
-) -> dict[str, Any]:
+def without_other_products(table: Mapping[str, Any], changed: Mapping[str, Any]) -> dict[str, Any]:
     """Return ``table``, tables of films by name, as far as it holds for ``changed``.
 
     A film of which ``changed`` names another product loses all that ``table`` says of it but its

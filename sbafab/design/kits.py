@@ -42,9 +42,7 @@ FILE = "kit.toml"
 OTHER_TUBE = "tubing of your choice"
 """What a tube is called whose name stands for another size in the kit."""
 VALUE, SOURCE = "value", "source"
-SECTIONS = (
-    *("films", "layup", "registration", "press", "acceptance", "laser", "sheets", "rules"),
-)
+SECTIONS = (*("films", "layup", "registration", "press", "acceptance", "laser", "sheets", "rules"),)
 """Sections of a design that a kit fills in."""
 OF_A_DESIGN = ("registration.method", "rules.waive", "rules.target_yield", "rules.yield_builds")
 """Keys in them that are no lab's to say."""
@@ -221,10 +219,10 @@ def under_kit(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """
     kit = _kit(data.get("kit", DEFAULT), folder)
     filled = {**data}
-    for section, table in kit.tables.items():
+    for section, given in kit.tables.items():
         own = data.get(section, {})
-        if section == "films" and isinstance(own, dict):
-            table = without_other_products(table, own)
+        is_of_films = section == "films" and isinstance(own, dict)
+        table = without_other_products(given, own) if is_of_films else given
         # What is no table is refused later, in the words for it.
         filled[section] = _merged(table, own) if isinstance(own, dict) else own
     inlet = data.get("inlet", {})

@@ -16,7 +16,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
 from sbafab.design.films import UNCALIBRATED, Films, KerfWidth, LayerFilms, Sheet
 from sbafab.design.form import Form, Free
-from sbafab.design.section import Section
+from sbafab.design.section import Section, writable
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, film_name
 from sbafab.notebook import table_html
@@ -182,13 +182,12 @@ def named_film(text: str) -> tuple[str, float]:
     except ValueError:
         thick = 0.0
     if not product.strip() or not SHORTEST <= thick <= 1:
-        raise ValueError(
-            f'must be product and thickness of a film, such as "{PAPER_FILM}"'
-        )
+        raise ValueError(f'must be product and thickness of a film, such as "{PAPER_FILM}"')
     return product.strip(), thick
 
 
 def _named_film(text: str) -> str:
+    writable(text)
     named_film(text)
     return text
 
@@ -199,8 +198,7 @@ def _time_constant(value: object) -> object:
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if not is_number or not 0 < float(str(value)) <= LONGEST_CONSTANT:
         raise ValueError(
-            f"must be minutes, more than 0 and at most {LONGEST_CONSTANT:g}, or "
-            f'"{NOT_MEASURED}"'
+            f'must be minutes, more than 0 and at most {LONGEST_CONSTANT:g}, or "{NOT_MEASURED}"'
         )
     return float(str(value))
 
@@ -243,19 +241,20 @@ class Press(Section):
     """Step 3: all layers between the bottom balloon and the top layer."""
     bond_all_minutes: float = Field(default=20.0, gt=0, le=600)
     """Step 4: the whole laminate, full bond."""
-    minutes_for: tuple[
-        Annotated[str, Field(max_length=120), AfterValidator(_named_film)], ...
-    ] = Field(default=(PAPER_FILM,), max_length=20, strict=False)
+    minutes_for: tuple[Annotated[str, Field(max_length=120), AfterValidator(_named_film)], ...] = (
+        Field(default=(PAPER_FILM,), max_length=20, strict=False)
+    )
     """Films that the minutes above were stated for, each as "product, thickness". A laminate of any
     other structural film gets no minutes: blanks on the traveller, null in press.json."""
     time_constant: TimeConstant = NOT_MEASURED
-    """Minutes in which the edge of the base plate, laid cold between the hot platens with the pad on
-    it, makes 63 % of its way; measured once at the bench (docs: In the press)."""
+    """Minutes in which the edge of the base plate, laid cold between the hot platens under the
+    pad, makes 63 % of its way; measured once at the bench."""
 
 
 class Acceptance(Section):
     """What an actuator must stand before it is handed on: all ours but the burst that it stays
-    below."""
+    below.
+    """
 
     leak_pressure_kpa: float = Field(default=5.0, gt=0, le=1000)
     """Leak test under water: enough to open every balloon (a stack of d = 5 unfolds up to 0.95)."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from sbafab.geometry.region import Region
+from sbafab.laminate.films import density_of
 from sbafab.laminate.laminate import Laminate
 
 
@@ -31,9 +32,12 @@ def beyond_the_outline(laminate: Laminate) -> str:
 
 
 def film_mass(laminate: Laminate) -> float:
-    """Mass in g of all films, tabs and ears included; without tubing, glue and fluid."""
+    """Mass in g of all films, tabs and ears included; without tubing, glue and fluid.
+
+    Raises DesignError where the density of a film is not known.
+    """
     return sum(
-        layer.profile.area * layer.film.thickness * layer.film.density * 1e-6
+        layer.profile.area * layer.film.thickness * density_of(layer.film) * 1e-6
         for layer in laminate.layers
     )
 

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from sbafab.errors import DesignError
+
 Material = str
 """What files, sheets and lists call a film: "TPE", "PTFE", or a further one's name in capitals."""
 FilmKind = Literal["structural", "mask"]
@@ -73,6 +75,16 @@ class Film:
     def is_mask(self) -> bool:
         """Whether nothing bonds to it."""
         return self.kind == "mask"
+
+
+def density_of(film: Film, what: str = "the mass") -> float:
+    """Return a film's density in kg/m3, which ``what`` needs. Raises DesignError if not known."""
+    if film.density is None:
+        raise DesignError(
+            f"{what} needs the density of {film.material}, {film.product}; add "
+            f"{film.table}.density, in kg/m3"
+        )
+    return film.density
 
 
 def film_name(product: str, thickness: float) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from sbafab.design.form import Discs, Form, Slots
 from sbafab.design.records import Design
 from sbafab.geometry.edges import Point
+from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, PAPER_TPE, film_name
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.figures import Factors
 from sbafab.models.kinematics import Kinematics, full_stroke, round_stack, slot_stack
@@ -16,6 +17,11 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+NOT_MEASURED = (
+    f"the paper measured it with its own film, {film_name(PAPER_PRODUCT, PAPER_THICKNESS)} of "
+    f"{PAPER_TPE[0]:g} MPa, and no model predicts it for another: take the free stroke at a "
+    "pressure, or simulate the design"
+)
 NO_OUTLINE = "no model knows the form of a drawn pocket outline; simulate the design instead"
 
 
@@ -53,11 +59,26 @@ class Actuator:
     def is_tapered(self) -> bool:
         return len(set(self.radii)) > 1
 
+    @property
+    def has_the_papers_film(self) -> bool:
+        """Whether what the paper measured of its film's actuators holds for this one's."""
+        return all(layer.film.is_the_papers for layer in self.laminate.tpe_layers)
+
+    @property
+    def knows_full(self) -> bool:
+        """Whether full stroke and full height are known: of round pockets they were measured."""
+        return not self.radii or self.has_the_papers_film
+
     def is_like_paper(self, stacks: int, radius: float) -> bool:
         """Whether the paper measured so many stacks of such balloons on common plates: its 1-DoF
         actuators have one, its 3-DoF actuator three.
         """
-        return self.form.wrap is None and self.form.stacks == stacks and set(self.radii) == {radius}
+        return (
+            self.has_the_papers_film
+            and self.form.wrap is None
+            and self.form.stacks == stacks
+            and set(self.radii) == {radius}
+        )
 
 
 def actuator(design: Design, laminate: Laminate, calibration: Factors) -> Actuator:

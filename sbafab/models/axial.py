@@ -9,7 +9,7 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.models import paper
-from sbafab.models.actuator import Actuator
+from sbafab.models.actuator import NOT_MEASURED, Actuator
 from sbafab.models.figures import Asked, Figure, LeftOut, Model, Points, Relation, Trace
 from sbafab.models.flow import seconds
 from sbafab.models.force import force, work_uj
@@ -48,12 +48,15 @@ def full_model(actuator: Actuator) -> Model:
 
 def strokes(actuator: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
     """Full state, the largest volumes, and strokes at the volumes asked for."""
-    full = full_model(actuator)
-    yield Figure("stroke", "full stroke", actuator.full_stroke, "mm", full)
-    yield Figure("stroke", "full height", actuator.full_height, "mm", full)
-    for k in actuator.kinematics:
-        at_full = float(k.volume(actuator.full_stroke))
-        yield Figure("stroke", "volume a balloon at full stroke", at_full, "ul", k.model)
+    if actuator.knows_full:
+        full = full_model(actuator)
+        yield Figure("stroke", "full stroke", actuator.full_stroke, "mm", full)
+        yield Figure("stroke", "full height", actuator.full_height, "mm", full)
+        for k in actuator.kinematics:
+            at_full = float(k.volume(actuator.full_stroke))
+            yield Figure("stroke", "volume a balloon at full stroke", at_full, "ul", k.model)
+    else:
+        yield LeftOut("full stroke, full height, and what is predicted at them", NOT_MEASURED)
     for k in actuator.kinematics:
         yield Figure("stroke", "largest volume a balloon", k.largest_volume, "ul", k.model)
         yield Figure("stroke", "stroke at the largest volume", k.largest_stroke, "mm", k.model)
@@ -79,7 +82,7 @@ def _stroke(k: Kinematics, volume: float) -> Figure | LeftOut:
 def forces(actuator: Actuator, asked: Asked) -> Iterator[Figure]:
     """Blocked force at the pressures asked for, flat and at the paper's shares of full stroke."""
     for pressure in asked.pressures_kpa:
-        for share in SHARES:
+        for share in SHARES if actuator.knows_full else SHARES[:1]:
             at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
             for k in actuator.kinematics:
                 value = _force(actuator, k, pressure, share * actuator.full_stroke, asked)
@@ -113,26 +116,33 @@ def _force_model(actuator: Actuator, k: Kinematics, asked: Asked) -> Model:
     return model.times("contact factor", asked.calibration.contact_factor)
 
 
-def power(actuator: Actuator, asked: Asked, mass_g: float) -> Iterator[Figure]:
-    """Time, work, speed and power density, all of it at the volume of the full stroke."""
+def power(actuator: Actuator, asked: Asked, mass_g: float | None) -> Iterator[Figure]:
+    """Time, work, speed and power density, all of it at the volume of the full stroke: where that
+    is not known only times to the volumes asked for, and without a mass no power density.
+    """
     first = actuator.kinematics[0]
-    chamber = actuator.balloons * float(first.volume(actuator.full_stroke))
-    whole = chamber * actuator.form.stacks
-    yield Figure("actuation", "volume of all chambers at full stroke", whole, "ul", first.model)
+    whole = None
+    if actuator.knows_full:
+        chamber = actuator.balloons * float(first.volume(actuator.full_stroke))
+        whole = chamber * actuator.form.stacks
+        yield Figure("actuation", "volume of all chambers at full stroke", whole, "ul", first.model)
     flow = Model(
         f"{first.model.name} over flow",
         "Sec. 4.5, 7",
         "a liquid at a steady flow into all chambers together, no lag of pump or tube: the paper's "
         "water took 0.92 +- 0.08 s; a gas takes 10 % longer at 10 kPa, and valves much longer",
     )
-    time = float(seconds(whole, asked.flow_ml_min))
-    name = f"time to full stroke at {asked.flow_ml_min:g} ml/min"
-    yield Figure("actuation", name, time, "s", flow)
+    if whole is not None:
+        time = float(seconds(whole, asked.flow_ml_min))
+        name = f"time to full stroke at {asked.flow_ml_min:g} ml/min"
+        yield Figure("actuation", name, time, "s", flow)
     for volume in asked.volumes_ul:
         held = volume * actuator.balloons * actuator.form.stacks
         name = f"time to {volume:g} ul a balloon at {asked.flow_ml_min:g} ml/min"
         plain = Model("volume over flow", "Sec. 7", flow.trust)
         yield Figure("actuation", name, float(seconds(held, asked.flow_ml_min)), "s", plain)
+    if whole is None:
+        return
     bound = Model(
         f"p v with {first.model.name}",
         "Sec. 4.1",
@@ -142,7 +152,7 @@ def power(actuator: Actuator, asked: Asked, mass_g: float) -> Iterator[Figure]:
     for pressure in asked.pressures_kpa:
         name = f"pneumatic input work at {pressure:g} kPa"
         yield Figure("actuation", name, work_uj(pressure, whole) / 1000, "mJ", bound)
-    if asked.pressures_kpa:
+    if asked.pressures_kpa and mass_g is not None:
         yield _power_density(actuator, asked, whole, mass_g)
 
 
@@ -198,7 +208,8 @@ def stroke_relation(actuator: Actuator) -> Relation:
 
 def force_relation(actuator: Actuator, asked: Asked) -> Relation:
     """Force against stroke, to full stroke, at every pressure asked for."""
-    stroke = np.linspace(0, actuator.full_stroke, SAMPLES)
+    most = min(k.largest_stroke for k in actuator.kinematics)
+    stroke = np.linspace(0, actuator.full_stroke if actuator.knows_full else most, SAMPLES)
     lines = []
     for pressure in asked.pressures_kpa:
         for k in actuator.kinematics:

@@ -66,8 +66,8 @@ def _films(laminate: Laminate, factors: Factors | None) -> list[list[tuple[float
     unknown = {film.material for film in films if film.elastic is None}
     if unknown:
         raise DesignError(
-            f"no modulus of {min(unknown)} is known; add films.{min(unknown).lower()}.modulus, in "
-            "MPa, and poisson, its ratio"
+            f"no modulus and Poisson's ratio of {min(unknown)} are known; add "
+            f"films.{min(unknown).lower()}.modulus, in MPa, and poisson, its ratio"
         )
     measured = None if factors is None else factors.modulus_mpa
     if measured is not None and len(films) > 1:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.models import paper
-from sbafab.models.actuator import Actuator
+from sbafab.models.actuator import NOT_MEASURED, Actuator
 from sbafab.models.bending import bend
 from sbafab.models.figures import Asked, Figure, LeftOut, Model, Points, Relation, Trace
 from sbafab.models.flow import seconds
@@ -58,6 +58,9 @@ def paths(actuator: Actuator, others_full: bool = False) -> list[Path]:
 
 def bending(actuator: Actuator) -> Iterator[Figure | LeftOut]:
     """The largest bend of each number of chambers, and how far the tip gets."""
+    if not actuator.knows_full:
+        yield LeftOut("bend and tip displacement at full stroke, constant curvature", NOT_MEASURED)
+        return
     all_paths = paths(actuator)
     for path in all_paths:
         name = f"bend with {_chambers(path.chambers)} at full stroke, the others flat"
@@ -124,9 +127,12 @@ def bending_relation(actuator: Actuator, asked: Asked) -> Relation:
 
 
 def workspace_relation(actuator: Actuator) -> Relation:
-    """Where the tip gets to: the plane in which the chambers next to each other bend."""
+    """Where the tip gets to: the plane in which the chambers next to each other bend; no lines of
+    constant curvature where the full stroke is not known.
+    """
     lines = []
-    for rest, others_full in (("flat", False), ("full", True)):
+    rests = (("flat", False), ("full", True)) if actuator.knows_full else ()
+    for rest, others_full in rests:
         for path in paths(actuator, others_full):
             label = f"{_chambers(path.chambers)}, the others {rest}"
             lines.append(Trace(label, path.aside.tolist(), path.height.tolist(), CURVATURE))

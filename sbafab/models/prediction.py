@@ -16,7 +16,7 @@ from sbafab.geometry.region import Region
 from sbafab.laminate.extent import film_mass
 from sbafab.laminate.laminate import Laminate
 from sbafab.models import axial, elastic, lobes, paper, stacked
-from sbafab.models.actuator import NO_OUTLINE, Actuator, actuator
+from sbafab.models.actuator import NO_OUTLINE, NOT_MEASURED, Actuator, actuator
 from sbafab.models.choice import REACHED, STACK, WIDEST, chosen
 from sbafab.models.drawn import flat_forces
 from sbafab.models.figures import (
@@ -99,10 +99,13 @@ def predict(
 
 def _all(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
     mass = _mass(one.laminate)
+    grams = None if isinstance(mass, LeftOut) else mass.value
     yield from _sizes(one, asked)
     if one.kinematics and one.form.is_parallel:
         yield lobes.folding(one, asked)
-    yield Figure("size", "mass", mass.value, mass.unit, mass.model)
+    yield mass
+    if isinstance(mass, LeftOut) and one.kinematics:
+        yield LeftOut("power density", mass.reason)
     yield from _tubes(one)
     if not one.kinematics:
         pushed = list(flat_forces(one, asked))
@@ -114,7 +117,7 @@ def _all(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
     yield from axial.strokes(one, asked)
     yield from elastic.free_strokes(one, asked)
     yield from axial.forces(one, asked)
-    yield from axial.power(one, asked, mass.value)
+    yield from axial.power(one, asked, grams)
     if one.form.is_parallel:
         yield from lobes.bending(one)
     yield from _stiffness(one)
@@ -139,14 +142,16 @@ def _relations(one: Actuator, asked: Asked, together: Stack | None) -> Iterator[
             )
         yield pushed
     if one.form.is_parallel:
-        yield lobes.bending_relation(one, asked)
+        if one.knows_full:
+            yield lobes.bending_relation(one, asked)
         if together is not None:
             yield stacked.bend_relation(asked, together)
         reached = lobes.workspace_relation(one)
         if together is not None:
             more = stacked.workspace_traces(asked, together)
             reached = replace(reached, lines=(*reached.lines, *more))
-        yield reached
+        if reached.lines:
+            yield reached
     if one.form.wrap is not None:
         yield _diameter_relation(one, one.form.wrap)
 
@@ -168,8 +173,11 @@ def _sizes(one: Actuator, asked: Asked) -> Iterator[Figure]:
             yield Figure("size", shown, value, "mm", GEOMETRY)
 
 
-def _mass(laminate: Laminate) -> Figure:
-    grams = film_mass(laminate)
+def _mass(laminate: Laminate) -> Figure | LeftOut:
+    try:
+        grams = film_mass(laminate)
+    except DesignError as error:
+        return LeftOut("mass", str(error))
     trust = "exact for the films, masks, tabs and ears included; without tubing, glue and fluid"
     return Figure("size", "mass", grams, "g", Model("area x thickness x density", "", trust))
 
@@ -203,8 +211,8 @@ def _stiffness(one: Actuator) -> Iterator[Figure | LeftOut]:
     if not one.radii:
         yield LeftOut(name, "the paper measured no modulus of oblong balloons")
         return
-    if any(layer.film.material != "TPE" for layer in one.laminate.tpe_layers):
-        yield LeftOut(name, "the paper measured the modulus of actuators of TPE alone")
+    if not one.has_the_papers_film:
+        yield LeftOut(name, f"the modulus of an actuator: {NOT_MEASURED}")
         return
     if plate is None:
         yield LeftOut(name, "the topmost film is not the plain outline: it has tabs or ears")

@@ -126,7 +126,8 @@ class Stack:
 
     ``maps`` are those of the unlike balloons, ``levels`` which of them each level has; ``axes``
     (chambers, 2) where the chambers stand, ``pitch`` the height of a flat level and ``outline`` the
-    radius of the plates, in mm; ``weight`` mN of each level.
+    radius of the plates, in mm; ``weight`` mN of each level, None where a film's density
+    is not known.
     """
 
     maps: tuple[BalloonMap, ...]
@@ -134,7 +135,7 @@ class Stack:
     axes: Array
     pitch: float
     outline: float
-    weight: float = 0.0
+    weight: float | None = 0.0
 
     @property
     def chambers(self) -> int:
@@ -279,6 +280,15 @@ class Stack:
         """The first level with each of the unlike balloons."""
         return np.array([int(np.argmax(self.levels == kind)) for kind in range(len(self.maps))])
 
+    @property
+    def _level_weight(self) -> float:
+        """Weight of a level in mN. Raises DesignError where it is not known."""
+        if self.weight is None:
+            raise DesignError(
+                "gravity needs the density of every film; add films.<name>.density, in kg/m3"
+            )
+        return self.weight
+
     def _load(
         self,
         tip_load: Sequence[float],
@@ -287,9 +297,9 @@ class Stack:
     ) -> Load | None:
         force, weight = 1000 * three(tip_load, "tip_load in N"), None
         if not isinstance(gravity, (bool, np.bool_)):
-            weight = self.weight * directed(gravity, "the direction of gravity")
+            weight = self._level_weight * directed(gravity, "the direction of gravity")
         elif gravity:
-            weight = np.array([0.0, 0.0, -self.weight])
+            weight = np.array([0.0, 0.0, -self._level_weight])
         if not force.any() and weight is None and plate is None:
             return None
         if plate is None:
@@ -357,6 +367,7 @@ def stack(
     modulus.
     """
     from sbafab.actuators import build
+    from sbafab.laminate.extent import film_mass
     from sbafab.models.balloons import balloons_of
 
     flat = laminate or build(design)
@@ -367,17 +378,14 @@ def stack(
     if len(axes) == 1:
         axes = np.zeros((1, 2))
     reach = float(np.hypot(*axes.T).max()) + max(one.pocket + one.ring for one in row)
-    grams = sum(
-        layer.profile.area * layer.film.thickness * layer.film.density * 1e-6
-        for layer in flat.layers
-    )
+    known = all(layer.film.density is not None for layer in flat.layers)
     return Stack(
         tuple(_mapped(kind, most_pressure) for kind in kinds),
         np.array([kinds.index(one) for one in row]),
         axes,
         flat.thickness * press / len(row),
         reach,
-        grams * GRAVITY / len(row),
+        film_mass(flat) * GRAVITY / len(row) if known else None,
     )
 
 

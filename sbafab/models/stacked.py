@@ -95,7 +95,7 @@ def stroke_at(one: Actuator, share: float) -> float:
 def _forces(one: Actuator, asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
     model = calibrated(FORCE, asked.calibration)
     for pressure in asked.pressures_kpa:
-        for share in SHARES:
+        for share in SHARES if one.knows_full else SHARES[:1]:
             at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
             name = f"blocked force at {pressure:g} kPa, {at}"
             try:
@@ -235,7 +235,10 @@ def _per_mm(name: str, pose: Pose, model: Model, asked: Asked) -> Figure:
 
 def force_traces(one: Actuator, asked: Asked, found: Stack) -> list[Trace]:
     """Force against stroke at every pressure asked for."""
-    strokes = np.linspace(0, one.full_height - one.thickness, SAMPLES)
+    most = one.full_height - one.thickness
+    if not one.knows_full:
+        most = min(k.largest_stroke for k in one.kinematics)
+    strokes = np.linspace(0, most, SAMPLES)
     model = calibrated(FORCE, asked.calibration)
     lines = []
     for pressure in asked.pressures_kpa:

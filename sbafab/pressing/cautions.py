@@ -74,14 +74,7 @@ def warnings(
 ) -> Iterator[str]:
     if laminate.panel is not None:
         yield sheets.UNTRIED
-    if words := unstated_minutes(films_without_minutes(laminate, press), press):
-        yield words
-    for film in dict.fromkeys(layer.film for layer in laminate.layers):
-        if not film.is_mask and film.softens_above is None and not film.stays_solid:
-            yield (
-                f"no melting point of {film.product} is known, so nobody has checked that "
-                f"{press.temperature_c:g} C bonds it; add {film.table}.melting_point, in C"
-            )
+    yield from _unknown_films(laminate, press)
     if press.temperature_c > HOTTEST_TRIED:
         yield (
             f"{press.temperature_c:g} C is hotter than the {HOTTEST_TRIED:g} C of earlier work, "
@@ -127,6 +120,18 @@ def warnings(
         if step.bond == "flash" and (layers := _unpinned(laminate, part)):
             which = named(layers) if len(layers) < 4 else _by_role(laminate, layers)
             yield f"step {step.step}: no pin holds {which}; align by hand"
+
+
+def _unknown_films(laminate: Laminate, press: PressSettings) -> Iterator[str]:
+    """What the schedule does not know of its films."""
+    if words := unstated_minutes(films_without_minutes(laminate, press), press):
+        yield words
+    for film in dict.fromkeys(layer.film for layer in laminate.layers):
+        if not film.is_mask and film.softens_above is None and not film.stays_solid:
+            yield (
+                f"no melting point of {film.product} is known, so nobody has checked that "
+                f"{press.temperature_c:g} C bonds it; add {film.table}.melting_point, in C"
+            )
 
 
 def _unpinned(laminate: Laminate, part: AssemblyStep) -> list[int]:

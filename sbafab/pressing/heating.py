@@ -122,10 +122,10 @@ def unstated_minutes(films: list[Film], press: PressSettings) -> str:
     names = [f'"{film.said}"' for film in films]
     stated = listed([f"{product}, {thickness:g} mm" for product, thickness in press.minutes_for])
     return (
-        f"the minutes are blank: they were stated for {stated or 'no film'}, and none for {listed(names)}; try "
-        f"the bond on a sample at {press.temperature_c:g} C, set press.temperature_c, "
-        "press.pressure_kpa and the press minutes to what held, and name the film in "
-        "press.minutes_for"
+        f"the minutes are blank: they were stated for {stated or 'no film'}, and none for "
+        f"{listed(names)}; try the bond on a sample at {press.temperature_c:g} C, set "
+        "press.temperature_c, press.pressure_kpa and the press minutes to what held, and name the "
+        "film in press.minutes_for"
     )
 
 

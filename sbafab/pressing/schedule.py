@@ -228,7 +228,8 @@ def _tacked(minutes: float) -> str:
 
 class _Setting(NamedTuple):
     """Thickness of pad and plate, mm, what one step's stack and pins are like, how the plate warms
-    and how long it is pressed."""
+    and how long it is pressed.
+    """
 
     pad: float
     plate: float
@@ -292,9 +293,7 @@ def _round_pins(press: PressSettings, own: _Setting) -> str:
     return f"; up to {free:.1f} mm round a pin none"
 
 
-def _items(
-    press: PressSettings, own: _Setting, size: tuple[float, float]
-) -> Iterator[BuildUpPart]:
+def _items(press: PressSettings, own: _Setting, size: tuple[float, float]) -> Iterator[BuildUpPart]:
     """From the lower platen up; ``size`` in mm is that of the films."""
     release = BuildUpPart(RELEASE, press.release_film, press.release_thickness, press.platen)
     pad = f"{press.pad.material}, {press.pad.hardness:g} Shore A"

@@ -107,7 +107,8 @@ def are_apart(places: tuple[Point, ...], bounds: Bounds, room: float) -> bool:
 @dataclass(frozen=True)
 class BatchTimes:
     """Minutes that a batch takes: in the press (None: not stated), by hand, and both after each
-    other."""
+    other.
+    """
 
     press: float | None
     hands: float

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from sbafab.geometry.beam import Kerf
 from sbafab.geometry.edges import Point
+from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS
 
 TOLERANCE = 0.001
 """mm by which a value may miss its limit and still hold it: what the cut files promise."""
@@ -40,7 +41,7 @@ class Limits:
     by name. The ``worst_`` limits are for what is left of bond and overhang under the
     ``tolerances``; ``target_yield`` is the share of ``yield_builds`` random builds that must keep
     them (None: none asked for; for the builds: as many as are quick). ``minutes_for``: product and
-    thickness of the films that the press minutes were stated for (None: nobody asks).
+    thickness of the films that the press minutes were stated for.
     """
 
     bond_width: float = 0.75
@@ -58,7 +59,7 @@ class Limits:
     worst_mask_overhang: float = 0.25
     target_yield: float | None = None
     yield_builds: int | None = None
-    minutes_for: tuple[tuple[str, float], ...] | None = None
+    minutes_for: tuple[tuple[str, float], ...] = ((PAPER_PRODUCT, PAPER_THICKNESS),)
     waive: frozenset[str] = frozenset()
 
 

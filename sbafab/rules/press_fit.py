@@ -1,5 +1,6 @@
 """press-fit: the laminate lies within the heated area; few enough balloons to be validated; press
-minutes that somebody stated for its films."""
+minutes that somebody stated for its films.
+"""
 
 from __future__ import annotations
 
@@ -51,9 +52,7 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
                 remedy=remedy,
             )
         )
-    if limits.minutes_for is not None:
-        found += _unstated(laminate, limits.minutes_for)
-    return found
+    return found + _unstated(laminate, limits.minutes_for)
 
 
 def _unstated(laminate: Laminate, stated: tuple[tuple[str, float], ...]) -> list[Finding]:

@@ -100,7 +100,15 @@ def tried(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -
     )
     missed += sum(_short(one) for one in (rules or {}).values())
     cost = wanted.goal.cost(figures[wanted.goal.quantity.said])
-    return Trial(values, figures, rules, missed, cost, film_mass(laminate), laminate=laminate)
+    return Trial(values, figures, rules, missed, cost, _mass(laminate), laminate=laminate)
+
+
+def _mass(laminate: Laminate) -> float:
+    """The films' mass in g, by which equals are told apart; 0 where a density is not known."""
+    try:
+        return film_mass(laminate)
+    except DesignError:
+        return 0.0
 
 
 def _short(rule: RuleMargin) -> float:

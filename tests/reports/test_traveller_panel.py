@@ -39,8 +39,8 @@ def test_every_press_step_has_its_pad_its_pins_and_one_time() -> None:
     for step, minutes in ((first, 10), (last, 20)):
         # Without the pad the force would lie on the sheets alone.
         assert "Cover with a release film and the press pad" in step
-        assert step.count("timer") == 1
-        assert f"start the timer, {minutes} min, when a thermocouple" in step
+        assert step.count("Start the clock") == 1
+        assert f"Start the clock, {minutes} min, when a thermocouple" in step
         assert "every pin reaches through the highest sheet" in step
         assert "do not stand higher" not in step
     assert "Drive in the corner pins to their heights (above)" in first
@@ -85,6 +85,6 @@ def test_every_actuator_of_a_batch_has_its_serial_number() -> None:
     page = lxml_html.fromstring(traveller_html(design, laminate, plan, [], job))
     rows = page.find_class("serials")[0].findall("tbody/tr")
     assert [words_of(row.find("th")) for row in rows] == ["1", "2", "3"]
-    assert all(len(row.findall("td/input")) == 3 for row in rows)
+    assert all(len(row.findall("td/input")) == 4 for row in rows)
     leak = words_of(page.get_element_by_id("leak").getparent())
     assert "write the result beside its serial number" in leak

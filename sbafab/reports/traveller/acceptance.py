@@ -64,7 +64,9 @@ def leak_words(work: Work) -> str:
 
 def proof_words(work: Work) -> str:
     """Return pressure and time of the proof test, a blank where nobody can say."""
-    return f"{say.plain(proof(work).kilopascals)} kPa for {work.design.acceptance.proof_seconds:g} s"
+    return (
+        f"{say.plain(proof(work).kilopascals)} kPa for {work.design.acceptance.proof_seconds:g} s"
+    )
 
 
 def fitting(work: Work) -> str:

@@ -18,6 +18,7 @@ from sbafab.reports.underlay import guides
 from sbafab.rules.pin_fit import NAME as PIN_FIT
 from sbafab.rules.pin_fit import most_on_a_pin
 
+
 def before_cutting(films: Iterable[Film]) -> list[Action]:
     """How films come clean and flat under the beam."""
     actions = [

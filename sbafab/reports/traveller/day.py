@@ -56,7 +56,8 @@ def _before(works: Sequence[Work]) -> Iterator[str]:
         "________."
     )
     yield f"Warming the platens from cold to {hot}: {UNKNOWN}"
-    yield from warming.before_the_day(works[0].schedule.heating)
+    steps = sum(work.runs.count * len(work.schedule.steps) for work in works)
+    yield from warming.before_the_day(works[0].schedule.heating, steps)
     yield f"Cooling the plate until it can be touched: {UNKNOWN} It comes after each step."
     if any(work.laminate.inlets for work in works):
         yield "Adhesive in date; how long it cures stands on its package: ________ h."

@@ -47,7 +47,9 @@ def film_words(works: Sequence[Work]) -> str:
     """Return which pressure-indicating film covers what the films get."""
     low, high = pressure_range(works)
     found = film_classes(low, high)
-    names = listed([f"{one.name} ({one.product}, {one.low:g} to {one.high:g} kPa)" for one in found])
+    names = listed(
+        [f"{one.name} ({one.product}, {one.low:g} to {one.high:g} kPa)" for one in found]
+    )
     return (
         f"pressure-indicating film for {low:.0f} to {high:.0f} kPa: Fujifilm Prescale, {names}"
         if found

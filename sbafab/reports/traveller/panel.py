@@ -145,14 +145,14 @@ def _step_pages(work: Work, panel: SheetPanel) -> list[StepPage]:
             f"plan-{page.step.step}",
             "the sheets from above on their pins",
         )
-        actions = tuple(_pressing(work.laminate, page, last))
+        actions = tuple(_pressing(work, page, last))
         found.append(replace(page, plan=plan, actions=actions))
     return found
 
 
-def _pressing(laminate: Laminate, page: StepPage, last: bool) -> list[Action]:
+def _pressing(work: Work, page: StepPage, last: bool) -> list[Action]:
     step = page.step
-    films = [pair for pair in _pairs(laminate) if pair[0].index in step.adds]
+    films = [pair for pair in _pairs(work.laminate) if pair[0].index in step.adds]
     ticks = tuple(
         f"{film.index} with {listed([str(mask.index) for mask in masks])}"
         if masks
@@ -192,7 +192,7 @@ def _pressing(laminate: Laminate, page: StepPage, last: bool) -> list[Action]:
             "pins or folded, and every pin reaches through the highest sheet."
         ),
         Action(COVER),
-        bench.closing(step),
+        bench.closing(step, work.schedule.heating),
         Action("Take it out on its plate and let it cool flat before you touch it."),
         *end,
     ]

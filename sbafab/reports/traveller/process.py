@@ -23,7 +23,7 @@ from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.layup import Bed, Round, beds, inlets_in, rounds
 from sbafab.reports.traveller.placing import PiecePlace, Things, over_tab, pitch, places
 from sbafab.reports.traveller.plan import plan
-from sbafab.reports.traveller.warming import HeatRow
+from sbafab.reports.traveller.warming import HeatBlank
 
 COVER = (
     "Cover with a release film and the press pad, flush with the platen all round. No second plate "
@@ -49,7 +49,7 @@ class StepPage:
     step: Step
     bond: str
     dials: tuple[tuple[str, str], ...]
-    heat: tuple[HeatRow, ...]
+    heat: tuple[HeatBlank, ...]
     build_up: str
     pins: str
     notes: tuple[str, ...]
@@ -73,7 +73,7 @@ def step_pages(work: Work) -> list[StepPage]:
                 step,
                 BONDS[step.bond],
                 _dials(step),
-                tuple(warming.rows(step, work.schedule.heating)),
+                tuple(warming.line(step, work.schedule.heating)),
                 build_up_svg(step, f"build-up-{step.step}"),
                 pin_lines(step),
                 _place_notes(runs),

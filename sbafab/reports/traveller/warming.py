@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -14,41 +15,35 @@ MOST_RAISED = 5.0
 """C by which the platens may be set hotter than the schedule says: ours."""
 
 
-class HeatRow(NamedTuple):
-    """A row of a step's time-temperature line; ``id`` tells its blank from the others."""
+class HeatBlank(NamedTuple):
+    """A point of a step's time-temperature line, in words, with a blank for the time read; ``id``
+    tells that from the others.
+    """
 
     point: str
-    edge: str
-    after: str
+    said: str
     id: str
 
 
-def rows(step: Step, heating: Heating) -> list[HeatRow]:
+def line(step: Step, heating: Heating) -> list[HeatBlank]:
     """Return the line of a step, from closing the press to the end of its clock."""
+    start = HeatPoint("press closes", heating.start_c, 0.0, 0.0)
+    points = (start, *step.time_temperature)
     return [
-        HeatRow(
-            point.point,
-            "" if point.edge_c is None else f"{point.edge_c:g} °C",
-            _after(point, step),
-            f"heat-{step.step}-{number}",
-        )
-        for number, point in enumerate(
-            (
-                HeatPoint("press closes", heating.start_c, 0.0, 0.0),
-                *step.time_temperature,
-            ),
-            1,
-        )
+        HeatBlank(point.point, _said(point, step), f"heat-{step.step}-{number}")
+        for number, point in enumerate(points, 1)
     ]
 
 
-def _after(point: HeatPoint, step: Step) -> str:
+def _said(point: HeatPoint, step: Step) -> str:
     if point.point == END:
-        total = "" if point.after_minutes is None else f", {say.minutes(point.after_minutes)} in all"
-        return f"{say.minutes(step.minutes)} on the clock{total}"
+        after = point.after_minutes
+        total = "" if after is None else f" ({say.minutes(after)} after closing)"
+        return f"clock ends {say.minutes(step.minutes)} later{total}"
+    what = f"{point.edge_c:g} °C, {point.point}"
     if not point.after_constants:
-        return "0"
-    return f"{point.after_constants:.2f} τ = {say.minutes(point.after_minutes)}"
+        return what
+    return f"{what}, after {point.after_constants:.2f} τ = {say.minutes(point.after_minutes)}"
 
 
 def note(work: Work) -> str:
@@ -66,41 +61,51 @@ def note(work: Work) -> str:
     )
     words += " (Before the day says how it is measured)."
     if found.melting_c is None:
-        return words + " The films' melting point is not known."
-    melting = found.constants_to(found.melting_c)
+        words += " The films' melting point is not known."
+    else:
+        melting = found.constants_to(found.melting_c)
+        words += (
+            f" It passes {found.melting_c:g} °C, where the films melt, {start - melting:.2f} τ "
+            "before the clock starts: for so long they melt beside the minutes."
+        )
     return words + (
-        f" It passes {found.melting_c:g} °C, where the films melt, {start - melting:.2f} τ before "
-        "the clock starts: for so long they are melting beside the minutes."
+        f" Where the edge does not read {found.clock_c:g} °C within {PATIENCE:g} τ "
+        f"({_patience(found)}): do not start the clock; open, set these films aside as a sample, "
+        "for nobody knows how long they were pressed, and find the cause as under Before the day."
     )
 
 
 def closing_words(step: Step, heating: Heating) -> str:
     """Return when the clock of a step starts, and what to do where it never does."""
-    tau = heating.time_constant_minutes
-    patience = say.minutes(None if tau is None else PATIENCE * tau)
     return (
-        f"Close the press; note the time. Start the clock, {say.minutes(step.minutes)}, when a "
-        f"thermocouple at the plate's edge reads {heating.clock_c:g} °C, not before. Does it not "
-        f"read {heating.clock_c:g} °C within {PATIENCE:g} τ ({patience})? Do not start the clock: "
-        "open, set these films aside as a sample, for nobody knows how long they were pressed, "
-        "and find the cause as under Before the day."
+        f"Close the press, note the time. Start the clock, {say.minutes(step.minutes)}, when a "
+        f"thermocouple at the plate's edge reads {heating.clock_c:g} °C, not before. Not within "
+        f"{PATIENCE:g} τ ({_patience(heating)})? Do not start it: see Time, above."
     )
 
 
-def before_the_day(heating: Heating) -> Iterator[str]:
+def _patience(heating: Heating) -> str:
+    tau = heating.time_constant_minutes
+    return say.minutes(None if tau is None else PATIENCE * tau)
+
+
+def before_the_day(heating: Heating, steps: int) -> Iterator[str]:
     """Yield how τ is measured, and what to do where the plate's edge stays too cold."""
-    reach = heating.platen_c - (heating.platen_c - heating.start_c) * 0.3679
+    hot, ready = say.temperature(heating.platen_c), say.temperature(heating.clock_c)
+    reach = heating.platen_c - (heating.platen_c - heating.start_c) * math.exp(-1)
     yield (
         "Time constant τ of the plate, once for a bench: lay the whole build-up without films, "
         f"plate at {heating.start_c:g} °C, a thermocouple taped to its edge; close it between "
-        f"platens at {heating.platen_c:g} °C and write the reading every half minute. τ is the "
-        f"time to {reach:.0f} °C, 63 % of the way: ________ min. Give it to press.time_constant."
+        f"platens at {hot} and write the reading every half minute. τ is the time to {reach:.0f} "
+        "°C, 63 % of the way: ________ min. Give it to press.time_constant. "
+        f"{heating.constants_to(heating.clock_c):.2f} τ come on top of each of the "
+        f"{say.count(steps, 'press step')}."
     )
     yield (
-        f"Where the edge ends after {PATIENCE:g} τ: ________ °C. It must be {heating.clock_c:g} °C "
-        "or more. If it is less: is the thermocouple right (boiling water at sea level: 100 °C) and "
-        "taped down; do both platens read what they are set to, with the same thermocouple; does "
-        "the plate lie flat and the pad cover it? Then set the platens hotter by what is missing, "
-        f"by {MOST_RAISED:g} °C at most, here: ________ °C, and measure again. More is missing: do "
+        f"Where the edge ends after {PATIENCE:g} τ: ________ °C. It must be {ready} or more. If it "
+        "is less: is the thermocouple right (100 °C in boiling water at sea level) and taped down; "
+        "do both platens read what they are set to, with the same thermocouple; does the plate lie "
+        "flat and the pad cover it? Then set the platens hotter by what is missing, by "
+        f"{MOST_RAISED:g} °C at most, here: ________ °C, and measure again. More is missing: do "
         "not press."
     )

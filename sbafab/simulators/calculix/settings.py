@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 from sbafab.errors import DesignError
-from sbafab.laminate.films import PAPER_TPE, Film
+from sbafab.laminate.films import PAPER_TPE, Film, density_of
 from sbafab.laminate.laminate import Laminate
 from sbafab.simulators.simulator import Wish, chamber_pressures
 
@@ -86,4 +86,4 @@ def _elastic(film: Film) -> Elastic:
             f"CalculiX needs Young's modulus of {film.material}; add "
             f"films.{film.material.lower()}.modulus, in MPa, and poisson, its ratio"
         )
-    return Elastic(*film.elastic, 1e-12 * film.density)
+    return Elastic(*film.elastic, 1e-12 * density_of(film, "CalculiX"))

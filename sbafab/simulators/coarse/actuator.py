@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from sbafab.errors import DesignError
+from sbafab.laminate.films import density_of
 from sbafab.laminate.laminate import Laminate
 from sbafab.simulators.coarse.meridian import Start, fullest
 from sbafab.simulators.coarse.mesh import SECTORS, CoarseMesh, coarse_mesh
@@ -63,7 +64,9 @@ class CoarseActuator:
     @cached_property
     def mass(self) -> float:
         """True mass of the films in kg, tabs left out."""
-        return self.mesh.mass(self.stack.film.thickness, self.stack.film.density)
+        return self.mesh.mass(
+            self.stack.film.thickness, density_of(self.stack.film, "a simulation")
+        )
 
     @property
     def balloons(self) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Sequence
 
+from sbafab.laminate.films import density_of
 from sbafab.meshing.surface import Vector
 from sbafab.simulators.coarse.actuator import CoarseActuator
 from sbafab.simulators.coarse.mesh import area
@@ -133,12 +134,13 @@ def film_groups(actuator: CoarseActuator) -> list[tuple[str, Sequence[Triangle],
 def _masses(actuator: CoarseActuator) -> list[float]:
     """True mass in kg of each node: a third of each triangle's."""
     film = actuator.stack.film
+    dense = density_of(film, "a simulation")
     masses = [0.0] * len(actuator.mesh.rest)
     for _, triangles, films in film_groups(actuator):
         for triangle in triangles:
             surface = area(actuator.mesh.rest, triangle)
             for node in triangle:
-                masses[node] += surface / 3 * films * film.thickness * film.density * 1e-9
+                masses[node] += surface / 3 * films * film.thickness * dense * 1e-9
     return masses
 
 

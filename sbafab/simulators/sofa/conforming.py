@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from sbafab.laminate.films import density_of
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Vector
 from sbafab.simulators.coarse.actuator import PRESSURE, checked
@@ -122,7 +123,7 @@ def _cells(stack: Layup, mesh: Mesh) -> NDArray[np.float64]:
         own = mesh.cell_sets[ply.name]
         young, ratio = elastic_of(ply.layer.film)
         made[own, STRETCH] += 1000 * young * ply.thickness
-        made[own, MASS] += 1e-9 * ply.layer.film.density * ply.thickness
+        made[own, MASS] += 1e-9 * density_of(ply.layer.film, "a simulation") * ply.thickness
         made[own, RATIO] += ratio * ply.thickness
         thickness[own] += ply.thickness
         new = own[made[own, LOWEST] < 0]
