@@ -66,7 +66,7 @@ def _films(laminate: Laminate, factors: Factors | None) -> list[list[tuple[float
     unknown = {film.material for film in films if film.elastic is None}
     if unknown:
         raise DesignError(
-            f"no modulus and Poisson's ratio of {min(unknown)} are known; add "
+            f"modulus and Poisson's ratio of {min(unknown)} are not known; add "
             f"films.{min(unknown).lower()}.modulus, in MPa, and poisson, its ratio"
         )
     measured = None if factors is None else factors.modulus_mpa

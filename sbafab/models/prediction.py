@@ -212,7 +212,7 @@ def _stiffness(one: Actuator) -> Iterator[Figure | LeftOut]:
         yield LeftOut(name, "the paper measured no modulus of oblong balloons")
         return
     if not one.has_the_papers_film:
-        yield LeftOut(name, f"the modulus of an actuator: {NOT_MEASURED}")
+        yield LeftOut(name, NOT_MEASURED)
         return
     if plate is None:
         yield LeftOut(name, "the topmost film is not the plain outline: it has tabs or ears")

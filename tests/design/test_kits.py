@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from sbafab.actuators import load_design
+from sbafab.actuators import build, load_design
 from sbafab.design.films import Films
 from sbafab.design.kits import OTHER_TUBE, citation, read_kit, tube_name, write_kit
 from sbafab.design.records import Acceptance, Design, Laser, Press, Registration, Rules, Sheets
 from sbafab.design.templates import kit_names, templates_folder
-from sbafab.design.writing import design_sha256, resolved
+from sbafab.design.writing import design_sha256, design_toml, resolved
 from sbafab.errors import DesignError
 
 SECTIONS = {
@@ -224,3 +225,53 @@ def test_a_kit_is_never_written_over(tmp_path: Path) -> None:
     assert read_kit(path).name == "our-lab"
     with pytest.raises(DesignError, match="exists"):
         write_kit(path)
+
+
+def test_another_product_shares_no_property_of_the_papers_film(tmp_path: Path) -> None:
+    """A kit or a design that names another film brings its own numbers, or they are not known."""
+    path = write_kit(tmp_path / "tpu.toml")
+    text = path.read_text()
+    for line in ("density", "melting_point", "modulus", "poisson"):
+        text = re.sub(rf"(?m)^{line} = .*\n", "", text, count=1)
+    text = text.replace('"Stretchlon 200"', '"TPU 85A"', 1)
+    text = text.replace("thickness = { value = 0.038", "thickness = { value = 0.05", 1)
+    path.write_text(text)
+    unknown = (None, None, None)
+    for design in (
+        load_design("1dof-5mm", [f"kit={path}"]),
+        load_design("1dof-5mm").with_(f"kit={path}"),
+        load_design("1dof-5mm", ["films.tpe.product=TPU 85A", "films.tpe.thickness=0.05"]),
+        load_design("1dof-5mm").with_({"films.tpe": {"product": "TPU 85A", "thickness": 0.05}}),
+    ):
+        film = design.films.stock["tpe"]
+        assert (film.product, film.thickness) == ("TPU 85A", 0.05)
+        assert (film.density, film.softens_above, film.elastic) == unknown
+    back = load_design("1dof-5mm", [f"kit={path}", "films.tpe.product=Stretchlon 200"])
+    film = back.films.stock["tpe"]
+    assert (film.thickness, film.density, film.softens_above) == (0.038, 1122, 120)
+    assert film.elastic == (10, 0.2)
+    with pytest.raises(DesignError, match=r"another product than Stretchlon 200 and no thickness"):
+        load_design("1dof-5mm", ["films.tpe.product=TPU 85A"])
+
+
+def test_a_film_keeps_its_numbers_when_read_back(tmp_path: Path) -> None:
+    """What is not known stays so in design.toml, and what is known is written."""
+    changes = ["films.tpe.product=TPU", "films.tpe.thickness=0.05", "films.tpe.modulus=25"]
+    design = load_design("1dof-5mm", changes)
+    path = tmp_path / "design.toml"
+    path.write_text(design_toml(design))
+    assert load_design(path).films == design.films
+    assert design_sha256(load_design(path)) == design_sha256(design)
+    plain = load_design("1dof-5mm", [*changes[:2], "films.tpe.modulus=26"])
+    assert design_sha256(plain) != design_sha256(design)
+
+
+def test_a_kit_says_which_film_a_layer_is_of(lab: Path) -> None:
+    text = lab.read_text() + '\n[layup]\ncap = "tpu50"\n'
+    lab.write_text(text)
+    design = load_design("1dof-5mm", [f"kit={lab}"])
+    assert design.layup.cap == "tpu50"
+    assert build(design).layers[-1].film.product == "TPU 85A"
+    own = load_design("1dof-5mm", [f"kit={lab}", "layup.cap=tpe"])
+    assert own.layup.cap == "tpe"
+    assert "layup.cap" in citation(own)["departures"]

@@ -33,9 +33,42 @@ def judge_press(folder: Folder) -> Iterator[Disagreement]:
     steps = press["steps"]
     if not steps or steps[-1]["bond"] != "full" or steps[-1]["layers"] != order:
         yield Disagreement("press", "the last step is not a full bond of the whole laminate")
+    if not _is_stated(folder):
+        if any(step["minutes"] is not None for step in steps) or press["total_press_minutes"]:
+            yield Disagreement("press", "minutes for a film that nobody stated any for")
+        return
     total = sum(step["minutes"] for step in steps)
     if abs(total - press["total_press_minutes"]) > 1e-6:
         yield Disagreement("press", f"steps take {total:g} min, and the total says otherwise")
+
+
+def _is_stated(folder: Folder) -> bool:
+    """Whether the minutes were stated for every film that bonds, to a tenth of its thickness."""
+    stated = folder.wish("press", "minutes_for", ["Stretchlon 200, 0.038 mm"])
+    known = [(text.rpartition(",")[0], float(text.split()[-2])) for text in stated]
+    bonding = {layer.material for layer in folder.films}
+    return all(
+        any(
+            film["product"] == product and abs(film["thickness"] - thick) <= thick / 10 + 1e-9
+            for product, thick in known
+        )
+        for film in folder.manifest["films"]
+        if film["material"] in bonding
+    )
+
+
+def _size(folder: Folder, step: dict[str, Any]) -> Iterator[Disagreement]:
+    """The laminate of a step is as large as its layers are cut."""
+    if folder.method == "sheet":
+        return
+    boxes = [layer.profile.bounds for layer in folder.layers if layer.index in step["layers"]]
+    low_x, low_y, high_x, high_y = zip(*boxes, strict=True)
+    cut = (max(high_x) - min(low_x), max(high_y) - min(low_y))
+    (told,) = [part["size_mm"] for part in step["build_up"] if part["part"] == "laminate"]
+    if any(abs(a - b) > 0.02 for a, b in zip(cut, told, strict=True)):
+        yield Disagreement(
+            "press", f"step {step['step']}: films of {cut[0]:.3f} x {cut[1]:.3f} mm, told {told}"
+        )
 
 
 def _step(
@@ -55,7 +88,8 @@ def _step(
             "press", f"{name} presses at {step['temperature_c']:g} C, not {wanted:g}"
         )
     asked = {float(folder.wish("press", key, usual)) for key, usual in MINUTES.items()}
-    if step["minutes"] not in asked:
+    yield from _size(folder, step)
+    if step["minutes"] is not None and step["minutes"] not in asked:
         yield Disagreement("press", f"{name} takes {step['minutes']:g} min, which nobody asked for")
     width, length = (float(folder.wish("press", f"platen_{k}", 152.4)) for k in ("width", "length"))
     force = float(folder.wish("press", "pressure_kpa", 110.0)) * width * length / 1000

@@ -87,4 +87,4 @@ def test_every_actuator_of_a_batch_has_its_serial_number() -> None:
     assert [words_of(row.find("th")) for row in rows] == ["1", "2", "3"]
     assert all(len(row.findall("td/input")) == 4 for row in rows)
     leak = words_of(page.get_element_by_id("leak").getparent())
-    assert "write the result beside its serial number" in leak
+    assert "Write both results beside its serial number" in leak
