@@ -45,7 +45,7 @@ conforming meshes as VTU, legacy VTK, Gmsh MSH 4.1 and Abaqus INP with named set
 | `manifest.json` | the index: every file with its SHA-256, layers, interfaces, sheets, bores, films |
 | `design.toml` | the design with every default written out; it makes the folder again |
 | `checks.json` | what the rules found |
-| `press.json`, `press.csv` | the press schedule |
+| `press.json`, `press.csv` | the press schedule; minutes and their totals are `null` (an empty cell) where nobody stated any for the film |
 | `predict.json` | from `sbafab predict`: every figure with model and trust |
 | `calculix/result.json`, `sofa/`, `mujoco/` likewise | from `sbafab simulate`: what the simulator found, in which units |
 
