@@ -123,17 +123,21 @@ def test_the_page_says_what_of_time_is_the_papers_and_what_ours() -> None:
     words = words_of(work_of("1dof-5mm"))
     assert "it does not say when its clock starts. Ours:" in words
     assert "T = 135 - 115 exp(-t/τ) °C from 20 °C, τ of this bench ________ min" in words
-    assert "1.10 τ before the clock starts" in words
-    assert "130 °C, clock starts, after 3.13 τ = ________ min" in words
+    assert "120 °C, is reached after 2.04 τ = ________ min" in words
+    assert "the clock starts after 3.13 τ = ________ min: for 1.10 τ they melt" in words
+    assert (
+        words.count("120 °C (melting, 2.04 τ)") == words.count("130 °C (clock starts, 3.13 τ)") == 4
+    )
     measured = words_of(work_of("1dof-5mm", "press.time_constant=2"))
     assert "τ of this bench 2 min" in measured
-    assert "after 3.13 τ = 6.3 min ; clock ends 12 min later (18 min after closing)" in measured
+    assert "the clock starts after 3.13 τ = 6.3 min" in measured
+    assert "130 °C (clock starts, 6.3 min) ; end (12 min later)" in measured
 
 
 def test_blanks_and_a_warning_for_minutes_that_nobody_stated() -> None:
     words = words_of(work_of("1dof-5mm", "films.tpe.product=TPU 85A", "films.tpe.thickness=0.05"))
     assert "Press schedule: the minutes are blank" in words
     assert '"TPU 85A, 0.05 mm"' in words
-    assert "Start the clock, ________ min, when" in words
+    assert "Start the clock, ________ min, only when" in words
     assert "Press 4 times: ________ + ________ + ________ + ________ min" in words
     assert not re.search(r"Start the clock, \d", words)

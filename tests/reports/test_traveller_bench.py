@@ -187,7 +187,7 @@ def test_what_good_hands_know_stands_where_it_happens(sheet_files: Any) -> None:
     first, second, third, fourth = steps(tree)
     for step, minutes in ((first, 3), (second, 12), (third, 10), (fourth, 20)):
         # One line says when the time begins, and nothing else on the page says otherwise.
-        words = f"Start the clock, {minutes} min, when a thermocouple at the plate's edge reads 130"
+        words = f"Start the clock, {minutes} min, only when the plate's edge reads 130 °C"
         assert words in step
         assert step.count("Start the clock") == 1
         assert step.index("base plate down, cold") < step.index("Close the press")

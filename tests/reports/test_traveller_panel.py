@@ -40,7 +40,7 @@ def test_every_press_step_has_its_pad_its_pins_and_one_time() -> None:
         # Without the pad the force would lie on the sheets alone.
         assert "Cover with a release film and the press pad" in step
         assert step.count("Start the clock") == 1
-        assert f"Start the clock, {minutes} min, when a thermocouple" in step
+        assert f"Start the clock, {minutes} min, only when the plate's edge reads 130" in step
         assert "every pin reaches through the highest sheet" in step
         assert "do not stand higher" not in step
     assert "Drive in the corner pins to their heights (above)" in first

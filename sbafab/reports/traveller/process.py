@@ -73,7 +73,7 @@ def step_pages(work: Work) -> list[StepPage]:
                 step,
                 BONDS[step.bond],
                 _dials(step),
-                tuple(warming.line(step, work.schedule.heating)),
+                tuple(warming.line(step)),
                 build_up_svg(step, f"build-up-{step.step}"),
                 pin_lines(step),
                 _place_notes(runs),

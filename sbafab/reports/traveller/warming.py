@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from sbafab.pressing.heating import END, PATIENCE, START, Heating, HeatPoint
+from sbafab.pressing.heating import END, MELTING, PATIENCE, START, Heating, HeatPoint
 from sbafab.pressing.schedule import Step
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.job import Work
@@ -25,48 +25,47 @@ class HeatBlank(NamedTuple):
     id: str
 
 
-def line(step: Step, heating: Heating) -> list[HeatBlank]:
-    """Return the line of a step, from closing the press to the end of its clock."""
-    start = HeatPoint("press closes", heating.start_c, 0.0, 0.0)
-    points = (start, *step.time_temperature)
+def line(step: Step) -> list[HeatBlank]:
+    """Return the line of a step, from the melting point to the end of its clock."""
     return [
         HeatBlank(point.point, _said(point, step), f"heat-{step.step}-{number}")
-        for number, point in enumerate(points, 1)
+        for number, point in enumerate(step.time_temperature, 1)
     ]
 
 
 def _said(point: HeatPoint, step: Step) -> str:
+    """The point as short as one line of the page asks for three of them."""
     if point.point == END:
-        after = point.after_minutes
-        total = "" if after is None else f" ({say.minutes(after)} after closing)"
-        return f"clock ends {say.minutes(step.minutes)} later{total}"
-    what = f"{point.edge_c:g} °C, {point.point}"
-    if not point.after_constants:
-        return what
-    return f"{what}, after {point.after_constants:.2f} τ = {say.minutes(point.after_minutes)}"
+        return f"end ({say.minutes(step.minutes)} later)"
+    what = "melting" if point.point == MELTING else point.point
+    minutes = point.after_minutes
+    after = f"{point.after_constants:.2f} τ" if minutes is None else say.minutes(minutes)
+    return f"{point.edge_c:g} °C ({what}, {after})"
 
 
 def note(work: Work) -> str:
     """Return what the paper says of time, what we add, and the line that all steps share."""
     found = work.schedule.heating
-    step = work.schedule.steps[0]
-    named = {point.point: point for point in step.time_temperature}
-    start = named[START].after_constants or 0.0
+    platens, warms = found.platen_c, found.platen_c - found.start_c
+    points = work.schedule.steps[0].time_temperature
+    [start] = [point for point in points if point.point == START]
     words = (
-        f"Time. The paper says 135 °C and minutes for each step; it does not say when its clock "
-        f"starts. Ours: plate and films go in cold, and the clock starts when the plate's edge "
-        f"reads {found.clock_c:g} °C. A first-order estimate of that edge is T = "
-        f"{found.platen_c:g} - {found.platen_c - found.start_c:g} exp(-t/τ) °C from "
-        f"{found.start_c:g} °C, τ of this bench {say.plain(found.time_constant_minutes)} min"
+        "Time. The paper says 135 °C and minutes for each step; it does not say when its clock "
+        "starts. Ours: plate and films go in cold, and the clock starts when a thermocouple taped "
+        f"to the plate's edge reads {found.clock_c:g} °C, not before. A first-order estimate of "
+        f"that edge is T = {platens:g} - {warms:g} exp(-t/τ) °C from {found.start_c:g} °C, τ of "
+        f"this bench {say.plain(found.time_constant_minutes)} min (Before the day says how it is "
+        "measured). After closing, "
     )
-    words += " (Before the day says how it is measured)."
+    starts = f"the clock starts after {_after(start)}"
     if found.melting_c is None:
-        words += " The films' melting point is not known."
+        words += f"{starts}; the films' melting point is not known."
     else:
-        melting = found.constants_to(found.melting_c)
+        [melting] = [point for point in points if point.point == MELTING]
+        apart = (start.after_constants or 0.0) - (melting.after_constants or 0.0)
         words += (
-            f" It passes {found.melting_c:g} °C, where the films melt, {start - melting:.2f} τ "
-            "before the clock starts: for so long they melt beside the minutes."
+            f"the films' melting point, {found.melting_c:g} °C, is reached after "
+            f"{_after(melting)}, and {starts}: for {apart:.2f} τ they melt beside the minutes."
         )
     return words + (
         f" Where the edge does not read {found.clock_c:g} °C within {PATIENCE:g} τ "
@@ -75,12 +74,15 @@ def note(work: Work) -> str:
     )
 
 
+def _after(point: HeatPoint) -> str:
+    return f"{point.after_constants:.2f} τ = {say.minutes(point.after_minutes)}"
+
+
 def closing_words(step: Step, heating: Heating) -> str:
-    """Return when the clock of a step starts, and what to do where it never does."""
+    """Return when the clock of a step starts; one line of the page."""
     return (
-        f"Close the press, note the time. Start the clock, {say.minutes(step.minutes)}, when a "
-        f"thermocouple at the plate's edge reads {heating.clock_c:g} °C, not before. Not within "
-        f"{PATIENCE:g} τ ({_patience(heating)})? Do not start it: see Time, above."
+        f"Close the press. Start the clock, {say.minutes(step.minutes)}, only when the plate's "
+        f"edge reads {heating.clock_c:g} °C (see Time, above)."
     )
 
 
