@@ -32,6 +32,7 @@ def record(
     *changes: Change,
     lab: str | Path = "lab.sqlite",
     table: str | Path | None = None,
+    again: bool = False,
     **said: Any,
 ) -> list[Record]:
     """Records what came out of a design or an assembly in the lab's file; the records added.
@@ -39,7 +40,8 @@ def record(
     ``said`` holds ``serial``, ``leak`` ("pass" or "fail"), ``operator``, ``kit``, ``note``, and
     what was measured: ``burst_kpa``, ``stroke_mm``, ``force_n``, ``height_mm``, ``mass_g``, one
     or several of ``offset_mm``, ``turn_deg``, ``cut_mm``; beside tables of the design. A
-    ``table`` (CSV) says it of a batch instead. Raises DesignError, OutputError.
+    ``table`` (CSV) says it of a batch instead. ``again`` records new attempts of actuators that
+    were mended and tested again. Raises DesignError, OutputError.
     """
     from sbafab.results import recording
     from sbafab.results.store import Lab
@@ -48,7 +50,7 @@ def record(
     tables = {name: value for name, value in said.items() if name not in recording.SAID}
     results = recording.results_of(told, table)
     built = recording.built_from(source, [*changes, tables] if tables else changes)
-    return recording.record(Lab(Path(lab)), built, results)
+    return recording.record(Lab(Path(lab)), built, results, again)
 
 
 def report(lab: str | Path = "lab.sqlite") -> Report:

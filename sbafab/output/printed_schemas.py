@@ -60,6 +60,8 @@ def _records() -> dict[str, Any]:
         recorded={**TEXT, "description": "UTC"},
         design_sha256=TEXT,
         corrects={"type": ["integer", "null"]},
+        attempt=COUNT,
+        actuator_sha256={**TEXT, "description": "the same for all designs that build this"},
         design=TEXT,
         corrected_by={"type": ["integer", "null"]},
     )
@@ -90,14 +92,31 @@ def _report() -> dict[str, Any]:
         found=table(errors=COUNT, largest=number(), highest=number()),
         verdict=TEXT,
     )
+    by_errors = table(
+        low=number(),
+        high=number(),
+        tolerances={
+            "type": "object",
+            "additionalProperties": array(number()),
+            "description": "of each key the largest error measured and the most it leaves room for",
+        },
+    )
+    promise = table(
+        design=TEXT,
+        promised=number(),
+        by_measured_errors={**by_errors, "type": ["object", "null"]},
+        **SHARE,
+        verdict=TEXT,
+    )
     return table(
         schema={"const": REPORT_SCHEMA},
         records=COUNT,
         actuators=COUNT,
-        success=array(table(by=TEXT, name=TEXT, **SHARE)),
+        success=array(table(by=TEXT, name=TEXT, **SHARE, passed_later=COUNT)),
         measured=array(measured),
         tolerances=array(tolerance),
-        promises=array(table(design=TEXT, promised=number(), **SHARE, verdict=TEXT)),
+        promises=array(promise),
+        contradictions=array(TEXT),
     )
 
 
