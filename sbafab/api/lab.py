@@ -14,17 +14,21 @@ if TYPE_CHECKING:
     from sbafab.results.report import Report
 
 
-def kerf(measurements: str | Path, resolution: float = 0.01) -> Calibration:
+def kerf(
+    measurements: str | Path, resolution: float | None = None, instrument: str = ""
+) -> Calibration:
     """The kerf in mm from a filled ``coupon.csv``, over all and along x and y.
 
-    ``resolution`` mm is the least step of the instrument. Uncertainties follow the usual guide to
-    their expression (JCGM 100:2008), intervals hold 95 %. Raises DesignError for a table that can
-    be read in two ways, for a slip in it, and for what no beam cuts.
+    ``instrument`` is "calliper", "scanner" or "microscope" where the table has no column of that
+    name; ``resolution`` mm is its least step, by default 0.01, 0.0106 (2400 dpi) or 0.001. A
+    constant reading error and a scale are fitted with the kerf. Uncertainties follow the usual
+    guide to their expression (JCGM 100:2008), intervals hold 95 %. Raises DesignError for a table
+    that can be read in two ways, for a slip in it, and for what no beam cuts.
     """
     from sbafab.cutting.calibration import calibrated
     from sbafab.cutting.measured_table import read_measurements
 
-    return calibrated(read_measurements(Path(measurements)), resolution)
+    return calibrated(read_measurements(Path(measurements), instrument), resolution)
 
 
 def record(

@@ -136,7 +136,12 @@ def _sweep() -> dict[str, Any]:
 def _kerf() -> dict[str, Any]:
     value = table(value=number(), uncertainty=number(), half_width=number())
     maybe = {**value, "type": ["object", "null"]}
-    estimate = table(kerf=value, scale=maybe, scaled=YES, count=COUNT)
+    offsets = {
+        "type": "object",
+        "additionalProperties": value,
+        "description": "mm that each instrument reads too much; empty where it cannot be told",
+    }
+    estimate = table(kerf=value, scale=maybe, scaled=YES, offsets=offsets, count=COUNT)
     of_axis = {**estimate, "type": ["object", "null"]}
     return table(
         schema={"const": KERF_SCHEMA},
@@ -146,6 +151,7 @@ def _kerf() -> dict[str, Any]:
         difference={**maybe, "description": "kerf along x less that along y, mm"},
         differs=YES,
         warnings=array(TEXT),
+        remarks=array(TEXT),
         toml={**TEXT, "description": "lines for the design file"},
     )
 
