@@ -226,9 +226,9 @@ def _scaled(estimate: Estimate, where: str) -> str:
 def _readings(estimate: Estimate) -> list[str]:
     """What each instrument reads too much or too little, where that is sure."""
     return [
-        f"{name or 'the instrument'} reads {abs(offset.value):.4f} mm too "
-        f"{'much' if offset.value > 0 else 'little'}, 95 % interval {offset.interval[0]:+.4f} to "
-        f"{offset.interval[1]:+.4f}: corrected for"
+        f"the {name or 'instrument'} reads {abs(offset.value):.4f} mm too "
+        f"{'much' if offset.value > 0 else 'little'} (95 % interval {offset.interval[0]:+.4f} to "
+        f"{offset.interval[1]:+.4f}), which the kerf is corrected for"
         for name, offset in estimate.offsets.items()
         if offset.differs_from(0.0)
     ]
@@ -239,6 +239,6 @@ def _touched(sizes: Sequence[Measurement]) -> list[str]:
     if not {size.instrument for size in sizes} & {"", "calliper"}:
         return []
     return [
-        "no table tells from kerf what jaws do to an edge: pressed in, outsides read small and "
-        "windows large; of thin film scan the pieces or use a microscope (--instrument)"
+        "a calliper's jaws press thin film in: outsides then read small and windows large, which no "
+        "table can tell from kerf; a scan or a microscope touches nothing (--instrument)"
     ]

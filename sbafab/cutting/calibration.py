@@ -106,9 +106,9 @@ class Estimate:
 
     ``offsets``: what each instrument reads too much, mm, by its name; empty where the sizes cannot
     tell, which takes it as 0. ``scale``: measured over nominal size apart from both; None where the
-    sizes cannot tell, which takes it as 1. Both are means of x and y; ``kerf_along_x`` and
-    ``scale_along_x`` are what they are more along x, and less along y. ``degrees`` of freedom are
-    left.
+    sizes cannot tell, which takes it as 1. Both are means of x and y; ``kerf_along_x`` mm and
+    ``scale_along_x``, a ratio, are what they are more along x, and less along y. ``degrees`` of
+    freedom are left.
     """
 
     kerf: Value

@@ -124,10 +124,10 @@ def test_a_constant_reading_error_is_told_and_corrected_for(
     arguments = ["kerf", str(table), "--resolution", "0.001", "--instrument", "calliper"]
     code, out, _ = run(arguments, capsys)
     assert code == 0
-    assert "calliper reads 0.0300 mm too much" in out
+    assert "the calliper reads 0.0300 mm too much" in out
     assert "warning" not in out
     assert "laser" not in out[: out.index("[laser]")]
-    assert "no table tells from kerf what jaws do to an edge" in out
+    assert "a calliper's jaws press thin film in" in out
     assert tomllib.loads(out[out.index("[laser]") :]) == {"laser": {"kerf_tpe": [0.12, 0.1]}}
     arguments[-1] = "scanner"
     assert "jaws" not in run(arguments, capsys)[1]
