@@ -239,6 +239,6 @@ def _touched(sizes: Sequence[Measurement]) -> list[str]:
     if not {size.instrument for size in sizes} & {"", "calliper"}:
         return []
     return [
-        "a calliper's jaws press thin film in: outsides then read small and windows large, which no "
-        "table can tell from kerf; a scan or a microscope touches nothing (--instrument)"
+        "a calliper's jaws press thin film in: outsides then read small and windows large, which "
+        "no table can tell from kerf; a scan or a microscope touches nothing (--instrument)"
     ]
