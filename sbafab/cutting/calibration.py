@@ -269,16 +269,16 @@ def _fitted(measurements: Sequence[Measurement], resolution: float) -> Estimate:
     errors = np.sqrt(noise * spread).tolist()
     errors[0] = math.hypot(errors[0], _left_by_rounding(scatter, resolution))
     t = student_t(degrees)
-    found = [Value(v, u, t * u) for v, u in zip(values.tolist(), errors, strict=True)]
+    fitted = [Value(v, u, t * u) for v, u in zip(values.tolist(), errors, strict=True)]
     kerf_along_x, scale_along_x = (
-        found[places[cause]].value if cause in places else 0.0
+        fitted[places[cause]].value if cause in places else 0.0
         for cause in ("kerf along x", "scale along x")
     )
-    scale = found[places["scale"]] if "scale" in places else None
+    scale = fitted[places["scale"]] if "scale" in places else None
     return Estimate(
-        kerf=found[0],
+        kerf=fitted[0],
         scale=None if scale is None else scale._replace(value=1 + scale.value),
-        offsets=dict(zip(instruments, found[1:], strict=False)) if "offsets" in places else {},
+        offsets=dict(zip(instruments, fitted[1:], strict=False)) if "offsets" in places else {},
         count=count,
         degrees=degrees,
         kerf_along_x=kerf_along_x,

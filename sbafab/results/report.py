@@ -281,18 +281,18 @@ def contradictions(records: Iterable[Record], builds: Mapping[str, Build]) -> li
     None are taken any more; a file of an earlier version may hold them, of one actuator recorded
     by designs that differ in order or sheets alone.
     """
-    told = []
+    sentences = []
     for (_, serial), own in _by_actuator(records, builds).items():
         before: dict[tuple[int, str], tuple[object, int]] = {}
         for record in own:
             for name, value in record.once.items():
                 other, number = before.setdefault((record.attempt, name), (value, record.id))
                 if other != value:
-                    told.append(
+                    sentences.append(
                         f"serial {serial} has {name} = {other} in record {number} and {value} in "
                         f"record {record.id}; correct one of them with --correct"
                     )
-    return told
+    return sentences
 
 
 def _names(builds: Mapping[str, Build]) -> dict[str, str]:
@@ -300,7 +300,7 @@ def _names(builds: Mapping[str, Build]) -> dict[str, str]:
     names: dict[str, dict[str, None]] = defaultdict(dict)
     for build in builds.values():
         names[build.actuator][build.name] = None
-    joined = {actuator: ", ".join(found) for actuator, found in names.items()}
+    joined = {actuator: ", ".join(designs) for actuator, designs in names.items()}
     shared = [*joined.values()]
     return {
         actuator: name if shared.count(name) == 1 else f"{name} {actuator[:8]}"
