@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from sbafab.actuators import build as laminate_of
 from sbafab.assemblies.build import Assembled
-from sbafab.assemblies.writing import assembly_sha256, assembly_toml
+from sbafab.assemblies.writing import assembled_sha256, assembly_sha256, assembly_toml
 from sbafab.design.kits import kit_of
 from sbafab.design.records import Design
-from sbafab.design.writing import design_sha256, design_toml
+from sbafab.design.writing import actuator_sha256, design_sha256, design_toml
+from sbafab.models.burst import burst_pressure
 from sbafab.models.figures import Asked, Prediction
 from sbafab.models.paper import BURST
 from sbafab.models.prediction import predict
@@ -43,9 +44,12 @@ def promised(design: Design) -> Build:
         family=design.family,
         method=registration.method,
         toml=design_toml(design),
-        predicted=_predicted(predict(design, Asked(pressures_kpa=(100.0,)))),
+        predicted=_predicted(
+            predict(design, Asked(pressures_kpa=(100.0,))), burst_pressure(design.form, laminate)
+        ),
         tolerances={name: getattr(registration, key) for name, key in TOLERANCES.items()},
         good_builds=(share.good, share.builds),
+        actuator_sha256=actuator_sha256(design),
     )
 
 
@@ -75,6 +79,7 @@ def promised_assembly(assembled: Assembled) -> Build:
             for name, key in TOLERANCES.items()
         },
         good_builds=(round(good * builds), builds),
+        actuator_sha256=assembled_sha256(assembled),
     )
 
 
@@ -83,9 +88,14 @@ def kit_name(design: Design) -> str:
     return kit_of(design).name
 
 
-def _predicted(prediction: Prediction) -> dict[str, tuple[float, str]]:
-    """What is predicted of each quantity, and by which model; the paper's burst pressure."""
-    found = {"burst_kpa": (BURST.value, f"the paper's balloons of 5 mm ({BURST.where})")}
+def _predicted(prediction: Prediction, burst: float | None) -> dict[str, tuple[float, str]]:
+    """What is predicted of each quantity, and by which model; the paper's burst pressure, scaled
+    to the design's pockets.
+    """
+    found = {}
+    if burst is not None:
+        said = f"the paper's balloons of 5 mm ({BURST.where}), film stress in proportion"
+        found["burst_kpa"] = (burst, said)
     for quantity, (name, model) in FIGURES.items():
         for figure in prediction.figures:
             if figure.name == name and figure.model.title.startswith(model):

@@ -33,6 +33,7 @@ thickness = { value = 0.05, source = "data sheet" }
 density = { value = 1200, source = "data sheet" }
 melting_point = { value = 115, source = "data sheet" }
 modulus = { value = 20, source = "data sheet" }
+poisson = { value = 0.3, source = "data sheet" }
 kerf = { value = 0.1, source = "coupon" }
 
 [films.pet]
@@ -162,7 +163,7 @@ def test_calculix_takes_each_film_and_the_coarse_shell_one_that_is_known(
     assert why_no_scene(tpu) is None
     with pytest.raises(DesignError, match=r"add films.pet.modulus, in MPa"):
         deck_settings(laminate)
-    stiff = build(design.with_("films.pet.modulus=3000"))
+    stiff = build(design.with_("films.pet.modulus=3000", "films.pet.poisson=0.3"))
     assert deck_settings(stiff).others == {"TPU50": (20, 0.3, 1.2e-9), "PET": (3000, 0.3, 1.39e-9)}
 
 

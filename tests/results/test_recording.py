@@ -14,6 +14,7 @@ from sbafab.assemblies.writing import assembly_sha256, assembly_toml
 from sbafab.design.writing import design_toml
 from sbafab.errors import DesignError
 from sbafab.reports.traveller.code import record_text
+from sbafab.results.builds import promised
 from sbafab.results.finding import found_by
 from sbafab.results.store import Lab
 
@@ -84,3 +85,15 @@ def test_an_assembly_is_recorded_as_a_whole(tmp_path: Path) -> None:
     assert build.good_builds[0] / build.good_builds[1] == pytest.approx((good / of) ** 3, abs=1e-4)
     scanned = record_text("standing", made.design_sha256, "sbafab 1.0.0")
     assert found_by(scanned, "", records, builds) == [made, again]
+
+
+def test_a_proof_test_is_recorded_and_the_burst_is_scaled(tmp_path: Path) -> None:
+    """367 kPa of pockets of 5 mm (paper, Sec. 4) is half of it for pockets of 10 mm."""
+    lab = tmp_path / "lab.sqlite"
+    [found] = sbafab.record("1dof-5mm", lab=lab, serial="A1", leak="pass", proof_kpa=150, **SMALL)
+    assert found.numbers == {"proof_kpa": 150.0}
+    small, wide = (sbafab.load(name, **SMALL) for name in ("1dof-5mm", "1dof-10mm"))
+    burst = [promised(design).predicted["burst_kpa"][0] for design in (small, wide)]
+    assert burst == pytest.approx([367, 367 / 2])
+    other = small.with_({"films.tpe": {"product": "TPU", "thickness": 0.038}})
+    assert "burst_kpa" not in promised(other).predicted
