@@ -52,7 +52,8 @@ def limits(design: Design) -> Limits:
         validated_balloons=design.rules.validated_balloons,
         tolerances=Tolerances(
             cutting=design.registration.cutting_error,
-            pin=design.registration.pin_error,
+            pin=design.pin_error,
+            lone_pin=design.lone_pin_error,
             placement=design.registration.hand_placement,
             turn=design.registration.hand_turn,
             sheet=design.panel.sheet_error,
@@ -100,8 +101,10 @@ def press_settings(design: Design) -> PressSettings:
         plate_thickness=press.plate_thickness,
         release_film=press.release_film,
         release_thickness=press.release_thickness,
+        underlay_thickness=press.underlay_thickness,
         pin_standard=design.registration.pin_standard,
         pin_lengths=design.registration.pin_lengths,
+        plate_made_by=design.registration.plate_made_by,
         tack=design.panel.tack_minutes,
     )
 
