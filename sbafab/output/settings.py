@@ -13,9 +13,11 @@ from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
 from sbafab.geometry.beam import Kerf
 from sbafab.laminate.films import Material
+from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.records import TURNS, Stock
+from sbafab.pressing import dowels
 from sbafab.pressing.build_up import Pad
-from sbafab.pressing.schedule import PressSettings
+from sbafab.pressing.schedule import PressSettings, plate_holes
 from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.lowered import lowered
 
@@ -107,6 +109,17 @@ def press_settings(design: Design) -> PressSettings:
         plate_made_by=design.registration.plate_made_by,
         tack=design.panel.tack_minutes,
     )
+
+
+def hole_notes(design: Design, laminate: Laminate) -> tuple[str, ...]:
+    """Return what a shop must know of the base plate's holes, line by line; none without pins.
+
+    Raises DesignError where no pin or plate does.
+    """
+    if not laminate.pins:
+        return ()
+    holes = plate_holes(laminate, press_settings(design))
+    return dowels.hole_notes(laminate.pins, holes, design.registration.plate_made_by)
 
 
 def machine(design: Design) -> Machine:

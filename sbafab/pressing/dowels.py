@@ -15,10 +15,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 from sbafab.errors import DesignError
+from sbafab.laminate.base_plate import MAKINGS, Machine
 from sbafab.laminate.laminate import Pin
 
 Standard = Literal["ISO 8734", "ISO 2338"]
@@ -242,8 +243,9 @@ def _choices(
     if not found:
         highest = max(needs.values())
         raise DesignError(
-            f"the pin {pin} (diameter {diameter:g}) must be at least {_needed(seat, highest):.3f} mm "
-            f"long for a stack {max(tops):.3f} mm high, the tolerances of pin and hole counted, and "
+            f"the pin {pin} (diameter {diameter:g}) must be at least "
+            f"{_needed(seat, highest):.3f} mm long for a stack {max(tops):.3f} mm high, the "
+            "tolerances of pin and hole counted, and "
             f"the longest there is has {sold[-1]:g}; give a longer one in registration.pin_lengths"
         )
     return found
@@ -275,8 +277,8 @@ def _thickness(choices: Mapping[float, Sequence[_Choice]], asked: float | None) 
         return next(sold, float(math.ceil(least)))
     if asked < least - SAME:
         raise DesignError(
-            f"press.plate_thickness = {asked:g} is thinner than the {least:g} mm that a dowel pin's "
-            f"hole takes with {FLOOR:g} mm left under its shoulder; make it thicker, or give other "
+            f"press.plate_thickness = {asked:g} is thinner than the {least:g} mm that a pin's hole "
+            f"takes with {FLOOR:g} mm left under its shoulder; make it thicker, or give other "
             "pins in registration.pin_lengths"
         )
     return asked
@@ -305,6 +307,31 @@ def pin_holes(settings: Sequence[Sequence[PinSetting]]) -> dict[str, PinHole]:
         )
         for name, pins in used.items()
     }
+
+
+def hole_notes(
+    pins: Sequence[Pin], holes: Mapping[str, PinHole], machine: Machine
+) -> tuple[str, ...]:
+    """Return what a shop must know of the plate's holes, a line each, in letters a plotter has.
+
+    ``pins`` are all of a laminate; those that no step uses need no shoulder.
+    """
+    sizes = dict.fromkeys(
+        (pin.diameter, replace(holes[pin.name], pin="") if pin.name in holes else None)
+        for pin in sorted(pins, key=lambda pin: pin.diameter)
+    )
+    making = MAKINGS[machine]
+    fit = "lapped to its pin m6" if making.is_lapped else "H7"
+    lines = [
+        f"D{diameter:g} {fit}, from above {hole.depth:g} +-{hole.tolerance:g} deep, flat; "
+        f"D{hole.push_out:g} on through"
+        if hole is not None
+        else f"D{diameter:g} {fit}, through, not used"
+        for diameter, hole in sizes
+    ]
+    if len(pins) > 1:
+        lines.append(f"each hole within {making.position:g} of its place: {making.words}")
+    return tuple(lines)
 
 
 def plate_thickness(asked: float | None, settings: Sequence[Sequence[PinSetting]]) -> float:

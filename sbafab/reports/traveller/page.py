@@ -113,6 +113,7 @@ def context(work: Work) -> dict[str, Any]:
         "lay_up": _lay_up(work),
         "force_notes": base_plate.build_up_notes(work),
         "plate_holes": base_plate.holes(work),
+        "plate_notes": base_plate.plate_notes(work),
         "plate_places": base_plate.places(work),
         "plate_grid": base_plate.grid(work),
         "batch": batch_page(work),

@@ -20,6 +20,7 @@ from sbafab.reports.traveller import bench, process
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
 from sbafab.reports.traveller.bill import Cut, Item, bill, cut_list
+from sbafab.reports.traveller.build_up_svg import stand_lines
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.notes import expected_sizes
 from sbafab.reports.traveller.process import COVER, StepPage
@@ -146,7 +147,7 @@ def _step_pages(work: Work, panel: SheetPanel) -> list[StepPage]:
             "the sheets from above on their pins",
         )
         actions = tuple(_pressing(work.laminate, page, last))
-        found.append(replace(page, plan=plan, actions=actions))
+        found.append(replace(page, plan=plan, actions=actions, taking_down=()))
     return found
 
 
@@ -167,8 +168,8 @@ def _pressing(laminate: Laminate, page: StepPage, last: bool) -> list[Action]:
         lay = f"Lay the sheet of layer {films[0][0].index}, the cap, on the pins over the stack."
     start = [
         Action(
-            "Lay the base plate down, cold, cut corner at the back right. Drive in the corner pins "
-            "to their heights (above) and prick a release film over them."
+            f"Lay the base plate down, cold, cut corner at the back right. {process.SET_PINS} "
+            f"Depth gauge: {stand_lines(step)}. Prick a release film over them."
         )
     ]
     end = [
@@ -177,8 +178,12 @@ def _pressing(laminate: Laminate, page: StepPage, last: bool) -> list[Action]:
     if last:
         start = []
         end = [
-            Action("Pins out, pushed from below through the plate, once the stack is cold."),
-            Action("Take off the release films. You now hold all sheets as one stack."),
+            Action(
+                "Once the stack is cold: pad off, upper release film back on itself. Pins out: "
+                "push them up from below through their push-out holes until their seats are free, "
+                "the stack held down round them, and draw them with pliers."
+            ),
+            Action("Take off the lower release film. You now hold all sheets as one stack."),
         ]
     return [
         Action(

@@ -15,13 +15,14 @@ from sbafab.pressing.words import listed
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
-from sbafab.reports.traveller.bench import closing, on_the_lumen, reseat, underlay
-from sbafab.reports.traveller.build_up_svg import build_up_svg, pin_lines
+from sbafab.reports.traveller.bench import closing, reseat, underlay
+from sbafab.reports.traveller.build_up_svg import build_up_svg, pin_lines, stand_lines
 from sbafab.reports.traveller.exploded import exploded
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.layup import Bed, Round, beds, inlets_in, rounds
 from sbafab.reports.traveller.placing import PiecePlace, Things, over_tab, pitch, places
 from sbafab.reports.traveller.plan import plan
+from sbafab.reports.traveller.taking_down import taking_down, taking_down_svg
 
 LEAK_KILOPASCALS = 5.0
 """Our choice, far below the paper's burst pressure and enough to open every balloon."""
@@ -29,6 +30,9 @@ LEAK_SECONDS = 60
 COVER = (
     "Cover with a release film and the press pad, flush with the platen all round. No second plate "
     "on top."
+)
+SET_PINS = (
+    "Set in the pins, each down to the shoulder of its hole: by hand, a tight one with light taps."
 )
 MOST_LINES = 12
 """Single layers up to which each has a line of its own."""
@@ -44,7 +48,8 @@ BONDS = {
 class StepPage:
     """One press step as it stands on the page; pictures are inline SVG.
 
-    ``places`` are those of pieces that are laid on a sheet by hand.
+    ``places`` are those of pieces that are laid on a sheet by hand. ``taking_down`` is what comes
+    after the press has opened.
     """
 
     step: Step
@@ -58,6 +63,8 @@ class StepPage:
     plan: str
     exploded: str
     actions: tuple[Action, ...]
+    taking_down: tuple[Action, ...]
+    taking_down_picture: str
 
 
 def step_pages(work: Work) -> list[StepPage]:
@@ -81,6 +88,8 @@ def step_pages(work: Work) -> list[StepPage]:
                 plan(work.laminate, part, lying, f"plan-{step.step}"),
                 exploded(work.laminate, part, lying, f"exploded-{step.step}"),
                 _bench_actions(work, part, step, lying, runs),
+                tuple(taking_down(step, _product(work.laminate, part))),
+                taking_down_svg(step, f"taking-down-{step.step}"),
             )
         )
     return found
@@ -116,18 +125,18 @@ def _bench_actions(
     """A step's actions; what it is laid up on comes between base plate and release film."""
     heat, *others = _actions(work.laminate, part, step, lying, runs)
     laid = underlay(work, part)
-    plate = _plate(part, bool(laid))
-    # One whole stack that is laid down again has nothing to be aligned with.
-    on_pin = on_the_lumen(work.laminate, part) if part.adds else []
-    return (heat, plate, *laid, *on_pin, *others)
+    return (heat, _plate(part, step, bool(laid)), *laid, *others)
 
 
-def _plate(part: AssemblyStep, has_underlay: bool) -> Action:
+def _plate(part: AssemblyStep, step: Step, has_underlay: bool) -> Action:
     """Base plate and pins, and the release film unless an underlay comes first."""
     text = "Lay the base plate down, cold, cut corner at the back right"
     if part.pins:
-        film = "." if has_underlay else " and prick a release film over them."
-        return Action(f"{text}. Drive in the pins to their heights (above){film}")
+        film = "" if has_underlay else " Prick a release film over them."
+        return Action(
+            f"{text}. {SET_PINS} Depth gauge: {stand_lines(step)}; change a pin that does "
+            f"not.{film}"
+        )
     film = "" if has_underlay else ", and a release film on it"
     by_eye = " Lay by eye, as each line says." if part.adds and not has_underlay else ""
     return Action(f"{text}, no pins in it{film}.{by_eye}")
@@ -155,11 +164,6 @@ def _actions(
     yield Action(COVER)
     cycles = tuple(f"cycle {n}" for n in range(1, runs.count + 1))
     yield closing(step, cycles if 1 < len(cycles) <= MOST_LINES else ())
-    yield Action("Take it out: it is as hot as the platens. Let it cool flat before you touch it.")
-    if part.pins:
-        names = listed([pin.name for pin in part.pins])
-        yield Action(f"Pins out, pushed from below through the plate: {names}.")
-    yield Action(f"Take off the release films. You now hold {_product(laminate, part)}.")
 
 
 def _lay(things: Things, bed: Bed, pins: Sequence[Pin]) -> Iterator[Action]:
