@@ -32,9 +32,9 @@ class Making(NamedTuple):
 
 
 MAKINGS: Mapping[Machine, Making] = {
-    "jig-borer": Making("jig borer", 0.003, True),
-    "cnc-mill": Making("CNC mill", 0.025, False),
-    "drill-press": Making("drill press, marked out by hand", 0.2, False),
+    "jig-borer": Making("a jig borer", 0.003, True),
+    "cnc-mill": Making("a CNC mill", 0.025, False),
+    "drill-press": Making("a drill press, marked out by hand", 0.2, False),
 }
 """Positions: a jig borer 0.003 and a hole marked out by hand 0.2 (a maker's guide to drilled and
 reamed holes, fobproto.com, cnc-drilling-reaming-tolerances); a CNC mill 0.001 in, what two shops

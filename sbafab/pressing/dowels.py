@@ -314,14 +314,15 @@ def hole_notes(
 ) -> tuple[str, ...]:
     """Return what a shop must know of the plate's holes, a line each, in letters a plotter has.
 
-    ``pins`` are all of a laminate; those that no step uses need no shoulder.
+    ``pins`` are all of a laminate; those that no step uses need no shoulder. The only pin of a
+    plate needs no more than a reamed hole, wherever it is.
     """
     sizes = dict.fromkeys(
         (pin.diameter, replace(holes[pin.name], pin="") if pin.name in holes else None)
         for pin in sorted(pins, key=lambda pin: pin.diameter)
     )
     making = MAKINGS[machine]
-    fit = "lapped to its pin m6" if making.is_lapped else "H7"
+    fit = "lapped to its pins m6" if making.is_lapped and len(pins) > 1 else "H7"
     lines = [
         f"D{diameter:g} {fit}, from above {hole.depth:g} +-{hole.tolerance:g} deep, flat; "
         f"D{hole.push_out:g} on through"
@@ -330,7 +331,7 @@ def hole_notes(
         for diameter, hole in sizes
     ]
     if len(pins) > 1:
-        lines.append(f"each hole within {making.position:g} of its place: {making.words}")
+        lines.append(f"each hole within {making.position:g} of its place, {making.words}")
     return tuple(lines)
 
 

@@ -101,27 +101,26 @@ def plate_notes(work: Work) -> tuple[str, ...]:
     counted = design.pin_error if several else design.lone_pin_error
     play = most_play(design.thickest_pin, own.plate_made_by)
     fit = (
-        "bore each 0.005 to 0.01 narrower and lap it to its own pin, until that goes in by hand "
-        "without shake; mark which pin is whose"
-        if making.is_lapped
-        else "ream them H7; take for each hole a pin of the pack that goes in by hand or with "
-        "light taps"
+        "Bore it 0.005 to 0.01 too narrow and lap it to its own pins, until they go in by hand "
+        "without shake; mark which pins are whose"
+        if making.is_lapped and several
+        else "Ream it H7; choose pins of the pack that go in by hand or with light taps"
     )
-    holes = "its hole" if not several else "the holes"
     made = (
-        f"Base plate, as large as the platen. Drill {holes} through at the push-out diameter, bore "
-        f"from above to the depth with a flat bottom, the shoulder on which the pin stands, and "
-        f"{fit}. Break the edge of each hole, no more: a burr lifts films. Edges are nominal."
+        "Base plate, as large as the platen. Each hole: drill it through at the push-out diameter; "
+        "widen it from above down to the depth, flat at the bottom: on that shoulder the pin "
+        f"stands. {fit}. Take off the burr, no more: it lifts films. The file has nominal edges."
     )
-    place = (
-        f"Holes within {making.position:g} mm of their places in the table, in any direction, "
-        f"which takes a {making.words} (registration.plate_made_by); a pin has up to {play:g} mm "
-        f"of play in its hole. The rules count {counted:g} mm for both."
-        if several
-        else f"All layers hang on this one pin, so its place on the plate counts for nothing: "
-        f"0.2 mm will do. The rules count {counted:g} mm for the pin's play."
+    if not several:
+        return made, (
+            "All layers hang on this one pin, so that its place on the plate counts for nothing: a "
+            f"drill press does, marked out to 0.2 mm. The rules count {counted:g} mm for its play."
+        )
+    return made, (
+        f"Each hole within {making.position:g} mm of its place in the table, in any direction: that "
+        f"is {making.words} (registration.plate_made_by). A pin has up to {play:g} mm of play in "
+        f"its hole. The rules count {counted:g} mm for both."
     )
-    return made, place
 
 
 def _underlay_words(work: Work) -> str:
