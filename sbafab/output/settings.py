@@ -44,6 +44,7 @@ def warnings(design: Design) -> dict[Material, str]:
 
 
 def limits(design: Design) -> Limits:
+    on_pins, on_one = design.pin_error, design.lone_pin_error
     return Limits(
         bond_width=design.rules.bond_width,
         mask_overhang=design.rules.mask_overhang,
@@ -54,8 +55,8 @@ def limits(design: Design) -> Limits:
         validated_balloons=design.rules.validated_balloons,
         tolerances=Tolerances(
             cutting=design.registration.cutting_error,
-            pin=design.pin_error,
-            lone_pin=design.lone_pin_error,
+            pin=on_pins,
+            lone_pin=on_one if on_one < on_pins else None,
             placement=design.registration.hand_placement,
             turn=design.registration.hand_turn,
             sheet=design.panel.sheet_error,

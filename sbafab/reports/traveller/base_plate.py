@@ -13,6 +13,7 @@ from sbafab.pressing.dowels import PinHole, pin_holes
 from sbafab.pressing.schedule import Schedule, Step
 from sbafab.pressing.words import listed
 from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller.bench import TAPE
 from sbafab.reports.traveller.job import Work
 
 MOST_LISTED = 9
@@ -117,9 +118,9 @@ def plate_notes(work: Work) -> tuple[str, ...]:
             f"drill press does, marked out to 0.2 mm. The rules count {counted:g} mm for its play."
         )
     return made, (
-        f"Each hole within {making.position:g} mm of its place in the table, in any direction: that "
-        f"is {making.words} (registration.plate_made_by). A pin has up to {play:g} mm of play in "
-        f"its hole. The rules count {counted:g} mm for both."
+        f"Each hole within {making.position:g} mm of its place in the table, in any direction: "
+        f"that is {making.words} (registration.plate_made_by). A pin has up to {play:g} mm of play "
+        f"in its hole. The rules count {counted:g} mm for both."
     )
 
 
@@ -131,9 +132,10 @@ def _underlay_words(work: Work) -> str:
     which = listed([str(number) for number in steps])
     thick = say.millimetres(work.design.press.underlay_thickness)
     return (
-        f" In step{'s' if len(steps) > 1 else ''} {which} the printed underlay, {thick} of paper, "
-        "lies between plate and release film while the press is closed; as it is as large as the "
-        "plate, it changes no pressure, and the pins' heights count it."
+        f" In step{'s' if len(steps) > 1 else ''} {which} a fresh print of the underlay, cut out "
+        f"along its dotted line, lies between plate and release film while the press is closed: "
+        f"{thick} of paper, which the heights of the pins count. As large as the plate, it changes "
+        f"no pressure. Its left and right edge are taped down with {TAPE}, off the films."
     )
 
 

@@ -108,14 +108,10 @@ def underlay(work: Work, part: AssemblyStep) -> list[Action]:
     eye = ": lay by eye along them, as each line says"
     if part.pins:
         film, over, eye = f"{film}, pricked likewise", "pricked at its grey rings over the pins", ""
-    thick = say.millimetres(work.design.press.underlay_thickness)
     return [
         Action(
-            f"Lay a fresh print of {work.job.underlay} ({thick} thick; printed at 100 %, its bars "
-            f"measured, cut out along its dotted line) on the plate, {over}, "
-            "its cut corner at the back right. Tape down its left and right edge with "
-            f"{TAPE}; over it {film}. It has the edges of {listed(patterns)}{eye}. It stays "
-            "in while the press is closed, this once."
+            f"Tape a fresh print of {work.job.underlay} to the plate, {over}, cut corner at the "
+            f"back right; over it {film}. It has the edges of {listed(patterns)}{eye}."
         )
     ]
 

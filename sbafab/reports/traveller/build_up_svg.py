@@ -181,23 +181,11 @@ def _pins(
 def pin_lines(step: Step) -> str:
     """Pins that are alike once: names, size, depth of the hole, height over plate and stack."""
     return "; ".join(
-        f"{listed(names)}: ⌀{pin.diameter_mm:g} {draw.TIMES} {pin.length_mm:g} mm, in holes "
-        f"{pin.seat_mm:.2f} mm deep, {pin.stands_mm:.2f} ± {pin.tolerance_mm:.2f} mm over the "
-        "plate, "
-        f"{pin.stands_mm - pin.tolerance_mm - step.top_mm:.2f} to "
-        f"{pin.stands_mm + pin.tolerance_mm - step.top_mm:.2f} mm over the stack"
+        f"{listed(names)}: ⌀{pin.diameter_mm:g} {draw.TIMES} {pin.length_mm:g} mm in "
+        f"{pin.seat_mm:.2f} mm, {pin.stands_mm - pin.tolerance_mm:.2f} to "
+        f"{pin.stands_mm + pin.tolerance_mm:.2f} mm over the plate by a depth gauge, "
+        f"{pin.stands_mm - pin.tolerance_mm - step.top_mm:.2f} mm at least over the stack"
         for names, pin in _alike(step)
-    )
-
-
-def stand_lines(step: Step) -> str:
-    """How high pins of each size must stand over the plate, as a gauge reads it."""
-    heights = dict.fromkeys(
-        (pin.diameter_mm, pin.stands_mm - pin.tolerance_mm, pin.stands_mm + pin.tolerance_mm)
-        for _, pin in _alike(step)
-    )
-    return listed(
-        [f"⌀{size:g} stand {low:.2f} to {high:.2f} mm high" for size, low, high in heights]
     )
 
 

@@ -43,8 +43,8 @@ def _before(works: Sequence[Work]) -> Iterator[str]:
     if any(work.laminate.pins for work in works):
         yield (
             "Base plate made and measured (table under Cut): place and depth of each hole; every "
-            "pin goes down to its shoulder by hand or with light taps, and comes out by the punch from "
-            "below. Where none does, lap the hole. The corner that is cut off is marked."
+            "pin goes down to its shoulder by hand or with light taps, and comes out by the punch "
+            "from below. Where none does, lap the hole. The corner that is cut off is marked."
         )
     release = sum(2 * len(work.schedule.steps) for work in works)
     yield f"Cut to the size above: {release} release films and the press pad."

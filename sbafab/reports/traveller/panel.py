@@ -20,7 +20,6 @@ from sbafab.reports.traveller import bench, process
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
 from sbafab.reports.traveller.bill import Cut, Item, bill, cut_list
-from sbafab.reports.traveller.build_up_svg import stand_lines
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.notes import expected_sizes
 from sbafab.reports.traveller.process import COVER, StepPage
@@ -48,6 +47,7 @@ def chapter(work: Work) -> dict[str, Any]:
         "panel_pictures": _pictures(work.laminate, panel),
         "panel_actions": _preparing(work, panel),
         "step_pages": _step_pages(work, panel),
+        "taking_down": None,
         "finishing": _cut_free(panel),
         "tubing": [*_each(panel, "Fit the tubes"), *process.tubing(work)],
         "leak_test": [*_each(panel, "Test"), *process.leak_test(work)],
@@ -147,7 +147,7 @@ def _step_pages(work: Work, panel: SheetPanel) -> list[StepPage]:
             "the sheets from above on their pins",
         )
         actions = tuple(_pressing(work.laminate, page, last))
-        found.append(replace(page, plan=plan, actions=actions, taking_down=()))
+        found.append(replace(page, plan=plan, actions=actions))
     return found
 
 
@@ -169,7 +169,7 @@ def _pressing(laminate: Laminate, page: StepPage, last: bool) -> list[Action]:
     start = [
         Action(
             f"Lay the base plate down, cold, cut corner at the back right. {process.SET_PINS} "
-            f"Depth gauge: {stand_lines(step)}. Prick a release film over them."
+            "Prick a release film over them."
         )
     ]
     end = [

@@ -16,13 +16,13 @@ from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
 from sbafab.reports.traveller.bench import closing, reseat, underlay
-from sbafab.reports.traveller.build_up_svg import build_up_svg, pin_lines, stand_lines
+from sbafab.reports.traveller.build_up_svg import build_up_svg, pin_lines
 from sbafab.reports.traveller.exploded import exploded
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.layup import Bed, Round, beds, inlets_in, rounds
 from sbafab.reports.traveller.placing import PiecePlace, Things, over_tab, pitch, places
 from sbafab.reports.traveller.plan import plan
-from sbafab.reports.traveller.taking_down import taking_down, taking_down_svg
+from sbafab.reports.traveller.taking_down import taking_down
 
 LEAK_KILOPASCALS = 5.0
 """Our choice, far below the paper's burst pressure and enough to open every balloon."""
@@ -32,7 +32,8 @@ COVER = (
     "on top."
 )
 SET_PINS = (
-    "Set in the pins, each down to the shoulder of its hole: by hand, a tight one with light taps."
+    "Set the pins on the shoulders of their holes, by hand or with light taps; change one whose "
+    "height (above) is wrong."
 )
 MOST_LINES = 12
 """Single layers up to which each has a line of its own."""
@@ -48,8 +49,7 @@ BONDS = {
 class StepPage:
     """One press step as it stands on the page; pictures are inline SVG.
 
-    ``places`` are those of pieces that are laid on a sheet by hand. ``taking_down`` is what comes
-    after the press has opened.
+    ``places`` are those of pieces that are laid on a sheet by hand.
     """
 
     step: Step
@@ -63,8 +63,6 @@ class StepPage:
     plan: str
     exploded: str
     actions: tuple[Action, ...]
-    taking_down: tuple[Action, ...]
-    taking_down_picture: str
 
 
 def step_pages(work: Work) -> list[StepPage]:
@@ -88,8 +86,6 @@ def step_pages(work: Work) -> list[StepPage]:
                 plan(work.laminate, part, lying, f"plan-{step.step}"),
                 exploded(work.laminate, part, lying, f"exploded-{step.step}"),
                 _bench_actions(work, part, step, lying, runs),
-                tuple(taking_down(step, _product(work.laminate, part))),
-                taking_down_svg(step, f"taking-down-{step.step}"),
             )
         )
     return found
@@ -125,18 +121,17 @@ def _bench_actions(
     """A step's actions; what it is laid up on comes between base plate and release film."""
     heat, *others = _actions(work.laminate, part, step, lying, runs)
     laid = underlay(work, part)
-    return (heat, _plate(part, step, bool(laid)), *laid, *others)
+    pinned = any(step.pin_settings for step in work.schedule.steps)
+    down = taking_down(step, _product(work.laminate, part), pinned)
+    return (heat, _plate(part, bool(laid)), *laid, *others, *down)
 
 
-def _plate(part: AssemblyStep, step: Step, has_underlay: bool) -> Action:
+def _plate(part: AssemblyStep, has_underlay: bool) -> Action:
     """Base plate and pins, and the release film unless an underlay comes first."""
     text = "Lay the base plate down, cold, cut corner at the back right"
     if part.pins:
         film = "" if has_underlay else " Prick a release film over them."
-        return Action(
-            f"{text}. {SET_PINS} Depth gauge: {stand_lines(step)}; change a pin that does "
-            f"not.{film}"
-        )
+        return Action(f"{text}. {SET_PINS}{film}")
     film = "" if has_underlay else ", and a release film on it"
     by_eye = " Lay by eye, as each line says." if part.adds and not has_underlay else ""
     return Action(f"{text}, no pins in it{film}.{by_eye}")
@@ -157,10 +152,9 @@ def _actions(
     lies = "stack lies" if many == 1 else f"{many} stacks lie"
     yield Action(
         f"Check: {_tabs(laminate, part.layers)}edges lie as in the picture, nothing is folded, no "
-        f"dust or hair between the films, the {lies} flat (about {_height(laminate, part)})."
+        f"dust or hair between the films, the {lies} flat (about {_height(laminate, part)})"
+        + (", every pin reaches through the highest layer with its hole." if part.pins else ".")
     )
-    if part.pins:
-        yield Action("Check: every pin reaches through the highest layer that has its hole.")
     yield Action(COVER)
     cycles = tuple(f"cycle {n}" for n in range(1, runs.count + 1))
     yield closing(step, cycles if 1 < len(cycles) <= MOST_LINES else ())

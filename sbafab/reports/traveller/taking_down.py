@@ -6,6 +6,7 @@ The order is ours; the paper gives none.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from sbafab.geometry.edges import Point
 from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, UNDERLAY
@@ -20,7 +21,7 @@ from sbafab.reports.traveller.shapes import Picture
 
 PUNCH_PLAY = 0.1
 """mm by which the punch is thinner than the push-out hole."""
-CELL, HIGH, WORDS = 35.0, 25.0, 2.2
+CELL, HIGH, WORDS = 35.0, 24.0, 2.2
 PIN = "#6d737c"
 
 
@@ -29,57 +30,68 @@ def punch(diameter: float) -> float:
     return round(push_out(diameter) - PUNCH_PLAY, 2)
 
 
-def taking_down(step: Step, product: str) -> list[Action]:
-    """Return what is done from the opening of the press until the ``product`` lies free."""
-    return [Action(text) for text in _lines(step, product)]
+@dataclass(frozen=True)
+class TakingDown:
+    """The order of taking down, once for all steps: a picture and its numbered sentences."""
+
+    picture: str
+    lines: tuple[str, ...]
 
 
-def _lines(step: Step, product: str) -> Iterator[str]:
-    yield (
-        "Open the press. Take plate, films and pad out together, level, with gloves: all of it is "
-        "as hot as the platens. Set it on a heat-proof board."
+def order_of(steps: Sequence[Step]) -> TakingDown:
+    """Return what is done after every press step, in the numbers that the steps name."""
+    pinned = any(step.pin_settings for step in steps)
+    lines = [
+        "Pad off first, straight up. The upper release film stays on until the plate is as cool as "
+        "your hand: hot films still flow.",
+        "Upper release film: hold the films down with a fingertip and fold the release film back "
+        "on itself, low, away from the finger. Pins may have pierced it: a new one for each step.",
+    ]
+    if pinned:
+        lines += [
+            "Pins, if there are any: turn plate and films over, films down, onto something soft, "
+            "cool, with a clean release film on it. It holds the films against the plate while the "
+            "punch pushes each pin down through its push-out hole, until its seat is free. Turn "
+            "all of it back.",
+            "Every pin now stands high. Hold the films down on both sides of it with flat tweezers "
+            "and draw it straight up with pliers: the way in which the films went on, so that no "
+            "edge of a hole folds back.",
+        ]
+    lines.append(
+        "Slide the lower release film off the plate with what lies on it. At the bench's edge draw "
+        "it down and back below the bench: what lies on it comes off flat, this side up. Peel the "
+        "release film from the films, never the films from it."
     )
-    yield (
-        "Pad off first, straight up. The upper release film stays where it is until the plate is "
-        "as cool as your hand: hot films still flow."
-    )
-    pierced = "; the pins may have pierced it: a new one for the next step" if step.pins else ""
-    yield (
-        "Upper release film off: hold the films down with a fingertip, and fold the film back on "
-        f"itself, low, away from the finger{pierced}."
+    return TakingDown(_picture(pinned), tuple(lines))
+
+
+def taking_down(step: Step, product: str, is_pinned: bool) -> Iterator[Action]:
+    """The boxes to tick of one step, from the opening of the press to the ``product``.
+
+    ``is_pinned``: some step of the design has pins, and the order five numbers, not three.
+    """
+    last = 5 if is_pinned else 3
+    yield Action(
+        "Plate, films and pad out together, level: as hot as the platens. Pad off, cool it (1). Upper "
+        "release film off (2)."
     )
     if step.pin_settings:
-        yield from _pins_out(step)
-    under = ", the underlay stays on the plate" if _has_underlay(step) else ""
-    yield (
-        f"Slide the lower release film off the plate with what lies on it{under}. At the bench's "
-        "edge draw the film down and back below the bench: what lies on it comes off flat, this "
-        "side up. Peel the film from the laminate, never the laminate from the film."
-    )
-    if _has_underlay(step):
-        yield "Take off the underlay and its tape and throw them away: one print, one hot cycle."
-    yield f"You now hold {product}."
+        names = listed([pin.pin for pin in step.pin_settings])
+        yield Action(
+            f"Turned over onto {_soft(step)}, free the pins {names} of their seats (3): "
+            f"{_punches(step)}. Turned back, hold the films down and draw the pins (4)."
+        )
+    away = "; underlay and tape off the plate and away" if _has_underlay(step) else ""
+    yield Action(f"Lower release film off ({last}){away}. You now hold {product}.")
 
 
-def _pins_out(step: Step) -> Iterator[str]:
+def _punches(step: Step) -> str:
     sizes = sorted({(pin.diameter_mm, pin.seat_mm) for pin in step.pin_settings})
-    how = listed(
+    return listed(
         [
-            f"⌀{say.millimetres(diameter)} with a punch of ⌀{say.millimetres(punch(diameter))}, "
-            f"{say.millimetres(seat)} deep"
+            f"⌀{diameter:g} by {say.millimetres(seat)}, punch ⌀{say.millimetres(punch(diameter))}"
             for diameter, seat in sizes
         ]
-    )
-    names = listed([pin.pin for pin in step.pin_settings])
-    yield (
-        f"Turn plate and films over, films down, onto {_soft(step)}, cool, with a clean release "
-        "film on it: it holds the films against the plate. Push each pin down through its push-out "
-        f"hole until its seat is free ({how}): {names}. Turn all of it back."
-    )
-    yield (
-        "Every pin now stands high. Hold the films down on both sides of it with flat tweezers and "
-        "draw it straight up with pliers: the way in which the films went on, so that no edge of "
-        "a hole folds back."
     )
 
 
@@ -97,18 +109,17 @@ def _has_underlay(step: Step) -> bool:
     return any(item.part == UNDERLAY for item in step.build_up)
 
 
-def taking_down_svg(step: Step, name: str) -> str:
+def _picture(is_pinned: bool) -> str:
     """The same in a row of small sections, not to scale."""
     cells = [("pad off", _pad_off), ("upper film back", _film_back)]
-    if step.pin_settings:
+    if is_pinned:
         cells += [("turned over: pins down", _pushed), ("held, pins drawn up", _drawn)]
     cells.append(("lower film round the edge", _peeled))
     said = "; ".join(f"{number} {words}" for number, (words, _) in enumerate(cells, 1))
-    width = CELL * len(cells)
-    picture = Picture(name, width, HIGH, f"taking down step {step.step}: {said}")
+    picture = Picture("taking-down", CELL * len(cells), HIGH, f"taking down: {said}")
     for number, (words, drawn) in enumerate(cells):
         left = CELL * number
-        picture.add(*drawn(left, bool(step.pin_settings)))
+        picture.add(*drawn(left, is_pinned))
         picture.add(draw.text((left + 1.0, HIGH - 1.0), f"{number + 1}  {words}", size=WORDS))
     return picture.svg()
 
