@@ -181,9 +181,9 @@ def _pins(
 def pin_lines(step: Step) -> str:
     """Pins that are alike once: names, size, depth of the hole, height over plate and stack."""
     return "; ".join(
-        f"{listed(names)}: ⌀{pin.diameter_mm:g} {draw.TIMES} {pin.length_mm:g} mm in "
-        f"{pin.seat_mm:.2f} mm, {pin.stands_mm - pin.tolerance_mm:.2f} to "
-        f"{pin.stands_mm + pin.tolerance_mm:.2f} mm over the plate by a depth gauge, "
+        f"{listed(names)}: ⌀{pin.diameter_mm:g} {draw.TIMES} {pin.length_mm:g} mm, "
+        f"{pin.seat_mm:.2f} mm in the plate, {pin.stands_mm - pin.tolerance_mm:.2f} to "
+        f"{pin.stands_mm + pin.tolerance_mm:.2f} mm over it by a depth gauge, "
         f"{pin.stands_mm - pin.tolerance_mm - step.top_mm:.2f} mm at least over the stack"
         for names, pin in _alike(step)
     )

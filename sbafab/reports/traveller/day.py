@@ -88,12 +88,14 @@ def tools(works: Sequence[Work]) -> list[Tool]:
         found.append(Tool("Antistatic tweezers, earthed mat, dish with a lid", "loose mask pieces"))
     sizes = sorted({pin.diameter for one in laminates for pin in one.pins})
     if sizes:
+        said = listed([f"⌀{say.millimetres(size)}" for size in sizes])
         thin = listed([f"⌀{say.millimetres(punch(size))}" for size in sizes])
         found += [
+            Tool(f"Drills, flat cutters, reamers H7 {said}", "base plate, if you make it yourself"),
             Tool("Depth gauge, small hammer", "pins to their shoulders, their heights checked"),
             Tool(f"Pin punches {thin}, or shanks of drills", "pins out, from below"),
             Tool("Flat tweezers, pliers", "to hold the films down and to draw the pins"),
-            Tool("Needle", "to prick release film and underlay over the pins"),
+            Tool("Needle", "to prick what lies under the films over the pins"),
         ]
     if any(work.job.underlay is not None for work in works):
         found.append(Tool("Knife, steel rule, 100 mm at least", "underlay: its bars, its cut"))
