@@ -132,7 +132,7 @@ def _chapter(one: DesignWork, number: int, mark: str) -> str:
     return _NAMES.sub(rf"\g<1>d{number}-", html)
 
 
-def _again(one: DesignWork, number: int) -> dict[str, tuple[str, ...]]:
+def _again(one: DesignWork, number: int) -> dict[str, tuple[str, ...] | None]:
     """What the first chapter has said of the build-up, in short in those that follow."""
     return (
         {}
