@@ -132,12 +132,12 @@ def _chapter(one: DesignWork, number: int, mark: str) -> str:
     return _NAMES.sub(rf"\g<1>d{number}-", html)
 
 
-def _again(one: DesignWork, number: int) -> dict[str, tuple[str, ...] | None]:
+def _again(one: DesignWork, number: int) -> dict[str, tuple[str, ...]]:
     """What the first chapter has said of the build-up, in short in those that follow."""
     return (
         {}
         if number == 1
-        else {"force_notes": base_plate.build_up_again(one.work), "taking_down": None}
+        else {"force_notes": base_plate.build_up_again(one.work)}
     )
 
 
