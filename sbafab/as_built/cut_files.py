@@ -220,12 +220,16 @@ def _part(
     )
 
 
+LETTERS = ("LWPOLYLINE", "POLYLINE")
+"""Types of the strokes of letters, the latter before R2000."""
+
+
 def _without_notes(found: ReadBack) -> ReadBack:
     """The same without polylines on REFERENCE, which are letters: the datum cross is two lines."""
     kept = [
         (kind, stroke)
         for kind, stroke in zip(found.other, found.strokes, strict=True)
-        if (kind, stroke[0]) != ("LWPOLYLINE", REFERENCE)
+        if kind not in LETTERS or stroke[0] != REFERENCE
     ]
     kinds, strokes = tuple(kind for kind, _ in kept), tuple(stroke for _, stroke in kept)
     return replace(found, other=kinds, strokes=strokes)

@@ -134,11 +134,7 @@ def _chapter(one: DesignWork, number: int, mark: str) -> str:
 
 def _again(one: DesignWork, number: int) -> dict[str, tuple[str, ...]]:
     """What the first chapter has said of the build-up, in short in those that follow."""
-    return (
-        {}
-        if number == 1
-        else {"force_notes": base_plate.build_up_again(one.work)}
-    )
+    return {} if number == 1 else {"force_notes": base_plate.build_up_again(one.work)}
 
 
 def _parts(job: AssemblyJob) -> list[tuple[str, str, str, str]]:
