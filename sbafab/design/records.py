@@ -18,7 +18,7 @@ from sbafab.design.films import UNCALIBRATED, Films, KerfWidth, LayerFilms, Shee
 from sbafab.design.form import Form, Free
 from sbafab.design.section import Section
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres
-from sbafab.laminate.base_plate import Machine, lone_pin_error, pin_error
+from sbafab.laminate.base_plate import PlateMachine, lone_pin_error, pin_error
 from sbafab.notebook import table_html
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
@@ -126,7 +126,7 @@ class Registration(Section):
     """Lengths of pins that you have, in place of the standard's."""
     cutting_error: Annotated[float, Millimetres(0, 1)] = 0.1
     """The most by which a cut edge lies off its place (paper Sec. 2)."""
-    plate_made_by: Machine = "jig-borer"
+    plate_made_by: PlateMachine = "jig-borer"
     """What makes the holes of the base plate: "jig-borer" (places to 0.003, each hole lapped to its
     pin), "cnc-mill" (0.025, reamed H7) or "drill-press" (marked out by hand, 0.2, reamed H7)."""
     pin_error: Annotated[float, Millimetres(0, 1)] | None = None

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
-Machine = Literal["jig-borer", "cnc-mill", "drill-press"]
+PlateMachine = Literal["jig-borer", "cnc-mill", "drill-press"]
 
 M6 = ((3.0, 0.002, 0.008), (6.0, 0.004, 0.012), (10.0, 0.006, 0.015), (18.0, 0.007, 0.018))
 """Lower and upper deviation of a dowel pin, m6, up to each diameter."""
@@ -31,7 +31,7 @@ class Making(NamedTuple):
     is_lapped: bool
 
 
-MAKINGS: Mapping[Machine, Making] = {
+MAKINGS: Mapping[PlateMachine, Making] = {
     "jig-borer": Making("a jig borer", 0.003, True),
     "cnc-mill": Making("a CNC mill", 0.025, False),
     "drill-press": Making("a drill press, marked out by hand", 0.2, False),
@@ -51,14 +51,14 @@ def hole_deviation(diameter: float) -> float:
     return next((high for d, high in H7 if diameter <= d), H7[-1][1])
 
 
-def most_play(diameter: float, machine: Machine) -> float:
+def most_play(diameter: float, machine: PlateMachine) -> float:
     """Return the most by which a plate's hole is wider than its pin, mm in diameter."""
     if MAKINGS[machine].is_lapped:
         return LAPPED_PLAY
     return round(hole_deviation(diameter) - pin_deviations(diameter)[0], 6)
 
 
-def pin_error(diameter: float, machine: Machine) -> float:
+def pin_error(diameter: float, machine: PlateMachine) -> float:
     """Return the most by which a pin stands off its place, mm: the hole's place and half its play.
 
     A jig borer's 0.003 + 0.002 / 2 is the 0.004 that the paper gives for its dowel pins (Sec. 2).
@@ -66,7 +66,7 @@ def pin_error(diameter: float, machine: Machine) -> float:
     return round(MAKINGS[machine].position + most_play(diameter, machine) / 2, 6)
 
 
-def lone_pin_error(diameter: float, machine: Machine) -> float:
+def lone_pin_error(diameter: float, machine: PlateMachine) -> float:
     """Return the same of a plate's only pin, mm: wherever it stands, all layers hang on it alike.
 
     What is left is the play of a hole reamed H7: for pins up to 6 mm the paper's 0.004 once more.

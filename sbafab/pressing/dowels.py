@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 from sbafab.errors import DesignError
-from sbafab.laminate.base_plate import MAKINGS, Machine
+from sbafab.laminate.base_plate import MAKINGS, PlateMachine
 from sbafab.laminate.laminate import Pin
 
 Standard = Literal["ISO 8734", "ISO 2338"]
@@ -310,7 +310,7 @@ def pin_holes(settings: Sequence[Sequence[PinSetting]]) -> dict[str, PinHole]:
 
 
 def hole_notes(
-    pins: Sequence[Pin], holes: Mapping[str, PinHole], machine: Machine
+    pins: Sequence[Pin], holes: Mapping[str, PinHole], machine: PlateMachine
 ) -> tuple[str, ...]:
     """Return what a shop must know of the plate's holes, a line each, in letters a plotter has.
 

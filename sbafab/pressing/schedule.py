@@ -18,7 +18,7 @@ from sbafab.laminate.assembly import (
     is_laid_by_hand,
     stack_count,
 )
-from sbafab.laminate.base_plate import Machine
+from sbafab.laminate.base_plate import PlateMachine
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing import build_up, sheets
 from sbafab.pressing.build_up import (
@@ -88,7 +88,7 @@ class PressSettings:
     underlay_thickness: float = 0.1
     pin_standard: Standard = "ISO 8734"
     pin_lengths: tuple[float, ...] = ()
-    plate_made_by: Machine = "jig-borer"
+    plate_made_by: PlateMachine = "jig-borer"
     tack: float = 1.0
 
     @property

@@ -13,7 +13,7 @@ NUMBERS = re.compile(r"\d+(?:\.\d+)?")
 COUNT = re.compile(rf"(\d+)(?: \+ (\d+) spare)?(?: ?{TIMES} (\d+) pieces)?")
 PINS = re.compile(
     rf"(.+): ⌀([\d.]+) {TIMES} ([\d.]+) mm, ([\d.]+) mm in the plate, ([\d.]+) to ([\d.]+) mm over "
-    r"it by a depth gauge, ([\d.]+) mm at least over the stack"
+    r"it, ([\d.]+) mm or more over the stack"
 )
 
 

@@ -87,8 +87,8 @@ FAULTS = {
         "divides its length",
     ),
     "a pin that stands too high": (
-        r"0\.\d(\d) mm at least over",
-        r"0.9\1 mm at least over",
+        r"0\.\d(\d) mm or more over",
+        r"0.9\1 mm or more over",
         "mm high",
     ),
     "a pin truer than any sold": (

@@ -45,7 +45,9 @@ def factor(step: Step) -> int:
     """By how much films are enlarged: pins that stand over the stack must end inside the pad."""
     pad = next(item.thickness_mm for item in step.build_up if item.part == PAD) * THICK
     over = max((pin.stands_mm for pin in step.pin_settings), default=step.top_mm) - step.top_mm
-    fits = (one for one in FACTORS if step.stack_mm * one <= TALLEST and over * one <= DEEP * pad)
+    paper = sum(item.thickness_mm for item in step.build_up if item.part == UNDERLAY)
+    films = step.stack_mm + paper
+    fits = (one for one in FACTORS if films * one <= TALLEST and over * one <= DEEP * pad)
     return next(fits, FACTORS[-1])
 
 
@@ -183,8 +185,8 @@ def pin_lines(step: Step) -> str:
     return "; ".join(
         f"{listed(names)}: ⌀{pin.diameter_mm:g} {draw.TIMES} {pin.length_mm:g} mm, "
         f"{pin.seat_mm:.2f} mm in the plate, {pin.stands_mm - pin.tolerance_mm:.2f} to "
-        f"{pin.stands_mm + pin.tolerance_mm:.2f} mm over it by a depth gauge, "
-        f"{pin.stands_mm - pin.tolerance_mm - step.top_mm:.2f} mm at least over the stack"
+        f"{pin.stands_mm + pin.tolerance_mm:.2f} mm over it, "
+        f"{pin.stands_mm - pin.tolerance_mm - step.top_mm:.2f} mm or more over the stack"
         for names, pin in _alike(step)
     )
 

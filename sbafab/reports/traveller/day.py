@@ -15,6 +15,8 @@ from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.taking_down import punch
 
 UNKNOWN = "not known, the paper gives no time. Measure it once: ________ min."
+LOUPE = "10x with a scale of 0.1 mm"
+"""Half a division is read; unaided, one minute of arc is 0.09 mm at 300 mm."""
 
 
 class Tool(NamedTuple):
@@ -99,6 +101,16 @@ def tools(works: Sequence[Work]) -> list[Tool]:
         ]
     if any(work.job.underlay is not None for work in works):
         found.append(Tool("Knife, steel rule, 100 mm at least", "underlay: its bars, its cut"))
+    hands = [w.design.registration for w in works if w.laminate.registration == "channel-pin"]
+    if hands:
+        finest = say.millimetres(min(hand.hand_placement for hand in hands))
+        found.append(
+            Tool(
+                f"Measuring loupe, {LOUPE}; bright light",
+                f"to lay by eye to {finest}, and to measure what came out (sbafab record "
+                "--offset): the bare eye tells about 0.1 mm",
+            )
+        )
     found += [
         Tool(
             f"Heat press, {say.size(width, length)}",

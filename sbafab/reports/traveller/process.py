@@ -32,8 +32,8 @@ COVER = (
     "on top."
 )
 SET_PINS = (
-    "Set the pins on the shoulders of their holes, by hand or with light taps; change one whose "
-    "height (above) is wrong."
+    "Set the pins on the shoulders of their holes, by hand or with light taps; gauge their heights "
+    "(above), change one that is wrong."
 )
 MOST_LINES = 12
 """Single layers up to which each has a line of its own."""

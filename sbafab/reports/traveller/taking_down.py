@@ -72,15 +72,15 @@ def taking_down(step: Step, product: str, is_pinned: bool) -> Iterator[Action]:
     """
     last = 5 if is_pinned else 3
     yield Action(
-        "Plate, films and pad out together, level: as hot as the platens. Pad off, cool it (1). "
-        "Upper release film off (2)."
+        "Plate, films and pad out together, level, all hot. Pad off, cool it (1). Upper release "
+        "film off (2)."
     )
     if step.pin_settings:
         yield Action(
             f"Turned over onto {_soft(step)}, push the pins out of their seats (3): "
             f"{_punches(step)}. Turned back, hold the films down and draw the pins (4)."
         )
-    away = "; underlay and tape off the plate and away" if _has_underlay(step) else ""
+    away = "; underlay off the plate and away" if _has_underlay(step) else ""
     yield Action(f"Lower release film off ({last}){away}. You now hold {product}.")
 
 
