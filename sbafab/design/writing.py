@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from sbafab.design.films import UNCALIBRATED, LayerFilms
-from sbafab.design.records import Acceptance, Design, Inlet, Press
+from sbafab.design.records import Acceptance, Design, Inlet, Press, Registration
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_TPE
 
 FITS = "fits"
@@ -90,6 +90,13 @@ def _as_first_hashed(table: dict[str, Any], design: Design) -> dict[str, Any]:
     tpe = design.films.tpe
     if (tpe.product, tpe.modulus, tpe.poisson) == (PAPER_PRODUCT, *PAPER_TPE):
         table["films"]["tpe"] |= {"modulus": None, "poisson": None}
+    table["registration"]["pin_error"] = design.pin_error
+    for name, key, usual in (
+        ("registration", "plate_made_by", Registration().plate_made_by),
+        ("press", "underlay_thickness", Press().underlay_thickness),
+    ):
+        if table[name][key] == usual:
+            table[name][key] = None
     return _without_none(table)
 
 

@@ -16,14 +16,32 @@ from sbafab.laminate.assembly import (
     StepName,
     assembly,
     distinct_layers,
+    is_laid_by_hand,
     stack_count,
 )
+from sbafab.laminate.base_plate import PlateMachine
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing import build_up, sheets
-from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, RELEASE, BuildUpPart, Footprint, Pad
+from sbafab.pressing.build_up import (
+    BASE_PLATE,
+    LAMINATE,
+    PAD,
+    RELEASE,
+    UNDERLAY,
+    BuildUpPart,
+    Footprint,
+    Pad,
+)
 from sbafab.pressing.cautions import refuse_temperature, warnings
-from sbafab.pressing.dowels import PinSetting, Standard, plate_thickness, settings_by_step
+from sbafab.pressing.dowels import (
+    PinHole,
+    PinSetting,
+    Standard,
+    pin_holes,
+    plate_thickness,
+    settings_by_step,
+)
 from sbafab.pressing.heating import Heating, HeatPoint, films_without_minutes, heating
 from sbafab.pressing.words import listed, named
 
@@ -70,8 +88,10 @@ class PressSettings:
     plate_thickness: float | None = None
     release_film: str = "PTFE film"
     release_thickness: float = 0.05
+    underlay_thickness: float = 0.1
     pin_standard: Standard = "ISO 8734"
     pin_lengths: tuple[float, ...] = ()
+    plate_made_by: PlateMachine = "jig-borer"
     tack: float = 1.0
     minutes_for: tuple[tuple[str, float], ...] = ((PAPER_PRODUCT, PAPER_THICKNESS),)
     """Products and thicknesses (mm) of the films that the minutes were stated for."""
@@ -135,9 +155,13 @@ class Step:
 
     @property
     def top_mm(self) -> float:
-        """Height of the stack's top over the base plate: the stack lies on a release film."""
-        release = next(item.thickness_mm for item in self.build_up if item.part == RELEASE)
-        return self.stack_mm + release
+        """Height of the stack's top over the base plate, with all that lies under the stack."""
+        under = 0.0
+        for item in self.build_up:
+            if item.part == LAMINATE:
+                break
+            under += 0.0 if item.part == BASE_PLATE else item.thickness_mm
+        return under + self.stack_mm
 
 
 @dataclass(frozen=True)
@@ -174,14 +198,7 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
     )
     stacks = [*under, *chain.from_iterable(others)]
     pad = build_up.pad_thickness(press.pressure_kpa, press.platen, press.pad, stacks)
-    pins = settings_by_step(
-        [
-            (height + press.release_thickness, part.pins)
-            for height, part in zip(_pinned_heights(laminate, under), parts, strict=True)
-        ],
-        press.pin_standard,
-        press.pin_lengths,
-    )
+    pins = pins_by_step(laminate, press)
     plate = plate_thickness(press.plate_thickness, pins)
     warming = heating(laminate, press)
     has_minutes = not films_without_minutes(laminate, press)
@@ -191,7 +208,13 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
             part,
             press,
             _Setting(
-                pad, plate, stack, own, warming, press.minutes(part.name) if has_minutes else None
+                pad,
+                plate,
+                stack,
+                own,
+                _under(laminate, part, press),
+                warming,
+                press.minutes(part.name) if has_minutes else None,
             ),
             f" {SNIP}" if laminate.registration == "ears" and part is parts[-1] else "",
         )
@@ -213,13 +236,32 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
     )
 
 
-def _pinned_heights(laminate: Laminate, under: Sequence[Footprint]) -> list[float]:
-    """Height of the stack that the pins of each step reach through, mm.
+def pins_by_step(laminate: Laminate, press: PressSettings) -> list[tuple[PinSetting, ...]]:
+    """Return the pins of every press step. Raises DesignError where pins or plate do not do."""
+    parts = assembly(laminate)
+    heights = [build_up.footprint(laminate, part.layers).height for part in parts]
+    if laminate.panel is not None:
+        # Registered sheets stay on their pins from step to step, so these are set once.
+        heights = [max(heights)] * len(heights)
+    return settings_by_step(
+        [
+            (round(height + _under(laminate, part, press) + press.release_thickness, 6), part.pins)
+            for height, part in zip(heights, parts, strict=True)
+        ],
+        press.pin_standard,
+        press.pin_lengths,
+        press.plate_thickness,
+    )
 
-    Registered sheets stay on their pins from step to step, so these are set once.
-    """
-    heights = [stack.height for stack in under]
-    return heights if laminate.panel is None else [max(heights)] * len(heights)
+
+def plate_holes(laminate: Laminate, press: PressSettings) -> dict[str, PinHole]:
+    """Return the base plate's hole of every pin that some step uses, by the pin's name."""
+    return pin_holes(pins_by_step(laminate, press))
+
+
+def _under(laminate: Laminate, part: AssemblyStep, press: PressSettings) -> float:
+    """Thickness of the underlay of a step, mm; 0 where nothing is laid by hand."""
+    return press.underlay_thickness if is_laid_by_hand(laminate, part) else 0.0
 
 
 def _tacked(minutes: float) -> str:
@@ -227,14 +269,15 @@ def _tacked(minutes: float) -> str:
 
 
 class _Setting(NamedTuple):
-    """Thickness of pad and plate, mm, what one step's stack and pins are like, how the plate warms
-    and how long it is pressed.
+    """Thickness of pad, plate and underlay, mm, what one step's stack and pins are like, how the
+    plate warms and how long it is pressed.
     """
 
     pad: float
     plate: float
     under: Footprint
     pins: tuple[PinSetting, ...]
+    underlay: float
     heating: Heating
     minutes: float | None
 
@@ -285,8 +328,8 @@ def _size(laminate: Laminate, part: AssemblyStep) -> tuple[float, float]:
 
 
 def _round_pins(press: PressSettings, own: _Setting) -> str:
-    beneath = own.under.height + press.release_thickness
-    out = max((pin.stands_mm - beneath for pin in own.pins), default=0.0)
+    beneath = own.under.height + press.release_thickness + own.underlay
+    out = max((pin.stands_mm + pin.tolerance_mm - beneath for pin in own.pins), default=0.0)
     if not out:
         return ""
     free = build_up.unpressed(press.pressure_kpa, press.pad, out)
@@ -298,6 +341,8 @@ def _items(press: PressSettings, own: _Setting, size: tuple[float, float]) -> It
     release = BuildUpPart(RELEASE, press.release_film, press.release_thickness, press.platen)
     pad = f"{press.pad.material}, {press.pad.hardness:g} Shore A"
     yield BuildUpPart(BASE_PLATE, press.plate_material, own.plate, press.platen)
+    if own.underlay:
+        yield BuildUpPart(UNDERLAY, "plain paper, printed", own.underlay, press.platen)
     yield release
     yield BuildUpPart(LAMINATE, "films of this step", round(own.under.height, 6), size)
     yield release
