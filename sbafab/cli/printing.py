@@ -89,7 +89,7 @@ def add_batch(table: Table, run: Run) -> None:
         said = f"; warns: {', '.join(warned)}" if warned else ""
         waived = f"; waived: {', '.join(one.waived)}" if one.waived else ""
         verdict = "a rule failed" if one.failed else "every rule holds"
-        words = f"{one.design.order.copies} x, {verdict}{waived}{said}"
+        words = f"{one.design.order.quantity} x, {verdict}{waived}{said}"
         table.add_row(one.design.name, Text(words))
     for note in notes_of(run.checked):
         table.add_row("note", Text(note))

@@ -16,6 +16,7 @@ from pydantic import Field, PrivateAttr
 
 from sbafab.design.films import UNCALIBRATED, Films, KerfWidth, LayerFilms, Sheet
 from sbafab.design.form import Form, Free
+from sbafab.design.order import Order
 from sbafab.design.section import Section
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres
 from sbafab.notebook import table_html
@@ -231,20 +232,6 @@ class Sheets(Section):
     """How long spyrrow looks, for each sheet."""
     label: bool = True
     """Whether name, material, number and design hash are engraved into the border."""
-
-
-class Order(Section):
-    """How many, for whom."""
-
-    copies: int = Field(default=1, ge=1, le=1000)
-    """How many of the actuator are cut."""
-    spares: int = Field(default=2, ge=0, le=100)
-    """Spare sets of every mask's pieces that are cut beyond what the copies take: they are small
-    and loose, and a lost one else costs a trip to the laser."""
-    made_for: str = Field(default="", max_length=120)
-    """Printed on the traveller."""
-    note: str = Field(default="", max_length=400)
-    """Printed on the traveller."""
 
 
 class Rules(Section):

@@ -143,7 +143,7 @@ def order_of(checked: Checked, folder: str = "") -> Job:
         fixture=f"{folder}{FIXTURE}" if checked.laminate.pins else None,
         underlay=f"{folder}{UNDERLAY}" if guides(checked.laminate) else None,
         kerf={str(name): kerf for name, kerf in kerf_widths(design).items()},
-        copies=design.order.copies,
+        copies=design.order.quantity,
     )
 
 
