@@ -67,6 +67,18 @@ class Order(Section):
         needed = builds_for(self.good, self.success_rate, self.certainty)
         return max(self.copies, needed or MOST)
 
+    @property
+    def why(self) -> str:
+        """Sentence on what the number that is made is good for; empty where none was asked for."""
+        if self.good is None:
+            return ""
+        likely = probability_of(self.good, self.quantity, self.success_rate)
+        return (
+            f"{self.quantity} are made for {self.good} good ones: with each good at "
+            f"{self.success_rate:.0%}, whatever the others are, at least {self.good} are at "
+            f"{likely:.0%} (binomial)."
+        )
+
     def spare_parts(self, needed: int) -> int:
         """Number of spares of a pattern of which the actuators take ``needed`` parts."""
         return max(self.spares, math.ceil(self.spare_share * needed - ROUNDING)) if needed else 0

@@ -84,7 +84,7 @@ def write_contents(
 
 def _press(checked: Checked, plan: Schedule) -> dict[str, Any]:
     runs = design_runs(checked.design, checked.laminate)
-    batch = {"batch": batch_json(checked.laminate, runs, plan)} if runs.copies > 1 else {}
+    batch = {"batch": batch_json(checked.design, checked.laminate, plan)} if runs.copies > 1 else {}
     return {**press_json(plan), **batch}
 
 

@@ -77,8 +77,16 @@ def test_an_assembly_counts_wholes() -> None:
 
 @pytest.mark.parametrize(
     ("needed", "share", "least", "expected"),
-    [(0, 0.05, 1, 0), (1, 0.05, 1, 1), (20, 0.05, 1, 1), (21, 0.05, 1, 2), (342, 0.05, 1, 18)]
-    + [(9, 0.0, 0, 0), (9, 0.0, 2, 2), (40, 0.1, 2, 4)],
+    [
+        (0, 0.05, 1, 0),
+        (1, 0.05, 1, 1),
+        (20, 0.05, 1, 1),
+        (21, 0.05, 1, 2),
+        (342, 0.05, 1, 18),
+        (9, 0.0, 0, 0),
+        (9, 0.0, 2, 2),
+        (40, 0.1, 2, 4),
+    ],
 )
 def test_spares_are_a_share_and_at_least_some(
     needed: int, share: float, least: int, expected: int

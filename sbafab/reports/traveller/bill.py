@@ -47,6 +47,9 @@ def bill(work: Work) -> list[Item]:
     items += [Item(*row) for row in base_plate.items(work)]
     if job.underlay is not None:
         items.append(_underlay(work, job.underlay))
+    if work.runs.together > 1:
+        what = "flat, with a lid, lined as section Batch says; tape for flags round the tubes"
+        items.append(Item("Tray", what, "1"))
     items += [Item(name, "", quantity) for name, quantity in job.extras]
     return items
 
