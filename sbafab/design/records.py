@@ -199,8 +199,12 @@ class Press(Section):
     """Step 4: the whole laminate, full bond."""
 
 
+HoldDown = Literal["border", "carrier", "vacuum"]
+"""What holds a film under the beam."""
+
+
 class Laser(Section):
-    """The laser: what it can cut, its kerf, speeds for estimates."""
+    """The laser: what it can cut, its kerf, how film is held, speeds for estimates."""
 
     least_feature: Length = 0.2
     """The narrowest slot or web the laser cuts well."""
@@ -217,6 +221,13 @@ class Laser(Section):
     and says so."""
     kerf_ptfe: KerfWidth = UNCALIBRATED
     """Full kerf width in PTFE, measured, likewise."""
+    hold_tpe: HoldDown = "border"
+    """What holds TPE, and other films that bond, under the beam: its "border" taped to card, a
+    "carrier" sheet of low tack, or a "vacuum" bed. Ours, not tried: adhesive of a carrier that
+    stays in a bond may leak."""
+    hold_ptfe: HoldDown = "carrier"
+    """What holds PTFE, and other masks, likewise. Ours, not tried: masks are light and loose, and
+    nothing bonds to them."""
     unknown_kerf: Annotated[float, Millimetres(0, 1)] = 0.1
     """What a kerf that was not measured may take off the width of a part: ours."""
 

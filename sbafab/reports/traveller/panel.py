@@ -97,6 +97,7 @@ def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
     )
     tack = say.minutes(design.panel.tack_minutes)
     return [
+        *bench.before_first_cut(),
         Action(
             f"Stick {design.panel.carrier} on the back of every PTFE sheet. It stops short of the "
             "corners, so that it covers no pin hole."
