@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Self
-
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from sbafab.design.section import Section
 
@@ -19,15 +17,15 @@ class Order(Section):
 
     copies: int = Field(default=1, ge=1, le=MOST)
     """How many of the actuator are made; more where order.good takes more."""
-    good: int | None = Field(default=None, ge=1, le=MOST)
-    """How many must come out good. As many more are made as order.success_rate and order.certainty
-    ask for; none asked for by default."""
     success_rate: float = Field(default=0.9, gt=0, le=1)
     """Share of builds that come out good (paper Sec. 4: under 10 % failed). Take your lab's own
     from "sbafab record --report" once it has one."""
     certainty: float = Field(default=0.8, gt=0, lt=1)
     """With what probability at least order.good come out good (ours): 20 good ones at 0.9 take 23
     with 0.81, 24 with 0.91, 25 with 0.97."""
+    good: int | None = Field(default=None, ge=1, le=MOST)
+    """How many must come out good. As many more are made as order.success_rate and order.certainty
+    ask for; none asked for by default."""
     spare_share: float = Field(default=0.05, ge=0, le=2)
     """Spare parts as a share of the number that the actuators take of each pattern, rounded up
     (ours). A part that is lost or torn at the press else costs a trip to the laser."""
@@ -40,24 +38,24 @@ class Order(Section):
     note: str = Field(default="", max_length=400)
     """Printed on the traveller."""
 
-    @model_validator(mode="after")
-    def _copies_suffice(self) -> Self:
-        if self.good is None:
-            return self
-        needed = builds_for(self.good, self.success_rate, self.certainty)
-        what = f"good = {self.good} at success_rate = {self.success_rate:g} and certainty = "
-        what += f"{self.certainty:g}"
+    @field_validator("good")
+    @classmethod
+    def _copies_suffice(cls, good: int | None, info: ValidationInfo) -> int | None:
+        rate, certainty = info.data.get("success_rate"), info.data.get("certainty")
+        if good is None or rate is None or certainty is None:
+            return good
+        needed = builds_for(good, rate, certainty)
+        odds = f"at success_rate = {rate:g} and certainty = {certainty:g}"
         if needed is None:
             raise ValueError(
-                f"has {what}, which takes more than {MOST} builds; lower good or certainty, or "
-                "split the order"
+                f"{odds} takes more than {MOST} builds; lower good or certainty, or split the order"
             )
-        if 1 < self.copies < needed:
+        if 1 < info.data.get("copies", 1) < needed:
             raise ValueError(
-                f"has copies = {self.copies}, and {what} takes {needed}; leave copies or good out, "
-                "or lower certainty"
+                f"{odds} takes {needed}, and order.copies = {info.data['copies']}; leave copies or "
+                "good out, or lower certainty"
             )
-        return self
+        return good
 
     @property
     def quantity(self) -> int:

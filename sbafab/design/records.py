@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, PrivateAttr
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
 
 from sbafab.design.films import UNCALIBRATED, Films, KerfWidth, LayerFilms, Sheet
 from sbafab.design.form import Form, Free
@@ -107,7 +107,10 @@ class Registration(Section):
     method: Literal["channel-pin", "ears", "sheet"] = "channel-pin"
     """"channel-pin": dowel pins in the channel bores, and in the lumen if there is one (the
     paper's). "ears": tooling holes outside the outline, pinned in every press step. "sheet": films
-    stay whole sheets on corner pins, hold all copies of a batch and are cut free last."""
+    stay whole sheets on corner pins, hold all copies of a batch and are cut free last; a proposal,
+    which registration.experimental allows."""
+    experimental: bool = Field(default=False, validate_default=True)
+    """Whether a proposal that no bench has tried may be made, as --experimental says."""
     pin_diameter: Length = 1.5
     """Dowel pins of the ears, and of the corners of registered sheets."""
     full_bond_pins: Literal["out", "in"] = "out"
@@ -136,6 +139,16 @@ class Registration(Section):
     """Degrees: the most by which what fewer than two pins hold is turned. Calibrated together with
     hand_placement."""
 
+    @field_validator("experimental")
+    @classmethod
+    def _allows_the_method(cls, experimental: bool, info: ValidationInfo) -> bool:
+        if info.data.get("method") == "sheet" and not experimental:
+            raise ValueError(
+                'does not allow registration.method = "sheet", a proposal that no bench has tried; '
+                'add --experimental, or set it to true, to have it all the same, or use "ears"'
+            )
+        return experimental
+
     @property
     def hole_diameter(self) -> float:
         """Diameter of the holes in ears and tails."""
@@ -155,8 +168,14 @@ class PanelSection(Section):
     """Sheet between two copies."""
     carrier: str = Field(default="transfer film of low tack", max_length=80)
     """What holds the masks in register until they are tacked to their film."""
+    carrier_adhesive: str = Field(default="", max_length=80)
+    """Its adhesive; none is known that was tried with PTFE in a press, so the traveller leaves a
+    blank."""
+    carrier_limit_c: float | None = Field(default=None, gt=0, le=500)
+    """C, what carrier and adhesive stand by their maker. The press must stay below; not known by
+    default, and the traveller leaves a blank."""
     tack_minutes: float = Field(default=1.0, gt=0, le=60)
-    """How long the press tacks the masks of one sheet to their film."""
+    """How long the press tacks the masks of one sheet to their film, once the plate is hot."""
     sheet_error: LengthOrZero = 0.05
     """The most by which film or mask lies off its place in its sheet: stretch, sag, transfer."""
     second_cut_error: LengthOrZero = 0.2

@@ -119,7 +119,8 @@ def test_all_laminates_of_a_cycle_share_the_force() -> None:
 
 
 def test_registered_sheets_are_one_piece_to_the_press() -> None:
-    sheets = laminate("registration.method=sheet", "order.copies=4", "stack.balloons=2")
+    whole = ("registration.method=sheet", "registration.experimental=true")
+    sheets = laminate(*whole, "order.copies=4", "stack.balloons=2")
     assert runs_of(sheets, 4, (152.4, 152.4)) == Runs(1, ((0.0, 0.0),))
 
 

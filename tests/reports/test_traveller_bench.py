@@ -178,9 +178,7 @@ def test_the_legend_names_the_cross_only_where_it_is_seen(sheet_files: Any) -> N
 def test_what_good_hands_know_stands_where_it_happens(sheet_files: Any) -> None:
     tree = page(sheet_files, "3dof-15mm")
     cut = words_of(tree.get_element_by_id("cut").getparent())
-    assert (
-        cut.index("lint-free") < cut.index("smooth card") < cut.index("sheets/TPE_1.dxf: TPE")
-    )
+    assert cut.index("lint-free") < cut.index("smooth card") < cut.index("sheets/TPE_1.dxf: TPE")
     assert cut.index("sheets/PTFE_1.dxf: PTFE") < cut.index("Wipe the soot")
     # 15 masks in three pieces, on 15 storeys.
     assert "45 loose mask pieces: pick them up with antistatic tweezers" in cut

@@ -20,7 +20,9 @@ SHA = "0123456789abcdef" * 4
 
 @cache
 def tree() -> Any:
-    design = load_design("3dof-15mm", ('registration.method="sheet"',))
+    design = load_design(
+        "3dof-15mm", ('registration.method="sheet"', "registration.experimental=true")
+    )
     laminate = build(design)
     plan = schedule(laminate, press_settings(design))
     return lxml_html.fromstring(traveller_html(design, laminate, plan, [], Job(SHA, "sbafab 1")))
@@ -77,7 +79,13 @@ def test_labels_of_the_picture_do_not_run_into_each_other() -> None:
 
 def test_every_actuator_of_a_batch_has_its_serial_number() -> None:
     design = load_design(
-        "1dof-5mm", ('registration.method="sheet"', "stack.balloons=2", "order.copies=3")
+        "1dof-5mm",
+        (
+            'registration.method="sheet"',
+            "registration.experimental=true",
+            "stack.balloons=2",
+            "order.copies=3",
+        ),
     )
     laminate = build(design)
     plan = schedule(laminate, press_settings(design))
