@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+
 from pydantic import Field, ValidationInfo, field_validator
 
 from sbafab.design.section import Section
