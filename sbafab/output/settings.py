@@ -103,6 +103,7 @@ def press_settings(design: Design) -> PressSettings:
         pin_standard=design.registration.pin_standard,
         pin_lengths=design.registration.pin_lengths,
         tack=design.panel.tack_minutes,
+        carrier_limit=design.panel.carrier_limit_c,
     )
 
 

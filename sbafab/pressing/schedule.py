@@ -70,6 +70,7 @@ class PressSettings:
     pin_standard: Standard = "ISO 8734"
     pin_lengths: tuple[float, ...] = ()
     tack: float = 1.0
+    carrier_limit: float | None = None
 
     @property
     def force_n(self) -> float:
@@ -139,6 +140,7 @@ class Schedule:
     estimated_build_minutes: float
     estimate_basis: str
     warnings: tuple[str, ...]
+    tacking: sheets.Tacking | None = None
 
 
 def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] = (1,)) -> Schedule:
@@ -158,15 +160,15 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
     )
     stacks = [*under, *chain.from_iterable(others)]
     pad = build_up.pad_thickness(press.pressure_kpa, press.platen, press.pad, stacks)
-    pins = settings_by_step(
-        [
-            (height + press.release_thickness, part.pins)
-            for height, part in zip(_pinned_heights(laminate, under), parts, strict=True)
-        ],
-        press.pin_standard,
-        press.pin_lengths,
-    )
-    plate = plate_thickness(press.plate_thickness, pins)
+    heights = [
+        (height + press.release_thickness, part.pins)
+        for height, part in zip(_pinned_heights(laminate, under), parts, strict=True)
+    ]
+    if laminate.panel is not None:
+        heights.append((sheets.tack_stack(laminate) + press.release_thickness, laminate.pins))
+    every = settings_by_step(heights, press.pin_standard, press.pin_lengths)
+    plate = plate_thickness(press.plate_thickness, every)
+    pins, tack_pins = every[: len(parts)], every[len(parts) :]
     steps = tuple(
         _step(
             laminate,
@@ -178,15 +180,19 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
         for part, stack, own in zip(parts, under, pins, strict=True)
     )
     total = sum(step.minutes for step in steps)
-    tacking = press.tack * sheets.tackings(laminate)
+    tacking = None
+    if laminate.panel is not None:
+        tacking = sheets.tacking(laminate, press.tack, press.temperature_c, plate, tack_pins[0])
+    tacked = 0.0 if tacking is None else tacking.total_minutes
     return Schedule(
         steps,
         total,
-        total + tacking + HANDLING_MINUTES,
+        total + tacked + HANDLING_MINUTES,
         f"{total:g} min in the press{_tacked(tacking)} and {HANDLING_MINUTES:g} min to cut, lay "
         "up, pin and fit the tubing; the latter is assumed the same for every design (paper: "
         "1.75 h in all)",
         tuple(warnings(laminate, press, parts, steps)),
+        tacking,
     )
 
 
@@ -199,8 +205,13 @@ def _pinned_heights(laminate: Laminate, under: Sequence[Footprint]) -> list[floa
     return heights if laminate.panel is None else [max(heights)] * len(heights)
 
 
-def _tacked(minutes: float) -> str:
-    return f", {minutes:g} min to tack masks to their films" if minutes else ""
+def _tacked(tacking: sheets.Tacking | None) -> str:
+    if tacking is None:
+        return ""
+    return (
+        f", {tacking.total_minutes:.0f} min to tack the masks of {tacking.sheets} sheets to their "
+        f"films ({tacking.basis})"
+    )
 
 
 class _Setting(NamedTuple):

@@ -59,7 +59,10 @@ def test_an_order_of_good_ones_says_how_many_are_made() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        (["order.good=20", "order.copies=5"], "order.good = 20 at .* takes 23, and order.copies = 5; leave"),
+        (
+            ["order.good=20", "order.copies=5"],
+            "order.good = 20 at .* takes 23, and order.copies = 5; leave",
+        ),
         (["order.good=990"], "takes more than 1000 builds"),
         (["order.certainty=1"], "order.certainty = 1.* must be less than 1"),
         (["order.shift_hours=0.5"], "order.shift_hours = 0.5 must be at least 1"),
