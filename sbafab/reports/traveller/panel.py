@@ -103,7 +103,8 @@ def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
             "corners, so that it covers no pin hole."
         ),
         Action(
-            "Cut every file in layers/ once for each batch. Mask sheets lie PTFE side up and are "
+            "Cut every file in layers/ once for each batch, and a pattern's file once more for each of "
+            "its spares, which the list above counts. Mask sheets lie PTFE side up and are "
             "drawn turned over: cut through the PTFE, not through the transfer film. Film sheets "
             "come off with their parts held by bridges: lift them by the edge."
         ),
@@ -204,7 +205,8 @@ def _cut_free(panel: SheetPanel) -> list[Action]:
     many = say.count(len(panel.places), "actuator")
     return [
         Action(
-            f"Fix the stack flat on the laser's bed, the cap up. Lay {SECOND_CUT} by the "
+            "Fix the stack flat on the laser's bed, the cap up, by tape or magnets all along its rim, "
+            f"clear of the slots; air assist off or low, for what is freed is loose. Lay {SECOND_CUT} by the "
             f"{len(panel.fiducials)} fiducials: a cross on REFERENCE stands in the middle of each "
             "hole. Check all of them before you cut."
         ),
@@ -241,11 +243,19 @@ def _bill(work: Work, panel: SheetPanel) -> list[Item]:
         own = [layer for layer in work.laminate.layers if layer.film.material == material]
         if own:
             number_of = len(own) * panel.batches
+            number_of += sum(
+                _spare_sheets(work, panel, pattern)
+                for pattern in dict.fromkeys(layer.pattern for layer in own)
+            )
             needed = f"{say.count(number_of, 'sheet')} {say.size(*panel.size)}"
             items.append(replace(item, quantity=needed))
         else:
             items.append(item)
-    masks = sum(layer.is_mask for layer in work.laminate.layers) * panel.batches
+    masks = sum(
+        len(layers) * panel.batches + _spare_sheets(work, panel, pattern)
+        for pattern, layers in work.laminate.patterns.items()
+        if layers[0].is_mask
+    )
     what = f"{work.design.panel.carrier}; carries the masks of one sheet each, off in the end"
     return [*items, Item("Carrier", what, say.count(masks, "piece"))]
 
@@ -258,9 +268,21 @@ def _cuts(work: Work, panel: SheetPanel) -> list[Cut]:
         sheet = work.laminate.first_cut(layers[0])
         length = sum(contour.length for contour in sheet.contours)
         found.append(
-            replace(row, count=len(layers) * panel.batches, pieces=1, spares=0, cut_length=length)
+            replace(
+                row,
+                count=len(layers) * panel.batches,
+                pieces=1,
+                spares=_spare_sheets(work, panel, row.pattern),
+                cut_length=length,
+            )
         )
     return found
+
+
+def _spare_sheets(work: Work, panel: SheetPanel, pattern: str) -> int:
+    """Number of spare sheets of a pattern, for all batches together."""
+    layers = work.laminate.patterns[pattern]
+    return work.design.order.spare_parts(len(layers) * panel.batches)
 
 
 def _times(work: Work, panel: SheetPanel) -> list[Time]:
