@@ -103,8 +103,8 @@ def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
             "corners, so that it covers no pin hole."
         ),
         Action(
-            "Cut every file in layers/ once for each batch, and a pattern's file once more for each of "
-            "its spares, which the list above counts. Mask sheets lie PTFE side up and are "
+            "Cut every file in layers/ once for each batch, and a pattern's file once more for each "
+            "of its spares, which the list above counts. Mask sheets lie PTFE side up and are "
             "drawn turned over: cut through the PTFE, not through the transfer film. Film sheets "
             "come off with their parts held by bridges: lift them by the edge."
         ),
