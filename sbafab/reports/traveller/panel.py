@@ -103,8 +103,8 @@ def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
             "corners, so that it covers no pin hole."
         ),
         Action(
-            "Cut every file in layers/ once for each batch, and a pattern's file once more for each "
-            "of its spares, which the list above counts. Mask sheets lie PTFE side up and are "
+            "Cut every file in layers/ once for each batch, and a pattern's file once more for "
+            "each of its spares, which the list above counts. Mask sheets lie PTFE side up and are "
             "drawn turned over: cut through the PTFE, not through the transfer film. Film sheets "
             "come off with their parts held by bridges: lift them by the edge."
         ),
@@ -205,8 +205,9 @@ def _cut_free(panel: SheetPanel) -> list[Action]:
     many = say.count(len(panel.places), "actuator")
     return [
         Action(
-            "Fix the stack flat on the laser's bed, the cap up, by tape or magnets all along its rim, "
-            f"clear of the slots; air assist off or low, for what is freed is loose. Lay {SECOND_CUT} by the "
+            "Fix the stack flat on the laser's bed, the cap up, by tape or magnets all along its "
+            "rim, clear of the slots; air assist off or low, for what is freed is loose. Lay "
+            f"{SECOND_CUT} by the "
             f"{len(panel.fiducials)} fiducials: a cross on REFERENCE stands in the middle of each "
             "hole. Check all of them before you cut."
         ),
