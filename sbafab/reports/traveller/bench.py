@@ -45,6 +45,8 @@ HOLDING: Mapping[HoldDown, str] = {
 }
 """What holds a film under the beam, by ``laser.hold_tpe`` and ``laser.hold_ptfe``."""
 SILICONE = " PTFE hardly sticks to acrylic or rubber adhesives: the carrier's must be silicone."
+RIM = 10.0
+"""mm of film round a registered sheet, by which it is held down."""
 WARM = 5.0
 """C by which a plate may be colder than the platens when the timer starts."""
 
@@ -54,10 +56,11 @@ def before_first_cut() -> list[Action]:
     return [
         Action(WIPE),
         Action(
-            "Each registered sheet is cut whole, edge and all, out of film that reaches at least "
-            "10 mm past it. Lay the film flat on smooth card, without stretching it, and hold it "
-            "down all along that rim with tape or magnets; a mask sheet is held by the rim of its "
-            "transfer film. Parts of the films hang on their bridges. (Our proposal, not tried.)"
+            f"Each registered sheet is cut whole, edge and all, out of film that reaches {RIM:g} "
+            "mm past it all round. Lay the film flat on smooth card, without stretching it, and "
+            "hold it down all along that rim with tape or magnets; a mask sheet is held by the rim "
+            "of its transfer film. Parts of the films hang on their bridges. (Our proposal, not "
+            "tried.)"
         ),
         Action(AIR),
     ]

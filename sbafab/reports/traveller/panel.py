@@ -248,7 +248,9 @@ def _bill(work: Work, panel: SheetPanel) -> list[Item]:
                 _spare_sheets(work, panel, pattern)
                 for pattern in dict.fromkeys(layer.pattern for layer in own)
             )
-            needed = f"{say.count(number_of, 'sheet')} {say.size(*panel.size)}"
+            rim = 2 * bench.RIM
+            least = say.size(panel.size[0] + rim, panel.size[1] + rim)
+            needed = f"{say.count(number_of, 'sheet')} of at least {least}"
             items.append(replace(item, quantity=needed))
         else:
             items.append(item)
@@ -324,8 +326,8 @@ def _carrier(work: Work) -> str:
     adhesive = design.carrier_adhesive or "________________"
     limit = "________ °C" if design.carrier_limit_c is None else f"{design.carrier_limit_c:g} °C"
     return (
-        f"Transfer film: {design.carrier}, product ________________, adhesive {adhesive}, rated "
-        f"for {limit} by its maker. It goes into the press at "
+        f"What carries the masks: {design.carrier}, product ________________, adhesive {adhesive}, "
+        f"rated for {limit} by its maker. It goes into the press at "
         f"{say.temperature(work.design.press.temperature_c)}: without a rating above that it is "
         "not used. Acrylic and rubber adhesives hardly hold PTFE; silicone adhesives on polyester "
         "or polyimide are sold for such temperatures. Which of them holds the masks, and lets them "
