@@ -341,10 +341,12 @@ def _tack_pins(work: Work) -> str:
     assert tacking is not None
     stands = listed(list(dict.fromkeys(say.millimetres(pin.stands_mm) for pin in tacking.pins)))
     lengths = listed(list(dict.fromkeys(say.millimetres(pin.length_mm) for pin in tacking.pins)))
+    beneath = tacking.stack_mm + work.design.press.release_thickness
+    out = say.millimetres(max(pin.stands_mm for pin in tacking.pins) - beneath)
     return (
         f"pins of {lengths} stand {stands} over the plate (one film with its masks is "
-        f"{say.millimetres(tacking.stack_mm)} high; for the whole stack they stand higher, see the "
-        "press steps)"
+        f"{say.millimetres(tacking.stack_mm)} high; the pins press {out} into the pad, those for "
+        "the whole stack would more)"
     )
 
 
