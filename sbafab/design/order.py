@@ -73,9 +73,9 @@ class Order(Section):
             return ""
         likely = probability_of(self.good, self.quantity, self.success_rate)
         return (
-            f"{self.quantity} are made for {self.good} good ones: with each good at "
-            f"{self.success_rate:.0%}, whatever the others are, at least {self.good} are at "
-            f"{likely:.0%} (binomial)."
+            f"{self.quantity} are made for {self.good} good ones: if {self.success_rate:.0%} of "
+            "builds come out good, each whatever the others do, at least "
+            f"{self.good} of {self.quantity} do with a probability of {likely:.0%} (binomial)."
         )
 
     def spare_parts(self, needed: int) -> int:

@@ -54,6 +54,8 @@ def test_an_order_of_good_ones_says_how_many_are_made() -> None:
     made = load_design("1dof-5mm", ["order.good=20"])
     assert (made.order.copies, made.order.good, made.order.quantity) == (1, 20, 23)
     assert load_design("1dof-5mm", ["order.good=20", "order.copies=30"]).order.quantity == 30
+    # As scipy has it: binom.sf(19, 23, 0.9) = 0.8073.
+    assert "at least 20 of 23 do with a probability of 81%" in made.order.why
     assert made.with_("order.certainty=0.9").order.quantity == 24
 
 

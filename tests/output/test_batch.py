@@ -51,6 +51,15 @@ def test_the_traveller_has_a_serial_number_for_each_copy(run: Run) -> None:
     words = " ".join(page.text_content().split())
     assert "5 copies in 2 press cycles of 3, 2 at once: 90 min in the press instead of 225" in words
     assert "390 min" in words
+    days = page.xpath("//table[@class='days']/tbody/tr")
+    # Cutting, two cycles of four steps, each cycle's tubes: 390 min fit into one day of 8 h.
+    assert len(days) == 1 + 2 * (4 + 1)
+    assert [row.find("th").text_content() for row in days if row.find("th") is not None] == ["1"]
+    assert "Cycle 2: lay up and press step 4 4 to 5" in " ".join(
+        " ".join(cell.text_content() for cell in row) for row in days
+    )
+    assert "It may not pause from the first layer of a step to the end of its pressing" in words
+    assert "each straight to its number in the tray" in words
     closings = page.xpath("//label[contains(., 'cycle 2')]")
     assert len(closings) == 4
 

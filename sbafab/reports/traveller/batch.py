@@ -19,6 +19,13 @@ WIDEST = 110.0
 PLATE = "#f1f1ef"
 
 
+PAUSES = (
+    "The work may pause between any two rows, within cutting after any sheet, and within the tubes "
+    "after any laminate. It may not pause from the first layer of a step to the end of its "
+    "pressing: loose films move."
+)
+
+
 @dataclass(frozen=True)
 class PatternRow:
     """How many of a pattern one place takes, and each kind of cycle."""
@@ -62,6 +69,7 @@ class BatchPage:
     picture: str
     plan: tuple[PlanRow, ...]
     plan_basis: str
+    pauses: str
     identity: tuple[Action, ...]
     cycle_names: tuple[str, ...]
     patterns: tuple[PatternRow, ...]
@@ -88,6 +96,7 @@ def batch_page(work: Work) -> BatchPage | None:
         _picture(work, runs),
         _plan(work),
         _plan_basis(work),
+        PAUSES,
         _identity(work),
         tuple(_name(runs, size) for size in sizes),
         tuple(
@@ -150,7 +159,7 @@ def _copies(entry: Entry) -> str:
 
 
 def _plan_basis(work: Work) -> str:
-    """How far the plan can be trusted, and where it may pause."""
+    """How far the plan can be trusted."""
     by_hand = work.schedule.estimated_build_minutes - work.schedule.total_press_minutes
     hours = work.design.order.shift_hours
     platen = work.schedule.steps[0].platen_mm
@@ -167,9 +176,7 @@ def _plan_basis(work: Work) -> str:
         "the steps by the number of parts that each lays, is ours. Warming and cooling of the "
         "plate come on top of every press step (blanks in Before the day): the fullest day with a "
         f"press step has {say.clock(max(0.0, left))} left for them. So do curing and leak tests. "
-        "Write beside the rows what they took. The work may pause between "
-        "any two rows, and within cutting after any sheet, within the tubes after any laminate. It "
-        "may not pause from the first layer of a step to the end of its pressing: loose films move."
+        "Write beside the rows what they took."
     )
 
 
