@@ -9,7 +9,7 @@ from typing import Any
 
 from sbafab.design.films import UNCALIBRATED, LayerFilms
 from sbafab.design.order import Order
-from sbafab.design.records import Design, Inlet
+from sbafab.design.records import Design, Inlet, Press, Registration
 
 FITS = "fits"
 LATER: Mapping[str, Sequence[str]] = {
@@ -90,6 +90,13 @@ def _as_first_hashed(table: dict[str, Any], design: Design) -> dict[str, Any]:
     if design.inlet.adhesive == Inlet().adhesive:
         table["inlet"]["adhesive"] = None
     _as_first_ordered(table, design)
+    table["registration"]["pin_error"] = design.pin_error
+    for name, key, usual in (
+        ("registration", "plate_made_by", Registration().plate_made_by),
+        ("press", "underlay_thickness", Press().underlay_thickness),
+    ):
+        if table[name][key] == usual:
+            table[name][key] = None
     return _without_none(table)
 
 
