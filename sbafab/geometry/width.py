@@ -169,7 +169,7 @@ class _Narrowest:
         return [(number, sides[number]) for number in index.in_order(box, found)]
 
     def corners_near(self, a: Corner, after: int) -> Iterator[Corner]:
-        """Yield corners, numbered ``after`` this, that a segment shorter than the best may reach."""
+        """Yield later corners, numbered above ``after``, that a shorter segment may reach."""
         index, corners = self.boundary.index, self.boundary.corners
         box = widened(a.box, self.value)
         for number in index.in_order(box, index.among(box, index.about(box, after))):
