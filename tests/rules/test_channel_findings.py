@@ -243,3 +243,20 @@ def test_tube_fit_without_inlets(good: Good) -> None:
             "the laminate has no inlet, so no tube can be fitted; give every chamber one",
         )
     ]
+
+
+def test_a_strip_that_opens_beside_its_inlet_is_no_mouth(good: Good, spoil: Spoil) -> None:
+    """Moved by 0.9, its end lies about 0.825 from the inlet's axis, outside the tube's 0.8."""
+    laminate = good(*ONE)
+    (inlet,) = laminate.inlets
+    (x, y), (dx, dy) = inlet.mouth, inlet.direction
+
+    def at(depth: float, off: float) -> tuple[float, float]:
+        return x - depth * dx - off * dy, y - depth * dy + off * dx
+
+    run = strip(at(inlet.length, 0.0), at(-5.0, 0.0), inlet.width)
+    aside = strip(at(inlet.length, 0.9), at(-5.0, 0.9), inlet.width)
+    mask = (laminate.layer(2).profile - run) | aside
+    (found,) = tube_fit.check(spoil(laminate, 2, mask), LIMITS)
+    assert (found.verdict, found.measured) == ("fail", 0.0)
+    assert "open a mask strip to the tab's end" in found.message
