@@ -213,7 +213,7 @@ def test_contour_that_encloses_nothing_is_refused(plate_text: str) -> None:
 def test_an_old_polyline_is_read_as_it_stands_and_refused_with_a_curve_fitted(
     flags: int, fitted: bool, plate_text: str
 ) -> None:
-    """Flag 1 is closed; 2 and 4 tell of curves and splines fitted to the vertices (DXF, POLYLINE)."""
+    """Flag 1 is closed; 2 and 4 tell of curves and splines fitted to the vertices (DXF)."""
 
     def old(model: Modelspace) -> None:
         polyline = model.add_polyline2d(SQUARE, close=True, dxfattribs=OUTER)

@@ -282,3 +282,18 @@ def test_a_slit_farther_off_than_the_strip_is_wide_is_none_of_its_sides(
     laminate = spoil(laminate, 2, laminate.layer(2).profile | slit | bulge)
     (found,) = tube_fit.check(laminate, LIMITS)
     assert (found.verdict, found.measured) == ("pass", pytest.approx(1.6 - 0.3))
+
+
+def test_a_strip_that_is_narrow_inside_the_mouth_is_so_wide_less_the_errors(
+    good: Good, spoil: Spoil
+) -> None:
+    """0.9 wide from 1.2 inside the mouth on: 0.1 is lost on each edge, and a kerf of 0.1."""
+    laminate = good(*ONE)
+    (inlet,) = laminate.inlets
+    (x, y), (dx, dy) = inlet.mouth, inlet.direction
+    mask = laminate.layer(2).profile
+    for off in (0.45 + 0.5, -0.45 - 0.5):
+        ends = [(x - d * dx - off * dy, y - d * dy + off * dx) for d in (1.2, inlet.length + 5.0)]
+        mask = mask - strip(*ends, 1.0)
+    (found,) = tube_fit.check(spoil(laminate, 2, mask), LIMITS)
+    assert (found.verdict, found.measured) == ("fail", pytest.approx(0.6))

@@ -125,9 +125,14 @@ def test_a_tongue_of_scrap_far_smaller_than_a_tab_is_found(reach: float) -> None
     # Two copies, which no scrap but the first one's is at.
     held = strip(aside(-1.5, tab - reach), aside(-1.5, tab + 4.0), 0.2)
     closing = strip(aside(scrap.AHEAD - reach, 0.0), aside(5.0, 0.0), 0.2)
-    for tongue, said in ((held, "bonds to the part"), (closing, "closes the inlet")):
+    for tongue, said in ((held, "bonds to the part of layer 3"), (closing, "closes the inlet")):
         (found,) = scrap.check(
             with_sheet(laminate, 5, lambda sheet, _, tongue=tongue: sheet | tongue), FEW
         )
         assert found.measured == 1.0
         assert said in found.message
+    # A mask sheet that reaches between the tongue and the tab keeps them apart.
+    shut = with_sheet(laminate, 5, lambda sheet, _: sheet | held)
+    cover = strip(aside(-1.5, tab - 1.0), aside(-1.5, tab + 4.0), 1.0)
+    (found,) = scrap.check(with_sheet(shut, 4, lambda sheet, _: sheet | cover), FEW)
+    assert found.verdict == "pass"
