@@ -83,7 +83,10 @@ def test_without_pressure_it_holds_and_widens_as_its_films_do(made: BalloonMap) 
     more, less = (inflate(made.balloon, none, h + s, tied=True).volume for s in (step, -step))
     own = (made.volume(none, h + step) - made.volume(none, h - step)) / (2 * step)
     widest = math.pi * made.balloon.pocket**2
-    assert own == pytest.approx((more - less) / (2 * step), abs=0.08 * widest)
+    expected = (more - less) / (2 * step)
+    assert own[:-1] == pytest.approx(expected[:-1], abs=0.03 * widest)
+    # At the top, far beyond any free height, volumes that may not fall with pressure bend it.
+    assert own[-1] == pytest.approx(expected[-1], abs=0.15 * widest)
 
 
 def mylar(radius: float) -> float:
