@@ -18,7 +18,7 @@ PORT = 8417
 """Tried first, so that a link that was kept finds the studio again."""
 
 
-class Opening(NamedTuple):
+class StudioStart(NamedTuple):
     """The folder that the studio is for, and the design that it opens with, if one was named."""
 
     folder: Path
@@ -29,28 +29,28 @@ class Opening(NamedTuple):
     template: str | None = None
 
 
-def opened(source: str | None) -> Opening:
+def opened(source: str | None) -> StudioStart:
     """Return what the studio shall open.
 
     ``source`` is a file, a folder, a template's name, a link that holds a design, or None for the
     folder one stands in. Raises DesignError.
     """
     if source is None:
-        return Opening(Path.cwd())
+        return StudioStart(Path.cwd())
     if source.startswith(("http://", "https://")):
-        return Opening(Path.cwd(), text=design_in(source))
+        return StudioStart(Path.cwd(), text=design_in(source))
     if source in api.templates():
-        return Opening(Path.cwd(), template=source)
+        return StudioStart(Path.cwd(), template=source)
     path = Path(source)
     if path.is_dir():
-        return Opening(path.resolve())
+        return StudioStart(path.resolve())
     if not path.is_file():
         raise DesignError(
             f"{source} is no design file, folder, template or link; the templates are "
             f"{', '.join(api.templates())}"
         )
     folder = path.resolve().parent
-    return Opening(folder, places.design_file(folder, path.name).name)
+    return StudioStart(folder, places.design_file(folder, path.name).name)
 
 
 def listening(port: int | None) -> socket.socket:
