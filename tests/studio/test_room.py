@@ -27,8 +27,15 @@ from tests.studio.browsing import served
 PARALLEL = 200
 SMALL = edited(api.template("1dof-5mm"), [("stack.balloons", "1"), ("rules.yield_builds", "100")])
 SLOW = edited(
-    api.template("1dof-5mm"), [("stack.balloons", "2"), ("rules.yield_builds", "1000000")]
+    api.template("3dof-15mm"),
+    [
+        ("chamber.count", "8"),
+        ("chamber.axis_radius", "9"),
+        ("stack.balloons", "60"),
+        ("rules.yield_builds", "1000000"),
+    ],
 )
+"""Half a minute of work."""
 PATIENCE = 120.0
 """Seconds: other work may share the machine."""
 
