@@ -14,7 +14,7 @@ from pathlib import Path
 from statistics import median
 
 from benchmarks.__main__ import python_of
-from benchmarks.sections import Asked, sections
+from benchmarks.sections import MODULES, RIVALS, Asked, importable, sections
 from benchmarks.timing import ROOT, Row, Section, keep_to_one_core
 from benchmarks.versions import Compared, compared
 from docs.scripts.measured import Record, Table, keep, record, versions
@@ -34,6 +34,8 @@ GROWN = ("balloons", "chambers", "edges", "copies")
 """Sections whose growth is told, in one table."""
 RATES = ("decks", "compiled", "processes", "poses")
 """Tables that tell rates: each has what another program took in the same run."""
+ONCE = ("memory",)
+"""Tables of one long run."""
 TABLES = (
     "plates",
     "decks",
@@ -72,7 +74,7 @@ def told(section: Section, beside: Row | None = None) -> Table:
     ``beside``: another program's work in the same run, by which a reader's machine can be compared.
     """
     each = 1000 if section.unit == "ms" else 1
-    if all(len(row.times) == 1 for row in section.rows):
+    if section.key in ONCE:
         once = [[row.name, f"{each * row.times[0]:.3g}", row.remark] for row in section.rows]
         return Table(["", f"{section.timed}, {section.unit}", ""], once)
     rows = [
@@ -114,6 +116,9 @@ def main() -> None:
     keep_to_one_core()
     prepare()
     rivals = python_of(ROOT / ".benchmarks" / "venv")
+    lacks = [RIVALS[name] for name, module in MODULES.items() if not importable(rivals, module)]
+    if lacks:
+        parser.error(f"{rivals} lacks {', '.join(lacks)}: run python -m benchmarks --install first")
     used = {"Python": platform.python_version(), **versions(numpy="numpy", MuJoCo="mujoco")}
     day, again = date.today().isoformat(), arguments.tables
     tables: dict[str, Table] = {}
