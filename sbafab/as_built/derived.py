@@ -34,7 +34,7 @@ from sbafab.output.earlier import PRESS
 from sbafab.output.manifest import as_json
 from sbafab.output.manifest_records import JobManifest, Manifest
 from sbafab.output.planned import EVERYTHING, Checked, Planned, RunPart, plan, schedule_of
-from sbafab.output.settings import GENERATOR
+from sbafab.output.settings import GENERATOR, hole_notes
 from sbafab.output.shop import find_nests, write_nested_sheets, write_panel
 from sbafab.pressing.together import design_runs
 from sbafab.progress import unheard
@@ -120,7 +120,8 @@ def _write_anew(
     if parts is not None:
         nests = find_nests(parts, design, folder, unheard)
         sheets = write_nested_sheets(nests, design, fresh, settings, unheard)
-    write_fixture(laminate, fresh, settings, design_runs(design, laminate).places)
+    places = design_runs(design, laminate).places
+    write_fixture(laminate, fresh, settings, places, hole_notes(design, laminate))
     write_panel(laminate, paths, fresh, settings)
     pressing = schedule_of(checked) if "press" in wanted else None
     planned = Planned(checked, frozenset(wanted), settings, pressing)

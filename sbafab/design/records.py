@@ -18,6 +18,7 @@ from sbafab.design.films import UNCALIBRATED, Films, KerfWidth, LayerFilms, Shee
 from sbafab.design.form import Form, Free
 from sbafab.design.section import Section
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres
+from sbafab.laminate.base_plate import PlateMachine, lone_pin_error, pin_error
 from sbafab.notebook import table_html
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
@@ -125,8 +126,13 @@ class Registration(Section):
     """Lengths of pins that you have, in place of the standard's."""
     cutting_error: Annotated[float, Millimetres(0, 1)] = 0.1
     """The most by which a cut edge lies off its place (paper Sec. 2)."""
-    pin_error: Annotated[float, Millimetres(0, 1)] = 0.004
-    """The most by which a layer on its pins lies off its place (paper Sec. 2)."""
+    plate_made_by: PlateMachine = "jig-borer"
+    """What makes the holes of the base plate: "jig-borer" (places to 0.003, each hole lapped to its
+    pin), "cnc-mill" (0.025, reamed H7) or "drill-press" (marked out by hand, 0.2, reamed H7)."""
+    pin_error: Annotated[float, Millimetres(0, 1)] | None = None
+    """The most by which a layer on its pins lies off its place; by default what plate_made_by
+    gives: a jig borer the paper's 0.004 (Sec. 2), a CNC mill 0.029, a drill press 0.204. The place
+    of a plate's only pin does not count: there each gives 0.004."""
     hand_placement: Annotated[float, Millimetres(0, 5)] = 0.08
     """The most by which what no pin holds lies off what it is laid on. The paper gives none: this,
     with hand_turn, is calibrated so that the designs it built keep their limits as often as it
@@ -181,6 +187,8 @@ class Press(Section):
     """What TPE does not stick to, one sheet below and one above (the paper names none)."""
     release_thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.05
     """Thickness of one release film; PTFE film is sold in this thickness."""
+    underlay_thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.1
+    """Thickness of the printed underlay, where one lies on the plate; plain paper of 80 g/m2."""
     pad_material: Literal["silicone sponge", "silicone rubber"] = "silicone sponge"
     """Press pad: the compliant sheet, as large as the platen, that spreads the force (ours)."""
     pad_thickness: Length | None = None
@@ -327,6 +335,27 @@ class Design(Section):
     def drawing(self) -> Path | None:
         """The file of the pockets' drawn outline, if there is one."""
         return None if self.chamber.outline is None else self.folder / self.chamber.outline
+
+    @property
+    def thickest_pin(self) -> float:
+        """Diameter of the thickest dowel pin that the design may need, mm."""
+        return max(self.bore.pin, self.registration.pin_diameter)
+
+    @property
+    def pin_error(self) -> float:
+        """The most by which a layer on several pins lies off its place, mm."""
+        own = self.registration
+        if own.pin_error is not None:
+            return own.pin_error
+        return pin_error(self.thickest_pin, own.plate_made_by)
+
+    @property
+    def lone_pin_error(self) -> float:
+        """The same where the plate has one pin, whose own place does not count, mm."""
+        own = self.registration
+        if own.pin_error is not None:
+            return own.pin_error
+        return lone_pin_error(self.thickest_pin, own.plate_made_by)
 
     @property
     def strip_width(self) -> float:

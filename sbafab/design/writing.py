@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from sbafab.design.films import UNCALIBRATED, LayerFilms
-from sbafab.design.records import Design, Inlet
+from sbafab.design.records import Design, Inlet, Press, Registration
 
 FITS = "fits"
 
@@ -80,6 +80,13 @@ def _as_first_hashed(table: dict[str, Any], design: Design) -> dict[str, Any]:
         table["layup"] = None
     if design.inlet.adhesive == Inlet().adhesive:
         table["inlet"]["adhesive"] = None
+    table["registration"]["pin_error"] = design.pin_error
+    for name, key, usual in (
+        ("registration", "plate_made_by", Registration().plate_made_by),
+        ("press", "underlay_thickness", Press().underlay_thickness),
+    ):
+        if table[name][key] == usual:
+            table[name][key] = None
     return _without_none(table)
 
 

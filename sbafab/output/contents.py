@@ -60,7 +60,9 @@ def write_contents(
         write_text(folder / "press.json", as_json(_press(checked, planned.pressing)))
         write_text(folder / "press.csv", press_csv(planned.pressing))
         places = design_runs(checked.design, checked.laminate).places
-        underlay = underlay_pdf(checked.laminate, design_sha256(checked.design), places)
+        press = checked.design.press
+        platen = press.platen_width, press.platen_length
+        underlay = underlay_pdf(checked.laminate, design_sha256(checked.design), places, platen)
         if underlay is not None:
             (folder / UNDERLAY).write_bytes(underlay)
     if "mesh" in wanted:

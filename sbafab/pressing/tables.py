@@ -89,5 +89,5 @@ def pin_words(pin: PinSetting) -> str:
     """One pin as the table and the page name it."""
     return (
         f"{pin.pin}: {pin.diameter_mm:g} x {pin.length_mm:g} mm, {pin.seat_mm:g} in the plate, "
-        f"stands {pin.stands_mm:g}"
+        f"stands {pin.stands_mm:g} +- {pin.tolerance_mm:g}"
     )

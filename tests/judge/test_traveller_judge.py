@@ -65,7 +65,7 @@ FAULTS = {
     ),
     "less to cut": (r"(\d\.\d+) m of cut", r"9\1 m of cut", "the laser cuts"),
     "a hole elsewhere": (
-        r'(chamber1</th><td class="number">1</td><td class="number">)(\d)',
+        r'(chamber1</th>(?:<td class="number">[^<]*</td>){3}<td class="number">)(\d)',
         r"\g<1>9\2",
         "no hole is there",
     ),
@@ -81,8 +81,22 @@ FAULTS = {
     "a cap laid along another edge": ("0.5 mm inside that", "0.5 mm outside that", "outside layer"),
     "a shorter press": (">3 min<", ">2 min<", "step 1 shows"),
     "another height": (r"\(about 0.063 mm\)", "(about 0.093 mm)", "0.063 mm high"),
-    "a pin driven too deep": ("2.69 mm in the plate", "2.96 mm in the plate", "divides its length"),
-    "a pin that stands too high": ("0.20 mm over the stack", "0.02 mm over the stack", "mm high"),
+    "a pin too deep": (
+        r"(\d)\.\d\d mm in the plate",
+        r"\1.96 mm in the plate",
+        "divides its length",
+    ),
+    "a pin that stands too high": (
+        r"0\.\d(\d) mm or more over",
+        r"0.9\1 mm or more over",
+        "mm high",
+    ),
+    "a pin truer than any sold": (
+        r"0\.35 to 0\.95 mm over it",
+        "0.60 to 0.70 mm over it",
+        "wants truer pins",
+    ),
+    "paper that the pins leave out": ("Tape a fresh print", "Tape a print", "mm high"),
     "a turn more": ("3 times in this order", "4 times in this order", "turns, and layers"),
     "less film": (r"(\d+\.\d) cm² of parts", r"9\1 cm² of parts", "parts are"),
     "a thicker laminate": (f"{FLAT}0", "<dt>Thickness, flat (nominal films)</dt><dd>1", "mm thick"),

@@ -91,6 +91,32 @@ def test_a_plate_without_a_hole_of_one_place_fails(doctor: Doctor) -> None:
     assert doctored(doctor, file, put) == {"manifest-claims", "as-designed"}
 
 
+def test_a_plate_with_other_notes_of_its_holes_fails(doctor: Doctor) -> None:
+    """A shop that bores to another depth, or to none, has pins that stand off their height."""
+    from sbafab.cutting.dxf_read import read_profile
+    from sbafab.cutting.dxf_write import dxf_text
+    from sbafab.cutting.order import cutting_order
+
+    file = doctor.manifest["fixture"]
+    path = doctor.folder / file
+    found = read_profile(path)
+    notes = [[edges[0].start, *(edge.end for edge in edges)] for _, edges in found.strokes[2:]]
+    assert notes
+    deeper = {**found.properties, "HOLES": found.properties["HOLES"].replace("2.", "4.")}
+    for properties, strokes, is_right in (
+        (found.properties, notes, True),
+        (deeper, notes, False),
+        (found.properties, notes[:-1], False),
+        (found.properties, (), False),
+    ):
+        text = dxf_text(cutting_order(found.region), properties, notes=strokes)
+
+        def put(text: str = text) -> None:
+            path.write_text(text, newline="\n")
+
+        assert doctored(doctor, file, put) == (set() if is_right else {"as-designed"})
+
+
 def test_places_that_are_too_near_fail_though_the_plate_agrees(doctor: Doctor) -> None:
     from sbafab.actuators import build
     from sbafab.cutting.dxf_read import read_profile

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from sbafab.laminate.assembly import AssemblyStep, distinct_layers, laying_pins
+from sbafab.laminate.assembly import AssemblyStep, distinct_layers
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.schedule import Step
@@ -16,6 +16,7 @@ from sbafab.reports.underlay import guides
 from sbafab.rules.pin_fit import NAME as PIN_FIT
 from sbafab.rules.pin_fit import most_on_a_pin
 
+TAPE = "polyimide tape (silicone adhesive, rated 260 °C)"
 WARM = 5.0
 """C by which a plate may be colder than the platens when the timer starts."""
 
@@ -91,7 +92,10 @@ def _loose(laminate: Laminate) -> int:
 
 
 def underlay(work: Work, part: AssemblyStep) -> list[Action]:
-    """The printed page below the release film, in steps in which it has a line to lay by."""
+    """The printed page below the release film, in steps in which it has a line to lay by.
+
+    One print lies in one hot cycle: paper dries and shrinks, and a worn line is no line.
+    """
     patterns = [
         pattern
         for guide in guides(work.laminate)
@@ -100,27 +104,14 @@ def underlay(work: Work, part: AssemblyStep) -> list[Action]:
     ]
     if work.job.underlay is None or not patterns:
         return []
-    film, eye = ("a release film over it", ": lay by eye along them, as each line says")
+    film, over = "a see-through release film", "flush with the plate's edges"
+    eye = ": lay by eye along them, as each line says"
     if part.pins:
-        film, eye = "a release film over it, the pins pricked through both", ""
+        film, over, eye = f"{film}, pricked likewise", "pricked at its grey rings over the pins", ""
     return [
         Action(
-            f"Tape {work.job.underlay}, printed at 100 % and its bars measured, to the plate, "
-            f"{film}. It has the edges of {listed(patterns)}{eye}."
-        )
-    ]
-
-
-def on_the_lumen(laminate: Laminate, part: AssemblyStep) -> list[Action]:
-    """A pin that a step without pins may be laid up on; empty where none passes all its films."""
-    pins = laying_pins(laminate, part)
-    if not pins:
-        return []
-    names = listed([f"{pin.name} (⌀{say.millimetres(pin.diameter)})" for pin in pins])
-    return [
-        Action(
-            f"Better than by eye alone: the pin of the {names} passes every film here. Lay up on "
-            "it, so that only the turn is yours, and push it out before the press closes."
+            f"Tape a fresh print of {work.job.underlay} to the plate, {over}, cut corner at the "
+            f"back right; over it {film}. It has the edges of {listed(patterns)}{eye}."
         )
     ]
 

@@ -47,6 +47,7 @@ def chapter(work: Work) -> dict[str, Any]:
         "panel_pictures": _pictures(work.laminate, panel),
         "panel_actions": _preparing(work, panel),
         "step_pages": _step_pages(work, panel),
+        "taking_down": None,
         "finishing": _cut_free(panel),
         "tubing": [*_each(panel, "Fit the tubes"), *process.tubing(work)],
         "leak_test": [*_each(panel, "Test"), *process.leak_test(work)],
@@ -167,8 +168,8 @@ def _pressing(laminate: Laminate, page: StepPage, last: bool) -> list[Action]:
         lay = f"Lay the sheet of layer {films[0][0].index}, the cap, on the pins over the stack."
     start = [
         Action(
-            "Lay the base plate down, cold, cut corner at the back right. Drive in the corner pins "
-            "to their heights (above) and prick a release film over them."
+            f"Lay the base plate down, cold, cut corner at the back right. {process.SET_PINS} "
+            "Prick a release film over them."
         )
     ]
     end = [
@@ -177,8 +178,12 @@ def _pressing(laminate: Laminate, page: StepPage, last: bool) -> list[Action]:
     if last:
         start = []
         end = [
-            Action("Pins out, pushed from below through the plate, once the stack is cold."),
-            Action("Take off the release films. You now hold all sheets as one stack."),
+            Action(
+                "Once the stack is cold: pad off, upper release film back on itself. Pins out: "
+                "push them up from below through their push-out holes until their seats are free, "
+                "the stack held down round them, and draw them with pliers."
+            ),
+            Action("Take off the lower release film. You now hold all sheets as one stack."),
         ]
     return [
         Action(
