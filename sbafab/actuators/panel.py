@@ -209,7 +209,7 @@ def _places(window: Region, design: Design) -> tuple[tuple[Point, ...], int]:
             f"{room[0]:g} x {room[1]:g}; take larger film (sheets), a larger platen or a smaller "
             "panel.margin"
         )
-    copies = design.order.copies
+    copies = design.order.quantity
     batches = math.ceil(copies / (fit[0] * fit[1]))
     each = math.ceil(copies / batches)
     columns = min(fit[0], each)

@@ -160,7 +160,7 @@ def design_problems(claims: Manifest, design: Design, digest: str) -> list[Probl
         ("family", claims.family, design.family),
         ("registration.method", claims.registration.method, design.registration.method),
         ("balloons", balloons, design.stack.balloons),
-        ("copies", claims.copies, design.order.copies),
+        ("copies", claims.copies, design.order.quantity),
     )
     problems = [
         claim(f"{what} is {said} in the manifest and {stated} by design.toml")

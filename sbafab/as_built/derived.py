@@ -55,7 +55,7 @@ def derived_problems(
     """
     with _made_anew(folder) as (fresh, problems):
         order = checked.design.order
-        parts = parts_of(checked.laminate, paths, order.copies, order.spares)
+        parts = parts_of(checked.laminate, paths, order.quantity, order.spare_parts)
         index = _write_anew(folder, fresh, claims, checked, paths, None if of_job else parts)
         problems.extend(_differences(folder, fresh, claims.files, claims.generator))
         problems.extend(_index_problems(folder, index, of_job))

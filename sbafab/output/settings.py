@@ -109,6 +109,7 @@ def press_settings(design: Design) -> PressSettings:
         pin_lengths=design.registration.pin_lengths,
         plate_made_by=design.registration.plate_made_by,
         tack=design.panel.tack_minutes,
+        carrier_limit=design.panel.carrier_limit_c,
     )
 
 

@@ -45,6 +45,7 @@ def press_json(plan: Schedule) -> dict[str, Any]:
         "estimated_build_minutes": plan.estimated_build_minutes,
         "estimate_basis": plan.estimate_basis,
         "warnings": list(plan.warnings),
+        "tacking": None if plan.tacking is None else _plain(asdict(plan.tacking)),
     }
 
 

@@ -24,7 +24,12 @@ Change = Callable[[Region, Laminate], Region]
 
 def good(*changes: str) -> Laminate:
     return built(
-        "1dof-5mm", 'registration.method="sheet"', "stack.balloons=2", "order.copies=2", *changes
+        "1dof-5mm",
+        'registration.method="sheet"',
+        "registration.experimental=true",
+        "stack.balloons=2",
+        "order.copies=2",
+        *changes,
     )
 
 
