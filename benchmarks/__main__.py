@@ -10,6 +10,7 @@ import argparse
 import subprocess
 import sys
 from pathlib import Path
+from statistics import median
 
 from benchmarks.sections import RIVALS, Asked, sections
 from benchmarks.timing import ROOT, Row, Section, keep_to_one_core
@@ -57,7 +58,7 @@ def python_of(folder: Path) -> Path:
 def beside(found: list[Compared]) -> Section:
     """This version's times, and what the earlier one took."""
     rows = [
-        Row(one.name, one.now, f"{min(one.before):.3f} before, {one.ratio:.1f} times as long")
+        Row(one.name, one.now, f"{median(one.before):.3f} before, {one.ratio:.1f} times as long")
         for one in found
     ]
     return Section("versions", "This version beside an earlier one", rows)

@@ -7,6 +7,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from pathlib import Path
+from statistics import median
 from typing import NamedTuple
 
 from benchmarks import (
@@ -34,7 +35,7 @@ from benchmarks.versions import compared
 RIVALS = {"foldable": "foldable-robotics==0.0.37", "build123d": "build123d"}
 MODULES = {"foldable": "foldable_robotics", "build123d": "build123d"}
 BATCH = 12
-"""Designs of which a rate is told: that of the quickest so many in a row."""
+"""Designs a round."""
 HEAVY = ("ezdxf", "manifold3d", "numpy", "pydantic", "rich", "shapely", "trimesh")
 
 
@@ -92,9 +93,15 @@ def plates(rivals: Path, rounds: int) -> Section:
                 notes.append(f"{name}: does not count, {wrong}")
                 continue
             arcs = "true arcs" if checking.has_true_arcs(root / name) else "chords"
-            ratio = min(times[name]) / min(times["sbafab"])
+            ratio = median(times[name]) / median(times["sbafab"])
             rows.append(Row(name, times[name], f"{arcs}, {ratio:.1f} times sbafab's"))
     return Section("plates", "40 lobed plates, a DXF each", rows, notes)
+
+
+def rate(times: Sequence[float], what: str) -> str:
+    """Return how many a second the median of the times is, in words."""
+    each = 1 / median(times)
+    return f"{each:.1f} {what} a second" if each < 100 else f"{each:,.0f} {what} a second"
 
 
 def importable(python: Path, module: str) -> bool:
@@ -110,12 +117,10 @@ def rule_decks(rounds: int) -> Section:
     for template in decks.VARIED:
         decks.checked(template, -1)
         taken = [decks.checked(template, turn) for turn in range(BATCH * rounds)]
-        best = min(sum(taken[first : first + BATCH]) for first in range(0, len(taken), BATCH))
-        rows.append(Row(template, taken, f"{BATCH / best:.1f} designs a second"))
+        rows.append(Row(template, taken, rate(taken, "designs")))
     for template in ("1dof-5mm", "3dof-15mm"):
-        taken = [decks.other_height(template, turn) for turn in range(BATCH)]
-        told = f"{len(taken) / sum(taken):.1f} designs a second"
-        rows.append(Row(f"{template}, other heights", taken, told))
+        taken = [decks.other_height(template, turn) for turn in range(BATCH * rounds)]
+        rows.append(Row(f"{template}, other heights", taken, rate(taken, "designs")))
     return Section("decks", "A design built, and all rules", rows)
 
 
@@ -130,11 +135,11 @@ def compiled_beside_plain(rounds: int) -> Section:
         decks = {name: _decks_by_turns(folder, name, 8 * rounds) for name in compiled.DECKS}
     rows = []
     for one in found:
-        plain, least = min(one.before), min(one.now)
-        told = f"{plain:.4f} plain, {1 - least / plain:.0%} less"
+        plain = median(one.before)
+        told = f"{plain:.4f} plain, {1 - median(one.now) / plain:.0%} less"
         rows.append(Row(one.name, one.now, told))
     for name, (before, now) in decks.items():
-        told = f"{1 / min(now):.0f} designs a second, {1 / min(before):.0f} plain"
+        told = f"{rate(now, 'designs')}, {1 / median(before):.0f} plain"
         rows.append(Row(f"{name}, built and all rules", now, told))
     return Section(key, title, rows)
 
@@ -157,7 +162,7 @@ def side_by_side(rounds: int) -> Section:
             rates = [processes.rate(template, count, 40) for _ in range(rounds)]
             name = f"{template}, {count} process{'es' if count > 1 else ''}"
             each = [1 / rate for rate in rates]
-            rows.append(Row(name, each, f"{max(rates):.1f} designs a second"))
+            rows.append(Row(name, each, rate(each, "designs")))
     return Section("processes", "Designs built and checked, all different", rows, timed="clock")
 
 
@@ -223,8 +228,7 @@ def poses(rounds: int) -> Section:
     for load in equilibria.LOADS:
         for kind, is_dragged in (("along a path", True), ("at random", False)):
             taken = [equilibria.pose_seconds(load, is_dragged) for _ in range(rounds)]
-            told = f"{1 / min(taken):,.0f} equilibria a second"
-            rows.append(Row(f"{load}, {kind}", taken, told))
+            rows.append(Row(f"{load}, {kind}", taken, rate(taken, "equilibria")))
     rivals = {
         "SOFA, shells": simulators.sofa,
         "MuJoCo, flexes in rings of 8": lambda: simulators.mujoco(8),

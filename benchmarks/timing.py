@@ -83,11 +83,15 @@ def sizes_by_turns(
 
 
 def exponent(times: Mapping[int, Sequence[float]], least: int = 1) -> float:
-    """The power of the size with which the least time grows, by least squares of logarithms.
+    """The power of the size with which the median time grows, by least squares of logarithms.
 
     Sizes below the ``least`` are left out: what is done once counts most there.
     """
-    points = [(math.log(n), math.log(min(taken))) for n, taken in times.items() if n >= least]
+    points = [
+        (math.log(n), math.log(statistics.median(taken)))
+        for n, taken in times.items()
+        if n >= least
+    ]
     x, y = (sum(values) / len(points) for values in zip(*points, strict=True))
     return sum((a - x) * (b - y) for a, b in points) / sum((a - x) ** 2 for a, _ in points)
 
@@ -98,6 +102,10 @@ class Row(NamedTuple):
     name: str
     times: Sequence[float]
     remark: str = ""
+
+    @property
+    def median(self) -> float:
+        return statistics.median(self.times)
 
 
 class Section(NamedTuple):
@@ -117,6 +125,6 @@ class Section(NamedTuple):
         each = {"s": 1, "ms": 1000}[self.unit]
         lines = [self.title, f"  {f'{self.timed}, {self.unit}':<44}{'least':>9}{'median':>9}"]
         for row in self.rows:
-            least, median = each * min(row.times), each * statistics.median(row.times)
+            least, median = each * min(row.times), each * row.median
             lines.append(f"  {row.name:<44}{least:9.3f}{median:9.3f}  {row.remark}".rstrip())
         return "\n".join([*lines, *(f"  {note}" for note in self.notes)])

@@ -5,6 +5,7 @@ Only what 0.1.0 could do as well is compared: whole commands, and a function of 
 
 from __future__ import annotations
 
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -44,7 +45,7 @@ class Compared(NamedTuple):
 
     @property
     def ratio(self) -> float:
-        return min(self.before) / min(self.now)
+        return statistics.median(self.before) / statistics.median(self.now)
 
 
 def compared(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 
-from sbafab.errors import BY_SIGNAL, STOPPED
+from sbafab.errors import BY_SIGNAL
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -37,6 +37,6 @@ def main() -> None:
 def stop_at_once(number: int, frame: FrameType | None) -> None:
     """Says so and ends the process, without a way back."""
     try:
-        os.write(2, f"sbafab: {STOPPED}\n".encode())
+        os.write(2, b"sbafab: stopped\n")
     finally:
         os._exit(BY_SIGNAL + number)

@@ -9,6 +9,14 @@ ERROR_SCHEMA = "sbafab/error@1"
 STOPPED = "stopped; the output folder is whole, as it was before or as the run made it"
 
 
+class Stopped(KeyboardInterrupt):
+    """An interrupt with a sentence of its own about what it has ended; then the signal's number."""
+
+    def __init__(self, sentence: str, *number: object) -> None:
+        super().__init__(*number)
+        self.sentence = sentence
+
+
 class SbafabError(Exception):
     """Base of every error whose message is meant for the user."""
 

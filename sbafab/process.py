@@ -21,3 +21,11 @@ def prepare() -> None:
     gc.set_threshold(YOUNG, *gc.get_threshold()[1:])
     # What is left when the process ends goes with it: looking for rings takes 0.05 s and more.
     atexit.register(gc.freeze)
+
+
+def processors() -> int:
+    """Return how many processors this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:
+        return os.cpu_count() or 1

@@ -1,7 +1,7 @@
 """Measures what docs/benchmarks.md shows and writes its tables.
 
 ``python -m docs.scripts.benchmark_runs --before FOLDER`` wants a checkout of the version to compare
-with, and a machine that does nothing else; it takes a quarter of an hour.
+with, and a machine that does nothing else; it takes half an hour.
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ import platform
 from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
+from statistics import median
 
 from benchmarks.__main__ import python_of
-from benchmarks.sections import Asked, sections
-from benchmarks.timing import ROOT, Section, keep_to_one_core
+from benchmarks.sections import MODULES, RIVALS, Asked, importable, sections
+from benchmarks.timing import ROOT, Row, Section, keep_to_one_core
 from benchmarks.versions import Compared, compared
 from docs.scripts.measured import Record, Table, keep, record, versions
 from sbafab.process import prepare
@@ -31,6 +32,10 @@ AIMS = {
 """Seconds that were aimed at."""
 GROWN = ("balloons", "chambers", "edges", "copies")
 """Sections whose growth is told, in one table."""
+RATES = ("decks", "compiled", "processes", "poses")
+"""Tables that tell rates: each has what another program took in the same run."""
+ONCE = ("memory",)
+"""Tables of one long run."""
 TABLES = (
     "plates",
     "decks",
@@ -44,12 +49,12 @@ TABLES = (
 )
 
 
-def beside(found: Sequence[Compared]) -> Table:
+def versions_table(found: Sequence[Compared]) -> Table:
     rows = [
-        [one.name, f"{min(one.before):.3f}", f"{min(one.now):.3f}", AIMS.get(one.name, "")]
+        [one.name, f"{median(one.before):.3f}", f"{median(one.now):.3f}", AIMS.get(one.name, "")]
         for one in found
     ]
-    return Table(["least processor time, s", "0.1.0", "now", "aim"], rows)
+    return Table(["median processor time, s", "0.1.0", "now", "aim"], rows)
 
 
 def growth(found: Sequence[Section]) -> Table:
@@ -57,23 +62,48 @@ def growth(found: Sequence[Section]) -> Table:
     for one in found:
         if one.power is not None:
             sizes = [row.name.split()[0] for row in one.rows]
-            least, most = f"{min(one.rows[0].times):.2f}", f"{min(one.rows[-1].times):.2f}"
-            rows.append([one.title, f"{sizes[0]} to {sizes[-1]} {one.key}", f"{least} to {most}"])
+            times = f"{one.rows[0].median:.2f} to {one.rows[-1].median:.2f}"
+            rows.append([one.title, f"{sizes[0]} to {sizes[-1]} {one.key}", times])
             rows[-1].append(f"{one.power:.2f}")
-    return Table(["work", "number of", "s", "grows to the power of"], rows)
+    return Table(["work", "number of", "median processor time, s", "grows to the power of"], rows)
 
 
-def told(section: Section) -> Table:
-    """Each row with its least time and remark."""
+def told(section: Section, beside: Row | None = None) -> Table:
+    """Return each row's median time, the least of how many, and what is said of it.
+
+    ``beside``: another program's work in the same run, by which a reader's machine can be compared.
+    """
     each = 1000 if section.unit == "ms" else 1
-    rows = [[row.name, f"{each * min(row.times):.3g}", row.remark] for row in section.rows]
-    return Table(["", f"{section.timed}, {section.unit}", ""], rows)
+    if section.key in ONCE:
+        once = [[row.name, f"{each * row.times[0]:.3g}", row.remark] for row in section.rows]
+        return Table(["", f"{section.timed}, {section.unit}", ""], once)
+    rows = [
+        [
+            row.name,
+            f"{each * row.median:.3g}",
+            f"{each * min(row.times):.3g}",
+            str(len(row.times)),
+            row.remark,
+        ]
+        for row in (*section.rows, *([beside] if beside else []))
+    ]
+    return Table(["", f"median {section.timed}, {section.unit}", "least", "of", ""], rows)
+
+
+def other_program(found: Sequence[Section]) -> Row | None:
+    """Return the quicker of the other programs at its plates, if it was measured."""
+    plates = (row for one in found if one.key == "plates" for row in one.rows)
+    others = [row for row in plates if row.name != "sbafab"]
+    if not others:
+        return None
+    name, times, _ = min(others, key=lambda row: row.median)
+    return Row(f"{name} in the same run", times, "40 lobed plates, a DXF each")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m docs.scripts.benchmark_runs")
     parser.add_argument("--before", type=Path, required=True)
-    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--designs", type=int, default=10_000)
     parser.add_argument(
         "--tables",
@@ -86,6 +116,9 @@ def main() -> None:
     keep_to_one_core()
     prepare()
     rivals = python_of(ROOT / ".benchmarks" / "venv")
+    lacks = [RIVALS[name] for name, module in MODULES.items() if not importable(rivals, module)]
+    if lacks:
+        parser.error(f"{rivals} lacks {', '.join(lacks)}: run python -m benchmarks --install first")
     used = {"Python": platform.python_version(), **versions(numpy="numpy", MuJoCo="mujoco")}
     day, again = date.today().isoformat(), arguments.tables
     tables: dict[str, Table] = {}
@@ -96,12 +129,20 @@ def main() -> None:
         tables = dict(kept.tables)
     if again != ["versions"]:
         only = [key for one in again for key in (GROWN if one == "growth" else [one])]
+        if not {*only}.isdisjoint(RATES):
+            # Rates stand beside what another program took in the same run.
+            only.append("plates")
         made = list(sections(Asked(arguments.rounds, arguments.designs, rivals), only))
-        tables |= {one.key: told(one) for one in made if one.power is None}
+        other = other_program(made)
+        tables |= {
+            one.key: told(one, other if one.key in RATES else None)
+            for one in made
+            if one.power is None
+        }
         if any(one.power is not None for one in made):
             tables["growth"] = growth(made)
     if not again or "versions" in again:
-        tables["versions"] = beside(compared(arguments.before.resolve(), arguments.rounds))
+        tables["versions"] = versions_table(compared(arguments.before.resolve(), arguments.rounds))
     keep("benchmarks", Record(COMMAND, day, used, tables))
 
 

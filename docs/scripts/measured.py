@@ -1,8 +1,8 @@
 """Figures that were measured once: docs/measured/NAME.json holds them, the pages show them.
 
 A page names a table between ``<!-- measured: NAME TABLE -->`` and ``<!-- end -->``, and ``how`` in
-place of a table says when and with what it was measured. ``python -m docs.scripts.measured`` writes
-all of them anew; scripts that measure do so themselves. A test holds pages and records together.
+place of a table says when and with what it was measured; what ``rates`` words of a record stands in
+a page likewise. ``python -m docs.scripts.measured`` writes all of them anew; scripts that measure do so themselves. A test holds pages and records together.
 """
 
 from __future__ import annotations
@@ -14,7 +14,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from docs.scripts.rates import WORDS
+
 DOCS = Path(__file__).parents[1]
+README = DOCS.parent / "README.md"
 FOLDER = DOCS / "measured"
 BLOCK = re.compile(r"(<!-- measured: (\w+) ([\w-]+) -->\n).*?(\n<!-- end -->)", re.DOTALL)
 SPLIT = re.compile(r",\s*\n\s*")
@@ -76,7 +79,7 @@ def keep(name: str, measured: Record) -> None:
 
 def pages() -> Iterator[Path]:
     """The pages that show a record."""
-    for page in sorted(DOCS.glob("*.md")):
+    for page in (README, *sorted(DOCS.glob("*.md"))):
         if BLOCK.search(page.read_text(encoding="utf-8")):
             yield page
 
@@ -88,8 +91,14 @@ def filled(text: str) -> str:
 
 def _said(name: str, table: str) -> str:
     found = record(name)
+    if table == HOW:
+        text = found.how
+    elif name == "benchmarks" and table in WORDS:
+        text = WORDS[table](found)
+    else:
+        text = found.tables[table].markdown
     # Blank lines part a table from the remarks round it, as Markdown asks.
-    return f"\n{found.how if table == HOW else found.tables[table].markdown}\n"
+    return f"\n{text}\n"
 
 
 def versions(**distributions: str) -> dict[str, str]:

@@ -17,7 +17,15 @@ from typing import NamedTuple, NoReturn
 import click
 
 from sbafab.cli.working import RULE_FAILED
-from sbafab.errors import BY_SIGNAL, ERROR_SCHEMA, STOPPED, DefectError, SbafabError, TooLargeError
+from sbafab.errors import (
+    BY_SIGNAL,
+    ERROR_SCHEMA,
+    STOPPED,
+    DefectError,
+    SbafabError,
+    Stopped,
+    TooLargeError,
+)
 
 BAD_INPUT = 2
 LATER = 0.01
@@ -69,7 +77,7 @@ def ended_plainly(as_json: bool = False) -> Iterator[None]:
                 yield
         finally:
             # An interrupt amid an import or a callback may come out as any error, or as none.
-            if asked:
+            if asked and not isinstance(sys.exception(), Stopped):
                 raise KeyboardInterrupt(asked[0])
             sys.stdout.flush()
     except click.UsageError as error:
@@ -86,7 +94,8 @@ def ended_plainly(as_json: bool = False) -> Iterator[None]:
         end(Exit("input", str(error), BAD_INPUT), as_json)
     except KeyboardInterrupt as stop:
         code = BY_SIGNAL + (stop.args[0] if stop.args else signal.SIGINT)
-        end(Exit("stopped", STOPPED, code), as_json)
+        sentence = stop.sentence if isinstance(stop, Stopped) else STOPPED
+        end(Exit("stopped", sentence, code), as_json)
     except BrokenPipeError:
         # The reader of standard output has seen enough (``| head``); the files are written.
         _silence()

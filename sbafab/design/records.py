@@ -12,10 +12,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    PrivateAttr,
+    ValidationInfo,
+    field_validator,
+)
 
 from sbafab.design.films import UNCALIBRATED, Films, KerfWidth, LayerFilms, Sheet
 from sbafab.design.form import Form, Free
+from sbafab.design.order import Order
 from sbafab.design.section import Section, writable
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
 from sbafab.laminate.base_plate import PlateMachine, lone_pin_error, pin_error
@@ -111,7 +119,10 @@ class Registration(Section):
     method: Literal["channel-pin", "ears", "sheet"] = "channel-pin"
     """"channel-pin": dowel pins in the channel bores, and in the lumen if there is one (the
     paper's). "ears": tooling holes outside the outline, pinned in every press step. "sheet": films
-    stay whole sheets on corner pins, hold all copies of a batch and are cut free last."""
+    stay whole sheets on corner pins, hold all copies of a batch and are cut free last; a proposal,
+    which registration.experimental allows."""
+    experimental: bool = Field(default=False, validate_default=True)
+    """Whether a proposal that no bench has tried may be made, as --experimental says."""
     pin_diameter: Length = 1.5
     """Dowel pins of the ears, and of the corners of registered sheets."""
     full_bond_pins: Literal["out", "in"] = "out"
@@ -145,6 +156,16 @@ class Registration(Section):
     """Degrees: the most by which what fewer than two pins hold is turned. Calibrated together with
     hand_placement."""
 
+    @field_validator("experimental")
+    @classmethod
+    def _allows_the_method(cls, experimental: bool, info: ValidationInfo) -> bool:
+        if info.data.get("method") == "sheet" and not experimental:
+            raise ValueError(
+                'does not allow registration.method = "sheet", a proposal that no bench has tried; '
+                'add --experimental, or set it to true, to have it all the same, or use "ears"'
+            )
+        return experimental
+
     @property
     def hole_diameter(self) -> float:
         """Diameter of the holes in ears and tails."""
@@ -164,8 +185,14 @@ class PanelSection(Section):
     """Sheet between two copies."""
     carrier: str = Field(default="transfer film of low tack", max_length=80)
     """What holds the masks in register until they are tacked to their film."""
+    carrier_adhesive: str = Field(default="", max_length=80)
+    """Its adhesive; none is known that was tried with PTFE in a press, so the traveller leaves a
+    blank."""
+    carrier_limit_c: float | None = Field(default=None, gt=0, le=500)
+    """C, what carrier and adhesive stand by their maker. The press must stay below; not known by
+    default, and the traveller leaves a blank."""
     tack_minutes: float = Field(default=1.0, gt=0, le=60)
-    """How long the press tacks the masks of one sheet to their film."""
+    """How long the press tacks the masks of one sheet to their film, once the plate is hot."""
     sheet_error: LengthOrZero = 0.05
     """The most by which film or mask lies off its place in its sheet: stretch, sag, transfer."""
     second_cut_error: LengthOrZero = 0.2
@@ -277,8 +304,12 @@ class Acceptance(Section):
     """What joins the tube to a syringe, regulator or gauge."""
 
 
+HoldDown = Literal["border", "carrier", "vacuum"]
+"""What holds a film under the beam."""
+
+
 class Laser(Section):
-    """The laser: what it can cut, its kerf, speeds for estimates."""
+    """The laser: what it can cut, its kerf, how film is held, speeds for estimates."""
 
     least_feature: Length = 0.2
     """The narrowest slot or web the laser cuts well."""
@@ -295,6 +326,13 @@ class Laser(Section):
     and says so."""
     kerf_ptfe: KerfWidth = UNCALIBRATED
     """Full kerf width in PTFE, measured, likewise."""
+    hold_tpe: HoldDown = "border"
+    """What holds TPE, and other films that bond, under the beam: its "border" taped to card, a
+    "carrier" sheet of low tack, or a "vacuum" bed. Ours, not tried: adhesive of a carrier that
+    stays in a bond may leak."""
+    hold_ptfe: HoldDown = "carrier"
+    """What holds PTFE, and other masks, likewise. Ours, not tried: masks are light and loose, and
+    nothing bonds to them."""
     unknown_kerf: Annotated[float, Millimetres(0, 1)] = 0.1
     """What a kerf that was not measured may take off the width of a part: ours."""
 
@@ -310,20 +348,6 @@ class Sheets(Section):
     """How long spyrrow looks, for each sheet."""
     label: bool = True
     """Whether name, material, number and design hash are engraved into the border."""
-
-
-class Order(Section):
-    """How many, for whom."""
-
-    copies: int = Field(default=1, ge=1, le=1000)
-    """How many of the actuator are cut."""
-    spares: int = Field(default=2, ge=0, le=100)
-    """Spare sets of every mask's pieces that are cut beyond what the copies take: they are small
-    and loose, and a lost one else costs a trip to the laser."""
-    made_for: str = Field(default="", max_length=120)
-    """Printed on the traveller."""
-    note: str = Field(default="", max_length=400)
-    """Printed on the traveller."""
 
 
 class Rules(Section):

@@ -149,6 +149,16 @@ def _batch() -> dict[str, Any]:
     place = {**array(number()), "minItems": 2, "maxItems": 2}
     times = ("press_minutes", "hands_minutes", "total_minutes")
     count_or_null = {**COUNT, "type": ["integer", "null"]}
+    perhaps = {"type": ["integer", "null"], "minimum": 1}
+    entry = table(
+        day=COUNT,
+        start_minutes={**number(), "description": "after the start of the shift"},
+        minutes=number(),
+        task={"enum": ["cut", "press", "finish"]},
+        cycle=perhaps,
+        step=perhaps,
+        copies={**array(COUNT), "minItems": 2, "maxItems": 2, "description": "first and last"},
+    )
     return table(
         copies=COUNT,
         at_once=COUNT,
@@ -158,6 +168,8 @@ def _batch() -> dict[str, Any]:
         **{name: number() if name == "hands_minutes" else number("null") for name in times},
         a_day_one_by_one=count_or_null,
         a_day_in_batches=count_or_null,
+        shift_minutes=number(),
+        plan={**array(entry), "description": "empty where no minutes are stated"},
         patterns=array(pattern),
     )
 

@@ -112,6 +112,7 @@ def press_settings(design: Design) -> PressSettings:
         tack=design.panel.tack_minutes,
         minutes_for=tuple(map(named_film, press.minutes_for)),
         time_constant=None if press.time_constant == NOT_MEASURED else press.time_constant,
+        carrier_limit=design.panel.carrier_limit_c,
     )
 
 

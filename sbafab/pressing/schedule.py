@@ -41,6 +41,7 @@ from sbafab.pressing.dowels import (
     pin_holes,
     plate_thickness,
     settings_by_step,
+    shortest_in,
 )
 from sbafab.pressing.heating import Heating, HeatPoint, films_without_minutes, heating
 from sbafab.pressing.words import listed, named
@@ -97,6 +98,7 @@ class PressSettings:
     """Products and thicknesses (mm) of the films that the minutes were stated for."""
     time_constant: float | None = None
     """Minutes in which the edge of the cold plate makes 63 % of its way; None: not measured."""
+    carrier_limit: float | None = None
 
     @property
     def force_n(self) -> float:
@@ -179,6 +181,7 @@ class Schedule:
     warnings: tuple[str, ...]
     heating: Heating
     hands_minutes: float
+    tacking: sheets.Tacking | None = None
 
 
 def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] = (1,)) -> Schedule:
@@ -221,18 +224,23 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
         for part, stack, own in zip(parts, under, pins, strict=True)
     )
     total = sum(step.minutes or 0.0 for step in steps) if has_minutes else None
-    tacking = press.tack * sheets.tackings(laminate)
+    tacking = None
+    if laminate.panel is not None:
+        low = tack_pins(laminate, press)
+        tacking = sheets.tacking(laminate, press.tack, press.temperature_c, plate, low)
+    hands = HANDLING_MINUTES + (0.0 if tacking is None else tacking.total_minutes)
     pressed = "no minutes stated for this film" if total is None else f"{total:g} min"
     return Schedule(
         steps,
         total,
-        None if total is None else total + tacking + HANDLING_MINUTES,
+        None if total is None else total + hands,
         f"{pressed} in the press{_tacked(tacking)} and {HANDLING_MINUTES:g} min to cut, lay "
         "up, pin and fit the tubing; the latter is assumed the same for every design (paper: "
         "1.75 h in all)",
         tuple(warnings(laminate, press, parts, steps)),
         warming,
-        tacking + HANDLING_MINUTES,
+        hands,
+        tacking,
     )
 
 
@@ -254,9 +262,19 @@ def pins_by_step(laminate: Laminate, press: PressSettings) -> list[tuple[PinSett
     )
 
 
+def tack_pins(laminate: Laminate, press: PressSettings) -> tuple[PinSetting, ...]:
+    """Return the corner pins for tacks of registered sheets: shorter ones in the same holes."""
+    top = sheets.tack_stack(laminate) + press.release_thickness
+    return tuple(
+        shortest_in(setting, top, press.pin_standard, press.pin_lengths)
+        for setting in pins_by_step(laminate, press)[0]
+    )
+
+
 def plate_holes(laminate: Laminate, press: PressSettings) -> dict[str, PinHole]:
-    """Return the base plate's hole of every pin that some step uses, by the pin's name."""
-    return pin_holes(pins_by_step(laminate, press))
+    """Return the base plate's hole of every pin that some step or tack uses, by the pin's name."""
+    tacks = [] if laminate.panel is None else [tack_pins(laminate, press)]
+    return pin_holes([*pins_by_step(laminate, press), *tacks])
 
 
 def _under(laminate: Laminate, part: AssemblyStep, press: PressSettings) -> float:
@@ -264,8 +282,13 @@ def _under(laminate: Laminate, part: AssemblyStep, press: PressSettings) -> floa
     return press.underlay_thickness if is_laid_by_hand(laminate, part) else 0.0
 
 
-def _tacked(minutes: float) -> str:
-    return f", {minutes:g} min to tack masks to their films" if minutes else ""
+def _tacked(tacking: sheets.Tacking | None) -> str:
+    if tacking is None:
+        return ""
+    return (
+        f", {tacking.total_minutes:.0f} min to tack the masks of {tacking.sheets} sheets to their "
+        f"films ({tacking.basis})"
+    )
 
 
 class _Setting(NamedTuple):

@@ -49,6 +49,7 @@ def press_json(plan: Schedule) -> dict[str, Any]:
         "warnings": list(plan.warnings),
         "heating": asdict(plan.heating),
         "hands_minutes": plan.hands_minutes,
+        "tacking": None if plan.tacking is None else _plain(asdict(plan.tacking)),
     }
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from sbafab.errors import DesignError, OutputError
+from sbafab.process import processors
 from sbafab.search.measure import SweepRow
 from sbafab.search.worker import MeasureJob, close_all, guarded, open_all
 
@@ -26,14 +26,6 @@ class Pool(NamedTuple):
 
     executor: Executor
     size: int
-
-
-def processors() -> int:
-    """How many this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:
-        return os.cpu_count() or 1
 
 
 @contextmanager

@@ -19,13 +19,15 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
+from starlette.types import Receive, Scope, Send
 
 from sbafab import api
 from sbafab.errors import SbafabError
+from sbafab.process import processors
 from sbafab.studio import places, requested
-from sbafab.studio.guard import Guard, TooLongError
+from sbafab.studio.guard import Guard, TooLongError, no_room
 from sbafab.studio.made import Made, zipped
-from sbafab.studio.workers import BusyError, Worker
+from sbafab.studio.workers import BusyError, WaitingJob, WorkerPool
 
 STATIC = Path(__file__).parent / "static"
 LIVE_SECONDS, MAKE_SECONDS = 60.0, 900.0
@@ -44,9 +46,15 @@ class Studio:
     opened: str | None = None
     text: str | None = None
     """A design from a link, in place of a file."""
-    live: Worker = field(default_factory=lambda: Worker(LIVE_SECONDS))
-    mover: Worker = field(default_factory=lambda: Worker(LIVE_SECONDS, warm=False))
-    maker: Worker = field(default_factory=lambda: Worker(MAKE_SECONDS, warm=False))
+    template: str | None = None
+    live: WorkerPool = field(default_factory=lambda: WorkerPool(LIVE_SECONDS, _processes()))
+    mover: WorkerPool = field(
+        default_factory=lambda: WorkerPool(LIVE_SECONDS, _processes(), warm=False)
+    )
+    # A run that is given up ends at its next step, where it tidies up.
+    maker: WorkerPool = field(
+        default_factory=lambda: WorkerPool(MAKE_SECONDS, _processes(), False, MAKE_SECONDS)
+    )
     made: dict[str, Made] = field(default_factory=dict)
     scratch: Path = field(default_factory=lambda: Path(tempfile.mkdtemp(prefix="sbafab-studio-")))
 
@@ -56,9 +64,14 @@ class Studio:
         try:
             yield
         finally:
-            for worker in (self.live, self.mover, self.maker):
-                worker.stop()
+            for pool in (self.live, self.mover, self.maker):
+                pool.stop()
             shutil.rmtree(self.scratch, ignore_errors=True)
+
+
+def _processes() -> int:
+    """Processes of a pool; two at least, so that a slow design of one tab never holds another."""
+    return max(2, processors())
 
 
 def app(studio: Studio) -> Starlette:
@@ -97,7 +110,7 @@ async def _refused(_: Request, error: Exception) -> Response:
 
 
 async def _busy(_: Request, __: Exception) -> Response:
-    return JSONResponse({"kind": "error", "message": "too many tabs ask at once; close some"}, 429)
+    return no_room()
 
 
 async def _too_long(_: Request, __: Exception) -> Response:
@@ -106,7 +119,9 @@ async def _too_long(_: Request, __: Exception) -> Response:
 
 async def start(request: Request) -> Response:
     studio = _studio(request)
-    return JSONResponse(requested.started(studio.folder, studio.opened, studio.text))
+    return JSONResponse(
+        requested.started(studio.folder, studio.opened, studio.text, studio.template)
+    )
 
 
 async def template(request: Request) -> Response:
@@ -139,7 +154,7 @@ async def watch(request: Request) -> Response:
             last = now
             await asyncio.sleep(LOOK_EVERY)
 
-    return _lines(changes())
+    return _Lines(changes())
 
 
 async def live(request: Request) -> Response:
@@ -160,9 +175,10 @@ async def generate(request: Request) -> Response:
     key = secrets.token_urlsafe(16)
     out = studio.folder / "out" if asked.get("keep") else studio.scratch / key
     job = {**requested.job(studio.folder, asked), "do": "generate", "out": str(out)}
+    wish = studio.maker.ask((job["tab"], "generate"), job)
 
     async def told() -> AsyncIterator[bytes]:
-        async for line in studio.maker.answers((job["tab"], "generate"), job):
+        async for line in wish.lines():
             answer = json.loads(line)
             if answer["kind"] == "made":
                 _keep(studio, key, Made(out / answer["name"], answer["name"]))
@@ -170,7 +186,7 @@ async def generate(request: Request) -> Response:
             else:
                 yield line + b"\n"
 
-    return _lines(told())
+    return _Lines(told(), studio.maker, wish)
 
 
 def _keep(studio: Studio, key: str, made: Made) -> None:
@@ -197,19 +213,39 @@ async def made_zip(request: Request) -> Response:
     return Response(content, media_type="application/zip", headers=headers)
 
 
-async def _worked(request: Request, worker: Worker, do: str) -> Response:
+async def _worked(request: Request, pool: WorkerPool, do: str) -> Response:
     studio, asked = _studio(request), await _asked(request)
     job = {**requested.job(studio.folder, asked), "do": do}
+    wish = pool.ask((job["tab"], do), job)
 
     async def lines() -> AsyncIterator[bytes]:
-        async for answer in worker.answers((job["tab"], do), job):
+        async for answer in wish.lines():
             yield answer + b"\n"
 
-    return _lines(lines())
+    return _Lines(lines(), pool, wish)
 
 
-def _lines(content: AsyncIterator[bytes]) -> Response:
-    return StreamingResponse(content, media_type="application/x-ndjson")
+class _Lines(StreamingResponse):
+    """A job's answers, each as a line of JSON; the job is given up where the reader goes away."""
+
+    media_type = "application/x-ndjson"
+
+    def __init__(
+        self,
+        content: AsyncIterator[bytes],
+        pool: WorkerPool | None = None,
+        wish: WaitingJob | None = None,
+    ) -> None:
+        super().__init__(content)
+        self.pool, self.wish = pool, wish
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            # Also where the reader was gone before the first line was asked for.
+            if self.pool is not None and self.wish is not None:
+                self.pool.forget(self.wish)
 
 
 async def _asked(request: Request) -> dict[str, Any]:

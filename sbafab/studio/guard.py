@@ -16,6 +16,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 HERE = ("127.0.0.1", "localhost", "[::1]")
 TOKEN_HEADER = b"x-sbafab-token"
 MOST_BODY = 2_000_000
+MOST_AT_ONCE = 64
+"""Requests that are read and answered at a time: at most 128 MB of them."""
 PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
     "connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; "
@@ -34,6 +36,7 @@ class Guard:
 
     def __init__(self, app: ASGIApp, token: str) -> None:
         self.app, self.token = app, token.encode()
+        self.at_once = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "lifespan":
@@ -46,8 +49,15 @@ class Guard:
             status, why = refused
             await JSONResponse({"kind": "refused", "message": why}, status)(scope, receive, send)
             return
+        if self.at_once >= MOST_AT_ONCE:
+            await no_room()(scope, receive, send)
+            return
         policy = MADE_POLICY if scope["path"].startswith("/made/") else PAGE_POLICY
-        await self.app(scope, _bounded(receive), _with_headers(send, policy))
+        self.at_once += 1
+        try:
+            await self.app(scope, _bounded(receive), _with_headers(send, policy))
+        finally:
+            self.at_once -= 1
 
     def refusal(self, scope: Scope) -> tuple[int, str] | None:
         """Status and reason why a request is not answered."""
@@ -66,6 +76,12 @@ class Guard:
         if not length.isdigit() or int(length) > MOST_BODY:
             return 413, f"a request holds at most {MOST_BODY:,} bytes"
         return None
+
+
+def no_room() -> JSONResponse:
+    """The answer where too much is asked at once; it is given before any other has begun."""
+    message = "too many requests at once; wait a moment, or close some tabs of the studio"
+    return JSONResponse({"kind": "error", "message": message}, 503, {"retry-after": "1"})
 
 
 def _is_call(scope: Scope) -> bool:

@@ -21,9 +21,12 @@ class Made:
 
     def file(self, path: str) -> Path | None:
         """A file of the run, None for any other place."""
-        found = (self.folder / path).resolve()
-        inside = found.is_relative_to(self.folder.resolve()) and "\0" not in path
-        return found if inside and found.is_file() else None
+        try:
+            found = (self.folder / path).resolve()
+            inside = found.is_relative_to(self.folder.resolve())
+            return found if inside and found.is_file() else None
+        except (OSError, ValueError):  # a name too long for any file, or one with a NUL
+            return None
 
 
 def zipped(made: Made) -> bytes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import stat
 import tempfile
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -15,6 +16,8 @@ from sbafab import api
 from sbafab.errors import DesignError, OutputError
 
 MOST_LISTED = 200
+MOST_BYTES = 2_000_000
+"""Bytes of a design file."""
 REFERRING = ("outline", "kit", "design")
 """Keys whose values may be paths of files."""
 
@@ -29,14 +32,18 @@ def design_file(folder: Path, name: str) -> Path:
 
 def listed(folder: Path) -> list[str]:
     """Names of the design files right in the folder."""
-    names = sorted(path.name for path in folder.glob("*.toml") if _lies_in(path, folder))
+    names = sorted(path.name for path in folder.glob("*.toml") if _is_listed(path, folder))
     return names[:MOST_LISTED]
+
+
+def _is_listed(path: Path, folder: Path) -> bool:
+    return _lies_in(path, folder) and path.is_file()
 
 
 def read(path: Path) -> tuple[str, str]:
     """Text and hash of a design file. Raises DesignError where it cannot be read."""
     try:
-        content = path.read_bytes()
+        content = content_of(path, MOST_BYTES)
         return content.decode("utf-8-sig"), _hash(content)
     except UnicodeDecodeError:
         raise DesignError(f"{path.name} is not a text file in UTF-8; save it as UTF-8") from None
@@ -44,11 +51,30 @@ def read(path: Path) -> tuple[str, str]:
         raise DesignError(f"{path.name} cannot be read: {error.strerror or error}") from None
 
 
+def content_of(path: Path, most: int | None = None) -> bytes:
+    """Return the bytes of a file, without waiting: what has another end (a FIFO) is not read.
+
+    Raises DesignError for what is not a regular file or holds more than ``most`` bytes, and
+    OSError.
+    """
+    # A FIFO that nobody writes to would hold whoever opens it, and with it the whole server.
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    with os.fdopen(os.open(path, flags), "rb") as opened:
+        about = os.fstat(opened.fileno())
+        if not stat.S_ISREG(about.st_mode):
+            raise DesignError(f"{path.name} is not a regular file; choose another one")
+        if most is not None and about.st_size > most:
+            raise DesignError(
+                f"{path.name} holds {about.st_size:,} bytes; a design file holds at most {most:,}"
+            )
+        return opened.read()
+
+
 def state(path: Path) -> str:
-    """Hash of what lies on disk; empty where nothing does."""
+    """Hash of what lies on disk; empty where nothing does that can be read."""
     try:
-        return _hash(path.read_bytes())
-    except OSError:
+        return _hash(content_of(path))
+    except (OSError, DesignError):
         return ""
 
 
@@ -57,6 +83,8 @@ def save(path: Path, text: str, seen: str | None) -> str:
 
     ``seen``: the hash of what the page has read; where another lies there now, raises OutputError.
     """
+    if path.exists() and not path.is_file():
+        raise OutputError(f"{path.name} is not a regular file; save under another name")
     if seen is not None and state(path) != seen:
         raise OutputError(f"{path.name} was changed on disk meanwhile; load it, or save over it")
     content = text.encode("utf-8")
@@ -94,10 +122,12 @@ def named_files(text: str, folder: Path, above: frozenset[Path] = frozenset()) -
         path = folder / value
         if "\0" in value or not _lies_in(path, folder):
             raise DesignError(f"{key} = {value[:60]!r} lies outside {folder}; copy it into there")
-        named.append(state(path) if path.is_file() else "")
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise DesignError(f"{key} = {value[:60]!r} is not a regular file; name another one")
+        named.append(state(path))
         # One that names itself is refused by who reads it.
         if path.suffix == ".toml" and path.is_file() and path not in above:
-            inner = path.read_text("utf-8", "replace")
+            inner = content_of(path, MOST_BYTES).decode("utf-8", "replace")
             named += named_files(inner, path.parent, above | {path})
     return tuple(named)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +11,27 @@ from sbafab import __version__, api
 from sbafab.errors import SbafabError
 from sbafab.studio import forms, places
 
+SURROGATE = re.compile("[\ud800-\udfff]")
+"""Half of a character as JSON may write it alone; no file in UTF-8 can hold it."""
 
-def started(folder: Path | None, opened: str | None = None, text: str | None = None) -> Any:
-    """What the page begins with; no ``folder`` where it has no disk to read from."""
+
+def started(
+    folder: Path | None,
+    opened: str | None = None,
+    text: str | None = None,
+    template: str | None = None,
+) -> Any:
+    """What the page begins with; no ``folder`` where it has no disk to read from.
+
+    ``opened`` names a file of the folder, ``text`` is a link's design, ``template`` a template.
+    """
     schema = api.schema()
     return {
         "version": __version__,
         "folder": str(folder or ""),
         "opened": opened,
         "text": text,
+        "template": template,
         "files": places.listed(folder) if folder else [],
         "templates": api.templates(),
         "families": forms.families(schema),
@@ -34,7 +47,26 @@ def table(body: bytes | str) -> dict[str, Any]:
         asked = None
     if not isinstance(asked, dict):
         raise SbafabError("the request is not a table in JSON")
+    _refuse_surrogates(asked)
     return asked
+
+
+def _refuse_surrogates(asked: dict[str, Any]) -> None:
+    text = asked.get("text")
+    half = SURROGATE.search(text) if isinstance(text, str) else None
+    if half is not None:
+        line = half.string.count("\n", 0, half.start()) + 1
+        raise SbafabError(
+            f"line {line} of the text holds half a character (U+{ord(half[0]):04X}), which no file "
+            "can; delete it and type it again"
+        )
+    try:
+        json.dumps(asked, ensure_ascii=False).encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise SbafabError(
+            f"the request holds half a character (U+{ord(error.object[error.start]):04X}), which "
+            "no file can; delete it and type it again"
+        ) from None
 
 
 def job(folder: Path, asked: dict[str, Any]) -> dict[str, Any]:

@@ -6,9 +6,10 @@ import secrets
 import socket
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 from sbafab import api
-from sbafab.errors import DesignError, OutputError
+from sbafab.errors import DesignError, OutputError, Stopped
 from sbafab.studio import places
 from sbafab.studio.links import design_in
 
@@ -17,28 +18,39 @@ PORT = 8417
 """Tried first, so that a link that was kept finds the studio again."""
 
 
-def opened(source: str | None) -> tuple[Path, str | None, str | None]:
-    """Folder, name of its design file, and text, of what the studio shall open.
+class StudioStart(NamedTuple):
+    """The folder that the studio is for, and the design that it opens with, if one was named."""
+
+    folder: Path
+    file: str | None = None
+    """A design file of the folder."""
+    text: str | None = None
+    """A design from a link."""
+    template: str | None = None
+
+
+def opened(source: str | None) -> StudioStart:
+    """Return what the studio shall open.
 
     ``source`` is a file, a folder, a template's name, a link that holds a design, or None for the
     folder one stands in. Raises DesignError.
     """
     if source is None:
-        return Path.cwd(), None, None
+        return StudioStart(Path.cwd())
     if source.startswith(("http://", "https://")):
-        return Path.cwd(), None, design_in(source)
+        return StudioStart(Path.cwd(), text=design_in(source))
     if source in api.templates():
-        return Path.cwd(), None, api.template(source)
+        return StudioStart(Path.cwd(), template=source)
     path = Path(source)
     if path.is_dir():
-        return path.resolve(), None, None
+        return StudioStart(path.resolve())
     if not path.is_file():
         raise DesignError(
             f"{source} is no design file, folder, template or link; the templates are "
             f"{', '.join(api.templates())}"
         )
     folder = path.resolve().parent
-    return folder, places.design_file(folder, path.name).name, None
+    return StudioStart(folder, places.design_file(folder, path.name).name)
 
 
 def listening(port: int | None) -> socket.socket:
@@ -62,7 +74,7 @@ def listening(port: int | None) -> socket.socket:
 def serve(source: str | None, port: int | None, announce: Callable[[str], None]) -> None:
     """Serves the studio until Ctrl-C; ``announce`` gets the link.
 
-    Raises DesignError and OutputError.
+    Raises DesignError, OutputError, and Stopped at the end.
     """
     try:
         import uvicorn
@@ -72,8 +84,8 @@ def serve(source: str | None, port: int | None, announce: Callable[[str], None])
         raise DesignError(
             f'{error.name} is not installed; add it with pip install "sbafab[studio]"'
         ) from None
-    folder, name, text = opened(source)
-    studio = Studio(folder, secrets.token_urlsafe(24), name, text)
+    folder, name, text, template = opened(source)
+    studio = Studio(folder, secrets.token_urlsafe(24), name, text, template)
     sock = listening(port)
     announce(f"http://{ADDRESS}:{sock.getsockname()[1]}/#token={studio.token}")
     config = uvicorn.Config(
@@ -84,4 +96,8 @@ def serve(source: str | None, port: int | None, announce: Callable[[str], None])
         lifespan="on",
         timeout_graceful_shutdown=1,
     )
-    uvicorn.Server(config).run(sockets=[sock])
+    try:
+        # It ends in order at a signal and then raises it once more.
+        uvicorn.Server(config).run(sockets=[sock])
+    except KeyboardInterrupt as stop:
+        raise Stopped("the studio has stopped", *stop.args) from None

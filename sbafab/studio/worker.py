@@ -14,6 +14,8 @@ from sbafab.errors import SbafabError
 
 END = b""
 """The last message of a job."""
+READY = 0
+"""The number that says that the process takes jobs; those count from 1."""
 FIRST_DESIGN = "1dof-5mm"
 
 
@@ -29,6 +31,7 @@ def serve(pipe: Connection, cancelled: Any, warm: bool) -> None:
     gc.collect()
     gc.freeze()
     with contextlib.suppress(EOFError, OSError):
+        pipe.send((READY, END))
         while True:
             number, job = pipe.recv()
             send = _sender(pipe, number)

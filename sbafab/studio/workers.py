@@ -1,6 +1,7 @@
 """Worker processes: the newest wish of a tab is worked on, what it replaces is given up.
 
-A process that dies or takes too long is replaced, and who waits for it is told so.
+A pool starts a second process only where somebody waits and none is idle, up to the number of
+processors. A process that dies or takes too long is replaced, and who waits for it is told so.
 """
 
 from __future__ import annotations
@@ -14,137 +15,208 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from sbafab.studio.worker import END, serve
+from sbafab.studio.worker import END, READY, serve
 
 MOST_WAITING = 24
+"""Jobs of a pool that wait for a process."""
+MOST_HOMES = 64
+"""Keys whose last process is remembered."""
+PATIENCE = 2.0
+"""Seconds that a job nobody waits for has until its next step; then its process is replaced."""
 Key = tuple[str, str]
 """A tab and what it asks for; a newer wish with the same key replaces the older one."""
 
 
 class BusyError(Exception):
-    """Too many tabs wait for this worker."""
+    """Too many jobs wait already."""
 
 
 @dataclass(eq=False)
 class WaitingJob:
-    """A job that somebody waits for."""
+    """A job that somebody waits for, and its answers as they come."""
 
     key: Key
     job: dict[str, Any]
     answers: asyncio.Queue[bytes] = field(default_factory=asyncio.Queue)
-    number: int = 0
+
+    def end(self, kind: str, message: str = "") -> None:
+        """Puts a last answer of this kind."""
+        self.answers.put_nowait(json.dumps({"kind": kind, "message": message}).encode())
+        self.answers.put_nowait(END)
+
+    async def lines(self) -> AsyncIterator[bytes]:
+        """Each answer as a line of JSON; they end early where a newer wish replaces this one."""
+        while (answer := await self.answers.get()) != END:
+            yield answer
 
 
-class Worker:
-    """One process and the wishes that wait for it. All methods belong to the event loop."""
+class WorkerPool:
+    """Processes and the wishes that wait for them. All methods belong to the event loop.
 
-    def __init__(self, seconds: float, warm: bool = True) -> None:
-        self.seconds, self.warm = seconds, warm
-        self.context = multiprocessing.get_context("spawn")
-        self.cancelled = self.context.Value("Q", 0, lock=False)
+    ``seconds`` is what a job may take, ``processes`` how many run at most, and ``patience`` the
+    seconds that a job has to end once nobody waits for it.
+    """
+
+    def __init__(
+        self, seconds: float, processes: int, warm: bool = True, patience: float = PATIENCE
+    ) -> None:
+        self.seconds, self.processes, self.patience = seconds, processes, patience
+        self.warm = warm
         self.waiting: dict[Key, WaitingJob] = {}
-        self.current: WaitingJob | None = None
-        self.number = 0
-        self.timer: asyncio.TimerHandle | None = None
+        self.workers: list[Worker] = []
+        self.homes: dict[Key, Worker] = {}
         self.closed = False
-        self.process: Any = None
 
     def start(self) -> None:
-        """Starts the process; what it answers comes back into this event loop."""
-        self.pipe, theirs = self.context.Pipe()
-        self.process = self.context.Process(
-            target=serve, args=(theirs, self.cancelled, self.warm), daemon=True
-        )
-        self.process.start()
-        theirs.close()
-        loop = asyncio.get_running_loop()
-        threading.Thread(target=_listen, args=(self.pipe, loop, self), daemon=True).start()
+        """Starts one more process; wishes are given to it once it is ready."""
+        self.workers.append(Worker(self))
 
     def stop(self) -> None:
-        """Ends the process."""
+        """Ends all processes."""
         self.closed = True
-        if self.process is not None and self.process.is_alive():
-            self.process.terminate()
+        for worker in self.workers:
+            worker.kill()
 
-    async def answers(self, key: Key, job: dict[str, Any]) -> AsyncIterator[bytes]:
-        """The job's answers, each a line of JSON; ends early where a newer wish replaces it."""
-        wish = WaitingJob(key, job)
+    def ask(self, key: Key, job: dict[str, Any]) -> WaitingJob:
+        """Return the job as one that is worked on in its turn; an older one of the key is given up.
+
+        Whoever asked calls :meth:`forget` at the end. Raises BusyError where too many wait.
+        """
         self._give_up(key)
         if len(self.waiting) >= MOST_WAITING:
             raise BusyError
-        self.waiting[key] = wish
-        self._next()
-        try:
-            while (answer := await wish.answers.get()) != END:
-                yield answer
-        finally:
-            self._forget(wish)
+        wish = self.waiting[key] = WaitingJob(key, job)
+        self.assign()
+        return wish
+
+    def forget(self, wish: WaitingJob) -> None:
+        """Gives a job up that nobody waits for any more; nothing happens to one that has ended."""
+        if self.waiting.get(wish.key) is wish:
+            del self.waiting[wish.key]
+        for worker in self.workers:
+            if worker.current is wish:
+                worker.cancel()
 
     def _give_up(self, key: Key) -> None:
         old = self.waiting.pop(key, None)
         if old is not None:
-            old.answers.put_nowait(_line("superseded"))
-            old.answers.put_nowait(END)
-        if self.current is not None and self.current.key == key:
-            self.cancelled.value = self.current.number
+            old.end("superseded")
+        for worker in self.workers:
+            if worker.current is not None and worker.current.key == key:
+                worker.cancel()
 
-    def _forget(self, wish: WaitingJob) -> None:
-        """Whoever waited went away."""
-        if self.waiting.get(wish.key) is wish:
-            del self.waiting[wish.key]
-        if self.current is wish:
-            self.cancelled.value = wish.number
-
-    def _next(self) -> None:
-        if self.current is not None or not self.waiting:
+    def assign(self) -> None:
+        """Gives every idle process the next wish that it may work on; starts one where none is."""
+        if self.closed:
             return
-        if self.process is None or not self.process.is_alive():
+        for wish in list(self.waiting.values()):
+            worker = self._idle(wish.key)
+            if worker is not None:
+                del self.waiting[wish.key]
+                self.homes.pop(wish.key, None)
+                self.homes[wish.key] = worker
+                while len(self.homes) > MOST_HOMES:
+                    del self.homes[next(iter(self.homes))]
+                worker.work(wish)
+        starting = sum(not worker.ready for worker in self.workers)
+        needed = sum(not self._ends_soon(key) for key in self.waiting) - starting
+        for _ in range(min(needed, self.processes - len(self.workers))):
             self.start()
-        key = next(iter(self.waiting))
-        self.current = self.waiting.pop(key)
+
+    def _idle(self, key: Key) -> Worker | None:
+        """Return an idle process, first the one that worked for the key and knows its motion."""
+        if self._ends_soon(key):
+            return None
+        idle = [worker for worker in self.workers if worker.ready and worker.current is None]
+        home = self.homes.get(key)
+        return home if home in idle else next(iter(idle), None)
+
+    def _ends_soon(self, key: Key) -> bool:
+        """Whether a process works on an older job of the key, which has been given up."""
+        return any(worker.current and worker.current.key == key for worker in self.workers)
+
+    def remove(self, worker: Worker, message: str) -> None:
+        """Takes a process out that has ended, and tells who waited for it; others go on."""
+        if worker not in self.workers:
+            return
+        self.workers.remove(worker)
+        self.homes = {key: home for key, home in self.homes.items() if home is not worker}
+        worker.kill()
+        if worker.current is not None:
+            worker.current.end("superseded" if worker.cancelled else "crashed", message)
+        elif not worker.ready and self.waiting:
+            # Else a process that cannot start would be started for ever.
+            self.waiting.pop(next(iter(self.waiting))).end("crashed", message)
+        worker.done()
+        self.assign()
+
+
+class Worker:
+    """A process and the job that it works on."""
+
+    def __init__(self, pool: WorkerPool) -> None:
+        self.pool = pool
+        self.current: WaitingJob | None = None
+        self.number = 0
+        self.ready = False
+        self.timers: list[asyncio.TimerHandle] = []
+        context = multiprocessing.get_context("spawn")
+        self.given_up = context.Value("Q", 0, lock=False)
+        self.pipe, theirs = context.Pipe()
+        self.process = context.Process(
+            target=serve, args=(theirs, self.given_up, pool.warm), daemon=True
+        )
+        self.process.start()
+        theirs.close()
+        threading.Thread(
+            target=_listen, args=(self.pipe, asyncio.get_running_loop(), self), daemon=True
+        ).start()
+
+    @property
+    def cancelled(self) -> bool:
+        """Whether nobody waits for the current job any more."""
+        return self.number > 0 and self.given_up.value == self.number
+
+    def work(self, wish: WaitingJob) -> None:
+        """Has the process work on the wish."""
+        self.current = wish
         self.number += 1
-        self.current.number = self.number
-        self.timer = asyncio.get_running_loop().call_later(
-            self.seconds, self._overtime, self.number
+        self._after(
+            self.pool.seconds, f"this took more than {self.pool.seconds:g} s and was stopped"
         )
         with contextlib.suppress(OSError):  # a process that just died is seen by who listens
-            self.pipe.send((self.number, self.current.job))
+            self.pipe.send((self.number, wish.job))
+
+    def cancel(self) -> None:
+        """Has the current job end at its next step, or its process where that is far."""
+        if not self.cancelled:
+            self.given_up.value = self.number
+            self._after(self.pool.patience, "")
+
+    def _after(self, seconds: float, message: str) -> None:
+        loop = asyncio.get_running_loop()
+        self.timers.append(loop.call_later(seconds, self.pool.remove, self, message))
 
     def heard(self, number: int, answer: bytes) -> None:
         """An answer of the process arrived."""
-        if self.current is None or self.current.number != number:
-            return
-        self.current.answers.put_nowait(answer)
-        if answer == END:
-            self._done()
+        if number == READY:
+            self.ready = True
+        elif self.current is not None and self.number == number:
+            self.current.answers.put_nowait(answer)
+            if answer == END:
+                self.done()
+        self.pool.assign()
 
-    def died(self, pipe: Any) -> None:
-        """The process of this pipe has ended."""
-        if pipe is not self.pipe or self.closed:
-            return
-        self.process = None
-        if self.current is not None:
-            self._end("crashed", "the process that worked on this ended; it was started again")
-        self._next()
-
-    def _overtime(self, number: int) -> None:
-        if self.current is not None and self.current.number == number:
-            process, self.process = self.process, None
-            process.kill()
-            self._end("crashed", f"this took more than {self.seconds:g} s and was stopped")
-            self._next()
-
-    def _end(self, kind: str, message: str) -> None:
-        assert self.current is not None
-        self.current.answers.put_nowait(_line(kind, message))
-        self.current.answers.put_nowait(END)
-        self._done()
-
-    def _done(self) -> None:
+    def done(self) -> None:
+        """The process is idle."""
         self.current = None
-        if self.timer is not None:
-            self.timer.cancel()
-        self._next()
+        while self.timers:
+            self.timers.pop().cancel()
+
+    def kill(self) -> None:
+        """Ends the process, whatever it does."""
+        if self.process.is_alive():
+            self.process.kill()
 
 
 def _listen(pipe: Any, loop: asyncio.AbstractEventLoop, worker: Worker) -> None:
@@ -155,8 +227,5 @@ def _listen(pipe: Any, loop: asyncio.AbstractEventLoop, worker: Worker) -> None:
                 number, answer = pipe.recv()
                 loop.call_soon_threadsafe(worker.heard, number, answer)
         except (EOFError, OSError):
-            loop.call_soon_threadsafe(worker.died, pipe)
-
-
-def _line(kind: str, message: str = "") -> bytes:
-    return json.dumps({"kind": kind, "message": message}).encode()
+            message = "the process that worked on this ended; it was started again"
+            loop.call_soon_threadsafe(worker.pool.remove, worker, message)

@@ -55,12 +55,12 @@ FLAT = "<dt>Thickness, flat \\(nominal films\\)</dt><dd>"
 FAULTS = {
     "an end tag too many": ("</section>", "</div></section>", "closes nothing"),
     "a part counted wrongly": ("<b>2</b>", "<b>3</b>", "is counted 3"),
-    "spares that are not cut": (r"\+ 2 spare", "+ 1 spare", "is counted"),
+    "spares that are not cut": (r"\+ 1 spare", "+ 2 spare", "is counted"),
     "another film": ("<td>TPE</td><td>base</td>", "<td>PTFE</td><td>base</td>", "to be PTFE"),
     "a longer cut": (r"(\d\d) mm</td><td>TPE_1", r"1\1 mm</td><td>TPE_1", "P01 cuts"),
     "a part more on a sheet": (
-        "2 \N{MULTIPLICATION SIGN} P01",
         "3 \N{MULTIPLICATION SIGN} P01",
+        "4 \N{MULTIPLICATION SIGN} P01",
         "are named",
     ),
     "less to cut": (r"(\d\.\d+) m of cut", r"9\1 m of cut", "the laser cuts"),

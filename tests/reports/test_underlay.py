@@ -18,7 +18,7 @@ from sbafab.cutting.fixture import plate_corner
 from sbafab.laminate.laminate import Laminate
 from sbafab.output.settings import press_settings
 from sbafab.pressing.schedule import schedule
-from sbafab.pressing.together import design_runs
+from sbafab.pressing.together import runs_of
 from sbafab.reports.underlay import guides, leaves, underlay_pdf
 
 SHA = "0123456789abcdef" * 4
@@ -124,10 +124,10 @@ def test_it_has_every_place_of_a_cycle() -> None:
 
 
 def test_a_cycle_larger_than_the_paper_is_tiled_edge_to_edge() -> None:
-    wide = ("press.platen_width=300", "press.platen_length=300", "order.copies=40")
+    wide = ("press.platen_width=300", "press.platen_length=300")
     design = load_design("3dof-15mm", wide)
     laminate = build(design)
-    places = design_runs(design, laminate).places
+    places = runs_of(laminate, 40, (300.0, 300.0)).places
     platen = 300.0, 300.0
     spread = leaves(laminate, places, platen)
     assert sorted(n for leaf in spread for n in leaf.places) == list(range(1, 41))

@@ -11,6 +11,7 @@ import pytest
 
 from docs.scripts import measured
 from docs.scripts.measured import BLOCK, FOLDER, HOW, Table, filled, record
+from docs.scripts.rates import WORDS
 from sbafab.cli import COMMANDS
 from sbafab.rules.deck import rule_names
 
@@ -48,6 +49,7 @@ def test_a_page_that_was_edited_by_hand_is_told() -> None:
 def test_every_record_is_shown_whole_with_its_day_and_command() -> None:
     assert len(NAMES) >= 6
     every = {(name, table) for name in NAMES for table in (*record(name).tables, HOW)}
+    every |= {("benchmarks", words) for words in WORDS}
     assert sorted(BLOCKS) == sorted(every)
     for name in NAMES:
         assert re.fullmatch(r"\d{4}-\d\d-\d\d", record(name).day)

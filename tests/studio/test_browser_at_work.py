@@ -16,6 +16,7 @@ import pytest
 from PIL import Image
 
 from sbafab import api
+from sbafab.studio.links import packed
 from tests.studio.browsing import (
     DESIGN,
     FILE,
@@ -32,6 +33,8 @@ pytestmark = [
     pytest.mark.long,
     pytest.mark.skipif(chromium() is None, reason="no Chromium"),
 ]
+
+CONE = api.template("1dof-5mm").replace('name = "1dof-5mm"', 'name = "cone"')
 
 
 # 3. The actuator moves.
@@ -285,6 +288,24 @@ def _parents(pid: str, rows: list[list[str]]) -> set[str]:
         pid = above[pid]
         found.add(pid)
     return found
+
+
+@pytest.mark.parametrize("source", ["template", "link", None])
+def test_the_gallery_opens_only_where_no_design_is_given(
+    chrome: Any, tmp_path: Path, source: str | None
+) -> None:
+    given = {"template": "1dof-10mm", "link": f"http://127.0.0.1/#design={packed(CONE)}"}
+    with served(tmp_path, *([given[source]] if source else [])) as link:
+        watched = Watched(chrome, link)
+        watched.ready()
+        dialog = watched.page.get_by_role("dialog", name="Open a design")
+        assert dialog.is_visible() == (source is None)
+        # What has changes that no file holds is a link's design alone.
+        shown = {"template": "1dof-10mm", "link": "cone", None: "3dof-15mm"}[source]
+        assert watched.say("studio.laminate.name") == shown
+        assert watched.say("studio.unsaved") is (source == "link")
+        assert watched.complaints == []
+        watched.close()
 
 
 def test_a_wrong_token_is_told_plainly(chrome: Any, link: str) -> None:

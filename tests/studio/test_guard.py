@@ -148,6 +148,8 @@ def test_what_was_made_needs_its_key_and_keeps_inside(client: Client, studio: St
     assert "sandbox" in client.get("/made/key/a.txt").headers["content-security-policy"]
     assert client.get("/made/other/a.txt").status_code == 404
     assert client.get("/made/key/%2e%2e/b.txt").status_code == 404
+    for name in ("a%00.txt", "a" * 5000, "%ED%A0%80"):
+        assert client.get(f"/made/key/{name}").status_code == 404
     assert client.get("/made/key.zip").content == zipped(studio.made["key"])
 
 

@@ -90,7 +90,8 @@ def _sizes(hole: PinHole | None) -> tuple[str, str, str]:
 
 
 def _pin_holes(plan: Schedule) -> dict[str, PinHole]:
-    return pin_holes([step.pin_settings for step in plan.steps])
+    tacks = [] if plan.tacking is None else [plan.tacking.pins]
+    return pin_holes([*(step.pin_settings for step in plan.steps), *tacks])
 
 
 def plate_notes(work: Work) -> tuple[str, ...]:

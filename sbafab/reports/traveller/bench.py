@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Mapping, Sequence
 
+from sbafab.design.records import HoldDown
 from sbafab.laminate.assembly import AssemblyStep, distinct_layers
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate
@@ -18,28 +20,91 @@ from sbafab.reports.underlay import guides
 from sbafab.rules.pin_fit import NAME as PIN_FIT
 from sbafab.rules.pin_fit import most_on_a_pin
 
+WIPE = (
+    "Wipe bench and film with isopropanol and a lint-free cloth, let them dry. Gloves on; hold "
+    "film by its border: grease and dust keep TPE from bonding."
+)
+AIR = (
+    "Air assist off, or as low as the machine's owner allows; exhaust drawn off below the bed "
+    "where the machine has it, and the lid opened slowly: a draught takes parts of a few "
+    "milligrams with it."
+)
+HOLDING: Mapping[HoldDown, str] = {
+    "border": (
+        "lay it flat on smooth card, without stretching it, and hold it down all along its border "
+        "with tape or magnets. Parts stay where they were cut, on the card."
+    ),
+    "carrier": (
+        "stick it without bubbles on a carrier sheet of low tack, of paper or polyester and never "
+        "of vinyl (PVC gives off hydrogen chloride). Cut through the film and not through the "
+        "carrier (try power and speed on a corner). Parts stay on the carrier until they are laid: "
+        "bend it away from the part, and wipe the face that was stuck on."
+    ),
+    "vacuum": (
+        "lay it on the vacuum bed over a porous sheet, such as filter paper, as large as the film. "
+        "The vacuum stays on until the last part is picked up."
+    ),
+}
+"""What holds a film under the beam, by ``laser.hold_tpe`` and ``laser.hold_ptfe``."""
+SILICONE = " PTFE hardly sticks to acrylic or rubber adhesives: the carrier's must be silicone."
+RIM = 10.0
+"""mm of film round a registered sheet, by which it is held down."""
 TAPE = "polyimide tape (silicone adhesive, rated 260 °C)"
 
 
-def before_cutting(films: Iterable[Film]) -> list[Action]:
-    """How films come clean and flat under the beam."""
-    actions = [
+def before_first_cut() -> list[Action]:
+    """The same of registered sheets, whose parts hang on bridges or lie on the transfer film."""
+    return [
+        Action(WIPE),
         Action(
-            "Wipe bench and film with isopropanol and a lint-free cloth, let them dry. Gloves on; "
-            "hold film by its border: grease and dust keep TPE from bonding."
-        )
+            f"Each registered sheet is cut whole, edge and all, out of film that reaches {RIM:g} "
+            "mm past it all round. Lay the film flat on smooth card, without stretching it, and "
+            "hold it down all along that rim with tape or magnets; a mask sheet is held by the rim "
+            "of its transfer film. Parts of the films hang on their bridges. (Our proposal, not "
+            "tried.)"
+        ),
+        Action(AIR),
     ]
-    masks = [film for film in films if film.is_mask]
-    if masks:
-        thin = say.millimetres(min(film.thickness for film in masks))
-        names = listed(list(dict.fromkeys(film.material for film in masks)))
-        actions.append(
-            Action(
-                f"Lay {names} on a backing of card, smooth it flat, and hold it down all along its "
-                f"border (tape, magnets or vacuum): {thin} of it lifts in the exhaust's draught."
-            )
-        )
-    return actions
+
+
+def before_cutting(works: Sequence[Work]) -> list[Action]:
+    """How films come clean and flat under the beam, and what holds their parts once they are cut.
+
+    None of it was tried, and the actions say so.
+    """
+    return [Action(WIPE), *(_held(works, film) for film in _films(works)), Action(AIR)]
+
+
+def _films(works: Sequence[Work]) -> list[Film]:
+    return list(dict.fromkeys(layer.film for work in works for layer in work.laminate.layers))
+
+
+def hold_down(work: Work, film: Film) -> HoldDown:
+    """Return how a film is held under the beam: masks as PTFE is, the others as TPE."""
+    laser = work.design.laser
+    return laser.hold_ptfe if film.is_mask else laser.hold_tpe
+
+
+def _held(works: Sequence[Work], film: Film) -> Action:
+    """How one film is held: on sheets of which each part comes free, for nothing bridges it."""
+    count, lightest = 0, math.inf
+    for work in works:
+        for layers in work.laminate.patterns.values():
+            if layers[0].film == film:
+                pieces = layers[0].profile.pieces
+                needed = len(layers) * work.job.copies
+                count += len(pieces) * (needed + work.design.order.spare_parts(needed))
+                lightest = min(lightest, *(piece.area for piece in pieces))
+    weight = ""
+    if film.density is not None:
+        weight = f", the lightest of {lightest * film.thickness * film.density / 1000:.2g} mg"
+    thin = say.millimetres(film.thickness)
+    how = HOLDING[hold_down(works[0], film)]
+    sticks = SILICONE if film.is_mask and hold_down(works[0], film) == "carrier" else ""
+    return Action(
+        f"{film.material}, {thin} thick: {how}{sticks} No tab holds a part: {count} come free"
+        f"{weight}. (Our proposal, not tried.)"
+    )
 
 
 def after_cutting(works: Sequence[Work]) -> list[Action]:

@@ -49,6 +49,9 @@ def bill(work: Work) -> list[Item]:
         items.append(_underlay(work, job.underlay))
         what = f"{bench.TAPE}, 0.06 mm thick, 10 mm wide: along the plate's edges, off the films"
         items.append(Item("Tape", what, "as needed"))
+    if work.runs.together > 1:
+        what = "flat, with a lid, lined as section Batch says; tape for flags round the tubes"
+        items.append(Item("Tray", what, "1"))
     items += [Item(name, "", quantity) for name, quantity in job.extras]
     return items
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from sbafab.design.records import HoldDown
 from sbafab.pressing.words import listed
 from sbafab.reports.traveller import base_plate, gauges, warming
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
+from sbafab.reports.traveller.bench import hold_down
 from sbafab.reports.traveller.bill import kerf_states
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.taking_down import punch
@@ -23,6 +25,16 @@ class Tool(NamedTuple):
 
     name: str
     use: str
+
+
+HOLDERS: Mapping[HoldDown, Tool] = {
+    "border": Tool("Smooth card; tape or magnets", "hold thin film flat under the beam"),
+    "carrier": Tool(
+        "Carrier sheet of low tack, silicone adhesive",
+        "holds masks and their parts under the beam: one as large as each sheet",
+    ),
+    "vacuum": Tool("Vacuum bed, porous sheet", "holds film and parts under the beam"),
+}
 
 
 def before_the_day(works: Sequence[Work]) -> list[Action]:
@@ -81,8 +93,12 @@ def tools(works: Sequence[Work]) -> list[Tool]:
         Tool("Lint-free cloths, isopropanol, clean gloves", "films and parts, before they bond"),
     ]
     masks = [layer for one in laminates for layer in one.layers if layer.is_mask]
-    if masks:
-        found.append(Tool("Card; tape or magnets", "to hold thin film flat under the beam"))
+    held = {
+        "border" if work.laminate.panel is not None else hold_down(work, layer.film)
+        for work in works
+        for layer in work.laminate.layers
+    }
+    found += [tool for hold, tool in HOLDERS.items() if hold in held]
     if any(len(layer.profile.pieces) > 1 for layer in masks):
         found.append(Tool("Antistatic tweezers, earthed mat, dish with a lid", "loose mask pieces"))
     sizes = sorted({pin.diameter for one in laminates for pin in one.pins})

@@ -87,7 +87,8 @@ def _helps(places: Measures) -> Iterator[str]:
         )
         yield (
             'registration.method = "sheet", for round and lobed actuators, keeps films and masks '
-            "whole on corner pins until all copies are pressed; no bench has tried it."
+            "whole on corner pins until all copies are pressed; no bench has tried it, so it takes "
+            "--experimental."
         )
     yield (
         "Count your own builds and set registration.hand_placement and registration.hand_turn to "

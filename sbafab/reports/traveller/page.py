@@ -111,7 +111,7 @@ def context(work: Work) -> dict[str, Any]:
         "legend": _legend(laminate),
         "solid": None if job.solid_png is None else b64encode(job.solid_png).decode("ascii"),
         "cautions": [*cautions(work), *for_the_designer(job.findings)],
-        "before_cutting": bench.before_cutting(films(laminate)),
+        "before_cutting": bench.before_cutting([work]),
         "after_cutting": bench.after_cutting([work]),
         "bill": bill.bill(work),
         "before_the_day": before_the_day([work]),

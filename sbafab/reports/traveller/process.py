@@ -113,7 +113,13 @@ def _place_notes(runs: Runs) -> tuple[str, ...]:
     if runs.copies == 1:
         return ()
     at = f"all {runs.together} places" if runs.together > 1 else "its place"
-    return (f"Lay each layer at {at} before the next one; press once a cycle, for all.",)
+    notes = [f"Lay each layer at {at} before the next one; press once a cycle, for all."]
+    if runs.together > 1:
+        notes.append(
+            "Stacks of earlier steps go back to the places of their numbers, and what comes off "
+            "the plate goes to its number in the tray (section Batch)."
+        )
+    return tuple(notes)
 
 
 def _bench_actions(

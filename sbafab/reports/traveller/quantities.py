@@ -53,6 +53,12 @@ def plain(value: float | None) -> str:
     return BLANK if value is None else f"{value:g}"
 
 
+def clock(minutes: float) -> str:
+    """Hours and minutes: 0:05, 7:45."""
+    whole = round(minutes)
+    return f"{whole // 60}:{whole % 60:02d}"
+
+
 def hours(value: float | None) -> str:
     return f"{BLANK} h" if value is None else f"{value / 60:.2f} h"
 

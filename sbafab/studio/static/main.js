@@ -61,7 +61,7 @@ function alone(lacks) {
   if (lacks.length) notice(`This page was made without ${lacks.join(" and ")}: layers, section, solid and all rules but those of registration work; prediction, motion and cut files take it.`);
 }
 
-// What is shown first: a link's design, a file, work that a reload interrupted, or the gallery.
+// What is shown first: a link's design, what the command named, work that a reload interrupted, or the gallery.
 async function begin() {
   const draft = studio.draft();
   if (linkedDesign) {
@@ -73,10 +73,11 @@ async function begin() {
     return;
   }
   if (studio.opened) await openFile(studio.opened).catch((error) => notice(error.message, true));
-  else if (studio.text) studio.open(studio.text, { saved: "" });
+  else if (studio.given) studio.open(studio.given, { saved: "" });
+  else if (studio.template) await openTemplate(studio.template).catch((error) => notice(error.message, true));
   else if (draft) { if (draft.name) await openFile(draft.name).catch(() => studio.open(draft.text)); else studio.open(draft.text); }
   else {
-    await ask("/api/template/3dof-15mm").then(({ text }) => studio.open(text));
+    await openTemplate("3dof-15mm");
     dialogs.openDesign();
   }
   const orphan = studio.orphan();
@@ -88,6 +89,10 @@ async function begin() {
 export async function openFile(name) {
   const { text, sha } = await ask(`/api/file/${encodeURIComponent(name)}`);
   studio.open(text, { name, seen: sha, saved: text });
+}
+
+async function openTemplate(name) {
+  studio.open((await ask(`/api/template/${encodeURIComponent(name)}`)).text);
 }
 
 function tabs() {

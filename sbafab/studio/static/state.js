@@ -9,6 +9,7 @@ const DRAFT_DAYS = 14;
 export class Studio {
   constructor(started) {
     Object.assign(this, started);
+    this.given = started.text;
     this.name = null;
     this.text = "";
     this.savedText = "";
