@@ -18,6 +18,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.models import axial, elastic, lobes, paper, stacked
 from sbafab.models.actuator import NO_OUTLINE, Actuator, actuator
 from sbafab.models.choice import REACHED, STACK, WIDEST, chosen
+from sbafab.models.counterparts import counterpart
 from sbafab.models.drawn import flat_forces
 from sbafab.models.figures import (
     Asked,
@@ -89,9 +90,13 @@ def predict(
     found.sort(key=_place)
     known = together if isinstance(together, Stack) else None
     to_come = (STACK,) if quick and one.radii else ()
+    figures = chosen((item for item in found if isinstance(item, Figure)), to_come)
     return Prediction(
         wish,
-        chosen((item for item in found if isinstance(item, Figure)), to_come),
+        tuple(
+            replace(figure, measured=counterpart(one.form, figure.name, figure.model.name))
+            for figure in figures
+        ),
         () if quick else tuple(_relations(one, wish, known)),
         tuple(item for item in found if isinstance(item, LeftOut)),
     )

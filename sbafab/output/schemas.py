@@ -176,6 +176,20 @@ def _predict() -> dict[str, Any]:
         "description": "false where another model gives the same quantity, and that one is to "
         "design with",
     }
+    measured = table(
+        sentence=TEXT,
+        value=number(),
+        error={**number(), "description": "0 where the paper gives none"},
+        unit=TEXT,
+        actuator=TEXT,
+        source=TEXT,
+        model_gave={**number(), "description": "the same model for that actuator, in the unit"},
+    )
+    measured["type"] = ["object", "null"]
+    measured["description"] = (
+        "what the paper measured, where validation shows the model to be off by more than a "
+        "quarter of it"
+    )
     figure = table(
         group=TEXT,
         name=TEXT,
@@ -184,6 +198,7 @@ def _predict() -> dict[str, Any]:
         model=TEXT,
         trust=TEXT,
         design_with=design_with,
+        measured=measured,
     )
     curve = {"label": TEXT, "x": array(number()), "y": array(number())}
     relation = table(
@@ -202,6 +217,7 @@ def _predict() -> dict[str, Any]:
         design_sha256=TEXT,
         generator=TEXT,
         asked=asked,
+        verdict=array(table(quantity=TEXT, figure=TEXT, note=TEXT)),
         figures=array(figure),
         left_out=array(table(name=TEXT, reason=TEXT)),
         relations=array(relation),
