@@ -8,7 +8,7 @@ from pathlib import Path
 import sbafab
 from sbafab.assemblies.reading import load
 from sbafab.assemblies.records import Assembly
-from sbafab.cli.verdicts import counted
+from sbafab.rules.finding import counted
 from sbafab.design.records import Design
 from sbafab.design.templates import template_names, templates_folder
 from sbafab.errors import DesignError

@@ -22,7 +22,7 @@ def _measured(command: Wrapped) -> Wrapped:
     """Options for what was measured, in the order of the help."""
     options = (
         click.option(
-            "--leak", type=click.Choice(["pass", "fail"]), help="LabResult of the leak test."
+            "--leak", type=click.Choice(["pass", "fail"]), help="Result of the leak test."
         ),
         click.option(
             "--burst", type=PRESSURE.read, metavar="P", help="Pressure at which it burst, kPa."

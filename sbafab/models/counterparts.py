@@ -185,8 +185,8 @@ def _others() -> Iterator[Counterpart]:
         (THREE_DOF, paper.MODULUS_3DOF, 13.31, three, True),
     ):
         yield Counterpart(
-            r"lateral tip stiffness at \S+ kPa, .*", STACK, measured,
-            "of modulus in bending", actuator, value, "at 10 kPa, chambers shut", template, MODULUS, parallel,
+            r"lateral tip stiffness at \S+ kPa, .*", STACK, measured, "of modulus in bending",
+            actuator, value, "at 10 kPa, chambers shut", template, MODULUS, parallel,
         )  # fmt: skip
 
 

@@ -76,8 +76,7 @@ class Figure:
             "model": self.model.title,
             "trust": self.model.trust,
             "design_with": not self.other,
-            "measured": self.measured
-            and self.measured.as_dict(is_calibrated(self.model.name)),
+            "measured": self.measured and self.measured.as_dict(is_calibrated(self.model.name)),
         }
 
 

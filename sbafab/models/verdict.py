@@ -17,9 +17,7 @@ STROKES = ("full stroke", "free stroke at ", "reached diameter")
 BENDS = ("bend at ", "bend with one chamber")
 RADIUS = 2.5
 """Pocket radius in mm of the actuators whose forces were measured."""
-FULL = (
-    "as the paper measured on one actuator of d = 5, in proportion to d; its error is not known"
-)
+FULL = "as the paper measured on one actuator of d = 5, in proportion to d; its error is not known"
 
 
 class VerdictLine(NamedTuple):
