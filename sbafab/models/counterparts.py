@@ -219,6 +219,19 @@ def counterpart(form: Form, name: str, model: str) -> Counterpart | None:
     return _counterpart(name, model, form.is_parallel)
 
 
+def counterpart_of_column(form: Form, column: str) -> Counterpart | None:
+    """Return the same for a column of a sweep: "name [unit]" or "name, model [unit]"."""
+    figure = column.partition(" [")[0]
+    name, _, model = figure.rpartition(", ")
+    for row in COUNTERPARTS:
+        if row.parallel in (None, form.is_parallel) and (
+            re.fullmatch(row.figure, figure)
+            or (model.startswith(row.model) and re.fullmatch(row.figure, name))
+        ):
+            return row
+    return None
+
+
 def is_calibrated(model: str) -> bool:
     """Return True for the name of a model that took a factor measured by the user."""
     return FACTORS.search(model) is not None
