@@ -75,9 +75,11 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
     they are drawn flat.
     """
     from sbafab.actuators import build, load_design
+    from sbafab.cli.lines import print_wrapped
     from sbafab.cli.printing import shown_progress
     from sbafab.errors import DesignError, OutputError
     from sbafab.models.balloons import has_balloons
+    from sbafab.models.counterparts import counterparts_of_pose
     from sbafab.models.stack import stack
     from sbafab.reports.flat_picture import WHY, write_flat_picture
     from sbafab.reports.inflated_picture import MOVING, PictureWish, write_picture
@@ -126,6 +128,8 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
         f"written to {path}: {kpa} kPa, {held} ul, tip {shown.height:.2f} mm high, "
         f"bent {shown.bend:.1f} degrees"
     )
+    for row in counterparts_of_pose(len(shown.pressures)).values():
+        print_wrapped(f"({row.sentence()})")
 
 
 def _refuse_still(ending: str) -> None:

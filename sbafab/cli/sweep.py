@@ -131,8 +131,8 @@ def _print(wanted: SweepRequest, found: SweptDesigns) -> None:
         )
     if not wanted.all_columns:
         click.echo(
-            "columns: what was varied, asked for and binding; all of them with --all-columns, which "
-            "measures nothing anew"
+            "columns: what was varied, asked for and binding; --all-columns has all, and measures "
+            "nothing anew"
         )
     if "sweep.parquet" not in found.files:
         click.echo('for Parquet as well: pip install "sbafab[parquet]"')

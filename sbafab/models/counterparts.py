@@ -63,8 +63,14 @@ class Counterpart:
         at = f" {self.at}" if self.at else ""
         return (
             f"the paper measured {self.measured} {self.state} on its {self.actuator}; "
-            f"{by} gave {self.gave:.4g}{at}"
+            f"{by} gives it {self.gave:.4g}{at}"
         )
+
+    @property
+    def short(self) -> str:
+        """The same for a caption or a column."""
+        measured = f"{self.measured} {self.state}".rstrip(",")
+        return f"the paper's {self.actuator}: {measured}; this model gives it {self.gave:.4g}"
 
     def as_dict(self, is_calibrated: bool = False) -> dict[str, Any]:
         """Return the row for programs, its sentence first."""
@@ -217,6 +223,17 @@ def counterpart(form: Form, name: str, model: str) -> Counterpart | None:
     if model.startswith(FLAT_HEIGHT_OF_FILMS) and FACTORS.search(model):
         return None
     return _counterpart(name, model, form.is_parallel)
+
+
+def counterparts_of_pose(chambers: int) -> dict[str, Counterpart]:
+    """Return those of what a pose of the elastic stack shows: its "height", and of several chambers
+    its "bend".
+    """
+    wanted = {"height": ("free height at 10 kPa", BALLOON)}
+    if chambers > 1:
+        wanted["bend"] = ("bend at 10 kPa in one chamber, the others empty", STACK)
+    found = {what: _counterpart(*names, chambers > 1) for what, names in wanted.items()}
+    return {what: row for what, row in found.items() if row is not None}
 
 
 def counterpart_of_column(form: Form, column: str) -> Counterpart | None:

@@ -8,6 +8,7 @@ from sbafab.design.form import Form, Slots, Wrap
 from sbafab.design.records import Design
 from sbafab.laminate.extent import beyond_the_outline, outline_diameter, overall_diameter
 from sbafab.laminate.laminate import Laminate
+from sbafab.models.counterparts import FLAT_HEIGHT_OF_FILMS, counterpart
 
 
 def sizes(design: Design, laminate: Laminate) -> dict[str, float]:
@@ -88,3 +89,9 @@ def size_said(design: Design, laminate: Laminate) -> tuple[str, ...]:
     flat = "flat, " if design.form.wrap is not None else ""
     said.append(f"{flat}{found['width']:.2f} x {found['length']:.2f} mm")
     return (*said, f"folded height {laminate.thickness:.3f} mm")
+
+
+def height_aside(form: Form) -> str:
+    """What the paper measured beside the folded height, in parentheses: films flow in the press."""
+    row = counterpart(form, "deflated height", FLAT_HEIGHT_OF_FILMS)
+    return f"({row.sentence()})" if row else ""

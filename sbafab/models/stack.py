@@ -24,6 +24,7 @@ from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import BalloonMap, balloon_map
 from sbafab.models.chain import Chain, chain
+from sbafab.models.counterparts import counterparts_of_pose
 from sbafab.models.loads import Load, directed, outer_plate, three
 from sbafab.models.springs import RING, GapPlaces, Springs
 from sbafab.models.stack_balance import free, held
@@ -140,6 +141,12 @@ class Stack:
     def chambers(self) -> int:
         """How many chambers it has."""
         return len(self.axes)
+
+    @property
+    def counterparts(self) -> dict[str, str]:
+        """What the paper measured beside the "height" and the "bend" of a pose, a clause each."""
+        rows = counterparts_of_pose(self.chambers)
+        return {what: row.sentence() for what, row in rows.items()}
 
     @property
     def flat_height(self) -> float:

@@ -211,7 +211,7 @@ def test_what_equals_the_best_is_told_by_its_mass(monkeypatch: pytest.MonkeyPatc
         return Trial(values, figures, {} if with_rules else None, missed, 5.0, 10.0 + n)
 
     monkeypatch.setattr(module, "tried", flat)
-    requirements, goal = read_all(["stroke=4"], [], "width")
+    requirements, goal = read_all(["stroke@10kPa=4"], [], "width")
     free = (Free("stack.balloons", 2, 9, 1),)
     found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, free))
     assert found.best.values == {"stack.balloons": 4}
