@@ -152,12 +152,14 @@ def _refuse_for_one(design: Design) -> None:
     """Raises UsageError for an option that no model of the design takes."""
     from sbafab.design.form import Drawn
     from sbafab.models.balloons import has_balloons
+    from sbafab.models.drawn import model_form
 
+    form = model_form(design)
     of = f"and {design.name} has other ones; leave it out"
     refuse_given(f"is for an assembly, and {design.name} is one actuator; leave it out", "load_g")
-    if not has_balloons(design.form):
+    if not has_balloons(form):
         refuse_given(f"is for elastic balloons, round pockets on flat plates, {of}", *OF_ELASTIC)
-    if isinstance(design.form.pockets, Drawn):
+    if isinstance(form.pockets, Drawn):
         refuse_given(f"is for pockets that are round or oblong, {of}", *OF_FORMULAS)
 
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 NO_OUTLINE = "no model knows the form of a drawn pocket outline; simulate the design instead"
+"""Of a search, which compares designs by figures without bounds."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +61,11 @@ class Actuator:
         return self.form.wrap is None and self.form.stacks == stacks and set(self.radii) == {radius}
 
 
-def actuator(design: Design, laminate: Laminate, calibration: Factors) -> Actuator:
-    """The actuator of a design of any family."""
-    balloons, form = design.stack.balloons, design.form
+def actuator(
+    design: Design, laminate: Laminate, calibration: Factors, form: Form | None = None
+) -> Actuator:
+    """The actuator of a design of any family; ``form`` in place of its own, where one is given."""
+    balloons, form = design.stack.balloons, form or design.form
     radii: tuple[float, ...] = ()
     kinematics: tuple[Kinematics, ...] = ()
     full = full_height = 0.0

@@ -45,6 +45,7 @@ class Figure:
 
     ``other``: another model gives the same quantity, and that one is to design with.
     ``measured``: what the paper measured, where the model is off by more than a quarter of it.
+    ``between``: bounds of the value, where a drawn pocket is taken for a disc.
     """
 
     group: str
@@ -54,6 +55,7 @@ class Figure:
     model: Model
     other: bool = False
     measured: Counterpart | None = None
+    between: tuple[float, float] | None = None
 
     @property
     def counterpart(self) -> str:
@@ -64,8 +66,13 @@ class Figure:
 
     @property
     def aside(self) -> str:
-        """The same in parentheses."""
-        return f"({self.counterpart})" if self.measured else ""
+        """The same in parentheses, after the bounds where it has any."""
+        bounds = ""
+        if self.between is not None:
+            low, high = self.between
+            bounds = f"(between {low:.4g} and {high:.4g} {self.unit} by discs within and round it)"
+        measured = f"({self.counterpart})" if self.measured else ""
+        return f"{bounds} {measured}".strip()
 
     def as_dict(self) -> dict[str, Any]:
         return {
@@ -77,6 +84,7 @@ class Figure:
             "trust": self.model.trust,
             "design_with": not self.other,
             "measured": self.measured and self.measured.as_dict(is_calibrated(self.model.name)),
+            "between": self.between and [_rounded(end) for end in self.between],
         }
 
 

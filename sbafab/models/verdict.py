@@ -51,6 +51,7 @@ def _main(found: Prediction) -> Iterator[tuple[str, Figure]]:
             yield "bend", bend[0]
             break
     flat = [one for one in figures if one.name.startswith("blocked force") and ", flat" in one.name]
+    flat = [one for one in flat if not one.name.endswith("at most")] or flat
     if flat:
         # Of the highest pressure that was asked for.
         at = f"at {max(found.asked.pressures_kpa):g} kPa"
@@ -67,11 +68,11 @@ def _shown(one: Figure) -> str:
 
 def _note(one: Figure) -> str:
     """The measured counterpart, else the interval that measurements give, else the trust."""
-    if one.aside:
+    if one.measured or one.between:
         return one.aside
     if one.model.name.startswith("the paper's full height"):
         return FULL
-    if one.model.name == EQ_4:
+    if one.model.name.startswith(EQ_4):
         low, high = eq_4_ratios()
         return (
             f"{low * one.value:.3g} to {high * one.value:.3g} N by the paper's six forces at "

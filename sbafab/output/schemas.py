@@ -190,6 +190,11 @@ def _predict() -> dict[str, Any]:
         "what the paper measured, where validation shows the model to be off by more than a "
         "quarter of it"
     )
+    between = {
+        **array(number()),
+        "type": ["array", "null"],
+        "description": "bounds of a drawn pocket that is taken for a disc",
+    }
     figure = table(
         group=TEXT,
         name=TEXT,
@@ -199,6 +204,7 @@ def _predict() -> dict[str, Any]:
         trust=TEXT,
         design_with=design_with,
         measured=measured,
+        between=between,
     )
     curve = {"label": TEXT, "x": array(number()), "y": array(number())}
     relation = table(

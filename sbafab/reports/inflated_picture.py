@@ -227,6 +227,8 @@ def _caption(laminate: Laminate, pose: Pose, moving: bool) -> tuple[str, ...]:
     """What is shown; above it what the paper measured beside a bend or height by the model."""
     pressures = ", ".join(f"{p:.3g}" for p in pose.pressures)
     model = "elastic stack" + (", ears snipped off" if laminate.registration == "ears" else "")
+    if any(note.startswith("drawn outline") for note in laminate.notes):
+        model += ", drawn pockets as discs"
     if moving:
         return (f"{laminate.name}, {model}",)
     what = "bend" if pose.bend > 0.5 else "height"
