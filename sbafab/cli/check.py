@@ -127,15 +127,12 @@ def _print(told: Told, advice: Advice | None, verbose: bool) -> None:
     from sbafab.cli.printing import FILES, print_failed, print_listed
     from sbafab.cli.verdicts import print_findings, verdict_said
     from sbafab.design.kits import cited
-    from sbafab.models.sizes import height_aside
 
     out = console()
     if told.kind == "as-built":
         out.print(f"as built: {told.name}", markup=False, soft_wrap=True)
     for name, phrases in told.sizes_said.items():
         print_listed(f"{name}, size" if len(told.sizes_said) > 1 else "size", phrases)
-    for said in dict.fromkeys(height_aside(one.form) for one in told.designs if told.sizes_said):
-        print_wrapped(said, indent="      ")
     # The paper's kit is what everyone has; one's own is told of.
     kits = [cited(design) for design in told.designs if verbose or design.kit != PAPER]
     for said in dict.fromkeys(kits):

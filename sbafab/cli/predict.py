@@ -100,14 +100,13 @@ def predict(
     the screen.
     """
     from sbafab.assemblies.loading import load
-    from sbafab.cli.lines import print_wrapped
     from sbafab.cli.printing import print_json, print_listed, shown_progress
     from sbafab.cli.printing_prediction import print_prediction
     from sbafab.design.records import Design
     from sbafab.errors import OutputError
     from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict as predicted
-    from sbafab.models.sizes import height_aside, size_said
+    from sbafab.models.sizes import size_said
     from sbafab.output.earlier import PREDICTION
     from sbafab.output.predicting import prediction_json, with_prediction
     from sbafab.output.run import Extras, generate
@@ -135,7 +134,6 @@ def predict(
         print_json({**prediction_json(design, found), "failed": failed, "folder": str(run.folder)})
     else:
         print_listed("size", size_said(design, run.laminate))
-        print_wrapped(height_aside(design.form), indent="      ")
         print_prediction(found, verbose)
         if not run.failed:
             click.echo(f"written to {run.folder}: predict.json, predict/")

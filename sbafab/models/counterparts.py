@@ -72,6 +72,11 @@ class Counterpart:
         measured = f"{self.measured} {self.state}".rstrip(",")
         return f"the paper's {self.actuator}: {measured}; this model gives it {self.gave:.4g}"
 
+    @property
+    def brief(self) -> str:
+        """The same in parentheses, for a line of sizes."""
+        return f"(paper's {self.actuator} {self.measured.value:g}, not {self.gave:.4g})"
+
     def as_dict(self, is_calibrated: bool = False) -> dict[str, Any]:
         """Return the row for programs, its sentence first."""
         return {

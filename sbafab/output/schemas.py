@@ -176,15 +176,7 @@ def _predict() -> dict[str, Any]:
         "description": "false where another model gives the same quantity, and that one is to "
         "design with",
     }
-    measured = table(
-        sentence=TEXT,
-        value=number(),
-        error={**number(), "description": "0 where the paper gives none"},
-        unit=TEXT,
-        actuator=TEXT,
-        source=TEXT,
-        model_gave={**number(), "description": "the same model for that actuator, in the unit"},
-    )
+    measured = _counterpart()
     measured["type"] = ["object", "null"]
     measured["description"] = (
         "what the paper measured, where validation shows the model to be off by more than a "
@@ -231,11 +223,23 @@ def _predict() -> dict[str, Any]:
     return and_perhaps(found, failed=array(TEXT), folder=TEXT)
 
 
+def _counterpart() -> dict[str, Any]:
+    return table(
+        sentence=TEXT,
+        value=number(),
+        error={**number(), "description": "0 where the paper gives none"},
+        unit=TEXT,
+        actuator=TEXT,
+        source=TEXT,
+        model_gave={**number(), "description": "the same model for that actuator, in the unit"},
+    )
+
+
 def _find() -> dict[str, Any]:
     figures = {"type": "object", "additionalProperties": number()}
     shown = table(
         keys={"type": "object", "description": "keys of the design that were found"},
-        figures={**figures, "description": "quantities in mm, N, g, kPa, ul, s or a share"},
+        figures={**figures, "description": "quantities in mm, deg, N, g or a share"},
     )
     return table(
         schema={"const": FIND_SCHEMA},
@@ -245,6 +249,13 @@ def _find() -> dict[str, Any]:
         tries=COUNT,
         is_cut_short={"type": "boolean", "description": "whether more tries might lead further"},
         best=shown,
+        full_stroke={**number("null"), "description": "mm, of the best, as predict has it"},
+        measured={
+            "type": "object",
+            "description": "what the paper measured, by quantity, where the model is off by more "
+            "than a quarter of it",
+            "additionalProperties": _counterpart(),
+        },
         missed=array(TEXT),
         binds=array(table(key=TEXT, value={}, breaks=TEXT)),
         range_ends=array(table(key=TEXT, value={}, low=number(), high=number())),

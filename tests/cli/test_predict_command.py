@@ -26,7 +26,7 @@ def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, 
 def test_writes_figures_and_plots_that_the_manifest_lists(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code, out, _ = run(["3dof-15mm", "-o", str(tmp_path), "--volume", "5"], capsys)
+    code, out, _ = run(["3dof-15mm", "-v", "-o", str(tmp_path), "--volume", "5"], capsys)
     assert code == 0
     assert "0.9353  s" in out
     _table_reads_well(out)

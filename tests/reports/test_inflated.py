@@ -184,9 +184,13 @@ def test_what_no_model_inflates_is_drawn_flat_and_said_to_be(name: str, tmp_path
         path = tmp_path / f"shown{ending}"
         result = CliRunner().invoke(app, [*arguments, str(path), *wide])
         assert result.exit_code == 0, result.output
-        assert f"{name}, flat, for no model inflates pockets" in result.output
+        assert f"{name}, flat, not inflated: no model inflates pockets" in result.output
     with Image.open(tmp_path / "shown.png") as image:
         assert image.size == (160, 128)
+    # Unnamed, it is named as what it is.
+    with CliRunner().isolated_filesystem(tmp_path) as folder:
+        assert CliRunner().invoke(app, [*arguments[:-1], "--width", "160"]).exit_code == 0
+        assert [file.name for file in Path(folder).iterdir()] == [f"{name}-flat.png"]
     mesh = trimesh.load(tmp_path / "shown.glb", force="mesh")
     laminate = sbafab.build(design, "stack.balloons=1")
     assert isinstance(mesh, trimesh.Trimesh)
