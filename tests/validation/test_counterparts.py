@@ -102,10 +102,10 @@ def _far_off(found: Prediction) -> Iterator[Figure]:
     parallel = any(figure.group == "bending" for figure in found.figures)
     for figure in found.figures:
         for row in COUNTERPARTS:
-            if row.parallel in (None, parallel) and figure.model.name.startswith(row.model):
-                if re.fullmatch(row.figure, figure.name):
-                    yield figure
-                    break
+            is_its = row.parallel in (None, parallel) and figure.model.name.startswith(row.model)
+            if is_its and re.fullmatch(row.figure, figure.name):
+                yield figure
+                break
 
 
 @pytest.mark.parametrize("name", MADE)
@@ -149,9 +149,8 @@ def test_predict_prints_them_below_their_figures(
     assert len(short.splitlines()) < 30
     written = json.loads((tmp_path / "3dof-15mm" / "predict.json").read_text(encoding="utf-8"))
     asides = sum(figure["measured"] is not None for figure in written["figures"])
-    assert (
-        _joined(out.partition("Figures to design with")[2]).count("(the paper measured") == asides
-    )
+    figures = _joined(out.partition("Figures to design with")[2])
+    assert figures.count("(the paper measured") == asides
     assert asides == len(list(_far_off(predictions["3dof-15mm"])))
 
 
