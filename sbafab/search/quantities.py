@@ -295,13 +295,15 @@ class Subject:
                 return first.largest_stroke - stroke
             return form.pushing * float(force(kpa, first.rate(stroke)))
         kinds = balloons_of(self.design, self.laminate)
-        free = self._stroke(kpa)
-        if stroke > free:
+        push = float(blocked(self._stack, kpa, stroke))
+        if push <= 0:
+            maps = self._stack.maps
+            free = sum(float(maps[level].free_height(kpa)) for level in self._stack.levels)
             # How far it is from getting there, in the force of so much of it.
             least = min(kind.pocket for kind in kinds)
-            return -kpa / 1000 * math.pi * least**2 * (stroke / max(free, 1e-6) - 1)
+            return -kpa / 1000 * math.pi * least**2 * max(stroke / max(free, 1e-6) - 1, 0.0)
         _refuse_stretched(kinds, kpa, stroke)
-        return form.pushing * float(blocked(self._stack, kpa, stroke))
+        return form.pushing * push
 
     def counterpart(self, quantity: AskedQuantity) -> Counterpart | None:
         """What the paper measured beside a quantity whose model is off by more than a quarter."""
@@ -344,9 +346,6 @@ def free_height(kind: Balloon, kpa: float) -> float:
 def _refuse_stretched(kinds: Sequence[Balloon], kpa: float, stroke: float) -> None:
     """Raises DesignError where a film would be stretched too far at a stroke in mm."""
     for kind in dict.fromkeys(kinds):
-        if float(stretch(kind, risen(kind, [kpa]))[0]) <= MOST_STRETCH:
-            # Held lower it is stretched less.
-            continue
         height = stroke * kind.pocket / sum(one.pocket for one in kinds)
         longer = float(stretch(kind, pressed(kind, [kpa], [max(height, 1e-3)]))[0])
         if longer > MOST_STRETCH:
