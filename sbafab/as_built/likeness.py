@@ -91,8 +91,25 @@ def _json_difference(found: Path, meant: Path) -> str:
 
 
 def _table_difference(found: Path, meant: Path) -> str:
+    """Where two tables differ, by row and column; rows are counted below the columns' names."""
     own, wanted = ([*csv.reader(_text(path).splitlines(True))] for path in (found, meant))
-    return _value_difference(own, wanted, "row ")
+    if own[:1] != wanted[:1]:
+        names, others = (", ".join(row) for table in (own, wanted) for row in table[:1] or [[]])
+        return f"its columns are {_shown(names)}, not {_shown(others)}"
+    if len(own) != len(wanted):
+        return f"it has {_rows(len(own) - 1)}, not {len(wanted) - 1}"
+    for number, (row, other) in enumerate(zip(own[1:], wanted[1:], strict=True), start=1):
+        if len(row) != len(other):
+            return f"row {number} has {len(row)} cells, not {len(other)}"
+        for name, cell, meant_cell in zip(wanted[0], row, other, strict=True):
+            said = _value_difference(cell, meant_cell, f"row {number}, column {name}")
+            if said:
+                return said
+    return ""
+
+
+def _rows(count: int) -> str:
+    return f"{count} row{'' if count == 1 else 's'}"
 
 
 def _value_difference(found: Any, meant: Any, where: str) -> str:

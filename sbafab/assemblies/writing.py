@@ -8,7 +8,7 @@ from typing import Any
 
 from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.records import Assembly
-from sbafab.design.writing import design_sha256
+from sbafab.design.writing import actuator_sha256, design_sha256
 
 DESIGN_FILE = "design.toml"
 
@@ -51,6 +51,20 @@ def assembly_sha256(assembled: Assembled) -> str:
     table = resolved(assembled)
     digests = {made.design.name: design_sha256(made.design) for made in assembled.designs}
     text = json.dumps([table, digests], sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def assembled_sha256(assembled: Assembled) -> str:
+    """Return the hash of what the assembly is: parts, places, glue, and the actuators among them.
+
+    Left out are name, order, pose of the pictures, notes and limits.
+    """
+    parts = {}
+    for name, part in resolved(assembled)["parts"].items():
+        made = assembled[name].made
+        actuator = {} if made is None else {"design": actuator_sha256(made.design)}
+        parts[name] = {**part, **actuator, "note": None}
+    text = json.dumps(parts, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

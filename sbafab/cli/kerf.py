@@ -10,7 +10,9 @@ import click
 from sbafab.cli.options import finite, json_option
 
 if TYPE_CHECKING:
-    from sbafab.cutting.calibration import Calibration, Estimate, Value
+    from collections.abc import Sequence
+
+    from sbafab.cutting.calibration import Calibration, Estimate, Measurement, Value
 
 
 @click.command()
@@ -24,13 +26,17 @@ if TYPE_CHECKING:
     help="The film that the coupon was cut from: tpe, ptfe or a further one of a kit.",
 )
 @click.option(
+    "--instrument",
+    type=click.Choice(["calliper", "scanner", "microscope"]),
+    help="What the sizes were measured with, unless a column of that name says so.",
+)
+@click.option(
     "--resolution",
     type=click.FloatRange(0, 1),
     callback=finite,
-    default=0.01,
-    show_default=True,
     metavar="MM",
-    help="The least step that the instrument shows.",
+    help="The least step that the instrument shows.  [default: calliper 0.01, scanner 0.0106 (2400 "
+    "dpi), microscope 0.001]",
 )
 @click.option(
     "--split-xy/--no-split-xy",
@@ -39,11 +45,18 @@ if TYPE_CHECKING:
 )
 @json_option
 def kerf(
-    measurements: Path, material: str, resolution: float, split_xy: bool | None, as_json: bool
+    measurements: Path,
+    material: str,
+    instrument: str | None,
+    resolution: float | None,
+    split_xy: bool | None,
+    as_json: bool,
 ) -> None:
     """Compute the kerf from a filled coupon.csv.
 
-    `sbafab new coupon` writes the piece to cut and the table to fill in.
+    `sbafab new coupon` writes the piece to cut and the table to fill in. A scan or a microscope
+    reads thin film better than a calliper, which bends it. A constant reading error and a scale are
+    told apart from kerf.
     """
     from sbafab.cli.printing import print_json
     from sbafab.cutting.calibration import calibrated
@@ -51,11 +64,13 @@ def kerf(
     from sbafab.errors import DesignError
     from sbafab.output.printed import KERF_SCHEMA
 
-    found = calibrated(read_measurements(measurements), resolution)
+    sizes = read_measurements(measurements, instrument or "")
+    found = calibrated(sizes, resolution)
     if split_xy and (found.x is None or found.y is None):
         raise DesignError("--split-xy needs two sizes along x and two along y; fill in more rows")
     widths = _widths(found, split_xy)
     warnings = _warnings(found, widths)
+    remarks = [_remark(found, widths), *_readings(found.overall), *_touched(sizes)]
     block = _to_paste(*_place_in_design(material), widths, warnings)
     if as_json:
         print_json(
@@ -67,6 +82,7 @@ def kerf(
                 "difference": found.difference and found.difference._asdict(),
                 "differs": found.differs,
                 "warnings": warnings,
+                "remarks": remarks,
                 "toml": block,
             }
         )
@@ -74,7 +90,8 @@ def kerf(
     for name, estimate in (("all", found.overall), ("along x", found.x), ("along y", found.y)):
         if estimate is not None:
             click.echo(f"{name:8} kerf {_told(estimate.kerf)}, from {estimate.count} sizes")
-    click.echo(_remark(found, widths))
+    for remark in remarks:
+        click.echo(remark)
     for warning in warnings:
         click.echo(f"warning: {warning}")
     click.echo(
@@ -103,6 +120,7 @@ def _as_dict(estimate: Estimate | None) -> dict[str, object] | None:
         "kerf": estimate.kerf._asdict(),
         "scale": estimate.scale and estimate.scale._asdict(),
         "scaled": estimate.is_scaled,
+        "offsets": {name: offset._asdict() for name, offset in estimate.offsets.items()},
         "count": estimate.count,
     }
 
@@ -159,7 +177,7 @@ def _warnings(found: Calibration, widths: Widths) -> list[str]:
             "a design takes no pair of which one is over ten times the other; measure again, or "
             "take --no-split-xy"
         )
-    return [*told, *_off_scale(found)]
+    return [*told, *_not_told(found, widths), *_off_scale(found)]
 
 
 def _vague(estimate: Estimate, place: str) -> str:
@@ -171,22 +189,56 @@ def _vague(estimate: Estimate, place: str) -> str:
     )
 
 
+def _not_told(found: Calibration, widths: Widths) -> list[str]:
+    """What these sizes cannot tell from kerf."""
+    if all(estimate.offsets for estimate in widths):
+        return []
+    along = " along each axis" if len(widths) == 2 else ""
+    return [
+        f"these sizes cannot tell a constant reading error from kerf, which is taken to be none; "
+        f"measure outsides and windows, three sizes or more{along}"
+    ]
+
+
 def _off_scale(found: Calibration) -> list[str]:
-    """How to set the laser where sizes scale: along x or y where one of them tells, else both."""
+    """What sizes that scale may come of: along x or y where one of them tells, else both."""
     axes = [(" along x", found.x), (" along y", found.y)]
-    along = [_steps(estimate, where) for where, estimate in axes if estimate and estimate.is_scaled]
+    along = [
+        _scaled(estimate, where) for where, estimate in axes if estimate and estimate.is_scaled
+    ]
     if along or not found.overall.is_scaled:
         return along
-    return [_steps(found.overall, "")]
+    return [_scaled(found.overall, "")]
 
 
-def _steps(estimate: Estimate, where: str) -> str:
+def _scaled(estimate: Estimate, where: str) -> str:
     assert estimate.scale is not None
     scale = estimate.scale.value
     low, high = estimate.scale.interval
     return (
-        f"outers and windows disagree{where}: sizes are {scale:.4f} times what was drawn, 95 % "
-        f"interval {low:.4f} to {high:.4f}, which kerf does not explain and no cut file corrects; "
-        f"set the laser to {1 / scale:.4f} times its present steps per mm{where} and cut the "
-        "coupon again (if that changes nothing, the film shrank or the instrument is off)"
+        f"sizes{where} are {scale:.4f} times what was drawn, 95 % interval {low:.4f} to "
+        f"{high:.4f}, besides kerf and a constant reading error: laser, film or instrument, which "
+        "the coupon cannot tell and no cut file corrects; leave the laser as it is until a gauge "
+        "of known length reads right with this instrument and a second coupon shows the same"
     )
+
+
+def _readings(estimate: Estimate) -> list[str]:
+    """What each instrument reads too much or too little, where that is sure."""
+    return [
+        f"the {name or 'instrument'} reads {abs(offset.value):.4f} mm too "
+        f"{'much' if offset.value > 0 else 'little'} (95 % interval {offset.interval[0]:+.4f} to "
+        f"{offset.interval[1]:+.4f}), which the kerf is corrected for"
+        for name, offset in estimate.offsets.items()
+        if offset.differs_from(0.0)
+    ]
+
+
+def _touched(sizes: Sequence[Measurement]) -> list[str]:
+    """What jaws do to film that no fit can see."""
+    if not {size.instrument for size in sizes} & {"", "calliper"}:
+        return []
+    return [
+        "a calliper's jaws press thin film in: outsides then read small and windows large, which "
+        "no table can tell from kerf; a scan or a microscope touches nothing (--instrument)"
+    ]

@@ -13,7 +13,7 @@ from sbafab.output.printed import RECORDS_SCHEMA, REPORT_SCHEMA
 
 if TYPE_CHECKING:
     from sbafab.results.records import Build, Record
-    from sbafab.results.report import Comparison, Report
+    from sbafab.results.report import Comparison, Promise, Report
     from sbafab.rules.registration_yield import Share
 
 
@@ -34,6 +34,7 @@ def print_records(
         told = [
             {**record.as_dict(), "design": builds[record.design_sha256].name}
             | {"corrected_by": newer.get(record.id)}
+            | {"actuator_sha256": builds[record.design_sha256].actuator}
             for record in shown
         ]
         print_json({"schema": RECORDS_SCHEMA, "records": told})
@@ -48,6 +49,7 @@ def _line(record: Record, design: str, newer: int | None) -> str:
     told = [f"{name} {value}" for name, value in record.once.items()]
     told += [f"{name} {' '.join(f'{v:g}' for v in found)}" for name, found in record.errors.items()]
     told += [record.note] if record.note else []
+    told += [f"attempt {record.attempt}"] if record.attempt > 1 else []
     told += [f"corrects {record.corrects}"] if record.corrects is not None else []
     told += ["withdrawn"] if record.withdrawn else []
     told += [f"corrected by {newer}"] if newer is not None else []
@@ -64,8 +66,8 @@ def print_report(report: Report, as_json: bool) -> None:
         return
     click.echo(f"actuators: {report.items}, records: {report.records}")
     _print_table(
-        "Success: leak test passed, with Wilson's interval of 95 %",
-        ("by", "", "passed", "share", "interval"),
+        "Success: leak test passed at the first attempt, with Wilson's interval of 95 %",
+        ("by", "", "passed", "share", "interval", "passed later"),
         (
             (
                 s.by,
@@ -73,6 +75,7 @@ def print_report(report: Report, as_json: bool) -> None:
                 f"{s.share.good} of {s.share.builds}",
                 f"{s.share.value:.1%}",
                 _range(s.share),
+                str(s.passed_later or ""),
             )
             for s in report.success
         ),
@@ -103,15 +106,17 @@ def print_report(report: Report, as_json: bool) -> None:
     )
     _print_table(
         "Success against registration-yield, the share of builds that keep every limit",
-        ("design", "passed", "interval", "yield", ""),
+        ("design", "passed", "interval", "as stated", "as measured", ""),
         (
             (
                 *(p.design, f"{p.success.good} of {p.success.builds}"),
-                *(_range(p.success), f"{p.promised:.1%}", p.verdict),
+                *(_range(p.success), f"{p.promised:.1%}", _measured(p), p.verdict),
             )
             for p in report.promises
         ),
     )
+    for sentence in report.contradictions:
+        click.echo(f"\nwarning: {sentence}")
     for advice in _advice(report):
         click.echo(f"\n{advice}")
 
@@ -119,6 +124,12 @@ def print_report(report: Report, as_json: bool) -> None:
 def _range(share: Share) -> str:
     low, high = share.interval
     return f"{low:.1%} to {high:.1%}"
+
+
+def _measured(promise: Promise) -> str:
+    if promise.measured is None:
+        return ""
+    return f"{promise.measured.low:.1%} to {promise.measured.high:.1%}"
 
 
 def _mean(found: Comparison) -> str:

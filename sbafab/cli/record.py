@@ -71,6 +71,9 @@ def _measured(command: Wrapped) -> Wrapped:
     metavar="CSV",
     help="A row an actuator, instead of --serial and what follows it.",
 )
+@click.option(
+    "--again", is_flag=True, help="A new attempt: the actuator was mended and tested again."
+)
 @click.option("--correct", type=int, metavar="N", help="Add a record that corrects record N.")
 @click.option("--withdraw", is_flag=True, help="With --correct: record N should not be there.")
 @click.option("--find", metavar="TEXT", help="Show records: a serial, a design, a scanned code.")
@@ -129,6 +132,8 @@ def _one_task(design: str | None, said: Mapping[str, Any]) -> None:
         raise click.UsageError("give either DESIGN, --correct, --find or --report")
     if not asked and design is None:
         raise click.UsageError("name the DESIGN that was built, or give --find or --report")
+    if said["again"] and asked:
+        raise click.UsageError("--again goes with DESIGN, --serial and what came out this time")
     if said["withdraw"] and said["correct"] is None:
         raise click.UsageError("--withdraw goes with --correct N")
     is_said = not _result(said).is_empty or said["operator"] or said["kit"]
@@ -183,4 +188,4 @@ def _recorded(
             raise click.UsageError("give --serial, the actuator's number on its traveller")
         if results[0].is_empty:
             raise click.UsageError("say what came out, such as --leak pass or --note TEXT")
-    return record_results(store, built_from(source, assignments), results)
+    return record_results(store, built_from(source, assignments), results, said["again"])

@@ -1,17 +1,22 @@
 """The kerf from what was measured on the calibration piece, with its uncertainty.
 
-An outside comes out smaller by the kerf, a window larger. Uncertainties follow the usual guide to
-their expression: scatter and the instrument's resolution in quadrature, Student's t for the
-interval.
+An outside comes out smaller by the kerf, a window larger; a constant reading error makes both
+larger, and a scale both in proportion. So all three are fitted together, by least squares of
+measured = scale * nominal -/+ kerf + offset, as far as the sizes tell them apart. What no size
+tells from kerf is an instrument that reads outsides too small and windows too large.
+
+Uncertainties follow the usual guide to their expression: scatter and what rounding leaves in
+quadrature, Student's t for the interval.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from statistics import mean, median, stdev
-from typing import Literal, NamedTuple
+from functools import cache
+from statistics import median
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from sbafab.errors import DesignError
 
@@ -28,6 +33,17 @@ MOST_SUSPECTS = 20
 WIDEST = 0.05
 """mm; half the largest error of laser cutting: a kerf known no better deserves a warning."""
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+SAME_COLUMN = 1e-6
+"""Singular values of columns of length 1, below which the sizes do not tell two causes apart."""
+FREE = 4
+"""Degrees of freedom that a difference between x and y must leave: Student's t is 2.8 there."""
+RESOLUTIONS = {"calliper": 0.01, "scanner": 25.4 / 2400, "microscope": 0.001}
+"""mm: the least step of an instrument, of a scanner that of 2400 dots an inch."""
+UNNAMED = RESOLUTIONS["calliper"]
+"""mm, of an instrument that nobody named."""
 Kind = Literal["outer", "window"]
 Axis = Literal["x", "y"]
 
@@ -41,12 +57,22 @@ class Measurement:
     nominal: float
     measured: float
     where: str = field(default="", compare=False)
+    instrument: str = ""
+
+    @property
+    def sign(self) -> int:
+        """By which the kerf counts in the size: -1 of an outside, 1 of a window."""
+        return -1 if self.kind == "outer" else 1
+
+    @property
+    def along_x(self) -> int:
+        """1 along x, -1 along y."""
+        return 1 if self.axis == "x" else -1
 
     @property
     def kerf(self) -> float:
         """What this size alone says of the kerf."""
-        lost = self.nominal - self.measured
-        return lost if self.kind == "outer" else -lost
+        return self.sign * (self.measured - self.nominal)
 
     def __str__(self) -> str:
         place = f"{self.where}: " if self.where else ""
@@ -76,15 +102,22 @@ class Value(NamedTuple):
 
 @dataclass(frozen=True)
 class Estimate:
-    """The kerf in mm from ``count`` sizes.
+    """The kerf in mm from ``count`` sizes, fitted together with what else they tell.
 
-    ``scale``: measured over nominal size apart from kerf, None where the sizes cannot tell.
-    Where it differs from 1, the kerf is the one fitted with it; else the mean.
+    ``offsets``: what each instrument reads too much, mm, by its name; empty where the sizes cannot
+    tell, which takes it as 0. ``scale``: measured over nominal size apart from both; None where the
+    sizes cannot tell, which takes it as 1. Both are means of x and y; ``kerf_along_x`` mm and
+    ``scale_along_x``, a ratio, are what they are more along x, and less along y. ``degrees`` of
+    freedom are left.
     """
 
     kerf: Value
     scale: Value | None
+    offsets: Mapping[str, Value]
     count: int
+    degrees: int
+    kerf_along_x: float = 0.0
+    scale_along_x: float = 0.0
 
     @property
     def is_scaled(self) -> bool:
@@ -98,9 +131,11 @@ class Estimate:
 
     def gap(self, size: Measurement) -> float:
         """How far a size lies from what kerf and scale say it should be."""
-        scale = self.scale.value if self.is_scaled and self.scale is not None else 1.0
-        sign = -1 if size.kind == "outer" else 1
-        return abs(size.measured - scale * size.nominal - sign * self.kerf.value)
+        scale = 1.0 if self.scale is None else self.scale.value
+        scale += size.along_x * self.scale_along_x
+        kerf = self.kerf.value + size.along_x * self.kerf_along_x
+        offset = self.offsets[size.instrument].value if self.offsets else 0.0
+        return abs(size.measured - scale * size.nominal - size.sign * kerf - offset)
 
 
 @dataclass(frozen=True)
@@ -121,11 +156,15 @@ class Calibration:
         return self.difference is not None and self.difference.differs_from(0.0)
 
 
-def calibrated(measurements: Sequence[Measurement], resolution: float) -> Calibration:
+def calibrated(measurements: Sequence[Measurement], resolution: float | None = None) -> Calibration:
     """The kerf from two sizes or more; ``resolution`` in mm is the instrument's least step.
 
-    Raises DesignError where there are fewer, where one of them is a slip, or where no beam cuts so.
+    By default it is that of RESOLUTIONS, the coarsest where several were used. Raises DesignError
+    where there are fewer sizes, where one of them is a slip, or where no beam cuts so.
     """
+    if resolution is None:
+        steps = [RESOLUTIONS.get(size.instrument, UNNAMED) for size in measurements]
+        resolution = max(steps, default=UNNAMED)
     _refuse_a_slip(measurements, resolution)
     overall = _estimate(measurements, resolution)
     along = {axis: [m for m in measurements if m.axis == axis] for axis in ("x", "y")}
@@ -133,7 +172,7 @@ def calibrated(measurements: Sequence[Measurement], resolution: float) -> Calibr
         return Calibration(overall, None, None, None)
     x, y = (_estimate(along[axis], resolution, f" along {axis}") for axis in ("x", "y"))
     uncertainty = math.hypot(x.kerf.uncertainty, y.kerf.uncertainty)
-    degrees = min(x.count, y.count) - 1
+    degrees = min(x.degrees, y.degrees)
     difference = Value(x.kerf.value - y.kerf.value, uncertainty, student_t(degrees) * uncertainty)
     return Calibration(overall, x, y, difference)
 
@@ -143,7 +182,7 @@ def _estimate(measurements: Sequence[Measurement], resolution: float, where: str
         raise DesignError(
             f"sizes measured{where}: {len(measurements)}, and a kerf needs 2; fill in more rows"
         )
-    found = _found(measurements, resolution)
+    found = _fitted(measurements, resolution)
     if _is_other_unit(found):
         assert found.scale is not None
         raise DesignError(
@@ -165,15 +204,6 @@ def _estimate(measurements: Sequence[Measurement], resolution: float, where: str
     return found
 
 
-def _found(measurements: Sequence[Measurement], resolution: float) -> Estimate:
-    """Kerf and scale as they come, likely or not."""
-    scale, fitted = _fitted(measurements, resolution)
-    found = Estimate(_mean(measurements, resolution), scale, len(measurements))
-    if found.is_scaled and fitted is not None:
-        return Estimate(fitted, scale, len(measurements))
-    return found
-
-
 def _is_other_unit(found: Estimate) -> bool:
     return found.scale is not None and abs(found.scale.value - 1) > WORST_SCALE
 
@@ -190,7 +220,9 @@ def _refuse_a_slip(measurements: Sequence[Measurement], resolution: float) -> No
     told: list[tuple[float, float, Measurement]] = []
     for suspect in by_distance[:MOST_SUSPECTS]:
         others = [m for m in measurements if m is not suspect]
-        found = _found(others, resolution)
+        if suspect.instrument not in {size.instrument for size in others}:
+            continue
+        found = _fitted(others, resolution)
         spread = max(map(found.gap, others))
         is_sound = 0 <= found.kerf.value <= LARGEST and not _is_other_unit(found)
         if is_sound and spread <= LARGEST_SLIP < found.gap(suspect):
@@ -203,43 +235,79 @@ def _refuse_a_slip(measurements: Sequence[Measurement], resolution: float) -> No
         )
 
 
-def _mean(measurements: Sequence[Measurement], resolution: float) -> Value:
-    """The mean of what the sizes say one by one."""
-    kerfs = [m.kerf for m in measurements]
-    count = len(kerfs)
-    scatter = stdev(kerfs) / math.sqrt(count)
-    uncertainty = math.hypot(scatter, resolution / math.sqrt(12))
-    return Value(mean(kerfs), uncertainty, student_t(count - 1) * uncertainty)
+def _fitted(measurements: Sequence[Measurement], resolution: float) -> Estimate:
+    """Kerf, offsets and scale by least squares, likely or not; from two sizes or more."""
+    import numpy as np
 
-
-def _fitted(
-    measurements: Sequence[Measurement], resolution: float
-) -> tuple[Value, Value] | tuple[None, None]:
-    """Scale and kerf by least squares of measured = scale * nominal -/+ kerf."""
-    signs = [-1.0 if m.kind == "outer" else 1.0 for m in measurements]
-    sizes = [m.nominal for m in measurements]
+    instruments = sorted({size.instrument for size in measurements})
     count = len(measurements)
-    squares = math.fsum(size * size for size in sizes)
-    mixed = math.fsum(size * sign for size, sign in zip(sizes, signs, strict=True))
-    determinant = squares * count - mixed * mixed
-    if count < 3 or determinant < 1e-9 * squares * count:
-        return None, None
-    to_size = math.fsum(m.nominal * m.measured for m in measurements)
-    to_sign = math.fsum(sign * m.measured for sign, m in zip(signs, measurements, strict=True))
-    scale = (count * to_size - mixed * to_sign) / determinant
-    kerf = (squares * to_sign - mixed * to_size) / determinant
-    rest = math.fsum(
-        (m.measured - scale * m.nominal - sign * kerf) ** 2
-        for sign, m in zip(signs, measurements, strict=True)
-    )
+    nominal = np.array([size.nominal for size in measurements])
+    departure = np.array([size.measured for size in measurements]) - nominal
+    columns = np.array([[size.sign] for size in measurements], dtype=float)
+    along_x = np.array([size.along_x for size in measurements], dtype=float)[:, None]
+    is_read_by = [[size.instrument == name for name in instruments] for size in measurements]
+    # The last two are small: a few sizes tell more where they are taken to be none.
+    blocks = {
+        "offsets": (np.array(is_read_by, dtype=float), 1),
+        "scale": (nominal[:, None], 1),
+        "kerf along x": (columns * along_x, FREE),
+        "scale along x": (nominal[:, None] * along_x, FREE),
+    }
+    # Where each cause that can be told stands among the columns.
+    places: dict[str, int] = {}
+    for cause, (block, free) in blocks.items():
+        wider = np.hstack([columns, block])
+        if count - wider.shape[1] >= free and _are_apart(wider):
+            places[cause] = columns.shape[1]
+            columns = wider
+    values = np.linalg.lstsq(columns, departure, rcond=None)[0]
+    degrees = count - columns.shape[1]
+    scatter = float(np.sum((departure - columns @ values) ** 2)) / degrees
+    spread = np.linalg.inv(columns.T @ columns).diagonal()
     # No reading is better than the instrument, however well a few of them agree.
-    noise = max(rest / (count - 2), resolution**2 / 12)
-    t = student_t(count - 2)
-    errors = math.sqrt(noise * count / determinant), math.sqrt(noise * squares / determinant)
-    common = math.hypot(errors[1], resolution / math.sqrt(12))
-    return Value(scale, errors[0], t * errors[0]), Value(kerf, common, t * common)
+    noise = max(scatter, resolution**2 / 12)
+    errors = np.sqrt(noise * spread).tolist()
+    errors[0] = math.hypot(errors[0], _left_by_rounding(scatter, resolution))
+    t = student_t(degrees)
+    fitted = [Value(v, u, t * u) for v, u in zip(values.tolist(), errors, strict=True)]
+    kerf_along_x, scale_along_x = (
+        fitted[places[cause]].value if cause in places else 0.0
+        for cause in ("kerf along x", "scale along x")
+    )
+    scale = fitted[places["scale"]] if "scale" in places else None
+    return Estimate(
+        kerf=fitted[0],
+        scale=None if scale is None else scale._replace(value=1 + scale.value),
+        offsets=dict(zip(instruments, fitted[1:], strict=False)) if "offsets" in places else {},
+        count=count,
+        degrees=degrees,
+        kerf_along_x=kerf_along_x,
+        scale_along_x=scale_along_x,
+    )
 
 
+def _are_apart(columns: NDArray[Any]) -> bool:
+    """Whether the sizes tell what the columns stand for from each other."""
+    import numpy as np
+
+    unit = columns / np.linalg.norm(columns, axis=0)
+    return bool(np.linalg.matrix_rank(unit, tol=SAME_COLUMN) == unit.shape[1])
+
+
+def _left_by_rounding(scatter: float, resolution: float) -> float:
+    """The standard uncertainty that rounding to a step leaves in a mean of readings.
+
+    A mean of Gaussian readings of deviation s, rounded to steps d, is off by up to d / pi *
+    exp(-2 (pi s / d)^2) (B. Widrow, I. Kollar, Quantization Noise, 2008): of readings that all
+    agree, a step's whole width remains in doubt, and of those that scatter by half a step nothing.
+    """
+    if resolution == 0:
+        return 0.0
+    own = max(scatter - resolution**2 / 12, 0.0)
+    return resolution / math.sqrt(12) * math.exp(-2 * math.pi**2 * own / resolution**2)
+
+
+@cache
 def student_t(degrees: int) -> float:
     """The t that 95 % of Student's distribution stay within, by its series for whole degrees."""
     degrees = min(degrees, MOST_DEGREES)

@@ -1,12 +1,14 @@
 """The calibration piece: four frames of film whose sizes tell how wide the beam cuts.
 
-A frame's outside comes out smaller by the kerf, its window larger. Sides along x and y differ, so
-that a frame that fell out still tells which is which; two sizes tell a film that shrank, or a scale
-that is off, from kerf.
+A frame's outside comes out smaller by the kerf, its window larger, and the piece that falls out of
+the window smaller again. Sides along x and y differ, so that a frame that fell out still tells
+which is which. A window and its piece are drawn alike, so that they tell a reading error, which
+makes both larger, from kerf; several sizes tell a scale from both.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,13 +24,16 @@ from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import rectangle
+from sbafab.spreadsheet import csv_text
 
 SIZE = 60.0
 """Side in mm of the film that the piece needs."""
 COLUMNS = ("feature", "axis", "nominal_mm", "measured_mm")
-HINT = (
+HINTS = (
     "# Cut coupon.dxf with kerf offset 0; measure each size in the middle of the side; "
-    "leave what you cannot measure empty"
+    "leave what you cannot measure empty",
+    "# A piece is what fell out of the window of A: keep it",
+    "# A scan at 2400 dpi or a microscope touches no edge; a calliper bends thin film",
 )
 LETTER = 2.4
 TITLE = "KERF COUPON"
@@ -66,14 +71,15 @@ def coupon() -> Region:
 
 def coupon_csv() -> str:
     """The table to fill in: a row for each size along each axis."""
-    rows = [HINT, ",".join(COLUMNS)]
+    rows: list[Sequence[str]] = [COLUMNS]
     for frame in FRAMES:
-        for kind, size in (("outer", frame.outer), ("window", frame.window)):
-            rows += [
-                f"{frame.name} {kind},{axis},{nominal:g},"
-                for axis, nominal in zip("xy", size, strict=True)
-            ]
-    return "\n".join(rows) + "\n"
+        sizes = {"outer": frame.outer, "window": frame.window, "piece": frame.window}
+        rows += [
+            (f"{frame.name} {kind}", axis, f"{nominal:g}", "")
+            for kind, size in sizes.items()
+            for axis, nominal in zip("xy", size, strict=True)
+        ]
+    return "".join(f"{hint}\n" for hint in HINTS) + csv_text(rows)
 
 
 def write_coupon(folder: Path, generator: str) -> tuple[Path, ...]:

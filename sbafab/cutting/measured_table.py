@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from sbafab.cutting.calibration import Kind, Measurement
+from sbafab.cutting.calibration import RESOLUTIONS, Kind, Measurement
 from sbafab.cutting.coupon import COLUMNS
 from sbafab.errors import DesignError
 
@@ -16,13 +16,18 @@ LONGEST = 10_000.0
 """mm."""
 SEPARATORS = (",", ";", "\t")
 NUMBERS = ("nominal_mm", "measured_mm")
+INSTRUMENT = "instrument"
+"""A column that may be there: what the size was measured with."""
+KINDS: dict[str, Kind] = {"outer": "outer", "window": "window", "piece": "outer"}
+"""Last words of a feature; a piece fell out of a window."""
 _NUMBER = re.compile(r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)", re.ASCII)
 _WHOLE = re.compile(r"\d+", re.ASCII)
 
 
-def read_measurements(path: Path) -> list[Measurement]:
+def read_measurements(path: Path, instrument: str = "") -> list[Measurement]:
     """The filled rows of a table with the coupon's columns; ``#`` begins a remark.
 
+    ``instrument`` is what all was measured with, unless a column of that name says so row by row.
     Columns are parted by commas, semicolons or tabs; numbers have a decimal point or comma. A
     spreadsheet that parts columns by semicolons leaves our commas in its first cell; that is read
     too. Raises DesignError, also for a row whose decimal commas cannot be told from those between
@@ -40,7 +45,7 @@ def read_measurements(path: Path) -> list[Measurement]:
         _refuse_two_ways(cells, names, separator, where)
         row = dict(zip(names, cells, strict=False))
         if row["measured_mm"]:
-            found.append(_measurement(row, where))
+            found.append(_measurement(row, where, instrument))
     return found
 
 
@@ -123,16 +128,21 @@ def _refuse_two_ways(cells: list[str], names: list[str], separator: str, where: 
             )
 
 
-def _measurement(row: dict[str, str], where: str) -> Measurement:
+def _measurement(row: dict[str, str], where: str, instrument: str) -> Measurement:
     words = row["feature"].lower().split()
     axis = row["axis"].lower()
-    kind: Kind = "window" if "window" in words else "outer"
-    if kind not in words:
-        raise DesignError(f"{where}: feature must end in outer or window")
+    kinds = {KINDS[word] for word in words if word in KINDS}
+    if len(kinds) != 1:
+        raise DesignError(f"{where}: feature must end in outer, window or piece")
+    (kind,) = kinds
+    used = row.get(INSTRUMENT, "").lower() or instrument
+    if used and used not in RESOLUTIONS:
+        known = ", ".join(RESOLUTIONS)
+        raise DesignError(f"{where}: instrument is {used[:40]!r}; it must be one of {known}")
     if axis not in ("x", "y"):
         raise DesignError(f"{where}: axis must be x or y")
     nominal, measured = (_size(row[name], name, where) for name in NUMBERS)
-    return Measurement(kind, "x" if axis == "x" else "y", nominal, measured, where)
+    return Measurement(kind, "x" if axis == "x" else "y", nominal, measured, where, used)
 
 
 def _size(text: str, column: str, where: str) -> float:

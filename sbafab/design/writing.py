@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from sbafab.design.films import LayerFilms
+from sbafab.design.films import UNCALIBRATED, LayerFilms
 from sbafab.design.records import Design, Inlet
 
 FITS = "fits"
@@ -85,8 +85,59 @@ def _as_first_hashed(table: dict[str, Any], design: Design) -> dict[str, Any]:
 
 def design_sha256(design: Design) -> str:
     """Hash of all that decides the output; a drawn outline counts by its content, not its path."""
-    table = _as_first_hashed(resolved(design), design)
+    return _sha256(_with_drawing(_as_first_hashed(resolved(design), design), design))
+
+
+def actuator_sha256(design: Design) -> str:
+    """Return the hash of what an actuator of the design is, however many are made, and on what.
+
+    It counts shapes, the films' kind, product and thickness, tube and adhesive, how films are
+    registered and bonded, and whether a kerf is compensated: uncompensated parts are narrower.
+    Left out are name, kit, order, sheets, rules, tolerances, tools, and the kerf's width.
+    """
+    table = _with_drawing(resolved(design), design)
+    for section in NO_ACTUATOR:
+        table.pop(section, None)
+    films = _films(design)
+    table["layup"] = {role: films.get(name) for role, name in table["layup"].items()}
+    table["bore"] = {"diameter": design.bore.diameter}
+    method = design.registration.method
+    table["registration"] = [
+        method,
+        *(getattr(design.registration, key) for key in PINNED if method != "channel-pin"),
+    ]
+    table["panel"] = [getattr(design.panel, key) for key in BRIDGED if method == "sheet"]
+    table["press"] = [getattr(design.press, key) for key in BONDED]
+    return _sha256(table)
+
+
+NO_ACTUATOR = ("name", "kit", "films", "laser", "sheets", "order", "rules", FITS)
+"""Sections that do not make another actuator; of films and laser the layup says what counts."""
+PINNED = ("pin_diameter", "pin_clearance", "full_bond_pins")
+BRIDGED = ("bridge_width", "stub", "tack_minutes")
+BONDED = (
+    *("temperature_c", "pressure_kpa", "platen_width", "platen_length", "flash_bottom_minutes"),
+    *("bond_bottom_minutes", "flash_middle_minutes", "bond_all_minutes"),
+)
+
+
+def _films(design: Design) -> dict[str, list[object]]:
+    """What a film is, by its table's name: kind, product, thickness, and if its kerf is known."""
+    kerfs = {name: film.kerf for name, film in design.films.others.items()}
+    kerfs |= {"tpe": design.laser.kerf_tpe, "ptfe": design.laser.kerf_ptfe}
+    return {
+        name: [film.kind, film.product, film.thickness, kerfs[name] != UNCALIBRATED]
+        for name, film in design.films.stock.items()
+    }
+
+
+def _with_drawing(table: dict[str, Any], design: Design) -> dict[str, Any]:
+    """The table with the drawn outline's content in place of its path."""
     if design.drawing is not None:
         table["chamber"]["outline"] = hashlib.sha256(design.drawing.read_bytes()).hexdigest()
+    return table
+
+
+def _sha256(table: dict[str, Any]) -> str:
     text = json.dumps(table, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()

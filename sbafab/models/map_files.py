@@ -6,11 +6,13 @@ Pressures kPa, heights mm (what a balloon has risen by), forces mN, volumes ul, 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sbafab.models.balloon_map import DEGREE, HEIGHT_SPANS, P0, PIECES, PRESSURE_SPANS
+from sbafab.spreadsheet import csv_text
 
 if TYPE_CHECKING:
     from sbafab.models.balloon_map import BalloonMap
@@ -40,14 +42,14 @@ def _grid(one: BalloonMap, points: int) -> tuple[Array, Array]:
 
 
 def _csv(stack: Stack, points: int) -> str:
-    lines = [",".join(COLUMNS)]
+    rows: list[Sequence[str]] = [COLUMNS]
     for number, one in enumerate(stack.maps, start=1):
         pressures, heights = _grid(one, points)
         p, h = (grid.ravel() for grid in np.meshgrid(pressures, heights, indexing="ij"))
         columns = (p, h, one.force(p, h), one.volume(p, h), one.potential(p, h))
         for row in zip(*(column.tolist() for column in columns), strict=True):
-            lines.append(",".join([str(number), *(f"{value:.7g}" for value in row)]))
-    return "\n".join(lines) + "\n"
+            rows.append([str(number), *(f"{value:.7g}" for value in row)])
+    return csv_text(rows)
 
 
 def _record(name: str, stack: Stack, points: int) -> dict[str, Any]:

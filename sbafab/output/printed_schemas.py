@@ -60,6 +60,8 @@ def _records() -> dict[str, Any]:
         recorded={**TEXT, "description": "UTC"},
         design_sha256=TEXT,
         corrects={"type": ["integer", "null"]},
+        attempt=COUNT,
+        actuator_sha256={**TEXT, "description": "the same for all designs that build this"},
         design=TEXT,
         corrected_by={"type": ["integer", "null"]},
     )
@@ -90,14 +92,31 @@ def _report() -> dict[str, Any]:
         found=table(errors=COUNT, largest=number(), highest=number()),
         verdict=TEXT,
     )
+    by_errors = table(
+        low=number(),
+        high=number(),
+        tolerances={
+            "type": "object",
+            "additionalProperties": array(number()),
+            "description": "of each key the largest error measured and the most it leaves room for",
+        },
+    )
+    promise = table(
+        design=TEXT,
+        promised=number(),
+        by_measured_errors={**by_errors, "type": ["object", "null"]},
+        **SHARE,
+        verdict=TEXT,
+    )
     return table(
         schema={"const": REPORT_SCHEMA},
         records=COUNT,
         actuators=COUNT,
-        success=array(table(by=TEXT, name=TEXT, **SHARE)),
+        success=array(table(by=TEXT, name=TEXT, **SHARE, passed_later=COUNT)),
         measured=array(measured),
         tolerances=array(tolerance),
-        promises=array(table(design=TEXT, promised=number(), **SHARE, verdict=TEXT)),
+        promises=array(promise),
+        contradictions=array(TEXT),
     )
 
 
@@ -117,7 +136,12 @@ def _sweep() -> dict[str, Any]:
 def _kerf() -> dict[str, Any]:
     value = table(value=number(), uncertainty=number(), half_width=number())
     maybe = {**value, "type": ["object", "null"]}
-    estimate = table(kerf=value, scale=maybe, scaled=YES, count=COUNT)
+    offsets = {
+        "type": "object",
+        "additionalProperties": value,
+        "description": "mm that each instrument reads too much; empty where it cannot be told",
+    }
+    estimate = table(kerf=value, scale=maybe, scaled=YES, offsets=offsets, count=COUNT)
     of_axis = {**estimate, "type": ["object", "null"]}
     return table(
         schema={"const": KERF_SCHEMA},
@@ -127,6 +151,7 @@ def _kerf() -> dict[str, Any]:
         difference={**maybe, "description": "kerf along x less that along y, mm"},
         differs=YES,
         warnings=array(TEXT),
+        remarks=array(TEXT),
         toml={**TEXT, "description": "lines for the design file"},
     )
 

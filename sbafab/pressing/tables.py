@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import csv
-import io
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 from sbafab.pressing.dowels import PinSetting
 from sbafab.pressing.schedule import Schedule
 from sbafab.pressing.words import named
+from sbafab.spreadsheet import csv_text
 
 PRESS_SCHEMA = "sbafab/press@1"
 COLUMNS = (
@@ -57,11 +57,9 @@ def _plain(value: Any) -> Any:
 
 def press_csv(plan: Schedule) -> str:
     """The steps as a table, one row each, with units in the column names."""
-    table = io.StringIO()
-    writer = csv.writer(table, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    rows: list[Sequence[object]] = [COLUMNS]
     for step in plan.steps:
-        writer.writerow(
+        rows.append(
             [
                 step.step,
                 step.title,
@@ -84,7 +82,7 @@ def press_csv(plan: Schedule) -> str:
                 step.instructions,
             ]
         )
-    return table.getvalue()
+    return csv_text(rows)
 
 
 def pin_words(pin: PinSetting) -> str:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from sbafab.actuators import build as laminate_of
 from sbafab.assemblies.build import Assembled
-from sbafab.assemblies.writing import assembly_sha256, assembly_toml
+from sbafab.assemblies.writing import assembled_sha256, assembly_sha256, assembly_toml
 from sbafab.design.kits import kit_of
 from sbafab.design.records import Design
-from sbafab.design.writing import design_sha256, design_toml
+from sbafab.design.writing import actuator_sha256, design_sha256, design_toml
 from sbafab.models.figures import Asked, Prediction
 from sbafab.models.paper import BURST
 from sbafab.models.prediction import predict
@@ -46,6 +46,7 @@ def promised(design: Design) -> Build:
         predicted=_predicted(predict(design, Asked(pressures_kpa=(100.0,)))),
         tolerances={name: getattr(registration, key) for name, key in TOLERANCES.items()},
         good_builds=(share.good, share.builds),
+        actuator_sha256=actuator_sha256(design),
     )
 
 
@@ -75,6 +76,7 @@ def promised_assembly(assembled: Assembled) -> Build:
             for name, key in TOLERANCES.items()
         },
         good_builds=(round(good * builds), builds),
+        actuator_sha256=assembled_sha256(assembled),
     )
 
 

@@ -16,12 +16,18 @@ def found_by(
 ) -> list[Record]:
     """Records of the design whose hash, or its first eight digits or more, the text holds.
 
-    Else those of a serial or of a design of that name, or the one of that number; of these only
-    those of ``serial``, if one is given. Raises DesignError where there are none.
+    With them come those of other designs that build the same actuator. Else those of a serial or of
+    a design of that name, or the one of that number; of these only those of ``serial``, if one is
+    given. Raises DesignError where there are none.
     """
     text = text.strip()
     hashes = _HASH.findall(text.lower())
-    found = [r for r in records if any(r.design_sha256.startswith(part) for part in hashes)]
+    actuators = {
+        build.actuator
+        for build in builds.values()
+        if any(h.startswith(part) for part in hashes for h in (build.sha256, build.actuator))
+    }
+    found = [record for record in records if builds[record.design_sha256].actuator in actuators]
     if not found:
         found = [
             record

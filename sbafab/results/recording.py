@@ -33,8 +33,14 @@ def built_from(source: str | Path | Design, changes: Sequence[Change] = ()) -> D
     return found if isinstance(found, Design) else assemble(found)
 
 
-def record(lab: Lab, built: Design | Assembled, results: Sequence[LabResult]) -> list[Record]:
-    """Stores results of what was built, with what it promises; all or none. Raises DesignError."""
+def record(
+    lab: Lab, built: Design | Assembled, results: Sequence[LabResult], is_again: bool = False
+) -> list[Record]:
+    """Stores results of what was built, with what it promises; all or none.
+
+    ``is_again``: as new attempts of actuators that were mended and tested again. Raises
+    DesignError.
+    """
     if isinstance(built, Design):
         sha256, kit = design_sha256(built), kit_name(built)
     else:
@@ -42,9 +48,9 @@ def record(lab: Lab, built: Design | Assembled, results: Sequence[LabResult]) ->
         kit = ", ".join(dict.fromkeys(kit_name(made.design) for made in built.designs))
     results = [replace(result, kit=result.kit or kit) for result in results]
     if lab.knows(sha256, GENERATOR):
-        return lab.add(sha256, None, results)
+        return lab.add(sha256, None, results, is_again)
     said = promised(built) if isinstance(built, Design) else promised_assembly(built)
-    return lab.add(sha256, said, results)
+    return lab.add(sha256, said, results, is_again)
 
 
 def results_of(said: Mapping[str, Any], table: str | Path | None = None) -> list[LabResult]:

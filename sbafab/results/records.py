@@ -89,12 +89,16 @@ class LabResult:
 
 @dataclass(frozen=True)
 class Record(LabResult):
-    """A result as it is stored: its number, when (UTC), of which design, what it corrects."""
+    """A result as it is stored: its number, when (UTC), of which design, what it corrects.
+
+    ``attempt`` is 1, and one more each time that the actuator was mended and tested again.
+    """
 
     id: int = 0
     recorded: str = ""
     design_sha256: str = ""
     corrects: int | None = None
+    attempt: int = 1
 
     def as_dict(self) -> dict[str, Any]:
         """The record for JSON; units stand in the keys."""
@@ -107,7 +111,8 @@ class Build:
     """A design that was recorded, with what was predicted of it and the tolerances it states.
 
     ``predicted``: quantity to value and model. ``tolerances``: key of the design to value.
-    ``good_builds``: of how many random builds how many keep every limit.
+    ``good_builds``: of how many random builds how many keep every limit. ``actuator_sha256`` is
+    the hash of what is built, the same for designs that differ in how many, or on what sheets.
     """
 
     sha256: str
@@ -119,6 +124,12 @@ class Build:
     predicted: Mapping[str, tuple[float, str]]
     tolerances: Mapping[str, float]
     good_builds: tuple[int, int]
+    actuator_sha256: str = ""
+
+    @property
+    def actuator(self) -> str:
+        """The hash that actuators are grouped by; the design's own where the other is not known."""
+        return self.actuator_sha256 or self.sha256
 
 
 def checked(result: LabResult, where: str = "") -> LabResult:

@@ -1,12 +1,17 @@
-"""What a lab's records say together: success, measured against predicted, tolerances."""
+"""What a lab's records say together: success, measured against predicted, tolerances.
+
+Designs that build the same actuator (``Build.actuator``) count as one. An actuator that was mended
+and tested again counts by its first attempt.
+"""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
+from sbafab.errors import DesignError
 from sbafab.results.builds import TOLERANCES
 from sbafab.results.intervals import Most, mean_of, most_of
 from sbafab.results.records import ERRORS, NUMBERS, PASS, Build, Record
@@ -17,13 +22,20 @@ UNSAID = "not said"
 CUT = "cut_mm"
 DIMENSIONS = {"offset_mm": 2, "turn_deg": 1, CUT: 1}
 """Of the space that an error is spread over."""
+ERROR_NAMES = {"offset_mm": "placement", "turn_deg": "turn", CUT: "cutting"}
+"""What rule registration-yield calls a measured error."""
 
 
 @dataclass(frozen=True)
 class Built:
-    """An actuator that was built: all that its records say together."""
+    """An actuator that was built: all that its records say together.
 
-    sha256: str
+    ``actuator`` is the hash of what was built, ``design_sha256`` that of the design it was first
+    recorded with. ``leak`` is the first attempt's; ``passed_later`` whether a later one passed.
+    """
+
+    actuator: str
+    design_sha256: str
     serial: str
     design: str
     method: str
@@ -32,15 +44,20 @@ class Built:
     leak: str
     numbers: Mapping[str, float]
     errors: Mapping[str, tuple[float, ...]]
+    passed_later: bool = False
 
 
 @dataclass(frozen=True)
 class Success:
-    """How many actuators of a group passed the leak test, of those that were tested."""
+    """How many actuators of a group passed the leak test at once, of those that were tested.
+
+    ``passed_later`` more passed at a later attempt.
+    """
 
     by: By
     name: str
     share: Share
+    passed_later: int
 
 
 @dataclass(frozen=True)
@@ -100,21 +117,46 @@ class Tolerance:
         return "holds" if self.stated <= self.found.highest else "wider than needed"
 
 
+class MeasuredYield(NamedTuple):
+    """The share of random builds that keep every limit with the errors that were measured.
+
+    ``low`` at the most that the measured errors leave room for, ``high`` at the largest measured;
+    each end takes its own 95 % interval of the draws. ``tolerances`` are those ends by key.
+    """
+
+    low: float
+    high: float
+    tolerances: Mapping[str, tuple[float, float]]
+
+
 @dataclass(frozen=True)
 class Promise:
-    """Success of a design against the share ``promised`` (rule registration-yield)."""
+    """Success of a design against what rule registration-yield promises.
+
+    ``promised`` is the share by the stated tolerances, ``measured`` that by the errors that were
+    recorded with the same kits and hands; None where there are none, or the design cannot be read
+    again. ``is_stated_enough`` is False where a larger error than stated was measured.
+    """
 
     design: str
     success: Share
     promised: float
+    measured: MeasuredYield | None
+    is_stated_enough: bool
 
     @property
     def verdict(self) -> str:
-        """Whether success agrees with what the tolerances promise, in words."""
+        """Return how success compares with the yield by measured errors, or else by stated ones."""
+        errors = "stated tolerances" if self.measured is None else "measured errors"
+        lowest, highest = (self.measured or (self.promised, self.promised))[:2]
         low, high = self.success.interval
-        if high < self.promised:
-            return "fewer hold than the tolerances promise"
-        return "more hold than the limits ask" if low > self.promised else "as promised"
+        if high < lowest:
+            return f"fewer hold than the {errors} promise"
+        if self.measured is None and not self.is_stated_enough:
+            return "not comparable: larger errors than stated were measured"
+        if low > highest:
+            return f"more hold than the limits ask, by the {errors}"
+        return f"as the {errors} promise"
 
 
 @dataclass(frozen=True)
@@ -127,13 +169,17 @@ class Report:
     comparisons: tuple[Comparison, ...]
     tolerances: tuple[Tolerance, ...]
     promises: tuple[Promise, ...]
+    contradictions: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """The report for JSON; every value has its unit beside it or is a share."""
         return {
             "records": self.records,
             "actuators": self.items,
-            "success": [{"by": s.by, "name": s.name, **_share(s.share)} for s in self.success],
+            "success": [
+                {"by": s.by, "name": s.name, **_share(s.share), "passed_later": s.passed_later}
+                for s in self.success
+            ],
             "measured": [
                 {**asdict(c), "ratio": c.ratio, "verdict": c.verdict} for c in self.comparisons
             ],
@@ -145,11 +191,20 @@ class Report:
                 {
                     "design": p.design,
                     "promised": p.promised,
+                    "by_measured_errors": p.measured
+                    and {
+                        "low": p.measured.low,
+                        "high": p.measured.high,
+                        "tolerances": {
+                            key: list(ends) for key, ends in p.measured.tolerances.items()
+                        },
+                    },
                     **_share(p.success),
                     "verdict": p.verdict,
                 }
                 for p in self.promises
             ],
+            "contradictions": list(self.contradictions),
         }
 
 
@@ -172,43 +227,84 @@ def standing(records: Iterable[Record]) -> list[Record]:
 
 
 def items(records: Iterable[Record], builds: Mapping[str, Build]) -> list[Built]:
-    """The actuators, by design and serial, in the order of their first record."""
-    gathered: dict[tuple[str, str], list[Record]] = defaultdict(list)
-    for record in standing(records):
-        gathered[record.design_sha256, record.serial].append(record)
+    """The actuators, by what was built and serial, in the order of their first record."""
     names = _names(builds)
     found = []
-
-    def told(own: Sequence[Record], name: str) -> str:
-        return next((said for said in (getattr(record, name) for record in own) if said), "")
-
-    for (sha256, serial), own in gathered.items():
+    for (actuator, serial), unsorted in _by_actuator(records, builds).items():
+        # The first attempt comes first; in each, the first record.
+        own = sorted(unsorted, key=lambda record: record.attempt)
         errors: dict[str, tuple[float, ...]] = {}
+        numbers: dict[str, float] = {}
         for record in own:
             for name, values in record.errors.items():
                 errors[name] = (*errors.get(name, ()), *values)
+            numbers = {**record.numbers, **numbers}
+        tests = [(record.attempt, record.leak) for record in own if record.leak]
+        first = min(tests, default=(1, ""))[0]
         found.append(
             Built(
-                sha256=sha256,
+                actuator=actuator,
+                design_sha256=own[0].design_sha256,
                 serial=serial,
-                design=names[sha256],
-                method=builds[sha256].method,
-                kit=told(own, "kit"),
-                operator=told(own, "operator"),
-                leak=told(own, "leak"),
-                numbers={name: value for record in own for name, value in record.numbers.items()},
+                design=names[actuator],
+                method=builds[own[0].design_sha256].method,
+                kit=_first(own, "kit"),
+                operator=_first(own, "operator"),
+                leak=_first(own, "leak"),
+                numbers=numbers,
                 errors=errors,
+                passed_later=_first(own, "leak") != PASS
+                and any(attempt > first and leak == PASS for attempt, leak in tests),
             )
         )
     return found
 
 
+def _first(own: Iterable[Record], name: str) -> str:
+    """What the first record that says something of it says."""
+    return next((said for said in (getattr(record, name) for record in own) if said), "")
+
+
+def _by_actuator(
+    records: Iterable[Record], builds: Mapping[str, Build]
+) -> dict[tuple[str, str], list[Record]]:
+    """The records that stand, by what was built and serial."""
+    gathered: dict[tuple[str, str], list[Record]] = defaultdict(list)
+    for record in standing(records):
+        gathered[builds[record.design_sha256].actuator, record.serial].append(record)
+    return gathered
+
+
+def contradictions(records: Iterable[Record], builds: Mapping[str, Build]) -> list[str]:
+    """Return a sentence for each serial of which one attempt is recorded in two ways.
+
+    None are taken any more; a file of an earlier version may hold them, of one actuator recorded
+    by designs that differ in order or sheets alone.
+    """
+    sentences = []
+    for (_, serial), own in _by_actuator(records, builds).items():
+        before: dict[tuple[int, str], tuple[object, int]] = {}
+        for record in own:
+            for name, value in record.once.items():
+                other, number = before.setdefault((record.attempt, name), (value, record.id))
+                if other != value:
+                    sentences.append(
+                        f"serial {serial} has {name} = {other} in record {number} and {value} in "
+                        f"record {record.id}; correct one of them with --correct"
+                    )
+    return sentences
+
+
 def _names(builds: Mapping[str, Build]) -> dict[str, str]:
-    """Names of the designs; of several with one name also the first digits of the hash."""
-    names = [build.name for build in builds.values()]
+    """Names of what was built, by hash: of several with one name also the hash's first digits."""
+    names: dict[str, dict[str, None]] = defaultdict(dict)
+    for build in builds.values():
+        names[build.actuator][build.name] = None
+    joined = {actuator: ", ".join(designs) for actuator, designs in names.items()}
+    shared = [*joined.values()]
     return {
-        sha: build.name if names.count(build.name) == 1 else f"{build.name} {sha[:8]}"
-        for sha, build in builds.items()
+        actuator: name if shared.count(name) == 1 else f"{name} {actuator[:8]}"
+        for actuator, name in joined.items()
     }
 
 
@@ -222,6 +318,7 @@ def report(records: Sequence[Record], builds: Mapping[str, Build]) -> Report:
         tuple(_comparisons(found, builds)),
         tuple(_tolerances(found, builds)),
         tuple(_promises(found, builds)),
+        tuple(contradictions(records, builds)),
     )
 
 
@@ -236,10 +333,14 @@ def _passed(own: Sequence[Built]) -> Share:
     return Share(sum(item.leak == PASS for item in own), len(own))
 
 
+def _later(own: Sequence[Built]) -> int:
+    return sum(item.passed_later for item in own)
+
+
 def _success(found: Sequence[Built]) -> Iterable[Success]:
     tested = [item for item in found if item.leak]
     if tested:
-        yield Success("all", "all", _passed(tested))
+        yield Success("all", "all", _passed(tested), _later(tested))
     told: dict[By, Callable[[Built], str]] = {
         "design": lambda item: item.design,
         "kit": lambda item: item.kit or UNSAID,
@@ -248,17 +349,18 @@ def _success(found: Sequence[Built]) -> Iterable[Success]:
     }
     for by, key in told.items():
         for name, own in _groups(tested, key):
-            yield Success(by, name, _passed(own))
+            yield Success(by, name, _passed(own), _later(own))
 
 
 def _comparisons(found: Sequence[Built], builds: Mapping[str, Build]) -> Iterable[Comparison]:
-    for (design, sha256), own in _groups(found, lambda item: (item.design, item.sha256)):
+    newest = {build.actuator: build for build in builds.values()}
+    for (design, actuator), own in _groups(found, lambda item: (item.design, item.actuator)):
         for quantity in NUMBERS:
             name = quantity.name
             values = [item.numbers[name] for item in own if name in item.numbers]
             if not values:
                 continue
-            predicted, model = builds[sha256].predicted.get(name, (None, ""))
+            predicted, model = newest[actuator].predicted.get(name, (None, ""))
             mean = mean_of(values)
             low, high = (None, None) if mean is None else mean.interval
             yield Comparison(
@@ -281,7 +383,7 @@ def _tolerances(found: Sequence[Built], builds: Mapping[str, Build]) -> Iterable
 
         def stated(item: Built, name: str = name) -> tuple[str, str, float]:
             hand = (item.operator or UNSAID) if name != CUT else ""
-            return item.kit or UNSAID, hand, builds[item.sha256].tolerances[name]
+            return item.kit or UNSAID, hand, builds[item.design_sha256].tolerances[name]
 
         for (kit, operator, value), own in _groups(measured, stated):
             errors = [error for item in own for error in item.errors[name]]
@@ -292,6 +394,47 @@ def _tolerances(found: Sequence[Built], builds: Mapping[str, Build]) -> Iterable
 
 def _promises(found: Sequence[Built], builds: Mapping[str, Build]) -> Iterable[Promise]:
     tested = [item for item in found if item.leak]
-    for (design, sha256), own in _groups(tested, lambda item: (item.design, item.sha256)):
-        good, drawn = builds[sha256].good_builds
-        yield Promise(design, _passed(own), good / drawn)
+    for (design, _), own in _groups(tested, lambda item: (item.design, item.actuator)):
+        stated = [builds[item.design_sha256] for item in own]
+        promised = sum(build.good_builds[0] / build.good_builds[1] for build in stated) / len(own)
+        bounds = _bounds(own, found)
+        is_enough = all(
+            bound.largest <= build.tolerances[name]
+            for name, bound in bounds.items()
+            for build in stated
+        )
+        measured = _measured_yield(stated[-1], bounds) if bounds else None
+        yield Promise(design, _passed(own), promised, measured, is_enough)
+
+
+def _bounds(own: Iterable[Built], every: Iterable[Built]) -> dict[str, Most]:
+    """The errors of the hands and lasers that built these, measured on whatever they built."""
+    hands = {(item.kit, item.operator) for item in own}
+    kits = {kit for kit, _ in hands}
+    bounds = {}
+    for name, dimensions in DIMENSIONS.items():
+        errors = [
+            error
+            for item in every
+            if (item.kit in kits if name == CUT else (item.kit, item.operator) in hands)
+            for error in item.errors.get(name, ())
+        ]
+        if errors:
+            bounds[name] = most_of(errors, dimensions)
+    return bounds
+
+
+def _measured_yield(build: Build, bounds: Mapping[str, Most]) -> MeasuredYield | None:
+    """The yield of a recorded design with measured errors for stated ones."""
+    from sbafab.results.rebuilt import rebuilt, yield_with
+
+    design = rebuilt(build)
+    if design is None:
+        return None
+    try:
+        best = yield_with(design, {ERROR_NAMES[n]: b.largest for n, b in bounds.items()})
+        worst = yield_with(design, {ERROR_NAMES[n]: b.highest for n, b in bounds.items()})
+    except DesignError:
+        return None
+    ends = {f"registration.{TOLERANCES[n]}": (b.largest, b.highest) for n, b in bounds.items()}
+    return MeasuredYield(worst.interval[0], best.interval[1], ends)

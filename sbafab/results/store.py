@@ -1,7 +1,8 @@
 """A lab's records in one SQLite file: rows are added, never changed, by any number of processes.
 
 The file refuses changes itself (triggers). A record that corrects another names it, and no record
-is corrected twice. Writers wait for each other; each write is one transaction.
+is corrected twice. Writers wait for each other; each write is one transaction. Whenever it is
+opened, tables, triggers and pages are checked: a file without them may have been changed.
 """
 
 from __future__ import annotations
@@ -10,14 +11,17 @@ import json
 import sqlite3
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 
 from sbafab.errors import DesignError, OutputError
+from sbafab.results.rebuilt import actuator_of
 from sbafab.results.records import ERRORS, NUMBERS, Build, LabResult, Record, checked
 
 APPLICATION = 0x5BAFAB
-VERSION = 1
+VERSION = 2
 PATIENCE = 10.0
 """Seconds that a writer waits for others."""
 
@@ -27,14 +31,16 @@ _ERRORS = tuple(quantity.name for quantity in ERRORS)
 _RESULT = (
     *("id", "recorded", "design_sha256", "corrects", "withdrawn"),
     *(*_SINGLE, *_NUMBERS, *_ERRORS),
+    "attempt",
 )
 _BUILD = (
     *("sha256", "generator", "name", "family", "method", "toml"),
     *("predicted", "tolerances", "good_builds"),
+    "actuator_sha256",
 )
 _SCHEMA = f"""
 CREATE TABLE design (
-    {", ".join(f"{name} TEXT NOT NULL" for name in _BUILD)},
+    {", ".join(f"{name} TEXT NOT NULL" for name in _BUILD[:-1])},
     PRIMARY KEY (sha256, generator)
 );
 CREATE TABLE result (
@@ -49,6 +55,13 @@ CREATE TABLE result (
 );
 CREATE INDEX item ON result (design_sha256, serial);
 """
+_ADDED = (
+    "ALTER TABLE design ADD COLUMN actuator_sha256 TEXT NOT NULL DEFAULT ''",
+    "ALTER TABLE result ADD COLUMN attempt INTEGER NOT NULL DEFAULT 1",
+)
+"""What version 2 added to version 1."""
+_BEFORE = {"actuator_sha256": "''", "attempt": "1"}
+"""What these columns say in a file of version 1."""
 _KEPT = """
 CREATE TRIGGER {name} BEFORE {what} BEGIN
     SELECT RAISE(ABORT, 'records are never changed; add one that corrects');
@@ -88,15 +101,37 @@ class Lab:
         """Whether this design is stored as this version predicts it."""
         if not self.path.exists():
             return False
-        with self._reading() as rows:
+        with self._reading() as (rows, _):
             return _is_known(rows, sha256, generator)
 
-    def add(self, sha256: str, build: Build | None, results: Sequence[LabResult]) -> list[Record]:
-        """Stores results of a design, all or none; ``build`` where it is not known yet."""
+    def add(
+        self,
+        sha256: str,
+        build: Build | None,
+        results: Sequence[LabResult],
+        is_again: bool = False,
+    ) -> list[Record]:
+        """Stores results of a design, all or none; ``build`` where it is not known yet.
+
+        ``is_again``: of actuators that were recorded, mended and tested again, as a new attempt.
+        """
+        if is_again and not self.path.exists():
+            raise OutputError(f"{self.path} does not exist, so there is no attempt before this one")
         with self._writing() as rows:
             if build is not None and not _is_known(rows, build.sha256, build.generator):
                 _put_build(rows, build)
-            return [self._put(rows, sha256, result, None) for result in results]
+            added = []
+            for result in map(checked, results):
+                live = _live(rows, sha256, result.serial)
+                attempt = max((record.attempt for record in live), default=0)
+                if is_again and not live:
+                    raise DesignError(
+                        f"serial {result.serial} has no record yet, so there is no attempt before "
+                        "this one; leave out --again, or see: sbafab record --find"
+                    )
+                attempt = attempt + 1 if is_again else max(attempt, 1)
+                added.append(self._put(rows, sha256, result, None, attempt, live))
+            return added
 
     def correct(self, number: int, change: LabResult) -> Record:
         """Stores a record that says what ``number`` says but for what ``change`` says."""
@@ -113,38 +148,34 @@ class Lab:
                 raise DesignError(
                     f"record {number} is corrected by record {newer[0]} already; correct that one"
                 )
-            return self._put(rows, old.design_sha256, old.changed(change), number)
+            result = checked(old.changed(change))
+            live = _live(rows, old.design_sha256, result.serial)
+            return self._put(rows, old.design_sha256, result, number, old.attempt, live)
 
     def contents(self) -> tuple[list[Record], dict[str, Build]]:
         """All records, those that were corrected too, and their designs by sha256.
 
         A design stands as the newest version that recorded it predicts it.
         """
-        with self._reading() as rows:
-            rows.execute("BEGIN")
-            designs = rows.execute(f"SELECT {', '.join(_BUILD)} FROM design ORDER BY rowid")
-            builds = {row[0]: _build(row) for row in designs}
-            records = [_record(row) for row in rows.execute(f"{_SELECT} ORDER BY id")]
-            rows.execute("COMMIT")
+        with self._reading() as (rows, version):
+            builds = {build.sha256: build for build in _builds(rows, version)}
+            records = [_record(row) for row in rows.execute(f"{_select(version)} ORDER BY id")]
         if not {record.design_sha256 for record in records} <= set(builds):
             raise OutputError(f"{self.path} {_REASONS['CORRUPT']}")
         return records, builds
 
     def _put(
-        self, rows: sqlite3.Connection, sha256: str, result: LabResult, corrects: int | None
+        self,
+        rows: sqlite3.Connection,
+        sha256: str,
+        result: LabResult,
+        corrects: int | None,
+        attempt: int,
+        live: Sequence[Record],
     ) -> Record:
-        result = checked(result)
-        live = [
-            _record(row)
-            for row in rows.execute(
-                f"{_SELECT} WHERE design_sha256 = ? AND serial = ? AND withdrawn = 0 "
-                "AND id NOT IN (SELECT corrects FROM result WHERE corrects IS NOT NULL)",
-                (sha256, result.serial),
-            )
-        ]
         if not result.withdrawn:
             for other in live:
-                if other.id != corrects:
+                if other.id != corrects and other.attempt == attempt:
                     _refuse_contradiction(result, other)
         values = (
             *(None, self.clock().strftime("%Y-%m-%dT%H:%M:%SZ"), sha256, corrects),
@@ -152,6 +183,7 @@ class Lab:
             *(getattr(result, name) for name in _SINGLE),
             *(result.numbers.get(name) for name in _NUMBERS),
             *(json.dumps(list(result.errors.get(name, ()))) for name in _ERRORS),
+            attempt,
         )
         marks = ", ".join("?" * len(values))
         added = rows.execute(
@@ -168,8 +200,7 @@ class Lab:
         with self._told(), closing(self._open()) as rows:
             rows.execute("BEGIN IMMEDIATE")
             try:
-                if self._version(rows) == 0:
-                    _make(rows)
+                _bring_up_to_date(rows, self._version(rows))
                 yield rows
                 rows.execute("COMMIT")
             finally:
@@ -177,17 +208,19 @@ class Lab:
                     rows.execute("ROLLBACK")
 
     @contextmanager
-    def _reading(self) -> Iterator[sqlite3.Connection]:
-        """The file as it lies there; a file that may only be read will do."""
+    def _reading(self) -> Iterator[tuple[sqlite3.Connection, int]]:
+        """The file as it lies at one moment, and its version; one that may only be read will do."""
         if not self.path.is_file():
             raise OutputError(
                 f"{self.path} is no file of records; record something first, or name the lab's "
                 "file with --lab"
             )
         with self._told(), closing(self._open("?mode=ro")) as rows:
-            if self._version(rows) == 0:
+            rows.execute("BEGIN")
+            version = self._version(rows)
+            if version == 0:
                 raise OutputError(f"{self.path} holds no records yet")
-            yield rows
+            yield rows, version
 
     def _open(self, mode: str = "") -> sqlite3.Connection:
         return sqlite3.connect(
@@ -208,12 +241,20 @@ class Lab:
             raise OutputError(
                 f"{self.path} is a database of another program; name the lab's file with --lab"
             )
-        if version != VERSION:
+        if not 1 <= version <= VERSION:
             raise OutputError(
                 f"{self.path} was written by a newer sbafab (records of version {version}, this "
                 f"one knows {VERSION}); update sbafab"
             )
-        return VERSION
+        shape, expected = _shape(rows), _shape_of(version)
+        if not shape >= expected or any(kind == "trigger" for kind, *_ in shape - expected):
+            raise OutputError(
+                f"{self.path} lacks tables or triggers of a file of records, or has other "
+                "triggers, so that its records may have been changed; put a sound copy in its place"
+            )
+        if rows.execute("PRAGMA integrity_check(1)").fetchone() != ("ok",):
+            raise OutputError(f"{self.path} {_REASONS['CORRUPT']}")
+        return int(version)
 
     @contextmanager
     def _told(self) -> Iterator[None]:
@@ -222,11 +263,39 @@ class Lab:
             yield
         except sqlite3.Error as error:
             raise OutputError(f"{self.path} {_reason(error)}") from error
-        except json.JSONDecodeError as error:
+        except (_DamagedError, UnicodeDecodeError) as error:
+            # SQLite's own message may quote what is no text any more.
             raise OutputError(f"{self.path} {_REASONS['CORRUPT']}") from error
 
 
-_SELECT = f"SELECT {', '.join(_RESULT)} FROM result"
+class _DamagedError(Exception):
+    """A row that no version has written."""
+
+
+def _select(version: int = VERSION) -> str:
+    return f"SELECT {', '.join(_columns(_RESULT, version))} FROM result"
+
+
+def _columns(names: Sequence[str], version: int) -> Sequence[str]:
+    """The columns to ask for, with what an older file lacks as a constant."""
+    return names if version == VERSION else [_BEFORE.get(name, name) for name in names]
+
+
+def _shape(rows: sqlite3.Connection) -> set[tuple[object, ...]]:
+    """Tables, indices and triggers: kind, name, table, and the statement that made it."""
+    return set(rows.execute("SELECT type, name, tbl_name, sql FROM sqlite_master"))
+
+
+@cache
+def _shape_of(version: int) -> set[tuple[object, ...]]:
+    """What a new file of a version holds."""
+    with closing(sqlite3.connect(":memory:", isolation_level=None)) as rows:
+        _make(rows)
+        if version > 1:
+            _bring_up_to_date(rows, 1)
+        return _shape(rows)
+
+
 _REASONS = {
     "BUSY": "is in use by another program; nothing was recorded, try again in a moment",
     "LOCKED": "is in use by another program; nothing was recorded, try again in a moment",
@@ -236,7 +305,7 @@ _REASONS = {
     "CANTOPEN": "cannot be opened; see that its folder exists and may be written",
     "NOTADB": "is no file of records; name the lab's file with --lab",
     "FULL": "cannot grow, the disk is full; nothing was recorded, make room there",
-    "CORRUPT": "is damaged; put a copy in its place that is sound",
+    "CORRUPT": "is damaged; put a sound copy in its place",
     "IOERR": "cannot be read or written, the disk reports an error; nothing was recorded",
 }
 
@@ -244,16 +313,29 @@ _REASONS = {
 def _reason(error: sqlite3.Error) -> str:
     name = getattr(error, "sqlite_errorname", None) or ""
     code = name.removeprefix("SQLITE_").partition("_")[0]
+    if not name and "decode" in str(error):
+        return _REASONS["CORRUPT"]
     return _REASONS.get(code, f"cannot be used as a file of records: {error}")
 
 
+def _bring_up_to_date(rows: sqlite3.Connection, version: int) -> None:
+    """Makes tables in an empty file, of version 0, and adds what later versions have."""
+    if version == 0:
+        _make(rows)
+    if version < VERSION:
+        for statement in _ADDED:
+            rows.execute(statement)
+        rows.execute(f"PRAGMA user_version = {VERSION}")
+
+
 def _make(rows: sqlite3.Connection) -> None:
+    """Makes the tables of version 1."""
     for statement in _SCHEMA.split(";"):
         rows.execute(statement)
     for name, what in _TRIGGERS.items():
         rows.execute(_KEPT.format(name=name, what=what))
     rows.execute(f"PRAGMA application_id = {APPLICATION}")
-    rows.execute(f"PRAGMA user_version = {VERSION}")
+    rows.execute("PRAGMA user_version = 1")
 
 
 def _is_known(rows: sqlite3.Connection, sha256: str, generator: str) -> bool:
@@ -268,43 +350,76 @@ def _put_build(rows: sqlite3.Connection, build: Build) -> None:
         for value in (dict(build.predicted), dict(build.tolerances), list(build.good_builds))
     ]
     marks = ", ".join("?" * len(_BUILD))
-    rows.execute(f"INSERT INTO design ({', '.join(_BUILD)}) VALUES ({marks})", [*plain, *told])
+    values = [*plain, *told, build.actuator_sha256]
+    rows.execute(f"INSERT INTO design ({', '.join(_BUILD)}) VALUES ({marks})", values)
+
+
+def _builds(
+    rows: sqlite3.Connection, version: int = VERSION, sha256: Sequence[str] = ()
+) -> list[Build]:
+    """The designs, or those of the hashes, in the order in which they were recorded."""
+    asked = f"SELECT {', '.join(_columns(_BUILD, version))} FROM design"
+    if sha256:
+        asked += f" WHERE sha256 IN ({', '.join('?' * len(sha256))})"
+    return [_build(row) for row in rows.execute(f"{asked} ORDER BY rowid", sha256)]
+
+
+def _live(rows: sqlite3.Connection, sha256: str, serial: str) -> list[Record]:
+    """The records that stand of an actuator: of its design, and of others that build the same."""
+    standing = (
+        f"{_select()} WHERE serial = ? AND withdrawn = 0 "
+        "AND id NOT IN (SELECT corrects FROM result WHERE corrects IS NOT NULL) ORDER BY id"
+    )
+    records = [_record(row) for row in rows.execute(standing, (serial,))]
+    hashes = {sha256, *(record.design_sha256 for record in records)}
+    actuators = {build.sha256: build.actuator for build in _builds(rows, VERSION, sorted(hashes))}
+    return [r for r in records if actuators[r.design_sha256] == actuators[sha256]]
 
 
 def _build(row: Sequence[str]) -> Build:
-    texts = dict(zip(_BUILD, row, strict=True))
-    predicted, tolerances, (good, drawn) = (json.loads(texts.pop(name)) for name in _BUILD[6:])
-    return Build(
-        sha256=texts["sha256"],
-        generator=texts["generator"],
-        name=texts["name"],
-        family=texts["family"],
-        method=texts["method"],
-        toml=texts["toml"],
-        predicted={name: (value, model) for name, (value, model) in predicted.items()},
-        tolerances=tolerances,
-        good_builds=(good, drawn),
-    )
+    """A row as a design. Raises _DamagedError."""
+    try:
+        texts = dict(zip(_BUILD, map(str, row), strict=True))
+        predicted, tolerances, (good, drawn) = (json.loads(texts.pop(name)) for name in _BUILD[6:9])
+        build = Build(
+            **texts,
+            predicted={name: (float(value), str(m)) for name, (value, m) in predicted.items()},
+            tolerances={name: float(value) for name, value in tolerances.items()},
+            good_builds=(int(good), int(drawn)),
+        )
+    except _UNLIKELY as error:
+        raise _DamagedError from error
+    return replace(build, actuator_sha256=actuator_of(build))
 
 
 def _one(rows: sqlite3.Connection, number: int) -> Record | None:
-    row = rows.execute(f"{_SELECT} WHERE id = ?", (number,)).fetchone()
+    row = rows.execute(f"{_select()} WHERE id = ?", (number,)).fetchone()
     return None if row is None else _record(row)
 
 
+_UNLIKELY = (ValueError, TypeError, AttributeError, ArithmeticError, LookupError, RecursionError)
+"""What comes of a row whose cells hold something else than what was written."""
+
+
 def _record(row: Sequence[object]) -> Record:
+    """A row as a record. Raises _DamagedError."""
     cells = dict(zip(_RESULT, row, strict=True))
-    numbers = {name: float(str(cells[name])) for name in _NUMBERS if cells[name] is not None}
-    errors = {name: tuple(json.loads(str(cells[name]))) for name in _ERRORS}
     corrects = cells["corrects"]
-    return Record(
-        **{name: str(cells[name]) for name in (*_SINGLE, "recorded", "design_sha256")},
-        id=int(str(cells["id"])),
-        corrects=None if corrects is None else int(str(corrects)),
-        withdrawn=bool(cells["withdrawn"]),
-        numbers=numbers,
-        errors={name: found for name, found in errors.items() if found},
-    )
+    try:
+        errors = {name: tuple(map(float, json.loads(str(cells[name])))) for name in _ERRORS}
+        record = Record(
+            **{name: str(cells[name]) for name in (*_SINGLE, "recorded", "design_sha256")},
+            id=int(str(cells["id"])),
+            corrects=None if corrects is None else int(str(corrects)),
+            withdrawn=bool(int(str(cells["withdrawn"]))),
+            numbers={name: float(str(cells[name])) for name in _NUMBERS if cells[name] is not None},
+            errors={name: values for name, values in errors.items() if values},
+            attempt=int(str(cells["attempt"])),
+        )
+        checked(record)
+    except _UNLIKELY as error:
+        raise _DamagedError from error
+    return record
 
 
 def _refuse_contradiction(result: LabResult, other: Record) -> None:
@@ -312,7 +427,8 @@ def _refuse_contradiction(result: LabResult, other: Record) -> None:
         if name in other.once and other.once[name] != value:
             raise DesignError(
                 f"serial {result.serial} has {name} = {other.once[name]} in record {other.id}; "
-                f"where that is wrong, add: sbafab record --correct {other.id}"
+                f"where that is wrong, add: sbafab record --correct {other.id}; where it was "
+                "mended and tested again, record that with --again"
             )
         if name in other.once and name not in ("operator", "kit"):
             raise DesignError(

@@ -6,17 +6,18 @@ took is in a file of its own.
 
 from __future__ import annotations
 
-import csv
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from sbafab.rules.deck import rule_names
 from sbafab.search.measure import SweepRow
 from sbafab.search.vary import Values
+from sbafab.spreadsheet import write_rows
 
 PARTS = (("verdict", 0), ("margin", 1), ("measured", 2), ("limit", 3))
 """Columns of each rule, and where they stand in its list."""
@@ -162,7 +163,7 @@ def write_csv(table: Table, path: Path) -> None:
     """Writes every row in the table's ``written`` columns; empty cells are what is not known."""
     with table.replacing(path) as opened:
         names = [column.name for column in table.written]
-        _write(opened, names, table.cells(table.written))
+        write_rows(opened, chain([names], table.cells(table.written)))
 
 
 def write_times(table: Table, path: Path) -> None:
@@ -172,13 +173,7 @@ def write_times(table: Table, path: Path) -> None:
             [number, row.get("sha256", ""), row.get("seconds")]
             for number, row in enumerate(table.rows(), 1)
         )
-        _write(opened, ["number", "sha256", "seconds"], rows)
-
-
-def _write(opened: IO[str], head: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    written = csv.writer(opened, lineterminator="\n")
-    written.writerow(head)
-    written.writerows(rows)
+        write_rows(opened, chain([["number", "sha256", "seconds"]], rows))
 
 
 def write_parquet(table: Table, path: Path) -> bool:

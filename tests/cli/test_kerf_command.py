@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -33,9 +34,9 @@ def table(
     lines = []
     for line in Path("coupon/coupon.csv").read_text().splitlines():
         name, _, rest = line.partition(",")
-        if name.endswith(("outer", "window")):
+        if name.endswith(("outer", "window", "piece")):
             axis, nominal, _ = rest.split(",")
-            kerf = {"x": 0.12, "y": 0.1}[axis] * (-1 if name.endswith("outer") else 1)
+            kerf = {"x": 0.12, "y": 0.1}[axis] * (1 if name.endswith("window") else -1)
             line += f"{float(nominal) + kerf:.3f}"  # noqa: PLW2901
         lines.append(line)
     path = Path("coupon/coupon.csv")
@@ -104,18 +105,53 @@ def test_x_and_y_apart_for_programs(table: Path, capsys: pytest.CaptureFixture[s
     assert tomllib.loads(said["toml"]) == {"laser": {"kerf_ptfe": [0.12, 0.1]}}
 
 
-def test_shrunk_film_draws_a_warning(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def changed_sizes(table: Path, change: Callable[[float, float], float]) -> None:
+    """Write the table with other sizes, from the nominal one and that read."""
     lines = table.read_text().splitlines()
-    shrunk = [
-        f"{','.join(cells[:3])},{float(cells[3]) - 0.003 * float(cells[2]):.3f}"
-        for cells in (line.split(",") for line in lines[2:])
+    (head,) = (n for n, line in enumerate(lines) if line.startswith("feature"))
+    changed = [
+        f"{','.join(cells[:3])},{change(float(cells[2]), float(cells[3])):.3f}"
+        for cells in (line.split(",") for line in lines[head + 1 :])
     ]
-    table.write_text("\n".join([*lines[:2], *shrunk]))
+    table.write_text("\n".join([*lines[: head + 1], *changed]))
+
+
+def test_a_constant_reading_error_is_told_and_corrected_for(
+    table: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A calliper that reads 0.03 mm too much: the old advice was to change the laser."""
+    changed_sizes(table, lambda nominal, measured: measured + 0.03)
+    arguments = ["kerf", str(table), "--resolution", "0.001", "--instrument", "calliper"]
+    code, out, _ = run(arguments, capsys)
+    assert code == 0
+    assert "the calliper reads 0.0300 mm too much" in out
+    assert "warning" not in out
+    assert "laser" not in out[: out.index("[laser]")]
+    assert "a calliper's jaws press thin film in" in out
+    assert tomllib.loads(out[out.index("[laser]") :]) == {"laser": {"kerf_tpe": [0.12, 0.1]}}
+    arguments[-1] = "scanner"
+    assert "jaws" not in run(arguments, capsys)[1]
+
+
+def test_outsides_alone_are_pasted_with_a_warning(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "outers.csv"
+    rows = "".join(f"A outer,{axis},{n},{n - 0.12:.2f}\n" for axis in "xy" for n in (24, 20, 16))
+    path.write_text(f"feature,axis,nominal_mm,measured_mm\n{rows}")
+    _, out, _ = run(["kerf", str(path), "--instrument", "microscope"], capsys)
+    says = "these sizes cannot tell a constant reading error from kerf"
+    assert f"warning: {says}" in out
+    assert f"# warning: {says}" in out[out.index("[laser]") :]
+
+
+def test_shrunk_film_draws_a_warning(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    changed_sizes(table, lambda nominal, measured: measured - 0.003 * nominal)
     code, out, _ = run(["kerf", str(table), "--resolution", "0.001"], capsys)
     assert code == 0
-    assert "outers and windows disagree" in out
-    assert "sizes are 0.9970 times what was drawn" in out
-    assert f"set the laser to {1 / 0.997:.4f} times its present steps per mm along x" in out
+    assert "warning: sizes along x are 0.9970 times what was drawn" in out
+    assert "leave the laser as it is until a gauge of known length reads right" in out
+    assert "steps per mm" not in out
     assert tomllib.loads(out[out.index("[laser]") :]) == {"laser": {"kerf_tpe": [0.12, 0.1]}}
 
 
@@ -124,7 +160,7 @@ def test_shrunk_film_draws_a_warning(table: Path, capsys: pytest.CaptureFixture[
     [
         (lambda text: text.replace("measured_mm", "size"), "no column measured_mm"),
         (lambda text: text.replace("24.120", "wide").replace("23.880", "wide"), "not a number"),
-        (lambda text: "\n".join(text.splitlines()[:3]), "needs 2"),
+        (lambda text: "\n".join(text.splitlines()[:5]), "needs 2"),
         (lambda text: text.replace("outer", "cave").replace("window", "outer"), "must end in"),
         (
             lambda text: (

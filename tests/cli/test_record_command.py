@@ -89,6 +89,23 @@ def test_from_the_first_record_to_the_report(
     assert advice in run(["record", "--report"], capsys)[1]
 
 
+def test_what_was_mended_is_recorded_again(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["record", "1dof-5mm", "--serial", "A1", "--leak", "fail"], capsys)[0] == 0
+    again = ["record", "1dof-5mm", "--serial", "A1", "--leak", "pass"]
+    code, _, err = run([*again, "--set", "order.copies=8"], capsys)
+    assert code == 2
+    assert "serial A1 has leak = fail in record 1" in err
+    assert "--again" in err
+    code, out, _ = run([*again, "--again"], capsys)
+    assert code == 0
+    assert "serial A1: leak pass, kit paper, attempt 2" in out
+    _, out, _ = run(["record", "--report"], capsys)
+    assert "Success: leak test passed at the first attempt" in out
+    [row] = (line for line in out.splitlines() if line.startswith("all"))
+    assert row.split()[:5] == ["all", "all", "0", "of", "1"]
+    assert row.split()[-1] == "1"
+
+
 def test_a_folder_is_recorded_as_the_design_that_it_was_built_from(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -113,6 +130,8 @@ def test_a_folder_is_recorded_as_the_design_that_it_was_built_from(
         (["1dof-5mm", "--table", "x.csv", "--leak", "pass"], "--table holds serials"),
         (["1dof-5mm", "--table", "x.csv"], "x.csv cannot be read"),
         (["--correct", "1"], "say what is right instead"),
+        (["--correct", "1", "--again"], "--again goes with DESIGN"),
+        (["1dof-5mm", "--serial", "A1", "--leak", "pass", "--again"], "no attempt before this"),
         (["--correct", "1", "--leak", "fail"], "lab.sqlite does not exist"),
         (["--report"], "lab.sqlite is no file of records; record something first"),
         (["nosuch", "--serial", "A1", "--leak", "pass"], "nosuch"),

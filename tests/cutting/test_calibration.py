@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import math
+import random
 from dataclasses import replace
 from pathlib import Path
+from statistics import mean, stdev
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -16,6 +20,7 @@ from sbafab.cutting.calibration import (
     calibrated,
     student_t,
 )
+from sbafab.cutting.coupon import coupon_csv
 from sbafab.cutting.measured_table import read_measurements
 from sbafab.errors import DesignError
 
@@ -50,17 +55,143 @@ def test_student_t_is_the_printed_table_s(degrees: int, t: float) -> None:
 
 
 def test_mean_and_uncertainty_by_hand() -> None:
-    """Kerfs 0.11, 0.12 and 0.16: mean 0.13, s = sqrt(0.0007)."""
+    """Two outsides and two windows of one size: half the difference of their means.
+
+    Outsides 0.11 and 0.15 too small, windows 0.14 and 0.12 too large: kerf (0.13 + 0.13) / 2, no
+    reading error; rest 2 * 0.02^2 + 2 * 0.01^2 = 0.001 on two degrees of freedom. A scale cannot be
+    told from one size. Scatter is wider than the step, so that rounding leaves next to nothing.
+    """
     rows = [
         Measurement("outer", "x", 20.0, 19.89),
+        Measurement("outer", "y", 20.0, 19.85),
+        Measurement("window", "x", 20.0, 20.14),
         Measurement("window", "y", 20.0, 20.12),
-        Measurement("outer", "y", 20.0, 19.84),
     ]
-    kerf = calibrated(rows, 0.02).overall.kerf
-    assert kerf.value == pytest.approx(0.13, abs=1e-12)
-    expected = math.sqrt(0.0007 / 3 + 0.02**2 / 12)
-    assert kerf.uncertainty == pytest.approx(expected, rel=1e-9)
-    assert kerf.half_width == pytest.approx(4.30265 * expected, rel=1e-5)
+    found = calibrated(rows, 0.02).overall
+    assert found.kerf.value == pytest.approx(0.13, abs=1e-12)
+    assert found.offsets[""].value == pytest.approx(0.0, abs=1e-12)
+    assert (found.scale, found.degrees) == (None, 2)
+    own = 0.0005 - 0.02**2 / 12
+    left = 0.02 / math.sqrt(12) * math.exp(-2 * math.pi**2 * own / 0.02**2)
+    expected = math.hypot(math.sqrt(0.0005 / 4), left)
+    assert left < 1e-11
+    assert found.kerf.uncertainty == pytest.approx(expected, rel=1e-9)
+    assert found.kerf.half_width == pytest.approx(4.30265 * expected, rel=1e-5)
+
+
+def test_readings_that_all_agree_leave_a_step_in_doubt() -> None:
+    """Of a step of 0.1 that hides all scatter, 0.1 / sqrt(12) is left, however many agree."""
+    rows = [
+        Measurement(kind, axis, 20.0, 20.0 + (0.1 if kind == "window" else -0.1))
+        for kind in KINDS
+        for axis in AXES
+        for _ in range(20)
+    ]
+    uncertainty = calibrated(rows, 0.1).overall.kerf.uncertainty
+    assert uncertainty == pytest.approx(0.1 / math.sqrt(12) * math.sqrt(1 + 1 / 80), rel=1e-9)
+
+
+KINDS: tuple[Kind, ...] = ("outer", "window")
+AXES: tuple[Axis, ...] = ("x", "y")
+COUPONS = 150
+
+
+class Reader(NamedTuple):
+    """A way of reading sizes: constant error, scatter and step in mm, scales along x and y."""
+
+    name: str
+    offset: float
+    scatter: float
+    scales: tuple[float, float]
+    step: float
+
+
+READERS = (
+    Reader("calliper that reads 0.03 too much", 0.03, 0.01, (1.0, 1.0), 0.01),
+    Reader("calliper of a rough hand", -0.02, 0.025, (1.0, 1.0), 0.01),
+    Reader("scanner with two scales", 0.004, 0.008, (1.002, 0.9985), 25.4 / 2400),
+    Reader("microscope", 0.0, 0.003, (1.0, 1.0), 0.001),
+    Reader("scanner and film that shrank", 0.0, 0.01, (0.997, 0.997), 25.4 / 1200),
+)
+
+
+def read_coupon(reader: Reader, kerf: float, draw: random.Random) -> list[Measurement]:
+    """Return the coupon's sizes as an instrument reads them."""
+    rows = []
+    for row in csv.DictReader(line for line in coupon_csv().splitlines() if line[0] != "#"):
+        kind: Kind = "window" if row["feature"].endswith("window") else "outer"
+        axis: Axis = "x" if row["axis"] == "x" else "y"
+        nominal = float(row["nominal_mm"])
+        size = nominal + (kerf if kind == "window" else -kerf)
+        read = reader.scales[axis == "y"] * size + reader.offset + draw.gauss(0, reader.scatter)
+        rows.append(Measurement(kind, axis, nominal, round(read / reader.step) * reader.step))
+    return rows
+
+
+@pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader.name)
+def test_intervals_hold_the_kerf_about_95_times_in_100(reader: Reader) -> None:
+    """Of COUPONS each; within four standard deviations of a share of 0.95."""
+    draw = random.Random(10)
+    held = dict.fromkeys(("all", "x", "y", "offset"), 0)
+    for _ in range(COUPONS):
+        kerf = draw.uniform(0.08, 0.16)
+        found = calibrated(read_coupon(reader, kerf, draw), reader.step)
+        assert found.x is not None
+        assert found.y is not None
+        for name, estimate in (("all", found.overall), ("x", found.x), ("y", found.y)):
+            low, high = estimate.kerf.interval
+            # The reader's scale takes the kerf with it.
+            scale = {"x": reader.scales[0], "y": reader.scales[1]}.get(name, mean(reader.scales))
+            held[name] += low <= scale * kerf <= high
+        low, high = found.x.offsets[""].interval
+        held["offset"] += low <= reader.offset <= high
+    slack = 4 * math.sqrt(0.95 * 0.05 / COUPONS)
+    assert all(abs(count / COUPONS - 0.95) <= slack for count in held.values()), held
+
+
+def test_a_constant_reading_error_is_no_scale_and_moves_no_kerf() -> None:
+    """0.03 mm too much in every size: of COUPONS about 5 in 100 show a scale, by chance."""
+    draw = random.Random(3)
+    scaled, shifts = 0, []
+    for _ in range(COUPONS):
+        found = calibrated(read_coupon(READERS[0], 0.12, draw), 0.01).overall
+        scaled += found.is_scaled
+        shifts.append(found.kerf.value - 0.12)
+    assert scaled <= COUPONS / 10
+    assert abs(mean(shifts)) < 4 * stdev(shifts) / math.sqrt(COUPONS)
+    assert stdev(shifts) < 0.004
+
+
+def test_what_a_window_and_its_piece_read_alike_is_the_instrument_s() -> None:
+    rows = [
+        Measurement("window", "x", 14.0, 14.15),
+        Measurement("outer", "x", 14.0, 13.91),
+        Measurement("window", "y", 10.0, 10.15),
+        Measurement("outer", "y", 10.0, 9.91),
+    ]
+    found = calibrated(rows, 0.001).overall
+    assert found.kerf.value == pytest.approx(0.12, abs=1e-9)
+    assert found.offsets[""].value == pytest.approx(0.03, abs=1e-9)
+    assert found.scale is not None
+    assert found.scale.value == pytest.approx(1.0, abs=1e-9)
+
+
+def test_each_instrument_has_its_own_reading_error() -> None:
+    draw = random.Random(6)
+    rows = [
+        replace(row, instrument=name)
+        for name, offset in (("calliper", 0.03), ("scanner", -0.01))
+        for row in read_coupon(Reader(name, offset, 0.002, (1.0, 1.0), 0.001), 0.11, draw)
+    ]
+    found = calibrated(rows, 0.001).overall
+    assert found.kerf.value == pytest.approx(0.11, abs=0.002)
+    assert found.offsets["calliper"].value == pytest.approx(0.03, abs=0.003)
+    assert found.offsets["scanner"].value == pytest.approx(-0.01, abs=0.003)
+
+
+def test_outsides_alone_cannot_tell_a_reading_error() -> None:
+    rows = [m for m in sizes(0.12, 0.12) if m.kind == "outer"]
+    assert calibrated(rows, 0.001).overall.offsets == {}
 
 
 def test_equal_kerfs_do_not_differ() -> None:
@@ -88,11 +219,15 @@ def test_shrunk_film_is_told_from_kerf() -> None:
     assert overall.scale is not None
     assert overall.scale.value == pytest.approx(0.997, abs=1e-9)
     assert overall.kerf.value == pytest.approx(0.12, abs=1e-9)
-    design = np.array([[m.nominal, -1.0 if m.kind == "outer" else 1.0] for m in rows])
+    kinds = [(-1 if m.kind == "outer" else 1, 1 if m.axis == "x" else -1) for m in rows]
+    design = np.array(
+        [[m.nominal, k, 1.0, k * x, m.nominal * x] for m, (k, x) in zip(rows, kinds, strict=True)]
+    )
     measured = np.array([m.measured for m in rows])
     solution, rest, *_ = np.linalg.lstsq(design, measured, rcond=None)
-    spread = rest[0] / (len(rows) - 2) * np.linalg.inv(design.T @ design)
-    assert (overall.scale.value, overall.kerf.value) == pytest.approx(tuple(solution), abs=1e-9)
+    spread = rest[0] / (len(rows) - 5) * np.linalg.inv(design.T @ design)
+    fitted = (overall.scale.value, overall.kerf.value, overall.offsets[""].value)
+    assert fitted == pytest.approx(tuple(solution[:3]), abs=1e-9)
     assert overall.scale.uncertainty == pytest.approx(math.sqrt(spread[0, 0]), rel=1e-6)
 
 
@@ -166,6 +301,18 @@ def test_remarks_blank_and_empty_rows_are_skipped(tmp_path: Path) -> None:
     ]
 
 
+def test_a_column_names_the_instrument(tmp_path: Path) -> None:
+    text = (
+        "feature,axis,nominal_mm,measured_mm,instrument\nA outer,x,20,19.9,Scanner\n"
+        "A window,x,14,14.1,\nA piece,x,14,13.9,microscope\n"
+    )
+    rows = read_measurements(table(tmp_path, text), "calliper")
+    assert [row.instrument for row in rows] == ["scanner", "calliper", "microscope"]
+    assert [row.kind for row in rows] == ["outer", "window", "outer"]
+    with pytest.raises(DesignError, match="instrument is 'ruler'; it must be one of calliper"):
+        read_measurements(table(tmp_path, text.replace("Scanner", "ruler")))
+
+
 def test_a_table_of_a_spreadsheet_with_decimal_commas(tmp_path: Path) -> None:
     text = "\ufeffFeature;Axis;Nominal_mm;Measured_mm\r\nA outer;X;20;19,88\r\n"
     (row,) = read_measurements(table(tmp_path, text))
@@ -221,7 +368,7 @@ def test_a_table_that_reads_one_way_only_is_read(tmp_path: Path, name: str) -> N
         ("feature;axis;nominal_mm;measured_mm\nA outer;x;20;1.019,9\n", "not a number"),
         (f"{HEADER}A outer,x,20,-19.9\n", "above 0"),
         (f"{HEADER}A outer,z,20,19.9\n", "axis must be x or y"),
-        (f"{HEADER}A,x,20,19.9\n", "feature must end in outer or window"),
+        (f"{HEADER}A,x,20,19.9\n", "feature must end in outer, window or piece"),
     ],
 )
 def test_a_table_that_cannot_be_understood_is_refused(text: str, says: str, tmp_path: Path) -> None:

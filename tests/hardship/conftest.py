@@ -17,9 +17,11 @@ from typing import Any
 
 import pytest
 
+from tests.hardship.starting import ANSWERING, ignored_signals
+
 # Forks a child a run from an interpreter that has imported all it needs, so that a run takes
 # a fraction of a second and a random moment falls into its work, not into its imports.
-SERVER = """
+SERVER = f"""{ANSWERING}
 import contextlib, io, json, os, sys
 from sbafab.cli import main
 with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
@@ -36,7 +38,7 @@ for line in sys.stdin:
     for number, path in ((1, job["out"]), (2, job["err"])):
         os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
     os.chdir(job["folder"])
-    exec(job["before"], {})
+    exec(job["before"], {{}})
     main(job["arguments"])
 """
 
@@ -89,18 +91,23 @@ class Runs:
 
 @pytest.fixture(scope="session")
 def runs() -> Iterator[Runs]:
-    """One server for all tests; its folders are open to every user."""
+    """Return one server for all tests; its folders are open to every user.
+
+    It is started as under ``nohup``, so that tests which stop runs ask for what they need.
+    """
     with tempfile.TemporaryDirectory() as place:
         logs = Path(place) / "logs"
         logs.mkdir()
         for folder in (Path(place), logs):
             folder.chmod(0o777)
-        with subprocess.Popen(
-            [sys.executable, "-c", SERVER, str(Path(place) / "scratch")],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        ) as server:
+        with ignored_signals():
+            server = subprocess.Popen(
+                [sys.executable, "-c", SERVER, str(Path(place) / "scratch")],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+            )
+        with server:
             yield Runs(server, logs)
             server.send_signal(signal.SIGTERM)
 

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.hardship.starting import ANSWERING, ignored_signals
+
 INTERRUPTS = int(os.environ.get("SBAFAB_KILLS", "4"))
 PROGRAM = """
 import os, sys
@@ -42,7 +44,7 @@ COMMANDS = {
 
 
 def run(arguments: list[str], step: int, folder: Path) -> subprocess.CompletedProcess[str]:
-    program = PROGRAM.format(step=step, number=int(signal.SIGINT), arguments=arguments)
+    program = ANSWERING + PROGRAM.format(step=step, number=int(signal.SIGINT), arguments=arguments)
     return subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, cwd=folder, check=False
     )
@@ -60,6 +62,14 @@ def test_interrupted_at_random_imports(command: str, tmp_path: Path) -> None:
         ended = run(arguments, step, tmp_path)
         assert (ended.returncode, ended.stderr.count("\n")) == (130, 1), (step, ended.stderr)
         assert ended.stderr.startswith("sbafab: stopped")
+
+
+def test_started_where_ctrl_c_is_ignored_a_program_is_stopped_all_the_same(tmp_path: Path) -> None:
+    """As these tests are under ``nohup`` or in the background."""
+    with ignored_signals():
+        ended = run(COMMANDS["help"], 9, tmp_path)
+    assert ended.returncode == 130
+    assert ended.stderr.startswith("sbafab: stopped")
 
 
 def test_an_interrupt_that_is_ignored_stays_so(tmp_path: Path) -> None:
@@ -98,7 +108,7 @@ with ending.ended_plainly():
 @pytest.mark.parametrize("program", [LOST, CONVERTED], ids=["lost", "converted"])
 def test_an_interrupt_that_comes_out_as_something_else_stops_all_the_same(program: str) -> None:
     ended = subprocess.run(
-        [sys.executable, "-c", program.format(number=int(signal.SIGINT))],
+        [sys.executable, "-c", ANSWERING + program.format(number=int(signal.SIGINT))],
         capture_output=True,
         text=True,
         check=False,

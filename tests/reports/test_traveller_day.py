@@ -30,6 +30,9 @@ def test_what_must_be_ready_before_the_day(sheet_files: Any, assignments: tuple[
     assert not re.search(r"\d+ min", section)
     assert "130 °C (266 °F)" in section
     assert ("ears" in section) == bool(assignments)
+    # No hand lays to 0.08 mm without one; ears hold every film.
+    assert ("loupe" not in section) == bool(assignments)
+    assert ("by eye to 0.08 mm" in section) != bool(assignments)
 
 
 def test_a_part_without_pins_needs_no_reamer(sheet_files: Any) -> None:

@@ -110,9 +110,9 @@ def test_the_truth_of_three_lots_lies_in_every_interval(make_build: Make) -> Non
     assert shares["operator", "Ada"].builds == 140
     assert shares["all", "all"].builds == 180
     assert {p.design: p.verdict for p in found.promises} == {
-        "as the paper's": "as promised",
-        "a rough hand": "fewer hold than the tolerances promise",
-        "a fine laser": "more hold than the limits ask",
+        "as the paper's": "as the stated tolerances promise",
+        "a rough hand": "fewer hold than the stated tolerances promise",
+        "a fine laser": "more hold than the limits ask, by the stated tolerances",
     }
 
 

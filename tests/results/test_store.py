@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import random
 import sqlite3
 import subprocess
 import sys
@@ -70,10 +71,10 @@ def test_a_correction_is_a_row_of_its_own_that_names_the_other(lab: Lab, make_bu
         "REPLACE INTO result SELECT * FROM result WHERE id = 1",
         "REPLACE INTO result SELECT 9, recorded, design_sha256, 1, withdrawn, serial, leak, "
         "operator, kit, note, burst_kpa, stroke_mm, force_n, height_mm, mass_g, offset_mm, "
-        "turn_deg, cut_mm FROM result WHERE id = 2",
+        "turn_deg, cut_mm, attempt FROM result WHERE id = 2",
         "INSERT INTO result SELECT 9, recorded, design_sha256, 1, withdrawn, serial, leak, "
         "operator, kit, note, burst_kpa, stroke_mm, force_n, height_mm, mass_g, offset_mm, "
-        "turn_deg, cut_mm FROM result WHERE id = 1",
+        "turn_deg, cut_mm, attempt FROM result WHERE id = 1",
     ],
 )
 def test_the_file_itself_refuses_changes(statement: str, lab: Lab, make_build: Make) -> None:
@@ -143,7 +144,7 @@ def other_program(path: Path) -> None:
 
 def newer(path: Path) -> None:
     with closing(sqlite3.connect(path)) as rows:
-        rows.execute("PRAGMA user_version = 2")
+        rows.execute("PRAGMA user_version = 3")
 
 
 def damaged(path: Path) -> None:
@@ -158,7 +159,7 @@ def damaged(path: Path) -> None:
         (other_program, "is a database of another program"),
         (lambda path: path.write_text("serial,leak\nA1,pass\n" * 50), "is no file of records"),
         (lambda path: path.mkdir(), "cannot be opened"),
-        (newer, r"was written by a newer sbafab \(records of version 2, this one knows 1\)"),
+        (newer, r"was written by a newer sbafab \(records of version 3, this one knows 2\)"),
         (damaged, "is damaged"),
     ],
 )
@@ -174,6 +175,114 @@ def test_a_file_that_is_not_ours_is_left_alone(
     with pytest.raises(OutputError):
         lab.contents()
     assert before == (lab.path.read_bytes() if lab.path.is_file() else None)
+
+
+def without_trigger(rows: sqlite3.Connection) -> None:
+    rows.execute("DROP TRIGGER result_UPDATE")
+    rows.execute("UPDATE result SET leak = 'pass'")
+
+
+def with_another_answer(rows: sqlite3.Connection) -> None:
+    rows.execute("DROP TRIGGER result_UPDATE")
+    rows.execute("CREATE TRIGGER result_UPDATE BEFORE UPDATE ON result BEGIN SELECT 1; END")
+
+
+def with_a_trigger_more(rows: sqlite3.Connection) -> None:
+    rows.execute(
+        "CREATE TRIGGER more AFTER INSERT ON design BEGIN INSERT INTO result SELECT 9, '', "
+        "NEW.sha256, NULL, 0, 'A9', 'pass', '', '', '', 1, 1, 1, 1, 1, '[]', '[]', '[]', 1; END"
+    )
+
+
+def without_order(rows: sqlite3.Connection) -> None:
+    rows.execute("DROP INDEX item")
+
+
+def of_other_columns(rows: sqlite3.Connection) -> None:
+    rows.execute("ALTER TABLE result ADD COLUMN colour TEXT")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [without_trigger, with_another_answer, with_a_trigger_more, without_order, of_other_columns],
+)
+def test_a_file_whose_triggers_or_tables_were_changed_is_refused(
+    change: Callable[[sqlite3.Connection], None], lab: Lab, make_build: Make
+) -> None:
+    lab.add(SHA, make_build(), [LabResult("A1", "fail")])
+    with closing(sqlite3.connect(lab.path)) as rows:
+        change(rows)
+        rows.commit()
+    before = lab.path.read_bytes()
+    for use in (lab.contents, lambda: lab.add(SHA, None, [LabResult("A2", "pass")])):
+        with pytest.raises(OutputError, match="records may have been changed"):
+            use()
+    assert lab.path.read_bytes() == before
+
+
+def test_a_view_and_a_table_of_the_lab_s_own_are_no_harm(lab: Lab, make_build: Make) -> None:
+    lab.add(SHA, make_build(), [LabResult("A1", "fail")])
+    with closing(sqlite3.connect(lab.path)) as rows:
+        rows.execute("CREATE VIEW failed AS SELECT serial FROM result WHERE leak = 'fail'")
+        rows.execute("CREATE TABLE shelf (serial TEXT, place TEXT)")
+        rows.execute("ANALYZE")
+        rows.commit()
+    lab.add(SHA, None, [LabResult("A2", "pass")])
+    assert len(lab.contents()[0]) == 2
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        "leak = 'maybe'",
+        "stroke_mm = 'long'",
+        "stroke_mm = -1",
+        "offset_mm = '{}x'",
+        "offset_mm = '[null]'",
+        "offset_mm = '3'",
+        "serial = CAST(x'ff41' AS TEXT)",
+        "withdrawn = 'no'",
+        "design_sha256 = 'abc'",
+    ],
+)
+def test_cells_that_no_version_writes_are_damage(cells: str, lab: Lab, make_build: Make) -> None:
+    """Rewritten with the triggers put back, or by a disk that fails."""
+    lab.add(SHA, make_build(), [LabResult("A1", "fail")])
+    with closing(sqlite3.connect(lab.path)) as rows:
+        [(trigger,)] = rows.execute("SELECT sql FROM sqlite_master WHERE name = 'result_UPDATE'")
+        rows.execute("DROP TRIGGER result_UPDATE")
+        rows.execute(f"UPDATE result SET {cells}")
+        rows.execute(trigger)
+        rows.commit()
+    with pytest.raises(OutputError, match="is damaged"):
+        lab.contents()
+
+
+def test_a_file_damaged_anywhere_is_one_sentence_or_whole(lab: Lab, make_build: Make) -> None:
+    """A page that is lost, bytes that flip, an end that is missing."""
+    for n in range(12):
+        lab.add(SHA, make_build(), [LabResult(f"A{n}", "pass", note="n\u00f6te")])
+    whole = lab.path.read_bytes()
+    dice = random.Random(35)
+    refused = 0
+    for number in range(150):
+        content = bytearray(whole)
+        place = dice.randrange(len(content))
+        if number % 3 == 0:
+            content[place : place + 4] = b"\xff\xfe\x80\xc0"
+        elif number % 3 == 1:
+            content = content[:place]
+        else:
+            for _ in range(16):
+                content[dice.randrange(len(content))] = dice.randrange(256)
+        lab.path.write_bytes(content)
+        try:
+            records, _ = lab.contents()
+        except OutputError:
+            refused += 1
+        else:
+            assert len(records) == 12
+    assert refused > 50
 
 
 def test_a_locked_file_is_one_sentence_and_readers_need_not_wait(

@@ -13,6 +13,8 @@ from sbafab.reports.traveller.bill import kerf_states
 from sbafab.reports.traveller.job import Work
 
 UNKNOWN = "not known, the paper gives no time. Measure it once: ________ min."
+LOUPE = "10x with a scale of 0.1 mm"
+"""Half a division is read; unaided, one minute of arc is 0.09 mm at 300 mm."""
 
 
 class Tool(NamedTuple):
@@ -87,6 +89,16 @@ def tools(works: Sequence[Work]) -> list[Tool]:
             Tool("Small hammer, pin punches, depth gauge", "pins in to their heights, and out"),
             Tool("Needle", "to prick the release film over the pins"),
         ]
+    hands = [w.design.registration for w in works if w.laminate.registration == "channel-pin"]
+    if hands:
+        finest = say.millimetres(min(hand.hand_placement for hand in hands))
+        found.append(
+            Tool(
+                f"Measuring loupe, {LOUPE}; bright light",
+                f"to lay by eye to {finest}, and to measure what came out (sbafab record "
+                "--offset): the bare eye tells about 0.1 mm",
+            )
+        )
     found += [
         Tool(
             f"Heat press, {say.size(width, length)}",

@@ -17,6 +17,7 @@ from sbafab.meshing.conforming.settings import Symmetry
 from sbafab.meshing.conforming.symmetry import images, sector
 from sbafab.simulators.calculix.frd import Frame
 from sbafab.simulators.calculix.settings import DeckSettings
+from sbafab.spreadsheet import csv_text
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -150,11 +151,11 @@ def history_csv(states: Sequence[State]) -> str:
     head += ["stroke_mm", "tip_x_mm", "tip_y_mm"]
     head += ["tilt_deg"] if first.tilt is not None else []
     head += [*(f"volume_{name}_ul" for name in first.volumes), "von_mises_max_MPa", "work_uJ"]
-    rows = [",".join(head)]
+    rows: list[Sequence[str]] = [head]
     for state in states:
         values = [state.time, *state.pressures.values(), state.stroke, *state.tip[:2]]
         values += [state.tilt] if state.tilt is not None else []
         values += [*state.volumes.values(), state.stress, state.work]
         # Adding 0.0 turns a rounded -0.0 into 0.0.
-        rows.append(",".join(f"{round(value, 6) + 0.0:.6g}" for value in values))
-    return "\n".join([*rows, ""])
+        rows.append([f"{round(value, 6) + 0.0:.6g}" for value in values])
+    return csv_text(rows)
