@@ -45,7 +45,7 @@ class Figure:
 
     ``other``: another model gives the same quantity, and that one is to design with.
     ``measured``: what the paper measured, where the model is off by more than a quarter of it.
-    ``between``: bounds of the value, in mm, N or as ``unit`` says, of a pocket taken for a disc.
+    The value lies ``between`` two of the same ``unit``, where a drawn pocket is taken for a disc.
     """
 
     group: str
