@@ -239,6 +239,7 @@ def test_a_stroke_is_not_met_by_what_predict_says_is_less(tmp_path: Path) -> Non
     target.unlink()
     asked[3] = "stroke@10kPa=20"
     ended = CliRunner().invoke(app, [*asked, "--tries", "60", "-o", str(target)])
+    assert ended.exit_code == 0, repr(ended.exception) + ended.output
     full = sbafab.predict(target).value("full stroke")
     assert full < 20
     assert f"full stroke {full:.4g} mm" in ended.output
