@@ -158,7 +158,12 @@ def _pin_fit() -> Pair:
 
 
 def _of_sheet(rule: str, index: int, change: Callable[[Region, Laminate], Region]) -> Pair:
-    settings = ('registration.method="sheet"', "stack.balloons=2", "order.copies=2")
+    settings = (
+        'registration.method="sheet"',
+        "registration.experimental=true",
+        "stack.balloons=2",
+        "order.copies=2",
+    )
     good = built("1dof-5mm", *settings)
     assert good.panel is not None
     sheets = list(good.panel.sheets)

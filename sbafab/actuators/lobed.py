@@ -78,6 +78,10 @@ class LobedDesign(Design):
         return Form(words, count, pockets, lumen=lumen.diameter, lumen_pin=lumen.pin)
 
     @property
+    def thickest_pin(self) -> float:
+        return max(super().thickest_pin, self.lumen.pin)
+
+    @property
     def free(self) -> tuple[Free, ...]:
         lumen = Free("lumen.diameter", 1.0, 10.0, 0.1, asked="lumen", widens=True)
         return free_of_round(self.chamber, (lumen, *super().free))

@@ -46,6 +46,8 @@ ASIDE = 8.0
 CHAMFER = 5.0
 PLAY = 1.0
 """mm by which the holes at two corners are wider than their pins: these keep the sheet flat."""
+FILM = 1.0
+"""mm of film, at least, between a corner pin's hole and the sheet's edges, windows and marks."""
 FIDUCIAL = 1.0
 """Diameter of the fiducials, mm."""
 FAR = 500.0
@@ -148,7 +150,8 @@ def with_stubs(shape: BalloonShape, made: Iterable[Root]) -> BalloonShape:
 def on_panel(laminate: Laminate, made: Sequence[Root], design: Design) -> Laminate:
     """The laminate with its registered sheets and their corner pins; as it is without bridges.
 
-    Raises DesignError where not even one copy fits on film and platen.
+    Raises DesignError where not even one copy fits on film and platen, or pins are too thick for
+    the sheet's corners.
     """
     if not made:
         return laminate
@@ -165,6 +168,7 @@ def on_panel(laminate: Laminate, made: Sequence[Root], design: Design) -> Lamina
     outline = _outline(window, places, design)
     pins, holes = _pins(outline, design.registration.pin_diameter)
     marks = _fiducials(outline)
+    _refuse_thick_pins(pins, (outline, *(window.moved(*place) for place in places)), marks)
     holes += [circle(mark, FIDUCIAL / 2) for mark in marks]
     whole = {name: _sheet(outline, holes, one, places) for name, one in openings.items()}
     slots = [contour for root in made for contour in root.slot.contours]
@@ -209,7 +213,7 @@ def _places(window: Region, design: Design) -> tuple[tuple[Point, ...], int]:
             f"{room[0]:g} x {room[1]:g}; take larger film (sheets), a larger platen or a smaller "
             "panel.margin"
         )
-    copies = design.order.copies
+    copies = design.order.quantity
     batches = math.ceil(copies / (fit[0] * fit[1]))
     each = math.ceil(copies / batches)
     columns = min(fit[0], each)
@@ -240,6 +244,33 @@ def _pins(outline: Region, diameter: float) -> tuple[tuple[Pin, ...], list[Conto
     wide = [disc(corner, (diameter + PLAY) / 2) for corner in corners[2:]]
     holes = [disc(corners[0], diameter / 2), along, *wide]
     return pins, [contour for hole in holes for contour in hole.contours]
+
+
+def _refuse_thick_pins(
+    pins: Sequence[Pin], around: Sequence[Region], marks: Sequence[Point]
+) -> None:
+    """Raises DesignError where pins leave less than FILM round their holes."""
+    plays = [0.0] + [PLAY] * (len(pins) - 1)
+    centres = [pin.centre for pin in pins]
+    room = [
+        2 * (room - FILM) - play
+        for centre, play in zip(centres, plays, strict=True)
+        for room in (
+            *(region.index.distance(centre) for region in around),
+            *(math.dist(centre, mark) - FIDUCIAL / 2 for mark in marks),
+        )
+    ]
+    room += [
+        math.dist(a, b) - FILM - (p + q) / 2
+        for (a, p), (b, q) in combinations(zip(centres, plays, strict=True), 2)
+    ]
+    most = math.floor(10 * min(room) + 1e-6) / 10
+    if pins[0].diameter > most:
+        raise DesignError(
+            f"registration.pin_diameter = {pins[0].diameter:g} leaves less than {FILM:g} mm of "
+            f"film round the holes in the corners of a registered sheet; at most {most:g} fits: "
+            'make it smaller, or use registration.method = "ears"'
+        )
 
 
 def _fiducials(outline: Region) -> tuple[Point, ...]:

@@ -166,7 +166,7 @@ def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tupl
         named += findings_of(DESIGNED, layers, AS_DESIGNED) if layers else []
         found += [replace(f, message=f"{told.name}: {f.message}") for f in named]
         checked.append(_as_designed(built, measured) if works is None else None)
-        lots.append(Lot(told.name, told.copies, built.files, built.design.order.spares))
+        lots.append(Lot(told.name, told.copies, built.files, built.design.order.spare_parts))
         own = (built.claims.name, built.claims.copies, built.claims.design_sha256)
         if own != (told.name, told.copies, told.design_sha256):
             message = f"{told.folder}: name, copies or design_sha256 are not those of its manifest"
@@ -321,7 +321,7 @@ def _own_sheet_problems(
     if not claims.sheets and is_job(folder.absolute().parent):
         message = "the film sheets are those of the job, and were not looked at; check the folder "
         return [Problem(CLAIMS, f"{message}above this one", verdict="warn")]
-    lots = [Lot(claims.name, claims.copies, files, design.order.spares)]
+    lots = [Lot(claims.name, claims.copies, files, design.order.spare_parts)]
     return sheet_problems(folder, SheetOrder(claims, design, claims.kerf, lots))
 
 

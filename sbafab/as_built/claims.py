@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from sbafab.actuators.stacking import film_of
 from sbafab.as_built.cut_files import LayerFile
@@ -23,8 +23,15 @@ from sbafab.laminate.laminate import Layer
 from sbafab.output.manifest import file_hashes, kerf_claim
 from sbafab.output.manifest_records import JobManifest, KerfClaim, LayerClaim, Manifest
 from sbafab.output.settings import kerf_widths, limits, warnings
+from sbafab.output.swap import is_among_cut_files
+from sbafab.rules.finding import Verdict
 from sbafab.rules.lowered import lowered
 
+CUT_ENDINGS = (
+    *(".dxf", ".dwg", ".ai", ".cdr", ".eps", ".lbrn", ENDING),
+    *(".rd", ".plt", ".hpgl", ".gcode", ".nc", ".ngc", ".tap"),
+)
+"""Of files that CAD draws and that a laser cuts; pictures and pages may lie about as notes."""
 HEIGHT = 1e-6
 """mm to which heights and thicknesses agree."""
 
@@ -34,7 +41,10 @@ def claim(message: str, *layers: int) -> Problem:
 
 
 def file_problems(folder: Path, claims: Manifest | JobManifest) -> list[Problem]:
-    """Files that are missing, changed, or not in the manifest (a cut file is worse than a note)."""
+    """Files that are missing, changed, or not in the manifest.
+
+    One that could be cut by mistake fails, a note elsewhere in the folder is a warning.
+    """
     found = file_hashes(folder)
     found.pop("manifest.json", None)
     layers = claims.layers if isinstance(claims, Manifest) else ()
@@ -52,12 +62,30 @@ def file_problems(folder: Path, claims: Manifest | JobManifest) -> list[Problem]
                     *own,
                 )
             )
-    for path in found:
+    for path in (*found, *_links(folder)):
         if path not in claims.files:
             message = f"{path} lies in the folder and is not in the manifest; remove it"
-            is_cut = path.lower().endswith((".dxf", ENDING))
-            problems.append(Problem(CLAIMS, message, verdict="fail" if is_cut else "warn"))
+            verdict: Verdict = "fail" if could_be_cut(path) else "warn"
+            problems.append(Problem(CLAIMS, message, verdict=verdict))
     return problems
+
+
+def could_be_cut(path: str) -> bool:
+    """Return whether a file of a folder, by its place or its ending, may be taken for a cut file.
+
+    All that lies among the cut files may: laser programs open pictures, pages and files without
+    an ending as well.
+    """
+    return is_among_cut_files(PurePosixPath(path)) or path.lower().endswith(CUT_ENDINGS)
+
+
+def _links(folder: Path) -> list[str]:
+    """Return links to folders, and all else whose contents have no hash."""
+    return [
+        path.relative_to(folder).as_posix()
+        for path in sorted(folder.rglob("*"))
+        if not path.is_file() and (path.is_symlink() or not path.is_dir())
+    ]
 
 
 def order_problems(claims: Manifest, design: Design) -> list[Problem]:
@@ -160,7 +188,7 @@ def design_problems(claims: Manifest, design: Design, digest: str) -> list[Probl
         ("family", claims.family, design.family),
         ("registration.method", claims.registration.method, design.registration.method),
         ("balloons", balloons, design.stack.balloons),
-        ("copies", claims.copies, design.order.copies),
+        ("copies", claims.copies, design.order.quantity),
     )
     problems = [
         claim(f"{what} is {said} in the manifest and {stated} by design.toml")

@@ -14,7 +14,7 @@ from sbafab.as_built.chords import chorded_place
 from sbafab.as_built.meant import Expected, departure
 from sbafab.as_built.records import INTEGRITY, Problem
 from sbafab.as_built.uncut import uncut
-from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER, CUT_SEQUENCE
+from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER, CUT_SEQUENCE, REFERENCE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.properties import (
     chord_error_of,
@@ -160,14 +160,17 @@ def read_part(
     chords_drawn: bool = False,
     told: Mapping[str, str] | None = None,
     expected: Expected | None = None,
+    noted: bool = False,
 ) -> CutPart:
     """The part that a cut file cuts. Raises OutputError where it is not what the format says.
 
     ``told`` stands in for the properties of a file that has none; ``expected`` is what it should
-    be, where that is known.
+    be, where that is known. ``noted``: it may have letters on REFERENCE, as a base plate has.
     """
     try:
         found = read_profile(path)
+        if noted:
+            found = _without_notes(found)
         return _part(found, chords_drawn, found.properties or told or {}, expected)
     except OutputError:
         raise
@@ -215,6 +218,21 @@ def _part(
         corner_room,
         found.units,
     )
+
+
+LETTERS = ("LWPOLYLINE", "POLYLINE")
+"""Types of the strokes of letters, the latter before R2000."""
+
+
+def _without_notes(found: ReadBack) -> ReadBack:
+    """The same without polylines on REFERENCE, which are letters: the datum cross is two lines."""
+    kept = [
+        (kind, stroke)
+        for kind, stroke in zip(found.other, found.strokes, strict=True)
+        if kind not in LETTERS or stroke[0] != REFERENCE
+    ]
+    kinds, strokes = tuple(kind for kind, _ in kept), tuple(stroke for _, stroke in kept)
+    return replace(found, other=kinds, strokes=strokes)
 
 
 def _check_drawn(found: ReadBack) -> None:

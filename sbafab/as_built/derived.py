@@ -15,12 +15,13 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from sbafab.as_built.claims import CUT_ENDINGS, could_be_cut
 from sbafab.as_built.likeness import file_difference, index_difference
 from sbafab.as_built.meant import drawn_settings
 from sbafab.as_built.meshes import bodies
 from sbafab.as_built.records import DESIGNED, Problem, is_joined
 from sbafab.cutting.fixture import write_fixture
-from sbafab.cutting.lightburn import ENDING
+from sbafab.cutting.properties import FOLDER as LAYERS
 from sbafab.cutting.properties import curves_of
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DesignError, OutputError
@@ -29,19 +30,22 @@ from sbafab.geometry.region import Region
 from sbafab.nesting.parts import parts_of
 from sbafab.nesting.records import NestPart
 from sbafab.output.batch import plan_batch, write_batch
-from sbafab.output.contents import TRAVELLER, write_contents
-from sbafab.output.earlier import PRESS
-from sbafab.output.manifest import as_json
+from sbafab.output.contents import FINDINGS, TRAVELLER, write_contents
+from sbafab.output.earlier import MESH, PREDICTION, PRESS
+from sbafab.output.manifest import as_json, file_names
 from sbafab.output.manifest_records import JobManifest, Manifest
 from sbafab.output.planned import EVERYTHING, Checked, Planned, RunPart, plan, schedule_of
-from sbafab.output.settings import GENERATOR
+from sbafab.output.settings import GENERATOR, hole_notes
 from sbafab.output.shop import find_nests, write_nested_sheets, write_panel
 from sbafab.pressing.together import design_runs
 from sbafab.progress import unheard
+from sbafab.simulators.simulator import NAMES as SIMULATORS
 
 INDEX = "manifest.json"
 UNMADE = (DesignError, OutputError, GeometryError, ArithmeticError, LookupError)
 """What a doctored design can raise where a sound one is made."""
+BY_OTHER_COMMANDS = (*MESH, *PREDICTION, *SIMULATORS)
+"""Folders and files of an earlier run that lie beside what is made again."""
 NOT_COMPARED = ("files", "mesh_statistics", "meshes")
 """Keys of a manifest with hashes, and with meshes of more than one command."""
 
@@ -55,8 +59,12 @@ def derived_problems(
     """
     with _made_anew(folder) as (fresh, problems):
         order = checked.design.order
-        parts = parts_of(checked.laminate, paths, order.copies, order.spares)
+        parts = parts_of(checked.laminate, paths, order.quantity, order.spare_parts)
         index = _write_anew(folder, fresh, claims, checked, paths, None if of_job else parts)
+        made = {*file_names(fresh), *(layer["file"] for layer in index["layers"])}
+        # The pages of a job's design show the sheets of the job, and are compared there.
+        others = (*BY_OTHER_COMMANDS, TRAVELLER, FINDINGS) if of_job else BY_OTHER_COMMANDS
+        problems.extend(_foreign_problems(claims, made, others))
         problems.extend(_differences(folder, fresh, claims.files, claims.generator))
         problems.extend(_index_problems(folder, index, of_job))
         problems.extend(_prediction_problems(folder, fresh, claims, checked))
@@ -82,8 +90,28 @@ def derived_job_problems(
             planned = [plan(one, EVERYTHING, curves_of(curves)) for one in checked]
             batch = plan_batch(job.schema_name, job.name, planned, folder, unheard)
             write_batch(batch, fresh, unheard)
+        problems.extend(_foreign_problems(job, file_names(fresh)))
         problems.extend(_differences(folder, fresh, job.files, job.generator))
     return problems
+
+
+def _foreign_problems(
+    claims: Manifest | JobManifest, made: Collection[str], others: Collection[str] = ()
+) -> list[Problem]:
+    """Return the files that a manifest lists and its design does not make.
+
+    ``others``: folders and files of commands that are not run again here; what could be cut is not
+    theirs either.
+    """
+    return [
+        _other(
+            f"{path} is listed and is no file of this design",
+            claims.generator,
+            is_done=path.lower().endswith(CUT_ENDINGS),
+        )
+        for path in claims.files
+        if path not in made and (could_be_cut(path) or path.partition("/")[0] not in others)
+    ]
 
 
 @contextmanager
@@ -120,7 +148,8 @@ def _write_anew(
     if parts is not None:
         nests = find_nests(parts, design, folder, unheard)
         sheets = write_nested_sheets(nests, design, fresh, settings, unheard)
-    write_fixture(laminate, fresh, settings, design_runs(design, laminate).places)
+    places = design_runs(design, laminate).places
+    write_fixture(laminate, fresh, settings, places, hole_notes(design, laminate))
     write_panel(laminate, paths, fresh, settings)
     pressing = schedule_of(checked) if "press" in wanted else None
     planned = Planned(checked, frozenset(wanted), settings, pressing)
@@ -150,7 +179,7 @@ def _differences(
     problems = []
     for path in sorted(path for path in fresh.rglob("*") if path.is_file()):
         name = path.relative_to(fresh).as_posix()
-        if name == INDEX or "layers/" in name:
+        if name == INDEX or (path.parent.name == LAYERS and path.suffix == ".dxf"):
             continue
         if name not in listed or not (folder / name).is_file():
             said = f"{name} is missing"
@@ -160,7 +189,7 @@ def _differences(
         else:
             said = file_difference(folder / name, path, name)
         if said:
-            is_done = name.endswith((*PRESS, ".dxf", ENDING))
+            is_done = name.endswith((*PRESS, *CUT_ENDINGS))
             problems.append(_other(said, generator, is_done))
     return problems
 

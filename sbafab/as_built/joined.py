@@ -49,7 +49,7 @@ def _assembly_problems(claims: AssemblyManifest, assembled: Assembled) -> list[P
         problems.append(claim("design_sha256 is not that of design.toml and its parts' designs"))
     told = [(one.name, one.copies, one.design_sha256) for one in claims.designs]
     own = [
-        (one.design.name, one.design.order.copies, design_sha256(one.design))
+        (one.design.name, one.design.order.quantity, design_sha256(one.design))
         for one in assembled.designs
     ]
     if told != own:

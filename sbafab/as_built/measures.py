@@ -222,7 +222,7 @@ def fixture_problems(folder: Path, laminate: Laminate, claims: Manifest) -> list
     if claims.fixture not in claims.files:
         return [claim(f"the fixture {claims.fixture!r} is not among the manifest's files")]
     try:
-        part = read_part(folder / claims.fixture, told=told_of(claims, "plate"))
+        part = read_part(folder / claims.fixture, told=told_of(claims, "plate"), noted=True)
     except OutputError as error:
         name = Path(claims.fixture).name
         said = str(error).removeprefix(f"{name}: ")
@@ -293,7 +293,7 @@ def with_plate_pins(folder: Path, laminate: Laminate, claims: Manifest) -> Lamin
     if claims.fixture is None or claims.fixture not in claims.files:
         return laminate
     try:
-        holes = read_part(folder / claims.fixture).region.holes
+        holes = read_part(folder / claims.fixture, noted=True).region.holes
     except OutputError:
         return laminate
     names = {(pin.x, pin.y): pin.name for pin in claims.registration.pins}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from sbafab.as_built.agreement import AGREED
@@ -15,6 +15,7 @@ from sbafab.cutting.verify import check_contours
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Mark, Region
 from sbafab.laminate.films import Material, in_order
+from sbafab.nesting.parts import no_spares
 from sbafab.nesting.records import TURNS, Turn
 from sbafab.output.manifest_records import SheetClaim
 
@@ -29,12 +30,12 @@ class CutSheet:
 
 @dataclass(frozen=True)
 class Lot:
-    """The layers' files of a design, of which ``copies`` are cut, and ``spares`` of every mask."""
+    """The layers' files of a design, of which ``copies`` are cut, and ``spares`` by the number."""
 
     design: str
     copies: int
     files: Sequence[LayerFile]
-    spares: int = 0
+    spares: Callable[[int], int] = no_spares
 
 
 _Outline = frozenset[tuple[Mark, ...]]
@@ -127,19 +128,20 @@ def _kinds_of(
     kinds = _Kinds(turns, room)
     for lot in lots:
         drawn = Counter(
-            (file.part.path, file.claim.pattern, file.claim.role.endswith("-mask"))
+            (file.part.path, file.claim.pattern)
             for file in lot.files
             if file.part is not None and file.claim.material == material
         )
-        # Spares are cut of masks alone, whatever film they are of.
-        counts: dict[tuple[Region, str], int] = {}
-        for (path, pattern, is_mask), count in drawn.items():
-            more = counts.get((path, pattern), lot.spares if is_mask else 0)
-            counts[path, pattern] = more + count * lot.copies
-        for (path, pattern), total in counts.items():
+        needed: Counter[str] = Counter()
+        for (_, pattern), count in drawn.items():
+            needed[pattern] += count * lot.copies
+        # Files of one pattern that differ by a hair share its spares.
+        spares = {pattern: lot.spares(number) for pattern, number in needed.items()}
+        for (path, pattern), count in drawn.items():
+            more = spares.pop(pattern, 0)
             for piece in path.pieces:
                 kind = kinds.find(piece) or kinds.add(piece)
-                kind.wanted[lot.design, pattern] += total
+                kind.wanted[lot.design, pattern] += count * lot.copies + more
     return kinds
 
 

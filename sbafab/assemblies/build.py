@@ -43,7 +43,7 @@ RESERVED = frozenset(
 
 @dataclass(frozen=True)
 class PartDesign:
-    """A design that one or several parts are made from; ``design.order.copies`` counts them all."""
+    """A design that parts are made from; ``design.order.quantity`` counts them all."""
 
     design: Design
     laminate: Laminate

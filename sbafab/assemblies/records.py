@@ -9,9 +9,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
-from sbafab.design.records import NAME_PATTERN, Laser, Order, Press, RuleName, Sheets
+from sbafab.design.order import Order
+from sbafab.design.records import NAME_PATTERN, Laser, Press, RuleName, Sheets
 from sbafab.design.section import Section
 from sbafab.design.units import Length, LengthOrZero, Millimetres
 
@@ -229,6 +230,16 @@ class Assembly(Section):
     """The press for all parts' designs."""
 
     _folder: Path = PrivateAttr(default=Path())
+
+    @field_validator("order")
+    @classmethod
+    def _counts_wholes(cls, order: Order) -> Order:
+        if order.good is not None:
+            raise ValueError(
+                "has good, which counts the actuators of one design; give order.copies of an "
+                "assembly"
+            )
+        return order
 
     @property
     def folder(self) -> Path:

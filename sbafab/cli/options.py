@@ -21,14 +21,31 @@ Command = Callable[..., Any]
 
 _GIVEN = click.core.ParameterSource.COMMANDLINE
 
-set_option = click.option(
-    "--set",
-    "assignments",
-    metavar="KEY=VALUE",
-    multiple=True,
-    shell_complete=completing.assignments,
-    help="Override a key of the design, e.g. --set chamber.diameter=6. Repeatable.",
-)
+EXPERIMENTAL = "registration.experimental=true"
+
+
+def set_option(command: Command) -> Command:
+    """``--set`` and ``--experimental``, which sets a key too."""
+
+    @functools.wraps(command)
+    def assigned(assignments: tuple[str, ...], experimental: bool, **others: Any) -> Any:
+        more = (EXPERIMENTAL,) if experimental else ()
+        return command(assignments=(*assignments, *more), **others)
+
+    keys = click.option(
+        "--set",
+        "assignments",
+        metavar="KEY=VALUE",
+        multiple=True,
+        shell_complete=completing.assignments,
+        help="Override a key of the design, e.g. --set chamber.diameter=6. Repeatable.",
+    )
+    proposals = click.option(
+        "--experimental",
+        is_flag=True,
+        help="Allow what no bench has tried: registered sheets. Sets registration.experimental.",
+    )
+    return keys(proposals(assigned))
 
 
 def calibration_options(command: Command) -> Command:

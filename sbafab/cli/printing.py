@@ -89,7 +89,7 @@ def add_batch(table: Table, run: Run) -> None:
         said = f"; warns: {', '.join(warned)}" if warned else ""
         waived = f"; waived: {', '.join(one.waived)}" if one.waived else ""
         verdict = "a rule failed" if one.failed else "every rule holds"
-        words = f"{one.design.order.copies} x, {verdict}{waived}{said}"
+        words = f"{one.design.order.quantity} x, {verdict}{waived}{said}"
         table.add_row(one.design.name, Text(words))
     for note in notes_of(run.checked):
         table.add_row("note", Text(note))
@@ -221,6 +221,7 @@ def _made(run: Run) -> Iterator[tuple[str, str]]:
             f"one sheet a layer, {width:.2f} x {length:.2f} mm; {batches} with places for "
             f"{len(panel['places'])} each; freed by {panel['second_cut']}",
         )
+    yield from _ordered(run)
     for film in index["films"]:
         if "sheets" in film:
             yield f"{film['material']} film", film_said(film, index["sheets"], index["copies"])
@@ -281,6 +282,12 @@ def _for_simulation(run: Run) -> Iterator[tuple[str, str]]:
         yield "", note
     if run.conforming is not None and run.conforming.fill is not None:
         yield "", "solid.* and cavity_<chamber>.stl show it flat, skin.* shows it filled."
+
+
+def _ordered(run: Run) -> Iterator[tuple[str, str]]:
+    """A row on an order of good actuators."""
+    if run.design.order.why:
+        yield "order", run.design.order.why
 
 
 def film_said(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], copies: int) -> str:

@@ -74,18 +74,19 @@ def dxf_text(
     properties: Mapping[str, str],
     profile: DxfProfile = "bulges",
     sheet: Surroundings | None = None,
+    notes: Sequence[Sequence[Point]] = (),
 ) -> str:
     """A DXF document of the contours, cut in the order given.
 
     Holes (clockwise) go on CUT_INNER, outlines on CUT_OUTER. ``properties`` become the
     document's custom properties. The chords profile takes contours of lines only. A layer's file
-    has a cross at the origin on REFERENCE, after all that is cut; a ``sheet`` has its engraving,
-    parting cut and frame instead.
+    has a cross at the origin on REFERENCE, after all that is cut, and there the strokes of its
+    ``notes``; a ``sheet`` has its engraving, parting cut and frame instead.
     """
     form = skeleton()
     cuts = _cuts(contours, profile)
     if sheet is None:
-        entities = [*cuts, *_datum_cross()]
+        entities = [*cuts, *_datum_cross(), *(_stroke(REFERENCE, run) for run in notes)]
         low, high = (-DATUM_ARM, -DATUM_ARM), (DATUM_ARM, DATUM_ARM)
     else:
         entities = [

@@ -7,9 +7,11 @@ from pathlib import Path
 
 from sbafab.cutting.chords import in_chords
 from sbafab.cutting.dxf_write import dxf_text
+from sbafab.cutting.lettering import Stroke, strokes, width
 from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import CutSettings, fixture_properties
 from sbafab.cutting.verify import verify_file
+from sbafab.errors import OutputError
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
@@ -19,6 +21,8 @@ from sbafab.laminate.laminate import Laminate
 
 PATH = "sheets/fixture.dxf"
 CHAMFER = 5.0
+LETTERS, BORDER, PITCH = 2.5, 3.0, 1.6
+"""Height of the notes' letters, mm at most, their distance from the edge, and from line to line."""
 ONE: tuple[Point, ...] = ((0.0, 0.0),)
 """The place of a laminate that is pressed by itself."""
 
@@ -91,21 +95,42 @@ def _drilled(plate: Region, laminate: Laminate, places: Sequence[Point] = ONE) -
 
 
 def write_fixture(
-    laminate: Laminate, folder: Path, settings: CutSettings, places: Sequence[Point] = ONE
+    laminate: Laminate,
+    folder: Path,
+    settings: CutSettings,
+    places: Sequence[Point] = ONE,
+    notes: Sequence[str] = (),
 ) -> str | None:
     """Writes and reads back the plate's cut file; its path in ``folder``, None without pins.
 
-    Nominal edges: the holes are to be reamed to the pins.
+    Nominal edges: the holes are to be finished to the pins. ``notes`` say how; they stand as
+    strokes on the plate, which are not cut, and in the file's properties.
     """
     plate = fixture(laminate, settings.platen, places)
     if plate is None:
         return None
-    properties = fixture_properties(settings)
+    properties = fixture_properties(settings, notes)
+    title = f"{settings.design}: base plate, seen from above #{settings.design_sha256[:8]}"
+    written = _lettered((title, *notes), plate) if notes else ()
     if settings.curves.in_chords:
         plate = in_chords(plate, None, settings.curves.chord_error)
-    text = dxf_text(cutting_order(plate), properties, settings.curves.profile)
+    text = dxf_text(cutting_order(plate), properties, settings.curves.profile, notes=written)
     path = folder / PATH
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(text.encode())
-    verify_file(path, plate, properties)
+    found = verify_file(path, plate, properties)
+    if len(found.strokes) != 2 + len(written):
+        raise OutputError(f"{path.name}: its notes are not whole. Regenerate it.")
     return PATH
+
+
+def _lettered(lines: Sequence[str], plate: Region) -> tuple[Stroke, ...]:
+    """The strokes of lines along the front edge of the plate, as large as its width lets them."""
+    low_x, low_y, high_x, _ = plate.bounds
+    longest = max(width(line, 1.0) for line in lines)
+    height = min(LETTERS, (high_x - low_x - 2 * BORDER) / longest)
+    return tuple(
+        stroke
+        for row, line in enumerate(reversed(lines))
+        for stroke in strokes(line, (low_x + BORDER, low_y + BORDER + row * PITCH * height), height)
+    )

@@ -62,9 +62,13 @@ def sheet_properties(
     return {**properties, **warning_property(settings.warnings.get(material))}
 
 
-def fixture_properties(settings: CutSettings) -> dict[str, str]:
-    """Custom properties of the base plate's cut file; its edges are nominal."""
-    return _properties(settings, "plate", "fixture", None)
+def fixture_properties(settings: CutSettings, notes: Sequence[str] = ()) -> dict[str, str]:
+    """Custom properties of the base plate's cut file; its edges are nominal.
+
+    ``notes`` are what a shop must know of its holes.
+    """
+    properties = _properties(settings, "plate", "fixture", None)
+    return {**properties, "HOLES": " / ".join(notes)} if notes else properties
 
 
 def second_cut_properties(

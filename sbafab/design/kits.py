@@ -35,7 +35,13 @@ OTHER_TUBE = "tubing of your choice"
 VALUE, SOURCE = "value", "source"
 SECTIONS = ("films", "registration", "press", "laser", "sheets", "rules")
 """Sections of a design that a kit fills in."""
-OF_A_DESIGN = ("registration.method", "rules.waive", "rules.target_yield", "rules.yield_builds")
+OF_A_DESIGN = (
+    "registration.method",
+    "registration.experimental",
+    "rules.waive",
+    "rules.target_yield",
+    "rules.yield_builds",
+)
 """Keys in them that are no lab's to say."""
 TEXTS = ("product", "use", "warning", "plate_material", "release_film")
 """Keys that are no numbers, whatever they say."""

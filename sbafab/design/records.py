@@ -12,12 +12,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, PrivateAttr
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
 
 from sbafab.design.films import UNCALIBRATED, Films, KerfWidth, LayerFilms, Sheet
 from sbafab.design.form import Form, Free
+from sbafab.design.order import Order
 from sbafab.design.section import Section
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres
+from sbafab.laminate.base_plate import PlateMachine, lone_pin_error, pin_error
 from sbafab.notebook import table_html
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
@@ -106,7 +108,10 @@ class Registration(Section):
     method: Literal["channel-pin", "ears", "sheet"] = "channel-pin"
     """"channel-pin": dowel pins in the channel bores, and in the lumen if there is one (the
     paper's). "ears": tooling holes outside the outline, pinned in every press step. "sheet": films
-    stay whole sheets on corner pins, hold all copies of a batch and are cut free last."""
+    stay whole sheets on corner pins, hold all copies of a batch and are cut free last; a proposal,
+    which registration.experimental allows."""
+    experimental: bool = Field(default=False, validate_default=True)
+    """Whether a proposal that no bench has tried may be made, as --experimental says."""
     pin_diameter: Length = 1.5
     """Dowel pins of the ears, and of the corners of registered sheets."""
     full_bond_pins: Literal["out", "in"] = "out"
@@ -125,8 +130,13 @@ class Registration(Section):
     """Lengths of pins that you have, in place of the standard's."""
     cutting_error: Annotated[float, Millimetres(0, 1)] = 0.1
     """The most by which a cut edge lies off its place (paper Sec. 2)."""
-    pin_error: Annotated[float, Millimetres(0, 1)] = 0.004
-    """The most by which a layer on its pins lies off its place (paper Sec. 2)."""
+    plate_made_by: PlateMachine = "jig-borer"
+    """What makes the holes of the base plate: "jig-borer" (places to 0.003, each hole lapped to its
+    pin), "cnc-mill" (0.025, reamed H7) or "drill-press" (marked out by hand, 0.2, reamed H7)."""
+    pin_error: Annotated[float, Millimetres(0, 1)] | None = None
+    """The most by which a layer on its pins lies off its place; by default what plate_made_by
+    gives: a jig borer the paper's 0.004 (Sec. 2), a CNC mill 0.029, a drill press 0.204. The place
+    of a plate's only pin does not count: there each gives 0.004."""
     hand_placement: Annotated[float, Millimetres(0, 5)] = 0.08
     """The most by which what no pin holds lies off what it is laid on. The paper gives none: this,
     with hand_turn, is calibrated so that the designs it built keep their limits as often as it
@@ -134,6 +144,16 @@ class Registration(Section):
     hand_turn: float = Field(default=0.4, ge=0, le=10)
     """Degrees: the most by which what fewer than two pins hold is turned. Calibrated together with
     hand_placement."""
+
+    @field_validator("experimental")
+    @classmethod
+    def _allows_the_method(cls, experimental: bool, info: ValidationInfo) -> bool:
+        if info.data.get("method") == "sheet" and not experimental:
+            raise ValueError(
+                'does not allow registration.method = "sheet", a proposal that no bench has tried; '
+                'add --experimental, or set it to true, to have it all the same, or use "ears"'
+            )
+        return experimental
 
     @property
     def hole_diameter(self) -> float:
@@ -154,8 +174,14 @@ class PanelSection(Section):
     """Sheet between two copies."""
     carrier: str = Field(default="transfer film of low tack", max_length=80)
     """What holds the masks in register until they are tacked to their film."""
+    carrier_adhesive: str = Field(default="", max_length=80)
+    """Its adhesive; none is known that was tried with PTFE in a press, so the traveller leaves a
+    blank."""
+    carrier_limit_c: float | None = Field(default=None, gt=0, le=500)
+    """C, what carrier and adhesive stand by their maker. The press must stay below; not known by
+    default, and the traveller leaves a blank."""
     tack_minutes: float = Field(default=1.0, gt=0, le=60)
-    """How long the press tacks the masks of one sheet to their film."""
+    """How long the press tacks the masks of one sheet to their film, once the plate is hot."""
     sheet_error: LengthOrZero = 0.05
     """The most by which film or mask lies off its place in its sheet: stretch, sag, transfer."""
     second_cut_error: LengthOrZero = 0.2
@@ -181,6 +207,8 @@ class Press(Section):
     """What TPE does not stick to, one sheet below and one above (the paper names none)."""
     release_thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.05
     """Thickness of one release film; PTFE film is sold in this thickness."""
+    underlay_thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.1
+    """Thickness of the printed underlay, where one lies on the plate; plain paper of 80 g/m2."""
     pad_material: Literal["silicone sponge", "silicone rubber"] = "silicone sponge"
     """Press pad: the compliant sheet, as large as the platen, that spreads the force (ours)."""
     pad_thickness: Length | None = None
@@ -198,8 +226,12 @@ class Press(Section):
     """Step 4: the whole laminate, full bond."""
 
 
+HoldDown = Literal["border", "carrier", "vacuum"]
+"""What holds a film under the beam."""
+
+
 class Laser(Section):
-    """The laser: what it can cut, its kerf, speeds for estimates."""
+    """The laser: what it can cut, its kerf, how film is held, speeds for estimates."""
 
     least_feature: Length = 0.2
     """The narrowest slot or web the laser cuts well."""
@@ -216,6 +248,13 @@ class Laser(Section):
     and says so."""
     kerf_ptfe: KerfWidth = UNCALIBRATED
     """Full kerf width in PTFE, measured, likewise."""
+    hold_tpe: HoldDown = "border"
+    """What holds TPE, and other films that bond, under the beam: its "border" taped to card, a
+    "carrier" sheet of low tack, or a "vacuum" bed. Ours, not tried: adhesive of a carrier that
+    stays in a bond may leak."""
+    hold_ptfe: HoldDown = "carrier"
+    """What holds PTFE, and other masks, likewise. Ours, not tried: masks are light and loose, and
+    nothing bonds to them."""
     unknown_kerf: Annotated[float, Millimetres(0, 1)] = 0.1
     """What a kerf that was not measured may take off the width of a part: ours."""
 
@@ -231,20 +270,6 @@ class Sheets(Section):
     """How long spyrrow looks, for each sheet."""
     label: bool = True
     """Whether name, material, number and design hash are engraved into the border."""
-
-
-class Order(Section):
-    """How many, for whom."""
-
-    copies: int = Field(default=1, ge=1, le=1000)
-    """How many of the actuator are cut."""
-    spares: int = Field(default=2, ge=0, le=100)
-    """Spare sets of every mask's pieces that are cut beyond what the copies take: they are small
-    and loose, and a lost one else costs a trip to the laser."""
-    made_for: str = Field(default="", max_length=120)
-    """Printed on the traveller."""
-    note: str = Field(default="", max_length=400)
-    """Printed on the traveller."""
 
 
 class Rules(Section):
@@ -327,6 +352,27 @@ class Design(Section):
     def drawing(self) -> Path | None:
         """The file of the pockets' drawn outline, if there is one."""
         return None if self.chamber.outline is None else self.folder / self.chamber.outline
+
+    @property
+    def thickest_pin(self) -> float:
+        """Diameter of the thickest dowel pin that the design may need, mm."""
+        return max(self.bore.pin, self.registration.pin_diameter)
+
+    @property
+    def pin_error(self) -> float:
+        """The most by which a layer on several pins lies off its place, mm."""
+        own = self.registration
+        if own.pin_error is not None:
+            return own.pin_error
+        return pin_error(self.thickest_pin, own.plate_made_by)
+
+    @property
+    def lone_pin_error(self) -> float:
+        """The same where the plate has one pin, whose own place does not count, mm."""
+        own = self.registration
+        if own.pin_error is not None:
+            return own.pin_error
+        return lone_pin_error(self.thickest_pin, own.plate_made_by)
 
     @property
     def strip_width(self) -> float:

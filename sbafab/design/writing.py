@@ -4,13 +4,22 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from sbafab.design.films import UNCALIBRATED, LayerFilms
-from sbafab.design.records import Design, Inlet
+from sbafab.design.order import Order
+from sbafab.design.records import Design, Inlet, Press, Registration
 
 FITS = "fits"
+LATER: Mapping[str, Sequence[str]] = {
+    "order": ("success_rate", "certainty", "shift_hours"),
+    "laser": ("hold_tpe", "hold_ptfe"),
+    "panel": ("carrier_adhesive", "carrier_limit_c"),
+}
+"""Keys that came after the first hashes, which have none of them."""
+FIRST_SPARES = 2
+"""What ``order.spares`` was by default, of masks alone; today's default keeps its hash."""
 
 
 def resolved(design: Design) -> dict[str, Any]:
@@ -80,7 +89,31 @@ def _as_first_hashed(table: dict[str, Any], design: Design) -> dict[str, Any]:
         table["layup"] = None
     if design.inlet.adhesive == Inlet().adhesive:
         table["inlet"]["adhesive"] = None
+    _as_first_ordered(table, design)
+    table["registration"]["pin_error"] = design.pin_error
+    for name, key, usual in (
+        ("registration", "plate_made_by", Registration().plate_made_by),
+        ("press", "underlay_thickness", Press().underlay_thickness),
+    ):
+        if table[name][key] == usual:
+            table[name][key] = None
     return _without_none(table)
+
+
+def _as_first_ordered(table: dict[str, Any], design: Design) -> None:
+    """Take out keys that came later and have their defaults, and what only allows a method."""
+    table["registration"].pop("experimental")
+    has_usual_spares = all(
+        getattr(design.order, key) == getattr(Order(), key) for key in ("spares", "spare_share")
+    )
+    if has_usual_spares:
+        table["order"] |= {"spares": FIRST_SPARES, "spare_share": None}
+    for section, keys in LATER.items():
+        asked = getattr(design, section)
+        usual = type(asked)()
+        for key in keys:
+            if getattr(asked, key) == getattr(usual, key):
+                table[section][key] = None
 
 
 def design_sha256(design: Design) -> str:

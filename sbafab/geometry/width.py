@@ -8,7 +8,7 @@ between corners; these are exact for lines and arcs.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from sbafab.geometry.boundary_side import BoundarySide, Foot
@@ -167,6 +167,15 @@ class _Narrowest:
             ):
                 found.append(number)
         return [(number, sides[number]) for number in index.in_order(box, found)]
+
+    def corners_near(self, a: Corner, after: int) -> Iterator[Corner]:
+        """Yield later corners, numbered above ``after``, that a shorter segment may reach."""
+        index, corners = self.boundary.index, self.boundary.corners
+        box = widened(a.box, self.value)
+        for number in index.in_order(box, index.among(box, index.about(box, after))):
+            corner = corners[number] if number > after else None
+            if corner is not None:
+                yield corner
 
     def is_clear(self, p: Point, q: Point) -> bool:
         known = self.boundary.known_clear
@@ -329,12 +338,14 @@ def _at_corners(corners: Sequence[Corner | None], narrowest: _Narrowest) -> None
             continue
         # What a convex corner faces may be square on neither of its edges.
         aside = SQUARE if corner.turn < 0 else math.pi / 2
-        for j, side in narrowest.near(corner, aside):
+        for _, side in narrowest.near(corner, aside):
             for foot in side.feet(corner.point):
                 _corner_to_edge(corner, side, foot, narrowest)
-            other = corners[j] if j > i else None
-            if other is not None and corner.turn < 0 and other.turn < 0:
-                _between_corners(corner, other, narrowest)
+        if corner.turn < 0:
+            # The edges of a corner that faces another one need not face it.
+            for other in narrowest.corners_near(corner, i):
+                if other.turn < 0:
+                    _between_corners(corner, other, narrowest)
 
 
 def _between_corners(a: Corner, b: Corner, narrowest: _Narrowest) -> None:

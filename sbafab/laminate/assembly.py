@@ -132,19 +132,20 @@ def _pins_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Pin, ...]:
     )
 
 
-def laying_pins(laminate: Laminate, step: AssemblyStep) -> tuple[Pin, ...]:
-    """Pins of the plate on which a step without any may be laid up, to be drawn before it closes.
+def is_laid_by_hand(laminate: Laminate, step: AssemblyStep) -> bool:
+    """Return True where a hand places a layer, or an earlier stack, that no pin of the step holds.
 
-    Every film of the step must have their opening: a lumen's pin has that, a bore's has not.
+    One whole stack that is laid down again is aligned with nothing.
     """
-    if step.pins:
-        return ()
-    films = [layer for layer in distinct_layers(laminate, step.layers) if not layer.is_mask]
-    return tuple(
-        pin
-        for pin in _pins_in(laminate, step.layers)
-        if all(pin in laminate.pins_holding(layer) for layer in films)
-    )
+    pins = set(step.pins)
+    for stack in step.stacks if step.adds else ():
+        held = [
+            not pins.isdisjoint(laminate.pins_holding(layer))
+            for layer in distinct_layers(laminate, stack)
+        ]
+        if not (any(held) if set(stack).isdisjoint(step.adds) else all(held)):
+            return True
+    return False
 
 
 def pins_when_added(laminate: Laminate) -> dict[int, tuple[Pin, ...]]:

@@ -3,7 +3,10 @@
 Both come from one potential, the films' energy less the work of the air: force -dW/dh, volume
 -dW/dp. It is a quintic spline in the height and in asinh(p / P0), fitted by least squares to W and
 both derivatives of balloons between plates. So the map keeps energy: what the air gives on any
-way round comes back. Lengths mm, pressures kPa, volumes ul, forces mN, energies uJ.
+way round comes back. A balloon of least energy holds the more the higher its pressure, and pushes
+the less the higher it stands (W is concave in p, convex in h): of all splines that do, and hold a
+volume above 0, the map is the one nearest to the balloons. Lengths mm, pressures kPa, volumes ul,
+forces mN, energies uJ.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, Shapes
+from sbafab.models.nearest import nearest
 from sbafab.models.rippled import pressed, risen
 
 if TYPE_CHECKING:
@@ -33,6 +37,8 @@ P0 = 0.1
 """Pressure in kPa below which the spline's pieces are alike in pressure, above alike in ratio."""
 RISES = 65
 """Pressures at which free heights are kept to begin with."""
+CAVES_IN = 0.1
+"""Suction in kPa by which a slack film caves in: about what brings one taut, ours, not measured."""
 ABOVE = 1.15
 """How far the map goes on above the highest free balloon, as a share of it."""
 FLATTEST = 0.01
@@ -45,6 +51,17 @@ VOLUMES = 0.6
 """Weight of volumes beside forces."""
 NEARLY_FLAT = 0.2
 """Height in mm above which volumes are fitted by their share of what they are, below all alike."""
+PRESSURE_CHECKS, HEIGHT_CHECKS = 8 * PRESSURE_SPANS + 1, 4 * HEIGHT_SPANS + 1
+"""Places each way at which volumes are made to rise with pressure and forces to fall with height.
+"""
+LOWEST = np.array([0.001, 0.002, 0.004, 0.007])
+"""Further ones near the flat, as shares of the map's height."""
+EMPTIEST = 0.005
+"""Share of the map's height from which on volumes are made to be above 0."""
+MARGIN = 5e-5
+"""By how much, as a share, they do so there, that they do it between as well."""
+ROUNDS = 12
+"""How often places at which they do not are looked for."""
 MOST_STRETCH = 0.15
 """Share by which films may stretch; one modulus is unlikely to hold beyond."""
 
@@ -122,13 +139,16 @@ class BalloonMap:
         rows = by_height[np.arange(PRESSURE_SPANS)[:, None] + np.arange(DEGREE + 1)]
         return np.asarray(PIECES.T @ rows)
 
-    def pressed(self, pressure: ArrayLike) -> Array:
+    def pressed(self, pressure: ArrayLike, sucked: bool = False) -> Array:
         """Polynomials by height, of W and of -dW/dp (the volume), at pressures: (..., 2, pieces,
         powers).
 
-        Raises DesignError for a pressure outside the map.
+        With ``sucked`` pressures may be below 0, as in a chamber that is shut and pulled open:
+        slack films cave in, their volume falls by exp(p / CAVES_IN). Raises DesignError for a
+        pressure outside the map.
         """
-        p = np.asarray(pressure, dtype=float)
+        below = np.asarray(pressure, dtype=float)
+        p = np.maximum(below, 0.0) if sucked else below
         if not (p.min() >= 0 and p.max() <= self.most_pressure):
             worst = p.max() if p.min() >= 0 else p.min()
             raise DesignError(
@@ -142,7 +162,12 @@ class BalloonMap:
         powers[..., 1, 0] = 0.0
         powers[..., 1, 1:] = powers[..., 0, :-1] * POWERS[1:] * -rate[..., None]
         found = powers @ self._polynomials[first]
-        return found.reshape(*p.shape, 2, PIECES_IN_ALL, DEGREE + 1)
+        found = found.reshape(*p.shape, 2, PIECES_IN_ALL, DEGREE + 1)
+        if sucked:
+            kept = np.exp((below - p) / CAVES_IN)[..., None, None]
+            found[..., 0, :, :] -= CAVES_IN * (kept - 1) * found[..., 1, :, :]
+            found[..., 1, :, :] *= kept
+        return found
 
     def _scaled(self, p: Array) -> tuple[Array, Array]:
         """Place among the pieces in pressure, and its rate by pressure."""
@@ -307,8 +332,79 @@ def _fitted(p: Array, h: Array, found: Shapes, most: float, top: float) -> Array
     wanted = np.concatenate(
         [potential * scale, found.force * push, found.volume * room, np.zeros(lowest.sum())]
     )
-    best = np.linalg.lstsq(matrix, wanted, rcond=None)[0]
+    best = _admissible(matrix, wanted, _limits(most, top, area))
+    if best is None:
+        raise DesignError(
+            f"no smooth map of a balloon fits up to {most:g} kPa; ask for less pressure"
+        )
     return np.asarray(best.reshape(blank.shape))
+
+
+class Limits(NamedTuple):
+    """Linear functions of a spline's coefficients that must not fall below MARGIN: the matrices by
+    pressure and by height (places, coefficients) of each kind.
+    """
+
+    kinds: tuple[tuple[Array, Array], ...]
+
+    def values(self, coefficients: Array) -> list[Array]:
+        """Return the values at all places of each kind: (pressures, heights)."""
+        grid = coefficients.reshape(PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE)
+        return [across @ grid @ along.T for across, along in self.kinds]
+
+    def rows(self, chosen: list[NDArray[np.bool_]]) -> Array:
+        """Return the equations of the places chosen: (places, coefficients)."""
+        found = []
+        for (across, along), these in zip(self.kinds, chosen, strict=True):
+            i, j = np.nonzero(these)
+            size = across.shape[1] * along.shape[1]
+            found.append((across[i][:, :, None] * along[j][:, None]).reshape(len(i), size))
+        return np.concatenate(found)
+
+
+def _limits(most: float, top: float, area: float) -> Limits:
+    """Return what W has to obey: volumes that rise with pressure and are above 0 without any, as
+    shares of what area times height holds; forces that fall with height, of pressure times area.
+    """
+    each = PRESSURE_SPANS / math.asinh(most / P0)
+    x = np.linspace(0, PRESSURE_SPANS * (1 - 1e-12), PRESSURE_CHECKS)
+    even = np.linspace(0, 1 - 1e-12, HEIGHT_CHECKS)
+    y = HEIGHT_SPANS * np.sort(np.concatenate([(even + even**2) / 2, LOWEST]))
+    value, slope, curve = (_rows(x, order, PRESSURE_SPANS + DEGREE) for order in (0, 1, 2))
+    slope, curve = each * slope, each**2 * curve
+    # With p = P0 sinh s the volume is -W_s / (P0 cosh s).
+    s = (x / each)[:, None]
+    rises = (np.tanh(s) * slope - curve) / (P0 * np.cosh(s) * area * top)
+    falls = value * HEIGHT_SPANS**2 / top / (area * (P0 * np.sinh(s) + LOW))
+    share = np.maximum(y / HEIGHT_SPANS, EMPTIEST)
+    by_height, bent = (_rows(y, order, HEIGHT_SPANS + DEGREE) for order in (0, 2))
+    by_height /= share[:, None]
+    holds = _rows(share * HEIGHT_SPANS * (1 - 1e-12), 0, HEIGHT_SPANS + DEGREE) / share[:, None]
+    return Limits(((rises, by_height), (falls, bent), (-slope[:1] / (P0 * area * top), holds)))
+
+
+def _admissible(matrix: Array, wanted: Array, limits: Limits) -> Array | None:
+    """Return the coefficients of least squares that keep the limits; None where none are found.
+
+    Limits are taken up where they are not kept, until all are.
+    """
+    stiff = 1e-9 * np.abs(matrix).max() * np.eye(matrix.shape[1])
+    upper = np.linalg.qr(np.concatenate([matrix, stiff]), mode="r")
+    back = np.linalg.inv(upper)
+    free = back.T @ (matrix.T @ wanted)
+    best, chosen = back @ free, [np.zeros(one.shape, bool) for one in limits.values(back @ free)]
+    for _ in range(ROUNDS):
+        values = limits.values(best)
+        if min(one.min() for one in values) >= MARGIN / 2:
+            return np.asarray(best)
+        chosen = [old | (one < 2 * MARGIN) for old, one in zip(chosen, values, strict=True)]
+        rows = limits.rows(chosen) @ back
+        size = np.linalg.norm(rows, axis=1)
+        kept = nearest(free, rows / size[:, None], MARGIN / size)
+        if kept is None:
+            return None
+        best = back @ kept
+    return None
 
 
 def _rows(x: Array, order: int, count: int) -> Array:

@@ -27,6 +27,8 @@ STEP = 1e-3
 SOFTEST = 0.01
 """Pressure in kPa below which volumes are nearly straight in pressure, above in its logarithm."""
 FARTHEST = 2.0
+SUCTION = 90.0
+"""kPa below the atmosphere to which a shut chamber may come before its fluid boils or leaks."""
 CLOSE = 1e-5
 LITTLE = 20.0
 """Share of a chamber's content by which it may be missed; in ul, the content that is least."""
@@ -109,11 +111,14 @@ class Motion:
         return self._solved(missed, before)
 
     def _filled(self, wanted: Array) -> Pose:
-        return self._solved(lambda pose: np.asarray(self._contents(pose) - wanted), wanted)
+        """The pose with these contents. A pump that stands still is shut: what would bend its
+        chamber open stands against suction.
+        """
+        return self._solved(lambda pose: np.asarray(self._contents(pose) - wanted), wanted, SUCTION)
 
-    def _solved(self, missed: Callable[[Pose], Array], scale: Array) -> Pose:
-        """The pose at which nothing is missed. A chamber that would need less than no pressure
-        draws in what it lacks.
+    def _solved(self, missed: Callable[[Pose], Array], scale: Array, suction: float = 0.0) -> Pose:
+        """The pose at which nothing is missed, at ``suction`` kPa below the atmosphere at most. A
+        chamber that would need less draws in what it lacks.
 
         What is missed, as volume, is the slope of one function of the pressures, whose least is
         sought: volumes are slopes of a potential that bends one way, and more pressure lets less
@@ -121,12 +126,13 @@ class Motion:
         as long as it leads downhill.
         """
         most = math.asinh(self.stack.most_pressure / SOFTEST)
+        least = -math.asinh(suction / SOFTEST)
         close = CLOSE * np.maximum(np.abs(scale), LITTLE)
-        start = np.arcsinh(np.asarray(self.pose.pressures) / SOFTEST)
+        start = np.maximum(np.arcsinh(np.asarray(self.pose.pressures) / SOFTEST), least)
         now = self._tried(start, missed, self.pose)
         for _ in range(MOST_ROUNDS):
             lacks = (now.x >= most) & (now.wrong < 0)
-            counts = ~((now.x <= 0) & (now.wrong >= 0)) & ~lacks
+            counts = ~((now.x <= least) & (now.wrong >= 0)) & ~lacks
             if (np.abs(now.wrong) <= close)[counts].all():
                 if lacks.any():
                     raise DesignError(
@@ -134,25 +140,29 @@ class Motion:
                         "for less, or make the stack with a larger most_pressure"
                     )
                 return now.pose
-            ahead = self._ahead(missed, now, counts)
+            ahead = self._ahead(missed, now, counts, least)
             ahead *= min(1.0, FARTHEST / max(float(np.abs(ahead).max()), 1e-12))
-            now = self._downhill(missed, now, ahead, most)
+            now = self._downhill(missed, now, ahead, (least, most))
         raise DesignError("the stack finds no balance at the end of this step; try a shorter one")
 
     def _downhill(
-        self, missed: Callable[[Pose], Array], now: _Tried, ahead: Array, most: float
+        self,
+        missed: Callable[[Pose], Array],
+        now: _Tried,
+        ahead: Array,
+        ends: tuple[float, float],
     ) -> _Tried:
         """What is found along a step, as far as it leads downhill."""
         steep = float(now.wrong @ (now.rates * ahead))
         share = 1.0
         for _ in range(HALVINGS):
-            x = np.clip(now.x + share * ahead, 0.0, most)
+            x = np.clip(now.x + share * ahead, *ends)
             try:
                 tried = self._tried(x, missed, now.pose)
             except DesignError:
                 share /= 2
                 continue
-            still = (x > 0) & (x < most)
+            still = (x > ends[0]) & (x < ends[1])
             slope = float((tried.wrong * tried.rates * ahead)[still].sum())
             if slope <= -OVERSHOT * steep:
                 return tried
@@ -161,7 +171,7 @@ class Motion:
 
     def _tried(self, x: Array, missed: Callable[[Pose], Array], near: Pose) -> _Tried:
         pressures = np.minimum(SOFTEST * np.sinh(x), self.stack.most_pressure)
-        pose = self.stack.pose(tuple(pressures.tolist()), near=near, **self.load)
+        pose = self.stack.pose(tuple(pressures.tolist()), near=near, sucked=True, **self.load)
         return _Tried(x, pose, missed(pose) / self._dense(pose), SOFTEST * np.cosh(x))
 
     def _dense(self, pose: Pose) -> Array:
@@ -169,7 +179,11 @@ class Motion:
         return np.array([self.line.content(1.0, p) for p in pose.pressures])
 
     def _ahead(
-        self, missed: Callable[[Pose], Array], now: _Tried, counts: NDArray[np.bool_]
+        self,
+        missed: Callable[[Pose], Array],
+        now: _Tried,
+        counts: NDArray[np.bool_],
+        least: float,
     ) -> Array:
         """Newton's step by x of the chambers that count; 0 of the others."""
         found = []
@@ -182,10 +196,10 @@ class Motion:
         while True:
             ahead = np.zeros_like(now.x)
             ahead[which] = _newton(slopes, now.wrong[which], now.rates[which])
-            may = (now.x[which] > 0) | (ahead[which] >= 0)
+            may = (now.x[which] > least) | (ahead[which] >= 0)
             if may.all():
                 return ahead
-            # What has no pressure cannot have less: the others move alone.
+            # What has no less pressure to give stays: the others move alone.
             which, slopes = which[may], slopes[np.ix_(may, may)]
 
 

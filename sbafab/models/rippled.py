@@ -49,6 +49,10 @@ LATEST = 0.02
 """Film strain by which films have fallen in step where they ever do."""
 ALIKE = 0.9
 """Cosine of the angle between waves that are those of one branch."""
+TAUT = 1.4
+"""Height over the free one at which waves are pulled straight."""
+NUDGE = 1e-3
+"""Share of a pressure by which rates are found."""
 HALVINGS = 3
 """How often a step between rungs is halved where it finds no balance."""
 
@@ -83,20 +87,54 @@ def risen(balloon: Balloon, pressure: ArrayLike) -> Shapes:
 def pressed(balloon: Balloon, pressure: ArrayLike, height: ArrayLike, tied: bool = False) -> Shapes:
     """Balloons between plates at heights (mm), as ``inflate`` has them.
 
-    Where waves are in step with the rim a balloon is taken for one that is lower, by the share by
-    which it would rise higher: W(p, h) = W'(p, h / share), with force and volume its slopes. Shapes
-    r and z are the lower one's.
+    Where waves are in step with the rim a balloon rises freely by a share more. Between plates it
+    is taken for one that is lower, W(p, h) = W'(p, h - e(p) f(h / h1)), with force and volume its
+    slopes: e is by how much the free height h1 is above that of ``inflate``, and f grows from 0
+    where it is pressed flat to 1 where it stands freely, and is 0 again where it is pulled to
+    TAUT times that: plates press waves flat, and a pull draws them straight. Shapes r and z are the
+    lower one's.
     """
     p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
     share, rate = taller(balloon, p)
-    found = inflate(balloon, p, h / share, tied=tied)
-    less = found.force * h * rate / share**2
+    if not (rate.any() or (share != 1).any()):
+        return inflate(balloon, p, h, tied=tied)
+    own, slope = _free_heights(balloon, p)
+    stands, stands_rate = share * own, rate * own + share * slope
+    more, more_rate = stands - own, stands_rate - slope
+    place = h / stands
+    faded, fading = _faded(place)
+    lower = more * faded
+    by_height = 1 - more * fading / stands
+    by_pressure = more * fading * place * stands_rate / stands - more_rate * faded
+    found = inflate(balloon, p, h - lower, tied=tied)
+    more_air = found.force * by_pressure
     return found._replace(
-        height=found.height * share,
-        force=found.force / share,
-        volume=found.volume - less,
-        energy=found.energy - found.pressure * less,
+        height=found.height + lower,
+        force=found.force * by_height,
+        volume=found.volume + more_air,
+        energy=found.energy + found.pressure * more_air,
     )
+
+
+def _free_heights(balloon: Balloon, p: Array) -> tuple[Array, Array]:
+    """Free heights by ``inflate`` in mm, and their rate by pressure; 1 mm where there is none."""
+    known = np.unique(p[p > 0])
+    each = inflate(
+        balloon, np.concatenate([known * (1 - NUDGE), known, known * (1 + NUDGE)])
+    ).height
+    low, height, high = each.reshape(3, -1)
+    height = np.append(height, 1.0)
+    slope = np.append((high - low) / (2 * NUDGE * known), 0.0)
+    at = np.where(p > 0, np.searchsorted(known, p), len(known))
+    return height[at], slope[at]
+
+
+def _faded(place: Array) -> tuple[Array, Array]:
+    """Share of the waves' rise at heights over the free one, and its slope."""
+    up = np.clip(place, 0.0, 1.0)
+    off = np.clip((place - 1) / (TAUT - 1), 0.0, 1.0)
+    value = up**2 * (3 - 2 * up) - off**2 * (3 - 2 * off)
+    return value, 6 * up * (1 - up) - 6 * off * (1 - off) / (TAUT - 1)
 
 
 class Taller(NamedTuple):

@@ -80,9 +80,15 @@ class Springs:
     places: GapPlaces
 
     @classmethod
-    def pressed(cls, maps: Sequence[BalloonMap], pressures: Array, places: GapPlaces) -> Springs:
-        """Those of kinds of balloons at pressures, one a chamber."""
-        found = np.stack([one.pressed(pressures) for one in maps])
+    def pressed(
+        cls,
+        maps: Sequence[BalloonMap],
+        pressures: Array,
+        places: GapPlaces,
+        sucked: bool = False,
+    ) -> Springs:
+        """Those of kinds of balloons at pressures, one a chamber, below 0 only where ``sucked``."""
+        found = np.stack([one.pressed(pressures, sucked) for one in maps])
         # Each point has its share of its balloon.
         rows = found.transpose(2, 0, 1, 3, 4).reshape(-1, DEGREE + 1) / RING
         return cls(derivatives(rows), places)

@@ -207,8 +207,11 @@ class Stack:
         """Where levels are."""
         return self._places.at(self.levels)
 
-    def springs(self, pressures: Sequence[float]) -> Springs:
-        """What kinds of balloons do at pressures, one a chamber. Raises DesignError."""
+    def springs(self, pressures: Sequence[float], sucked: bool = False) -> Springs:
+        """What kinds of balloons do at pressures, one a chamber. Raises DesignError.
+
+        With ``sucked`` a chamber that is shut may stand below 0 kPa.
+        """
         try:
             asked = np.array(pressures, dtype=float)
         except (TypeError, ValueError):
@@ -217,7 +220,7 @@ class Stack:
             raise DesignError(
                 f"{asked.size} pressures are given for {self.chambers} chambers; give one a chamber"
             )
-        return Springs.pressed(self.maps, asked, self._places)
+        return Springs.pressed(self.maps, asked, self._places, sucked)
 
     def each(self, springs: Springs) -> Springs:
         """What levels do."""
@@ -230,15 +233,17 @@ class Stack:
         gravity: bool | Sequence[float] = False,
         plate: float | Plate | None = None,
         near: Pose | None = None,
+        sucked: bool = False,
     ) -> Pose:
         """The pose at pressures (kPa, one a chamber), in balance.
 
         ``tip_load`` is a force in N on the middle of the top; ``gravity`` is True where the base
         lies level, or the direction (3) of down; ``plate`` an outer plate, or its height in mm.
-        ``near`` is a pose to start from, such as the last one of a motion. Raises DesignError for
-        pressures outside the maps, and where no balance is found.
+        ``near`` is a pose to start from, such as the last one of a motion. Pressures may be below 0
+        only where chambers may be ``sucked``: shut, with a fluid that keeps its volume. Raises
+        DesignError for pressures outside the maps, and where no balance is found.
         """
-        springs = self.springs(pressures)
+        springs = self.springs(pressures, sucked)
         load = self._load(tip_load, gravity, plate)
         if load is None:
             start = self._risen(pressures) if near is None else near.freedoms[self._first]

@@ -2,28 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.records import NestPart
 
 
+def no_spares(needed: int) -> int:
+    """Return zero spares, whatever number is needed."""
+    return 0
+
+
 def parts_of(
-    laminate: Laminate, paths: Mapping[str, Region], copies: int, spares: int = 0
+    laminate: Laminate,
+    paths: Mapping[str, Region],
+    copies: int,
+    spares: Callable[[int], int] = no_spares,
 ) -> tuple[NestPart, ...]:
     """Every piece of every pattern, by pattern in stacking order.
 
-    ``paths`` holds each pattern's path of the beam, kerf compensated; ``spares`` more of every
-    mask are cut than the ``copies`` take. Pieces of one pattern that
-    differ only in their place are one part, named after the first of them. None where the
-    layers are registered sheets: these are not nested.
+    ``paths`` holds each pattern's path of the beam, kerf compensated; ``spares`` tells
+    how many more of a pattern are cut than the ``copies`` take. Pieces of one pattern that differ
+    only in their place are one part, named after the first of them. None where the layers are
+    registered sheets: these are not nested.
     """
     if laminate.panel is not None:
         return ()
     parts: list[NestPart] = []
     for pattern, layers in laminate.patterns.items():
-        layers_cut = len(layers) * copies + (spares if layers[0].is_mask else 0)
+        needed = len(layers) * copies
+        layers_cut = needed + spares(needed)
         alike: dict[Region, list[int]] = {}
         pieces = paths[pattern].pieces
         for number, piece in enumerate(pieces):

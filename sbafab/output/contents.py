@@ -60,7 +60,9 @@ def write_contents(
         write_text(folder / "press.json", as_json(_press(checked, planned.pressing)))
         write_text(folder / "press.csv", press_csv(planned.pressing))
         places = design_runs(checked.design, checked.laminate).places
-        underlay = underlay_pdf(checked.laminate, design_sha256(checked.design), places)
+        press = checked.design.press
+        platen = press.platen_width, press.platen_length
+        underlay = underlay_pdf(checked.laminate, design_sha256(checked.design), places, platen)
         if underlay is not None:
             (folder / UNDERLAY).write_bytes(underlay)
     if "mesh" in wanted:
@@ -84,7 +86,7 @@ def write_contents(
 
 def _press(checked: Checked, plan: Schedule) -> dict[str, Any]:
     runs = design_runs(checked.design, checked.laminate)
-    batch = {"batch": batch_json(checked.laminate, runs, plan)} if runs.copies > 1 else {}
+    batch = {"batch": batch_json(checked.design, checked.laminate, plan)} if runs.copies > 1 else {}
     return {**press_json(plan), **batch}
 
 
@@ -143,7 +145,7 @@ def order_of(checked: Checked, folder: str = "") -> Job:
         fixture=f"{folder}{FIXTURE}" if checked.laminate.pins else None,
         underlay=f"{folder}{UNDERLAY}" if guides(checked.laminate) else None,
         kerf={str(name): kerf for name, kerf in kerf_widths(design).items()},
-        copies=design.order.copies,
+        copies=design.order.quantity,
     )
 
 

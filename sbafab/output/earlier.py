@@ -26,6 +26,10 @@ RESULTS = "result.json"
 """Of a simulator's folder: what a run has found, not only what the simulator reads."""
 WORTH_KEEPING = {*CUT, *PRESS, *MESH, *PREDICTION, *SIMULATORS}
 """Files and folders that a design which breaks a rule does not get."""
+WHOLE = {"layers", "sheets", "preview", "predict"}
+"""Folders that a run which writes into them writes whole."""
+PARTS = {*WORTH_KEEPING, *WHOLE, "findings.html"}
+"""All that runs write of one design's parts; a listed file elsewhere is none of theirs."""
 
 
 def would_replace(
@@ -113,8 +117,9 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
     old_meshes = old.get("mesh_statistics")
     if "mesh_statistics" in index and old_meshes not in (None, index["mesh_statistics"]):
         anew.update(MESH)
+    anew |= WHOLE & {path.partition("/")[0] for path in made}
     for path, digest in (files if isinstance(files, dict) else {}).items():
-        if path in made or path not in kept or path.partition("/")[0] in anew:
+        if path in made or path not in kept or not _may_stay(path, anew):
             continue
         if file_hash(old_folder / path) == digest:
             target = folder / path
@@ -134,6 +139,12 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
         index["meshes"] += kept_meshes
         if any(mesh.get("kind") == "volume" for mesh in kept_meshes):
             index["mesh_statistics"] = old.get("mesh_statistics", {})
+
+
+def _may_stay(path: str, anew: Collection[str]) -> bool:
+    """Return whether an old run's file belongs to a part of a run that is not written anew."""
+    first = path.partition("/")[0]
+    return first in PARTS and first not in anew
 
 
 def _differs(path: str, old_folder: Path, folder: Path) -> bool:

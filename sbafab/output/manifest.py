@@ -97,7 +97,7 @@ def manifest(
         lowered_limits=checked.lowered,
         sizes={name: round(value, 6) for name, value in sizes(design, laminate).items()},
         notes=laminate.notes,
-        copies=design.order.copies,
+        copies=design.order.quantity,
         films=_films(laminate, sheets),
         warnings=tuple(dict.fromkeys(warnings(design).values())),
         layers=tuple(_layer(planned, layer) for layer in laminate.layers),
@@ -150,7 +150,7 @@ def job_manifest(
             DesignClaim(
                 name=design.name,
                 folder=design.name,
-                copies=design.order.copies,
+                copies=design.order.quantity,
                 design_sha256=design_sha256(design),
                 kit=KitClaim.model_validate_json(as_json(citation(design))),
             )

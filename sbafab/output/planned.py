@@ -91,7 +91,7 @@ def plan(checked: Checked, wanted: Collection[RunPart], curves: Curves = TRUE_AR
         from sbafab.as_built.coarse import refuse_coarse
 
         refuse_coarse(laminate, paths, settings, limits(design))
-    parts = parts_of(laminate, paths, design.order.copies, design.order.spares)
+    parts = parts_of(laminate, paths, design.order.quantity, design.order.spare_parts)
     return replace(planned, paths=paths, parts=parts)
 
 

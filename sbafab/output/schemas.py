@@ -148,6 +148,16 @@ def _batch() -> dict[str, Any]:
     pattern = table(pattern=TEXT, each=COUNT, cycles=array(COUNT))
     place = {**array(number()), "minItems": 2, "maxItems": 2}
     times = ("press_minutes", "hands_minutes", "total_minutes")
+    perhaps = {"type": ["integer", "null"], "minimum": 1}
+    entry = table(
+        day=COUNT,
+        start_minutes={**number(), "description": "after the start of the shift"},
+        minutes=number(),
+        task={"enum": ["cut", "press", "finish"]},
+        cycle=perhaps,
+        step=perhaps,
+        copies={**array(COUNT), "minItems": 2, "maxItems": 2, "description": "first and last"},
+    )
     return table(
         copies=COUNT,
         at_once=COUNT,
@@ -157,6 +167,8 @@ def _batch() -> dict[str, Any]:
         **dict.fromkeys(times, number()),
         a_day_one_by_one=COUNT,
         a_day_in_batches=COUNT,
+        shift_minutes=number(),
+        plan=array(entry),
         patterns=array(pattern),
     )
 

@@ -13,9 +13,11 @@ from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
 from sbafab.geometry.beam import Kerf
 from sbafab.laminate.films import Material
+from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.records import TURNS, Stock
+from sbafab.pressing import dowels
 from sbafab.pressing.build_up import Pad
-from sbafab.pressing.schedule import PressSettings
+from sbafab.pressing.schedule import PressSettings, plate_holes
 from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.lowered import lowered
 
@@ -42,6 +44,7 @@ def warnings(design: Design) -> dict[Material, str]:
 
 
 def limits(design: Design) -> Limits:
+    on_pins, on_one = design.pin_error, design.lone_pin_error
     return Limits(
         bond_width=design.rules.bond_width,
         mask_overhang=design.rules.mask_overhang,
@@ -52,7 +55,8 @@ def limits(design: Design) -> Limits:
         validated_balloons=design.rules.validated_balloons,
         tolerances=Tolerances(
             cutting=design.registration.cutting_error,
-            pin=design.registration.pin_error,
+            pin=on_pins,
+            lone_pin=on_one if on_one < on_pins else None,
             placement=design.registration.hand_placement,
             turn=design.registration.hand_turn,
             sheet=design.panel.sheet_error,
@@ -100,10 +104,24 @@ def press_settings(design: Design) -> PressSettings:
         plate_thickness=press.plate_thickness,
         release_film=press.release_film,
         release_thickness=press.release_thickness,
+        underlay_thickness=press.underlay_thickness,
         pin_standard=design.registration.pin_standard,
         pin_lengths=design.registration.pin_lengths,
+        plate_made_by=design.registration.plate_made_by,
         tack=design.panel.tack_minutes,
+        carrier_limit=design.panel.carrier_limit_c,
     )
+
+
+def hole_notes(design: Design, laminate: Laminate) -> tuple[str, ...]:
+    """Return what a shop must know of the base plate's holes, line by line; none without pins.
+
+    Raises DesignError where no pin or plate does.
+    """
+    if not laminate.pins:
+        return ()
+    holes = plate_holes(laminate, press_settings(design))
+    return dowels.hole_notes(laminate.pins, holes, design.registration.plate_made_by)
 
 
 def machine(design: Design) -> Machine:

@@ -24,7 +24,7 @@ from sbafab.nesting.nest import nest
 from sbafab.nesting.records import Nest, NestPart
 from sbafab.nesting.saved import as_dict, from_dict
 from sbafab.output.planned import Planned
-from sbafab.output.settings import machine, stocks
+from sbafab.output.settings import hole_notes, machine, stocks
 from sbafab.pressing.together import design_runs
 from sbafab.progress import Progress
 
@@ -53,7 +53,9 @@ def write_cut_files(planned: Planned, folder: Path, tell: Progress) -> None:
     laminate, settings = planned.checked.laminate, planned.settings
     told = partial(tell, "cut files")
     write_layer_files(laminate, planned.paths, folder, settings, told)
-    write_fixture(laminate, folder, settings, design_runs(planned.checked.design, laminate).places)
+    design = planned.checked.design
+    places = design_runs(design, laminate).places
+    write_fixture(laminate, folder, settings, places, hole_notes(design, laminate))
     write_panel(laminate, planned.paths, folder, settings)
 
 

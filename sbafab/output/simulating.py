@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from sbafab.design.records import Design
+from sbafab.errors import OutputError
 from sbafab.output.checking import check
 from sbafab.output.earlier import refuse_to_replace
 from sbafab.output.manifest import as_json
@@ -78,9 +80,26 @@ def simulate(
         if export:
             simulator(name).export(checked.laminate, wish, folder)
         else:
-            found = simulator(name).run(checked.laminate, wish, folder, tell)
+            try:
+                found = simulator(name).run(checked.laminate, wish, folder, tell)
+            except OutputError as error:
+                raise _with_log(error, folder, out / f"{design.name}-{name}-failed.log") from None
             told = as_json(result_json(found))
             (folder / "result.json").write_text(told, encoding="utf-8", newline="\n")
         extras = Extras(also=with_folder(folder), own=(name,))
         run = generate(design, out, (), tell, extras=extras)
     return Simulated(checked.findings, run.folder / name, found)
+
+
+def _with_log(error: OutputError, folder: Path, place: Path) -> OutputError:
+    """The same error, its log copied to a place that stays and named there."""
+    for log in sorted(folder.glob("*.log")):
+        said = str(error)
+        if str(log) in said:
+            try:
+                place.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(log, place)
+            except OSError:
+                return OutputError(said.replace(f" (see {log})", ""))
+            return OutputError(said.replace(str(log), str(place)))
+    return error

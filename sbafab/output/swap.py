@@ -10,7 +10,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Final
 
 from filelock import FileLock, Timeout
@@ -26,6 +26,8 @@ SCHEMAS = (SCHEMA, JOB_SCHEMA, ASSEMBLY_SCHEMA)
 MANIFEST = "manifest.json"
 CUT_FOLDERS = ("layers", "sheets")
 """Where a file of somebody else would be cut together with those of the run."""
+SYSTEM_FILES = (".DS_Store", "Thumbs.db", "desktop.ini")
+"""What file managers leave in a folder that is looked at; no laser program opens them."""
 BEGUN, ASIDE = ".part", ".old.part"
 """Endings of a folder that is being written, and of an old one that is moved out of its way."""
 LONGEST_SHOWN = 120
@@ -111,7 +113,7 @@ def _refuse_foreign(target: Path) -> None:
         raise OutputError(
             f"{target} holds files that sbafab did not write; choose another folder with -o"
         )
-    among = next((p for p in _foreign_files(target) if {*p.parts} & {*CUT_FOLDERS}), None)
+    among = next((p for p in _foreign_files(target) if is_among_cut_files(p)), None)
     if among is not None:
         raise OutputError(
             f"{target / among} was not written by sbafab and lies among the cut files; move it "
@@ -131,6 +133,11 @@ def _foreign_files(target: Path) -> list[Path]:
         if (path.is_symlink() or not path.is_dir())
         and path.relative_to(target).as_posix() not in ours
     ]
+
+
+def is_among_cut_files(path: PurePath) -> bool:
+    """Return whether a file, given relative to a run's folder, lies where the laser's files do."""
+    return bool({*path.parts} & {*CUT_FOLDERS}) and path.name not in SYSTEM_FILES
 
 
 def listed_files(folder: Path) -> list[str]:

@@ -20,7 +20,8 @@ from sbafab.laminate.laminate import Laminate
 
 PadMaterial = Literal["silicone sponge", "silicone rubber"]
 
-BASE_PLATE, RELEASE, LAMINATE, PAD = "base plate", "release film", "laminate", "press pad"
+BASE_PLATE, UNDERLAY, RELEASE = "base plate", "underlay", "release film"
+LAMINATE, PAD = "laminate", "press pad"
 """The parts of the build-up, between the platens."""
 PADS = (3.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0)
 """Thicknesses in which silicone sheet is sold; thicker pads are piled of the last."""

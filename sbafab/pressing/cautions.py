@@ -49,6 +49,12 @@ def refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
                 f"press.temperature_c = {press.temperature_c:g} reaches the limit of "
                 f"{film.material}, {film.limit:g} C for {film.product}; lower it"
             )
+    limit = press.carrier_limit
+    if laminate.panel is not None and limit is not None and press.temperature_c >= limit:
+        raise DesignError(
+            f"press.temperature_c = {press.temperature_c:g} reaches panel.carrier_limit_c = "
+            f"{limit:g}, what the transfer film stands that is pressed with the masks; take another"
+        )
     for interface in laminate.interfaces:
         below, above = interface.below, interface.above
         if below.film.softens_above is None and above.film.softens_above is None:
@@ -73,6 +79,11 @@ def warnings(
 ) -> Iterator[str]:
     if laminate.panel is not None:
         yield sheets.UNTRIED
+        if press.carrier_limit is None:
+            yield (
+                "nobody stated what temperature the transfer film of the masks stands; it is "
+                f"pressed at {press.temperature_c:g} C (panel.carrier_limit_c)"
+            )
     if press.temperature_c > HOTTEST_TRIED:
         yield (
             f"{press.temperature_c:g} C is hotter than the {HOTTEST_TRIED:g} C of earlier work, "

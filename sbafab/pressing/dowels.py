@@ -1,5 +1,9 @@
 """Dowel pins as they are sold, and how deep they sit in the base plate.
 
+A pin stands on the shoulder of its hole: loose or tight, it can neither fall through nor be driven
+too deep, and its height over the plate is its length less the hole's depth. A narrower hole leads
+on through the plate, so that it is pushed out from below.
+
 Lengths, diameters and chamfers: ISO 8734:1997 (hardened) and ISO 2338:1997 (unhardened, m6 or h8:
 order m6). The standards themselves were not opened. Held against the tables of FreeCAD's workbench
 for fasteners (FsData/iso8734*.csv, iso2338*.csv), all equal; against a table of ISO 8734 in the
@@ -11,10 +15,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
 
 from sbafab.errors import DesignError
+from sbafab.laminate.base_plate import MAKINGS, PlateMachine
 from sbafab.laminate.laminate import Pin
 
 Standard = Literal["ISO 8734", "ISO 2338"]
@@ -66,23 +71,72 @@ PLATES = (6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
 SEAT = 1.5
 LEAST_SEAT = 2.0
 """A pin stands straight with this many diameters of it, and this many mm, in the plate: ours."""
+LENGTH_TOLERANCES = ((10.0, 0.25), (50.0, 0.5), (math.inf, 0.75))
+"""By how much a pin may be shorter or longer than its length, up to each length, mm: ISO 2338 and
+8734 (from memory: neither was opened; DIN 7, which came before, gives 0 to +0.3, +0.5 and +0.8)."""
+DEPTH_TOLERANCES = ((6.0, 0.05), (30.0, 0.1), (math.inf, 0.15))
+"""The same of the depth of a hole's shoulder, up to each depth, mm: ISO 2768-1, fine."""
+STEP = 0.05
+"""Depths of shoulders are multiples of this, mm."""
+FLOOR = 1.0
+"""What is left of the plate under a shoulder, mm at least: ours."""
+PUSH_OUT = 0.6
+"""Diameter of the hole through which a pin is pushed out, in diameters of the pin: its end, which
+the chamfer narrows to 0.85 or more, rests on what is left."""
 SAME = 1e-6
 
 
 @dataclass(frozen=True)
 class PinSetting:
-    """One pin in one step: ``seat_mm`` of its length are in the plate, ``stands_mm`` above it."""
+    """One pin in one step: ``seat_mm`` of its length are in the plate, ``stands_mm`` above it.
+
+    The shoulder of its hole sets both. As pin and depth may be off, it stands up to
+    ``tolerance_mm`` lower or higher.
+    """
 
     pin: str
     diameter_mm: float
     length_mm: float
     seat_mm: float
     stands_mm: float
+    tolerance_mm: float
+
+
+@dataclass(frozen=True)
+class PinHole:
+    """The hole of one pin in the base plate, mm.
+
+    It is reamed from above down to a shoulder at ``depth``, give or take ``tolerance``, on which
+    the pin stands; from there ``push_out`` wide through the plate. ``lengths`` are those of the
+    pins that it takes, shortest first.
+    """
+
+    pin: str
+    diameter: float
+    depth: float
+    tolerance: float
+    push_out: float
+    lengths: tuple[float, ...]
 
 
 def chamfer(diameter: float) -> float:
     """By how much a pin stands over a stack, mm: the chamfer alone holds no film."""
     return CHAMFERS.get(round(diameter, 6), round(diameter / 5, 3))
+
+
+def length_tolerance(length: float) -> float:
+    """Return by how much a pin may be shorter or longer than its length, mm."""
+    return next(most for limit, most in LENGTH_TOLERANCES if length <= limit)
+
+
+def depth_tolerance(depth: float) -> float:
+    """Return by how much a shoulder may lie higher or lower than its depth, mm."""
+    return next(most for limit, most in DEPTH_TOLERANCES if depth <= limit)
+
+
+def push_out(diameter: float) -> float:
+    """Return the diameter of the hole through which a pin is pushed out, mm, to 0.1."""
+    return round(PUSH_OUT * diameter, 1)
 
 
 def is_sold(diameter: float, standard: Standard) -> bool:
@@ -114,63 +168,197 @@ def settings_by_step(
     steps: Sequence[tuple[float, Sequence[Pin]]],
     standard: Standard,
     own: Sequence[float] = (),
+    plate: float | None = None,
 ) -> list[tuple[PinSetting, ...]]:
-    """The pins of every step, given the height of its stack's top over the plate in mm, release
-    film included, and the pins that are in.
+    """Return the pins of every step, given the height of its stack's top over the plate in mm, all
+    that lies under the stack included, and the pins that are in.
 
-    A pin has the same length in all steps, the shortest that is sold and sits firm under the
-    highest stack; it is driven in until it stands over the stack by its chamfer. Raises DesignError
-    where no pin is long enough.
+    Holes of one diameter have one depth, and a step with a higher stack takes longer pins. Of all
+    depths that a plate takes (``plate`` mm thick, or the thinnest sold that takes any) the one is
+    chosen with which pins stand least over their stacks. Even the shortest pin in the deepest hole
+    stands over its stack by its chamfer. Raises DesignError where no pin is long enough, or the
+    plate too thin.
     """
-    highest: dict[Pin, float] = {}
+    tops: dict[float, list[float]] = {}
+    first: dict[float, str] = {}
     for height, pins in steps:
         for pin in pins:
-            highest[pin] = max(highest.get(pin, 0.0), height)
-    length = {pin: _length(pin, height, standard, own) for pin, height in highest.items()}
-    return [
-        tuple(
-            PinSetting(
-                pin.name,
-                pin.diameter,
-                length[pin],
-                round(length[pin] - height - chamfer(pin.diameter), 3),
-                round(height + chamfer(pin.diameter), 3),
-            )
-            for pin in pins
+            tops.setdefault(pin.diameter, []).append(height)
+            first.setdefault(pin.diameter, pin.name)
+    choices = {
+        diameter: _choices(
+            first[diameter], diameter, heights, lengths_sold(diameter, standard, own)
         )
-        for height, pins in steps
+        for diameter, heights in tops.items()
+    }
+    thickness = _thickness(choices, plate)
+    chosen = {diameter: _best(every, thickness) for diameter, every in choices.items()}
+    return [
+        tuple(_setting(pin, height, chosen[pin.diameter]) for pin in pins) for height, pins in steps
     ]
 
 
-def _length(pin: Pin, height: float, standard: Standard, own: Sequence[float]) -> float:
-    needed = height + chamfer(pin.diameter) + least_seat(pin.diameter)
-    sold = lengths_sold(pin.diameter, standard, own)
-    found = next((length for length in sold if length >= needed - SAME), None)
-    if found is None:
-        where = "registration.pin_lengths" if own else f"{standard} in this diameter"
+class _Choice(NamedTuple):
+    """A depth of holes, their pins' length by height of stack, and the most that one stands out."""
+
+    depth: float
+    lengths: Mapping[float, float]
+    out: float
+
+
+def _setting(pin: Pin, height: float, choice: _Choice) -> PinSetting:
+    length = choice.lengths[height]
+    return PinSetting(
+        pin.name,
+        pin.diameter,
+        length,
+        choice.depth,
+        round(length - choice.depth, 3),
+        round(length_tolerance(length) + depth_tolerance(choice.depth), 3),
+    )
+
+
+def _choices(
+    pin: str, diameter: float, tops: Sequence[float], sold: Sequence[float]
+) -> list[_Choice]:
+    """Depths with which some pin stands no higher than it must over one of the stacks."""
+    needs = {top: top + chamfer(diameter) for top in tops}
+    seat = least_seat(diameter)
+    depths = {
+        _down(length - length_tolerance(length) - depth_tolerance(length) - need)
+        for need in needs.values()
+        for length in sold
+    }
+    found = []
+    for depth in sorted(depth for depth in depths if depth >= seat - SAME):
+        lengths = {
+            top: length
+            for top, need in needs.items()
+            for length in [_shortest(sold, depth, need)]
+            if length is not None
+        }
+        if len(lengths) == len(needs):
+            out = max(length - depth - top for top, length in lengths.items())
+            found.append(_Choice(depth, lengths, round(out, 6)))
+    if not found:
+        highest = max(needs.values())
         raise DesignError(
-            f"the pin {pin.name} (diameter {pin.diameter:g}) must be at least {needed:.3f} mm long "
-            f"for a stack {height:.3f} mm high, and the longest of {where} has {sold[-1]:g}; give "
-            "a longer one in registration.pin_lengths"
+            f"the pin {pin} (diameter {diameter:g}) must be at least "
+            f"{_needed(seat, highest):.3f} mm long for a stack {max(tops):.3f} mm high, the "
+            "tolerances of pin and hole counted, and "
+            f"the longest there is has {sold[-1]:g}; give a longer one in registration.pin_lengths"
         )
     return found
 
 
-def plate_thickness(
-    asked: float | None, settings: Sequence[Sequence[PinSetting]], usual: float = PLATES[0]
-) -> float:
-    """The base plate's thickness in mm: as asked, or the thinnest sold that takes every seat.
+def _down(depth: float) -> float:
+    """The multiple of ``STEP`` at or below a depth, so that pins never stand lower for it."""
+    return round(math.floor(depth / STEP + SAME) * STEP, 6)
 
-    Raises DesignError where a pin would reach through the plate that was asked for.
+
+def _shortest(sold: Sequence[float], depth: float, need: float) -> float | None:
+    """The shortest pin that surely stands ``need`` mm over the plate; None where none does."""
+    off = depth_tolerance(depth)
+    return next((n for n in sold if n - length_tolerance(n) - off >= depth + need - SAME), None)
+
+
+def _needed(seat: float, need: float) -> float:
+    least = seat + depth_tolerance(seat) + need
+    return next(least + off for limit, off in LENGTH_TOLERANCES if least + off <= limit)
+
+
+def _thickness(choices: Mapping[float, Sequence[_Choice]], asked: float | None) -> float:
+    """The plate's thickness in mm: as asked, or the thinnest sold that takes every pin's seat."""
+    least = max((every[0].depth for every in choices.values()), default=0.0) + FLOOR
+    if not choices:
+        least = 0.0
+    if asked is None:
+        sold = (plate for plate in PLATES if plate >= least - SAME)
+        return next(sold, float(math.ceil(least)))
+    if asked < least - SAME:
+        raise DesignError(
+            f"press.plate_thickness = {asked:g} is thinner than the {least:g} mm that a pin's hole "
+            f"takes with {FLOOR:g} mm left under its shoulder; make it thicker, or give other "
+            "pins in registration.pin_lengths"
+        )
+    return asked
+
+
+def _best(choices: Sequence[_Choice], plate: float) -> _Choice:
+    """Of the depths that the plate takes the one with which the pins stand out least."""
+    fitting = [choice for choice in choices if choice.depth + FLOOR <= plate + SAME]
+    return min(fitting, key=lambda choice: (choice.out, choice.depth))
+
+
+def shortest_in(
+    setting: PinSetting, top: float, standard: Standard, own: Sequence[float] = ()
+) -> PinSetting:
+    """Return the shortest pin that stands over a lower stack in the hole of a setting.
+
+    ``top`` is the height of that stack over the plate, mm, no more than the setting's own stands.
     """
-    deepest = max((s.seat_mm for step in settings for s in step), default=0.0)
+    depth, least = setting.seat_mm, top + chamfer(setting.diameter_mm)
+    length = next(
+        length
+        for length in (*lengths_sold(setting.diameter_mm, standard, own), setting.length_mm)
+        if length - length_tolerance(length) - depth - depth_tolerance(depth) >= least - SAME
+    )
+    return replace(
+        setting,
+        length_mm=length,
+        stands_mm=round(length - depth, 3),
+        tolerance_mm=round(length_tolerance(length) + depth_tolerance(depth), 3),
+    )
+
+
+def pin_holes(settings: Sequence[Sequence[PinSetting]]) -> dict[str, PinHole]:
+    """Return the plate's hole of every pin that some step uses, by the pin's name."""
+    used: dict[str, list[PinSetting]] = {}
+    for step in settings:
+        for pin in step:
+            used.setdefault(pin.pin, []).append(pin)
+    return {
+        name: PinHole(
+            name,
+            pins[0].diameter_mm,
+            pins[0].seat_mm,
+            depth_tolerance(pins[0].seat_mm),
+            push_out(pins[0].diameter_mm),
+            tuple(sorted({pin.length_mm for pin in pins})),
+        )
+        for name, pins in used.items()
+    }
+
+
+def hole_notes(
+    pins: Sequence[Pin], holes: Mapping[str, PinHole], machine: PlateMachine
+) -> tuple[str, ...]:
+    """Return what a shop must know of the plate's holes, a line each, in letters a plotter has.
+
+    ``pins`` are all of a laminate; those that no step uses need no shoulder. The only pin of a
+    plate needs no more than a reamed hole, wherever it is.
+    """
+    sizes = dict.fromkeys(
+        (pin.diameter, replace(holes[pin.name], pin="") if pin.name in holes else None)
+        for pin in sorted(pins, key=lambda pin: pin.diameter)
+    )
+    making = MAKINGS[machine]
+    fit = "lapped to its pins m6" if making.is_lapped and len(pins) > 1 else "H7"
+    lines = [
+        f"D{diameter:g} {fit}, from above {hole.depth:g} +-{hole.tolerance:g} deep, flat; "
+        f"D{hole.push_out:g} on through"
+        if hole is not None
+        else f"D{diameter:g} {fit}, through, not used"
+        for diameter, hole in sizes
+    ]
+    if len(pins) > 1:
+        lines.append(f"each hole within {making.position:g} of its place, {making.words}")
+    return tuple(lines)
+
+
+def plate_thickness(asked: float | None, settings: Sequence[Sequence[PinSetting]]) -> float:
+    """Return the base plate's thickness in mm: as asked, or the thinnest sold under every seat."""
     if asked is not None:
-        if asked < deepest - SAME:
-            raise DesignError(
-                f"press.plate_thickness = {asked:g} is thinner than the {deepest:g} mm that a "
-                "dowel pin sits in it; make it thicker, or give shorter pins in "
-                "registration.pin_lengths"
-            )
         return asked
-    thick = (plate for plate in PLATES if plate >= max(deepest, usual) - SAME)
-    return next(thick, float(math.ceil(deepest)))
+    deepest = max((pin.seat_mm + FLOOR for step in settings for pin in step), default=0.0)
+    return next((p for p in PLATES if p >= deepest - SAME), float(math.ceil(deepest)))

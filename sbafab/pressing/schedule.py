@@ -15,13 +15,32 @@ from sbafab.laminate.assembly import (
     BondState,
     StepName,
     assembly,
+    is_laid_by_hand,
     stack_count,
 )
+from sbafab.laminate.base_plate import PlateMachine
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing import build_up, sheets
-from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, RELEASE, BuildUpPart, Footprint, Pad
+from sbafab.pressing.build_up import (
+    BASE_PLATE,
+    LAMINATE,
+    PAD,
+    RELEASE,
+    UNDERLAY,
+    BuildUpPart,
+    Footprint,
+    Pad,
+)
 from sbafab.pressing.cautions import refuse_temperature, warnings
-from sbafab.pressing.dowels import PinSetting, Standard, plate_thickness, settings_by_step
+from sbafab.pressing.dowels import (
+    PinHole,
+    PinSetting,
+    Standard,
+    pin_holes,
+    plate_thickness,
+    settings_by_step,
+    shortest_in,
+)
 from sbafab.pressing.words import listed, named
 
 TITLES: dict[StepName, str] = {
@@ -67,9 +86,12 @@ class PressSettings:
     plate_thickness: float | None = None
     release_film: str = "PTFE film"
     release_thickness: float = 0.05
+    underlay_thickness: float = 0.1
     pin_standard: Standard = "ISO 8734"
     pin_lengths: tuple[float, ...] = ()
+    plate_made_by: PlateMachine = "jig-borer"
     tack: float = 1.0
+    carrier_limit: float | None = None
 
     @property
     def force_n(self) -> float:
@@ -125,9 +147,13 @@ class Step:
 
     @property
     def top_mm(self) -> float:
-        """Height of the stack's top over the base plate: the stack lies on a release film."""
-        release = next(item.thickness_mm for item in self.build_up if item.part == RELEASE)
-        return self.stack_mm + release
+        """Height of the stack's top over the base plate, with all that lies under the stack."""
+        under = 0.0
+        for item in self.build_up:
+            if item.part == LAMINATE:
+                break
+            under += 0.0 if item.part == BASE_PLATE else item.thickness_mm
+        return under + self.stack_mm
 
 
 @dataclass(frozen=True)
@@ -139,6 +165,7 @@ class Schedule:
     estimated_build_minutes: float
     estimate_basis: str
     warnings: tuple[str, ...]
+    tacking: sheets.Tacking | None = None
 
 
 def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] = (1,)) -> Schedule:
@@ -158,58 +185,91 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
     )
     stacks = [*under, *chain.from_iterable(others)]
     pad = build_up.pad_thickness(press.pressure_kpa, press.platen, press.pad, stacks)
-    pins = settings_by_step(
-        [
-            (height + press.release_thickness, part.pins)
-            for height, part in zip(_pinned_heights(laminate, under), parts, strict=True)
-        ],
-        press.pin_standard,
-        press.pin_lengths,
-    )
+    pins = pins_by_step(laminate, press)
     plate = plate_thickness(press.plate_thickness, pins)
     steps = tuple(
         _step(
             laminate,
             part,
             press,
-            _Setting(pad, plate, stack, own),
+            _Setting(pad, plate, stack, own, _under(laminate, part, press)),
             f" {SNIP}" if laminate.registration == "ears" and part is parts[-1] else "",
         )
         for part, stack, own in zip(parts, under, pins, strict=True)
     )
     total = sum(step.minutes for step in steps)
-    tacking = press.tack * sheets.tackings(laminate)
+    tacking = None
+    if laminate.panel is not None:
+        low = tack_pins(laminate, press)
+        tacking = sheets.tacking(laminate, press.tack, press.temperature_c, plate, low)
+    tacked = 0.0 if tacking is None else tacking.total_minutes
     return Schedule(
         steps,
         total,
-        total + tacking + HANDLING_MINUTES,
+        total + tacked + HANDLING_MINUTES,
         f"{total:g} min in the press{_tacked(tacking)} and {HANDLING_MINUTES:g} min to cut, lay "
         "up, pin and fit the tubing; the latter is assumed the same for every design (paper: "
         "1.75 h in all)",
         tuple(warnings(laminate, press, parts, steps)),
+        tacking,
     )
 
 
-def _pinned_heights(laminate: Laminate, under: Sequence[Footprint]) -> list[float]:
-    """Height of the stack that the pins of each step reach through, mm.
+def pins_by_step(laminate: Laminate, press: PressSettings) -> list[tuple[PinSetting, ...]]:
+    """Return the pins of every press step. Raises DesignError where pins or plate do not do."""
+    parts = assembly(laminate)
+    heights = [build_up.footprint(laminate, part.layers).height for part in parts]
+    if laminate.panel is not None:
+        # Registered sheets stay on their pins from step to step, so these are set once.
+        heights = [max(heights)] * len(heights)
+    return settings_by_step(
+        [
+            (round(height + _under(laminate, part, press) + press.release_thickness, 6), part.pins)
+            for height, part in zip(heights, parts, strict=True)
+        ],
+        press.pin_standard,
+        press.pin_lengths,
+        press.plate_thickness,
+    )
 
-    Registered sheets stay on their pins from step to step, so these are set once.
-    """
-    heights = [stack.height for stack in under]
-    return heights if laminate.panel is None else [max(heights)] * len(heights)
+
+def tack_pins(laminate: Laminate, press: PressSettings) -> tuple[PinSetting, ...]:
+    """Return the corner pins for tacks of registered sheets: shorter ones in the same holes."""
+    top = sheets.tack_stack(laminate) + press.release_thickness
+    return tuple(
+        shortest_in(setting, top, press.pin_standard, press.pin_lengths)
+        for setting in pins_by_step(laminate, press)[0]
+    )
 
 
-def _tacked(minutes: float) -> str:
-    return f", {minutes:g} min to tack masks to their films" if minutes else ""
+def plate_holes(laminate: Laminate, press: PressSettings) -> dict[str, PinHole]:
+    """Return the base plate's hole of every pin that some step or tack uses, by the pin's name."""
+    tacks = [] if laminate.panel is None else [tack_pins(laminate, press)]
+    return pin_holes([*pins_by_step(laminate, press), *tacks])
+
+
+def _under(laminate: Laminate, part: AssemblyStep, press: PressSettings) -> float:
+    """Thickness of the underlay of a step, mm; 0 where nothing is laid by hand."""
+    return press.underlay_thickness if is_laid_by_hand(laminate, part) else 0.0
+
+
+def _tacked(tacking: sheets.Tacking | None) -> str:
+    if tacking is None:
+        return ""
+    return (
+        f", {tacking.total_minutes:.0f} min to tack the masks of {tacking.sheets} sheets to their "
+        f"films ({tacking.basis})"
+    )
 
 
 class _Setting(NamedTuple):
-    """Thickness of pad and plate, mm, and what one step's stack and pins are like."""
+    """Thickness of pad, plate and underlay, mm, and what one step's stack and pins are like."""
 
     pad: float
     plate: float
     under: Footprint
     pins: tuple[PinSetting, ...]
+    underlay: float
 
 
 def _step(
@@ -246,8 +306,8 @@ def _step(
 
 
 def _round_pins(press: PressSettings, own: _Setting) -> str:
-    beneath = own.under.height + press.release_thickness
-    out = max((pin.stands_mm - beneath for pin in own.pins), default=0.0)
+    beneath = own.under.height + press.release_thickness + own.underlay
+    out = max((pin.stands_mm + pin.tolerance_mm - beneath for pin in own.pins), default=0.0)
     if not out:
         return ""
     free = build_up.unpressed(press.pressure_kpa, press.pad, out)
@@ -259,6 +319,8 @@ def _items(press: PressSettings, own: _Setting) -> Iterator[BuildUpPart]:
     release = BuildUpPart(RELEASE, press.release_film, press.release_thickness, press.platen)
     pad = f"{press.pad.material}, {press.pad.hardness:g} Shore A"
     yield BuildUpPart(BASE_PLATE, press.plate_material, own.plate, press.platen)
+    if own.underlay:
+        yield BuildUpPart(UNDERLAY, "plain paper, printed", own.underlay, press.platen)
     yield release
     yield BuildUpPart(LAMINATE, "films of this step", round(own.under.height, 6), (0.0, 0.0))
     yield release

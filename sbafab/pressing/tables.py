@@ -45,6 +45,7 @@ def press_json(plan: Schedule) -> dict[str, Any]:
         "estimated_build_minutes": plan.estimated_build_minutes,
         "estimate_basis": plan.estimate_basis,
         "warnings": list(plan.warnings),
+        "tacking": None if plan.tacking is None else _plain(asdict(plan.tacking)),
     }
 
 
@@ -89,5 +90,5 @@ def pin_words(pin: PinSetting) -> str:
     """One pin as the table and the page name it."""
     return (
         f"{pin.pin}: {pin.diameter_mm:g} x {pin.length_mm:g} mm, {pin.seat_mm:g} in the plate, "
-        f"stands {pin.stands_mm:g}"
+        f"stands {pin.stands_mm:g} +- {pin.tolerance_mm:g}"
     )

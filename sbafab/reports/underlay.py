@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from sbafab.cutting.fixture import whole_plate
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Contour, Region
 from sbafab.geometry.shapes import disc
@@ -23,6 +24,8 @@ from sbafab.reports.traveller.layup import Bed, beds
 NAME = "underlay.pdf"
 PAPER = (210.0, 279.4)
 """mm: as wide as A4 and as long as Letter, so that either prints it whole at 100 %."""
+PLATEN = (152.4, 152.4)
+"""mm: the paper's heated area."""
 BAR = 100.0
 """mm of the bars that show whether a print has the right size."""
 CLOSE = 0.3
@@ -38,17 +41,19 @@ THIN, SMALL, WORDS, TITLE, ROW = 0.1, 2.2, 3.0, 5.0, 4.5
 USE = (
     "Print at 100 % (“actual size”, not “fit to page”) on plain paper. Measure both bars:",
     f"if either is not {BAR:g} mm, {CLOSE:g} more or less, do not use this print.",
-    "Tape it to the plate, a see-through release film over it. Lay edges on their lines.",
+    "Cut it out along the dotted line. Lay it flush on the plate, tape two edges down, a",
+    "see-through release film over it. Lay edges on their lines.",
 )
 NOTES = (
     "Grey: pins, and a cross through the actuator's axis. In a step with pins prick them through.",
-    "Plain paper stands the press; toner may soften and mark the release film. Not tried by us.",
+    "A fresh print for every hot cycle: paper dries and shrinks. Toner softens in the press and",
+    "may mark the release film or stick to it: print with ink if you can. Not tried by us.",
 )
 
 
 TRIM = (
-    "Cut along the dotted frames and lay the pages edge to edge on the plate: crosses go on across "
-    "the cut."
+    "Cut along the dotted frames and lay pages edge to edge on the plate: crosses go on across the "
+    "cut."
 )
 
 
@@ -56,12 +61,14 @@ TRIM = (
 class Leaf:
     """One page: its size in mm, and which places of a cycle lie on it, counted from 1.
 
-    ``trim`` is the frame to cut out, in the frame of the places; None where one page has them all.
+    ``trim`` is the frame to cut out, in the frame of the places. ``is_plate``: it is the base
+    plate's own edge, with its cut corner.
     """
 
     size: tuple[float, float]
     places: tuple[int, ...]
-    trim: Bounds | None = None
+    trim: Bounds
+    is_plate: bool = False
 
 
 @dataclass(frozen=True)
@@ -84,20 +91,25 @@ class Guide:
 
 
 def underlay_pdf(
-    laminate: Laminate, design_sha256: str, places: Sequence[Point] = ((0.0, 0.0),)
+    laminate: Laminate,
+    design_sha256: str,
+    places: Sequence[Point] = ((0.0, 0.0),),
+    platen: tuple[float, float] = PLATEN,
 ) -> bytes | None:
     """The pages; None for a laminate of which pins hold every part in every step.
 
-    They show the laminate at each of the ``places`` that it has in the press.
+    They show the laminate at each of the ``places`` that it has in the press, and the edge of the
+    base plate, as large as the ``platen`` (mm), to be cut out along.
     """
     found = guides(laminate)
     if not found:
         return None
-    spread = leaves(laminate, places)
+    spread = leaves(laminate, places, platen)
+    plate = whole_plate(laminate, platen, places).outers[0]
     pages = []
     for number, leaf in enumerate(spread, 1):
         page = PdfPage(*leaf.size)
-        _draw(page, laminate, found, [places[place - 1] for place in leaf.places], leaf)
+        _draw(page, laminate, found, places, leaf, plate)
         _bars(page)
         which = f", page {number} of {len(spread)}" if len(spread) > 1 else ""
         _words(page, f"{laminate.name}: alignment underlay{which}, seen from above, 1:1")
@@ -106,10 +118,13 @@ def underlay_pdf(
     return pdf(pages, f"{laminate.name}: alignment underlay")
 
 
-def leaves(laminate: Laminate, places: Sequence[Point]) -> tuple[Leaf, ...]:
+def leaves(
+    laminate: Laminate, places: Sequence[Point], platen: tuple[float, float] = PLATEN
+) -> tuple[Leaf, ...]:
     """Which places lie on which page, whole rows and columns of them; none without a guide.
 
-    A laminate that is itself larger than the paper gets a page as large as it takes.
+    A laminate that is itself larger than the paper gets a page as large as it takes. No page
+    reaches past the base plate, which is as large as the ``platen``.
     """
     found = guides(laminate)
     if not found:
@@ -120,6 +135,8 @@ def leaves(laminate: Laminate, places: Sequence[Point]) -> tuple[Leaf, ...]:
     room = [PAPER[axis] - margins[axis] - 2 * BEYOND for axis in (0, 1)]
     columns = _runs(xs, own[2] - own[0], room[0])
     rows = _runs(ys, own[3] - own[1], room[1])
+    plate = whole_plate(laminate, platen, places).bounds
+    has_room = all(plate[axis + 2] - plate[axis] <= PAPER[axis] - margins[axis] for axis in (0, 1))
     spread = []
     for row in rows:
         for column in columns:
@@ -129,11 +146,12 @@ def leaves(laminate: Laminate, places: Sequence[Point]) -> tuple[Leaf, ...]:
             wide = max(column) - min(column) + own[2] - own[0] + 2 * BEYOND
             high = max(row) - min(row) + own[3] - own[1] + 2 * BEYOND
             size = max(PAPER[0], wide + margins[0]), max(PAPER[1], high + margins[1])
-            trim = None
-            if len(rows) * len(columns) > 1:
-                (x0, x1), (y0, y1) = _between(xs, column, own, 0), _between(ys, row, own, 1)
-                trim = x0, y0, x1, y1
-            spread.append(Leaf(size, numbers, trim))
+            if len(rows) * len(columns) == 1 and has_room:
+                spread.append(Leaf(size, numbers, plate, is_plate=True))
+            else:
+                spans = _between(xs, column, own, plate, 0), _between(ys, row, own, plate, 1)
+                (x0, x1), (y0, y1) = spans
+                spread.append(Leaf(size, numbers, (x0, y0, x1, y1)))
     return tuple(spread)
 
 
@@ -147,15 +165,23 @@ def _runs(steps: Sequence[float], own: float, room: float) -> list[list[float]]:
 
 
 def _between(
-    steps: Sequence[float], here: Sequence[float], own: Bounds, axis: int
+    steps: Sequence[float], here: Sequence[float], own: Bounds, plate: Bounds, axis: int
 ) -> tuple[float, float]:
-    """From half-way to the page before to half-way to the next; at an end as far as the cross."""
+    """From half-way to the page before to half-way to the next; at an end as far as the cross, or
+    the plate.
+    """
     low, high = own[axis], own[axis + 2]
     pitch = steps[1] - steps[0] if len(steps) > 1 else 0.0
     half = (pitch - (high - low)) / 2
-    first = min(here) + low - (half if min(here) > steps[0] else BEYOND)
-    last = max(here) + high + (half if max(here) < steps[-1] else BEYOND)
+    ends = min(here) + low, max(here) + high
+    first = ends[0] - (half if min(here) > steps[0] else _beyond(ends[0] - plate[axis]))
+    last = ends[1] + (half if max(here) < steps[-1] else _beyond(plate[axis + 2] - ends[1]))
     return first, last
+
+
+def _beyond(free: float) -> float:
+    """How far paper reaches past what is drawn on it, with so much of the plate free there."""
+    return min(BEYOND, max(free, 0.0))
 
 
 def _foot(found: Sequence[Guide]) -> float:
@@ -169,26 +195,28 @@ def _draw(
     found: tuple[Guide, ...],
     places: Sequence[Point],
     leaf: Leaf,
+    plate: Contour,
 ) -> None:
-    """The laminates of a page in its middle, numbered where there are several, and its frame."""
+    """The laminates of a page, numbered where there are several, its trim frame in its middle."""
     own = _bounds(found)
     foot = _foot(found)
-    low_x, high_x = (pick(x for x, _ in places) for pick in (min, max))
-    low_y, high_y = (pick(y for _, y in places) for pick in (min, max))
-    middle = page.width / 2, foot + (page.height - HEAD - foot) / 2
-    x = middle[0] - (low_x + own[0] + high_x + own[2]) / 2
-    y = middle[1] - (low_y + own[1] + high_y + own[3]) / 2
-    for number, place in zip(leaf.places, places, strict=True):
+    left, low, right, top = leaf.trim
+    x = page.width / 2 - (left + right) / 2
+    y = foot + (page.height - HEAD - foot) / 2 - (low + top) / 2
+    for number in leaf.places:
+        place = places[number - 1]
         at = x + place[0], y + place[1]
         _laminate(page, laminate, found, at)
-        if len(leaf.places) > 1 or leaf.trim is not None:
+        if len(places) > 1:
             page.text((at[0] + own[0], at[1] + own[1] - 2.3), f"{number}", SMALL)
-    if leaf.trim is not None:
-        left, low, right, top = leaf.trim
-        ring = [(left, low), (right, low), (right, top), (left, top), (left, low)]
-        page.stroke(BLACK, THIN, (0.2, 0.8))
-        for start, end in zip(ring, ring[1:], strict=False):
-            page.line((start[0] + x, start[1] + y), (end[0] + x, end[1] + y))
+    page.stroke(BLACK, THIN, (0.2, 0.8))
+    if leaf.is_plate:
+        (frame,) = _moved(Region((plate,)), (x, y))
+        page.contour(frame)
+        return
+    ring = [(left, low), (right, low), (right, top), (left, top), (left, low)]
+    for start, end in zip(ring, ring[1:], strict=False):
+        page.line((start[0] + x, start[1] + y), (end[0] + x, end[1] + y))
 
 
 def _laminate(page: PdfPage, laminate: Laminate, found: tuple[Guide, ...], shift: Point) -> None:
@@ -297,7 +325,7 @@ def _notes(page: PdfPage, found: tuple[Guide, ...], sha256: str, leaf: Leaf) -> 
         page.line((14, y + 1), (24, y + 1))
         page.text((27, y), guide.words, WORDS)
         y -= ROW
-    join = (TRIM,) if leaf.trim is not None else ()
+    join = () if leaf.is_plate else (TRIM,)
     for line in (*join, *NOTES):
         page.text((14, y), line, WORDS)
         y -= ROW

@@ -59,7 +59,7 @@ def tables(one: Prediction, three: Prediction) -> dict[str, list[Row]]:
     return {
         "Making": list(rows.process()),
         "Sizes": list(rows.sizes(three)),
-        "Stroke and volume": list(rows.strokes()),
+        "Stroke and volume": [*rows.strokes(), *mechanics.fuller()],
         "Energy": list(mechanics.energy()),
         "Force": list(mechanics.forces(one, three)),
         "Time and bending": list(mechanics.motion(three)),

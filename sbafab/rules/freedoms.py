@@ -148,7 +148,7 @@ def freedoms(
         for piece in range(counts[layer.pattern])
     }
     for number, one in enumerate(lay_up(laminate) if laid is None else laid, 1):
-        own = () if one.stays else _own(one, number, tolerances)
+        own = () if one.stays else _own(one, number, tolerances, tolerances.on_pins(laminate))
         if one.under is not None:
             own = (*found[one.under], *own)
         for part in one.body:
@@ -178,8 +178,8 @@ def _in_sheets(laminate: Laminate, tolerances: Tolerances) -> Freedoms:
     return Freedoms(found)
 
 
-def _own(laid: Laid, number: int, tolerances: Tolerances) -> tuple[Freedom, ...]:
-    """What a body can do in a step by itself."""
+def _own(laid: Laid, number: int, tolerances: Tolerances, on_pins: float) -> tuple[Freedom, ...]:
+    """What a body can do in a step by itself; ``on_pins`` mm off its place on its pins."""
     pins = laid.pins
     lowest, highest = min(laid.body).layer, max(laid.body).layer
 
@@ -187,7 +187,7 @@ def _own(laid: Laid, number: int, tolerances: Tolerances) -> tuple[Freedom, ...]
         return Freedom(laid.step, number, lowest, highest, len(pins), most, centre)
 
     loose = min(pins.values(), default=0.0)
-    shift = freedom(tolerances.pin + loose if pins else tolerances.placement)
+    shift = freedom(on_pins + loose if pins else tolerances.placement)
     if len(pins) >= 2:
         both = [shift, freedom(*_turn_on(pins))]
     else:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from sbafab.geometry.beam import Kerf
 from sbafab.geometry.edges import Point
+from sbafab.laminate.laminate import Laminate
 
 TOLERANCE = 0.001
 """mm by which a value may miss its limit and still hold it: what the cut files promise."""
@@ -20,6 +21,8 @@ class Tolerances:
     mm and ``turn`` degrees: a layer laid by hand. The first two are the paper's (Sec. 2); the hand
     is calibrated on its success rate (``docs/scripts/hand.py``).
     ``sheet``: mm, a part in its registered sheet; ``second_cut``: mm, the second cut of these.
+    ``lone_pin``: mm, a layer on the plate's only pin, whose own place does not count (None: as on
+    several).
     """
 
     cutting: float = 0.1
@@ -28,6 +31,13 @@ class Tolerances:
     turn: float = 0.4
     sheet: float = 0.05
     second_cut: float = 0.2
+    lone_pin: float | None = None
+
+    def on_pins(self, laminate: Laminate) -> float:
+        """Return the most by which a layer of a laminate lies off its place on its pins, mm."""
+        if self.lone_pin is None or len(laminate.pins) > 1:
+            return self.pin
+        return self.lone_pin
 
 
 @dataclass(frozen=True)

@@ -12,14 +12,12 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from sbafab.laminate.assembly import assembly, distinct_layers
+from sbafab.laminate.base_plate import pin_deviations
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, at
 
 NAME = "pin-fit"
-
-M6 = ((3.0, 0.008), (6.0, 0.012), (10.0, 0.015), (18.0, 0.018))
-"""Upper deviation of a dowel pin up to each diameter, mm: m6 of ISO 286-2, ISO 8734 and 2338."""
 
 
 class _Fit(NamedTuple):
@@ -33,7 +31,7 @@ class _Fit(NamedTuple):
     @property
     def most(self) -> float:
         """The pin's largest diameter."""
-        return self.pin.diameter + next((up for d, up in M6 if self.pin.diameter <= d), M6[-1][1])
+        return self.pin.diameter + pin_deviations(self.pin.diameter)[1]
 
     @property
     def stretch(self) -> float:
@@ -85,6 +83,7 @@ def _stretch_said(fit: _Fit) -> str:
 def _fits(laminate: Laminate, limits: Limits) -> Iterator[_Fit]:
     """Every pin in every pattern that hangs on it in a step."""
     seen = set()
+    on_pins = limits.tolerances.on_pins(laminate)
     for step in assembly(laminate):
         for layer in distinct_layers(laminate, step.adds):
             for pin in step.pins:
@@ -98,7 +97,7 @@ def _fits(laminate: Laminate, limits: Limits) -> Iterator[_Fit]:
                     if abs(2 * circle[1] - pin.hole) < LOOSE:
                         # A hole off its place leaves the pin that much less room.
                         drawn = 2 * (circle[1] - math.dist(circle[0], pin.centre))
-                        least = drawn - 2 * (limits.tolerances.cutting + limits.tolerances.pin)
+                        least = drawn - 2 * (limits.tolerances.cutting + on_pins)
                         yield _Fit(pin, layer, 2 * circle[1], least)
 
 

@@ -14,7 +14,7 @@ from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.panel import SheetPanel
 
-SHEET = 'registration.method="sheet"'
+SHEET = ('registration.method="sheet"', "registration.experimental=true")
 ONE = ("1dof-5mm", "stack.balloons=2", "order.copies=2")
 LOBED = ("3dof-15mm", "stack.balloons=2", "order.copies=3")
 EIGHT = ("3dof-15mm", "stack.balloons=2", "chamber.count=8")
@@ -22,7 +22,7 @@ EIGHT = ("3dof-15mm", "stack.balloons=2", "chamber.count=8")
 
 @cache
 def made(template: str, *changes: str) -> Laminate:
-    return build(load_design(template, [SHEET, *changes]))
+    return build(load_design(template, [*SHEET, *changes]))
 
 
 def panel_of(laminate: Laminate) -> SheetPanel:

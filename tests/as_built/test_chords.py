@@ -122,7 +122,15 @@ def test_edges_stay_within_the_chord_error(
 
 
 def test_sheets_are_cut_as_the_layers_are(tmp_path: Path) -> None:
-    doctor = written("1dof-5mm", ("order.spares=0",), 0.1, tmp_path)
+    doctor = written(
+        "1dof-5mm",
+        (
+            "order.spares=0",
+            "order.spare_share=0",
+        ),
+        0.1,
+        tmp_path,
+    )
     pieces = sorted(
         (layer["material"], piece.area, len(piece.exterior.coords))
         for layer in doctor.manifest["layers"]

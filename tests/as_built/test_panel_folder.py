@@ -29,7 +29,10 @@ KERF = 0.12
 
 def design(*changes: str) -> Design:
     few = ("stack.balloons=2", "order.copies=2", "rules.yield_builds=100")
-    return load_design("1dof-5mm", ['registration.method="sheet"', *few, *changes])
+    return load_design(
+        "1dof-5mm",
+        ['registration.method="sheet"', "registration.experimental=true", *few, *changes],
+    )
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ from sbafab.models.figures import Asked, Factors
 from sbafab.models.prediction import predict
 from sbafab.nesting.bottom_left import bottom_left
 from sbafab.nesting.records import NestPart, Placement, Stock
-from sbafab.output import contents
+from sbafab.output import contents, self_check
 from sbafab.output.job import generate_job
 from sbafab.output.manifest import file_hashes
 from sbafab.output.planned import Planned
@@ -32,6 +32,7 @@ from sbafab.output.run import Extras, generate
 from sbafab.output.shop import write_cut_files
 from sbafab.progress import Progress
 from sbafab.rules.deck import Rule
+from sbafab.rules.finding import Finding, Place
 from tests.as_built.doctoring import Doctor
 
 FEW = ("stack.balloons=1", "rules.yield_builds=100")
@@ -165,3 +166,20 @@ def test_parts_of_a_nest_that_lie_badly_are_not_let_through(
     ):
         generate(load_design("1dof-5mm", FEW), tmp_path, ("cut",))
     assert not (tmp_path / "1dof-5mm").exists()
+
+
+def test_what_is_cut_is_told_before_what_is_claimed(tmp_path: Path) -> None:
+    """The sentence names three rules: design and files first, the manifest's words last."""
+    order = ("as-designed", "file-integrity", "sealing", "manifest-claims")
+    found = [
+        Finding(rule, "fail", None, None, "", Place(), f"wrong by {rule}")
+        for rule in ("manifest-claims", "sealing", "file-integrity", "as-designed")
+    ]
+    with (
+        patch.object(self_check, "check_written", lambda *_: found),
+        pytest.raises(DefectError) as told,
+    ):
+        generate(load_design("1dof-5mm", FEW), tmp_path, ("cut",))
+    said = [str(told.value).find(f"{rule}: wrong by {rule}") for rule in order]
+    assert 0 < said[0] < said[1] < said[2]
+    assert said[3] == -1

@@ -207,3 +207,22 @@ def test_contour_that_encloses_nothing_is_refused(plate_text: str) -> None:
     )
     with pytest.raises(OutputError, match="encloses nothing"):
         read_profile(text)
+
+
+@pytest.mark.parametrize(("flags", "fitted"), [(1, False), (1 | 2, True), (1 | 4, True)])
+def test_an_old_polyline_is_read_as_it_stands_and_refused_with_a_curve_fitted(
+    flags: int, fitted: bool, plate_text: str
+) -> None:
+    """Flag 1 is closed; 2 and 4 tell of curves and splines fitted to the vertices (DXF)."""
+
+    def old(model: Modelspace) -> None:
+        polyline = model.add_polyline2d(SQUARE, close=True, dxfattribs=OUTER)
+        polyline.dxf.flags = flags
+
+    text = drawn(plate_text, old)
+    if fitted:
+        with pytest.raises(OutputError):
+            read_profile(text)
+    else:
+        before = read_profile(plate_text).region.area
+        assert read_profile(text).region.area == pytest.approx(before + 16.0)

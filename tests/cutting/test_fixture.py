@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
+import ezdxf
 import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.dxf_write import Curves
 from sbafab.cutting.fixture import PATH, fixture, plate_corner, write_fixture
 from sbafab.cutting.properties import CutSettings
+from sbafab.output.settings import hole_notes, limits
 
 SETTINGS = CutSettings("test", "0" * 64)
 
@@ -56,3 +60,45 @@ def test_no_pins_no_plate(tmp_path: Path) -> None:
     assert laminate.pins == ()
     assert write_fixture(laminate, tmp_path, SETTINGS) is None
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("curves", [Curves("bulges"), Curves("arcs"), Curves("chords")])
+def test_the_plate_carries_what_the_shop_must_know(curves: Curves, tmp_path: Path) -> None:
+    """Letters in single strokes on REFERENCE, on the plate, and the same words as a property."""
+    laminate = build(load_design("3dof-15mm"))
+    notes = ("D1 H7, from above 2.35 +-0.05 deep", "each hole within 0.025 of its place")
+    settings = replace(SETTINGS, curves=curves)
+    path = write_fixture(laminate, tmp_path, settings, notes=notes)
+    assert path is not None
+    document = ezdxf.readfile(tmp_path / path)
+    kinds = {(e.dxftype(), e.dxf.layer) for e in document.modelspace()}
+    assert {kind for kind, layer in kinds if layer == "REFERENCE"} == {"LINE", "LWPOLYLINE"}
+    assert not any(kind in ("TEXT", "MTEXT") for kind, _ in kinds)
+    assert dict(document.header.custom_vars)["HOLES"] == " / ".join(notes)
+    plate = fixture(laminate, settings.platen)
+    assert plate is not None
+    letters = [
+        list(e.get_points("xy"))
+        for e in document.modelspace()
+        if e.dxftype() == "LWPOLYLINE" and e.dxf.layer == "REFERENCE"
+    ]
+    # The title and two lines: a stroke or more for each letter, all on the plate.
+    words = f"test: base plate, seen from above #{'0' * 8}", *notes
+    assert len(letters) >= sum(len(line.replace(" ", "")) for line in words)
+    low_x, low_y, high_x, high_y = plate.bounds
+    for x, y in (p for run in letters for p in run):
+        assert low_x + 1 < x < high_x - 1
+        assert low_y + 1 < y < high_y - 1
+    read = read_profile(tmp_path / path)
+    assert len(read.region.holes) == len(laminate.pins)
+
+
+def test_a_machine_that_bores_less_true_is_told_on_the_drawing() -> None:
+    """What the plate's drawing asks for is what the rules count, for each machine."""
+    for machine, position, play in (("jig-borer", 0.003, 0.002), ("cnc-mill", 0.025, 0.008)):
+        design = load_design("3dof-15mm", [f'registration.plate_made_by="{machine}"'])
+        notes = hole_notes(design, build(design))
+        assert f"each hole within {position:g} of its place" in notes[-1]
+        assert limits(design).tolerances.pin == pytest.approx(position + play / 2)
+    given = load_design("3dof-15mm", ["registration.pin_error=0.01"])
+    assert limits(given).tolerances.pin == 0.01

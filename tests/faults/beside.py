@@ -78,7 +78,10 @@ def plate(name: str, change: Callable[[Region], Region]) -> Fault:
         (piece,) = found.region.pieces
         outline = change(Region(tuple(piece.outers)))
         region = Region((*outline.outers, *found.region.holes))
-        path.write_text(dxf_text(cutting_order(region), found.properties), newline="\n")
+        # After the datum cross come the letters that tell the shop of its holes.
+        notes = [[edges[0].start, *(e.end for e in edges)] for _, edges in found.strokes[2:]]
+        text = dxf_text(cutting_order(region), found.properties, notes=notes)
+        path.write_text(text, newline="\n")
         specimen.doctor.rehash()
 
     return Fault(name, RULE, put, no_pins, beside=True)

@@ -16,7 +16,7 @@ from sbafab.laminate.laminate import Laminate
 from tests.faults.record import Fault, Kind
 from tests.faults.specimen import Change, Pick, Specimen, base, separator, wall
 
-SHEETS = ('registration.method="sheet"', "order.copies=2")
+SHEETS = ('registration.method="sheet"', "registration.experimental=true", "order.copies=2")
 HELD, LOCKED, PINNED = "bridges", "scrap", "pin-holes"
 
 

@@ -49,6 +49,13 @@ WIDTHS = {
         rectangle((-5, -5), (5, 5)) - rectangle((-3, -3), (0, 0)) - rectangle((0.3, 0.4), (3, 3)),
         0.5,
     ),
+    # A web that is narrowest where it leaves a bar: both corners have an edge along the bar.
+    "corners along one line": (
+        rectangle((-5, -5), (5, 5))
+        - polygon([(-6, -2), (-1, -2), (-0.3, -0.5), (-6, -0.5)])
+        - polygon([(0.3, -0.5), (1, -2), (3, -2), (3, -0.5)]),
+        0.6,
+    ),
     "reflex corner near arc": (disc(AXIS, 5) - rectangle((-1, -1), (3, 3)), 5 - 18**0.5),
     "tapering strip": (polygon([AXIS, (6, 0), (6, 1), (0, 1.003)]) | disc(AXIS, 2), 1.0),
     "flat end of a taper": (rounded_arm(10.0), 1.0),
@@ -159,6 +166,35 @@ def test_webs_agree_with_shapely(seed: int) -> None:
     rings = [ring_of(contour) for contour in region.contours]
     apart = min(a.distance(b) for i, a in enumerate(rings) for b in rings[:i])
     width = least_width(region)
+    assert width is not None
+    assert width.value == pytest.approx(apart, abs=2.1e-5)
+
+
+def sharp_holes_in_a_plate(seed: int) -> Region:
+    """A 24 mm disc with up to sixty triangular and quadrangular holes of any angles, apart."""
+    draw = random.Random(seed)
+    taken: list[shapely.Polygon] = []
+    for _ in range(60):
+        radius, distance = draw.uniform(0.4, 1.5), draw.uniform(0, 10)
+        angle = draw.uniform(0, math.tau)
+        x, y = distance * math.cos(angle), distance * math.sin(angle)
+        ways = sorted(draw.uniform(0, math.tau) for _ in range(draw.choice([3, 4])))
+        hole = shapely.Polygon(
+            [(x + radius * math.cos(way), y + radius * math.sin(way)) for way in ways]
+        )
+        if hole.area > 0.2 and all(hole.distance(other) > 0.02 for other in taken):
+            taken.append(hole)
+    holes = [polygon(list(hole.exterior.coords)[:-1]) for hole in taken]
+    return disc((0.0, 0.0), 12.0) - union(holes)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_webs_between_sharp_corners_agree_with_shapely(seed: int) -> None:
+    """Corners face each other where none of their edges does."""
+    region = sharp_holes_in_a_plate(seed)
+    tree = [ring_of(contour) for contour in region.contours]
+    apart = min(a.distance(b) for i, a in enumerate(tree) for b in tree[:i])
+    width = least_width(region, 15.0)
     assert width is not None
     assert width.value == pytest.approx(apart, abs=2.1e-5)
 

@@ -43,7 +43,12 @@ def write_design(design: str, profile: DxfProfile, folder: Path) -> Run:
         for film in ("tpe", "ptfe")
         for key in (f"width={WIDTH}", f"length={LENGTH}", f"border={BORDER}")
     ]
-    overrides = ["order.spares=0", f"stack.balloons={DESIGNS[design]}", *sizes]
+    overrides = [
+        "order.spares=0",
+        "order.spare_share=0",
+        f"stack.balloons={DESIGNS[design]}",
+        *sizes,
+    ]
     return generate(
         load_design(design, overrides), folder / profile, ("cut",), None, Curves(profile)
     )

@@ -82,7 +82,7 @@ def _layers(folder: Folder) -> Iterator[Disagreement]:
         own = [layer for layer in folder.layers if layer.material == film["material"]]
         area = sum(layer.profile.area for layer in own)
         slack = sum(_slack(folder, layer.profile) for layer in own)
-        copies = int(folder.wish("order", "copies", 1))
+        copies = folder.copies
         if min(abs(area - film["area"]), abs(copies * area - film["area"])) > slack * copies:
             yield Disagreement(
                 "claims", f"{film['material']} has {area:.4f} mm2, stated {film['area']:.4f}"

@@ -81,7 +81,7 @@ def beside(first: Draft, second: Draft) -> Draft:
 
 def in_sheets(made: Draft) -> Draft:
     """The draft as registered sheets: balloons all alike, true arcs. Radial ones are refused."""
-    tables = {**made.tables, "registration": {"method": "sheet"}}
+    tables = {**made.tables, "registration": {"method": "sheet", "experimental": True}}
     pockets = (made.pockets[0],) * len(made.pockets)
     sizes = tables["chamber"].get("diameter")
     if isinstance(sizes, list):

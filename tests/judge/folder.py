@@ -8,14 +8,17 @@ the design file that was given, with the defaults that the docs name.
 from __future__ import annotations
 
 import json
+import math
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import shapely
+from scipy.stats import binom
 from shapely import affinity
 from shapely.geometry.base import BaseGeometry
 
@@ -95,6 +98,22 @@ class Folder:
 
     def wish(self, table: str, key: str, default: Any) -> Any:
         return self.asked.get(table, {}).get(key, default)
+
+    @property
+    def copies(self) -> int:
+        """As many as are asked for, or the fewest of which so many come out good."""
+        copies, good = int(self.wish("order", "copies", 1)), int(self.wish("order", "good", 0))
+        rate = float(self.wish("order", "success_rate", 0.9))
+        while good and float(binom.sf(good - 1, max(copies, good), rate)) < float(
+            self.wish("order", "certainty", 0.8)
+        ):
+            copies = max(copies, good) + 1
+        return max(copies, good)
+
+    def spares(self, needed: int) -> int:
+        """Of a pattern of which so many are needed: a share of them, and at least some."""
+        share = Fraction(str(self.wish("order", "spare_share", 0.05)))
+        return max(int(self.wish("order", "spares", 1)), math.ceil(share * needed))
 
     @property
     def method(self) -> str:

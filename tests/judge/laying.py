@@ -26,8 +26,8 @@ TABS = 0.6
 """Share of an outline of many chambers that may be tabs, where the rest is laid along."""
 APART = 0.2
 """mm between the points at which edges are held against each other."""
-COVER = 0.11
-"""mm of release films and of rounding by which pins stand higher than films alone would ask."""
+FLOOR, LENGTH, DEPTH = 1.0, 0.25, 0.05
+"""mm of plate under a pin, and by how much a pin's length (ISO 8734) and a depth may be off."""
 LAID = re.compile(r"\b(TPE|PTFE) ([a-z ]+?) (P\d+)")
 ALONG = r"(?:([\d.]+) mm )?(on|outside|inside) that of the (?:TPE|PTFE) [a-z ]+ below"
 WHOLE = r", (all round(?: but for the tabs)?)"
@@ -247,7 +247,13 @@ def _set(folder: Folder, page: Any) -> Iterator[Disagreement]:
                 "traveller", f"step {number} is {height:.3f} mm high, not {flat.group(1)}"
             )
         for pin in standing(step):
-            if abs(pin.inside + pin.over - pin.length) > 2 * SHOWN or pin.inside > plate:
+            over = (pin.low + pin.high) / 2
+            if abs(pin.inside + over - pin.length) > 2 * SHOWN or pin.inside > plate - FLOOR:
                 yield Disagreement("traveller", f"step {number} divides its length wrongly: {pin}")
-            if not 0 <= pin.clear <= pin.over or pin.over - pin.clear > height + COVER:
+            if (pin.high - pin.low) / 2 < LENGTH + DEPTH - SHOWN:
+                yield Disagreement("traveller", f"step {number} wants truer pins: {pin}")
+            paper = "Tape a fresh print" in said
+            below = float(folder.wish("press", "release_thickness", 0.05))
+            below += float(folder.wish("press", "underlay_thickness", 0.1)) if paper else 0.0
+            if pin.clear <= 0 or abs(pin.low - pin.clear - height - below) > 2 * SHOWN + 1e-9:
                 yield Disagreement("traveller", f"step {number} is {height:.3f} mm high: {pin}")

@@ -12,8 +12,8 @@ TIMES = "\N{MULTIPLICATION SIGN}"
 NUMBERS = re.compile(r"\d+(?:\.\d+)?")
 COUNT = re.compile(rf"(\d+)(?: \+ (\d+) spare)?(?: ?{TIMES} (\d+) pieces)?")
 PINS = re.compile(
-    rf"(.+): ⌀([\d.]+) {TIMES} ([\d.]+) mm, ([\d.]+) mm in the plate, ([\d.]+) mm over it, "
-    r"([\d.]+) mm over the stack"
+    rf"(.+): ⌀([\d.]+) {TIMES} ([\d.]+) mm, ([\d.]+) mm in the plate, ([\d.]+) to ([\d.]+) mm over "
+    r"it, ([\d.]+) mm or more over the stack"
 )
 
 
@@ -120,20 +120,25 @@ def pin_holes(page: Any) -> list[PinHole]:
     found = []
     for table in page.xpath("//table[contains(@class, 'holes')]"):
         for row in table.iterfind("tbody/tr"):
-            name, *numbers = [words(cell) for cell in row]
-            d, x, y, u, v, films = (float(number) for number in numbers[:6])
+            # After the diameter come the shoulder's depth and the push-out hole.
+            name, diameter, _, _, *numbers = [words(cell) for cell in row]
+            d, x, y, u, v, films = (float(number) for number in (diameter, *numbers[:5]))
             found.append(PinHole(name, d, (x, y), (u, v), films))
     return found
 
 
 class Standing(NamedTuple):
-    """A pin in the plate during a step: its diameter, length, and how much of it is where, mm."""
+    """A pin in the plate during a step: its diameter, length, and how much of it is where, mm.
+
+    It stands ``low`` to ``high`` over the plate, and ``clear`` at least over the stack.
+    """
 
     pin: str
     diameter: float
     length: float
     inside: float
-    over: float
+    low: float
+    high: float
     clear: float
 
 

@@ -79,8 +79,7 @@ def _parts(folders: Sequence[Folder]) -> list[Part]:
         for layer in folder.layers:
             counts[layer.shape] = counts.get(layer.shape, 0) + 1
             first.setdefault(layer.shape, layer)
-        copies = int(folder.wish("order", "copies", 1))
-        spares = int(folder.wish("order", "spares", 2))
+        copies = folder.copies
         for number, layer in first.items():
             for piece in pieces(layer.path):
                 shape = _centred(piece)
@@ -90,7 +89,7 @@ def _parts(folders: Sequence[Folder]) -> list[Part]:
                         layer.material,
                         shape,
                         shapely.get_coordinates(shape),
-                        counts[number] * copies + (spares if layer.material == "PTFE" else 0),
+                        counts[number] * copies + folder.spares(counts[number] * copies),
                     )
                 )
     return parts

@@ -41,7 +41,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Patient:
         "family": "1dof",
         "stack": {"balloons": 2},
         "order": {"copies": 2},
-        "registration": {"method": "sheet"},
+        "registration": {"method": "sheet", "experimental": True},
     }
     design.write_text(tomli_w.dumps(tables))
     ended = sbafab("cut", design, "-o", home / "out")

@@ -51,8 +51,7 @@ def _nesting(text: str) -> Iterator[Disagreement]:
 
 
 def _counted(folder: Folder, named: Iterable[Part]) -> Iterator[Disagreement]:
-    copies = int(folder.wish("order", "copies", 1))
-    spares = int(folder.wish("order", "spares", 2))
+    copies = folder.copies
     for part in named:
         layers = [layer for layer in folder.layers if layer.index in part.layers]
         if len({layer.shape for layer in layers}) != 1:
@@ -62,7 +61,7 @@ def _counted(folder: Folder, named: Iterable[Part]) -> Iterator[Disagreement]:
         told = {part.film} | set(part.role.split(", "))
         if {layer.material for layer in layers} | {role(layer) for layer in layers} != told:
             yield Disagreement("traveller", f"{part.pattern} is said to be {part.film} {part.role}")
-        wanted = copies * len(layers), spares if first.is_mask else 0
+        wanted = copies * len(layers), folder.spares(copies * len(layers))
         if (part.count, part.spares) != wanted:
             yield Disagreement(
                 "traveller", f"{part.pattern} is counted {part.count} + {part.spares}, not {wanted}"
@@ -140,7 +139,7 @@ def _drilled(folder: Folder, page: Any) -> Iterator[Disagreement]:
 
 def _amounts(folder: Folder, page: Any) -> Iterator[Disagreement]:
     """Film needed, and thickness of the whole."""
-    copies = int(folder.wish("order", "copies", 1))
+    copies = folder.copies
     bill = {row["Item"]: row["What"] for row in rows(page, "Item", "What", "Quantity")}
     for film in ("TPE", "PTFE"):
         layers = [layer for layer in folder.layers if layer.material == film]

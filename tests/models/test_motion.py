@@ -51,8 +51,10 @@ def test_a_pump_of_water_puts_in_what_it_delivers(three: Stack) -> None:
         motion.step(0.1, flows=(300.0, 200.0, 0.0))
     assert motion.time == pytest.approx(0.3)
     assert motion.pose.volumes[:2] - empty[:2] == pytest.approx([90.0, 60.0], abs=0.05)
-    # The third one is bent open and draws in what it lacks.
-    assert motion.pressures[2] == 0.0
+    # The third one is bent open, but its pump is shut: it keeps its volume against suction.
+    assert motion.pose.volumes[2] == pytest.approx(empty[2], abs=0.05)
+    assert -2.0 < motion.pressures[2] < 0.0
+    assert motion.pose.volumes.sum() - empty.sum() == pytest.approx(150.0, abs=0.1)
     pressure, _, _ = motion.pressures
     tube = Line(WATER).source_pressure(300.0, 0.0)
     assert motion.sources[0] == pytest.approx(pressure + tube)
@@ -65,6 +67,11 @@ def test_a_prediction_of_water_is_what_the_motion_does(three: Stack) -> None:
         motion.step(time / 4, flows=(35e3 / 60 / 3,) * 3)
     assert motion.sources[0] == pytest.approx(10.0, rel=1e-3)
     assert motion.pose.height == pytest.approx(pose.height, rel=1e-3)
+
+
+def test_a_pose_has_no_suction_where_nothing_is_shut(three: Stack) -> None:
+    with pytest.raises(DesignError, match="a pressure of -1 kPa is outside"):
+        three.pose((5, 0, -1))
 
 
 def test_a_valve_fills_to_its_pressure_and_no_further(three: Stack) -> None:

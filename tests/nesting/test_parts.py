@@ -32,11 +32,25 @@ def test_masks_of_three_equal_discs_are_one_part() -> None:
     assert laminate.patterns[discs.pattern][0].role == "chamber-mask"
 
 
-def test_spares_are_cut_of_every_mask_and_of_no_film() -> None:
-    laminate = build(load_design("3dof-15mm"))
+@pytest.mark.parametrize(
+    ("copies", "wall", "base"),
+    # Two films a balloon of six, less base, cap and the wall with the tab: 9 walls. A twentieth of
+    # 9 is 0.45, of 54 is 2.7, of 180 is 9; of 1, 6 and 20 bases it is 0.05, 0.3 and 1.
+    [(1, 1, 1), (6, 3, 1), (20, 9, 1)],
+)
+def test_every_pattern_has_a_twentieth_of_its_number_as_spares(
+    copies: int, wall: int, base: int
+) -> None:
+    design = load_design("1dof-5mm", [f"order.copies={copies}"])
+    laminate = build(design)
     paths = {pattern: layers[0].profile for pattern, layers in laminate.patterns.items()}
-    plain, spared = parts_of(laminate, paths, 2), parts_of(laminate, paths, 2, 3)
-    for part, more in zip(plain, spared, strict=True):
-        masks = 2 * len(laminate.patterns[part.pattern])
-        sets = 3 if part.material == "PTFE" else 0
-        assert more.count - part.count == sets * part.count / masks
+    plain = parts_of(laminate, paths, copies)
+    spared = parts_of(laminate, paths, copies, design.order.spare_parts)
+    more = {}
+    for few, many in zip(plain, spared, strict=True):
+        layers = laminate.patterns[few.pattern]
+        pieces = few.count / (copies * len(layers))
+        more[layers[0].role, len(layers)] = (many.count - few.count) / pieces
+    assert min(more.values()) >= 1
+    assert more["wall", 9] == wall
+    assert more["base", 1] == base

@@ -57,8 +57,8 @@ def test_a_design_used_three_times_is_drawn_once_and_cut_three_times(
             read_profile(path).region.area
             for path in (standing.folder / "sheets").glob(f"{material}_*.dxf")
         )
-        # Two spare sets of every mask.
-        assert cut == pytest.approx((5 if material == "PTFE" else 3) * one, abs=1e-3)
+        # A spare of every pattern.
+        assert cut == pytest.approx((3 + 1) * one, abs=1e-3)
 
 
 def test_the_solid_has_a_node_a_part_at_true_size(brace: Run) -> None:

@@ -27,7 +27,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 def test_two_cycles_make_five_copies_on_one_plate(run: Run) -> None:
     batch = run.manifest["batch"]
-    assert (batch["at_once"], batch["cycles"]) == (4, [4, 1])
+    assert (batch["at_once"], batch["cycles"]) == (3, [3, 2])
     press = json.loads((run.folder / "press.json").read_text())
     said = press["batch"]
     assert (said["press_minutes"], said["hands_minutes"]) == (90, 300)
@@ -45,12 +45,21 @@ def test_the_traveller_has_a_serial_number_for_each_copy(run: Run) -> None:
         ["1", "1", "1"],
         ["2", "1", "2"],
         ["3", "1", "3"],
-        ["4", "1", "4"],
-        ["5", "2", "1"],
+        ["4", "2", "1"],
+        ["5", "2", "2"],
     ]
     words = " ".join(page.text_content().split())
-    assert "5 copies in 2 press cycles of 4, 1 at once: 90 min in the press instead of 225" in words
+    assert "5 copies in 2 press cycles of 3, 2 at once: 90 min in the press instead of 225" in words
     assert "390 min" in words
+    days = page.xpath("//table[@class='days']/tbody/tr")
+    # Cutting, two cycles of four steps, each cycle's tubes: 390 min fit into one day of 8 h.
+    assert len(days) == 1 + 2 * (4 + 1)
+    assert [row.find("th").text_content() for row in days if row.find("th") is not None] == ["1"]
+    assert "Cycle 2: lay up and press step 4 4 to 5" in " ".join(
+        " ".join(cell.text_content() for cell in row) for row in days
+    )
+    assert "It may not pause from the first layer of a step to the end of its pressing" in words
+    assert "each straight to its number in the tray" in words
     closings = page.xpath("//label[contains(., 'cycle 2')]")
     assert len(closings) == 4
 
@@ -89,6 +98,32 @@ def test_a_plate_without_a_hole_of_one_place_fails(doctor: Doctor) -> None:
         path.write_text(dxf_text(cutting_order(left), found.properties), newline="\n")
 
     assert doctored(doctor, file, put) == {"manifest-claims", "as-designed"}
+
+
+def test_a_plate_with_other_notes_of_its_holes_fails(doctor: Doctor) -> None:
+    """A shop that bores to another depth, or to none, has pins that stand off their height."""
+    from sbafab.cutting.dxf_read import read_profile
+    from sbafab.cutting.dxf_write import dxf_text
+    from sbafab.cutting.order import cutting_order
+
+    file = doctor.manifest["fixture"]
+    path = doctor.folder / file
+    found = read_profile(path)
+    notes = [[edges[0].start, *(edge.end for edge in edges)] for _, edges in found.strokes[2:]]
+    assert notes
+    deeper = {**found.properties, "HOLES": found.properties["HOLES"].replace("2.", "4.")}
+    for properties, strokes, is_right in (
+        (found.properties, notes, True),
+        (deeper, notes, False),
+        (found.properties, notes[:-1], False),
+        (found.properties, (), False),
+    ):
+        text = dxf_text(cutting_order(found.region), properties, notes=strokes)
+
+        def put(text: str = text) -> None:
+            path.write_text(text, newline="\n")
+
+        assert doctored(doctor, file, put) == (set() if is_right else {"as-designed"})
 
 
 def test_places_that_are_too_near_fail_though_the_plate_agrees(doctor: Doctor) -> None:

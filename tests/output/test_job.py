@@ -26,7 +26,7 @@ def designs(*assignments: str) -> list[Design]:
 
 @pytest.fixture(scope="module")
 def job(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    made = designs("order.copies=2", "order.spares=0")
+    made = designs("order.copies=2", "order.spares=0", "order.spare_share=0")
     return generate_job(made, "batch", tmp_path_factory.mktemp("job"))
 
 
@@ -77,7 +77,9 @@ def test_travellers_name_the_shared_sheets(job: Run) -> None:
 
 
 def test_the_same_job_gives_the_same_bytes(job: Run, tmp_path: Path) -> None:
-    again = generate_job(designs("order.copies=2", "order.spares=0"), "batch", tmp_path)
+    again = generate_job(
+        designs("order.copies=2", "order.spares=0", "order.spare_share=0"), "batch", tmp_path
+    )
     assert file_hashes(again.folder) == file_hashes(job.folder)
 
 

@@ -68,9 +68,9 @@ def test_times_of_a_batch_are_those_of_the_paper_a_copy_and_a_cycle() -> None:
     times = batch_times(Runs(30, ((0.0, 0.0),) * 12), plan)
     assert (times.press, times.hands, times.total) == (3 * 45, 30 * 60, 135 + 1800)
     # 480 min: 4 x 105 fit and 5 x 105 do not; 45 + 7 x 60 = 465 fits and 45 + 8 x 60 does not.
-    assert (a_day(plan, 1), a_day(plan, 12)) == (4, 7)
+    assert (a_day(plan, 1, 480), a_day(plan, 12, 480)) == (4, 7)
     # Two cycles of 4: 90 + 60 n.
-    assert a_day(plan, 4) == 6
+    assert a_day(plan, 4, 480) == 6
 
 
 def test_one_plate_has_every_hole_of_every_place() -> None:
@@ -119,14 +119,18 @@ def test_all_laminates_of_a_cycle_share_the_force() -> None:
 
 
 def test_registered_sheets_are_one_piece_to_the_press() -> None:
-    sheets = laminate("registration.method=sheet", "order.copies=4", "stack.balloons=2")
+    whole = ("registration.method=sheet", "registration.experimental=true")
+    sheets = laminate(*whole, "order.copies=4", "stack.balloons=2")
     assert runs_of(sheets, 4, (152.4, 152.4)) == Runs(1, ((0.0, 0.0),))
 
 
 def test_patterns_are_counted_a_cycle() -> None:
-    column = laminate("stack.balloons=2")
-    runs = Runs(5, ((0.0, 0.0),) * 3)
-    said = batch_json(column, runs, schedule(column, PressSettings()))
+    # 45 min in the press and 60 by hand a copy: three fit in 225 min, and four do not.
+    design = load_design(
+        "1dof-5mm", ["stack.balloons=2", "order.copies=5", "order.shift_hours=3.75"]
+    )
+    column = build(design)
+    said = batch_json(design, column, schedule(column, PressSettings()))
     assert said["cycles"] == [3, 2]
     for row in said["patterns"]:
         assert row["each"] == len(column.patterns[row["pattern"]])

@@ -15,6 +15,7 @@ from sbafab.output.settings import press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import traveller_html
+from sbafab.reports.underlay import guides
 
 EARS = 'registration.method="ears"'
 SHA = hashlib.sha256(b"design").hexdigest()
@@ -30,7 +31,8 @@ def page(sheet_files: Any, template: str, *assignments: str) -> Any:
     design, laminate = built(template, *assignments)
     plan = schedule(laminate, press_settings(design))
     fixture = "sheets/fixture.dxf" if laminate.pins else None
-    job = Job(SHA, "sbafab 1.0.0", fixture=fixture)
+    underlay = "underlay.pdf" if guides(laminate) else None
+    job = Job(SHA, "sbafab 1.0.0", fixture=fixture, underlay=underlay)
     work = Work(design, laminate, plan, sheet_files(laminate), job)
     return lxml_html.fromstring(traveller_html(*(getattr(work, name) for name in FIELDS)))
 

@@ -238,10 +238,15 @@ def test_the_bill_counts_what_is_needed(sheet_files: Any) -> None:
     rows = parsed(work).get_element_by_id("materials").getparent().findall(".//tbody/tr")
     bill = [[words_of(cell) for cell in row][1:] for row in rows]
     found = {(name, what): quantity for name, what, quantity in bill}
-    # The highest stack on pins, 1.726 mm, the chamfers, 0.2 and 0.35, and 2 and 3 mm of seat; both
+    # A hole has one depth, so two stacks, 0.063 and 1.726 mm high, take two lengths of pins; both
     # copies lie in the press at once.
-    assert found["Dowel pins", "ISO 8734, ⌀1 mm m6, 4 mm long"] == "6"
-    assert found["Dowel pins", "ISO 8734, ⌀2 mm m6, 6 mm long"] == "2"
+    pins = {
+        tuple(map(float, re.findall(r"([\d.]+) mm", what))): quantity
+        for (name, what), quantity in found.items()
+        if name == "Dowel pins"
+    }
+    assert sorted(pins) == [(1, 3), (1, 5), (2, 5), (2, 6)]
+    assert [pins[size] for size in sorted(pins)] == ["6 + 3 spare"] * 2 + ["2 + 2 spare"] * 2
     names = [name for name, _ in found]
     assert {"Base plate", "Release film", "Press pad"} <= set(names)
     assert found["Tube", "Braintree RPT040, outer diameter 1.016 mm"] == "6 pieces"

@@ -30,6 +30,9 @@ def test_what_must_be_ready_before_the_day(sheet_files: Any, assignments: tuple[
     assert not re.search(r"\d+ min", section)
     assert "130 °C (266 °F)" in section
     assert ("ears" in section) == bool(assignments)
+    # A punch goes through the push-out hole of 0.6 diameters.
+    assert ("punches ⌀0.5 mm and ⌀1.1 mm" in section) == (not assignments)
+    assert ("Underlay printed at 100 %, 2 times" in section) == (not assignments)
     # No hand lays to 0.08 mm without one; ears hold every film.
     assert ("loupe" not in section) == bool(assignments)
     assert ("by eye to 0.08 mm" in section) != bool(assignments)

@@ -14,13 +14,16 @@ import shapely
 import shapely.affinity
 
 from sbafab.actuators import build, load_design
+from sbafab.cutting.fixture import plate_corner
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.together import design_runs
+from sbafab.output.settings import press_settings
+from sbafab.pressing.schedule import schedule
+from sbafab.pressing.together import runs_of
 from sbafab.reports.underlay import guides, leaves, underlay_pdf
 
 SHA = "0123456789abcdef" * 4
 MM = 25.4 / 72
-FILM, MASK, BLACK = (13, 64, 140), (217, 102, 0), (0, 0, 0)
+FILM, MASK, BLACK, GREY = (13, 64, 140), (217, 102, 0), (0, 0, 0), (140, 140, 140)
 Points = list[tuple[float, float]]
 
 
@@ -121,13 +124,14 @@ def test_it_has_every_place_of_a_cycle() -> None:
 
 
 def test_a_cycle_larger_than_the_paper_is_tiled_edge_to_edge() -> None:
-    wide = ("press.platen_width=300", "press.platen_length=300", "order.copies=40")
+    wide = ("press.platen_width=300", "press.platen_length=300")
     design = load_design("3dof-15mm", wide)
     laminate = build(design)
-    places = design_runs(design, laminate).places
-    spread = leaves(laminate, places)
+    places = runs_of(laminate, 40, (300.0, 300.0)).places
+    platen = 300.0, 300.0
+    spread = leaves(laminate, places, platen)
     assert sorted(n for leaf in spread for n in leaf.places) == list(range(1, 41))
-    data = underlay_pdf(laminate, SHA, places)
+    data = underlay_pdf(laminate, SHA, places, platen)
     assert data is not None
     document = pypdfium2.PdfDocument(data)
     assert len(document) == len(spread) == 4
@@ -141,7 +145,6 @@ def test_a_cycle_larger_than_the_paper_is_tiled_edge_to_edge() -> None:
         lines = [line for line in paths(document, FILM, page) if len(line) > 2]
         assert len(lines) == 2 * len(leaf.places)
         # Every outline lies whole within the frame that is cut out.
-        assert leaf.trim is not None
         tile = shapely.box(*leaf.trim)
         drawn = shapely.MultiLineString(lines).bounds
         frame = [path for path in paths(document, BLACK, page) if len(path) == 2]
@@ -155,6 +158,56 @@ def test_a_cycle_larger_than_the_paper_is_tiled_edge_to_edge() -> None:
     whole = shapely.union_all(tiles)
     assert sum(tile.area for tile in tiles) == pytest.approx(whole.area)
     assert whole.area == pytest.approx(whole.envelope.area)
+
+
+@pytest.mark.parametrize("template", ["3dof-15mm", "1dof-5mm", "radial-15mm"])
+def test_its_trim_line_is_the_edge_of_the_plate(template: str) -> None:
+    """Cut out and laid flush with the plate, its lines lie where the plate's holes want them."""
+    laminate, document = printed(template)
+    # A square of 6 inches, less 5 mm at the corner of largest x and y.
+    [frame] = [
+        path
+        for path in paths(document, BLACK)
+        if len(path) >= 5 and shapely.Polygon(path).area > 1e4
+    ]
+    edge = shapely.Polygon(frame)
+    assert edge.area == pytest.approx(152.4**2 - 5 * 5 / 2, abs=0.1)
+    left, low, right, top = edge.bounds
+    assert (right - left, top - low) == pytest.approx((152.4, 152.4), abs=2e-3)
+    assert not edge.contains(shapely.Point(right - 1, top - 1))
+    # The actuator's axis, where the cross is, lies from the edge as the plate's datum does.
+    x0, y0 = plate_corner(laminate, (152.4, 152.4))
+    lines = [path for path in paths(document, GREY) if len(path) == 2]
+    [upright] = [path for path in lines if abs(path[0][0] - path[1][0]) < 1e-3]
+    [level] = [path for path in lines if abs(path[0][1] - path[1][1]) < 1e-3]
+    assert (upright[0][0] - left, level[0][1] - low) == pytest.approx((-x0, -y0), abs=2e-3)
+    width, height = (side * MM for side in document[0].get_size())
+    assert 18 < left < right < width - 18
+    assert 40 < low < top < height - 50
+
+
+def test_paper_that_is_no_plate_ends_on_the_plate() -> None:
+    laminate = build(load_design("1dof-5mm"))
+    [leaf] = leaves(laminate, ((0.0, 0.0),), (400.0, 400.0))
+    assert not leaf.is_plate
+    assert shapely.box(*leaf.trim).within(shapely.box(-200, -200, 200, 200))
+    [narrow] = leaves(laminate, ((0.0, 0.0),), (17.0, 170.0))
+    x0, _, x1, _ = narrow.trim
+    assert x1 - x0 <= 17.0 + 1e-9
+
+
+@pytest.mark.parametrize("method", ["channel-pin", "ears"])
+@pytest.mark.parametrize("template", ["3dof-15mm", "1dof-5mm", "1dof-10mm", "radial-15mm"])
+def test_it_lies_in_every_step_that_counts_its_thickness(template: str, method: str) -> None:
+    design = load_design(template, [f'registration.method="{method}"'])
+    laminate = build(design)
+    with_lines = {number for guide in guides(laminate) for number in guide.steps}
+    counted = {
+        step.step
+        for step in schedule(laminate, press_settings(design)).steps
+        if any(item.part == "underlay" for item in step.build_up)
+    }
+    assert counted == with_lines
 
 
 def test_it_shows_what_a_hand_lays() -> None:

@@ -243,3 +243,57 @@ def test_tube_fit_without_inlets(good: Good) -> None:
             "the laminate has no inlet, so no tube can be fitted; give every chamber one",
         )
     ]
+
+
+def test_a_strip_that_opens_beside_its_inlet_is_no_mouth(good: Good, spoil: Spoil) -> None:
+    """Moved by 0.9, its end lies about 0.825 from the inlet's axis, outside the tube's 0.8."""
+    laminate = good(*ONE)
+    (inlet,) = laminate.inlets
+    (x, y), (dx, dy) = inlet.mouth, inlet.direction
+
+    def at(depth: float, off: float) -> tuple[float, float]:
+        return x - depth * dx - off * dy, y - depth * dy + off * dx
+
+    run = strip(at(inlet.length, 0.0), at(-5.0, 0.0), inlet.width)
+    aside = strip(at(inlet.length, 0.9), at(-5.0, 0.9), inlet.width)
+    mask = (laminate.layer(2).profile - run) | aside
+    (found,) = tube_fit.check(spoil(laminate, 2, mask), LIMITS)
+    assert (found.verdict, found.measured) == ("fail", 0.0)
+    assert "open a mask strip to the tab's end" in found.message
+
+
+def test_a_slit_farther_off_than_the_strip_is_wide_is_none_of_its_sides(
+    good: Good, spoil: Spoil
+) -> None:
+    """On a tab that was widened: 2.0 from the inlet's axis, where 1.6 is looked at."""
+    laminate = good(*ONE)
+    (inlet,) = laminate.inlets
+    (x, y), (dx, dy) = inlet.mouth, inlet.direction
+
+    def at(depth: float, off: float) -> tuple[float, float]:
+        return x - depth * dx - off * dy, y - depth * dy + off * dx
+
+    wide = strip(at(inlet.length, 0.0), at(0.0, 0.0), 8.0)
+    for index in (1, 3):
+        laminate = spoil(laminate, index, laminate.layer(index).profile | wide)
+    slit = strip(at(0.5, 2.15), at(inlet.length - 0.5, 2.15), 0.3)
+    # A strip that bulges, which no shortcut for straight ones takes.
+    bulge = disc(at(inlet.length / 2, 0.8), 0.1)
+    laminate = spoil(laminate, 2, laminate.layer(2).profile | slit | bulge)
+    (found,) = tube_fit.check(laminate, LIMITS)
+    assert (found.verdict, found.measured) == ("pass", pytest.approx(1.6 - 0.3))
+
+
+def test_a_strip_that_is_narrow_inside_the_mouth_is_so_wide_less_the_errors(
+    good: Good, spoil: Spoil
+) -> None:
+    """0.9 wide from 1.2 inside the mouth on: 0.1 is lost on each edge, and a kerf of 0.1."""
+    laminate = good(*ONE)
+    (inlet,) = laminate.inlets
+    (x, y), (dx, dy) = inlet.mouth, inlet.direction
+    mask = laminate.layer(2).profile
+    for off in (0.45 + 0.5, -0.45 - 0.5):
+        ends = [(x - d * dx - off * dy, y - d * dy + off * dx) for d in (1.2, inlet.length + 5.0)]
+        mask = mask - strip(*ends, 1.0)
+    (found,) = tube_fit.check(spoil(laminate, 2, mask), LIMITS)
+    assert (found.verdict, found.measured) == ("fail", pytest.approx(0.6))

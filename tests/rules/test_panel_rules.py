@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.shapes import disc, strip
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import bridges, scrap
 from sbafab.rules.deck import run_deck
@@ -24,7 +24,12 @@ Change = Callable[[Region, Laminate], Region]
 
 def good(*changes: str) -> Laminate:
     return built(
-        "1dof-5mm", 'registration.method="sheet"', "stack.balloons=2", "order.copies=2", *changes
+        "1dof-5mm",
+        'registration.method="sheet"',
+        "registration.experimental=true",
+        "stack.balloons=2",
+        "order.copies=2",
+        *changes,
     )
 
 
@@ -109,3 +114,30 @@ def test_stretch_of_the_sheets_lowers_the_yield() -> None:
     assert shares[0] == 1.0
     assert shares == sorted(shares, reverse=True)
     assert shares[2] < 0.7
+
+
+@pytest.mark.parametrize("reach", [0.02, 0.2])
+def test_a_tongue_of_scrap_far_smaller_than_a_tab_is_found(reach: float) -> None:
+    """0.2 wide and so far over the side of an inlet tab (held), or in front of it (closed)."""
+    laminate = good()
+    inlet = laminate.inlets[0]
+    (x, y), (dx, dy) = inlet.mouth, inlet.direction
+    tab = 0.75 + inlet.width / 2
+
+    def aside(along: float, off: float) -> tuple[float, float]:
+        return x + along * dx - off * dy, y + along * dy + off * dx
+
+    # Two copies, which no scrap but the first one's is at.
+    held = strip(aside(-1.5, tab - reach), aside(-1.5, tab + 4.0), 0.2)
+    closing = strip(aside(scrap.AHEAD - reach, 0.0), aside(5.0, 0.0), 0.2)
+    for tongue, said in ((held, "bonds to the part of layer 3"), (closing, "closes the inlet")):
+        (found,) = scrap.check(
+            with_sheet(laminate, 5, lambda sheet, _, tongue=tongue: sheet | tongue), FEW
+        )
+        assert found.measured == 1.0
+        assert said in found.message
+    # A mask sheet that reaches between the tongue and the tab keeps them apart.
+    shut = with_sheet(laminate, 5, lambda sheet, _: sheet | held)
+    cover = strip(aside(-1.5, tab - 1.0), aside(-1.5, tab + 4.0), 1.0)
+    (found,) = scrap.check(with_sheet(shut, 4, lambda sheet, _: sheet | cover), FEW)
+    assert found.verdict == "pass"

@@ -10,9 +10,11 @@ import pytest
 import shapely
 from shapely import affinity
 
+from sbafab.actuators import load_design
 from sbafab.geometry.region import Region
 from sbafab.geometry.shapes import disc
 from sbafab.laminate.laminate import Laminate
+from sbafab.output.settings import limits
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding
 from sbafab.rules.freedoms import Part, freedoms
@@ -52,6 +54,19 @@ def test_cutting_and_pins_leave_what_the_papers_errors_say(good: Good) -> None:
     bond, overhang = measured(good(*ONE), Tolerances(placement=0, turn=0))
     assert bond == pytest.approx(0.75 - 0.2 - 0.008, abs=1e-6)
     assert overhang == pytest.approx(0.5 - 0.2 - 0.008, abs=1e-6)
+
+
+def test_a_plate_that_is_less_true_leaves_less(good: Good) -> None:
+    """Four pins off their places cost twice that; the place of one pin alone costs nothing."""
+    for machine, error in (("cnc-mill", 0.025 + 0.008 / 2), ("drill-press", 0.2 + 0.008 / 2)):
+        made = f"registration.plate_made_by={machine}"
+        tolerances = replace(limits(load_design("3dof-15mm", [made])).tolerances, turn=0)
+        lobed, usual = good(*LOBED), Tolerances(turn=0)
+        # Chamber mask and wall of a balloon in the middle: both hang on pins.
+        lost = left(lobed, 3, "bond", usual) - left(lobed, 3, "bond", tolerances)
+        assert lost == pytest.approx(2 * (error - 0.004), abs=1e-6)
+        alone = limits(load_design("1dof-5mm", [made])).tolerances
+        assert measured(good(*ONE), alone) == measured(good(*ONE), Tolerances())
 
 
 def test_without_errors_the_nominal_widths_are_left(good: Good) -> None:

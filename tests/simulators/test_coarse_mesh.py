@@ -182,3 +182,24 @@ def test_unsuited_designs_are_refused_with_the_reason(tmp_path: Path) -> None:
         round_stack(square)
     assert "lie on a sheet" in (why_not_round(sbafab.build("radial-15mm")) or "")
     assert why_not_round(sbafab.build("1dof-5mm")) is None
+
+
+@pytest.mark.parametrize("sectors", [8, 12, 16])
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_a_mirrored_mesh_is_the_same_and_begins_its_triangles_alike(
+    count: int, sectors: int
+) -> None:
+    """Corotational elements take their axes from a triangle's first edge: where mirrored triangles
+    begin with others, a chamber on the axis of x bends the actuator out of its plane.
+    """
+    design = (LOBED, f"chamber.count={count}", "stack.balloons=2")
+    mesh = coarse_mesh(round_stack(sbafab.build(*design)), sectors=sectors)
+    nodes = {
+        (round(x, 4), round(y, 4) + 0.0, round(z, 4)): i
+        for i, (x, y, z) in enumerate(mesh.position)
+    }
+    mirror = [nodes[round(x, 4), round(-y, 4) + 0.0, round(z, 4)] for x, y, z in mesh.position]
+    for group in (mesh.lower, mesh.upper, mesh.web, mesh.necks):
+        begun = {(frozenset((a, b)), c) for a, b, c in group}
+        mirrored = {(frozenset((mirror[a], mirror[b])), mirror[c]) for a, b, c in group}
+        assert begun == mirrored

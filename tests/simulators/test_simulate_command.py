@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 from hashlib import sha256
 from pathlib import Path
 
@@ -156,3 +158,22 @@ def test_a_run_leaves_what_it_found(tmp_path: Path) -> None:
     hold("simulate", found)
     assert told == {**found, "folder": str(tmp_path / "1dof-5mm" / "mujoco")}
     assert found["stopped"] is None
+
+
+def test_the_log_of_a_void_run_is_where_the_message_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A program in runSofa's place that writes no place of the tip."""
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    program = programs / "runSofa"
+    program.write_text("#!/bin/sh\necho '[ERROR] what went wrong'\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{programs}{os.pathsep}{os.environ['PATH']}")
+    out = tmp_path / "out"
+    given = ["simulate", "1dof-5mm", "--set", "stack.balloons=1", "--with", "sofa", "-o", str(out)]
+    found = CliRunner().invoke(app, given)
+    named = re.search(r"\(see (.*\.log)\)", found.output.replace("\n", " "))
+    assert found.exit_code != 0
+    assert named is not None, found.output
+    assert "[ERROR] what went wrong" in Path(named[1]).read_text(encoding="utf-8")

@@ -90,6 +90,16 @@ def test_it_bends_away_from_two_chambers_by_what_the_paper_measured(tmp_path: Pa
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("scene", ["shell", "frames", "volume"])
+def test_one_chamber_along_x_bends_it_in_that_plane(tmp_path: Path, scene: str) -> None:
+    job = SofaJob(scene, 3.0, volumes={"chamber1": 80.0})  # type: ignore[arg-type]
+    done = ran(tmp_path, LOBED, {"chamber1": 5.0}, job)
+    x, y, _ = done.last.place
+    assert x < -1
+    assert abs(y) < 0.002 * abs(x)
+
+
+@pytest.mark.long
 @pytest.mark.parametrize(("scene", "seconds"), [("frames", 4.0), ("volume", 4.0), ("beam", 6.0)])
 def test_the_other_scenes_come_as_high_as_the_shell(
     tmp_path: Path, scene: str, seconds: float

@@ -22,7 +22,6 @@ from sbafab.reports.traveller.code import code_svg, record_text
 from sbafab.reports.traveller.day import before_the_day, tools
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.page import context, environment, frame, sheet_rows
-from sbafab.reports.traveller.page import films as page_films
 from sbafab.reports.traveller.shapes import definitions, pattern_regions
 from sbafab.reports.traveller.sheet_map import part_regions
 from sbafab.rules.finding import Finding
@@ -91,7 +90,7 @@ def assembly_html(job: AssemblyJob) -> str:
             bill=_bill(job),
             before_the_day=before_the_day(works),
             tools=tools(works),
-            before_cutting=bench.before_cutting(f for w in works for f in page_films(w.laminate)),
+            before_cutting=bench.before_cutting(works),
             after_cutting=bench.after_cutting(works),
             sheet_rows=sheet_rows(works[0].design, job.sheets, _marks(job)),
             laser_minutes=times.laser_minutes(works[0]),

@@ -6,10 +6,14 @@ from collections import Counter
 from typing import NamedTuple
 
 from sbafab.cutting.fixture import plate_corner
+from sbafab.laminate.base_plate import MAKINGS, most_play
 from sbafab.laminate.laminate import Pin
-from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, RELEASE, pieces
-from sbafab.pressing.schedule import Schedule
+from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, RELEASE, UNDERLAY, pieces
+from sbafab.pressing.dowels import PinHole, pin_holes
+from sbafab.pressing.schedule import Schedule, Step
+from sbafab.pressing.words import listed
 from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller.bench import TAPE
 from sbafab.reports.traveller.job import Work
 
 MOST_LISTED = 9
@@ -25,7 +29,9 @@ class PlateHole(NamedTuple):
     y: float
     from_datum: tuple[float, float]
     films: float
-    length: str
+    depth: str
+    push_out: str
+    lengths: str
 
 
 class PlatePlace(NamedTuple):
@@ -60,7 +66,7 @@ def holes(work: Work) -> list[PlateHole]:
     laminate, press = work.laminate, work.design.press
     platen = press.platen_width, press.platen_length
     corner_x, corner_y = plate_corner(laminate, platen, work.runs.places)
-    lengths = _lengths(work.schedule)
+    found = _pin_holes(work.schedule)
     return [
         PlateHole(
             pin.name,
@@ -69,14 +75,78 @@ def holes(work: Work) -> list[PlateHole]:
             pin.centre[1] - corner_y,
             pin.centre,
             pin.hole,
-            say.millimetres(lengths[pin.name]) if pin.name in lengths else "not used",
+            *_sizes(found.get(pin.name)),
         )
         for pin in laminate.pins
     ]
 
 
-def _lengths(plan: Schedule) -> dict[str, float]:
-    return {pin.pin: pin.length_mm for step in plan.steps for pin in step.pin_settings}
+def _sizes(hole: PinHole | None) -> tuple[str, str, str]:
+    """Depth, push-out hole and pins of a hole, as the table has them."""
+    if hole is None:
+        return "not used", "", ""
+    lengths = listed([f"{length:g}" for length in hole.lengths])
+    return f"{hole.depth:g} ± {hole.tolerance:g}", f"{hole.push_out:g}", f"{lengths} mm"
+
+
+def _pin_holes(plan: Schedule) -> dict[str, PinHole]:
+    tacks = [] if plan.tacking is None else [plan.tacking.pins]
+    return pin_holes([*(step.pin_settings for step in plan.steps), *tacks])
+
+
+def plate_notes(work: Work) -> tuple[str, ...]:
+    """How the plate's holes are made, how true, and what the rules count for it."""
+    design = work.design
+    own = design.registration
+    making = MAKINGS[own.plate_made_by]
+    several = len(work.laminate.pins) > 1
+    counted = design.pin_error if several else design.lone_pin_error
+    play = most_play(design.thickest_pin, own.plate_made_by)
+    fit = (
+        "Bore it 0.005 to 0.01 too narrow and lap it to its own pins, until they go in by hand "
+        "without shake; mark which pins are whose"
+        if making.is_lapped and several
+        else "Ream it H7; choose pins of the pack that go in by hand or with light taps"
+    )
+    made = (
+        "Base plate, as large as the platen. Each hole: drill it through at the push-out diameter; "
+        "widen it from above down to the depth, flat at the bottom: on that shoulder the pin "
+        f"stands. {fit}. Take off the burr, no more: it lifts films. The file has nominal edges."
+    )
+    if not several:
+        return made, (
+            "All layers hang on this one pin, so that its place on the plate counts for nothing: a "
+            f"drill press does, marked out to 0.2 mm. The rules count {counted:g} mm for its play."
+        )
+    return made, (
+        f"Each hole within {making.position:g} mm of its place in the table, in any direction: "
+        f"that is {making.words} (registration.plate_made_by). A pin has up to {play:g} mm of play "
+        f"in its hole. The rules count {counted:g} mm for both."
+    )
+
+
+def _underlay_words(work: Work) -> str:
+    """What is said of the underlay where some step has one."""
+    steps = [step.step for step in work.schedule.steps if _has_underlay(step)]
+    if not steps:
+        return ""
+    which = listed([str(number) for number in steps])
+    thick = say.millimetres(work.design.press.underlay_thickness)
+    return (
+        f" In step{'s' if len(steps) > 1 else ''} {which} a fresh print of the underlay, cut out "
+        f"along its dotted line, lies between plate and release film while the press is closed: "
+        f"{thick} of paper, which the heights of the pins count. As large as the plate, it changes "
+        f"no pressure. Its left and right edge are taped down with {TAPE}, off the films."
+    )
+
+
+def _has_underlay(step: Step) -> bool:
+    return any(item.part == UNDERLAY for item in step.build_up)
+
+
+def hot_prints(work: Work) -> int:
+    """Return how often a print of the underlay lies in the closed press, all cycles counted."""
+    return work.runs.count * sum(_has_underlay(step) for step in work.schedule.steps)
 
 
 def build_up_notes(work: Work) -> tuple[str, ...]:
@@ -94,13 +164,13 @@ def build_up_notes(work: Work) -> tuple[str, ...]:
         f"({plate.material}, {say.millimetres(plate.thickness_mm)}, {size}, as large as the "
         f"platen), release film ({release.material}), {LAMINATE}, release film, press pad "
         f"({pad.material}, {say.millimetres(pad.thickness_mm)}, as large as the platen), upper "
-        "platen. Nothing rigid lies on the films: no second plate.",
+        f"platen. Nothing rigid lies on the films: no second plate.{_underlay_words(work)}",
         f"{newtons} is {kilopascals} on the whole platen of {size}; the paper gives no force. The "
         f"pad brings it to the films; without it {newtons} on the {what} alone ({alone:.0f} mm²) "
         f"would be {step.force_n / alone:.1f} MPa. What the paper laid between platen and films is "
         "not known. The pressures at each step are estimates that no press has confirmed: check "
         "them once, cold, with pressure-indicating film.",
-        "The pad has no holes: pins press their chamfers into it. It keeps heat back: films are "
+        "The pad has no holes: pins press into it. It keeps heat back: films are "
         "heated from below, through the base plate. Lay up on the plate while it is cold, out of "
         "the press; it warms with the films on it, and each step counts from when it is hot.",
     )
@@ -127,7 +197,7 @@ def items(work: Work) -> list[tuple[str, str, str]]:
     sheets = pieces(pad.thickness_mm)
     piled = f", a pile of {sheets} sheets" if sheets > 1 else ""
     holes = (
-        f"; holes from {work.job.fixture} and the hole table, reamed H7"
+        f"; stepped holes from {work.job.fixture} and the hole table"
         if work.job.fixture is not None
         else "; no holes"
     )
@@ -156,13 +226,19 @@ def items(work: Work) -> list[tuple[str, str, str]]:
 
 
 def _pin_items(pins: tuple[Pin, ...], plan: Schedule, standard: str) -> list[tuple[str, str, str]]:
-    lengths = _lengths(plan)
-    sizes = Counter((pin.diameter, lengths[pin.name]) for pin in pins if pin.name in lengths)
+    holes = _pin_holes(plan)
+    sizes = Counter(
+        (pin.diameter, length)
+        for pin in pins
+        if pin.name in holes
+        for length in holes[pin.name].lengths
+    )
     return [
         (
             "Dowel pins",
-            f"{standard}, ⌀{say.millimetres(diameter)} m6, {say.millimetres(length)} long",
-            str(number),
+            f"{standard}, ⌀{say.millimetres(diameter)} m6, {say.millimetres(length)} long; spares "
+            "to choose from",
+            f"{number} + {max(2, number // 2)} spare",
         )
         for (diameter, length), number in sorted(sizes.items())
     ]

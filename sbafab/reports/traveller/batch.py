@@ -1,4 +1,4 @@
-"""Several copies on one traveller: the press cycles, the plate with its places, a serial each."""
+"""Several copies on one traveller: the press cycles by day, the plate's places, a serial each."""
 
 from __future__ import annotations
 
@@ -6,15 +6,24 @@ from dataclasses import dataclass
 
 from sbafab.cutting.fixture import whole_plate
 from sbafab.geometry.svg import number, path_data
-from sbafab.pressing.together import Runs, batch_times
+from sbafab.pressing.together import Runs, batch_times, most_together, working_days
+from sbafab.pressing.working_days import CUT_SHARE, FINISH_SHARE, Entry
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller.action import Action
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.shapes import Picture, flat, label, pattern_id
 
 WIDEST = 110.0
 """mm of the page that the platen takes."""
 PLATE = "#f1f1ef"
+
+
+PAUSES = (
+    "The work may pause between any two rows, within cutting after any sheet, and within the tubes "
+    "after any laminate. It may not pause from the first layer of a step to the end of its "
+    "pressing: loose films move."
+)
 
 
 @dataclass(frozen=True)
@@ -37,6 +46,19 @@ class CopyRow:
 
 
 @dataclass(frozen=True)
+class PlanRow:
+    """Work that is done in one go; ``day`` and ``span`` stand beside the first row of a day."""
+
+    day: int
+    span: int
+    start: str
+    end: str
+    work: str
+    copies: str
+    minutes: str
+
+
+@dataclass(frozen=True)
 class BatchPage:
     """What the page says of a batch. Cycles of one size share a column of the counts."""
 
@@ -45,6 +67,10 @@ class BatchPage:
     said: str
     why: str
     picture: str
+    plan: tuple[PlanRow, ...]
+    plan_basis: str
+    pauses: str
+    identity: tuple[Action, ...]
     cycle_names: tuple[str, ...]
     patterns: tuple[PatternRow, ...]
     copies: tuple[CopyRow, ...]
@@ -68,6 +94,10 @@ def batch_page(work: Work) -> BatchPage | None:
         "Copies are alike layer by layer and share the pressure evenly (ours: the paper does not "
         f"say how many it pressed at once).{lesser}",
         _picture(work, runs),
+        _plan(work),
+        _plan_basis(work),
+        PAUSES,
+        _identity(work),
         tuple(_name(runs, size) for size in sizes),
         tuple(
             PatternRow(
@@ -89,9 +119,94 @@ def _said(work: Work, runs: Runs) -> str:
     times, one = batch_times(runs, work.schedule), work.schedule.total_press_minutes
     cycles = say.count(runs.count, "press cycle")
     sizes = ", ".join(str(size) for size in dict.fromkeys(runs.cycles))
+    why = f" {work.design.order.why}" if work.design.order.why else ""
     return (
         f"{runs.copies} copies in {cycles} of {sizes} at once: {times.press:g} min in the press "
-        f"instead of {runs.copies * one:g}."
+        f"instead of {runs.copies * one:g}.{why}"
+    )
+
+
+def _plan(work: Work) -> tuple[PlanRow, ...]:
+    """The work of every day, in its order."""
+    entries = working_days(work.design, work.laminate, work.schedule, work.job.copies)
+    days = [entry.day for entry in entries]
+    return tuple(
+        PlanRow(
+            entry.day,
+            days.count(entry.day) if number == days.index(entry.day) else 0,
+            say.clock(entry.start),
+            say.clock(entry.start + entry.minutes),
+            _task(work, entry),
+            _copies(entry),
+            f"{entry.minutes:.0f}",
+        )
+        for number, entry in enumerate(entries)
+    )
+
+
+def _task(work: Work, entry: Entry) -> str:
+    if entry.task == "cut":
+        return "Cut all sheets, wipe and sort the parts"
+    if entry.task == "finish":
+        trim = "trim, " if work.laminate.registration == "ears" else ""
+        return f"Cycle {entry.cycle}: {trim}fit the tubes"
+    return f"Cycle {entry.cycle}: lay up and press step {entry.step}"
+
+
+def _copies(entry: Entry) -> str:
+    first, last = entry.copies
+    return str(first) if first == last else f"{first} to {last}"
+
+
+def _plan_basis(work: Work) -> str:
+    """How far the plan can be trusted."""
+    by_hand = work.schedule.estimated_build_minutes - work.schedule.total_press_minutes
+    hours = work.design.order.shift_hours
+    platen = work.schedule.steps[0].platen_mm
+    holds = most_together(work.laminate, platen)
+    entries = working_days(work.design, work.laminate, work.schedule, work.job.copies)
+    pressing = {entry.day for entry in entries if entry.task == "press"}
+    left = 60 * hours - max(e.start + e.minutes for e in entries if e.day in pressing)
+    return (
+        f"One person, one press, shifts of {hours:g} h (order.shift_hours); a cycle takes no more "
+        f"copies than such a shift makes (the plate has room for {holds}), and its press steps end "
+        "on the day on which they begin, where they fit into one. The minutes are estimates: "
+        f"{by_hand:g} by hand for each copy, as the paper's total leaves them; that "
+        f"{CUT_SHARE:.0%} of these go to cutting, {FINISH_SHARE:.0%} to the tubes, and the rest to "
+        "the steps by the number of parts that each lays, is ours. Warming and cooling of the "
+        "plate come on top of every press step (blanks in Before the day): the fullest day with a "
+        f"press step has {say.clock(max(0.0, left))} left for them. So do curing and leak tests. "
+        "Write beside the rows what they took."
+    )
+
+
+def _identity(work: Work) -> tuple[Action, ...]:
+    """How a laminate is told from the others from one step to the next."""
+    lining = "a drawing of the places above, with their numbers"
+    if work.job.underlay is not None:
+        lining = f"a second print of {work.job.underlay}, which has the places' numbers"
+    return (
+        Action(
+            "A laminate is known by its cycle and its place; the table below has its copy number. "
+            "Nothing that is pressed carries a label: at the press temperature ink and paper would "
+            "go into the bond."
+        ),
+        Action(
+            f"Line a flat tray with {lining}. After every step take the laminates off the plate "
+            "one at a time, each straight to its number in the tray, the same side up. Stacks of "
+            "the same number that are not yet bonded to each other lie on each other with paper "
+            "between."
+        ),
+        Action(
+            "In the next step each goes back to the place of its number. One that has lost its "
+            "number may be pressed with the others, for all are alike: write “place lost” in its "
+            "row."
+        ),
+        Action(
+            "After the last step they stay in the tray until their tubes are fitted. Then put a "
+            "flag of tape with the copy number round a tube, and write the serial number beside it "
+            "in the table."
+        ),
     )
 
 

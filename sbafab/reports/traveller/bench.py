@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Mapping, Sequence
 
-from sbafab.laminate.assembly import AssemblyStep, distinct_layers, laying_pins
+from sbafab.design.records import HoldDown
+from sbafab.laminate.assembly import AssemblyStep, distinct_layers
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.schedule import Step
@@ -16,29 +18,91 @@ from sbafab.reports.underlay import guides
 from sbafab.rules.pin_fit import NAME as PIN_FIT
 from sbafab.rules.pin_fit import most_on_a_pin
 
+WIPE = (
+    "Wipe bench and film with isopropanol and a lint-free cloth, let them dry. Gloves on; hold "
+    "film by its border: grease and dust keep TPE from bonding."
+)
+AIR = (
+    "Air assist off, or as low as the machine's owner allows; exhaust drawn off below the bed "
+    "where the machine has it, and the lid opened slowly: a draught takes parts of a few "
+    "milligrams with it."
+)
+HOLDING: Mapping[HoldDown, str] = {
+    "border": (
+        "lay it flat on smooth card, without stretching it, and hold it down all along its border "
+        "with tape or magnets. Parts stay where they were cut, on the card."
+    ),
+    "carrier": (
+        "stick it without bubbles on a carrier sheet of low tack, of paper or polyester and never "
+        "of vinyl (PVC gives off hydrogen chloride). Cut through the film and not through the "
+        "carrier (try power and speed on a corner). Parts stay on the carrier until they are laid: "
+        "bend it away from the part, and wipe the face that was stuck on."
+    ),
+    "vacuum": (
+        "lay it on the vacuum bed over a porous sheet, such as filter paper, as large as the film. "
+        "The vacuum stays on until the last part is picked up."
+    ),
+}
+"""What holds a film under the beam, by ``laser.hold_tpe`` and ``laser.hold_ptfe``."""
+SILICONE = " PTFE hardly sticks to acrylic or rubber adhesives: the carrier's must be silicone."
+RIM = 10.0
+"""mm of film round a registered sheet, by which it is held down."""
+TAPE = "polyimide tape (silicone adhesive, rated 260 °C)"
 WARM = 5.0
 """C by which a plate may be colder than the platens when the timer starts."""
 
 
-def before_cutting(films: Iterable[Film]) -> list[Action]:
-    """How films come clean and flat under the beam."""
-    actions = [
+def before_first_cut() -> list[Action]:
+    """The same of registered sheets, whose parts hang on bridges or lie on the transfer film."""
+    return [
+        Action(WIPE),
         Action(
-            "Wipe bench and film with isopropanol and a lint-free cloth, let them dry. Gloves on; "
-            "hold film by its border: grease and dust keep TPE from bonding."
-        )
+            f"Each registered sheet is cut whole, edge and all, out of film that reaches {RIM:g} "
+            "mm past it all round. Lay the film flat on smooth card, without stretching it, and "
+            "hold it down all along that rim with tape or magnets; a mask sheet is held by the rim "
+            "of its transfer film. Parts of the films hang on their bridges. (Our proposal, not "
+            "tried.)"
+        ),
+        Action(AIR),
     ]
-    masks = [film for film in films if film.is_mask]
-    if masks:
-        thin = say.millimetres(min(film.thickness for film in masks))
-        names = listed(list(dict.fromkeys(film.material for film in masks)))
-        actions.append(
-            Action(
-                f"Lay {names} on a backing of card, smooth it flat, and hold it down all along its "
-                f"border (tape, magnets or vacuum): {thin} of it lifts in the exhaust's draught."
-            )
-        )
-    return actions
+
+
+def before_cutting(works: Sequence[Work]) -> list[Action]:
+    """How films come clean and flat under the beam, and what holds their parts once they are cut.
+
+    None of it was tried, and the actions say so.
+    """
+    return [Action(WIPE), *(_held(works, film) for film in _films(works)), Action(AIR)]
+
+
+def _films(works: Sequence[Work]) -> list[Film]:
+    return list(dict.fromkeys(layer.film for work in works for layer in work.laminate.layers))
+
+
+def hold_down(work: Work, film: Film) -> HoldDown:
+    """Return how a film is held under the beam: masks as PTFE is, the others as TPE."""
+    laser = work.design.laser
+    return laser.hold_ptfe if film.is_mask else laser.hold_tpe
+
+
+def _held(works: Sequence[Work], film: Film) -> Action:
+    """How one film is held: on sheets of which each part comes free, for nothing bridges it."""
+    count, lightest = 0, math.inf
+    for work in works:
+        for layers in work.laminate.patterns.values():
+            if layers[0].film == film:
+                pieces = layers[0].profile.pieces
+                needed = len(layers) * work.job.copies
+                count += len(pieces) * (needed + work.design.order.spare_parts(needed))
+                lightest = min(lightest, *(piece.area for piece in pieces))
+    mass = lightest * film.thickness * film.density / 1000
+    thin = say.millimetres(film.thickness)
+    how = HOLDING[hold_down(works[0], film)]
+    sticks = SILICONE if film.is_mask and hold_down(works[0], film) == "carrier" else ""
+    return Action(
+        f"{film.material}, {thin} thick: {how}{sticks} No tab holds a part: {count} come free, the "
+        f"lightest of {mass:.2g} mg. (Our proposal, not tried.)"
+    )
 
 
 def after_cutting(works: Sequence[Work]) -> list[Action]:
@@ -91,7 +155,10 @@ def _loose(laminate: Laminate) -> int:
 
 
 def underlay(work: Work, part: AssemblyStep) -> list[Action]:
-    """The printed page below the release film, in steps in which it has a line to lay by."""
+    """The printed page below the release film, in steps in which it has a line to lay by.
+
+    One print lies in one hot cycle: paper dries and shrinks, and a worn line is no line.
+    """
     patterns = [
         pattern
         for guide in guides(work.laminate)
@@ -100,27 +167,14 @@ def underlay(work: Work, part: AssemblyStep) -> list[Action]:
     ]
     if work.job.underlay is None or not patterns:
         return []
-    film, eye = ("a release film over it", ": lay by eye along them, as each line says")
+    film, over = "a see-through release film", "flush with the plate's edges"
+    eye = ": lay by eye along them, as each line says"
     if part.pins:
-        film, eye = "a release film over it, the pins pricked through both", ""
+        film, over, eye = f"{film}, pricked likewise", "pricked at its grey rings over the pins", ""
     return [
         Action(
-            f"Tape {work.job.underlay}, printed at 100 % and its bars measured, to the plate, "
-            f"{film}. It has the edges of {listed(patterns)}{eye}."
-        )
-    ]
-
-
-def on_the_lumen(laminate: Laminate, part: AssemblyStep) -> list[Action]:
-    """A pin that a step without pins may be laid up on; empty where none passes all its films."""
-    pins = laying_pins(laminate, part)
-    if not pins:
-        return []
-    names = listed([f"{pin.name} (⌀{say.millimetres(pin.diameter)})" for pin in pins])
-    return [
-        Action(
-            f"Better than by eye alone: the pin of the {names} passes every film here. Lay up on "
-            "it, so that only the turn is yours, and push it out before the press closes."
+            f"Tape a fresh print of {work.job.underlay} to the plate, {over}, cut corner at the "
+            f"back right; over it {film}. It has the edges of {listed(patterns)}{eye}."
         )
     ]
 

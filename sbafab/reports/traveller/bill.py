@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from sbafab.design.kits import tube_name
 from sbafab.laminate.laminate import Layer
 from sbafab.reports.features import layer_numbers
-from sbafab.reports.traveller import base_plate
+from sbafab.reports.traveller import base_plate, bench
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.shapes import thumbnail
@@ -47,20 +47,31 @@ def bill(work: Work) -> list[Item]:
     items += [Item(*row) for row in base_plate.items(work)]
     if job.underlay is not None:
         items.append(_underlay(work, job.underlay))
+        what = f"{bench.TAPE}, 0.06 mm thick, 10 mm wide: along the plate's edges, off the films"
+        items.append(Item("Tape", what, "as needed"))
+    if work.runs.together > 1:
+        what = "flat, with a lid, lined as section Batch says; tape for flags round the tubes"
+        items.append(Item("Tray", what, "1"))
     items += [Item(name, "", quantity) for name, quantity in job.extras]
     return items
 
 
 def _underlay(work: Work, path: str) -> Item:
     """The pages to print, and on what paper where A4 and Letter are too small."""
-    spread = leaves(work.laminate, work.runs.places)
+    spread = leaves(work.laminate, work.runs.places, work.schedule.steps[0].platen_mm)
     width, height = (max(leaf.size[axis] for leaf in spread) for axis in (0, 1))
     paper = "A4 or Letter"
     if (width, height) != PAPER:
         paper = f"at least {say.size(math.ceil(width), math.ceil(height))}"
     join = "; cut out along their dotted frames and laid edge to edge" if len(spread) > 1 else ""
-    what = f"{path} printed at 100 % on plain paper, {paper}; its bars must measure 100 mm{join}"
-    return Item("Underlay", what, say.count(len(spread), "page"))
+    thick = say.millimetres(work.design.press.underlay_thickness)
+    closings = base_plate.hot_prints(work)
+    what = (
+        f"{path} printed at 100 % on plain paper {thick} thick, {paper}; its bars must measure 100 "
+        f"mm{join}. A fresh print for each of {say.count(closings, 'time', 'times')} that it lies "
+        "in the closed press: paper dries there and shrinks"
+    )
+    return Item("Underlay", what, say.count(len(spread) * closings, "page"))
 
 
 def _films(work: Work) -> list[Item]:

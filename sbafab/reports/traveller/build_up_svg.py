@@ -6,10 +6,11 @@ enlarged by a factor that the picture names. Widths are not to scale.
 
 from __future__ import annotations
 
-from itertools import groupby
+from collections.abc import Mapping
+from dataclasses import replace
 
-from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD
-from sbafab.pressing.dowels import PinSetting
+from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, UNDERLAY, BuildUpPart
+from sbafab.pressing.dowels import PinSetting, push_out
 from sbafab.pressing.schedule import Step
 from sbafab.pressing.words import listed
 from sbafab.reports import drawing as draw
@@ -36,6 +37,7 @@ INKS = {
     "film": "#e0872f",
     LAMINATE: "#bcd3ea",
     PAD: "#f3ddd6",
+    UNDERLAY: "#ffffff",
 }
 
 
@@ -43,7 +45,9 @@ def factor(step: Step) -> int:
     """By how much films are enlarged: pins that stand over the stack must end inside the pad."""
     pad = next(item.thickness_mm for item in step.build_up if item.part == PAD) * THICK
     over = max((pin.stands_mm for pin in step.pin_settings), default=step.top_mm) - step.top_mm
-    fits = (one for one in FACTORS if step.stack_mm * one <= TALLEST and over * one <= DEEP * pad)
+    paper = sum(item.thickness_mm for item in step.build_up if item.part == UNDERLAY)
+    films = step.stack_mm + paper
+    fits = (one for one in FACTORS if films * one <= TALLEST and over * one <= DEEP * pad)
     return next(fits, FACTORS[-1])
 
 
@@ -60,8 +64,10 @@ def build_up_svg(step: Step, name: str) -> str:
     over = top + pad
     upper = over + release
     lower = upper + stack
+    paper = thick[UNDERLAY].thickness_mm * by if UNDERLAY in thick else 0.0
     bed = lower + release
-    bottom = bed + plate
+    face = bed + paper
+    bottom = face + plate
     end = max(bottom + PLATEN, EDGE + LEAST)
     low, high = STACK
     words = "; ".join(f"{item.part} {item.thickness_mm:g} mm" for item in reversed(step.build_up))
@@ -69,11 +75,12 @@ def build_up_svg(step: Step, name: str) -> str:
     for y in (start, bottom):
         picture.add(draw.box((EDGE, y), (WIDE, y + PLATEN), fill=INKS["platen"], stroke=draw.DARK))
     picture.add(
-        draw.box((EDGE, bed), (WIDE, bottom), fill=INKS[BASE_PLATE], stroke=draw.DARK),
+        draw.box((EDGE, face), (WIDE, bottom), fill=INKS[BASE_PLATE], stroke=draw.DARK),
+        *_underlay(bed, face),
         _pad(top, over, bed - 2 * release, low, high),
         *_release(upper, bed, release, low, high),
         draw.box((low, upper), (high, lower), fill=INKS[LAMINATE], stroke=draw.DARK),
-        *_pins(step.pin_settings, bed, by, low, high),
+        *_pins(step.pin_settings, face, bottom, by, low, high),
     )
     said = [
         (start + PLATEN / 2, f"upper platen, {say.temperature(step.temperature_c)}"),
@@ -87,7 +94,8 @@ def build_up_svg(step: Step, name: str) -> str:
             f"laminate {say.millimetres(step.stack_mm)}, ~{step.film_kpa:.0f} kPa",
         ),
         (bed - release / 2, "release film"),
-        (bed + plate / 2, _plate_words(step, thick[BASE_PLATE].thickness_mm)),
+        *_underlay_words(thick, (bed + face) / 2),
+        (face + plate / 2, _plate_words(step, thick[BASE_PLATE].thickness_mm)),
         (bottom + PLATEN / 2, f"lower platen, {say.temperature(step.temperature_c)}"),
     ]
     rows = draw.spread([y for y, _ in said], GAP, EDGE + 2.0, end)
@@ -98,6 +106,19 @@ def build_up_svg(step: Step, name: str) -> str:
     scale = f"plate and pad 1:2; what lies between {by}:1; widths not"
     picture.add(draw.text((EDGE, end + 3.6), scale, size=2.2))
     return picture.svg()
+
+
+def _underlay(top: float, bottom: float) -> list[str]:
+    """The printed paper between plate and release film; nothing where there is none."""
+    if top == bottom:
+        return []
+    return [draw.box((EDGE, top), (WIDE, bottom), fill=INKS[UNDERLAY], stroke=draw.DARK, width=0.1)]
+
+
+def _underlay_words(thick: Mapping[str, BuildUpPart], y: float) -> list[tuple[float, str]]:
+    if UNDERLAY not in thick:
+        return []
+    return [(y, f"underlay {say.millimetres(thick[UNDERLAY].thickness_mm)}, paper")]
 
 
 def _release_words(step: Step) -> str:
@@ -133,31 +154,46 @@ def _release(upper: float, bed: float, release: float, low: float, high: float) 
 
 
 def _pins(
-    settings: tuple[PinSetting, ...], bed: float, by: int, low: float, high: float
+    settings: tuple[PinSetting, ...],
+    face: float,
+    bottom: float,
+    by: int,
+    low: float,
+    high: float,
 ) -> list[str]:
-    """The pins, seat 1:2, what stands over the plate enlarged; their tips press into the pad."""
+    """The pins on the shoulders of their holes, seat 1:2, what stands over the plate enlarged.
+
+    Below each is its push-out hole; the tips press into the pad.
+    """
     parts = []
     for place, pin in enumerate(settings[:4]):
         x = low + (high - low) * (place + 1) / (min(len(settings), 4) + 1)
         half = pin.diameter_mm / 2
-        corner = x - half, bed - pin.stands_mm * by
-        parts.append(
+        tip, shoulder = face - pin.stands_mm * by, face + pin.seat_mm * THICK
+        narrow = push_out(pin.diameter_mm) / 2
+        parts += [
             draw.box(
-                corner, (x + half, bed + pin.seat_mm * THICK), fill="#6d737c", stroke=draw.DARK
-            )
-        )
+                (x - narrow, shoulder), (x + narrow, bottom), fill="#ffffff", stroke=draw.DARK
+            ),
+            draw.box((x - half, tip), (x + half, shoulder), fill="#6d737c", stroke=draw.DARK),
+        ]
     return parts
 
 
 def pin_lines(step: Step) -> str:
-    """Pins that are alike once: names, size, seat in the plate, height over plate and stack."""
-    alike = groupby(
-        sorted(step.pin_settings, key=lambda pin: (pin.diameter_mm, pin.length_mm, pin.stands_mm)),
-        key=lambda pin: (pin.diameter_mm, pin.length_mm, pin.seat_mm, pin.stands_mm),
-    )
+    """Pins that are alike once: names, size, depth of the hole, height over plate and stack."""
     return "; ".join(
-        f"{listed([pin.pin for pin in pins])}: ⌀{diameter:g} {draw.TIMES} {length:g} mm, "
-        f"{seat:.2f} mm in the plate, {stands:.2f} mm over it, {stands - step.top_mm:.2f} mm "
-        "over the stack"
-        for (diameter, length, seat, stands), pins in alike
+        f"{listed(names)}: ⌀{pin.diameter_mm:g} {draw.TIMES} {pin.length_mm:g} mm, "
+        f"{pin.seat_mm:.2f} mm in the plate, {pin.stands_mm - pin.tolerance_mm:.2f} to "
+        f"{pin.stands_mm + pin.tolerance_mm:.2f} mm over it, "
+        f"{pin.stands_mm - pin.tolerance_mm - step.top_mm:.2f} mm or more over the stack"
+        for names, pin in _alike(step)
     )
+
+
+def _alike(step: Step) -> list[tuple[list[str], PinSetting]]:
+    """Names of pins that are alike, and one of them."""
+    groups: dict[PinSetting, list[str]] = {}
+    for pin in sorted(step.pin_settings, key=lambda pin: (pin.diameter_mm, pin.length_mm)):
+        groups.setdefault(replace(pin, pin=""), []).append(pin.pin)
+    return [(names, pin) for pin, names in groups.items()]

@@ -56,6 +56,13 @@ def _all(work: Work) -> Iterator[tuple[str, str]]:
             "Cut, measure and compute a calibration piece (“sbafab new coupon”, “sbafab kerf”), "
             "and generate again.",
         )
+    if job.underlay is not None:
+        yield (
+            "Toner on the underlay",
+            "laser toner softens in the press and may mark the release film or stick to it: print "
+            "with ink if you can. Each print goes into the press once: paper dries there and "
+            "shrinks. Not tried by us.",
+        )
     for warning in schedule.warnings:
         if not warning.startswith(("made although", CHECKED_AGAINST)) and not _is_in_step(warning):
             yield "Press schedule", warning

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from sbafab.design.records import HoldDown
 from sbafab.pressing.words import listed
+from sbafab.reports.traveller import base_plate
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
-from sbafab.reports.traveller.bench import WARM
+from sbafab.reports.traveller.bench import WARM, hold_down
 from sbafab.reports.traveller.bill import kerf_states
 from sbafab.reports.traveller.job import Work
+from sbafab.reports.traveller.taking_down import punch
 
 UNKNOWN = "not known, the paper gives no time. Measure it once: ________ min."
 LOUPE = "10x with a scale of 0.1 mm"
@@ -22,6 +25,16 @@ class Tool(NamedTuple):
 
     name: str
     use: str
+
+
+HOLDERS: Mapping[HoldDown, Tool] = {
+    "border": Tool("Smooth card; tape or magnets", "hold thin film flat under the beam"),
+    "carrier": Tool(
+        "Carrier sheet of low tack, silicone adhesive",
+        "holds masks and their parts under the beam: one as large as each sheet",
+    ),
+    "vacuum": Tool("Vacuum bed, porous sheet", "holds film and parts under the beam"),
+}
 
 
 def before_the_day(works: Sequence[Work]) -> list[Action]:
@@ -42,13 +55,18 @@ def _before(works: Sequence[Work]) -> Iterator[str]:
         yield "Leave to cut these films, from the laser's owner; exhaust tried (warning above)."
     if any(work.laminate.pins for work in works):
         yield (
-            "Base plate drilled and reamed (table under Cut); every pin goes in and comes out by "
-            "the punch; the corner that is cut off is marked."
+            "Base plate made and measured (table under Cut): place and depth of each hole; every "
+            "pin goes down to its shoulder by hand or with light taps, and comes out by the punch "
+            "from below. Where none does, lap the hole. The corner that is cut off is marked."
         )
     release = sum(2 * len(work.schedule.steps) for work in works)
     yield f"Cut to the size above: {release} release films and the press pad."
     if any(work.job.underlay is not None for work in works):
-        yield "Underlay printed at 100 %, its bars measured."
+        prints = sum(base_plate.hot_prints(work) for work in works if work.job.underlay)
+        yield (
+            f"Underlay printed at 100 %, {say.count(prints, 'time', 'times')}, the bars of each "
+            "print measured, each cut out along its dotted line."
+        )
     yield "Clean and dry: base plate, pad, release films, film as it comes off the roll."
     first = works[0].schedule.steps[0]
     hot, ready = (say.temperature(t) for t in (first.temperature_c, first.temperature_c - WARM))
@@ -77,18 +95,27 @@ def tools(works: Sequence[Work]) -> list[Tool]:
         Tool("Lint-free cloths, isopropanol, clean gloves", "films and parts, before they bond"),
     ]
     masks = [layer for one in laminates for layer in one.layers if layer.is_mask]
-    if masks:
-        found.append(Tool("Card; tape or magnets", "to hold thin film flat under the beam"))
+    held = {
+        "border" if work.laminate.panel is not None else hold_down(work, layer.film)
+        for work in works
+        for layer in work.laminate.layers
+    }
+    found += [tool for hold, tool in HOLDERS.items() if hold in held]
     if any(len(layer.profile.pieces) > 1 for layer in masks):
         found.append(Tool("Antistatic tweezers, earthed mat, dish with a lid", "loose mask pieces"))
     sizes = sorted({pin.diameter for one in laminates for pin in one.pins})
     if sizes:
         said = listed([f"⌀{say.millimetres(size)}" for size in sizes])
+        thin = listed([f"⌀{say.millimetres(punch(size))}" for size in sizes])
         found += [
-            Tool(f"Drill, reamers H7 {said}", "holes of the base plate"),
-            Tool("Small hammer, pin punches, depth gauge", "pins in to their heights, and out"),
-            Tool("Needle", "to prick the release film over the pins"),
+            Tool(f"Drills, flat cutters, reamers H7 {said}", "base plate, if you make it yourself"),
+            Tool("Depth gauge, small hammer", "pins to their shoulders, their heights checked"),
+            Tool(f"Pin punches {thin}, or shanks of drills", "pins out, from below"),
+            Tool("Flat tweezers, pliers", "to hold the films down and to draw the pins"),
+            Tool("Needle", "to prick what lies under the films over the pins"),
         ]
+    if any(work.job.underlay is not None for work in works):
+        found.append(Tool("Knife, steel rule, 100 mm at least", "underlay: its bars, its cut"))
     hands = [w.design.registration for w in works if w.laminate.registration == "channel-pin"]
     if hands:
         finest = say.millimetres(min(hand.hand_placement for hand in hands))

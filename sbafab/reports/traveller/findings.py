@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from sbafab.laminate.laminate import Laminate
-from sbafab.reports.traveller.hand import Hand, at_roughest, on_laying_pins, rougher_hands
+from sbafab.reports.traveller.hand import Hand, at_roughest, rougher_hands
 from sbafab.reports.traveller.page import environment, frame
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import Limits
@@ -66,22 +66,16 @@ def _hands(one: Inspected) -> tuple[Sequence[Hand], Sequence[str]]:
         return (), ()
     places = at_roughest(one.laminate, one.limits)
     hands = rougher_hands(places, one.limits)
-    return hands, tuple(_helps(places, one.limits)) if hands else ()
+    return hands, tuple(_helps(places)) if hands else ()
 
 
-def _helps(places: Measures, limits: Limits) -> Iterator[str]:
+def _helps(places: Measures) -> Iterator[str]:
     """What leaves less to the hand, cheapest first."""
     yield (
         "Print underlay.pdf at 1:1 and lay up on it: its lines show where every edge goes that no "
         "pin holds. How much steadier that makes a hand nobody has measured; half the error "
         "gives the first row."
     )
-    pinned = on_laying_pins(places, limits)
-    if pinned is not None:
-        yield (
-            f"Lay up the steps without pins on the lumen's pin, and draw it before the press "
-            f"closes: {pinned.share:.0%} of builds are then good, if the hand turns as before."
-        )
     yield (
         "sbafab check design.toml --target-yield 0.99 says how much wider bonds and overhangs "
         "reach 99 % with the hand as it is."
@@ -93,7 +87,8 @@ def _helps(places: Measures, limits: Limits) -> Iterator[str]:
         )
         yield (
             'registration.method = "sheet", for round and lobed actuators, keeps films and masks '
-            "whole on corner pins until all copies are pressed; no bench has tried it."
+            "whole on corner pins until all copies are pressed; no bench has tried it, so it takes "
+            "--experimental."
         )
     yield (
         "Count your own builds and set registration.hand_placement and registration.hand_turn to "

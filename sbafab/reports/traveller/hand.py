@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import NamedTuple
 
-from sbafab.laminate.assembly import assembly, laying_pins
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.limits import Limits
 from sbafab.rules.measures import Measures
@@ -39,18 +38,6 @@ def rougher_hands(places: Measures, limits: Limits) -> tuple[Hand, ...]:
         return ()
     asked = (_hand(places, _rougher(limits, factor)) for factor in ROUGHER[:-1])
     return (*asked, roughest)
-
-
-def on_laying_pins(places: Measures, limits: Limits) -> Hand | None:
-    """The design's hand where every step without pins is laid up on one, and only turns are left.
-
-    None where a step has no pin that passes all its films.
-    """
-    laminate, own = places.laminate, limits.tolerances
-    steps = [step for step in assembly(laminate) if not step.pins]
-    if not steps or not all(laying_pins(laminate, step) for step in steps):
-        return None
-    return _hand(places, replace(limits, tolerances=replace(own, placement=own.pin)))
 
 
 def _rougher(limits: Limits, factor: float) -> Limits:

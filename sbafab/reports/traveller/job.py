@@ -10,7 +10,7 @@ from sbafab.design.records import Design
 from sbafab.geometry.beam import Kerf
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.schedule import Schedule
-from sbafab.pressing.together import Runs, runs_of
+from sbafab.pressing.together import Runs, design_runs
 from sbafab.rules.finding import Finding
 
 
@@ -52,6 +52,4 @@ class Work:
     @property
     def runs(self) -> Runs:
         """How all copies are pressed."""
-        press = self.design.press
-        platen = press.platen_width, press.platen_length
-        return runs_of(self.laminate, self.job.copies, platen)
+        return design_runs(self.design, self.laminate, self.job.copies)

@@ -37,6 +37,7 @@ from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.layup import Round, rounds
 from sbafab.reports.traveller.shapes import definitions, pattern_regions
 from sbafab.reports.traveller.sheet_map import marked, part_regions, rows_said, sheet_map
+from sbafab.reports.traveller.taking_down import order_of
 from sbafab.reports.traveller.wrapping import wrapping
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ def context(work: Work) -> dict[str, Any]:
         "legend": _legend(laminate),
         "solid": None if job.solid_png is None else b64encode(job.solid_png).decode("ascii"),
         "cautions": [*cautions(work), *for_the_designer(job.findings)],
-        "before_cutting": bench.before_cutting(films(laminate)),
+        "before_cutting": bench.before_cutting([work]),
         "after_cutting": bench.after_cutting([work]),
         "bill": bill.bill(work),
         "before_the_day": before_the_day([work]),
@@ -113,10 +114,12 @@ def context(work: Work) -> dict[str, Any]:
         "lay_up": _lay_up(work),
         "force_notes": base_plate.build_up_notes(work),
         "plate_holes": base_plate.holes(work),
+        "plate_notes": base_plate.plate_notes(work),
         "plate_places": base_plate.places(work),
         "plate_grid": base_plate.grid(work),
         "batch": batch_page(work),
         "step_pages": process.step_pages(work),
+        "taking_down": order_of(work.schedule.steps),
         "finishing": process.finishing(work),
         "tubing": process.tubing(work),
         "leak_test": process.leak_test(work),

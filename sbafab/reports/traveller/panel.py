@@ -13,7 +13,6 @@ from sbafab.geometry.svg import number, path_data
 from sbafab.laminate.inks import ink
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.laminate.panel import SheetPanel
-from sbafab.pressing.sheets import tackings
 from sbafab.pressing.words import listed
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller import bench, process
@@ -47,6 +46,7 @@ def chapter(work: Work) -> dict[str, Any]:
         "panel_pictures": _pictures(work.laminate, panel),
         "panel_actions": _preparing(work, panel),
         "step_pages": _step_pages(work, panel),
+        "taking_down": None,
         "finishing": _cut_free(panel),
         "tubing": [*_each(panel, "Fit the tubes"), *process.tubing(work)],
         "leak_test": [*_each(panel, "Test"), *process.leak_test(work)],
@@ -97,12 +97,15 @@ def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
     )
     tack = say.minutes(design.panel.tack_minutes)
     return [
+        *bench.before_first_cut(),
+        Action(_carrier(work)),
         Action(
             f"Stick {design.panel.carrier} on the back of every PTFE sheet. It stops short of the "
             "corners, so that it covers no pin hole."
         ),
         Action(
-            "Cut every file in layers/ once for each batch. Mask sheets lie PTFE side up and are "
+            "Cut every file in layers/ once for each batch, and a pattern's file once more for "
+            "each of its spares, which the list above counts. Mask sheets lie PTFE side up and are "
             "drawn turned over: cut through the PTFE, not through the transfer film. Film sheets "
             "come off with their parts held by bridges: lift them by the edge."
         ),
@@ -116,12 +119,13 @@ def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
             "film."
         ),
         Action(
-            "Pins into the plate, a release film pricked over them. Tack the masks, a film at a "
-            "time: the film sheet on the pins, cut corner over the plate's, its mask sheet face "
-            "down on it, a release film and the press pad on top; press for "
-            f"{tack} at {say.temperature(design.press.temperature_c)} (ours), counted from when "
-            "the plate is hot, let it cool, peel off the transfer film flat and slowly. Masks and "
-            "PTFE sheet stay on the film.",
+            f"Pins into the plate, at the height for tacks: {_tack_pins(work)}. Prick a release "
+            "film over them. Tack the masks, a film at a time: the film sheet on the pins, cut "
+            "corner over the plate's, its mask sheet face down on it, a release film and the press "
+            f"pad on top. The plate goes in cold each time: press for {tack} at "
+            f"{say.temperature(design.press.temperature_c)} (ours), counted from when the plate is "
+            "hot, let it cool until it can be touched, peel off the transfer film flat and slowly. "
+            "Masks and PTFE sheet stay on the film.",
             tuple(mask.index for _, masks in pairs for mask in masks),
             ticks,
         ),
@@ -167,8 +171,8 @@ def _pressing(laminate: Laminate, page: StepPage, last: bool) -> list[Action]:
         lay = f"Lay the sheet of layer {films[0][0].index}, the cap, on the pins over the stack."
     start = [
         Action(
-            "Lay the base plate down, cold, cut corner at the back right. Drive in the corner pins "
-            "to their heights (above) and prick a release film over them."
+            f"Lay the base plate down, cold, cut corner at the back right. {process.SET_PINS} "
+            "Prick a release film over them."
         )
     ]
     end = [
@@ -177,8 +181,12 @@ def _pressing(laminate: Laminate, page: StepPage, last: bool) -> list[Action]:
     if last:
         start = []
         end = [
-            Action("Pins out, pushed from below through the plate, once the stack is cold."),
-            Action("Take off the release films. You now hold all sheets as one stack."),
+            Action(
+                "Once the stack is cold: pad off, upper release film back on itself. Pins out: "
+                "push them up from below through their push-out holes until their seats are free, "
+                "the stack held down round them, and draw them with pliers."
+            ),
+            Action("Take off the lower release film. You now hold all sheets as one stack."),
         ]
     return [
         Action(
@@ -202,7 +210,9 @@ def _cut_free(panel: SheetPanel) -> list[Action]:
     many = say.count(len(panel.places), "actuator")
     return [
         Action(
-            f"Fix the stack flat on the laser's bed, the cap up. Lay {SECOND_CUT} by the "
+            "Fix the stack flat on the laser's bed, the cap up, by tape or magnets all along its "
+            "rim, clear of the slots; air assist off or low, for what is freed is loose. Lay "
+            f"{SECOND_CUT} by the "
             f"{len(panel.fiducials)} fiducials: a cross on REFERENCE stands in the middle of each "
             "hole. Check all of them before you cut."
         ),
@@ -239,11 +249,21 @@ def _bill(work: Work, panel: SheetPanel) -> list[Item]:
         own = [layer for layer in work.laminate.layers if layer.film.material == material]
         if own:
             number_of = len(own) * panel.batches
-            needed = f"{say.count(number_of, 'sheet')} {say.size(*panel.size)}"
+            number_of += sum(
+                _spare_sheets(work, panel, pattern)
+                for pattern in dict.fromkeys(layer.pattern for layer in own)
+            )
+            rim = 2 * bench.RIM
+            least = say.size(panel.size[0] + rim, panel.size[1] + rim)
+            needed = f"{say.count(number_of, 'sheet')} of at least {least}"
             items.append(replace(item, quantity=needed))
         else:
             items.append(item)
-    masks = sum(layer.is_mask for layer in work.laminate.layers) * panel.batches
+    masks = sum(
+        len(layers) * panel.batches + _spare_sheets(work, panel, pattern)
+        for pattern, layers in work.laminate.patterns.items()
+        if layers[0].is_mask
+    )
     what = f"{work.design.panel.carrier}; carries the masks of one sheet each, off in the end"
     return [*items, Item("Carrier", what, say.count(masks, "piece"))]
 
@@ -256,31 +276,83 @@ def _cuts(work: Work, panel: SheetPanel) -> list[Cut]:
         sheet = work.laminate.first_cut(layers[0])
         length = sum(contour.length for contour in sheet.contours)
         found.append(
-            replace(row, count=len(layers) * panel.batches, pieces=1, spares=0, cut_length=length)
+            replace(
+                row,
+                count=len(layers) * panel.batches,
+                pieces=1,
+                spares=_spare_sheets(work, panel, row.pattern),
+                cut_length=length,
+            )
         )
     return found
+
+
+def _spare_sheets(work: Work, panel: SheetPanel, pattern: str) -> int:
+    """Number of spare sheets of a pattern, for all batches together."""
+    layers = work.laminate.patterns[pattern]
+    return work.design.order.spare_parts(len(layers) * panel.batches)
 
 
 def _times(work: Work, panel: SheetPanel) -> list[Time]:
     """How long a batch takes; the paper's handling is of one actuator, and is not known of many."""
     plan, copies = work.schedule, len(panel.places)
     steps = " + ".join(f"{step.minutes:g}" for step in plan.steps)
-    tacking = work.design.panel.tack_minutes * tackings(work.laminate)
-    pressing = plan.total_press_minutes + tacking
+    tacking = plan.tacking
+    assert tacking is not None
+    total = plan.total_press_minutes + tacking.total_minutes
+    many = say.count(copies, "actuator")
     return [
+        Time("In the press", say.minutes(plan.total_press_minutes), f"{steps} min, one batch"),
         Time(
-            "In the press",
-            say.minutes(pressing),
-            f"{steps} min, and {tacking:g} min to tack masks; one batch of "
-            f"{say.count(copies, 'actuator')}, {say.minutes(pressing / copies)} each",
+            "Tacking, from cold to cold",
+            f"{tacking.total_minutes:.0f} min = {say.hours(tacking.total_minutes)}",
+            f"{tacking.sheets} mask sheets, each {tacking.warm_minutes:g} min to warm the plate, "
+            f"{tacking.press_minutes:g} min pressed and {tacking.cool_minutes:g} min to cool it, "
+            f"one after the other on one plate; {tacking.basis}. Several plates in turn, or one "
+            "cooled between cold blocks of metal, take less: how much nobody has tried",
+        ),
+        Time(
+            "Both, one batch",
+            f"{total:.0f} min = {say.hours(total)}",
+            f"{many}, {total / copies:.0f} min each",
         ),
         Time(
             "Handling",
             "not known",
-            "cutting, weeding, tacking and stacking sheets, tubes; no bench has tried it",
+            "cutting, weeding, stacking sheets, tubes; no bench has tried it",
         ),
         Time("The paper", f"{PAPER_MINUTES:g} min", "one actuator of single parts, in all"),
     ]
+
+
+def _carrier(work: Work) -> str:
+    """What must be known of the transfer film before it is pressed, blanks for what is not."""
+    design = work.design.panel
+    adhesive = design.carrier_adhesive or "________________"
+    limit = "________ °C" if design.carrier_limit_c is None else f"{design.carrier_limit_c:g} °C"
+    return (
+        f"What carries the masks: {design.carrier}, product ________________, adhesive {adhesive}, "
+        f"rated for {limit} by its maker. It goes into the press at "
+        f"{say.temperature(work.design.press.temperature_c)}: without a rating above that it is "
+        "not used. Acrylic and rubber adhesives hardly hold PTFE; silicone adhesives on polyester "
+        "or polyimide are sold for such temperatures. Which of them holds the masks, and lets them "
+        "go after the tack, nobody has tried: try one sheet first."
+    )
+
+
+def _tack_pins(work: Work) -> str:
+    """How high the corner pins stand for the tacks: far lower than for the whole stack."""
+    tacking = work.schedule.tacking
+    assert tacking is not None
+    stands = listed(list(dict.fromkeys(say.millimetres(pin.stands_mm) for pin in tacking.pins)))
+    lengths = listed(list(dict.fromkeys(say.millimetres(pin.length_mm) for pin in tacking.pins)))
+    beneath = tacking.stack_mm + work.design.press.release_thickness
+    out = say.millimetres(max(pin.stands_mm for pin in tacking.pins) - beneath)
+    return (
+        f"pins of {lengths} stand {stands} over the plate (one film with its masks is "
+        f"{say.millimetres(tacking.stack_mm)} high; the pins press {out} into the pad, those for "
+        "the whole stack would more)"
+    )
 
 
 def _pictures(laminate: Laminate, panel: SheetPanel) -> list[tuple[str, str]]:

@@ -18,7 +18,7 @@ from sbafab.reports.traveller.layup import Bed, inlets_in
 from sbafab.reports.traveller.named_places import PlanName, named
 from sbafab.reports.traveller.shapes import Picture, flat, pattern_id
 
-WIDEST, TALLEST = 64.0, 44.0
+WIDEST, TALLEST = 64.0, 36.0
 NARROWEST = 66.0
 """mm: room for the words under the picture."""
 EDGE, HEAD, FOOT = 5.0, 5.0, 9.0

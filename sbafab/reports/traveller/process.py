@@ -15,13 +15,14 @@ from sbafab.pressing.words import listed
 from sbafab.reports.features import layer_numbers
 from sbafab.reports.traveller import quantities as say
 from sbafab.reports.traveller.action import Action
-from sbafab.reports.traveller.bench import closing, on_the_lumen, reseat, underlay
+from sbafab.reports.traveller.bench import closing, reseat, underlay
 from sbafab.reports.traveller.build_up_svg import build_up_svg, pin_lines
 from sbafab.reports.traveller.exploded import exploded
 from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.layup import Bed, Round, beds, inlets_in, rounds
 from sbafab.reports.traveller.placing import PiecePlace, Things, over_tab, pitch, places
 from sbafab.reports.traveller.plan import plan
+from sbafab.reports.traveller.taking_down import taking_down
 
 LEAK_KILOPASCALS = 5.0
 """Our choice, far below the paper's burst pressure and enough to open every balloon."""
@@ -29,6 +30,10 @@ LEAK_SECONDS = 60
 COVER = (
     "Cover with a release film and the press pad, flush with the platen all round. No second plate "
     "on top."
+)
+SET_PINS = (
+    "Set the pins on the shoulders of their holes, by hand or with light taps; gauge their heights "
+    "(above), change one that is wrong."
 )
 MOST_LINES = 12
 """Single layers up to which each has a line of its own."""
@@ -107,7 +112,13 @@ def _place_notes(runs: Runs) -> tuple[str, ...]:
     if runs.copies == 1:
         return ()
     at = f"all {runs.together} places" if runs.together > 1 else "its place"
-    return (f"Lay each layer at {at} before the next one; press once a cycle, for all.",)
+    notes = [f"Lay each layer at {at} before the next one; press once a cycle, for all."]
+    if runs.together > 1:
+        notes.append(
+            "Stacks of earlier steps go back to the places of their numbers, and what comes off "
+            "the plate goes to its number in the tray (section Batch)."
+        )
+    return tuple(notes)
 
 
 def _bench_actions(
@@ -116,18 +127,17 @@ def _bench_actions(
     """A step's actions; what it is laid up on comes between base plate and release film."""
     heat, *others = _actions(work.laminate, part, step, lying, runs)
     laid = underlay(work, part)
-    plate = _plate(part, bool(laid))
-    # One whole stack that is laid down again has nothing to be aligned with.
-    on_pin = on_the_lumen(work.laminate, part) if part.adds else []
-    return (heat, plate, *laid, *on_pin, *others)
+    pinned = any(step.pin_settings for step in work.schedule.steps)
+    down = taking_down(step, _product(work.laminate, part), pinned)
+    return (heat, _plate(part, bool(laid)), *laid, *others, *down)
 
 
 def _plate(part: AssemblyStep, has_underlay: bool) -> Action:
     """Base plate and pins, and the release film unless an underlay comes first."""
     text = "Lay the base plate down, cold, cut corner at the back right"
     if part.pins:
-        film = "." if has_underlay else " and prick a release film over them."
-        return Action(f"{text}. Drive in the pins to their heights (above){film}")
+        film = "" if has_underlay else " Prick a release film over them."
+        return Action(f"{text}. {SET_PINS}{film}")
     film = "" if has_underlay else ", and a release film on it"
     by_eye = " Lay by eye, as each line says." if part.adds and not has_underlay else ""
     return Action(f"{text}, no pins in it{film}.{by_eye}")
@@ -148,18 +158,12 @@ def _actions(
     lies = "stack lies" if many == 1 else f"{many} stacks lie"
     yield Action(
         f"Check: {_tabs(laminate, part.layers)}edges lie as in the picture, nothing is folded, no "
-        f"dust or hair between the films, the {lies} flat (about {_height(laminate, part)})."
+        f"dust or hair between the films, the {lies} flat (about {_height(laminate, part)})"
+        + (", every pin reaches through the highest layer with its hole." if part.pins else ".")
     )
-    if part.pins:
-        yield Action("Check: every pin reaches through the highest layer that has its hole.")
     yield Action(COVER)
     cycles = tuple(f"cycle {n}" for n in range(1, runs.count + 1))
     yield closing(step, cycles if 1 < len(cycles) <= MOST_LINES else ())
-    yield Action("Take it out: it is as hot as the platens. Let it cool flat before you touch it.")
-    if part.pins:
-        names = listed([pin.name for pin in part.pins])
-        yield Action(f"Pins out, pushed from below through the plate: {names}.")
-    yield Action(f"Take off the release films. You now hold {_product(laminate, part)}.")
 
 
 def _lay(things: Things, bed: Bed, pins: Sequence[Pin]) -> Iterator[Action]:

@@ -42,6 +42,12 @@ def minutes(value: float) -> str:
     return f"{round(value, 1):g} min" if value < ROUND else f"{value:.0f} min"
 
 
+def clock(minutes: float) -> str:
+    """Hours and minutes: 0:05, 7:45."""
+    whole = round(minutes)
+    return f"{whole // 60}:{whole % 60:02d}"
+
+
 def hours(value: float) -> str:
     return f"{value / 60:.2f} h"
 

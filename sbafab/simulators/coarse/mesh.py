@@ -193,7 +193,7 @@ class _Builder:
 
     def _cap(self, k: int, disc: tuple[Ring, ...], film: list[Triangle], *, turned: bool) -> None:
         (centre,), bore, neck = disc
-        fan = [(centre, a, b) for a, b in zip(bore, bore[1:] + bore[:1], strict=True)]
+        fan = [(a, b, centre) for a, b in zip(bore, bore[1:] + bore[:1], strict=True)]
         triangles = [*fan, *annulus(bore, neck)]
         triangles = [reverse(t) for t in triangles] if turned else triangles
         film += triangles
@@ -269,16 +269,18 @@ class _Builder:
 def annulus(inner: Ring, outer: Ring) -> list[Triangle]:
     """Triangles between two rings, seen counter-clockwise from above.
 
-    Diagonals alternate, so that the mesh has no hand that would twist the actuator.
+    Diagonals alternate, so that the mesh has no hand that would twist the actuator. So do the edges
+    that triangles begin with, from which corotational elements take their axes.
     """
     triangles: list[Triangle] = []
     for i in range(len(inner)):
         j = (i + 1) % len(inner)
         a, b, c, d = inner[i], outer[i], outer[j], inner[j]
-        triangles += [(a, b, c), (a, c, d)] if i % 2 == 0 else [(a, b, d), (d, b, c)]
+        triangles += [(a, b, c), (a, c, d)] if i % 2 == 0 else [(b, d, a), (c, d, b)]
     return triangles
 
 
 def reverse(triangle: Triangle) -> Triangle:
+    """Return it as seen from the other side, beginning with the same edge."""
     a, b, c = triangle
-    return a, c, b
+    return b, a, c

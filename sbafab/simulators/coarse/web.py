@@ -65,7 +65,8 @@ class Web:
 
                 for a, b, c in self.half:
                     corners = (node(a), node(b), node(c))
-                    found.append(corners if side > 0 else corners[::-1])
+                    # A mirrored triangle begins with the mirrored edge.
+                    found.append(corners if side > 0 else (corners[1], corners[0], corners[2]))
         return found
 
 
