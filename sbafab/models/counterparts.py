@@ -161,7 +161,7 @@ def _others() -> Iterator[Counterpart]:
         "constant curvature", paper.LARGEST_BEND, bend, THREE_DOF, 140.5, "", three, flat, True,
     )  # fmt: skip
     for some, chambers, kpa, value in (
-        ("one chamber", "one chamber", 10, 128.2),
+        ("one chamber", "one chamber", 10, 128.3),
         (r"\d+ chambers", "2 chambers", 100, 105.8),
     ):
         yield Counterpart(
