@@ -36,7 +36,7 @@ what was waived. See [cutting](../cutting.md) for kerf, order and readers that t
 ## Meshes
 
 STL, 3MF and GLB of the flat solid and of each chamber's cavity in millimetres (GLB in metres, as its standard asks);
-conforming meshes as VTU, legacy VTK, Gmsh MSH 4.1 and Abaqus INP with named sets: see [meshing](../meshing.md).
+conforming meshes as VTU, legacy VTK, Gmsh MSH 2.2 and Abaqus INP with named sets: see [meshing](../meshing.md).
 
 ## A folder
 

@@ -14,7 +14,7 @@ from sbafab.actuators.pockets import (
     RoundChamber,
     bonded,
     check_neck,
-    free_diameter,
+    free_of_round,
     pocket_shapes,
     reach,
     round_pockets,
@@ -84,7 +84,7 @@ class LobedDesign(Design):
     @property
     def free(self) -> tuple[Free, ...]:
         lumen = Free("lumen.diameter", 1.0, 10.0, 0.1, asked="lumen", widens=True)
-        return (*free_diameter(self.chamber), lumen, *super().free)
+        return free_of_round(self.chamber, (lumen, *super().free))
 
     def fitted(self) -> Self:
         return fitted(self, self.fits, build)

@@ -11,7 +11,7 @@ from sbafab.actuators.pockets import (
     RoundChamber,
     bonded,
     check_neck,
-    free_diameter,
+    free_of_round,
     pocket_shapes,
     round_pockets,
     tab_and_strip,
@@ -43,7 +43,7 @@ class OneDofDesign(Design):
 
     @property
     def free(self) -> tuple[Free, ...]:
-        return (*free_diameter(self.chamber), *super().free)
+        return free_of_round(self.chamber, super().free)
 
     def fitted(self) -> Self:
         return fitted(self, self.fits, build)

@@ -30,9 +30,17 @@ class RoundChamber(Chamber):
 
 
 def free_diameter(chamber: RoundChamber) -> tuple[Free, ...]:
-    """A search may change one diameter that all balloons share."""
-    is_one = chamber.outline is None and isinstance(chamber.diameter, float)
-    return (Free("chamber.diameter", 2.6, 16.0, 0.1, widens=True),) if is_one else ()
+    """A search may change the diameter that all balloons share, or the largest of a list."""
+    if chamber.outline is not None:
+        return ()
+    return (Free("chamber.diameter", 2.6, 16.0, 0.1, widens=True),)
+
+
+def free_of_round(chamber: RoundChamber, others: tuple[Free, ...]) -> tuple[Free, ...]:
+    """Its diameter and the ``others``; a list of diameters settles how many balloons there are."""
+    is_list = chamber.outline is None and not isinstance(chamber.diameter, float)
+    settled = ("stack.balloons",) if is_list else ()
+    return (*free_diameter(chamber), *(one for one in others if one.key not in settled))
 
 
 def diameters(design: Design, chamber: RoundChamber) -> tuple[float, ...]:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from sbafab.rules.finding import Finding
 
 
+YIELD = "registration-yield"
 PAPER = "paper"
 """The kit that a design has by itself."""
 
@@ -47,7 +48,8 @@ class CheckRequest(NamedTuple):
 class Told(NamedTuple):
     """What was checked ("design" or "as-built"), its name, findings, notes, and the designs.
 
-    ``sizes``: those of each design by name, and in words.
+    ``sizes``: those of each design by name, and in words. ``has_target``: the design itself asks
+    for a yield.
     """
 
     kind: str
@@ -58,6 +60,7 @@ class Told(NamedTuple):
     designs: Sequence[Design] = ()
     sizes: Mapping[str, Mapping[str, float]] = {}
     sizes_said: Mapping[str, Sequence[str]] = {}
+    has_target: bool = False
 
 
 @click.command()
@@ -124,7 +127,6 @@ def _print(told: Told, advice: Advice | None, verbose: bool) -> None:
     from sbafab.cli.printing import FILES, print_failed, print_listed
     from sbafab.cli.verdicts import print_findings, verdict_said
     from sbafab.design.kits import cited
-    from sbafab.rules.deck import has_failed
 
     out = console()
     if told.kind == "as-built":
@@ -140,7 +142,15 @@ def _print(told: Told, advice: Advice | None, verbose: bool) -> None:
     print_findings(told.groups, verbose)
     if advice:
         print_wrapped(advice.sentence)
-    if has_failed(told.findings):
+    failed = {one.rule for one in told.findings if one.verdict == "fail"}
+    if advice and failed == {YIELD} and not told.has_target:
+        print_wrapped(
+            f"{told.name} misses the yield of {advice.target:g} that was asked for. Without that "
+            "target no rule fails, and it may be cut.",
+            "bold red",
+        )
+        return
+    if failed:
         change = FILES if told.kind == "as-built" else "design"
         print_failed(told.findings, f"{told.name} must not be cut", change)
         return
@@ -165,9 +175,10 @@ def _of_source(asked: CheckRequest) -> Told:
                     "parts' designs one by one"
                 )
             return _of_assembly(found, progress)
+        has_target = found.rules.target_yield is not None
         if asked.target is not None:
             found = load_design(asked.source, _asking(asked, asked.target), asked.waivers)
-        return _of_design(found, progress)
+        return _of_design(found, progress)._replace(has_target=has_target)
 
 
 def _of_design(design: Design, progress: Progress) -> Told:

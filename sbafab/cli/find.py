@@ -9,11 +9,31 @@ import click
 
 from sbafab.cli.options import json_option, set_option
 from sbafab.cli.working import RULE_FAILED
+from sbafab.search.quantity_names import quantity_lines
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from sbafab.progress import Progress
     from sbafab.search.find import FindRequest, FoundDesign
     from sbafab.search.requirements import Goal, Requirement
+
+
+HELP = """Find the best design that meets requirements.
+
+Without DESIGN it starts from every family. Exit code 1 where nothing meets all: then the nearest
+miss is shown and no file written. A quantity may name its pressure P and height H with units, such
+as force@12.5mm@50kPa:
+
+\b
+{quantities}
+"""
+
+
+def _with_quantities(command: Callable[..., None]) -> Callable[..., None]:
+    """Gives a command its help, which lists every quantity with its unit."""
+    command.__doc__ = HELP.format(quantities=quantity_lines())
+    return command
 
 
 @click.command()
@@ -23,7 +43,7 @@ if TYPE_CHECKING:
     "least",
     metavar="QUANTITY=VALUE",
     multiple=True,
-    help='At least this much, e.g. lumen=3, stroke@50kPa=25 or "force@12.5mm@50kPa=3". Repeatable.',
+    help='At least this much, e.g. lumen=3, stroke=25 or "force@12.5mm@50kPa=3". Repeatable.',
 )
 @click.option(
     "--max",
@@ -37,7 +57,8 @@ if TYPE_CHECKING:
     default="mass",
     show_default=True,
     metavar="QUANTITY",
-    help="Of what meets all: the most stroke, force, yield or lumen, or the least of another.",
+    help="Of what meets all: the most stroke, bend, force, yield or lumen, or the least of "
+    "another.",
 )
 @click.option(
     "--free",
@@ -65,32 +86,27 @@ if TYPE_CHECKING:
 @click.option(
     "-o",
     "--out",
-    "target",
-    type=click.Path(path_type=Path),
-    default=Path("found.toml"),
-    show_default=True,
-    metavar="FILE",
-    help="The design file to write; its stem names the design.",
+    type=click.Path(path_type=Path, readable=False),
+    default=Path(),
+    show_default="this folder",
+    metavar="OUT",
+    help="Folder that receives found.toml, or a file that ends in .toml; its stem names the "
+    "design.",
 )
 @set_option
 @json_option
+@_with_quantities
 def find(source: str | None, **asked: Any) -> None:
-    """Find the best design that meets requirements.
-
-    Without DESIGN it starts from every family. Exit code 1 where nothing meets all: then the
-    nearest miss is shown and no file written.
-    """
     from sbafab.cli.ending import say
     from sbafab.cli.printing import print_json, shown_progress
     from sbafab.cli.printing_find import as_json, print_found
     from sbafab.design.templates import name_of
-    from sbafab.search.design_file import found_toml, refuse_target, write_found
+    from sbafab.search.design_file import found_file, found_toml, write_found
 
     if asked["storage"] is not None and not asked["optuna"]:
         raise click.UsageError("--storage goes with --optuna; add it")
-    target: Path = asked["target"]
     requests = _requests(source, asked)
-    refuse_target(target)
+    target = found_file(asked["out"])
     try:
         with shown_progress(asked["as_json"]) as tell:
             started, found = _found(requests, tell)

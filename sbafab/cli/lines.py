@@ -41,12 +41,15 @@ def wrapped(said: str, width: int, first: str = "", rest: str = "") -> list[str]
     )
 
 
-def print_wrapped(said: str, style: str = "") -> None:
+def print_wrapped(said: str, style: str = "", indent: str = "") -> None:
     """A sentence, broken between words where it is longer than a line; the rest indented.
+
+    All of it stands behind ``indent``.
 
     Words joined by ``KEPT`` stay on one line.
     """
-    for line in wrapped(said, console().width, rest="  "):
+    rest = indent or "  "
+    for line in wrapped(said, console().width, indent, rest):
         print_line(line.replace(KEPT, " "), style)
 
 

@@ -86,6 +86,8 @@ WAIVES = {
     "Repeatable.",
     "predict": "Let the prediction be written although this rule fails, for an actuator that may "
     "not hold. Repeatable.",
+    "sweep": "Take this rule's failure as accepted in every design; the tables say waived. "
+    "Repeatable.",
     "simulate": "Simulate although this rule fails, an actuator that may not hold. Repeatable.",
 }
 CUT_ALL_THE_SAME = (

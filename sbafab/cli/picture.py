@@ -40,7 +40,8 @@ if TYPE_CHECKING:
     "path",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
-    help="A .png, a moving .gif or .webp, or a .glb.  [default: NAME-inflated.png]",
+    help="A .png, a moving .gif or .webp, or a .glb.  [default: NAME-inflated.png, or "
+    "NAME-flat.png of what no model inflates]",
 )
 @click.option(
     "--motion",
@@ -71,13 +72,17 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
 
     It stands as the elastic stack says at the given pressures or volumes. Balloons are drawn as
     they are between their plates; ears are snipped off, and inlet tubes are left out. Elevation and
-    azimuth are degrees over the bench and round it. Drawn or oblong pockets have no such model:
-    they are drawn flat.
+    azimuth are degrees over the bench and round it. Drawn pockets that are nearly round are taken
+    for discs of equal area. Other drawn pockets, and oblong ones, no model inflates: they are drawn
+    flat, into NAME-flat.png.
     """
     from sbafab.actuators import build, load_design
+    from sbafab.cli.lines import print_wrapped
     from sbafab.cli.printing import shown_progress
     from sbafab.errors import DesignError, OutputError
     from sbafab.models.balloons import has_balloons
+    from sbafab.models.counterparts import counterparts_of_pose
+    from sbafab.models.drawn import model_form, near_discs
     from sbafab.models.stack import stack
     from sbafab.reports.flat_picture import WHY, write_flat_picture
     from sbafab.reports.inflated_picture import MOVING, PictureWish, write_picture
@@ -85,7 +90,9 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
     if pressures and volumes:
         raise DesignError("give --pressure or --volume, not both")
     loaded = load_design(design, assignments)
-    path = path or Path(f"{loaded.name}-inflated.png")
+    form = model_form(loaded)
+    is_inflated = has_balloons(form)
+    path = path or Path(f"{loaded.name}-{'inflated' if is_inflated else 'flat'}.png")
     wide = width or (480 if path.suffix.lower() in MOVING else 1000)
     wish = PictureWish(
         pressures or {"": 5.0},
@@ -98,7 +105,7 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
     )
     _refuse_still(path.suffix.lower())
     laminate = build(loaded)
-    if not has_balloons(loaded.form):
+    if not is_inflated:
         refuse_given(
             f"is for inflated actuators, and {WHY}: {loaded.name} is drawn flat; leave it out",
             *("pressures", "volumes", "elevation", "azimuth"),
@@ -107,13 +114,13 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
             write_flat_picture(laminate, path, wish.width, wish.height)
         except OSError as error:
             raise OutputError(f"{path} cannot be written: {error.strerror}") from error
-        click.echo(f"written to {path}: {loaded.name}, flat, for {WHY}")
+        click.echo(f"written to {path}: {loaded.name}, flat, not inflated: {WHY}")
         return
     with shown_progress(False) as tell:
         try:
             shown = write_picture(
                 laminate,
-                stack(loaded, laminate),
+                stack(loaded, laminate, form=form),
                 wish,
                 path,
                 lambda done, total: tell("frames", done, total),
@@ -126,6 +133,14 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
         f"written to {path}: {kpa} kPa, {held} ul, tip {shown.height:.2f} mm high, "
         f"bent {shown.bend:.1f} degrees"
     )
+    discs = near_discs(loaded)
+    if discs is not None:
+        print_wrapped(
+            f"(the drawn pocket taken for a disc of equal area, d = {discs.equal:.4g} mm; the "
+            f"discs within and round it have {discs.inner:.4g} and {discs.outer:.4g} mm)"
+        )
+    for row in counterparts_of_pose(len(shown.pressures)).values():
+        print_wrapped(f"({row.sentence()})")
 
 
 def _refuse_still(ending: str) -> None:

@@ -79,17 +79,22 @@ OF_FORMULAS = ("flow", "volumes", "contact_factor")
     metavar="G",
     help="Assemblies: mass at the tips, g; the paper's marble by default.",
 )
+@click.option(
+    "-v", "--verbose", is_flag=True, help="All figures, with their models and what these hold for."
+)
 def predict(
     request: Request,
     pressures: tuple[float, ...],
     flow: float,
     volumes: tuple[float, ...],
     load_g: float,
+    verbose: bool,
     **factors: Any,
 ) -> None:
     """Predict sizes, stroke, force, time and bending.
 
-    Writes predict.json and plots. Every figure names its model and how far that is trusted. A
+    Shows a verdict, and what the paper measured beside what is off by more than a quarter; -v and
+    predict.json, which it writes with plots, have every figure with its model and validity. A
     design that fails a rule is predicted on the screen only (exit code 1). Of an assembly: reach,
     load, grip in its lumen, and whether inflated parts meet, at one pressure (default 10 kPa), on
     the screen.
@@ -122,14 +127,14 @@ def predict(
         except OutputError:
             # What was asked is known, only not written.
             if not request.as_json:
-                print_prediction(found)
+                print_prediction(found, verbose)
             raise
     failed = sorted({finding.rule for finding in run.findings if finding.verdict == "fail"})
     if request.as_json:
         print_json({**prediction_json(design, found), "failed": failed, "folder": str(run.folder)})
     else:
         print_listed("size", size_said(design, run.laminate))
-        print_prediction(found)
+        print_prediction(found, verbose)
         if not run.failed:
             click.echo(f"written to {run.folder}: predict.json, predict/")
     if run.failed:
@@ -145,12 +150,14 @@ def _refuse_for_one(design: Design) -> None:
     """Raises UsageError for an option that no model of the design takes."""
     from sbafab.design.form import Drawn
     from sbafab.models.balloons import has_balloons
+    from sbafab.models.drawn import model_form
 
+    form = model_form(design)
     of = f"and {design.name} has other ones; leave it out"
     refuse_given(f"is for an assembly, and {design.name} is one actuator; leave it out", "load_g")
-    if not has_balloons(design.form):
+    if not has_balloons(form):
         refuse_given(f"is for elastic balloons, round pockets on flat plates, {of}", *OF_ELASTIC)
-    if isinstance(design.form.pockets, Drawn):
+    if isinstance(form.pockets, Drawn):
         refuse_given(f"is for pockets that are round or oblong, {of}", *OF_FORMULAS)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sbafab.cli.lines import console, facts_table
+from sbafab.cli.lines import console, facts_table, print_wrapped
 from sbafab.cli.printing import add_batch, print_verdict
 
 if TYPE_CHECKING:
@@ -61,6 +61,9 @@ def print_assembly_prediction(found: AssemblyPrediction) -> None:
     out = console()
     out.print(Text(f"{found.name} at {found.pressure_kpa:g} kPa", style="bold"))
     out.print(table)
+    for measured in dict.fromkeys(figure.measured for figure in found.figures if figure.measured):
+        names = [figure.name for figure in found.figures if figure.measured == measured]
+        print_wrapped(f"{'; '.join(dict.fromkeys(names))}: {measured}")
     for sentence in found.met():
         out.print(Text(sentence))
     for one in found.left_out:

@@ -6,11 +6,11 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from sbafab.cli.lines import print_line
+from sbafab.cli.lines import print_line, print_wrapped
 from sbafab.output.schemas import FIND_SCHEMA
 from sbafab.search.find import FoundDesign
-from sbafab.search.quantities import shown_value
-from sbafab.search.trial import Trial
+from sbafab.search.quantities import AskedQuantity, shown_value
+from sbafab.search.trial import Trial, keys_said, value_said
 
 TABS = (
     "overall_diameter counts the inlet tabs: ask for outline_diameter where they may stand out, or "
@@ -32,6 +32,8 @@ def as_json(found: FoundDesign, started: str, target: Path) -> dict[str, Any]:
         "tries": found.tries,
         "is_cut_short": found.is_cut_short,
         "best": shown(found.best),
+        "full_stroke": found.full_stroke,
+        "measured": {name: one.as_dict() for name, one in found.measured.items()},
         "missed": found.missed,
         "binds": [{"key": b.key, "value": b.value, "breaks": b.breaks} for b in found.binds],
         "range_ends": [
@@ -49,7 +51,7 @@ def as_json(found: FoundDesign, started: str, target: Path) -> dict[str, Any]:
 
 def print_found(found: FoundDesign, started: str, target: Path) -> None:
     """The design with its figures, what binds and the front; or the nearest miss."""
-    keys = _keys(found.best)
+    keys = keys_said(found.best.values)
     if found.holds:
         print_line(f"{target}: {keys}, from {started}", "bold")
     else:
@@ -60,17 +62,24 @@ def print_found(found: FoundDesign, started: str, target: Path) -> None:
         print_line(
             f"{said}; {one.bound}" if one.holds(value) else f"{said}, not {one.bound}  MISSED"
         )
+        _print_measured(found, one.quantity)
     goal = found.wanted.goal
     value = found.best.value(goal)
     said = goal.said if found.holds else goal.quantity.said
     print_line(f"  {said}: {shown_value(goal.quantity, value)}")
+    if goal.quantity.said not in [one.quantity.said for one in found.wanted.requirements]:
+        _print_measured(found, goal.quantity)
+    asked = found.wanted.quantities
+    is_told = any(one.is_full_stroke for one in asked)
+    if any(one.name == "stroke" for one in asked) and not is_told and found.full_stroke is not None:
+        print_line(f"  full stroke {found.full_stroke:.4g} mm, as the paper's in proportion")
     for said in found.broken_rules:
         print_line(f"  {said}")
     told = found.binds or found.ends or (found.holds and found.without_room)
     if told:
         print_line("What binds" if found.holds else "What stops it there", "bold")
     for bind in found.binds:
-        print_line(f"  {bind.key} = {bind.value:g}: {bind.breaks}")
+        print_line(f"  {bind.key} = {value_said(bind.value)}: {bind.breaks}")
     _print_ends(found)
     if not found.holds:
         _print_miss(found)
@@ -82,6 +91,12 @@ def print_found(found: FoundDesign, started: str, target: Path) -> None:
     _print_front(found)
     _print_cut(found)
     print_line(f"Next: sbafab generate {shlex.quote(str(target))}")
+
+
+def _print_measured(found: FoundDesign, quantity: AskedQuantity) -> None:
+    measured = found.measured.get(quantity.said)
+    if measured is not None:
+        print_wrapped(f"({measured.sentence()})", indent="    ")
 
 
 def _print_cut(found: FoundDesign) -> None:
@@ -123,8 +138,6 @@ def _print_front(found: FoundDesign) -> None:
     print_line(f"Pareto front, {some}{found.on_front} of the {found.tries} designs tried", "bold")
     for trial in found.front:
         figures = ", ".join(f"{name} {value:.4g}" for name, value in trial.figures.items())
-        print_line(f"  {_keys(trial)}: {figures}")
-
-
-def _keys(trial: Trial) -> str:
-    return ", ".join(f"{key} = {value:g}" for key, value in trial.values.items())
+        print_line(f"  {keys_said(trial.values)}: {figures}")
+    for name, measured in found.measured.items():
+        print_wrapped(f"({name}: {measured.sentence()})", indent="    ")

@@ -1,6 +1,6 @@
-"""What ``sbafab predict`` prints of a design: figures by group and model, and their validity.
+"""What ``sbafab predict`` prints of a design: a verdict, on request all figures and their validity.
 
-What to design with comes first, each quantity once; other models of the same follow.
+Of the figures what to design with comes first, each quantity once; other models of the same follow.
 """
 
 from __future__ import annotations
@@ -10,17 +10,41 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from sbafab.cli.lines import console, wrapped
+from sbafab.models.verdict import LEFT_OUT
 
 if TYPE_CHECKING:
     from sbafab.models.figures import Figure, Model, Prediction
 
 NAME, VALUE = 56, 10
 """Columns of a name, at most, and of a value."""
+FIRST = "Figures to design with"
 OTHERS = "Other models of the same: design with the figures above"
 
 
-def print_prediction(found: Prediction) -> None:
-    """The figures, then what each model is good for, and what is not predicted and why."""
+def print_prediction(found: Prediction, verbose: bool = False) -> None:
+    """The verdict; ``verbose`` also all figures, and what each model is good for."""
+    from rich.text import Text
+
+    out = console()
+    label = max((len(line.quantity) for line in found.verdict), default=0) + 2
+    before = ""
+    for line in found.verdict:
+        head = "" if line.quantity == before else f"{line.quantity}:"
+        before = line.quantity
+        said = f"{line.figure}: {line.note}" if line.quantity == LEFT_OUT else line.figure
+        for row in wrapped(said, out.width, head.ljust(label), " " * label):
+            out.print(Text(row), soft_wrap=True)
+        if line.quantity != LEFT_OUT:
+            for row in wrapped(line.note, out.width, " " * (label + 2), " " * (label + 2)):
+                out.print(Text(row), soft_wrap=True)
+    if verbose:
+        _print_figures(found)
+    else:
+        out.print(Text(f"{len(found.figures)} figures, each with its model and validity: -v"))
+
+
+def _print_figures(found: Prediction) -> None:
+    """All figures, then what each model is good for."""
     from rich.text import Text
 
     out = console()
@@ -30,24 +54,16 @@ def print_prediction(found: Prediction) -> None:
     own = first[: len(first) - len(others)]
 
     def part(title: str, lines: Iterator[str]) -> None:
-        if title:
-            out.print(Text(f"\n{title}", style="bold"))
+        out.print(Text(f"\n{title}", style="bold"))
         for line in lines:
             # A heading starts at the margin.
-            is_head = title in ("", OTHERS) and not line.startswith(" ")
+            is_head = title in (FIRST, OTHERS) and not line.startswith(" ")
             out.print(Text(line, style="bold" if is_head else ""), soft_wrap=True)
 
-    part("", figure_lines(own, models, out.width))
+    part(FIRST, figure_lines(own, models, out.width))
     if others:
         part(OTHERS, figure_lines(others, models, out.width))
     part("Models and validity", _numbered(models, out.width))
-    if found.left_out:
-        # What is left out for one reason is said together.
-        why: dict[str, list[str]] = {}
-        for one in found.left_out:
-            why.setdefault(one.reason, []).append(one.name)
-        left = (f"{', '.join(names)}: {reason}" for reason, names in why.items())
-        part("Left out", (line for said in left for line in wrapped(said, out.width, "- ", "  ")))
     out.print()
 
 
@@ -73,6 +89,7 @@ def figure_lines(figures: Sequence[Figure], models: Sequence[Model], width: int)
                 *over, last = textwrap.wrap(name, room, subsequent_indent="  ") or [name]
                 yield from (f"  {line}" for line in over)
                 yield f"  {last:{room}}{one.value:>{VALUE}.4g}  {one.unit}".rstrip()
+                yield from wrapped(one.aside, width, "    ", "    ") if one.aside else ()
 
 
 def _numbered(models: Sequence[Model], width: int) -> Iterator[str]:

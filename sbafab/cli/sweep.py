@@ -62,6 +62,11 @@ if TYPE_CHECKING:
     metavar="S",
     help="Seconds that one design may take.",
 )
+@click.option(
+    "--all-columns",
+    is_flag=True,
+    help="Tables with every key, rule and figure, not only those varied, asked for and binding.",
+)
 def sweep(
     request: Request, varied: tuple[str, ...], pressures: tuple[float, ...], **asked: Any
 ) -> None:
@@ -123,6 +128,11 @@ def _print(wanted: SweepRequest, found: SweptDesigns) -> None:
         click.echo(
             f"{found.no_longer_asked} of the designs that an earlier sweep had in these tables are "
             "not asked for now; its command brings them back from the journal"
+        )
+    if not wanted.all_columns:
+        click.echo(
+            "columns: what was varied, asked for and binding; --all-columns has all, and measures "
+            "nothing anew"
         )
     if "sweep.parquet" not in found.files:
         click.echo('for Parquet as well: pip install "sbafab[parquet]"')

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.cli.lines import console, print_wrapped, wrapped
 from sbafab.cli.printing import COLOURS
+from sbafab.rules.finding import counted
 
 if TYPE_CHECKING:
     from sbafab.output.planned import Checked
@@ -78,20 +79,6 @@ def _told(findings: Sequence[Finding]) -> Iterator[tuple[str, Verdict]]:
     for one in findings:
         if one.verdict in ("fail", "warn") or one.by_user:
             yield f"{one.rule}: {one.remedy or one.message}", one.verdict
-
-
-def counted(findings: Iterable[Finding]) -> str:
-    """How many rules pass, warn, are waived by the design, or fail."""
-    from sbafab.rules.finding import summary
-
-    counts = summary(findings)
-    words = [
-        f"{counts['pass']} {'rule passes' if counts['pass'] == 1 else 'rules pass'}",
-        f"{counts['warn']} warn{'s' if counts['warn'] == 1 else ''}" if counts["warn"] else "",
-        f"{counts['waived']} waived" if counts["waived"] else "",
-        f"{counts['fail']} fail{'s' if counts['fail'] == 1 else ''}" if counts["fail"] else "",
-    ]
-    return ", ".join(word for word in words if word)
 
 
 def verdict_said(name: str, groups: Sequence[Group], more: str) -> str:

@@ -130,9 +130,10 @@ def _nearest(key: str, paths: Iterable[str], cutoff: float) -> str | None:
 
 
 def key_paths(record: type[BaseModel], prefix: str = "") -> dict[str, object]:
-    """Every dotted key a record knows, with its annotation."""
+    """Every dotted key a record knows, as a file spells it, with its annotation."""
     found: dict[str, object] = {}
-    for key, info in record.model_fields.items():
+    for name, info in record.model_fields.items():
+        key = info.alias or name
         found[prefix + key] = info.annotation
         if isinstance(info.annotation, type) and issubclass(info.annotation, BaseModel):
             found.update(key_paths(info.annotation, f"{prefix}{key}."))

@@ -23,6 +23,7 @@ NOT_MEASURED = (
     "pressure, or simulate the design"
 )
 NO_OUTLINE = "no model knows the form of a drawn pocket outline; simulate the design instead"
+"""Of a search, which compares designs by figures without bounds."""
 
 
 @dataclass(frozen=True)
@@ -81,9 +82,11 @@ class Actuator:
         )
 
 
-def actuator(design: Design, laminate: Laminate, calibration: Factors) -> Actuator:
-    """The actuator of a design of any family."""
-    balloons, form = design.stack.balloons, design.form
+def actuator(
+    design: Design, laminate: Laminate, calibration: Factors, form: Form | None = None
+) -> Actuator:
+    """The actuator of a design of any family; ``form`` in place of its own, where one is given."""
+    balloons, form = design.stack.balloons, form or design.form
     radii: tuple[float, ...] = ()
     kinematics: tuple[Kinematics, ...] = ()
     full = full_height = 0.0

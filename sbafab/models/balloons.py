@@ -24,14 +24,18 @@ def has_balloons(form: Form) -> bool:
 
 
 def balloons_of(
-    design: Design, laminate: Laminate, factors: Factors | None = None
+    design: Design,
+    laminate: Laminate,
+    factors: Factors | None = None,
+    form: Form | None = None,
 ) -> list[Balloon]:
     """The balloons of one chamber, bottom to top, all taken for inner ones.
 
+    ``form`` stands in place of the design's own, where one is given.
     ``factors`` may make the pockets smaller than drawn, and give another modulus than the film's.
     Raises DesignError where pockets are not round, or for films whose modulus is not known.
     """
-    form = design.form
+    form = form or design.form
     if not has_balloons(form) or not isinstance(form.pockets, Discs):
         raise DesignError(
             f"design {design.name} has no round pockets on flat plates; only those have an elastic "

@@ -41,7 +41,7 @@ def free_strokes(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
     if not one.radii:
         return
     try:
-        kinds = Counter(balloons_of(one.design, one.laminate, asked.calibration))
+        kinds = Counter(balloons_of(one.design, one.laminate, asked.calibration, one.form))
     except DesignError as error:
         yield LeftOut("free stroke, elastic balloon", str(error))
         return

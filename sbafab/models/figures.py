@@ -6,10 +6,19 @@ import difflib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sbafab.errors import DesignError
+from sbafab.models.counterparts import Counterpart, is_calibrated
 from sbafab.notebook import table_html
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from sbafab.models.verdict import VerdictLine
+
+MEASURED = "measured (paper)"
+"""In place of a model's name."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +44,8 @@ class Figure:
     """One predicted number: ``value`` in ``unit``; ``group`` gathers what belongs together.
 
     ``other``: another model gives the same quantity, and that one is to design with.
+    ``measured``: what the paper measured, where the model is off by more than a quarter of it.
+    The value lies ``between`` two of the same ``unit``, where a drawn pocket is taken for a disc.
     """
 
     group: str
@@ -43,6 +54,25 @@ class Figure:
     unit: str
     model: Model
     other: bool = False
+    measured: Counterpart | None = None
+    between: tuple[float, float] | None = None
+
+    @property
+    def counterpart(self) -> str:
+        """The measured counterpart in a clause; empty where none is needed."""
+        if self.measured is None:
+            return ""
+        return self.measured.sentence(is_calibrated(self.model.name))
+
+    @property
+    def aside(self) -> str:
+        """The same in parentheses, after the bounds where it has any."""
+        bounds = ""
+        if self.between is not None:
+            low, high = self.between
+            bounds = f"(between {low:.4g} and {high:.4g} {self.unit} by discs within and round it)"
+        measured = f"({self.counterpart})" if self.measured else ""
+        return f"{bounds} {measured}".strip()
 
     def as_dict(self) -> dict[str, Any]:
         return {
@@ -53,6 +83,8 @@ class Figure:
             "model": self.model.title,
             "trust": self.model.trust,
             "design_with": not self.other,
+            "measured": self.measured and self.measured.as_dict(is_calibrated(self.model.name)),
+            "between": self.between and [_rounded(end) for end in self.between],
         }
 
 
@@ -93,6 +125,42 @@ class Relation:
     lines: tuple[Trace, ...]
     points: tuple[Points, ...] = ()
 
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """A flat row a point of each curve, and of what was measured: ``x`` and ``y`` in the units
+        of ``x_label`` and ``y_label``, ``error`` of y only where one was measured.
+        """
+        found = [
+            {
+                "curve": line.label,
+                "x": float(x),
+                "y": float(y),
+                "error": None,
+                "model": line.model.title if line.model else MEASURED,
+            }
+            for line in self.lines
+            for x, y in zip(line.x, line.y, strict=True)
+        ]
+        return found + [
+            {
+                "curve": points.label,
+                "x": float(x),
+                "y": float(y),
+                "error": float(error),
+                "model": MEASURED,
+            }
+            for points in self.points
+            for x, y, error in zip(points.x, points.y, points.error, strict=True)
+        ]
+
+    def frame(self) -> DataFrame:
+        """Return ``rows`` as a pandas DataFrame whose ``attrs`` hold the title and the labels of
+        the axes. Raises DesignError without pandas.
+        """
+        found = _frame(self.rows)
+        found.attrs.update(title=self.title, x=self.x_label, y=self.y_label)
+        return found
+
     def as_dict(self) -> dict[str, Any]:
         return {
             "name": self.name,
@@ -102,7 +170,7 @@ class Relation:
             "lines": [
                 {
                     "label": line.label,
-                    "model": line.model.title if line.model else "measured (paper)",
+                    "model": line.model.title if line.model else MEASURED,
                     "trust": line.model.trust if line.model else "",
                     "x": [_rounded(value) for value in line.x],
                     "y": [_rounded(value) for value in line.y],
@@ -184,18 +252,34 @@ class Prediction:
         named = [figure for figure in self.figures if figure.name == name]
         found = [figure for figure in named if figure.model.title.startswith(model)]
         if not named:
-            near = difflib.get_close_matches(name, [figure.name for figure in self.figures], 3)
-            hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
-            raise KeyError(f"no figure is named {name!r}{hint}")
+            raise KeyError(_unknown("figure", name, [figure.name for figure in self.figures]))
         if len(found) != 1:
             titles = ", ".join(repr(figure.model.title) for figure in found or named)
             raise KeyError(f"{name!r} is given by {titles}; name one of these models")
         return found[0].value
 
+    def relation(self, name: str) -> Relation:
+        """Return the curves of this name, such as "force". Raises KeyError where there are none."""
+        for relation in self.relations:
+            if relation.name == name:
+                return relation
+        raise KeyError(_unknown("relation", name, [relation.name for relation in self.relations]))
+
+    @property
+    def verdict(self) -> tuple[VerdictLine, ...]:
+        """What it reaches, how far that is to be trusted, and what is left out: a line each."""
+        from sbafab.models.verdict import verdict
+
+        return verdict(self)
+
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """A row a figure, for example for ``pandas.DataFrame(prediction.rows)``."""
-        return [figure.as_dict() for figure in self.figures]
+        """A flat row a figure; ``measured`` is what the paper measured, in words, or empty."""
+        return [{**figure.as_dict(), "measured": figure.counterpart} for figure in self.figures]
+
+    def frame(self) -> DataFrame:
+        """Return ``rows`` as a pandas DataFrame. Raises DesignError without pandas."""
+        return _frame(self.rows)
 
     def __repr__(self) -> str:
         left = f", {len(self.left_out)} left out" if self.left_out else ""
@@ -210,7 +294,7 @@ class Prediction:
                 f.value,
                 f.unit,
                 f.model.title,
-                f.model.trust,
+                f"{f.model.trust} {f.aside}".strip(),
             )
             for f in first
         ]
@@ -229,10 +313,29 @@ class Prediction:
                 "pocket_loss": self.asked.calibration.pocket_loss,
                 "modulus_mpa": self.asked.calibration.modulus_mpa,
             },
+            "verdict": [line._asdict() for line in self.verdict],
             "figures": [figure.as_dict() for figure in self.figures],
             "left_out": [{"name": left.name, "reason": left.reason} for left in self.left_out],
             "relations": [relation.as_dict() for relation in self.relations],
         }
+
+
+def _unknown(what: str, name: str, names: Sequence[str]) -> str:
+    """That nothing has this name, with the nearest names, each once."""
+    near = difflib.get_close_matches(name, list(dict.fromkeys(names)), 3)
+    hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
+    return f"no {what} is named {name!r}{hint}"
+
+
+def _frame(rows: Sequence[dict[str, Any]]) -> DataFrame:
+    try:
+        from pandas import DataFrame
+    except ImportError:
+        raise DesignError(
+            "frame() needs pandas, which is not installed; install it with pip install pandas, or "
+            "use .rows, a list of dicts"
+        ) from None
+    return DataFrame(rows)
 
 
 def _rounded(value: float) -> float:

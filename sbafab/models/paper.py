@@ -59,6 +59,8 @@ MODULUS_1DOF = Measured(35, 0, "kPa", "Sec. 4.4")
 MODULUS_3DOF = Measured(60, 0, "kPa", "Sec. 4.4")
 SUCCESS = Measured(0.9, 0, "", "Sec. 6")
 """Share of the actuators built that held."""
+WORK = Measured(45.3, 0, "mJ", "Sec. 4.1")
+"""Pneumatic input work at 10 kPa, 6 balloons of d = 10."""
 BURST = Measured(367, 18, "kPa", "Sec. 4")
 FOLDED = Measured(9.25, 0, "mm", "Sec. 2")
 RADIAL_FLAT = Measured(15.33, 0, "mm", "Sec. 2.1")

@@ -16,9 +16,16 @@ from sbafab.geometry.region import Region
 from sbafab.laminate.extent import film_mass
 from sbafab.laminate.laminate import Laminate
 from sbafab.models import axial, elastic, lobes, paper, stacked
-from sbafab.models.actuator import NO_OUTLINE, NOT_MEASURED, Actuator, actuator
+from sbafab.models.actuator import NOT_MEASURED, Actuator, actuator
 from sbafab.models.choice import REACHED, STACK, WIDEST, chosen
-from sbafab.models.drawn import flat_forces
+from sbafab.models.counterparts import counterpart
+from sbafab.models.drawn import (
+    bounded,
+    flat_forces,
+    near_discs,
+    relation_by_disc,
+    why_no_disc,
+)
 from sbafab.models.figures import (
     Asked,
     Figure,
@@ -78,23 +85,47 @@ def predict(
         flat = laminate or build(design)
     except GeometryError as error:
         raise DesignError(f"design {design.name} cannot be resolved: {error}") from None
-    one = actuator(design, flat, wish.calibration)
+    discs = near_discs(design)
+    if discs is not None and not discs.is_round:
+        discs = None
+    one = actuator(design, flat, wish.calibration, discs and discs.form(design, discs.equal))
     axial.check_asked(one, wish)
     together = None if quick else stacked.stacked(one, wish)
-    found = list(_all(one, wish))
+    found = _found(one, wish, together)
+    relations = () if quick else tuple(_relations(one, wish, _stack(together)))
+    if discs is not None:
+        bounds = [
+            actuator(design, flat, wish.calibration, discs.form(design, diameter))
+            for diameter in (discs.inner, discs.outer)
+        ]
+        each = [_found(end, wish, None if quick else stacked.stacked(end, wish)) for end in bounds]
+        found = list(bounded(found, each, discs))
+        relations = tuple(relation_by_disc(relation, discs) for relation in relations)
+    to_come = (STACK,) if quick and one.radii else ()
+    figures = chosen((item for item in found if isinstance(item, Figure)), to_come)
+    return Prediction(
+        wish,
+        tuple(
+            replace(figure, measured=counterpart(one.form, figure.name, figure.model.name))
+            for figure in figures
+        ),
+        relations,
+        tuple(item for item in found if isinstance(item, LeftOut)),
+    )
+
+
+def _stack(together: Stack | LeftOut | None) -> Stack | None:
+    return together if isinstance(together, Stack) else None
+
+
+def _found(one: Actuator, asked: Asked, together: Stack | LeftOut | None) -> list[Figure | LeftOut]:
+    """All figures, and what is left out, in the order of their groups."""
+    found = list(_all(one, asked))
     if isinstance(together, LeftOut):
         found.append(together)
     elif together is not None:
-        found += stacked.figures(one, wish, together)
-    found.sort(key=_place)
-    known = together if isinstance(together, Stack) else None
-    to_come = (STACK,) if quick and one.radii else ()
-    return Prediction(
-        wish,
-        chosen((item for item in found if isinstance(item, Figure)), to_come),
-        () if quick else tuple(_relations(one, wish, known)),
-        tuple(item for item in found if isinstance(item, LeftOut)),
-    )
+        found += stacked.figures(one, asked, together)
+    return sorted(found, key=_place)
 
 
 def _all(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
@@ -107,12 +138,12 @@ def _all(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
     if isinstance(mass, LeftOut) and one.kinematics:
         yield LeftOut("power density", mass.reason)
     yield from _tubes(one)
+    pushed = list(flat_forces(one, asked))
+    yield from pushed
     if not one.kinematics:
-        pushed = list(flat_forces(one, asked))
-        yield from pushed
         force = "force once the plates part" if pushed else "force"
         for what in ("stroke", force, "actuation", "bending", "folded diameter"):
-            yield LeftOut(what, NO_OUTLINE)
+            yield LeftOut(what, why_no_disc(one.design))
         return
     yield from axial.strokes(one, asked)
     yield from elastic.free_strokes(one, asked)

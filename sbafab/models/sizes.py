@@ -8,6 +8,7 @@ from sbafab.design.form import Form, Slots, Wrap
 from sbafab.design.records import Design
 from sbafab.laminate.extent import beyond_the_outline, outline_diameter, overall_diameter
 from sbafab.laminate.laminate import Laminate
+from sbafab.models.counterparts import FLAT_HEIGHT_OF_FILMS, counterpart
 
 
 def sizes(design: Design, laminate: Laminate) -> dict[str, float]:
@@ -75,7 +76,10 @@ def _round_the_tube(form: Form, laminate: Laminate, rise: float) -> float | None
 
 
 def size_said(design: Design, laminate: Laminate) -> tuple[str, ...]:
-    """The size in phrases: across with what stands out of it, without, flat, and its height."""
+    """The size in phrases: across with what stands out of it, without, flat, and its height.
+
+    Films flow in the press: beside the height stands what the paper measured of its own.
+    """
     found = sizes(design, laminate)
     said = []
     if "overall_diameter" in found:
@@ -85,6 +89,9 @@ def size_said(design: Design, laminate: Laminate) -> tuple[str, ...]:
         said.append(f"{found['outline_diameter']:.2f} without")
     if "deflated_diameter" in found:
         said.append(f"{found['deflated_diameter']:.2f} mm round its tube")
-    flat = "flat, " if design.form.wrap is not None else ""
+    form = design.form
+    flat = "flat, " if form.wrap is not None else ""
     said.append(f"{flat}{found['width']:.2f} x {found['length']:.2f} mm")
-    return (*said, f"folded height {laminate.thickness:.3f} mm")
+    row = counterpart(form, "deflated height", FLAT_HEIGHT_OF_FILMS)
+    height = f"folded height {laminate.thickness:.3f} mm"
+    return (*said, f"{height} {row.brief}" if row else height)

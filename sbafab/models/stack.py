@@ -24,6 +24,7 @@ from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import BalloonMap, balloon_map
 from sbafab.models.chain import Chain, chain
+from sbafab.models.counterparts import counterparts_of_pose
 from sbafab.models.loads import Load, directed, outer_plate, three
 from sbafab.models.springs import RING, GapPlaces, Springs
 from sbafab.models.stack_balance import free, held
@@ -31,6 +32,7 @@ from sbafab.models.stack_balance import free, held
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from sbafab.design.form import Form
     from sbafab.design.records import Design
     from sbafab.laminate.laminate import Laminate
     from sbafab.models.figures import Factors
@@ -141,6 +143,12 @@ class Stack:
     def chambers(self) -> int:
         """How many chambers it has."""
         return len(self.axes)
+
+    @property
+    def counterparts(self) -> dict[str, str]:
+        """What the paper measured beside the "height" and the "bend" of a pose, a clause each."""
+        rows = counterparts_of_pose(self.chambers)
+        return {what: row.sentence() for what, row in rows.items()}
 
     @property
     def flat_height(self) -> float:
@@ -363,11 +371,13 @@ def stack(
     laminate: Laminate | None = None,
     most_pressure: float = MOST_PRESSURE,
     factors: Factors | None = None,
+    form: Form | None = None,
 ) -> Stack:
     """The stack of a design with round pockets on one axis or side by side.
 
     ``most_pressure`` in kPa is what maps are made to; those of wide pockets end before. A lone
-    balloon is held by a small disc. ``factors`` are measured ones. Raises
+    balloon is held by a small disc. ``factors`` are measured ones; ``form`` stands in place of the
+    design's own, for drawn pockets that are nearly round (``models.drawn.model_form``). Raises
     DesignError for pockets of another shape, for actuators round a tube and for films of unknown
     modulus.
     """
@@ -376,7 +386,7 @@ def stack(
     from sbafab.models.balloons import balloons_of
 
     flat = laminate or build(design)
-    row = [_gripped(one) for one in balloons_of(design, flat, factors)]
+    row = [_gripped(one) for one in balloons_of(design, flat, factors, form)]
     press = 1.0 if factors is None else factors.press_factor
     kinds = list(dict.fromkeys(row))
     axes = np.array([chamber.centres[0] for chamber in flat.chambers])

@@ -72,7 +72,7 @@ def stacked(one: Actuator, asked: Asked) -> Stack | LeftOut | None:
         return None
     most = max(MOST_PRESSURE, *asked.pressures_kpa, 0.0)
     try:
-        return stack(one.design, one.laminate, most, asked.calibration)
+        return stack(one.design, one.laminate, most, asked.calibration, one.form)
     except DesignError as error:
         return LeftOut("elastic stack", str(error))
 

@@ -189,6 +189,17 @@ def _predict() -> dict[str, Any]:
         "description": "false where another model gives the same quantity, and that one is to "
         "design with",
     }
+    measured = _counterpart()
+    measured["type"] = ["object", "null"]
+    measured["description"] = (
+        "what the paper measured, where validation shows the model to be off by more than a "
+        "quarter of it"
+    )
+    between = {
+        **array(number()),
+        "type": ["array", "null"],
+        "description": "bounds of a drawn pocket that is taken for a disc",
+    }
     figure = table(
         group=TEXT,
         name=TEXT,
@@ -197,6 +208,8 @@ def _predict() -> dict[str, Any]:
         model=TEXT,
         trust=TEXT,
         design_with=design_with,
+        measured=measured,
+        between=between,
     )
     curve = {"label": TEXT, "x": array(number()), "y": array(number())}
     relation = table(
@@ -215,6 +228,7 @@ def _predict() -> dict[str, Any]:
         design_sha256=TEXT,
         generator=TEXT,
         asked=asked,
+        verdict=array(table(quantity=TEXT, figure=TEXT, note=TEXT)),
         figures=array(figure),
         left_out=array(table(name=TEXT, reason=TEXT)),
         relations=array(relation),
@@ -222,11 +236,23 @@ def _predict() -> dict[str, Any]:
     return and_perhaps(found, failed=array(TEXT), folder=TEXT)
 
 
+def _counterpart() -> dict[str, Any]:
+    return table(
+        sentence=TEXT,
+        value=number(),
+        error={**number(), "description": "0 where the paper gives none"},
+        unit=TEXT,
+        actuator=TEXT,
+        source=TEXT,
+        model_gave={**number(), "description": "the same model for that actuator, in the unit"},
+    )
+
+
 def _find() -> dict[str, Any]:
     figures = {"type": "object", "additionalProperties": number()}
     shown = table(
         keys={"type": "object", "description": "keys of the design that were found"},
-        figures={**figures, "description": "quantities in mm, N, g, kPa, ul, s or a share"},
+        figures={**figures, "description": "quantities in mm, deg, N, g or a share"},
     )
     return table(
         schema={"const": FIND_SCHEMA},
@@ -236,6 +262,13 @@ def _find() -> dict[str, Any]:
         tries=COUNT,
         is_cut_short={"type": "boolean", "description": "whether more tries might lead further"},
         best=shown,
+        full_stroke={**number("null"), "description": "mm, of the best, as predict has it"},
+        measured={
+            "type": "object",
+            "description": "what the paper measured, by quantity, where the model is off by more "
+            "than a quarter of it",
+            "additionalProperties": _counterpart(),
+        },
         missed=array(TEXT),
         binds=array(table(key=TEXT, value={}, breaks=TEXT)),
         range_ends=array(table(key=TEXT, value={}, low=number(), high=number())),

@@ -11,6 +11,12 @@ import numpy as np
 from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
 from sbafab.design.form import Discs, Slots
 from sbafab.models.choice import REACHED, WIDEST
+from sbafab.models.counterparts import (
+    BALLOON,
+    FLAT_HEIGHT_OF_FILMS,
+    counterpart,
+    counterparts_of_pose,
+)
 from sbafab.models.lens import fullest, rate
 from sbafab.models.stack import Stack, stack
 from sbafab.reports.bent_arms import BentTouch, Clearance, bent_arms
@@ -39,12 +45,18 @@ IN_THE_LUMEN = (
     "push of each stack on the wall",
     "friction",
 )
+SEVERAL = 3
+"""Chambers of an arm that bends."""
 PAPERS = ("aperture", "brace", "standing")
 """The assemblies that the paper built: figures of others stand beside nothing."""
 
 
 class AssemblyFigure(NamedTuple):
-    """One figure of a part: value in ``unit``, model, and what the paper says, if it does."""
+    """One figure of a part: value in ``unit``, model, and what the paper says, if it does.
+
+    ``measured`` is what it measured of a single actuator, where the model is off by more than a
+    quarter of that.
+    """
 
     part: str
     name: str
@@ -52,6 +64,7 @@ class AssemblyFigure(NamedTuple):
     unit: str
     model: str
     paper: str = ""
+    measured: str = ""
 
 
 class Touch(NamedTuple):
@@ -85,7 +98,8 @@ class AssemblyPrediction(NamedTuple):
         said += [
             f"press {bent.chambers} of {bent.part} to less than {bent.from_kpa:.2g} kPa, or move "
             f"{bent.other}: from there on, bent by {bent.bend:.0f} degrees, they meet, and at "
-            f"{self.pressure_kpa:g} kPa they share {bent.volume:.2f} mm3"
+            f"{self.pressure_kpa:g} kPa they share {bent.volume:.2f} mm3 "
+            f"({counterparts_of_pose(SEVERAL)['bend'].sentence()})"
             for bent in self.bent_touches
         ]
         if not self.touches:
@@ -194,6 +208,28 @@ def _arm(
     placed: PlacedSba, found: Stack, pressure: float, load_g: float
 ) -> Iterator[AssemblyFigure]:
     """Height, reach, bend and load of an actuator with round pockets."""
+    for figure in _figures_of_arm(placed, found, pressure, load_g):
+        beside = counterpart(placed.made.design.form, *_as_predicted(figure.name, pressure))
+        yield figure._replace(measured=beside.sentence() if beside else "")
+
+
+def _as_predicted(name: str, pressure: float) -> tuple[str, str]:
+    """The figure of a design's own prediction that says the same, and its model."""
+    at = f"at {pressure:g} kPa"
+    known = {
+        "height, flat": ("deflated height", FLAT_HEIGHT_OF_FILMS),
+        "height, inflated": (f"free height {at}", BALLOON),
+        "push at 75 % of its stroke": (f"blocked force {at}, at 75 % of full stroke", ELASTIC),
+        "bend by one chamber": (f"bend {at} in one chamber, the others empty", ELASTIC),
+        "reach of the tip aside": (f"tip aside {at} in one chamber, the others empty", ELASTIC),
+    }
+    # A sag is a load over a stiffness.
+    return known.get(name, (f"lateral tip stiffness {at}, pressure held", ELASTIC))
+
+
+def _figures_of_arm(
+    placed: PlacedSba, found: Stack, pressure: float, load_g: float
+) -> Iterator[AssemblyFigure]:
     name, weight = placed.name, load_g * 1e-3 * GRAVITY
     every = (pressure,) * found.chambers
     free = found.pose(every)

@@ -9,7 +9,7 @@ from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.reports.inflated_picture import ENDINGS, MOVING
 
-WHY = "no model inflates pockets that are not round or stand round a tube"
+WHY = "no model inflates pockets that are not nearly round, or stand round a tube"
 
 
 def write_flat_picture(laminate: Laminate, path: Path, width: int, height: int) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
 from sbafab.errors import DesignError
+from sbafab.models.counterparts import counterparts_of_pose
 from sbafab.reports.inflated import COARSE, InflatedPart, inflated, pressed
 from sbafab.reports.render import RGB, LitBody, rendered
 
@@ -222,16 +223,22 @@ def _colour(part: InflatedPart, pose: Pose, most: float) -> RGB:
     return r, g, b
 
 
-def _caption(laminate: Laminate, pose: Pose, moving: bool) -> str:
+def _caption(laminate: Laminate, pose: Pose, moving: bool) -> tuple[str, ...]:
+    """What is shown; above it what the paper measured beside a bend or height by the model."""
     pressures = ", ".join(f"{p:.3g}" for p in pose.pressures)
     model = "elastic stack" + (", ears snipped off" if laminate.registration == "ears" else "")
+    if any(note.startswith("drawn outline") for note in laminate.notes):
+        model += ", drawn pockets as discs"
     if moving:
-        return f"{laminate.name}, {model}"
-    bent = f", bent {pose.bend:.0f} degrees" if pose.bend > 0.5 else f", {pose.height:.1f} mm high"
-    return f"{laminate.name} at {pressures} kPa{bent} ({model})"
+        return (f"{laminate.name}, {model}",)
+    what = "bend" if pose.bend > 0.5 else "height"
+    bent = f", bent {pose.bend:.0f} degrees" if what == "bend" else f", {pose.height:.1f} mm high"
+    said = f"{laminate.name} at {pressures} kPa{bent} ({model})"
+    beside = counterparts_of_pose(len(pose.pressures)).get(what)
+    return (beside.short, said) if beside else (said,)
 
 
-def _write(image: Image, caption: str, pixels_per_mm: float) -> None:
+def _write(image: Image, caption: Sequence[str], pixels_per_mm: float) -> None:
     from PIL import ImageDraw, ImageFont
 
     from sbafab.reports.length_bar import INK, draw_length_bar
@@ -240,7 +247,9 @@ def _write(image: Image, caption: str, pixels_per_mm: float) -> None:
     size = max(11, round(height / 40))
     font = ImageFont.load_default(size)
     draw = ImageDraw.Draw(image)
-    draw.text((round(0.03 * width), height - round(1.9 * size)), caption, fill=INK, font=font)
+    for row, text in enumerate(reversed(caption)):
+        at = round(0.03 * width), height - round((1.9 + 1.3 * row) * size)
+        draw.text(at, text, fill=INK, font=font)
     draw_length_bar(draw, 0.97 * width, height - size, width / 5, pixels_per_mm, font)
 
 

@@ -85,6 +85,18 @@ def summary(findings: Iterable[Finding]) -> dict[str, object]:
     return {"holds": counts["fail"] == 0, **{name: counts[name] for name in verdicts}}
 
 
+def counted(findings: Iterable[Finding]) -> str:
+    """Return in words how many rules pass, warn, are waived by the design, or fail."""
+    counts = summary(findings)
+    words = [
+        f"{counts['pass']} {'rule passes' if counts['pass'] == 1 else 'rules pass'}",
+        f"{counts['warn']} warn{'s' if counts['warn'] == 1 else ''}" if counts["warn"] else "",
+        f"{counts['waived']} waived" if counts["waived"] else "",
+        f"{counts['fail']} fail{'s' if counts['fail'] == 1 else ''}" if counts["fail"] else "",
+    ]
+    return ", ".join(word for word in words if word)
+
+
 def _gravity(finding: Finding) -> int:
     if finding.verdict == "waived":
         return 2 if finding.by_user else 0
@@ -121,8 +133,7 @@ class Findings(tuple[Finding, ...]):
         ]
 
     def __repr__(self) -> str:
-        counts = Counter(finding.verdict for finding in self)
-        return f"Findings({', '.join(f'{number} {verdict}' for verdict, number in counts.items())})"
+        return f"Findings({counted(self) or 'none'})"
 
     def _repr_html_(self) -> str:
         rows = [(f.rule, f.verdict, f.measured, f.limit, f.unit, f.message) for f in self]

@@ -21,17 +21,29 @@ from sbafab.design.templates import kit_names
 from sbafab.errors import DesignError, OutputError
 from sbafab.search.find import FoundDesign
 from sbafab.search.quantities import shown_value
+from sbafab.search.trial import keys_said
+
+FOUND = "found.toml"
+"""The file in a folder that ``-o`` names."""
 
 
-def refuse_target(target: Path) -> None:
-    """Raises DesignError where no file can come to be: nobody's design is overwritten."""
-    if not target.parent.is_dir():
-        raise DesignError(f"{target.parent} is no folder; make it first, or name another with -o")
+def found_file(out: Path) -> Path:
+    """Return the file that ``-o`` asks for: itself where it ends in .toml, else one in the folder.
+
+    Raises DesignError where no file can come to be: nobody's design is overwritten.
+    """
+    is_file = out.suffix.lower() == ".toml"
+    if is_file and not out.parent.is_dir():
+        raise DesignError(f"{out.parent} is no folder; make it first, or name another with -o")
+    if not is_file and out.exists() and not out.is_dir():
+        raise DesignError(f"{out} is a file; name a folder with -o, or a file that ends in .toml")
+    target = out if is_file else out / FOUND
     if target.exists():
         raise DesignError(
-            f"{target} exists; name another file with -o, or remove it first: a search may take "
-            "minutes and overwrites nothing"
+            f"{target} exists; name another file or folder with -o, or remove it first: a search "
+            "may take minutes and overwrites nothing"
         )
+    return target
 
 
 def found_toml(
@@ -51,8 +63,9 @@ def found_toml(
     goal = found.wanted.goal
     value = shown_value(goal.quantity, found.best.value(goal))
     best = f"# {goal.quantity.said} = {value} (the goal)"
-    keys = ", ".join(f"{key} = {value:g}" for key, value in found.best.values.items())
-    head = [f"# Found by sbafab find, from {Path(source).name}: {keys}.", *said, best]
+    keys = keys_said(found.best.values)
+    measured = [f"# {name}: {one.sentence()}" for name, one in found.measured.items()]
+    head = [f"# Found by sbafab find, from {Path(source).name}: {keys}.", *said, best, *measured]
     return "\n".join(line.rstrip() for line in head) + "\n\n" + tomli_w.dumps(first | tables)
 
 
@@ -70,9 +83,10 @@ def _from_anywhere(data: dict[str, Any], folder: Path, given: set[str]) -> None:
 def write_found(text: str, target: Path) -> None:
     """Raises OutputError where it cannot be written, also where a file came to be meanwhile."""
     try:
+        target.parent.mkdir(parents=True, exist_ok=True)
         with target.open("x", encoding="utf-8", newline="\n") as opened:
             opened.write(text)
     except OSError as error:
         raise OutputError(
-            f"{target} cannot be written: {error.strerror or error}; name another file with -o"
+            f"{target} cannot be written: {error.strerror or error}; name another folder with -o"
         ) from None

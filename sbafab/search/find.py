@@ -13,8 +13,9 @@ from sbafab.design.form import Free
 from sbafab.design.records import Design
 from sbafab.design.writing import keys_of
 from sbafab.errors import DesignError
+from sbafab.models.counterparts import Counterpart
 from sbafab.progress import Progress, unheard
-from sbafab.search.quantities import refuse_unknown_key
+from sbafab.search.quantities import Subject, refuse_unknown_key
 from sbafab.search.requirements import Goal, Requirement
 from sbafab.search.space import SearchSpace
 from sbafab.search.told import (
@@ -82,6 +83,30 @@ class FoundDesign:
     def missed(self) -> list[str]:
         """What the best design breaks, a sentence each; empty where it holds."""
         return misses(self.wanted, self.best)
+
+    @property
+    def measured(self) -> dict[str, Counterpart]:
+        """What the paper measured, by quantity, where its model is off by more than a quarter."""
+        if self.best.laminate is None:
+            return {}
+        subject = self._subject
+        found = {one.said: subject.counterpart(one) for one in self.wanted.quantities}
+        return {name: one for name, one in found.items() if one is not None}
+
+    @property
+    def full_stroke(self) -> float | None:
+        """The full stroke of the best design in mm, as ``predict`` has it; None for drawn ones."""
+        if self.best.laminate is None:
+            return None
+        try:
+            return self._subject.full_stroke
+        except DesignError:
+            return None
+
+    @property
+    def _subject(self) -> Subject:
+        assert self.best.laminate is not None
+        return Subject(self.wanted.design.with_(dict(self.best.values)), self.best.laminate)
 
     @property
     def broken_rules(self) -> list[str]:

@@ -8,7 +8,9 @@ from dataclasses import replace
 from sbafab.design.form import Free
 from sbafab.design.messages import shown
 from sbafab.design.records import Design
+from sbafab.design.writing import keys_of
 from sbafab.errors import DesignError
+from sbafab.search.space import numbers_of
 from sbafab.search.vary import read_varied, refuse_unknown
 
 
@@ -17,9 +19,11 @@ def read_free(
 ) -> tuple[Free, ...]:
     """The family's own keys without those ``fixed``, and those of the ``texts`` in their place.
 
-    Keys that are ``given`` by hand stay as they are; what the design must fit gives its chamber.
-    Raises DesignError.
+    Keys that are ``given`` by hand stay as they are, but for lists, which are scaled as a whole;
+    what the design must fit gives its chamber. Raises DesignError.
     """
+    keys = {key: value for key, value, _ in keys_of(design)}
+    given = [key for key in given if not numbers_of(keys.get(key))]
     varied = [_stepped(text) for text in texts]
     refuse_unknown(design, [read_varied(text, "--free") for text in texts], "--free")
     own = {one.key: one for one in design.free}
@@ -37,6 +41,11 @@ def read_free(
         del own[key]
     # What is named is free whatever the requirements name.
     own |= {one.key: one for one in varied}
+    if "stack.balloons" in own and numbers_of(keys.get("chamber.diameter")):
+        raise DesignError(
+            "--free stack.balloons: chamber.diameter lists a diameter for each balloon, and a "
+            "search scales that list; leave it out, or give one diameter"
+        )
     return tuple(own.values())
 
 

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from sbafab.design.records import Design
 from sbafab.design.writing import design_sha256
+from sbafab.models.counterparts import counterpart_of_column
 from sbafab.output.settings import GENERATOR
 from sbafab.search.plots import Dots, Objective, passes_svg, trades_svg
 from sbafab.search.table import Table
@@ -70,7 +71,14 @@ def sweep_html(design: Design, varied: Sequence[Varied], table: Table) -> str:
         head=[*keys, *(one.label for one in objectives)],
         best=[(n + 1, [_cell(dots.columns[name][n]) for name in wanted]) for n in listed],
         unlisted=len(best) - len(listed),
+        measured=_measured(design, objectives),
     )
+
+
+def _measured(design: Design, objectives: Sequence[Objective]) -> list[tuple[str, str]]:
+    """What the paper measured beside figures whose model is off by more than a quarter of it."""
+    found = [(one.label, counterpart_of_column(design.form, one.column)) for one in objectives]
+    return [(label, row.sentence()) for label, row in found if row is not None]
 
 
 def _values_said(one: Varied) -> str:

@@ -1,7 +1,7 @@
-"""What a requirement may be about: sizes, mass, yield, stroke and force of a design, and its keys.
+"""What a requirement may be about: sizes, mass, yield, stroke, bend, force, and a design's keys.
 
-Strokes and forces are those of the elastic balloon, one on the other: all balloons of a stack push
-with the same force, and each rises by its share of the stroke.
+Each is the figure that ``predict`` has, from the same function: a stroke without a pressure is its
+full stroke, one at a pressure its free stroke; bends and forces are those of the elastic stack.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -25,31 +25,35 @@ from sbafab.design.writing import keys_of
 from sbafab.errors import DesignError
 from sbafab.laminate.extent import film_mass
 from sbafab.laminate.laminate import Laminate
-from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.actuator import NO_OUTLINE, Actuator, actuator
+from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
+from sbafab.models.counterparts import BALLOON as ELASTIC_BALLOON
+from sbafab.models.counterparts import FLAT_HEIGHT_OF_FILMS, Counterpart, counterpart
+from sbafab.models.counterparts import STACK as ELASTIC_STACK
+from sbafab.models.figures import Factors
 from sbafab.models.force import force
-from sbafab.models.kinematics import slot_stack
-from sbafab.models.rippled import pressed, taller
+from sbafab.models.paper import HEIGHTS
+from sbafab.models.rippled import pressed, risen
+from sbafab.models.series import blocked
 from sbafab.models.sizes import sizes
+from sbafab.models.stack import Stack, stack
+from sbafab.search.quantity_names import QUANTITIES
 
 SHARES = np.linspace(0.1, 1.0, 10)
 """Of the pressure asked for: tried until the film would be longer than MOST_STRETCH."""
 USUAL_KPA = 10.0
 _PRESSURE = re.compile(r"\s*(\d+\.?\d*|\.\d+)\s*([A-Za-z]+)\s*")
-SIZES = (
-    "overall_diameter",
-    "outline_diameter",
-    "deflated_diameter",
-    "inflated_diameter",
-    "reached_diameter",
-    "width",
-    "length",
-)
-PLAIN = {**dict.fromkeys(SIZES, "mm"), "height": "mm", "lumen": "mm", "mass": "g", "yield": ""}
-AT = {"stroke": "mm", "force": "N"}
-UNITS = {"g": {"g": 1.0, "mg": 0.001, "kg": 1000.0}, "N": {"N": 1.0, "mN": 0.001, "kN": 1000.0}}
-"""Of masses and forces; lengths have those of design files."""
+AT = {one.name: one.unit for one in QUANTITIES if "@" in one.written}
+"""Quantities that are told at a pressure."""
+PLAIN = {one.name: one.unit for one in QUANTITIES if one.name not in AT}
+UNITS = {
+    "g": {"g": 1.0, "mg": 0.001, "kg": 1000.0},
+    "N": {"N": 1.0, "mN": 0.001, "kN": 1000.0},
+    "deg": {"deg": 1.0},
+}
+"""Of masses, forces and angles; lengths have those of design files."""
 _VALUE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
 KEYS = {"lumen": "lumen.diameter"}
 """Quantities that are keys: they are asked for, and need no model."""
@@ -57,7 +61,10 @@ ROUND_A_TUBE = ("deflated_diameter", "inflated_diameter", "reached_diameter")
 REACHED, WIDEST = "reached_diameter", "inflated_diameter"
 """Inflated round a tube: the lower figure, for a wall that it must reach, and the upper end, for
 one that it must not touch."""
-HOW = 'for example overall_diameter, mass, "stroke@50kPa", "force@12.5mm@50kPa" or chamber.diameter'
+HOW = (
+    'for example overall_diameter, mass, stroke, "stroke@50kPa", "bend@5kPa", "force@12.5mm@50kPa" '
+    "or chamber.diameter"
+)
 
 
 @dataclass(frozen=True)
@@ -70,6 +77,11 @@ class AskedQuantity:
     unit: str
     kpa: float | None = None
     stroke: float | None = None
+
+    @property
+    def is_full_stroke(self) -> bool:
+        """Whether it is the stroke that belongs to no pressure."""
+        return self.name == "stroke" and self.kpa is None
 
     @property
     def said(self) -> str:
@@ -89,9 +101,11 @@ def read_quantity(text: str, kpa: float | None = None) -> AskedQuantity:
     if name in AT:
         return _at(name, places, text, kpa)
     if places:
-        raise DesignError(f"{shown(text)}: only stroke and force are told at a pressure; {HOW}")
+        raise DesignError(
+            f"{shown(text)}: only stroke, bend and force are told at a pressure; {HOW}"
+        )
     if name not in PLAIN and "." not in name:
-        known = [*PLAIN, *AT]
+        known = list(dict.fromkeys(one.name for one in QUANTITIES))
         near = difflib.get_close_matches(name, known, 1)
         mends = f"did you mean {near[0]}?" if near else f"there are {listed(known)} and any key"
         raise DesignError(f"{shown(text)} is no quantity; {mends}")
@@ -127,7 +141,12 @@ def _at(name: str, places: list[str], text: str, kpa: float | None) -> AskedQuan
                 f"{shown(text)}: {shown(place)} is neither a pressure nor a length; {HOW}"
             ) from None
     if (name == "force") != (stroke is not None):
-        raise DesignError(f"{shown(text)}: a force is told at a stroke, a stroke is not; {HOW}")
+        raise DesignError(
+            f"{shown(text)}: a force is told at a stroke, {'a stroke' if name != 'bend' else name} "
+            f"is not; {HOW}"
+        )
+    if pressure is None and name == "stroke":
+        return AskedQuantity(name, AT[name])
     if pressure is None:
         pressure = USUAL_KPA if kpa is None else kpa
     force(pressure, 0.0)
@@ -216,10 +235,8 @@ class Subject:
         """Raises DesignError where the design has no such quantity, or no model knows it."""
         if quantity.name == "yield":
             return share_of_good()
-        if quantity.name == "stroke":
-            return self._stroke(quantity.kpa or 0.0)
-        if quantity.name == "force":
-            return self._force(quantity.stroke or 0.0, quantity.kpa or 0.0)
+        if quantity.name in AT:
+            return self._moved(quantity)
         if quantity.name == "mass":
             return film_mass(self.laminate)
         if quantity.name == "height":
@@ -233,25 +250,84 @@ class Subject:
             return float(found)
         raise DesignError(f"{self.design.name} has no {quantity.name} that is a number")
 
+    def _moved(self, quantity: AskedQuantity) -> float:
+        """A stroke, bend or force."""
+        kpa = quantity.kpa
+        if kpa is None:
+            return self.full_stroke
+        if quantity.name == "stroke":
+            return self._stroke(kpa)
+        if quantity.name == "bend":
+            return self._bend(kpa)
+        return self._force(quantity.stroke or 0.0, kpa)
+
+    @cached_property
+    def _actuator(self) -> Actuator:
+        return actuator(self.design, self.laminate, Factors())
+
+    @cached_property
+    def _stack(self) -> Stack:
+        return stack(self.design, self.laminate)
+
+    @property
+    def full_stroke(self) -> float:
+        """What ``predict`` calls the full stroke, mm. Raises DesignError where no model has one."""
+        if not self._actuator.kinematics:
+            raise DesignError(NO_OUTLINE)
+        return self._actuator.full_stroke
+
     def _stroke(self, kpa: float) -> float:
-        pockets = self.design.form.pockets
-        if isinstance(pockets, Slots):
-            stack = slot_stack(pockets.width, pockets.run, self.design.stack.balloons)
-            return stack[0].largest_stroke
+        if isinstance(self.design.form.pockets, Slots):
+            return self.full_stroke
         kinds = balloons_of(self.design, self.laminate)
         return sum(kinds.count(kind) * free_height(kind, kpa) for kind in dict.fromkeys(kinds))
+
+    def _bend(self, kpa: float) -> float:
+        if not self.design.form.is_parallel:
+            raise DesignError(f"{self.design.name} does not bend; only chambers side by side do")
+        return self._stack.pose((kpa, *(0.0,) * (self._stack.chambers - 1))).bend
 
     def _force(self, stroke: float, kpa: float) -> float:
         form = self.design.form
         if isinstance(form.pockets, Slots):
-            first = slot_stack(form.pockets.width, form.pockets.run, self.design.stack.balloons)[0]
+            first = self._actuator.kinematics[0]
             if stroke > first.largest_stroke:
                 return first.largest_stroke - stroke
             return form.pushing * float(force(kpa, first.rate(stroke)))
         kinds = balloons_of(self.design, self.laminate)
-        if len(set(kinds)) > 1:
-            raise DesignError("the force of a tapered stack at a stroke is not searched for")
-        return form.pushing * pressed_force(kinds[0], kpa, stroke / len(kinds)) / 1000
+        push = float(blocked(self._stack, kpa, stroke))
+        if push <= 0:
+            maps = self._stack.maps
+            free = sum(float(maps[level].free_height(kpa)) for level in self._stack.levels)
+            # How far it is from getting there, in the force of so much of it.
+            least = min(kind.pocket for kind in kinds)
+            return -kpa / 1000 * math.pi * least**2 * max(stroke / max(free, 1e-6) - 1, 0.0)
+        _refuse_stretched(kinds, kpa, stroke)
+        return form.pushing * push
+
+    def counterpart(self, quantity: AskedQuantity) -> Counterpart | None:
+        """What the paper measured beside a quantity whose model is off by more than a quarter."""
+        name, model = self._figure(quantity)
+        return counterpart(self.design.form, name, model)
+
+    def _figure(self, quantity: AskedQuantity) -> tuple[str, str]:
+        """The name of the figure in ``predict``, and that of its model."""
+        at = f"at {quantity.kpa or 0.0:g} kPa"
+        if quantity.name == "height":
+            return "deflated height", FLAT_HEIGHT_OF_FILMS
+        if quantity.name == "bend":
+            return f"bend {at} in one chamber, the others empty", ELASTIC_STACK
+        if isinstance(self.design.form.pockets, Slots):
+            return "", ""
+        if quantity.name == "stroke" and not quantity.is_full_stroke:
+            return f"free stroke {at}", ELASTIC_BALLOON
+        if quantity.name == "force":
+            # Of the three heights at which forces were measured the nearest.
+            share = (quantity.stroke or 0.0) / self.full_stroke
+            near = min(HEIGHTS, key=lambda one: abs(one - share))
+            where = f"at {100 * near:g} % of full stroke" if near else "flat"
+            return f"blocked force {at}, {where}", ELASTIC_STACK
+        return "", ""
 
 
 @lru_cache(maxsize=4096)
@@ -260,30 +336,24 @@ def free_height(kind: Balloon, kpa: float) -> float:
 
     The latter is less than it would rise by.
     """
-    shapes = inflate(kind, SHARES * kpa)
-    high = shapes.height * taller(kind, shapes.pressure).share
-    return float(np.interp(MOST_STRETCH, stretch(kind, shapes), high))
+    shape = risen(kind, [kpa])
+    if float(stretch(kind, shape)[0]) <= MOST_STRETCH:
+        return float(shape.height[0])
+    shapes = risen(kind, SHARES * kpa)
+    return float(np.interp(MOST_STRETCH, stretch(kind, shapes), shapes.height))
 
 
-@lru_cache(maxsize=4096)
-def pressed_force(kind: Balloon, kpa: float, height: float) -> float:
-    """The force in mN of a balloon between plates at a height; below 0 where it does not get there.
-
-    Raises DesignError where its film would be stretched too far.
-    """
-    free = free_height(kind, kpa)
-    if height > free:
-        # How far it is from getting there, in the force of so much of it.
-        return -kpa * math.pi * kind.pocket**2 * (height / max(free, 1e-6) - 1)
-    shape = pressed(kind, [kpa], [max(height, 1e-3)])
-    longer = float(stretch(kind, shape)[0])
-    if longer > MOST_STRETCH:
-        raise DesignError(
-            f"at {kpa:g} kPa and a rise of {height:.3g} mm a balloon's film would be "
-            f"{100 * longer:.0f} % longer, and one modulus is unlikely to hold beyond "
-            f"{100 * MOST_STRETCH:g} %"
-        )
-    return float(shape.force[0])
+def _refuse_stretched(kinds: Sequence[Balloon], kpa: float, stroke: float) -> None:
+    """Raises DesignError where a film would be stretched too far at a stroke in mm."""
+    for kind in dict.fromkeys(kinds):
+        height = stroke * kind.pocket / sum(one.pocket for one in kinds)
+        longer = float(stretch(kind, pressed(kind, [kpa], [max(height, 1e-3)]))[0])
+        if longer > MOST_STRETCH:
+            raise DesignError(
+                f"at {kpa:g} kPa and a rise of {height:.3g} mm a balloon's film would be "
+                f"{100 * longer:.0f} % longer, and one modulus is unlikely to hold beyond "
+                f"{100 * MOST_STRETCH:g} %"
+            )
 
 
 def refuse_unknown_key(quantity: AskedQuantity, design: Design) -> None:

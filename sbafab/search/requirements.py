@@ -60,7 +60,7 @@ class Goal:
         return f"{'most' if self.more else 'least'} {self.quantity.said}"
 
 
-GOOD_IF_MORE = ("stroke", "force", "yield", "lumen")
+GOOD_IF_MORE = ("stroke", "bend", "force", "yield", "lumen")
 """Of these as much as can be is best, of all others as little."""
 
 
@@ -69,7 +69,8 @@ def read_all(
 ) -> tuple[tuple[Requirement, ...], Goal]:
     """The requirements of ``QUANTITY=VALUE`` texts, and the goal. Raises DesignError.
 
-    A stroke without a pressure is one at the highest that any of them names.
+    A bend or a force without a pressure is one at the highest that any of them names; a stroke
+    without one is the full stroke.
     """
     pairs = [(text, True) for text in least] + [(text, False) for text in most]
     kpa = named_pressure([text.partition("=")[0] for text, _ in pairs] + [best])

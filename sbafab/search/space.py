@@ -14,6 +14,11 @@ from sbafab.search.trial import Steps, Trial, Wanted, tried
 TRYING = "trying designs"
 
 
+def numbers_of(value: Any) -> list[float]:
+    """The numbers of a key that lists some, such as one diameter a balloon; else none."""
+    return list(map(float, value)) if isinstance(value, list | tuple) and value else []
+
+
 class SearchSpace:
     """The designs that were tried, each once, by the steps of their free keys.
 
@@ -29,6 +34,7 @@ class SearchSpace:
         self.highs = [int(round((one.high - one.low) / one.step, 6)) for one in free]
         self.trials: dict[Steps, Trial] = {}
         self._tell = tell
+        self._keys: dict[str, Any] = {key: value for key, value, _ in keys_of(wanted.design)}
 
     @property
     def is_over(self) -> bool:
@@ -44,22 +50,34 @@ class SearchSpace:
         """How many values each key takes."""
         return [high - low + 1 for low, high in zip(self.lows, self.highs, strict=True)]
 
+    def number(self, axis: int, place: Steps) -> float:
+        """The value of a key at a place; of a list its largest number."""
+        return round(self.free[axis].low + place[axis] * self.free[axis].step, 6)
+
     def values(self, place: Steps) -> Mapping[str, Any]:
-        """The keys' values at a place, whole numbers where low and step are."""
+        """The keys' values at a place, whole numbers where low and step are.
+
+        A list, such as the diameters of a tapered stack, is scaled as a whole.
+        """
         found: dict[str, Any] = {}
-        for free, step in zip(self.free, place, strict=True):
-            value = round(free.low + step * free.step, 6)
+        for axis, free in enumerate(self.free):
+            value = self.number(axis, place)
             is_whole = free.low == int(free.low) and free.step == int(free.step)
-            found[free.key] = int(value) if is_whole else value
+            known = numbers_of(self._keys.get(free.key))
+            if known:
+                found[free.key] = [round(value * one / max(known), 2) for one in known]
+            else:
+                found[free.key] = int(value) if is_whole else value
         return found
 
     def nearest(self) -> Steps:
         """Where the design itself stands, or as near as the free keys come to it."""
-        keys = {key: value for key, value, _ in keys_of(self.wanted.design)}
         found = []
         for free in self.free:
-            own: Any = keys.get(free.key)
-            at = own if isinstance(own, int | float) else (free.low + free.high) / 2
+            value: Any = self._keys.get(free.key)
+            known = numbers_of(value)
+            at = max(known) if known else value
+            at = at if isinstance(at, int | float) else (free.low + free.high) / 2
             found.append(round((at - free.low) / free.step))
         return self.inside(found)
 
@@ -91,7 +109,7 @@ class SearchSpace:
     def is_asked(self, axis: int, place: Steps) -> bool:
         """Whether a requirement itself keeps the key from its value at the place."""
         key = self.free[axis].key
-        at = float(self.values(place)[key])
+        at = self.number(axis, place)
         return any(
             one.quantity.key == key and not one.holds(at) for one in self.wanted.requirements
         )

@@ -41,7 +41,8 @@ class SweepRequest:
     """What is swept and how: ``samples`` drawn by Latin hypercube, or the whole grid.
 
     ``workers`` processes of this machine (as many as processors by default), or the cluster behind
-    ``dask``; each design may take ``seconds``.
+    ``dask``; each design may take ``seconds``. ``all_columns``: the tables hold every key, rule
+    and figure.
     """
 
     design: Design
@@ -52,6 +53,7 @@ class SweepRequest:
     workers: int | None = None
     dask: str | None = None
     seconds: float = SECONDS
+    all_columns: bool = False
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,9 @@ def sweep(request: SweepRequest, out: Path, tell: Progress = unheard) -> SweptDe
         finally:
             journal.close()
         tell("writing tables", 0, 1)
-        table = Table(lambda: journal.rows(iter(keys)), values)
+        table = Table(
+            lambda: journal.rows(iter(keys)), values, request.pressures_kpa, request.all_columns
+        )
         gone = no_longer_asked(folder / CSV, table)
         files = _write(folder, request, table)
     outcomes = Counter(row["outcome"] for row in table.rows())

@@ -23,6 +23,21 @@ PARTS = (("verdict", 0), ("margin", 1), ("measured", 2), ("limit", 3))
 """Columns of each rule, and where they stand in its list."""
 HEAD = ("number", "sha256", "outcome", "reason")
 """The first columns, whatever is varied."""
+FIRST = (
+    "outline diameter",
+    "overall diameter",
+    "deflated diameter",
+    "reached diameter",
+    "deflated height",
+    "mass",
+    "full stroke",
+)
+"""Figures that are looked for first, whatever the pressure."""
+MOVED = ("free stroke", "bend", "blocked force", "blocked force of one SBA")
+"""Those at a pressure."""
+YIELD = "registration-yield.measured"
+LITTLE = 0.005
+"""Share of a limit that is nothing to spare."""
 BATCH = 1000
 """Rows in memory at a time."""
 
@@ -35,11 +50,22 @@ class Column(NamedTuple):
 
 
 class Table:
-    """Rows that are read anew each time, so that as many fit as the disk holds."""
+    """Rows that are read anew each time, so that as many fit as the disk holds.
 
-    def __init__(self, rows: Callable[[], Iterator[SweepRow]], values: Sequence[Values]) -> None:
+    Files get the columns that a reader looks for first; ``is_whole``: all of them.
+    """
+
+    def __init__(
+        self,
+        rows: Callable[[], Iterator[SweepRow]],
+        values: Sequence[Values],
+        pressures_kpa: Sequence[float] = (),
+        is_whole: bool = False,
+    ) -> None:
         self.rows = rows
         self.values = values
+        self.pressures_kpa = pressures_kpa
+        self.is_whole = is_whole
 
     def __len__(self) -> int:
         return len(self.values)
@@ -62,11 +88,43 @@ class Table:
         names = [name for part in order for name in part]
         return tuple(Column(name, kinds.get(name, True)) for name in names)
 
-    def cells(self) -> Iterator[list[Any]]:
-        """The cells of every row, None where there is nothing."""
+    @cached_property
+    def written(self) -> tuple[Column, ...]:
+        """The columns of the files: what was varied, what was asked for, and rules that bind; then
+        all others, where they were asked for.
+        """
+        known = {column.name: column for column in self.columns}
+        varied = [name for values in self.values for name in values]
+        first = [*HEAD, *varied, *self._asked(list(known)), *self._binding()]
+        rest = known if self.is_whole else ()
+        return tuple(known[name] for name in dict.fromkeys([*first, *rest]) if name in known)
+
+    def _asked(self, names: Sequence[str]) -> Iterator[str]:
+        """Of each figure that is looked for first the column by the model to design with."""
+        each = [f"{what} at {kpa:g} kPa" for kpa in self.pressures_kpa for what in MOVED]
+        for begins in (*FIRST, *each):
+            yield from [name for name in names if name.startswith(begins)][:1]
+        yield YIELD
+
+    def _binding(self) -> Iterator[str]:
+        """Verdict and margin of the rules that fail, warn or have nothing to spare anywhere."""
+        found = {
+            name
+            for row in self.rows()
+            for name, (verdict, margin, _, limit, _) in row.get("rules", {}).items()
+            if verdict != "pass"
+            or (margin is not None and limit and abs(margin) < LITTLE * abs(limit))
+        }
+        for name in rule_names():
+            if name in found:
+                yield from (f"{name}.verdict", f"{name}.margin")
+
+    def cells(self, columns: Sequence[Column] | None = None) -> Iterator[list[Any]]:
+        """The cells of every row in these columns, or in all; None where there is nothing."""
+        wanted = self.columns if columns is None else columns
         for row in self._flat():
             every = {name: cell for part in row for name, cell in part.items()}
-            yield [_cell(every.get(name), is_number) for name, is_number in self.columns]
+            yield [_cell(every.get(name), is_number) for name, is_number in wanted]
 
     def _flat(self) -> Iterator[tuple[dict[str, Any], ...]]:
         for number, (row, values) in enumerate(zip(self.rows(), self.values, strict=True), 1):
@@ -102,9 +160,10 @@ def _cell(value: Any, is_number: bool) -> Any:
 
 
 def write_csv(table: Table, path: Path) -> None:
-    """Writes every row; empty cells are what is not known."""
+    """Writes every row in the table's ``written`` columns; empty cells are what is not known."""
     with table.replacing(path) as opened:
-        write_rows(opened, chain([[column.name for column in table.columns]], table.cells()))
+        names = [column.name for column in table.written]
+        write_rows(opened, chain([names], table.cells(table.written)))
 
 
 def write_times(table: Table, path: Path) -> None:
@@ -125,11 +184,11 @@ def write_parquet(table: Table, path: Path) -> bool:
     except ImportError:
         return False
     schema = pa.schema(
-        [(name, pa.float64() if is_number else pa.string()) for name, is_number in table.columns]
+        [(name, pa.float64() if is_number else pa.string()) for name, is_number in table.written]
     )
     begun = path.with_name(f".{path.name}.part")
     with parquet.ParquetWriter(begun, schema) as written:
-        for rows in _batches(table.cells()):
+        for rows in _batches(table.cells(table.written)):
             columns = [
                 pa.array(column, field.type)
                 for column, field in zip(zip(*rows, strict=True), schema, strict=True)

@@ -105,7 +105,7 @@ def range_ends(space: SearchSpace, place: Steps, best: Trial) -> list[RangeEnd]:
                 round(one.low + step * one.step, 6)
                 for step in (space.lows[axis], space.highs[axis])
             )
-            found.append(RangeEnd(one.key, best.values[one.key], low, high, one.step))
+            found.append(RangeEnd(one.key, space.number(axis, place), low, high, one.step))
     return found
 
 

@@ -142,6 +142,16 @@ def misses(wanted: Wanted, trial: Trial) -> list[str]:
     return [*said, *broken_rules(trial)]
 
 
+def value_said(value: Any) -> str:
+    """The value of a key, a list in brackets."""
+    return f"[{', '.join(map(value_said, value))}]" if isinstance(value, list) else f"{value:g}"
+
+
+def keys_said(values: Mapping[str, Any]) -> str:
+    """Keys with their values, as people read them."""
+    return ", ".join(f"{key} = {value_said(value)}" for key, value in values.items())
+
+
 def broken_rules(trial: Trial) -> list[str]:
     """The rules that a design breaks, a sentence each."""
     failed = [one for one in (trial.rules or {}).values() if one.verdict == "fail"]

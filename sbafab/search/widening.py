@@ -31,7 +31,7 @@ def _moved_ends(space: SearchSpace, place: Steps) -> bool:
         beyond = {-1: place[axis] == space.lows[axis], 1: place[axis] == space.highs[axis]}
         for sign, is_at_end in beyond.items():
             other = tuple(at + sign * (own == axis) for own, at in enumerate(place))
-            value = float(space.values(other)[free.key])
+            value = space.number(axis, other)
             if not free.widens or not is_at_end or value <= 0 or space.is_asked(axis, other):
                 continue
             if sign > 0:

@@ -56,6 +56,7 @@ def stack_model(name: str, stack: Stack) -> dict[str, Any]:
             for one in stack.maps
         ],
         "most_pressure": min(one.most_pressure for one in stack.maps),
+        "measured": stack.counterparts,
     }
 
 

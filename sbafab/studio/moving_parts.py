@@ -95,6 +95,7 @@ def whole_prediction(
             "model": one.model,
             "trust": f"The paper: {one.paper}" if one.paper else "",
             "design_with": True,
+            "measured": {"sentence": one.measured} if one.measured else None,
         }
         for one in found.figures
     ]

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from click.shell_completion import ShellComplete
 
+import sbafab
 from sbafab.assemblies.checks import CHECKS
 from sbafab.cli import app, main
 from sbafab.cli.verdicts import limit_said
@@ -258,3 +259,57 @@ def test_help_cuts_no_command_short(
     lines = [line for line in out.splitlines() if line.split()[:1] and line.split()[0] in ours]
     assert len(lines) >= len(ours)
     assert [line for line in lines if line.endswith("...")] == []
+
+
+def test_python_counts_rules_as_the_command_does(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = run(["check", "1dof-5mm"], capsys)
+    said = out.splitlines()[-1].partition("holds: ")[2].partition(".")[0]
+    assert repr(sbafab.check("1dof-5mm")) == f"Findings({said})"
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("record", "Result of the leak test."),
+        ("sweep", "Take this rule's failure as accepted in every design"),
+        ("find", "Folder that receives found.toml"),
+        ("picture", "NAME-flat.png"),
+    ],
+)
+def test_help_says_what_the_command_does(
+    command: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, out, _ = run([command, "--help"], capsys)
+    said = " ".join(out.split())
+    assert words in said
+    assert "LabResult" not in said
+    if command == "sweep":
+        # It writes none.
+        assert "cut files" not in said
+
+
+def test_known_keys_are_those_that_a_file_may_hold(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kit = tmp_path / "mine.toml"
+    kit.write_text('schema = "sbafab/kit@1"\nname = "mine"\nversion = "1"\nfoo = "bar"\n')
+    code, _, err = run(["check", "1dof-5mm", "--set", f"kit={kit}"], capsys)
+    assert code == 2
+    known = err.partition("known here: ")[2].strip().split(", ")
+    assert "schema" in known
+    assert "schema_name" not in known
+
+
+def test_mesh_formats_are_called_as_they_are_written() -> None:
+    """The version of Gmsh's format, wherever it is named, is the one in the files' first lines."""
+    root = Path(__file__).parents[2]
+    writer = (root / "sbafab/meshing/conforming/write_msh.py").read_text(encoding="utf-8")
+    version = re.findall(r"MeshFormat.n(\d\.\d)", writer)[0]
+    places = [*root.glob("docs/*.md"), *root.glob("docs/scripts/*.py"), root / "README.md"]
+    named = [
+        found
+        for place in places
+        for found in re.findall(r"(?:MSH|Gmsh) (\d\.\d)", place.read_text(encoding="utf-8"))
+    ]
+    assert named
+    assert set(named) == {version}

@@ -18,7 +18,7 @@ def test_check_opens_with_the_size_and_gives_it_to_programs() -> None:
     # which lies farther than the tab's own, 8.25 out and 1.725 aside.
     assert said == [
         "size: 17.61 mm overall diameter with 1 inlet tab, 6.50 without, 12.50 x 7.50 mm,",
-        "      folded height 0.731 mm",
+        "      folded height 0.731 mm (paper's 3-DoF 0.95, not 1.865)",
     ]
     told = json.loads(CliRunner().invoke(app, ["check", "1dof-5mm", *QUICK, "--json"]).output)
     assert round(told["sizes"]["1dof-5mm"]["overall_diameter"], 2) == 17.61

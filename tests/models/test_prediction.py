@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -201,6 +203,113 @@ def test_more_than_half_a_turn_is_left_out() -> None:
     bends = [left for left in found.left_out if left.name.startswith("bend with")]
     assert len(bends) == 2
     assert "half a turn" in bends[0].reason
+
+
+def _drawn(folder: Path, shape: str) -> str:
+    """A change that gives a design a drawn pocket."""
+    (folder / "pocket.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="20mm" height="20mm" '
+        f'viewBox="-10 -10 20 20">{shape}</svg>'
+    )
+    return f'chamber.outline="{folder / "pocket.svg"}"'
+
+
+def _polygon(corners: int, reach: float) -> str:
+    turns = [math.tau * (number + 0.5) / corners for number in range(corners)]
+    points = " ".join(f"{reach * math.cos(t):.6f},{reach * math.sin(t):.6f}" for t in turns)
+    return f'<polygon points="{points}"/>'
+
+
+def test_a_drawn_disc_is_predicted_as_a_round_pocket(tmp_path: Path) -> None:
+    few = {"balloons": 2}
+    drawn = sbafab.predict("3dof-15mm", _drawn(tmp_path, '<circle r="2.5"/>'), stack=few)
+    plain = sbafab.predict("3dof-15mm", stack=few)
+    by_name = {(one.name, one.model.name): one.value for one in plain.figures}
+    found = [one for one in drawn.figures if one.between is not None]
+    assert {one.group for one in found} >= {"stroke", "force", "actuation", "bending", "stiffness"}
+    for one in found:
+        known = by_name[one.name, one.model.name.removesuffix(", disc of equal area")]
+        assert one.value == pytest.approx(known, rel=1e-5), one.name
+        assert one.between == pytest.approx((known, known), rel=1e-5)
+
+
+def test_a_drawn_octagon_stands_between_two_discs(tmp_path: Path) -> None:
+    change = _drawn(tmp_path, _polygon(8, 3.0))
+    found = sbafab.predict("1dof-5mm", change, "stack.balloons=2", pressures_kpa=[5.0])
+    figures = {one.name: one for one in reversed(found.figures)}
+    # Area 2 sqrt(2) r^2, within it a disc of r cos(22.5 degrees).
+    equal = 3.0 * math.sqrt(2 * math.sqrt(2) / math.pi)
+    inner = 3.0 * math.cos(math.pi / 8)
+    full = figures["full stroke"]
+    per_mm = 2 * 17.5 / 15 / 2.5
+    assert full.value == pytest.approx(per_mm * equal)
+    assert full.between == pytest.approx((per_mm * inner, per_mm * 3.0))
+    for name, radius in (("inner", inner), ("outer", 3.0)):
+        chamber = {"diameter": 2 * radius}
+        disc = sbafab.predict("1dof-5mm", stack={"balloons": 2}, chamber=chamber, pressures_kpa=[5])
+        end = figures["free stroke at 5 kPa"].between
+        assert end is not None
+        told = end[0 if name == "inner" else 1]
+        assert told == pytest.approx(disc.value("free stroke at 5 kPa"), rel=1e-6)
+    assert "disc of d = " in full.model.trust
+    assert "between" in figures["free stroke at 5 kPa"].aside
+    # Sizes are those of the drawing itself, and so is the upper bound of the force.
+    assert figures["mass"].between is None
+    assert figures["blocked force at 5 kPa, flat, at most"].between is None
+
+
+def test_a_drawn_square_is_not_taken_for_a_disc(tmp_path: Path) -> None:
+    found = sbafab.predict("1dof-5mm", _drawn(tmp_path, _polygon(4, 4.0)))
+    (left,) = [one for one in found.left_out if one.name == "stroke"]
+    # Its corners lie 1.41 times as far from the axis as its sides.
+    assert "2.83 to 4 mm" in left.reason
+    assert "sbafab simulate" in left.reason
+
+
+def test_a_verdict_says_stroke_bend_force_and_what_is_left_out(three: Prediction) -> None:
+    lines = three.verdict
+    assert [line.quantity for line in lines][:4] == ["stroke", "stroke", "bend", "force"]
+    assert len(lines) < 8
+    force = next(line for line in lines if line.quantity == "force")
+    eq_4 = three.value("blocked force at 100 kPa, flat", "virtual work on Eq. 4")
+    # Sec. 4.3: the farthest of the six are 0.64 N (1-DoF, 75 %) and 4.87 N (3-DoF, flat).
+    alone = 0.1 * float(printed.rate(0.75 * 17.5 / 15, 2.5))
+    assert f"{eq_4 * 0.64 / alone:.3g} to 4.87 N" in force.note
+    left = [line for line in lines if line.quantity == "left out"]
+    assert {name for line in left for name in line.figure.split(", free")} >= {
+        left.name.split(", free")[0] for left in three.left_out
+    }
+    assert [line["quantity"] for line in three.as_dict()["verdict"]] == [
+        line.quantity for line in lines
+    ]
+
+
+def test_frames_are_rows_with_names(three: Prediction, monkeypatch: pytest.MonkeyPatch) -> None:
+    frame = three.frame()
+    assert len(frame) == len(three.figures)
+    by_name = frame.set_index("name")["value"]
+    assert by_name["full stroke"] == pytest.approx(17.5)
+    assert "81 +- 6 deg" in frame.set_index("name")["measured"]["maximum lateral tip displacement"]
+    force = three.relation("force").frame()
+    assert force.attrs["y"] == "blocked force, N"
+    measured = force[force["model"] == "measured (paper)"]
+    # Sec. 4.3.
+    assert measured["y"].tolist() == [4.87, 4.07, 2.4]
+    assert measured["error"].tolist() == [0.02, 0.07, 0.03]
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(DesignError, match="pip install pandas"):
+        three.frame()
+
+
+def test_an_unknown_name_is_met_with_the_nearest_each_once(three: Prediction) -> None:
+    with pytest.raises(KeyError) as refused:
+        three.value("blocked force at 100 kPa, flt")
+    said = str(refused.value)
+    names = re.findall(r"'([^']+)'", said.partition("did you mean")[2])
+    assert "blocked force at 100 kPa, flat" in names
+    assert len(names) == len(set(names))
+    with pytest.raises(KeyError, match="did you mean 'force'"):
+        three.relation("forces")
 
 
 def test_drawn_outline_has_sizes_and_reasons_for_the_rest(tmp_path: Path) -> None:

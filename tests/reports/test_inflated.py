@@ -177,16 +177,23 @@ def test_the_command_says_what_it_drew_and_refuses_in_a_sentence(tmp_path: Path)
 
 
 @pytest.mark.parametrize("name", ["oval", "radial-15mm"])
-def test_what_no_model_inflates_is_drawn_flat_and_said_to_be(name: str, tmp_path: Path) -> None:
+def test_what_no_model_inflates_is_drawn_flat_and_said_to_be(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     design = str(GALLERY / f"{name}.toml") if name == "oval" else name
     arguments = ["picture", design, "--set", "stack.balloons=1", "--to"]
     for ending, wide in ((".png", ["--width", "160"]), (".glb", [])):
         path = tmp_path / f"shown{ending}"
         result = CliRunner().invoke(app, [*arguments, str(path), *wide])
         assert result.exit_code == 0, result.output
-        assert f"{name}, flat, for no model inflates pockets" in result.output
+        assert f"{name}, flat, not inflated: no model inflates pockets" in result.output
     with Image.open(tmp_path / "shown.png") as image:
         assert image.size == (160, 128)
+    # Unnamed, it is named as what it is.
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    assert CliRunner().invoke(app, [*arguments[:-1], "--width", "160"]).exit_code == 0
+    assert [file.name for file in Path().iterdir()] == [f"{name}-flat.png"]
     mesh = trimesh.load(tmp_path / "shown.glb", force="mesh")
     laminate = sbafab.build(design, "stack.balloons=1")
     assert isinstance(mesh, trimesh.Trimesh)

@@ -18,6 +18,8 @@ from sbafab.errors import DesignError
 from sbafab.search import space as module
 from sbafab.search.find import FindRequest, find, free_keys
 from sbafab.search.free import read_free
+from sbafab.search.quantities import read_quantity
+from sbafab.search.quantity_names import QUANTITIES
 from sbafab.search.requirements import read_all
 from sbafab.search.trial import Trial, Wanted
 
@@ -192,6 +194,66 @@ def test_a_file_in_no_folder_is_refused_before_the_search(tmp_path: Path) -> Non
     assert "trying designs" not in ended.output
 
 
+def test_a_folder_gets_found_toml(tmp_path: Path) -> None:
+    asked = ["find", "1dof-5mm", "--max", "mass=1", "--tries", "4", "-o", str(tmp_path / "new")]
+    ended = CliRunner().invoke(app, asked)
+    assert ended.exit_code == 0, ended.output
+    assert sbafab.load(tmp_path / "new" / "found.toml").name == "found"
+    assert CliRunner().invoke(app, asked).exit_code == 2
+    (tmp_path / "file").write_text("mine")
+    ended = CliRunner().invoke(app, [*asked[:-1], str(tmp_path / "file")])
+    assert ended.exit_code == 2
+    assert "is a file; name a folder with -o" in ended.output
+
+
+TAPER = ["--set", "chamber.diameter=[8, 7, 6]", "--set", "stack.balloons=3"]
+
+
+def test_a_taper_is_scaled_as_a_whole(tmp_path: Path) -> None:
+    target = tmp_path / "found.toml"
+    asked = ["find", "1dof-5mm", *TAPER, "--min", "stroke=4", "--tries", "200", "-o", str(target)]
+    ended = CliRunner().invoke(app, asked)
+    assert ended.exit_code == 0, ended.output
+    diameters: Any = sbafab.load(target).chamber.diameter  # type: ignore[attr-defined]
+    first, second, third = diameters
+    assert (second / first, third / first) == pytest.approx((7 / 8, 6 / 8), abs=0.002)
+    # Sec. 4.6: 17.5 mm of 15 balloons of d = 5; the largest diameter goes in steps of 0.1.
+    stroke = 17.5 / 15 / 5 * sum(diameters)
+    assert 4 <= stroke < 4 * (1 + 0.1 / first) + 0.01
+    assert f"stroke {stroke:.4g} mm; at least 4 mm" in ended.output
+    refused = CliRunner().invoke(app, [*asked[:-1], str(tmp_path / "b"), *BALLOONS])
+    assert refused.exit_code == 2
+    assert "a search scales that list" in refused.output
+
+
+BALLOONS = ["--free", "stack.balloons=2:4:1"]
+
+
+def test_a_stroke_is_not_met_by_what_predict_says_is_less(tmp_path: Path) -> None:
+    """The elastic balloon rises by 20 mm where in proportion to what was measured it is 14."""
+    target = tmp_path / "found.toml"
+    asked = ["find", "1dof-5mm", "--min", "stroke=20", "--max", "outline_diameter=8"]
+    ended = CliRunner().invoke(app, [*asked, "--tries", "60", "-o", str(target)])
+    assert ended.exit_code == 0, ended.output
+    assert sbafab.predict(target).value("full stroke") >= 20
+    target.unlink()
+    asked[3] = "stroke@10kPa=20"
+    ended = CliRunner().invoke(app, [*asked, "--tries", "60", "-o", str(target)])
+    assert ended.exit_code == 0, repr(ended.exception) + ended.output
+    full = sbafab.predict(target).value("full stroke")
+    assert full < 20
+    assert f"full stroke {full:.4g} mm" in ended.output
+
+
+def test_the_help_lists_every_quantity_with_its_unit() -> None:
+    said = CliRunner().invoke(app, ["find", "--help"]).output
+    lines = [" ".join(line.split()) for line in said.splitlines()]
+    for one in QUANTITIES:
+        assert any(line.startswith(f"{one.written} {one.unit}".strip()) for line in lines), one
+        name = one.written.replace("@H@P", "@1mm@5kPa").replace("@P", "@5kPa")
+        assert read_quantity(name).unit == one.unit
+
+
 def test_a_file_with_a_space_in_its_name_names_a_design_that_loads(tmp_path: Path) -> None:
     target = tmp_path / "my file.toml"
     asked = ["find", "1dof-5mm", "--max", "mass=1", "--tries", "6", "-o", str(target)]
@@ -211,7 +273,7 @@ def test_what_equals_the_best_is_told_by_its_mass(monkeypatch: pytest.MonkeyPatc
         return Trial(values, figures, {} if with_rules else None, missed, 5.0, 10.0 + n)
 
     monkeypatch.setattr(module, "tried", flat)
-    requirements, goal = read_all(["stroke=4"], [], "width")
+    requirements, goal = read_all(["stroke@10kPa=4"], [], "width")
     free = (Free("stack.balloons", 2, 9, 1),)
     found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, free))
     assert found.best.values == {"stack.balloons": 4}

@@ -49,7 +49,29 @@ def _here(
 def found(tmp_path_factory: pytest.TempPathFactory) -> SweptDesigns:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "run_jobs", _here)
-        return _swept(tmp_path_factory.mktemp("sweep"))
+        return _swept(tmp_path_factory.mktemp("sweep"), all_columns=True)
+
+
+def test_a_table_opens_with_what_was_varied_asked_for_and_binding(
+    found: SweptDesigns, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "run_jobs", _here)
+    short = _swept(tmp_path)
+    first, every = list(_rows(short)[0]), list(_rows(found)[0])
+    assert every[: len(first)] == first
+    assert len(first) < 30
+    assert len(every) > 100
+    varied = [text.partition("=")[0] for text in VARY]
+    assert first[4 : 4 + len(varied)] == varied
+    for asked in ("mass [g]", "full stroke [mm]", "free stroke at 10 kPa [mm]"):
+        assert asked in first
+    # A narrow bond fails bond-width, and the others have nothing to spare.
+    assert {"bond-width.verdict", "bond-width.margin"} <= set(first)
+    assert "piece-count.verdict" not in first
+    # All columns later: nothing is measured anew.
+    again = _swept(tmp_path, all_columns=True)
+    assert again.measured == 0
+    assert list(_rows(again)[0]) == every
 
 
 def test_each_row_says_what_check_and_predict_say(found: SweptDesigns) -> None:
@@ -121,7 +143,7 @@ def test_what_was_measured_before_is_not_measured_again(
         raise AssertionError("measured again")
 
     monkeypatch.setattr(module, "run_jobs", refuse)
-    again = _swept(found.folder.parent)
+    again = _swept(found.folder.parent, all_columns=True)
     assert again.measured == 0
     assert {name: (again.folder / name).read_bytes() for name in again.files} == before
     # Another pressure, another design or another program asks for something else.

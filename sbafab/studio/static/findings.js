@@ -69,7 +69,8 @@ export class Findings {
     const row = (figure) => {
       const was = before.get(named(figure));
       const change = was === undefined || was === figure.value ? "" : `${figure.value > was ? "+" : "−"}${significant(Math.abs(figure.value - was))}`;
-      return el("tr", { title: `${figure.model}. ${figure.trust}` }, el("td", {}, figure.name), el("td", { class: "v" }, significant(figure.value)), el("td", { class: "n" }, figure.unit), reference ? el("td", { class: "d" }, change) : null);
+      const beside = figure.measured ? `(${figure.measured.sentence})` : "";
+      return el("tr", { title: `${figure.model}. ${figure.trust}` }, el("td", {}, figure.name, beside ? el("small", { class: "beside" }, beside) : null), el("td", { class: "v" }, significant(figure.value)), el("td", { class: "n" }, figure.unit), reference ? el("td", { class: "d" }, change) : null);
     };
     const table = (figures) => {
       const groups = [...new Set(figures.map(({ group }) => group))];

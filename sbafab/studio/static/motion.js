@@ -1,7 +1,7 @@
 // The actuator under pressure: poses from the fast stack, drawn as they come.
 import { css, el, plain } from "./dom.js";
 import { Balloons } from "./balloons.js";
-import { COARSE, FINE, chart, meshOf } from "./motion_drawing.js";
+import { COARSE, FINE, chart, measured, meshOf } from "./motion_drawing.js";
 import { Playing } from "./playing.js";
 import { listen, tab } from "./server.js";
 import { Stage3D, THREE } from "./stage3d.js";
@@ -181,8 +181,9 @@ export class Motion {
     if (pose.valves) rows.push(["In the chambers", `${pose.pressures.map((p) => p.toFixed(1)).join(" · ")} kPa`], ["Since the valves", `${(pose.time - this.valvesAt).toFixed(2)} s${this.settled ? ", filled" : ""}`]);
     if (this.pull) rows.push(["Pull", `${(1000 * Math.hypot(...this.pull)).toFixed(1)} mN`]);
     this.values.replaceChildren(...rows.flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)]));
-    if (!pose.stable) this.say("Stands as a straight column that would rather buckle", true);
-    else this.say("Elastic films, still air, no calibration on a built actuator; fill time is the fullest chamber at this flow, without the tube's resistance, which Supply has. Walls are drawn as arcs of the film's length.", false);
+    const beside = measured(stack);
+    if (!pose.stable) this.say(`Stands as a straight column that would rather buckle. ${beside}`, true);
+    else this.say(`${beside} Elastic films, still air, no calibration on a built actuator; fill time is the fullest chamber at this flow, without the tube's resistance, which Supply has. Walls are drawn as arcs of the film's length.`, false);
   }
 
   plots() {

@@ -33,3 +33,5 @@ export function chart(xs, ys, x, y, words, unit = "kPa") {
     el("circle", { cx: px(x), cy: py(y), r: 4, fill: "var(--select)" }),
     label(words, left + 6, 16, "start"), label(plain(top, 1), left - 4, 16, "end"), label("0", left - 4, low + 3, "end"), label(`${plain(far, 1)} ${unit}`, w - 6, low + 14, "end"));
 }
+// What the paper measured beside heights and bends of the elastic stack, which is off by more than a quarter.
+export const measured = (stack) => Object.entries(stack.measured ?? {}).map(([what, sentence]) => `${what[0].toUpperCase()}${what.slice(1)}: ${sentence}.`).join(" ");

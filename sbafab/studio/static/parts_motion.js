@@ -1,7 +1,7 @@
 // An assembly under pressure: every actuator by its own fast stack, and what stands on its top goes along.
 import { Balloons } from "./balloons.js";
 import { css, el, plain } from "./dom.js";
-import { COARSE, FINE, meshOf } from "./motion_drawing.js";
+import { COARSE, FINE, measured, meshOf } from "./motion_drawing.js";
 import { PartMeshes, THREE, geometryOf, paintOf } from "./parts_scene.js";
 import { Playing } from "./playing.js";
 import { listen, tab } from "./server.js";
@@ -135,7 +135,7 @@ export class PartsMotion {
     clearTimeout(this.telling);
     if (wait > 0) { this.telling = setTimeout(() => this.tell(), wait); return; }
     this.told = now;
-    this.values.replaceChildren(...[...this.movers.values()].flatMap((mover) => [el("h4", {}, mover.part), el("dl", { class: "reading" }, ...rows(mover, this.pressures(mover)).flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)]))]));
+    this.values.replaceChildren(...[...this.movers.values()].flatMap((mover) => [el("h4", {}, mover.part), el("dl", { class: "reading" }, ...rows(mover, this.pressures(mover)).flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)])), mover.is === "stack" && mover.pose ? el("p", { class: "more" }, measured(mover)) : ""]));
     const leaning = [...this.movers.values()].find(({ pose }) => pose && !pose.stable);
     this.say(leaning ? `${leaning.part} stands as a straight column that would rather buckle` : this.trusted(), Boolean(leaning));
     this.surface.firstChild?.setAttribute("aria-label", `Assembly in motion: ${[...this.movers.values()].flatMap((mover) => rows(mover, this.pressures(mover)).slice(0, 2).map(([name, value]) => `${mover.part} ${name.toLowerCase()} ${value}`)).join(", ")}`);

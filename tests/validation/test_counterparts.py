@@ -1,0 +1,251 @@
+"""What the paper measured stands beside every figure that validation shows to be far off.
+
+The table is held against the models and against the rows of ``docs/validation.md``; then every
+output is walked.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import sbafab
+from docs.scripts.gallery import figures_of
+from sbafab.cli import app
+from sbafab.models import paper
+from sbafab.models.counterparts import (
+    AIR_TIME,
+    COUNTERPARTS,
+    MODULUS,
+    OFF,
+    POCKET_AREA,
+    Counterpart,
+    counterpart_of_column,
+)
+from sbafab.models.figures import Figure, Prediction
+from sbafab.models.flow import seconds
+from sbafab.models.stiffness import modulus
+from sbafab.studio.jobs import elastic
+from sbafab.studio.moving import stack_model
+from tests.cli.test_predict_command import run as run_predict
+from tests.studio.worked import job
+from tests.validation.test_validation_table import rows
+
+MADE = ("1dof-5mm", "1dof-10mm", "3dof-15mm")
+
+
+@pytest.fixture(scope="module")
+def predictions() -> dict[str, Prediction]:
+    return {name: sbafab.predict(name) for name in MADE}
+
+
+def _model_value(row: Counterpart, found: Prediction) -> float:
+    """What a row's model gives for the actuator that was measured, as validation works it out."""
+    if row.recorded == AIR_TIME:
+        held = found.value("volume of all chambers at full stroke")
+        return float(seconds(held, paper.AIR_FLOW, paper.FULL_KPA))
+    if row.recorded == POCKET_AREA:
+        return 0.1 * math.pi * 2.5**2
+    if row.recorded == MODULUS:
+        tip = found.value("lateral tip stiffness at 10 kPa, chambers shut")
+        second = found.value("second moment of area of the plate")
+        return float(modulus(tip, 1.0, found.value("free height at 10 kPa"), second))
+    return found.value(row.recorded, row.model)
+
+
+@pytest.mark.parametrize("row", COUNTERPARTS, ids=lambda row: f"{row.figure} {row.model}")
+def test_each_row_says_what_its_model_gives_and_is_off_by_more_than_a_quarter(
+    row: Counterpart, predictions: dict[str, Prediction]
+) -> None:
+    assert row.gave == pytest.approx(_model_value(row, predictions[row.template]), rel=2e-3)
+    assert abs(row.ratio - 1) > OFF
+
+
+SHOWN_ALONE = (
+    # Rows of the page itself, or of models that no prediction shows: each says what it is instead.
+    "cutting|build",
+    "time to .* deg",
+    "calibrated",
+    "in time",
+    "one half each",
+    "two halves at their largest volume",
+    "Eqs. 1-3, one half",
+)
+
+
+def test_every_row_of_the_validation_that_is_off_by_more_than_a_quarter_is_in_the_table() -> None:
+    """But for those whose model no prediction shows, which are named here."""
+    known = {(one.measured.value, one.measured.unit) for one in COUNTERPARTS}
+    far = 0
+    for what, measured, _, predicted, residual, model, _ in rows():
+        share = re.search(r"([+-][\d.]+)%", residual)
+        if predicted == "not" or share is None or abs(float(share[1])) <= 100 * OFF:
+            continue
+        if any(re.search(words, f"{what}; {model}") for words in SHOWN_ALONE):
+            continue
+        far += 1
+        value, unit = float(measured.split()[0]), measured.split()[-1]
+        # At 1 kPa the same figure has its counterpart at 10.
+        value = 45.3 if value == 0.531 else value
+        assert (value, unit) in known, what
+    assert far > 15
+
+
+def _far_off(found: Prediction) -> Iterator[Figure]:
+    """Figures that the table's patterns name, looked up apart from the program's own marks."""
+    parallel = any(figure.group == "bending" for figure in found.figures)
+    for figure in found.figures:
+        for row in COUNTERPARTS:
+            is_its = row.parallel in (None, parallel) and figure.model.name.startswith(row.model)
+            if is_its and re.fullmatch(row.figure, figure.name):
+                yield figure
+                break
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_predictions_carry_them(name: str, predictions: dict[str, Prediction]) -> None:
+    found = predictions[name]
+    far = list(_far_off(found))
+    assert len(far) > 8
+    for figure in far:
+        assert figure.measured is not None, figure.name
+        assert str(figure.measured.measured) in figure.aside
+    by_name = {(row["name"], row["model"]): row for row in found.as_dict()["figures"]}
+    html = found._repr_html_()
+    for figure in far:
+        told = by_name[figure.name, figure.model.title]["measured"]
+        assert told["sentence"] == figure.counterpart
+        assert told["value"] == figure.measured.measured.value  # type: ignore[union-attr]
+        assert figure.counterpart in html
+    assert all(
+        row["measured"] is None or any(f.name == row["name"] for f in far)
+        for row in found.as_dict()["figures"]
+    )
+
+
+def _joined(text: str) -> str:
+    return " ".join(text.split())
+
+
+def test_predict_prints_them_below_their_figures(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], predictions: dict[str, Prediction]
+) -> None:
+    _, short, _ = run_predict(["3dof-15mm", "-o", str(tmp_path)], capsys)
+    _, out, _ = run_predict(["3dof-15mm", "-v", "-o", str(tmp_path)], capsys)
+    for text in (short, out):
+        # A line with a value, and below it the counterpart, before the next value.
+        assert "24.55" in text
+        after = _joined(text).partition("22.68")[2]
+        assert after.index("(the paper measured 17.5 mm") < 60
+        bend = predictions["3dof-15mm"].value("bend at 10 kPa in one chamber, the others empty")
+        after = _joined(text).partition(f" {bend:.4g} ")[2]
+        assert after.index("(the paper measured 81 +- 6 deg") < 80
+        assert "folded height 1.865 mm (paper's 3-DoF 0.95, not 1.865)" in _joined(text)
+    assert len(short.splitlines()) < 30
+    written = json.loads((tmp_path / "3dof-15mm" / "predict.json").read_text(encoding="utf-8"))
+    asides = sum(figure["measured"] is not None for figure in written["figures"])
+    figures = _joined(out.partition("Figures to design with")[2])
+    assert figures.count("(the paper measured") == asides
+    assert asides == len(list(_far_off(predictions["3dof-15mm"])))
+
+
+def test_find_prints_and_writes_them(tmp_path: Path) -> None:
+    asked = ["find", "3dof-15mm", "--min", "stroke@10kPa=20", "--min", "bend@10kPa=100"]
+    asked += ["--min", "force@4mm@50kPa=1", "--max", "height=3"]
+    asked += ["--set", "stack.balloons=15", "--free", "chamber.diameter=5:5:1"]
+    asked += ["-o", str(tmp_path / "tip.toml")]
+    ended = CliRunner().invoke(app, asked)
+    assert ended.exit_code == 0, ended.output
+    text = (tmp_path / "tip.toml").read_text(encoding="utf-8")
+    for quantity, measured in (
+        ("stroke@10kPa", "17.5 mm"),
+        ("bend@10kPa", "81 +- 6 deg"),
+        ("force@4mm@50kPa", "4.07 +- 0.07 N"),
+        ("height", "0.95 mm"),
+    ):
+        after = _joined(ended.output).partition(f" {quantity} ")[2]
+        assert f"(the paper measured {measured}" in after[: after.index("least mass")]
+        assert f"# {quantity}: the paper measured {measured}" in text
+    assert "full stroke" in ended.output
+    (tmp_path / "tip.toml").unlink()
+    told = json.loads(CliRunner().invoke(app, [*asked, "--json", "-q"]).stdout)
+    assert set(told["measured"]) == {"stroke@10kPa", "bend@10kPa", "force@4mm@50kPa", "height"}
+
+
+def test_the_gallery_s_cards_show_them() -> None:
+    design = sbafab.load("3dof-15mm")
+    card = list(figures_of(sbafab.predict(design), design))
+    for begins, measured in (("flat 1.8", "0.95 mm"), ("bend at 10 kPa", "81 +- 6 deg")):
+        (line,) = [one for one in card if one.startswith(begins)]
+        assert f"(the paper measured {measured}" in line
+    # The upper bound, 141 degrees, is no longer a key figure.
+    assert not any("140" in one.partition("(")[0] or "141" in one for one in card)
+
+
+def test_the_studio_s_answers_hold_them(predictions: dict[str, Prediction], tmp_path: Path) -> None:
+    (answer,) = elastic(job(tmp_path, sbafab.template("3dof-15mm")), lambda: None)
+    told = {figure["name"] for figure in answer["figures"] if figure["measured"]}
+    assert told == {figure.name for figure in _far_off(predictions["3dof-15mm"])}
+    moving = stack_model("3dof-15mm", sbafab.stack("3dof-15mm"))["measured"]
+    assert "17.5 mm" in moving["height"]
+    assert "81 +- 6 deg" in moving["bend"]
+    folder = Path(sbafab.__file__).parent / "studio" / "static"
+    for script, words in (
+        ("findings.js", "figure.measured.sentence"),
+        ("compare.js", "figure.measured.sentence"),
+        ("motion.js", "measured(stack)"),
+        ("parts_motion.js", "measured(mover)"),
+    ):
+        assert words in (folder / script).read_text(encoding="utf-8")
+
+
+def test_assemblies_hold_them() -> None:
+    found = sbafab.predict_assembly("standing")
+    told = {figure.name: figure.measured for figure in found.figures}
+    assert "0.95 mm" in told["height, flat"]
+    assert "17.5 mm" in told["height, inflated"]
+    assert "81 +- 6 deg" in told["bend by one chamber"]
+    assert "60 kPa" in told["sag of the tip, 1.2 g across it"]
+    ended = CliRunner().invoke(app, ["predict", "standing"])
+    for sentence in filter(None, told.values()):
+        assert sentence in _joined(ended.output)
+
+
+def test_pictures_say_them(tmp_path: Path) -> None:
+    asked = ["picture", "3dof-15mm", "--pressure", "chamber1=10", "--width", "200"]
+    ended = CliRunner().invoke(app, [*asked, "--to", str(tmp_path / "tip.png")])
+    said = _joined(ended.output).partition("bent 128")[2]
+    assert "(the paper measured 81 +- 6 deg" in said
+    assert "(the paper measured 17.5 mm" in said
+
+
+def test_columns_of_a_sweep_have_them() -> None:
+    form = sbafab.load("3dof-15mm").form
+    for column, measured in (
+        ("free stroke at 10 kPa [mm]", "17.5 mm"),
+        ("blocked force at 100 kPa, at 75 % of full stroke, elastic stack [N]", "2.4 +- 0.03 N"),
+        ("bend at 10 kPa in one chamber, the others empty [deg]", "81 +- 6 deg"),
+    ):
+        row = counterpart_of_column(form, column)
+        assert row is not None
+        assert str(row.measured) == measured
+    for column in (
+        "full stroke [mm]",
+        "mass [g]",
+        "blocked force at 100 kPa, flat, virtual work on Eq. 4 [N]",
+        "blocked force at 100 kPa, flat, elastic stack [N]",
+    ):
+        assert counterpart_of_column(form, column) is None, column
+
+
+def test_with_factors_the_clause_says_that_the_model_had_none() -> None:
+    found = sbafab.predict("3dof-15mm", press_factor=0.509, pocket_loss=0.28)
+    told = {figure.name: figure for figure in found.figures}
+    assert told["deflated height"].measured is None
+    assert "this model without factors gives it 24.55" in told["free height at 10 kPa"].aside
