@@ -340,7 +340,7 @@ def _fitted(p: Array, h: Array, found: Shapes, most: float, top: float) -> Array
     return np.asarray(best.reshape(blank.shape))
 
 
-class Limits(NamedTuple):
+class MapLimits(NamedTuple):
     """Linear functions of a spline's coefficients that must not fall below MARGIN: the matrices by
     pressure and by height (places, coefficients) of each kind.
     """
@@ -362,7 +362,7 @@ class Limits(NamedTuple):
         return np.concatenate(found)
 
 
-def _limits(most: float, top: float, area: float) -> Limits:
+def _limits(most: float, top: float, area: float) -> MapLimits:
     """Return what W has to obey: volumes that rise with pressure and are above 0 without any, as
     shares of what area times height holds; forces that fall with height, of pressure times area.
     """
@@ -380,10 +380,10 @@ def _limits(most: float, top: float, area: float) -> Limits:
     by_height, bent = (_rows(y, order, HEIGHT_SPANS + DEGREE) for order in (0, 2))
     by_height /= share[:, None]
     holds = _rows(share * HEIGHT_SPANS * (1 - 1e-12), 0, HEIGHT_SPANS + DEGREE) / share[:, None]
-    return Limits(((rises, by_height), (falls, bent), (-slope[:1] / (P0 * area * top), holds)))
+    return MapLimits(((rises, by_height), (falls, bent), (-slope[:1] / (P0 * area * top), holds)))
 
 
-def _admissible(matrix: Array, wanted: Array, limits: Limits) -> Array | None:
+def _admissible(matrix: Array, wanted: Array, limits: MapLimits) -> Array | None:
     """Return the coefficients of least squares that keep the limits; None where none are found.
 
     Limits are taken up where they are not kept, until all are.

@@ -26,7 +26,15 @@ FEW = ("stack.balloons=2", "rules.yield_builds=100")
 DESIGNS = (
     ("1dof-5mm", ()),
     ("3dof-15mm", ("laser.kerf_tpe=0.12",)),
-    ("1dof-5mm", ("name=panel", 'registration.method="sheet"', "registration.pin_diameter=1.5")),
+    (
+        "1dof-5mm",
+        (
+            "name=panel",
+            'registration.method="sheet"',
+            "registration.experimental=true",
+            "registration.pin_diameter=1.5",
+        ),
+    ),
 )
 OPENED = (
     *(".lbrn", ".lbrn2", ".svg", ".dwg", ".dxf", ".DXF", ".pdf", ".ai", ".eps", ".ps", ".cdr"),

@@ -95,6 +95,7 @@ def test_a_sweep_s_table_holds_no_formula(tmp_path: Path) -> None:
         {"stack": {"balloons": 1}, "order": {"note": note, "made_for": "-Ada"}},
         vary=["bond.width=0.75:0.8:0.05"],
         out=tmp_path,
+        all_columns=True,
     )
     text = (swept.folder / "sweep.csv").read_text(encoding="utf-8")
     assert formulas(text) == []

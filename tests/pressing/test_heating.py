@@ -142,7 +142,8 @@ TEMPLATES += [("radial-15mm", way) for way in METHODS[:2]]
 
 @pytest.mark.parametrize(("template", "method"), TEMPLATES)
 def test_every_step_says_how_large_its_laminate_is(template: str, method: str) -> None:
-    design = load_design(template, (f"registration.method={method}",))
+    settings = (f"registration.method={method}", "registration.experimental=true")
+    design = load_design(template, settings)
     laminate = build(design)
     plan = schedule(laminate, press_settings(design))
     for step in plan.steps:

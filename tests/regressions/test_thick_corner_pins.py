@@ -12,7 +12,12 @@ from sbafab.cli import main
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 
-SHEET = ("stack.balloons=1", 'registration.method="sheet"', "rules.yield_builds=100")
+SHEET = (
+    "stack.balloons=1",
+    'registration.method="sheet"',
+    "registration.experimental=true",
+    "rules.yield_builds=100",
+)
 
 
 def made(template: str, diameter: float, *settings: str) -> Laminate:

@@ -39,6 +39,7 @@ DESIGN = """
     width = 3.572
     [registration]
     method = "sheet"
+    experimental = true
     [lumen]
     diameter = 4.194
     [chamber]
