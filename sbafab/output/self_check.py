@@ -57,5 +57,6 @@ def _said(failed: Iterable[Finding]) -> str:
         f"{finding.rule}: {finding.message.rstrip('.')}"
         for finding in sorted(first.values(), key=lambda finding: order.get(finding.rule, 2))
     ]
-    more = f"; {len(told) - MOST_NAMED} more rules fail" if len(told) > MOST_NAMED else ""
+    rest = len(told) - MOST_NAMED
+    more = "" if rest <= 0 else "; 1 more rule fails" if rest == 1 else f"; {rest} more rules fail"
     return "; ".join(told[:MOST_NAMED]) + more
