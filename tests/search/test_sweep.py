@@ -163,7 +163,7 @@ def test_a_row_that_a_journal_lost_is_the_only_one_measured(
     folder.mkdir()
     lines = (found.folder / "journal.jsonl").read_bytes().splitlines(keepends=True)
     (folder / "journal.jsonl").write_bytes(b"".join(lines[1:3]) + lines[3][:50])
-    again = _swept(tmp_path, workers=2)
+    again = _swept(tmp_path, workers=2, all_columns=True)
     assert again.measured == 2
     for name in ("sweep.csv", "sweep.parquet", "sweep.html"):
         assert (folder / name).read_bytes() == (found.folder / name).read_bytes()
