@@ -33,7 +33,7 @@ QUOTED = [
     Balloon(3.85, neck=1.27, bore=0.52),
 ]
 """Balloons whose volumes once fell with pressure, the first to below 0."""
-COUNT = int(os.environ.get("SBAFAB_BALLOONS", "4"))
+COUNT = int(os.environ.get("SBAFAB_BALLOONS", "2"))
 """How many random balloons are judged."""
 PULLED = 1.3
 """The height to which balloons are pulled here, as a share of where they stand freely."""

@@ -233,6 +233,7 @@ def test_a_drawn_disc_is_predicted_as_a_round_pocket(tmp_path: Path) -> None:
         assert one.between == pytest.approx((known, known), rel=1e-5)
 
 
+@pytest.mark.long
 def test_a_drawn_octagon_stands_between_two_discs(tmp_path: Path) -> None:
     change = _drawn(tmp_path, _polygon(8, 3.0))
     found = sbafab.predict("1dof-5mm", change, "stack.balloons=2", pressures_kpa=[5.0])

@@ -229,6 +229,7 @@ def test_a_taper_is_scaled_as_a_whole(tmp_path: Path) -> None:
 BALLOONS = ["--free", "stack.balloons=2:4:1"]
 
 
+@pytest.mark.long
 def test_a_stroke_is_not_met_by_what_predict_says_is_less(tmp_path: Path) -> None:
     """The elastic balloon rises by 20 mm where in proportion to what was measured it is 14."""
     target = tmp_path / "found.toml"
