@@ -54,6 +54,10 @@ def drawn(
     return dxf_text(contours, found.properties, sheet=around)
 
 
+NO_SPARES = ("order.spares=0", "order.spare_share=0")
+"""Settings that leave the corner FREE free with the larger parts of ears too."""
+
+
 def rearranged(
     name: str,
     change: Rearrange,
@@ -237,7 +241,11 @@ KIND = Kind(
         rearranged("part missing on a sheet", lambda pieces: pieces[1:]),
         rearranged("part doubled on a sheet", doubled),
         rearranged("part of another pattern on a sheet", of_another),
-        rearranged("part mirrored on a sheet", with_first(Region.mirrored), settings=EARS),
+        rearranged(
+            "part mirrored on a sheet",
+            with_first(Region.mirrored),
+            settings=(*EARS, *NO_SPARES),
+        ),
         rearranged("part turned 2 degrees on a sheet", with_first(lambda p: p.turned(2.0))),
         rearranged("part scaled by 1.002 on a sheet", with_first(lambda p: p.scaled(1.002))),
         rearranged("bore missing on a sheet", undrilled),
