@@ -9,7 +9,8 @@ from sbafab.actuators import build
 from sbafab.as_built.coarse import as_cut
 from sbafab.cutting.files import compensated_paths
 from sbafab.cutting.properties import CutSettings, curves_of
-from sbafab.cutting.verify import TOLERANCE, check_contours
+from sbafab.cutting.verify import check_contours
+from sbafab.rules.limits import TOLERANCE
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.inconsistent import GeometryError

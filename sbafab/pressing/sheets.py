@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from sbafab.laminate.assembly import AssemblyStep
 from sbafab.laminate.laminate import Laminate
+from sbafab.pressing.heating import ROOM, WARM
 from sbafab.pressing.dowels import PinSetting
 
 UNTRIED = (
@@ -38,10 +39,8 @@ def instructions(part: AssemblyStep) -> str:
     )
 
 
-ROOM, TOUCH = 20.0, 40.0
-"""C of a room, and of a plate that can be touched."""
-WARM = 5.0
-"""C by which a plate may be colder than the platens when the clock starts."""
+TOUCH = 40.0
+"""C of a plate that can be touched."""
 STEEL = 3.8e6
 """J/(m3 K): heat of a base plate; 7,850 kg/m3 of steel with 490 J/(kg K)."""
 CONTACT, AIR = 500.0, 10.0
