@@ -35,3 +35,14 @@ class OutputError(SbafabError, OSError):
 
 class DefectError(SbafabError):
     """Files that the program wrote and that are not what it was asked for: a defect of its own."""
+
+
+# What is raised where edges cannot be told apart.
+
+
+class GeometryError(SbafabError, ArithmeticError):
+    """An operation on regions came out inconsistent; the message says where."""
+
+
+class InconsistentError(ArithmeticError):
+    """Two ways to a face do not agree; the argument is the point where they meet."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import gc
 import os
+from collections.abc import Callable
 
 YOUNG = 200_000
 """Records after which they are looked through for rings that nothing holds: a run makes many
@@ -29,3 +30,16 @@ def processors() -> int:
         return len(os.sched_getaffinity(0))
     except AttributeError:
         return os.cpu_count() or 1
+
+
+# How work that takes its time tells how far it is.
+
+
+Progress = Callable[[str, int, int], None]
+"""Told what is being done, and how much of how much is done."""
+Counted = Callable[[int, int], None]
+"""Told how many of how many are done."""
+
+
+def unheard(what: str, done: int, total: int) -> None:
+    """A progress that nobody watches."""

@@ -18,13 +18,13 @@ import numpy as np
 import sbafab
 from docs.scripts.ripple_sector import Sector, sector_states
 from sbafab.actuators import load_design
-from sbafab.meshing.conforming.settings import MeshSettings
+from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloons import balloons_of
 from sbafab.models.rippled import resolved, rippled, risen
 from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_states
-from sbafab.simulators.calculix.job import simulate
-from sbafab.simulators.calculix.settings import deck_settings
+from sbafab.simulators.calculix.deck import deck_settings
+from sbafab.simulators.calculix.run import simulate
 
 PAGE = Path(__file__).parents[1] / "prediction.md"
 BEGIN, END = "<!-- written by docs.scripts.balloon_runs -->", "<!-- to here -->"

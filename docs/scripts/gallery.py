@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import sbafab
-from sbafab.assemblies.reading import load
+from sbafab.assemblies.files import load
 from sbafab.assemblies.records import Assembly
+from sbafab.design.files import template_names, templates_folder
 from sbafab.design.records import Design
-from sbafab.design.templates import template_names, templates_folder
 from sbafab.errors import DesignError
 from sbafab.models.figures import Prediction
 from sbafab.reports.assembly_png import assembly_png

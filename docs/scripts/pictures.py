@@ -16,9 +16,9 @@ from PIL import Image
 
 import sbafab
 from sbafab.reports.assembly_png import assembly_png
+from sbafab.reports.charts import relation_svg
 from sbafab.reports.inflated_picture import PictureWish, write_picture
 from sbafab.reports.layers_svg import layers_svg
-from sbafab.reports.relation_svg import relation_svg
 from sbafab.reports.solid_png import solid_png
 from sbafab.reports.stack_svg import stack_svg
 

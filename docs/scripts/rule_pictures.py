@@ -7,10 +7,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
-from sbafab.geometry.svg import number, path_data
-from sbafab.laminate.inks import MASKS, STRUCTURAL, Ink, ink
+from sbafab.geometry.region import Region, disc, number, path_data, rectangle
+from sbafab.laminate.films import MASKS, STRUCTURAL, Ink, ink
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding

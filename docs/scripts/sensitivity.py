@@ -18,10 +18,9 @@ from sbafab.models.balloon import inflate
 from sbafab.models.balloon_map import balloon_map
 from sbafab.models.balloons import balloons_of
 from sbafab.models.figures import Factors
-from sbafab.models.series import blocked
 from sbafab.models.stack import Plate, Pose, Stack, stack
-from sbafab.models.stacked import bent
-from sbafab.reproduction.mechanics import FITTED
+from sbafab.models.stacked import bent, blocked
+from sbafab.reproduction.rows import FITTED
 
 OWN_LOSS = 0.18
 """Pocket loss in mm that makes the flat 3-DoF's force right, in steps of 0.01."""

@@ -19,7 +19,7 @@ from unittest import mock
 import sbafab
 from docs.scripts.measured import Record, Table, keep
 from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_strokes
-from sbafab.simulators.coarse.actuator import CoarseActuator
+from sbafab.simulators.coarse.shell import CoarseActuator
 from sbafab.simulators.sofa import files, shell
 from sbafab.simulators.sofa.run import SofaJob, SofaRun, simulate
 

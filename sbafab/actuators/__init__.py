@@ -12,7 +12,8 @@ from pydantic import BaseModel
 
 from sbafab.actuators import lobed, one_dof, radial
 from sbafab.actuators.fits import Fits, refuse_unfit
-from sbafab.design.reading import (
+from sbafab.design.files import (
+    FITS,
     Change,
     add_waivers,
     design_path,
@@ -23,7 +24,6 @@ from sbafab.design.reading import (
     validated,
 )
 from sbafab.design.records import Design
-from sbafab.design.writing import FITS
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 

@@ -6,13 +6,17 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from sbafab.design.reading import AnyDesign
+from sbafab.design.files import AnyDesign
 from sbafab.design.records import Design
 from sbafab.design.section import Section
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
-from sbafab.laminate.extent import beyond_the_outline, outline_diameter, overall_diameter
-from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.laminate import (
+    Laminate,
+    beyond_the_outline,
+    outline_diameter,
+    overall_diameter,
+)
 
 STEP = 0.01
 """mm: chambers are solved in whole steps."""

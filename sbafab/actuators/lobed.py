@@ -7,23 +7,25 @@ from typing import Literal, Self
 
 from pydantic import Field
 
-from sbafab.actuators.ears import NOTE, Ear, Holder, Ray, film_setback, placed
+from sbafab.actuators.ears import NOTE, Ear, Holder, Ray, film_setback, placed, tails
 from sbafab.actuators.fits import Fits, fitted
 from sbafab.actuators.panel import on_panel, roots, with_stubs
-from sbafab.actuators.pockets import (
+from sbafab.actuators.stacking import (
+    BalloonShape,
+    BalloonStack,
     RoundChamber,
+    balloon_cuts,
     bonded,
+    channel_pin,
     check_neck,
     free_of_round,
+    layers,
     pocket_shapes,
     reach,
     round_pockets,
     tab_and_strip,
 )
-from sbafab.actuators.stacking import BalloonShape, BalloonStack, balloon_cuts, channel_pin, layers
-from sbafab.actuators.tails import tails
-from sbafab.design.form import Form, Free, degrees_of_freedom
-from sbafab.design.records import Design
+from sbafab.design.records import Design, Form, Free, degrees_of_freedom
 from sbafab.design.section import Section
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
@@ -31,8 +33,7 @@ from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point, unit
 from sbafab.geometry.nearby import boxes_meet
 from sbafab.geometry.offset import fillet, grow
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Region, disc
 from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Pin
 
 ROUNDING = 1e-9

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 from typing import Literal, Self
 
-from sbafab.actuators.ears import NOTE, Ear, Ray, placed
+from sbafab.actuators.ears import NOTE, Ear, Ray, placed, tails
 from sbafab.actuators.fits import Fits, fitted
 from sbafab.actuators.panel import on_panel, roots, with_stubs
-from sbafab.actuators.pockets import (
+from sbafab.actuators.stacking import (
+    BalloonShape,
+    BalloonStack,
     RoundChamber,
+    balloon_cuts,
     bonded,
+    channel_pin,
     check_neck,
     free_of_round,
+    layers,
     pocket_shapes,
     round_pockets,
     tab_and_strip,
 )
-from sbafab.actuators.stacking import BalloonShape, BalloonStack, balloon_cuts, channel_pin, layers
-from sbafab.actuators.tails import tails
-from sbafab.design.form import Form, Free, degrees_of_freedom
-from sbafab.design.records import Design
+from sbafab.design.records import Design, Form, Free, degrees_of_freedom
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import unit
 from sbafab.geometry.offset import fillet

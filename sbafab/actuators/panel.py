@@ -18,10 +18,8 @@ from sbafab.errors import DesignError
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point, unit
 from sbafab.geometry.offset import grow
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import circle, disc, polygon, stadium, strip
-from sbafab.laminate.laminate import Inlet, Laminate, Pin
-from sbafab.laminate.panel import SheetPanel
+from sbafab.geometry.region import Contour, Region, circle, disc, polygon, stadium, strip
+from sbafab.laminate.laminate import Inlet, Laminate, Pin, SheetPanel
 
 METHOD = "sheet"
 NOTE = (

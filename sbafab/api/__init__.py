@@ -13,6 +13,7 @@ A design is given as a template's name, a TOML file, or a ``Design``. Keys are c
 from __future__ import annotations
 
 from sbafab.api.designs import (
+    Source,
     assemble,
     build,
     check,
@@ -28,10 +29,8 @@ from sbafab.api.designs import (
     template,
     templates,
 )
-from sbafab.api.lab import kerf, record, report
-from sbafab.api.making import cut, generate, mesh, nest, press, simulate
+from sbafab.api.making import cut, generate, kerf, mesh, nest, press, record, report, simulate
 from sbafab.api.predicting import find, grip, motion, predict, predict_assembly, stack, sweep
-from sbafab.api.sources import Source
 
 __all__ = [
     "Source",

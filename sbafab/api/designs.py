@@ -1,16 +1,15 @@
-"""A design from its file to its laminate, what the rules find in it, and its shapes."""
+"""What the functions are given: a design in one of three ways, and keywords of two kinds."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sbafab import actuators
-from sbafab.api.sources import Source, design_of, either_of
-from sbafab.design.reading import Change
+from sbafab.design.files import Change, template_names, template_text
 from sbafab.design.records import Design
-from sbafab.design.templates import template_names, template_text
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
@@ -19,9 +18,45 @@ if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
     from sbafab.laminate.laminate import Laminate, Layer
     from sbafab.meshing.surface import Surface
-    from sbafab.progress import Progress
-    from sbafab.reports.features import Dimension
+    from sbafab.process import Progress
+    from sbafab.reports.drawing import Dimension
     from sbafab.rules.finding import Findings
+
+Source = Design | str | Path
+"""A design: itself, a template's name, or a TOML file."""
+
+
+def design_of(source: Source, changes: Sequence[Change], tables: Mapping[str, Any]) -> Design:
+    """The design with its keys changed. Raises DesignError."""
+    if isinstance(source, Design):
+        return source.with_(*changes, **tables) if changes or tables else source
+    return actuators.load_design(source, [*changes, tables])
+
+
+def either_of(
+    source: Source | Assembly, changes: Sequence[Change], tables: Mapping[str, Any]
+) -> Design | Assembly:
+    """The design or the assembly, likewise."""
+    from sbafab.assemblies.files import load
+    from sbafab.assemblies.records import Assembly
+
+    if isinstance(source, Assembly):
+        return source
+    if isinstance(source, Design):
+        return design_of(source, changes, tables)
+    return load(source, [*changes, tables])
+
+
+def parted(asked: Mapping[str, Any], record: type) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What of the keywords are fields of the record, and what are tables of a design."""
+    names = {field.name for field in fields(record)}
+    return (
+        {name: value for name, value in asked.items() if name in names},
+        {name: value for name, value in asked.items() if name not in names},
+    )
+
+
+# A design from its file to its laminate, what the rules find in it, and its shapes.
 
 
 def templates() -> list[str]:
@@ -55,15 +90,15 @@ def loads(text: str, path: str | Path = "design.toml") -> Design | Assembly:
 
     Raises DesignError.
     """
-    from sbafab.assemblies.reading import load_text
+    from sbafab.assemblies.files import load_text
 
     return load_text(text, Path(path))
 
 
 def resolved(design: Design | Assembly) -> dict[str, Any]:
     """The tables of a design or an assembly with every default written out; lengths are mm."""
-    from sbafab.assemblies.writing import plain_tables
-    from sbafab.design.writing import resolved as written_out
+    from sbafab.assemblies.files import plain_tables
+    from sbafab.design.files import resolved as written_out
 
     return written_out(design) if isinstance(design, Design) else plain_tables(design)
 
@@ -84,7 +119,7 @@ def assemble(source: str | Path | Assembly, *changes: Change, **tables: Any) -> 
     where a part cannot sit where it should. The templates are the paper's (Sec. 2.1).
     """
     from sbafab.assemblies.build import assemble as put_together
-    from sbafab.assemblies.reading import load_assembly
+    from sbafab.assemblies.files import load_assembly
     from sbafab.assemblies.records import Assembly
 
     if isinstance(source, Assembly):
@@ -106,7 +141,7 @@ def check(
     """
     from sbafab.assemblies.records import Assembly
     from sbafab.output.assembly import check_assembly
-    from sbafab.output.checking import check as run_check
+    from sbafab.output.checked import check as run_check
     from sbafab.rules.finding import Findings
 
     found = either_of(source, changes, tables)
@@ -124,7 +159,7 @@ def checking(
     ``laminate`` is the design's, where it is built already; ``pause`` is called between parts of
     long rules, and what it raises ends the deck. Raises DesignError.
     """
-    from sbafab.output.settings import limits
+    from sbafab.output.checked import limits
     from sbafab.rules.deck import RULES, run_rule
     from sbafab.rules.finding import Findings
     from sbafab.rules.measures import Measures
@@ -186,6 +221,6 @@ def dimensions(laminate: Laminate, layer: Layer) -> list[Dimension]:
     """What a drawing of a layer gives the size of: circles, radii and widths in mm, each with its
     words.
     """
-    from sbafab.reports.features import dimensions as measured
+    from sbafab.reports.drawing import dimensions as measured
 
     return measured(laminate, layer)

@@ -6,16 +6,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sbafab.api.designs import load
-from sbafab.api.sources import Source, either_of, parted
-from sbafab.design.reading import Change
+from sbafab.api.designs import Source, either_of, load, parted
+from sbafab.design.files import Change
 
 if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
+    from sbafab.cutting.calibration import Calibration
     from sbafab.cutting.dxf_write import DxfProfile
-    from sbafab.output.run import Run
-    from sbafab.output.simulating import Simulated
-    from sbafab.progress import Progress
+    from sbafab.output.run import Run, Simulated
+    from sbafab.process import Progress
+    from sbafab.results.records import Record
+    from sbafab.results.report import Report
     from sbafab.simulators.simulator import Name
 
 
@@ -89,7 +90,7 @@ def mesh(
     ``MeshSettings``, such as ``h`` mm, ``symmetry`` and ``fill_ul``, beside tables of the design.
     Takes the extra "mesh". Raises DesignError and OutputError.
     """
-    from sbafab.meshing.conforming.settings import MeshSettings
+    from sbafab.meshing.conforming.layup import MeshSettings
     from sbafab.output.run import Conforming, Extras
     from sbafab.output.run import generate as run_generate
 
@@ -103,7 +104,7 @@ def nest(sources: Sequence[Source], name: str = "job", out: str | Path = "out") 
 
     Their films, sheets and kerf must be alike. Raises DesignError, OutputError and DefectError.
     """
-    from sbafab.output.job import generate_job
+    from sbafab.output.batch import generate_job
 
     return generate_job([load(source) for source in sources], name, Path(out))
 
@@ -123,9 +124,66 @@ def simulate(
     ``export`` writes what it reads and runs nothing. Raises DesignError for what it cannot do, and
     OutputError.
     """
-    from sbafab.output.simulating import simulate as run
+    from sbafab.output.run import simulate as run
     from sbafab.simulators.simulator import Wish
 
     wish, tables = parted(asked, Wish)
     design = load(source, *changes, **tables)
     return run(design, simulator, Wish(**wish), Path(out), export=export)
+
+
+# What a lab measures: the kerf of its laser, and what came out of the press.
+
+
+def kerf(
+    measurements: str | Path, resolution: float | None = None, instrument: str = ""
+) -> Calibration:
+    """The kerf in mm from a filled ``coupon.csv``, over all and along x and y.
+
+    ``instrument`` is "calliper", "scanner" or "microscope" where the table has no column of that
+    name; ``resolution`` mm is its least step, by default 0.01, 0.0106 (2400 dpi) or 0.001. A
+    constant reading error and a scale are fitted with the kerf. Uncertainties follow the usual
+    guide to their expression (JCGM 100:2008), intervals hold 95 %. Raises DesignError for a table
+    that can be read in two ways, for a slip in it, and for what no beam cuts.
+    """
+    from sbafab.cutting.calibration import calibrated, read_measurements
+
+    return calibrated(read_measurements(Path(measurements), instrument), resolution)
+
+
+def record(
+    source: Source,
+    *changes: Change,
+    lab: str | Path = "lab.sqlite",
+    table: str | Path | None = None,
+    again: bool = False,
+    **said: Any,
+) -> list[Record]:
+    """Records what came out of a design or an assembly in the lab's file; the records added.
+
+    ``said`` holds ``serial``, ``leak`` ("pass" or "fail"), ``operator``, ``kit``, ``note``, and
+    what was measured: ``proof_kpa``, ``burst_kpa``, ``stroke_mm``, ``force_n``, ``height_mm``,
+    ``mass_g``, one or several of ``offset_mm``, ``turn_deg``, ``cut_mm``; beside tables of the
+    design. A ``table`` (CSV) says it of a batch instead. ``again`` records new attempts of
+    actuators that were mended and tested again. Raises DesignError, OutputError.
+    """
+    from sbafab.results import recording
+    from sbafab.results.store import Lab
+
+    told = {name: value for name, value in said.items() if name in recording.SAID}
+    tables = {name: value for name, value in said.items() if name not in recording.SAID}
+    results = recording.results_of(told, table)
+    built = recording.built_from(source, [*changes, tables] if tables else changes)
+    return recording.record(Lab(Path(lab)), built, results, again)
+
+
+def report(lab: str | Path = "lab.sqlite") -> Report:
+    """What all records of a lab's file say together: success, figures, tolerances.
+
+    Units stand in the names and in ``unit``; shares come with their interval of 95 %. Raises
+    OutputError where the file cannot be read.
+    """
+    from sbafab.results.report import report as report_of
+    from sbafab.results.store import Lab
+
+    return report_of(*Lab(Path(lab)).contents())

@@ -6,9 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sbafab.api.designs import load
-from sbafab.api.sources import Source, parted
-from sbafab.design.reading import Change
+from sbafab.api.designs import Source, load, parted
+from sbafab.design.files import Change
 from sbafab.errors import DesignError
 
 if TYPE_CHECKING:
@@ -17,8 +16,7 @@ if TYPE_CHECKING:
     from sbafab.laminate.laminate import Laminate
     from sbafab.meshing.surface import Surface
     from sbafab.models.figures import Prediction
-    from sbafab.models.motion import Motion
-    from sbafab.models.stack import Stack
+    from sbafab.models.stack import Motion, Stack
     from sbafab.reports.assembly_prediction import AssemblyPrediction, Grip
     from sbafab.search.find import FoundDesign
     from sbafab.search.sweep import SweptDesigns
@@ -84,7 +82,7 @@ def grip(assembled: Assembled, part: str) -> tuple[Grip, Surface] | None:
     from sbafab.assemblies.build import PlacedSba
     from sbafab.errors import DesignError
     from sbafab.reports.assembly_prediction import grip as grip_of
-    from sbafab.reports.gripping import gripping
+    from sbafab.reports.inflated import gripping
 
     names = [placed.name for placed in assembled.parts]
     if part not in names:
@@ -157,7 +155,7 @@ def find(
     """
     from sbafab.search.find import FindRequest
     from sbafab.search.find import find as run_find
-    from sbafab.search.requirements import read_all
+    from sbafab.search.trial import read_all
 
     settings, tables = parted(asked, FindRequest)
     at_least = [f"{name}={value!r}" for name, value in (least or {}).items()]

@@ -7,19 +7,28 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sbafab.actuators import build, load_design, records
-from sbafab.as_built.by_layer import UNMEASURED, findings_as_built, rules_by_layer
-from sbafab.as_built.chords import chorded_place
 from sbafab.as_built.claims import (
+    CLAIMS,
+    DESIGNED,
+    INTEGRITY,
+    Problem,
     claim,
     design_problems,
     file_problems,
+    findings_of,
     height_problems,
+    is_job,
+    is_joined,
     lowered_problems,
     order_problems,
     property_problems,
+    read_claims,
+    read_job,
+    read_joined,
 )
 from sbafab.as_built.cut_files import CutPart, LayerFile, inside, read_layers
-from sbafab.as_built.meant import Meant, RunWork, departure, meant_by
+from sbafab.as_built.expected import Meant, RunWork, departure, meant_by
+from sbafab.as_built.kerf_removed import chorded_place
 from sbafab.as_built.measures import (
     batch_problems,
     fixture_problems,
@@ -30,36 +39,24 @@ from sbafab.as_built.measures import (
     size_problems,
     with_plate_pins,
 )
-from sbafab.as_built.panels import read_panel
-from sbafab.as_built.pieces import Lot
-from sbafab.as_built.records import (
-    CLAIMS,
-    DESIGNED,
-    INTEGRITY,
-    Problem,
-    findings_of,
-    is_job,
-    is_joined,
-    read_claims,
-    read_job,
-)
-from sbafab.as_built.sheets import SheetOrder, sheet_problems
+from sbafab.as_built.sheets import Lot, SheetOrder, read_panel, sheet_problems
 from sbafab.as_built.stack import laminate_of, stacked_layers
-from sbafab.design.reading import validated
+from sbafab.assemblies.build import Assembled, assemble
+from sbafab.assemblies.checks import lowered_checks, run_checks
+from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, load_assembly, part_entry
+from sbafab.design.files import design_sha256, validated
 from sbafab.design.records import Design
-from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
-from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.panel import SheetPanel
-from sbafab.models.sizes import sizes
-from sbafab.output.manifest_records import Manifest
-from sbafab.output.planned import Checked
-from sbafab.output.settings import limits as limits_of
-from sbafab.rules.deck import RULES, run_deck
-from sbafab.rules.finding import Finding
-from sbafab.rules.limits import TOLERANCE, Limits
-from sbafab.rules.lowered import lowered
+from sbafab.laminate.laminate import Laminate, SheetPanel
+from sbafab.models.formulas import sizes
+from sbafab.output.checked import Checked
+from sbafab.output.checked import limits as limits_of
+from sbafab.output.manifest import AssemblyManifest, Manifest
+from sbafab.rules import film_limits
+from sbafab.rules.deck import RULES, Rule, run_deck, run_rule
+from sbafab.rules.finding import Finding, Place
+from sbafab.rules.limits import TOLERANCE, Limits, lowered
 from sbafab.rules.measures import Measures
 
 AS_DESIGNED = "all that lies here is what design.toml makes"
@@ -176,8 +173,6 @@ def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tupl
     order = SheetOrder(job, first.design, first.claims.kerf, lots)
     problems += sheet_problems(folder, order)
     if is_joined(job):
-        from sbafab.as_built.joined import joined_findings, lowered_between
-
         weak += lowered_between(folder)
         between, wrong = joined_findings(folder)
         found += between
@@ -373,5 +368,110 @@ def _unsaid_waivers(measured: Sequence[Finding], claims: Manifest) -> list[Probl
     return [
         claim(f"{rule} fails and is waived by design.toml, which the manifest does not say")
         for rule in rules
+        if rule not in claims.waived
+    ]
+
+
+# What rules find on files as they lie: on a whole stack, or on the layers that can be read.
+
+
+BY_LAYER = (film_limits.NAME,)
+"""Rules that need no layer but the one they look at."""
+UNMEASURED = (ArithmeticError, ValueError, LookupError, StopIteration)
+"""What shapes that no rule foresees can raise; a mistake of the program's own is not among them."""
+
+
+def findings_as_built(rule: Rule, measures: Measures) -> list[Finding]:
+    """What a rule finds; doctored files can make shapes that no rule can measure, which fails."""
+    try:
+        return run_rule(rule, measures.laminate, measures.limits, measures)
+    except UNMEASURED as error:
+        message = f"cannot be measured on these files ({error}); regenerate them"
+        return [Finding(rule.name, "fail", None, None, "", Place(), message)]
+
+
+def rules_by_layer(
+    files: Sequence[LayerFile], claims: Manifest, design: Design, limits: Limits
+) -> tuple[Finding, ...]:
+    """The rules that can run on the layers that could be read; the others say that they did not."""
+    layers = stacked_layers(files, design)
+    lost = tuple(file.position for file in files if file.part is None)
+    some = Laminate(
+        name=claims.name,
+        family=claims.family,
+        layers=layers,
+        chambers=(),
+        bores=(),
+        inlets=(),
+        pins=(),
+        lumen=None,
+        balloons=0,
+        registration=design.registration.method,
+    )
+    why = "it needs every layer, and not all could be read" if lost else "there is no whole stack"
+    found: list[Finding] = []
+    measures = Measures(some, limits)
+    for rule in RULES:
+        if layers and rule.name in BY_LAYER:
+            found += findings_as_built(rule, measures)
+        else:
+            message = f"not run: {why}"
+            found.append(Finding(rule.name, "warn", None, None, "", Place(None, lost), message))
+    return tuple(found)
+
+
+# The assembly of a folder: its parts as design.toml puts them together, and what is claimed.
+
+
+def joined_findings(folder: Path) -> tuple[tuple[Finding, ...], list[Problem]]:
+    """What is found between the parts, and where the manifest says otherwise than design.toml.
+
+    Parts are as their designs make them: how films were cut is checked design by design.
+    """
+    claims = read_joined(folder)
+    try:
+        assembled = assemble(load_assembly(folder / DESIGN_FILE))
+    except (DesignError, OSError) as error:
+        return (), [claim(f"the parts were not put together, for {error or type(error).__name__}")]
+    between = run_checks(assembled)
+    return between, [
+        *_assembly_problems(claims, assembled),
+        *_unsaid_assembly_waivers(claims, between),
+    ]
+
+
+def lowered_between(folder: Path) -> tuple[str, ...]:
+    """The limits between parts that the assembly in a folder weakens; none if it is unreadable."""
+    try:
+        return lowered_checks(load_assembly(folder / DESIGN_FILE).rules)
+    except (DesignError, OSError):
+        return ()
+
+
+def _assembly_problems(claims: AssemblyManifest, assembled: Assembled) -> list[Problem]:
+    problems = []
+    if claims.name != assembled.assembly.name:
+        problems.append(claim(f"design.toml names the assembly {assembled.assembly.name}"))
+    if claims.design_sha256 != assembly_sha256(assembled):
+        problems.append(claim("design_sha256 is not that of design.toml and its parts' designs"))
+    told = [(one.name, one.copies, one.design_sha256) for one in claims.designs]
+    own = [
+        (one.design.name, one.design.order.quantity, design_sha256(one.design))
+        for one in assembled.designs
+    ]
+    if told != own:
+        problems.append(claim("designs or their copies are not those that the parts ask for"))
+    if list(claims.parts) != [part_entry(placed) for placed in assembled.parts]:
+        problems.append(claim("parts or their places are not those of design.toml"))
+    return problems
+
+
+def _unsaid_assembly_waivers(
+    claims: AssemblyManifest, between: tuple[Finding, ...]
+) -> list[Problem]:
+    waived = dict.fromkeys(finding.rule for finding in between if finding.by_user)
+    return [
+        claim(f"{rule} fails and is waived by design.toml, which the manifest does not say")
+        for rule in waived
         if rule not in claims.waived
     ]

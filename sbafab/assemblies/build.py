@@ -1,28 +1,19 @@
-"""An assembly put together: every part with its design, laminate and place."""
+"""Rigid poses: a turn and a shift, mm."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import difflib
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.actuators import build
-from sbafab.assemblies.poses import (
-    FLIPPED,
-    LYING,
-    OUTWARD,
-    PartPose,
-    about_axis,
-    along,
-    shifted,
-)
-from sbafab.assemblies.reading import part_design
-from sbafab.assemblies.records import AnyPart, Assembly, Base, Cup, Line, Magnet, Sba, Tube
-from sbafab.assemblies.tree import building_order
+from sbafab.assemblies.files import part_design
+from sbafab.assemblies.records import AnyPart, Assembly, Base, Cup, Line, Magnet, Sba, Seat, Tube
+from sbafab.design.files import design_sha256, listed, shown
 from sbafab.design.records import Design
-from sbafab.design.writing import design_sha256
-from sbafab.errors import DesignError
-from sbafab.geometry.inconsistent import GeometryError
+from sbafab.errors import DesignError, GeometryError
 from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.meshing.surface import Vector
 from sbafab.meshing.wrap import bent_point
@@ -30,6 +21,174 @@ from sbafab.meshing.wrap import bent_point
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+Rows = tuple[Vector, Vector, Vector]
+
+
+class PartPose(NamedTuple):
+    """Takes a point p of a part's frame to ``rows p + shift``."""
+
+    rows: Rows = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    shift: Vector = (0.0, 0.0, 0.0)
+
+    def at(self, p: Vector) -> Vector:
+        x, y, z = (
+            sum(a * b for a, b in zip(row, p, strict=True)) + s
+            for row, s in zip(self.rows, self.shift, strict=True)
+        )
+        return x, y, z
+
+    def then(self, inner: PartPose) -> PartPose:
+        """The pose of a part whose pose in this frame is ``inner``."""
+        columns = tuple(zip(*inner.rows, strict=True))
+        r0, r1, r2 = (
+            tuple(sum(a * b for a, b in zip(row, column, strict=True)) for column in columns)
+            for row in self.rows
+        )
+        return PartPose(((*r0,), (*r1,), (*r2,)), self.at(inner.shift))  # type: ignore[arg-type]
+
+    def points(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The points (n, 3) moved."""
+        import numpy as np
+
+        moved: NDArray[np.float64] = points @ np.array(self.rows).T + np.array(self.shift)
+        return moved
+
+    @property
+    def axis(self) -> Vector:
+        """Where the part's own axis points."""
+        return self.rows[0][2], self.rows[1][2], self.rows[2][2]
+
+
+def shifted(x: float, y: float, z: float) -> PartPose:
+    return PartPose(shift=(x, y, z))
+
+
+def about_axis(degrees: float) -> PartPose:
+    """A turn about z; quarter turns are exact."""
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    if degrees % 90 == 0:
+        c, s = float(round(c)), float(round(s))
+    return PartPose(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
+
+
+FLIPPED = PartPose(((-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)))
+"""Upside down: half a turn about y."""
+LYING = PartPose(((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)))
+"""The axis along x, what pointed along x downward."""
+OUTWARD = PartPose(((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+"""The axis along x, the part's x along y, its y along z: lying on a cylinder's side."""
+
+
+def along(direction: Vector, at: Vector) -> PartPose:
+    """A pose whose axis points along a unit vector, at a point."""
+    z = direction
+    least = min(range(3), key=lambda i: abs(z[i]))
+    helper: Vector = (float(least == 0), float(least == 1), float(least == 2))
+    x = _unit(_cross(helper, z))
+    y = _cross(z, x)
+    return PartPose(((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])), at)
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+def _unit(v: Vector) -> Vector:
+    size = math.hypot(*v)
+    return v[0] / size, v[1] / size, v[2] / size
+
+
+# Which part hangs on which: the order to build in, and what may be fixed where.
+
+
+PLACES: Mapping[str, tuple[Seat, ...]] = {
+    "sba": ("top", "bottom", "lumen", "inlet"),
+    "tube": ("start", "end", "outside", "lumen"),
+    "magnet": ("top", "bottom"),
+    "base": ("top", "bottom"),
+    "sheet": ("top", "bottom"),
+    "cup": (),
+    "line": (),
+}
+"""Where parts are fixed on a part of each kind."""
+FOR_LINES: tuple[Seat, ...] = ("lumen", "inlet")
+
+
+def building_order(parts: Mapping[str, AnyPart]) -> tuple[str, ...]:
+    """Part names, the root first, each after what it is fixed on; else in the file's order.
+
+    Raises DesignError where there is not exactly one root, a part hangs on an unknown one or in a
+    circle, or at a place that is not there.
+    """
+    roots = [name for name, part in parts.items() if part.on is None]
+    for name, part in parts.items():
+        if part.on is not None:
+            _check_joint(name, part, parts)
+        elif part.at is not None:
+            raise DesignError(
+                f'parts.{name}.at = "{part.at}" needs parts.{name}.on, the part that it is fixed on'
+            )
+    if len(roots) > 1:
+        raise DesignError(
+            f"{listed(roots)} are fixed on nothing; give all but one of them on = the part that "
+            "each is fixed on"
+        )
+    order = list(roots)
+    for name in order:
+        order += [other for other, part in parts.items() if part.on == name]
+    if len(order) < len(parts):
+        circle = _circle(parts, order)
+        how = "are fixed on each other in a circle" if circle[1:] else "hangs on itself"
+        raise DesignError(
+            f"{listed(circle)} {how}; leave out on and at in the part that all others are fixed on"
+        )
+    return tuple(order)
+
+
+def _circle(parts: Mapping[str, AnyPart], hanging: Iterable[str]) -> list[str]:
+    """The parts of one circle among those that do not hang on the root."""
+    name = next(name for name in parts if name not in set(hanging))
+    walk: list[str] = []
+    while name not in walk:
+        walk.append(name)
+        name = str(parts[name].on)
+    return walk[walk.index(name) :]
+
+
+def _check_joint(name: str, part: AnyPart, parts: Mapping[str, AnyPart]) -> None:
+    where = f"parts.{name}"
+    other = parts.get(str(part.on))
+    if other is None:
+        near = difflib.get_close_matches(str(part.on), parts, 1)
+        hint = f"did you mean {near[0]}?" if near else f"the parts are {', '.join(parts)}"
+        raise DesignError(f"{where}.on = {shown(part.on)} is not a part of the assembly; {hint}")
+    allowed = places_for(part, other)
+    if not allowed:
+        raise DesignError(
+            f'{where}.on = "{part.on}": no {part.kind} can be fixed on a {other.kind}; fix it on '
+            "another part"
+        )
+    if part.at not in allowed:
+        said = "is missing" if part.at is None else f'= "{part.at}"'
+        raise DesignError(
+            f"{where}.at {said}; a {part.kind} is fixed on a {other.kind} at one of "
+            f"{listed(allowed)}"
+        )
+
+
+def places_for(part: AnyPart, other: AnyPart) -> tuple[Seat, ...]:
+    """Where a part may be fixed on another: lines run inside, all else sits outside."""
+    is_line = isinstance(part, Line)
+    return tuple(place for place in PLACES[other.kind] if (place in FOR_LINES) == is_line)
+
+
+# An assembly put together: every part with its design, laminate and place.
+
 
 RESERVED = frozenset(
     {

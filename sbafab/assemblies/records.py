@@ -11,8 +11,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
-from sbafab.design.order import Order
-from sbafab.design.records import NAME_PATTERN, Laser, Press, RuleName, Sheets
+from sbafab.design.records import NAME_PATTERN, Laser, Order, Press, RuleName, Sheets
 from sbafab.design.section import Section
 from sbafab.design.units import Length, LengthOrZero, Millimetres
 

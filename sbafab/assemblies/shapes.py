@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from sbafab.assemblies.build import PlacedPart
+from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Sba, Tube
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import Region, disc, rectangle
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.prisms import Slab, closed_surface
-from sbafab.meshing.solid import solid_slabs
+from sbafab.meshing.solid import Slab, closed_surface, solid_slabs
 from sbafab.meshing.surface import Surface
 from sbafab.meshing.wrap import bent
 
@@ -108,3 +106,41 @@ def _bell(cup: Cup) -> Surface:
     both = (ring + 1) % AROUND * count + (place + 1) % count
     lower, upper = np.column_stack([here, on, both]), np.column_stack([here, both, up])
     return Surface(points, np.concatenate([lower, upper]))
+
+
+# One colour a part in pictures and solids, apart from each other for the colour blind.
+
+
+RGB = tuple[int, int, int]
+FILMS: tuple[RGB, ...] = ((86, 180, 233), (0, 114, 178), (240, 228, 66), (204, 121, 167))
+"""Of the assembly's designs in their order, then from the first again (Okabe and Ito's set)."""
+BOUGHT: dict[str, RGB] = {
+    "tube": (190, 190, 186),
+    "magnet": (66, 66, 72),
+    "cup": (230, 159, 0),
+    "line": (213, 94, 0),
+    "base": (150, 200, 180),
+    "sheet": (0, 158, 115),
+}
+
+
+def colours(assembled: Assembled) -> dict[str, RGB]:
+    """Screen colours by part name."""
+    designs = [made.design.name for made in assembled.designs]
+    return {
+        placed.name: BOUGHT[placed.part.kind]
+        if placed.made is None
+        else FILMS[designs.index(placed.made.design.name) % len(FILMS)]
+        for placed in assembled.parts
+    }
+
+
+def linear(colour: RGB) -> tuple[float, float, float]:
+    """A screen (sRGB) colour as light adds up, 0 to 1."""
+    r, g, b = (round(_light(value / 255), 6) for value in colour)
+    return r, g, b
+
+
+def _light(value: float) -> float:
+    low = 0.04045
+    return value / 12.92 if value <= low else ((value + 0.055) / 1.055) ** 2.4

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from sbafab import __version__
-from sbafab.cli.ending import BAD_INPUT, ended_plainly, prepared_streams, say
+from sbafab.cli.exit import BAD_INPUT, ended_plainly, prepared_streams, say
 from sbafab.cli.fetching import Fetched
 from sbafab.process import prepare
 

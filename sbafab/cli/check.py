@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from sbafab.cli.completing import designs_or_folders
-from sbafab.cli.options import json_option, set_option, waive_option
-from sbafab.cli.working import RULE_FAILED
+from sbafab.cli.exit import RULE_FAILED, say
+from sbafab.cli.options import designs_or_folders, json_option, set_option, waive_option
+from sbafab.errors import SbafabError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from sbafab.assemblies.records import Assembly
-    from sbafab.cli.verdicts import Group
+    from sbafab.cli.printing import Group
     from sbafab.design.records import Design
     from sbafab.output.advice import Advice
-    from sbafab.output.planned import Checked
-    from sbafab.progress import Progress
+    from sbafab.output.checked import Checked
+    from sbafab.process import Progress
     from sbafab.rules.finding import Finding
-
 
 YIELD = "registration-yield"
 PAPER = "paper"
@@ -40,7 +43,7 @@ class CheckRequest(NamedTuple):
 
     @property
     def is_folder(self) -> bool:
-        from sbafab.design.templates import template_names
+        from sbafab.design.files import template_names
 
         return self.source not in template_names() and Path(self.source).is_dir()
 
@@ -93,8 +96,6 @@ def check(
     """
     asked = CheckRequest(source, assignments, waivers, target_yield, as_json, verbose)
     if watch:
-        from sbafab.cli.watching import repeated
-
         if as_json:
             raise click.UsageError("--watch is for people; leave out --json or --watch")
         repeated(lambda: _checked(asked), Path(source))
@@ -105,7 +106,7 @@ def check(
 def _checked(asked: CheckRequest) -> bool:
     """Checks once and prints what was found; whether a rule failed."""
     from sbafab.cli.printing import print_json
-    from sbafab.output.checking import checks
+    from sbafab.output.checked import checks
     from sbafab.rules.deck import has_failed
 
     told = _of_folder(asked) if asked.is_folder else _of_source(asked)
@@ -123,9 +124,15 @@ def _checked(asked: CheckRequest) -> bool:
 def _print(told: Told, advice: Advice | None, verbose: bool) -> None:
     from rich.text import Text
 
-    from sbafab.cli.lines import console, print_wrapped
-    from sbafab.cli.printing import FILES, print_failed, print_listed
-    from sbafab.cli.verdicts import print_findings, verdict_said
+    from sbafab.cli.printing import (
+        FILES,
+        console,
+        print_failed,
+        print_findings,
+        print_listed,
+        print_wrapped,
+        verdict_said,
+    )
     from sbafab.design.kits import cited
 
     out = console()
@@ -161,7 +168,7 @@ def _print(told: Told, advice: Advice | None, verbose: bool) -> None:
 def _of_source(asked: CheckRequest) -> Told:
     """What is found in a design or an assembly."""
     from sbafab.actuators import load_design
-    from sbafab.assemblies.loading import load
+    from sbafab.assemblies.files import load
     from sbafab.cli.printing import shown_progress
     from sbafab.design.records import Design
     from sbafab.errors import DesignError
@@ -183,8 +190,8 @@ def _of_source(asked: CheckRequest) -> Told:
 
 def _of_design(design: Design, progress: Progress) -> Told:
     """The findings and notes; what press and sheets cannot do is refused, as a run would do."""
-    from sbafab.output.checking import check as run_check
-    from sbafab.output.planned import Checked
+    from sbafab.output.checked import Checked
+    from sbafab.output.checked import check as run_check
 
     checked = Checked(design, *run_check(design, progress))
     return _of_checked(design.name, checked.findings, [checked])
@@ -204,10 +211,9 @@ def _of_checked(
     checked: Sequence[Checked],
     between: Sequence[Finding] | None = None,
 ) -> Told:
-    from sbafab.cli.printing import notes_of
-    from sbafab.cli.verdicts import groups_of
-    from sbafab.models.sizes import size_said, sizes
-    from sbafab.output.checking import refuse_undoable
+    from sbafab.cli.printing import groups_of, notes_of
+    from sbafab.models.formulas import size_said, sizes
+    from sbafab.output.checked import refuse_undoable
     from sbafab.rules.deck import has_failed
 
     if not has_failed(findings):
@@ -237,7 +243,7 @@ def _of_folder(asked: CheckRequest) -> Told:
     import logging
 
     from sbafab.as_built.check import check_folder
-    from sbafab.cli.verdicts import Group
+    from sbafab.cli.printing import Group
     from sbafab.errors import DesignError
 
     if asked.assignments or asked.waivers or asked.target is not None:
@@ -249,3 +255,51 @@ def _of_folder(asked: CheckRequest) -> Told:
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())
     findings = check_folder(Path(asked.source))
     return Told("as-built", asked.source, findings, [Group(asked.source, findings)])
+
+
+# Doing a thing again whenever a file changes, until Ctrl-C.
+
+
+READ = (".toml", ".dxf", ".svg")
+"""What a design is made of: its file, a kit, drawings, the designs of an assembly."""
+EVERY = 0.4
+"""Seconds between two looks: a file system tells of changes in as many ways as there are."""
+
+Stamps = dict[Path, tuple[int, int]]
+
+
+def repeated(once: Callable[[], object], source: Path, looks: int | None = None) -> None:
+    """Calls ``once`` now and after every change in the folder of ``source``.
+
+    Bad input is said and waited out. ``looks`` bounds how often is looked (None: for ever).
+    """
+    seen: Stamps | None = None
+    while looks is None or looks > 0:
+        now = stamps(source)
+        if now != seen:
+            seen = now
+            click.echo(f"{datetime.now():%H:%M:%S}  watching {source}; Ctrl-C ends")
+            try:
+                once()
+            except SbafabError as error:
+                say(str(error))
+        looks = None if looks is None else looks - 1
+        time.sleep(EVERY)
+
+
+def stamps(source: Path) -> Stamps:
+    """Time and size of every file that the source may be made of."""
+    found: Stamps = {}
+    for path in _files(source):
+        # One that an editor is just replacing is there again at the next look.
+        with suppress(OSError):
+            state = path.stat()
+            found[path] = state.st_mtime_ns, state.st_size
+    return found
+
+
+def _files(source: Path) -> Iterator[Path]:
+    if source.is_dir():
+        yield from (path for path in source.rglob("*") if path.is_file())
+    elif source.parent.is_dir():
+        yield from (path for path in source.parent.iterdir() if path.suffix.lower() in READ)

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from sbafab.cli.exit import run_parts
 from sbafab.cli.options import Request, dxf_options, run_options, sheet_options
-from sbafab.cli.working import run_parts
 
 if TYPE_CHECKING:
     from sbafab.cutting.dxf_write import Curves

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import click
 
-from sbafab.cli.completing import rules
-from sbafab.cli.options import json_option
+from sbafab.cli.options import json_option, rules
 
 
 @click.command()
@@ -17,7 +16,7 @@ def explain(rule: str | None, as_json: bool) -> None:
     Without RULE: a line for every rule and check.
     """
     from sbafab.cli.printing import print_json
-    from sbafab.output.printed import EXPLAIN_SCHEMA, EXPLAINED_SCHEMA
+    from sbafab.output.schemas import EXPLAIN_SCHEMA, EXPLAINED_SCHEMA
     from sbafab.rules.explained import EXPLAINED
 
     if rule is None:
@@ -44,7 +43,7 @@ def explain(rule: str | None, as_json: bool) -> None:
 def _print(rule: str) -> None:
     from rich.text import Text
 
-    from sbafab.cli.lines import console, facts_table
+    from sbafab.cli.printing import console, facts_table
     from sbafab.rules.explained import EXPLAINED
 
     one = EXPLAINED[rule]

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from sbafab.cli.exit import run_design, tell
 from sbafab.cli.options import Request, dxf_options, run_options, sheet_options
-from sbafab.cli.working import run_design, tell
 
 if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
@@ -27,9 +27,9 @@ def generate(request: Request, curves: Curves, decks: bool) -> None:
     With --decks also calculix/, sofa/ and mujoco/, as `sbafab simulate --export` writes them.
     An assembly gets a folder for each of its designs, and sheets, traveller and solid of the whole.
     """
-    from sbafab.assemblies.loading import load
+    from sbafab.assemblies.files import load
     from sbafab.design.records import Design
-    from sbafab.output.planned import EVERYTHING
+    from sbafab.output.checked import EVERYTHING
     from sbafab.output.run import Extras
 
     found = load(request.designs[0], request.assignments, request.waivers)
@@ -43,8 +43,7 @@ def generate(request: Request, curves: Curves, decks: bool) -> None:
 
 
 def _generate_assembly(assembly: Assembly, request: Request, curves: Curves) -> None:
-    from sbafab.cli.printing import run_json, shown_progress
-    from sbafab.cli.printing_assembly import print_assembly
+    from sbafab.cli.printing import print_assembly, run_json, shown_progress
     from sbafab.output.assembly import generate_assembly
 
     with shown_progress(request.as_json) as progress:

@@ -59,10 +59,9 @@ def kerf(
     told apart from kerf.
     """
     from sbafab.cli.printing import print_json
-    from sbafab.cutting.calibration import calibrated
-    from sbafab.cutting.measured_table import read_measurements
+    from sbafab.cutting.calibration import calibrated, read_measurements
     from sbafab.errors import DesignError
-    from sbafab.output.printed import KERF_SCHEMA
+    from sbafab.output.schemas import KERF_SCHEMA
 
     sizes = read_measurements(measurements, instrument or "")
     found = calibrated(sizes, resolution)

@@ -7,13 +7,12 @@ from typing import Any
 
 import click
 
-from sbafab.cli import completing
-from sbafab.cli.options import calibration_options, set_option
-from sbafab.cli.quantities import PRESSURE
+from sbafab.cli import options
+from sbafab.cli.options import PRESSURE, calibration_options, set_option
 
 
 @click.command(name="map")
-@click.argument("source", metavar="DESIGN", shell_complete=completing.designs)
+@click.argument("source", metavar="DESIGN", shell_complete=options.designs)
 @set_option
 @click.option(
     "--to",
@@ -53,7 +52,7 @@ def map_(
     from sbafab.actuators import load_design
     from sbafab.errors import DesignError, OutputError
     from sbafab.models.figures import Factors
-    from sbafab.models.force import force
+    from sbafab.models.formulas import force
     from sbafab.models.map_files import FORMATS, map_text
     from sbafab.models.stack import stack
 

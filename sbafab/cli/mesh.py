@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sbafab.cli.options import Request, run_options
-from sbafab.cli.quantities import LENGTH, VOLUME, OfChamber, by_chamber
-from sbafab.cli.working import run_parts
+from sbafab.cli.exit import run_parts
+from sbafab.cli.options import LENGTH, VOLUME, OfChamber, Request, by_chamber, run_options
 
 if TYPE_CHECKING:
-    from sbafab.meshing.conforming.settings import Element, Symmetry
+    from sbafab.meshing.conforming.layup import Element, Symmetry
 
 FORMATS = ("vtu", "vtk", "msh", "inp", "stl", "obj", "ply")
 
@@ -89,7 +88,7 @@ def mesh(  # noqa: PLR0913, PLR0917 - one an option
 
     The conforming ones take the extra "mesh": pip install "sbafab[mesh]".
     """
-    from sbafab.meshing.conforming.settings import MeshSettings
+    from sbafab.meshing.conforming.layup import MeshSettings
     from sbafab.output.run import Conforming, Extras
 
     settings = MeshSettings(size, element, symmetry, fill, gaps, not flat)

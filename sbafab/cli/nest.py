@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from sbafab.cli.exit import tell
 from sbafab.cli.options import Request, dxf_options, several_run_options, sheet_options
-from sbafab.cli.working import tell
 
 if TYPE_CHECKING:
     from sbafab.cutting.dxf_write import Curves
@@ -26,7 +26,7 @@ def nest(request: Request, name: str, curves: Curves) -> None:
     """
     from sbafab.actuators import load_design
     from sbafab.cli.printing import job_json, print_job, shown_progress
-    from sbafab.output.job import generate_job
+    from sbafab.output.batch import generate_job
 
     designs = [
         load_design(design, request.assignments, request.waivers) for design in request.designs

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from sbafab.cli.completing import templates
+from sbafab.cli.options import templates
 
 COUPON = "coupon"
 KIT = "kit"
@@ -31,7 +31,7 @@ def new(template: str, file: Path | None) -> None:
     if template == KIT:
         _kit(file or Path("kit.toml"))
         return
-    from sbafab.design.templates import write_new
+    from sbafab.design.files import write_new
 
     written = write_new(template, file)
     path = shlex.quote(str(written))
@@ -46,8 +46,8 @@ def _kit(file: Path) -> None:
 
 
 def _coupon(folder: Path) -> None:
-    from sbafab.cutting.coupon import write_coupon
-    from sbafab.output.settings import GENERATOR
+    from sbafab.cutting.calibration import write_coupon
+    from sbafab.output.checked import GENERATOR
 
     drawing, picture, table = write_coupon(folder, GENERATOR)
     click.echo(f"Cut {drawing} (picture: {picture}) from each film, with a kerf offset of 0.")

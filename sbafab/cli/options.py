@@ -1,21 +1,161 @@
-"""Arguments and options that several commands share."""
+"""Pressures, volumes and flows as people write them: ``6``, ``"60 mbar"``, ``5ul``.
+
+What reads them is an option's ``type``.
+"""
 
 from __future__ import annotations
 
 import functools
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.shell_completion import CompletionItem
 
-from sbafab.cli import completing
-from sbafab.cli.quantities import LENGTH, MODULUS
+from sbafab.design.pressure_units import KILOPASCALS
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
     from sbafab.cutting.dxf_write import DxfProfile
+
+_WRITTEN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
+
+
+@dataclass(frozen=True)
+class MeasuredQuantity:
+    """A number with or without one of ``units``, whose sizes are in the first one's."""
+
+    name: str
+    units: dict[str, float]
+    example: str
+
+    def read(self, written: str) -> float:
+        found = _WRITTEN.fullmatch(written)
+        unit = found and (found[2] or next(iter(self.units)))
+        if found is None or unit not in self.units:
+            allowed = f"a {self.name} such as {self.example}; the units are {', '.join(self.units)}"
+            raise click.BadParameter(f"{written!r} must be {allowed}")
+        number = float(found[1]) * self.units[unit]
+        if not math.isfinite(number):
+            raise click.BadParameter(f"{written!r} must be a finite {self.name}")
+        return number
+
+
+LENGTH = MeasuredQuantity(
+    "length", {"mm": 1.0, "um": 0.001, "cm": 10.0, "in": 25.4}, '0.35 or "350 um"'
+)
+PRESSURE = MeasuredQuantity("pressure", KILOPASCALS, '6, "6 kPa" or "60 mbar"')
+MODULUS = MeasuredQuantity("modulus", {"MPa": 1.0, "kPa": 0.001, "GPa": 1000.0}, '10 or "10 MPa"')
+VOLUME = MeasuredQuantity("volume", {"ul": 1.0, "ml": 1000.0, "mm3": 1.0}, '5, 5ul or "0.005 ml"')
+FLOW = MeasuredQuantity(
+    "flow",
+    {"ml/min": 1.0, "ul/min": 0.001, "ml/s": 60.0, "l/min": 1000.0},
+    '35, "35 ml/min" or "0.6 ml/s"',
+)
+
+
+@dataclass(frozen=True)
+class OfChamber:
+    """``NAME=QUANTITY``; where ``all_chambers``, also a quantity alone, with "" for the name."""
+
+    quantity: MeasuredQuantity
+    all_chambers: bool = False
+
+    def read(self, written: str) -> tuple[str, float]:
+        chamber, equals, text = written.rpartition("=")
+        if not (chamber.strip() if equals else self.all_chambers):
+            short = self.quantity.example.split(",")[0]
+            pattern = f"NAME={self.quantity.name.upper()}"
+            raise click.BadParameter(f"{written!r} must be {pattern}, such as chamber1={short}")
+        return chamber.strip(), self.quantity.read(text)
+
+
+def by_chamber(
+    ctx: click.Context, param: click.Parameter, values: tuple[tuple[str, float], ...]
+) -> dict[str, float]:
+    """What was given by chamber: the callback of an option of several OfChamber."""
+    found = dict(values)
+    if len(found) < len(values):
+        raise click.BadParameter("gives a chamber more than once", ctx, param)
+    return found
+
+
+# What a shell completes: templates and files, keys with their choices, rules.
+
+
+def designs(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
+    """Templates by name, and files."""
+    from sbafab.design.files import template_summaries
+
+    found = [
+        CompletionItem(name, help=said)
+        for name, said in template_summaries().items()
+        if name.startswith(typed)
+    ]
+    return [*found, CompletionItem(typed, type="file")]
+
+
+designs_or_folders = designs
+"""Files of a shell's own completion include folders."""
+
+
+def templates(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
+    """What ``sbafab new`` writes."""
+    from sbafab.cli.new import COUPON, KIT
+    from sbafab.design.files import template_summaries
+
+    others = {COUPON: "the kerf's calibration piece", KIT: "films, tubes, press, laser, limits"}
+    return _beginning(typed, (template_summaries() | others).items())
+
+
+def rules(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
+    """Rules and checks by name, with what they ask."""
+    from sbafab.rules.explained import EXPLAINED
+
+    return _beginning(typed, ((name, one.holds) for name, one in EXPLAINED.items()))
+
+
+def assignments(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
+    """``KEY=`` for every key of a design; after it the values of a key that has a choice."""
+    key, equals, _ = typed.partition("=")
+    if not equals:
+        return _beginning(typed, ((f"{name}=", None) for name in _keys()))
+    return _beginning(typed, ((f"{key}={value}", None) for value in _choices(_keys().get(key))))
+
+
+def _beginning(typed: str, known: Iterable[tuple[str, str | None]]) -> list[CompletionItem]:
+    return [CompletionItem(name, help=said) for name, said in known if name.startswith(typed)]
+
+
+def _keys() -> dict[str, object]:
+    """Every key that holds a value, of any family, with its annotation."""
+    from sbafab.actuators import records
+    from sbafab.design.files import key_paths
+
+    found: dict[str, object] = {}
+    for record in records().values():
+        found |= key_paths(record)
+    tables = {path.rpartition(".")[0] for path in found}
+    return {path: found[path] for path in sorted(found) if path not in tables}
+
+
+def _choices(annotation: Any) -> Iterator[str]:
+    """The values of a ``Literal``, and of a switch."""
+    from typing import Literal, get_args, get_origin
+
+    if annotation is bool:
+        yield from ("true", "false")
+    elif get_origin(annotation) is Literal:
+        yield from map(str, get_args(annotation))
+
+
+# Arguments and options that several commands share.
+
 
 Command = Callable[..., Any]
 
@@ -37,7 +177,7 @@ def set_option(command: Command) -> Command:
         "assignments",
         metavar="KEY=VALUE",
         multiple=True,
-        shell_complete=completing.assignments,
+        shell_complete=assignments,
         help="Override a key of the design, e.g. --set chamber.diameter=6. Repeatable.",
     )
     proposals = click.option(
@@ -75,7 +215,7 @@ def waive_option(words: str) -> Callable[[Command], Command]:
         "waivers",
         metavar="RULE",
         multiple=True,
-        shell_complete=completing.rules,
+        shell_complete=rules,
         help=words,
     )
 
@@ -120,7 +260,7 @@ class Request:
 
 def run_options(command: Command) -> Command:
     """DESIGN and the options of a writing command, handed over as one Request."""
-    one = click.argument("designs", metavar="DESIGN", nargs=1, shell_complete=completing.designs)
+    one = click.argument("designs", metavar="DESIGN", nargs=1, shell_complete=designs)
     return _requested(command, one)
 
 
@@ -131,7 +271,7 @@ def several_run_options(command: Command) -> Command:
         metavar="DESIGN...",
         nargs=-1,
         required=True,
-        shell_complete=completing.designs,
+        shell_complete=designs,
     )
     return _requested(command, several)
 

@@ -7,8 +7,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sbafab.cli.options import finite, refuse_given, set_option
-from sbafab.cli.quantities import PRESSURE, VOLUME, OfChamber, by_chamber
+from sbafab.cli.options import (
+    PRESSURE,
+    VOLUME,
+    OfChamber,
+    by_chamber,
+    finite,
+    refuse_given,
+    set_option,
+)
 
 if TYPE_CHECKING:
     from sbafab.reports.inflated_picture import Movement
@@ -77,15 +84,19 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
     flat, into NAME-flat.png.
     """
     from sbafab.actuators import build, load_design
-    from sbafab.cli.lines import print_wrapped
-    from sbafab.cli.printing import shown_progress
+    from sbafab.cli.printing import print_wrapped, shown_progress
     from sbafab.errors import DesignError, OutputError
     from sbafab.models.balloons import has_balloons
-    from sbafab.models.counterparts import counterparts_of_pose
-    from sbafab.models.drawn import model_form, near_discs
+    from sbafab.models.elastic import model_form, near_discs
+    from sbafab.models.paper import counterparts_of_pose
     from sbafab.models.stack import stack
-    from sbafab.reports.flat_picture import WHY, write_flat_picture
-    from sbafab.reports.inflated_picture import MOVING, PictureWish, write_picture
+    from sbafab.reports.inflated_picture import (
+        MOVING,
+        WHY,
+        PictureWish,
+        write_flat_picture,
+        write_picture,
+    )
 
     if pressures and volumes:
         raise DesignError("give --pressure or --volume, not both")

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from sbafab.cli.exit import RULE_FAILED
 from sbafab.cli.options import (
+    FLOW,
+    PRESSURE,
+    VOLUME,
     Request,
     calibration_options,
     finite,
     refuse_given,
     run_options,
 )
-from sbafab.cli.quantities import FLOW, PRESSURE, VOLUME
-from sbafab.cli.working import RULE_FAILED
+from sbafab.cli.printing import console, wrapped
+from sbafab.models.figures import LEFT_OUT
 
 if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
     from sbafab.design.records import Design
+    from sbafab.models.figures import Figure, Model, Prediction
 
 OF_ELASTIC = ("pocket_loss", "modulus_mpa")
 """Options that elastic balloons take, and no other model."""
@@ -99,17 +106,15 @@ def predict(
     load, grip in its lumen, and whether inflated parts meet, at one pressure (default 10 kPa), on
     the screen.
     """
-    from sbafab.assemblies.loading import load
+    from sbafab.assemblies.files import load
     from sbafab.cli.printing import print_json, print_listed, shown_progress
-    from sbafab.cli.printing_prediction import print_prediction
     from sbafab.design.records import Design
     from sbafab.errors import OutputError
     from sbafab.models.figures import Asked, Factors
+    from sbafab.models.formulas import size_said
     from sbafab.models.prediction import predict as predicted
-    from sbafab.models.sizes import size_said
     from sbafab.output.earlier import PREDICTION
-    from sbafab.output.predicting import prediction_json, with_prediction
-    from sbafab.output.run import Extras, generate
+    from sbafab.output.run import Extras, generate, prediction_json, with_prediction
 
     design = load(request.designs[0], request.assignments, request.waivers)
     if not isinstance(design, Design):
@@ -148,9 +153,9 @@ def predict(
 
 def _refuse_for_one(design: Design) -> None:
     """Raises UsageError for an option that no model of the design takes."""
-    from sbafab.design.form import Drawn
+    from sbafab.design.records import Drawn
     from sbafab.models.balloons import has_balloons
-    from sbafab.models.drawn import model_form
+    from sbafab.models.elastic import model_form
 
     form = model_form(design)
     of = f"and {design.name} has other ones; leave it out"
@@ -175,9 +180,8 @@ def _predict_assembly(
     assembly: Assembly, request: Request, pressure_kpa: float, load_g: float
 ) -> None:
     from sbafab.assemblies.build import assemble
-    from sbafab.cli.printing import print_json
-    from sbafab.cli.printing_assembly import print_assembly_prediction
-    from sbafab.output.printed import ASSEMBLY_PREDICT_SCHEMA
+    from sbafab.cli.printing import print_assembly_prediction, print_json
+    from sbafab.output.schemas import ASSEMBLY_PREDICT_SCHEMA
     from sbafab.reports.assembly_prediction import as_json, predict_assembly
 
     found = predict_assembly(assemble(assembly), pressure_kpa, load_g)
@@ -187,3 +191,91 @@ def _predict_assembly(
         print_assembly_prediction(found)
     if found.touches:
         click.get_current_context().exit(RULE_FAILED)
+
+
+# What ``sbafab predict`` prints of a design: a verdict, on request all figures and their validity.
+#
+# Of the figures what to design with comes first, each quantity once; other models of the same follow.
+
+
+NAME, VALUE = 56, 10
+"""Columns of a name, at most, and of a value."""
+FIRST = "Figures to design with"
+OTHERS = "Other models of the same: design with the figures above"
+
+
+def print_prediction(found: Prediction, verbose: bool = False) -> None:
+    """The verdict; ``verbose`` also all figures, and what each model is good for."""
+    from rich.text import Text
+
+    out = console()
+    label = max((len(line.quantity) for line in found.verdict), default=0) + 2
+    before = ""
+    for line in found.verdict:
+        head = "" if line.quantity == before else f"{line.quantity}:"
+        before = line.quantity
+        said = f"{line.figure}: {line.note}" if line.quantity == LEFT_OUT else line.figure
+        for row in wrapped(said, out.width, head.ljust(label), " " * label):
+            out.print(Text(row), soft_wrap=True)
+        if line.quantity != LEFT_OUT:
+            for row in wrapped(line.note, out.width, " " * (label + 2), " " * (label + 2)):
+                out.print(Text(row), soft_wrap=True)
+    if verbose:
+        _print_figures(found)
+    else:
+        out.print(Text(f"{len(found.figures)} figures, each with its model and validity: -v"))
+
+
+def _print_figures(found: Prediction) -> None:
+    """All figures, then what each model is good for."""
+    from rich.text import Text
+
+    out = console()
+    first = sorted(found.figures, key=lambda figure: figure.other)
+    models = list(dict.fromkeys(figure.model for figure in first))
+    others = [figure for figure in first if figure.other]
+    own = first[: len(first) - len(others)]
+
+    def part(title: str, lines: Iterator[str]) -> None:
+        out.print(Text(f"\n{title}", style="bold"))
+        for line in lines:
+            # A heading starts at the margin.
+            is_head = title in (FIRST, OTHERS) and not line.startswith(" ")
+            out.print(Text(line, style="bold" if is_head else ""), soft_wrap=True)
+
+    part(FIRST, figure_lines(own, models, out.width))
+    if others:
+        part(OTHERS, figure_lines(others, models, out.width))
+    part("Models and validity", _numbered(models, out.width))
+    out.print()
+
+
+def figure_lines(figures: Sequence[Figure], models: Sequence[Model], width: int) -> Iterator[str]:
+    """A heading for each model of a group, and below it a line a figure.
+
+    What a name has in common with the one above it, up to a comma, is left blank.
+    """
+    unit = max((len(figure.unit) for figure in figures), default=0)
+    room = min(NAME, width - VALUE - unit - 4)
+    for group in dict.fromkeys(figure.group for figure in figures):
+        for number, model in enumerate(models, start=1):
+            own = [one for one in figures if one.group == group and one.model == model]
+            if own:
+                yield f"{group}: {model.name} [{number}]"
+            before = ""
+            for one in own:
+                head, comma, _ = one.name.partition(", ")
+                name = one.name
+                if comma and head == before:
+                    name = " " * (len(head) + 2) + name.removeprefix(f"{head}, ")
+                before = head
+                *over, last = textwrap.wrap(name, room, subsequent_indent="  ") or [name]
+                yield from (f"  {line}" for line in over)
+                yield f"  {last:{room}}{one.value:>{VALUE}.4g}  {one.unit}".rstrip()
+                yield from wrapped(one.aside, width, "    ", "    ") if one.aside else ()
+
+
+def _numbered(models: Sequence[Model], width: int) -> Iterator[str]:
+    for number, model in enumerate(models, start=1):
+        said = f"{model.title}: {model.trust}"
+        yield from wrapped(said, width, f"[{number}]".ljust(5), " " * 5)

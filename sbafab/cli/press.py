@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import click
 
+from sbafab.cli.exit import run_parts
 from sbafab.cli.options import Request, run_options
-from sbafab.cli.working import run_parts
 
 
 @click.command()

@@ -1,24 +1,100 @@
-"""What commands print: progress, findings, the closing table."""
+"""Lines and labelled facts on standard output, coloured where somebody looks at them."""
 
 from __future__ import annotations
 
 import json
 import sys
+import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from sbafab.cli.lines import KEPT, console, facts_table, print_facts, print_line, print_wrapped
-from sbafab.progress import Progress, unheard
+from sbafab.process import Progress, unheard
+from sbafab.rules.finding import counted
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.table import Table
 
-    from sbafab.output.planned import Checked
+    from sbafab.output.checked import Checked
     from sbafab.output.run import Run
-    from sbafab.rules.finding import Finding
+    from sbafab.reports.assembly_prediction import AssemblyPrediction
+    from sbafab.rules.finding import Finding, Verdict
+
+KEPT = "\u00a0"
+"""A space at which no line is broken."""
+
+
+def console() -> Console:
+    """A console on standard output; 80 columns where there is no terminal and no COLUMNS."""
+    from rich.console import Console
+
+    class Told(Console):
+        """A console that leaves it to its caller what a closed pipe means."""
+
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError
+
+    return Told(highlight=False, soft_wrap=False)
+
+
+def wrapped(said: str, width: int, first: str = "", rest: str = "") -> list[str]:
+    """Lines of a sentence, broken between words; ``first`` stands before the first, ``rest`` before
+    the others.
+    """
+    return textwrap.wrap(
+        said,
+        width,
+        initial_indent=first,
+        subsequent_indent=rest,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def print_wrapped(said: str, style: str = "", indent: str = "") -> None:
+    """A sentence, broken between words where it is longer than a line; the rest indented.
+
+    All of it stands behind ``indent``.
+
+    Words joined by ``KEPT`` stay on one line.
+    """
+    rest = indent or "  "
+    for line in wrapped(said, console().width, indent, rest):
+        print_line(line.replace(KEPT, " "), style)
+
+
+def print_line(said: str, style: str = "") -> None:
+    """One line, however long."""
+    from rich.text import Text
+
+    console().print(Text(said, style=style), soft_wrap=True)
+
+
+def print_facts(facts: Iterable[tuple[str, str]]) -> None:
+    """Labels, and beside them what is said of each."""
+    from rich.text import Text
+
+    made = facts_table()
+    for label, text in facts:
+        made.add_row(label, Text(text))
+    console().print(made)
+
+
+def facts_table() -> Table:
+    """Without rows yet: a bold label and what is said of it."""
+    from rich.table import Table
+
+    made = Table(box=None, pad_edge=False, show_header=False)
+    made.add_column(no_wrap=True, style="bold")
+    made.add_column(ratio=1, overflow="fold")
+    return made
+
+
+# What commands print: progress, findings, the closing table.
+
 
 DECKS = ("calculix/actuator.inp", "sofa/actuator.scn", "mujoco/actuator.xml")
 """What a simulator opens."""
@@ -127,8 +203,6 @@ def print_run(run: Run) -> None:
 
 def print_verdict(run: Run, change: str) -> None:
     """What needs something done, and last whether the design or assembly holds."""
-    from sbafab.cli.verdicts import groups_of, print_open, verdict_said
-
     groups = groups_of(run.checked, run.between)
     for group in groups:
         print_open(group.findings)
@@ -144,8 +218,6 @@ def print_verdict(run: Run, change: str) -> None:
 def print_job(job: Run) -> None:
     """What a job made; for a design that a rule stopped, what the rules found."""
     from rich.text import Text
-
-    from sbafab.cli.verdicts import print_open
 
     out = console()
     made = facts_table()
@@ -163,7 +235,7 @@ def print_job(job: Run) -> None:
 
 def job_json(job: Run) -> dict[str, object]:
     """The result of a job for programs."""
-    from sbafab.output.printed import NESTED_SCHEMA
+    from sbafab.output.schemas import NESTED_SCHEMA
 
     return {
         "schema": NESTED_SCHEMA,
@@ -183,7 +255,7 @@ def job_json(job: Run) -> dict[str, object]:
 
 
 def _made(run: Run) -> Iterator[tuple[str, str]]:
-    from sbafab.pressing.together import batch_times, design_runs
+    from sbafab.pressing.cycles import batch_times, design_runs
 
     index = run.manifest
     lam = run.laminate
@@ -312,7 +384,7 @@ def film_said(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], copi
 
 def run_json(run: Run) -> dict[str, object]:
     """The result of a run for programs."""
-    from sbafab.output.printed import RUN_SCHEMA
+    from sbafab.output.schemas import RUN_SCHEMA
 
     return {
         "schema": RUN_SCHEMA,
@@ -322,3 +394,172 @@ def run_json(run: Run) -> dict[str, object]:
         "notes": notes_of(run.checked),
         "files": [] if run.kept else sorted(run.manifest["files"]),
     }
+
+
+# What the rules found, as people read it: a line a rule, what to do, a summary last.
+
+
+SHARES = {"pin-fit": "stretch", "registration-yield": "hold"}
+"""Rules that measure a share, and what it is of: a film stretches over its pin, builds hold."""
+
+
+class Group(NamedTuple):
+    """Findings that belong together: of one design, or between the parts of an assembly."""
+
+    name: str
+    findings: Sequence[Finding]
+
+
+def groups_of(
+    checked: Iterable[Checked], between: Sequence[Finding] | None = None
+) -> tuple[Group, ...]:
+    """A group a design, and one for what lies between parts."""
+    own = tuple(Group(one.design.name, one.findings) for one in checked)
+    return own if between is None else (*own, Group("between the parts", between))
+
+
+def print_findings(groups: Sequence[Group], verbose: bool = False) -> None:
+    """A line for every rule; for several groups, and below, what needs something done."""
+    out = console()
+    for group in groups:
+        if len(groups) > 1:
+            out.print(f"{group.name}: {counted(group.findings)}", style="bold", markup=False)
+        if verbose:
+            print_lines(group.findings, verbose)
+            continue
+        if len(groups) == 1:
+            print_lines(group.findings)
+        print_open(group.findings)
+
+
+def print_lines(findings: Sequence[Finding], verbose: bool = False) -> None:
+    """A line a rule: the finding that decides; ``verbose`` all of them, each with what it says."""
+    from rich.text import Text
+
+    from sbafab.rules.finding import decisive
+
+    out = console()
+    shown = findings if verbose else list(decisive(findings).values())
+    wide = max((len(one.rule) for one in shown), default=0)
+    out.print(Text(f"{'rule':{wide}}  verdict  {'measured':>13}  {'limit':>14}", style="bold"))
+    for one in shown:
+        line = Text(f"{one.rule:{wide}}  ")
+        line.append(f"{one.verdict:7}", style=COLOURS[one.verdict])
+        measured = short_figure(one.measured, _unit(one))
+        line.append(f"  {measured:>13}  {limit_said(one):>14}")
+        line.rstrip()
+        out.print(line, soft_wrap=True)
+        for said in wrapped(one.message, out.width, "    ", "    ") if verbose else ():
+            out.print(Text(said), soft_wrap=True)
+
+
+def print_open(findings: Sequence[Finding]) -> None:
+    """What to do about each warning, and what is wrong in each failure."""
+    # Bond and overhang may ask for the same.
+    for said, verdict in dict.fromkeys(_told(findings)):
+        print_wrapped(said, COLOURS[verdict])
+
+
+def _told(findings: Sequence[Finding]) -> Iterator[tuple[str, Verdict]]:
+    for one in findings:
+        if one.verdict in ("fail", "warn") or one.by_user:
+            yield f"{one.rule}: {one.remedy or one.message}", one.verdict
+
+
+def verdict_said(name: str, groups: Sequence[Group], more: str) -> str:
+    """The closing line of what holds; ``more`` tells where the details are."""
+    if len(groups) == 1:
+        return f"{name} holds: {counted(groups[0].findings)}. {more}"
+    return f"{name} holds. {more}"
+
+
+def limit_said(finding: Finding) -> str:
+    """A limit with its sense: ">=" the least that may be measured, "<=" the most."""
+    if finding.limit is None:
+        return "no target" if finding.rule in SHARES else ""
+    sense = "<=" if _is_most(finding.rule) else ">="
+    return f"{sense} {short_figure(finding.limit, _unit(finding))}"
+
+
+def _unit(finding: Finding) -> str:
+    """The unit of a finding's figures; of a share what is counted, after a per cent sign."""
+    return f"% {SHARES[finding.rule]}" if finding.rule in SHARES else finding.unit
+
+
+def _is_most(rule: str) -> bool:
+    from sbafab.rules.deck import AT_MOST, rule_names
+
+    if rule in rule_names():
+        return rule in AT_MOST
+    from sbafab.assemblies.checks import AT_MOST as BETWEEN_PARTS
+
+    return rule in BETWEEN_PARTS
+
+
+def short_figure(value: float | None, unit: str) -> str:
+    """A measured value in a column; none where nothing was measured."""
+    if value is None:
+        return ""
+    if unit.startswith("%"):
+        return f"{100 * value:.3g}{unit}"
+    digits = f"{value:.3f}" if unit == "mm" else f"{value:.4g}"
+    return f"{digits} {unit}".strip()
+
+
+# What ``sbafab generate`` prints of an assembly.
+
+
+def print_assembly(run: Run) -> None:
+    """What was made of an assembly, what the rules found, and the checks between its parts."""
+    out = console()
+    if not run.kept:
+        out.print(_assembly_table(run))
+        out.print()
+    print_verdict(run, "assembly")
+
+
+def _assembly_table(run: Run) -> Table:
+    from rich.text import Text
+
+    made = facts_table()
+    index = run.manifest
+    parts = (f"{p['name']} ({p['design'] or p['kind']})" for p in index["parts"])
+    made.add_row("assembly", Text(f"{index['name']}, {index['design_sha256'][:12]}"))
+    made.add_row("parts", Text(", ".join(parts)))
+    add_batch(made, run)
+    return made
+
+
+def print_assembly_prediction(found: AssemblyPrediction) -> None:
+    """What the parts of an assembly do inflated, and what they then touch."""
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("part", no_wrap=True)
+    table.add_column("figure")
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    table.add_column("model")
+    table.add_column("paper")
+    part = ""
+    for figure in found.figures:
+        table.add_row(
+            figure.part if figure.part != part else "",
+            Text(figure.name),
+            f"{figure.value:.4g}",
+            figure.unit,
+            Text(figure.model),
+            Text(figure.paper),
+        )
+        part = figure.part
+    out = console()
+    out.print(Text(f"{found.name} at {found.pressure_kpa:g} kPa", style="bold"))
+    out.print(table)
+    for measured in dict.fromkeys(figure.measured for figure in found.figures if figure.measured):
+        names = [figure.name for figure in found.figures if figure.measured == measured]
+        print_wrapped(f"{'; '.join(dict.fromkeys(names))}: {measured}")
+    for sentence in found.met():
+        out.print(Text(sentence))
+    for one in found.left_out:
+        out.print(Text(f"left out: {one}"))

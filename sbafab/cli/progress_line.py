@@ -14,7 +14,7 @@ from typing import Any
 
 import click
 
-from sbafab.progress import Progress
+from sbafab.process import Progress
 
 QUIET, VERBOSE = "sbafab.quiet", "sbafab.verbose"
 FIRST_LINE = 5.0

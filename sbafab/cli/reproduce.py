@@ -10,7 +10,7 @@ import click
 from sbafab.cli.options import json_option, out_option
 
 if TYPE_CHECKING:
-    from sbafab.reproduction.records import Row
+    from sbafab.reproduction.rows import Row
 
 FOLDER = "reproduction"
 
@@ -25,11 +25,11 @@ def reproduce(out: Path, as_json: bool) -> None:
     paper that is predicted, with the paper's error bars.
     """
     from sbafab.cli.printing import print_json
-    from sbafab.reproduction import write
+    from sbafab.reproduction import page
 
-    found = write.reproduce(out / FOLDER)
+    found = page.reproduce(out / FOLDER)
     if as_json:
-        print_json({**write.as_json(found), "folder": str(out / FOLDER)})
+        print_json({**page.as_json(found), "folder": str(out / FOLDER)})
         return
     for section, rows in found.items():
         click.echo(f"\n{section}")

@@ -7,9 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sbafab.cli.options import Request, finite, run_options
-from sbafab.cli.quantities import LENGTH, PRESSURE, VOLUME, OfChamber, by_chamber
-from sbafab.cli.working import RULE_FAILED
+from sbafab.cli.exit import RULE_FAILED
+from sbafab.cli.options import (
+    LENGTH,
+    PRESSURE,
+    VOLUME,
+    OfChamber,
+    Request,
+    by_chamber,
+    finite,
+    run_options,
+)
 
 if TYPE_CHECKING:
     from sbafab.simulators.simulator import Name, Result, Wish
@@ -89,12 +97,11 @@ def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> N
     reached is kept.
     """
     from sbafab.actuators import load_design
-    from sbafab.cli.printing import print_json, shown_progress
-    from sbafab.cli.verdicts import Group, print_findings
+    from sbafab.cli.printing import Group, print_findings, print_json, shown_progress
     from sbafab.models.paper import BURST
-    from sbafab.output.checking import checks
-    from sbafab.output.simulating import result_json
-    from sbafab.output.simulating import simulate as run
+    from sbafab.output.checked import checks
+    from sbafab.output.run import result_json
+    from sbafab.output.run import simulate as run
     from sbafab.simulators.simulator import Wish
 
     wish = Wish(**asked)

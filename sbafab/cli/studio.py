@@ -47,7 +47,7 @@ def studio(
         return
     if pyodide is not None:
         raise click.UsageError("--pyodide goes with --static FOLDER")
-    from sbafab.studio.serving import serve
+    from sbafab.studio.app import serve
 
     def announce(link: str) -> None:
         click.echo(f"studio: {link}")

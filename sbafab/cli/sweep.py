@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sbafab.cli.options import Request, finite, run_options
-from sbafab.cli.quantities import PRESSURE
+from sbafab.cli.options import PRESSURE, Request, finite, run_options
 
 if TYPE_CHECKING:
     from sbafab.search.sweep import SweepRequest, SweptDesigns
@@ -76,10 +75,10 @@ def sweep(
     design, times.csv, and the page sweep.html. A run that was stopped goes on where it was.
     """
     from sbafab.actuators import load_design
-    from sbafab.cli.ending import say
+    from sbafab.cli.exit import say
     from sbafab.cli.printing import print_json, shown_progress
     from sbafab.models.figures import Asked
-    from sbafab.models.force import force
+    from sbafab.models.formulas import force
     from sbafab.search import sweep as search
     from sbafab.search.vary import read_varied
 
@@ -104,7 +103,7 @@ def sweep(
 
 
 def _as_json(found: SweptDesigns) -> dict[str, object]:
-    from sbafab.output.printed import SWEEP_SCHEMA
+    from sbafab.output.schemas import SWEEP_SCHEMA
 
     return {
         "schema": SWEEP_SCHEMA,

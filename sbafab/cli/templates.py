@@ -12,7 +12,7 @@ from sbafab.cli.options import json_option
 def templates(as_json: bool) -> None:
     """List the designs that ship, a line each."""
     from sbafab.cli.printing import print_json
-    from sbafab.design.templates import template_summaries
+    from sbafab.design.files import template_summaries
 
     summaries = template_summaries()
     if as_json:

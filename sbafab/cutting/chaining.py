@@ -6,16 +6,13 @@ import math
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 
-from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER
+from sbafab.cutting.properties import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
-from sbafab.geometry.copies import COPIED, Copies, between
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, edge_from_bulge
+from sbafab.geometry.boolean import LEAST_AREA, tidy
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, edge_from_bulge, same_support
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.runs import same_support
-from sbafab.geometry.shapes import circle
-from sbafab.geometry.tidy import LEAST_AREA, tidy
+from sbafab.geometry.region import COPIED, Contour, Copies, Region, between, circle
 
 CLEAR = 10 * EPSILON
 """mm between two circles from which on they surely do not touch."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.design.films import is_kerf
 from sbafab.errors import OutputError
-from sbafab.geometry.beam import Kerf, widths
+from sbafab.geometry.offset import Kerf, widths
 from sbafab.laminate.films import PTFE_WARNING, Material
 
 UNCALIBRATED = "uncalibrated: nominal edges"
@@ -200,3 +200,19 @@ def chord_error_of(properties: Mapping[str, str]) -> float:
             f"custom property CURVES is {said!r}, not {CHORDS} up to 0.1 mm; regenerate it."
         )
     return error
+
+
+# The layers of a cut file, in the order a laser program takes them.
+
+
+ENGRAVE = "ENGRAVE"
+CUT_INNER = "CUT_INNER"
+CUT_OUTER = "CUT_OUTER"
+CUT_SHEET = "CUT_SHEET"
+REFERENCE = "REFERENCE"
+
+COLOURS = {ENGRAVE: 7, CUT_INNER: 5, CUT_OUTER: 1, CUT_SHEET: 6, REFERENCE: 8}
+"""AutoCAD colour index of every layer; REFERENCE is neither cut nor plotted."""
+
+CUT_SEQUENCE = (ENGRAVE, CUT_INNER, CUT_OUTER, CUT_SHEET)
+"""What is cut first comes first: a hole cut after its outline would be cut in a loose part."""

@@ -11,13 +11,11 @@ from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import CutSettings, second_cut_properties
 from sbafab.cutting.verify import check_surroundings, verify_file
 from sbafab.errors import OutputError
-from sbafab.geometry.beam import Kerf, widths
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import rectangle
+from sbafab.geometry.offset import Kerf, widths
+from sbafab.geometry.region import Region, rectangle
 from sbafab.laminate.films import Material
-from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.panel import SheetPanel
+from sbafab.laminate.laminate import Laminate, SheetPanel
 
 PATH = "sheets/second_cut.dxf"
 ROOM = 10.0

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 
-from sbafab.cutting.cut_layers import CUT_SEQUENCE, CUT_SHEET, ENGRAVE, REFERENCE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import DATUM_ARM, Surroundings
-from sbafab.cutting.remaining import PointsLeft
+from sbafab.cutting.order import PointsLeft
+from sbafab.cutting.properties import CUT_SEQUENCE, CUT_SHEET, ENGRAVE, REFERENCE
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Bounds, Edge, Line, Point, distance_to
 from sbafab.geometry.region import Contour, Region

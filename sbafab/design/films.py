@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from sbafab.design.section import Section
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
-from sbafab.geometry.beam import Kerf
+from sbafab.geometry.offset import Kerf
 from sbafab.laminate.films import (
     PAPER_PRODUCT,
     PAPER_THICKNESS,

@@ -16,9 +16,19 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from sbafab.design.files import (
+    KITS,
+    checked,
+    kit_names,
+    listed,
+    plain_tables,
+    read_toml,
+    resolved,
+    shown,
+    templates_folder,
+    write_copy,
+)
 from sbafab.design.films import Films, LayerFilms, without_other_products
-from sbafab.design.messages import listed, shown
-from sbafab.design.reading import checked, read_toml
 from sbafab.design.records import (
     NAME_PATTERN,
     Acceptance,
@@ -30,9 +40,7 @@ from sbafab.design.records import (
     Sheets,
 )
 from sbafab.design.section import Section, writable
-from sbafab.design.templates import KITS, kit_names, templates_folder, write_copy
 from sbafab.design.units import Length, millimetres
-from sbafab.design.writing import plain_tables, resolved
 from sbafab.errors import DesignError
 
 DEFAULT = "paper"

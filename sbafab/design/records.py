@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -22,13 +23,116 @@ from pydantic import (
 )
 
 from sbafab.design.films import UNCALIBRATED, Films, KerfWidth, LayerFilms, Sheet
-from sbafab.design.form import Form, Free
-from sbafab.design.order import Order
 from sbafab.design.section import Section, writable
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
 from sbafab.laminate.base_plate import PlateMachine, lone_pin_error, pin_error
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, film_name
 from sbafab.notebook import table_html
+
+# How many are made: of actuators, for so many good ones, and of parts, with spares.
+
+
+MOST = 1000
+"""Actuators of one order."""
+ROUNDING = 1e-9
+
+
+class Order(Section):
+    """How many, for whom, and how long a working day is."""
+
+    copies: int = Field(default=1, ge=1, le=MOST)
+    """How many of the actuator are made; more where order.good takes more."""
+    success_rate: float = Field(default=0.9, gt=0, le=1)
+    """Share of builds that come out good (paper Sec. 4: under 10 % failed). Take your lab's own
+    from "sbafab record --report" once it has one."""
+    certainty: float = Field(default=0.8, gt=0, lt=1)
+    """With what probability at least order.good come out good (ours): 20 good ones at 0.9 take 23
+    with 0.81, 24 with 0.91, 25 with 0.97."""
+    good: int | None = Field(default=None, ge=1, le=MOST)
+    """How many must come out good. As many more are made as order.success_rate and order.certainty
+    ask for; none asked for by default."""
+    spare_share: float = Field(default=0.05, ge=0, le=2)
+    """Spare parts as a share of the number that the actuators take of each pattern, rounded up
+    (ours). A part that is lost or torn at the press else costs a trip to the laser."""
+    spares: int = Field(default=1, ge=0, le=100)
+    """The fewest spares of a pattern, films and masks alike; 0, with spare_share = 0, cuts none."""
+    shift_hours: float = Field(default=8.0, ge=1, le=24)
+    """A working day of one person at one press: no press cycle takes more copies than fit in it."""
+    made_for: str = Field(default="", max_length=120)
+    """Printed on the traveller."""
+    note: str = Field(default="", max_length=400)
+    """Printed on the traveller."""
+
+    @field_validator("good")
+    @classmethod
+    def _copies_suffice(cls, good: int | None, info: ValidationInfo) -> int | None:
+        rate, certainty = info.data.get("success_rate"), info.data.get("certainty")
+        if good is None or rate is None or certainty is None:
+            return good
+        needed = builds_for(good, rate, certainty)
+        odds = f"at success_rate = {rate:g} and certainty = {certainty:g}"
+        if needed is None:
+            raise ValueError(
+                f"{odds} takes more than {MOST} builds; lower good or certainty, or split the order"
+            )
+        if 1 < info.data.get("copies", 1) < needed:
+            raise ValueError(
+                f"{odds} takes {needed}, and order.copies = {info.data['copies']}; leave copies or "
+                "good out, or lower certainty"
+            )
+        return good
+
+    @property
+    def quantity(self) -> int:
+        """Number of actuators that are made."""
+        if self.good is None:
+            return self.copies
+        needed = builds_for(self.good, self.success_rate, self.certainty)
+        return max(self.copies, needed or MOST)
+
+    @property
+    def why(self) -> str:
+        """Sentence on what the number that is made is good for; empty where none was asked for."""
+        if self.good is None:
+            return ""
+        likely = probability_of(self.good, self.quantity, self.success_rate)
+        return (
+            f"{self.quantity} are made for {self.good} good ones: if {self.success_rate:.0%} of "
+            "builds come out good, each whatever the others do, at least "
+            f"{self.good} of {self.quantity} do with a probability of {likely:.0%} (binomial)."
+        )
+
+    def spare_parts(self, needed: int) -> int:
+        """Number of spares of a pattern of which the actuators take ``needed`` parts."""
+        return max(self.spares, math.ceil(self.spare_share * needed - ROUNDING)) if needed else 0
+
+
+def probability_of(good: int, builds: int, rate: float) -> float:
+    """Probability that at least ``good`` of ``builds`` succeed, each with probability ``rate``.
+
+    The upper tail of the binomial distribution, summed over the number of failures. Builds are
+    taken as independent of each other, which those of one press cycle are not wholly.
+    """
+    return math.fsum(
+        math.comb(builds, failed) * rate ** (builds - failed) * (1 - rate) ** failed
+        for failed in range(builds - good + 1)
+    )
+
+
+def builds_for(good: int, rate: float, certainty: float) -> int | None:
+    """Least number of builds of which ``good`` succeed with this certainty; None beyond MOST."""
+    low, high = good, MOST
+    if probability_of(good, high, rate) < certainty:
+        return None
+    # The probability grows with the number of builds.
+    while low < high:
+        middle = (low + high) // 2
+        if probability_of(good, middle, rate) >= certainty:
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
 
 PAPER_FILM = film_name(PAPER_PRODUCT, PAPER_THICKNESS)
 FITTING = "blunt dispensing needle, 22 G (outer diameter 0.718 mm), Luer lock"
@@ -493,7 +597,7 @@ class Design(Section):
         ``design.with_("stack.balloons=6")``, ``design.with_({"stack.balloons": 6})`` and
         ``design.with_(stack={"balloons": 6})`` say the same. Raises DesignError with one sentence.
         """
-        from sbafab.design.reading import changed
+        from sbafab.design.files import changed
 
         return changed(self, [*changes, tables])
 
@@ -501,7 +605,7 @@ class Design(Section):
         return f"{type(self).__name__}({self.name!r}, {self.stack.balloons} balloons)"
 
     def _repr_html_(self) -> str:
-        from sbafab.design.writing import keys_of
+        from sbafab.design.files import keys_of
 
         return table_html(("key", "value", "default"), keys_of(self), self.name)
 
@@ -528,3 +632,93 @@ class Design(Section):
         copy = self.model_copy()
         copy._folder = folder
         return copy
+
+
+# The form of an actuator: what a family says of a design to all who do not know the family.
+
+
+@dataclass(frozen=True)
+class Discs:
+    """Round pockets on one axis a stack: their diameters in mm, one a balloon, bottom to top."""
+
+    diameters: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Slots:
+    """Oblong pockets, alike in every balloon: half discs of ``width`` joined by a straight ``run``,
+    both in mm.
+    """
+
+    width: float
+    run: float
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Pockets of an outline that the user drew."""
+
+
+Pockets = Discs | Slots | Drawn
+
+
+@dataclass(frozen=True)
+class Wrap:
+    """A laminate that is wrapped round a tube: its outer diameter, and the pitch of the stacks
+    round it, both in mm; ``glue`` is the adhesive that holds it there, and ``overlap`` by how much
+    (mm) one end of the sheet lies over the other.
+    """
+
+    tube_diameter: float
+    pitch: float
+    glue: str
+    overlap: float = 0.0
+
+
+@dataclass(frozen=True)
+class Form:
+    """What an actuator is like, whichever family made it.
+
+    ``words`` is what a technician calls it; ``stacks`` of balloons stand side by side, all with the
+    same ``pockets``; ``lumen`` is the diameter in mm of the channel through all layers,
+    ``lumen_pin`` its dowel pin's.
+    """
+
+    words: str
+    stacks: int
+    pockets: Pockets
+    lumen: float | None = None
+    lumen_pin: float | None = None
+    wrap: Wrap | None = None
+
+    @property
+    def is_parallel(self) -> bool:
+        """Whether stacks on common plates push one way: unlike strokes then bend the actuator."""
+        return self.stacks > 1 and self.wrap is None
+
+    @property
+    def pushing(self) -> int:
+        """Stacks that push one way: all on common plates, one alone of those round a tube."""
+        return self.stacks if self.wrap is None else 1
+
+
+@dataclass(frozen=True)
+class Free:
+    """A key that a search may change: from ``low`` to ``high`` in steps.
+
+    ``asked``: only where a requirement names this quantity; else it stays as it is. ``widens``: the
+    ends are where a search begins to look, and may move.
+    """
+
+    key: str
+    low: float
+    high: float
+    step: float
+    asked: str = ""
+    widens: bool = False
+
+
+def degrees_of_freedom(stacks: int) -> str:
+    """Words for round stacks on common plates: one lengthens (1-DoF), three also bend (3-DoF)."""
+    said = {1: " (1-DoF)", 3: " (3-DoF)"}.get(stacks, "")
+    return f"stacked balloon actuator with {stacks} chamber{'s' if stacks > 1 else ''}{said}"

@@ -1,18 +1,26 @@
-"""Edges in arrays, a column each, for what is asked of many places at once."""
+"""The types of arrays that geometry and rules are worked out in; only checks of types read this."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from itertools import chain
 from operator import mul
-from typing import TYPE_CHECKING, Final
+from typing import Final, final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge
+from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal
+from sbafab.geometry.width import ALONGSIDE
 
-if TYPE_CHECKING:
-    from sbafab.geometry.arrays import Bools, Floats, Indices
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Bools = NDArray[np.bool_]
+
+
+# Edges in arrays, a column each, for what is asked of many places at once.
+
 
 FEW = 20_000
 """Pairs of boxes up to which all are compared at once."""
@@ -226,3 +234,168 @@ def crossings(
     found = np.array([np.where(straight, t, along), along - half, along + half])
     there = np.array([np.where(straight, ~parallel, touches), both & ~straight, both & ~straight])
     return found, there
+
+
+# An edge of a boundary, with what a search for places that face each other asks of it.
+
+
+BESIDE: Final = 1e-5
+"""mm that an edge may miss another's normals by, for rounding."""
+
+
+@final
+class Foot:
+    """A point of an edge, and the unit normal into the material there."""
+
+    __slots__ = ("normal", "point")
+
+    def __init__(self, point: Point, normal: Point) -> None:
+        self.point: Final[Point] = point
+        self.normal: Final[Point] = normal
+
+
+@final
+class BoundarySide:
+    """An edge with what the search asks of it again and again.
+
+    ``half`` is how far its ends lie from its middle, ``lean`` the sine of its half turn.
+    """
+
+    __slots__ = ("box", "edge", "half", "half_turn", "lean", "middle", "normal")
+
+    def __init__(
+        self, edge: Edge, box: Bounds, middle: Point, half_turn: float, half: float
+    ) -> None:
+        self.edge: Final[Edge] = edge
+        self.box: Final[Bounds] = box
+        self.middle: Final[Point] = middle
+        self.normal: Final[Point] = left_normal(edge, middle)
+        self.half_turn: Final[float] = half_turn
+        self.half: Final[float] = half
+        self.lean: Final[float] = math.sin(min(half_turn, math.pi / 2))
+
+    def may_hold_feet(self, other: BoundarySide, within: float) -> bool:
+        """Whether a normal of this edge may meet the other no farther off than ``within``."""
+        x, y = self.middle
+        nx, ny = self.normal
+        aside = abs((other.middle[0] - x) * ny - (other.middle[1] - y) * nx)
+        return aside <= self.half + other.half + within * self.lean + BESIDE
+
+    def feet(self, p: Point) -> list[Foot]:
+        """Points of the edge where its normal passes through ``p``."""
+        edge = self.edge
+        if isinstance(edge, Line):
+            x0, y0 = edge.start
+            x1, y1 = edge.end
+            dx, dy = x1 - x0, y1 - y0
+            square = dx * dx + dy * dy
+            t = ((p[0] - x0) * dx + (p[1] - y0) * dy) / square
+            if not -1e-9 <= t <= 1 + 1e-9:
+                return []
+            length = math.sqrt(square)
+            return [Foot((x0 + t * dx, y0 + t * dy), (-dy / length, dx / length))]
+        cx, cy = edge.centre
+        r = edge.radius
+        ux, uy = p[0] - cx, p[1] - cy
+        distance = math.hypot(ux, uy)
+        if distance < 1e-12:
+            return [Foot(self.middle, left_normal(edge, self.middle))]
+        inward = -1.0 if edge.ccw else 1.0
+        mx, my = self.middle[0] - cx, self.middle[1] - cy
+        least = r * (math.cos(self.half_turn) - 1e-9)
+        found = []
+        for sign in (1.0, -1.0):
+            vx, vy = sign * ux / distance, sign * uy / distance
+            if vx * mx + vy * my >= least:
+                found.append(Foot((cx + r * vx, cy + r * vy), (inward * vx, inward * vy)))
+        return found
+
+
+# The sides of a boundary in arrays: which of them may face each other is asked of all at once.
+
+
+ROOM: Final = 1e-9
+"""More than the rounding of what is asked once more of each pair."""
+
+
+class SideTable:
+    """What the search knows of the sides of a boundary, or of several one after the other.
+
+    ``parts`` are the numbers of sides in each boundary; none faces a side of another.
+    """
+
+    def __init__(self, sides: Sequence[BoundarySide], parts: Sequence[int] = ()) -> None:
+        self.parts = parts or [len(sides)]
+        self.edges = [side.edge for side in sides]
+        self.table = EdgeTable.of(self.edges, [side.box for side in sides])
+        rows = [
+            (*side.middle, *side.normal, side.half_turn, side.half, side.lean) for side in sides
+        ]
+        columns = columns_of(rows, 7)
+        self.middle, self.normal = columns[0:2], columns[2:4]
+        self.half_turn, self.half, self.lean = columns[4:7]
+
+    def pairs(self, aside: float, within: Floats) -> tuple[Indices, Indices]:
+        """Sides and those that their normals may meet no farther off, as ``near`` tells them.
+
+        ``within`` is so many mm for each side.
+        """
+        asked, a, b = self._near(within)
+        far = within.take(a)
+        chosen = self._opposed(a, b, aside) & self._may_hold_feet(b, a, far) & (a != b)
+        a, b = a[chosen], b[chosen]
+        faces = self._may_face(a, b, within.take(a))
+        a, b = a[faces], b[faces]
+        order = CellOrder(self.table.box, self.parts).sorted(asked, a, b)
+        return a.take(order), b.take(order)
+
+    def later(self, aside: float, within: float) -> list[list[int]]:
+        """For each side the later ones that it may face square no farther off, and few others."""
+        _, a, b = self._near(within)
+        a, b = a[a < b], b[a < b]
+        opposed = self._opposed(a, b, aside)
+        a, b = a[opposed], b[opposed]
+        feet = self._may_hold_feet(a, b, within) | self._may_hold_feet(b, a, within)
+        found: list[list[int]] = [[] for _ in self.edges]
+        for one, other in zip(a[feet].tolist(), b[feet].tolist(), strict=True):
+            found[one].append(other)
+        return found
+
+    def _near(self, within: float | Floats) -> tuple[Floats, Indices, Indices]:
+        """The boxes of sides widened by ``within``, and the sides whose boxes these touch."""
+        asked, box = self.table.box.copy(), self.table.box
+        asked[:2] -= within
+        asked[2:] += within
+        return asked, *touching_in_parts(asked, self.parts, box, self.parts)
+
+    def _opposed(self, a: Indices, b: Indices, aside: float) -> Bools:
+        """Whether their normals are opposed somewhere, to within ``aside`` radians."""
+        room = self.half_turn.take(a) + aside + self.half_turn.take(b)
+        facing = dot(self.normal.take(a, axis=1), self.normal.take(b, axis=1))
+        opposed = facing < ROOM - np.cos(room)
+        found: Bools = opposed | (room > math.pi)
+        return found
+
+    def _may_face(self, a: Indices, b: Indices, within: Floats) -> Bools:
+        """Whether they may face each other no farther off, as ``width._may_face`` tells of arcs of
+        nearly one centre that both have the material inside, or both outside.
+        """
+        table = self.table
+        off = table.centre.take(a, axis=1) - table.centre.take(b, axis=1)
+        turn, r, s = table.turn.take(a), table.radius.take(a), table.radius.take(b)
+        alike = (np.hypot(off[0], off[1]) < ALONGSIDE) & (turn == table.turn.take(b)) & (turn != 0)
+        alike &= np.minimum(r, s) >= 10 * ALONGSIDE
+        across = (turn > 0) & (r + s <= within + 2 * ALONGSIDE)
+        found: Bools = ~alike | across
+        return found
+
+    def _may_hold_feet(self, a: Indices, b: Indices, within: float | Floats) -> Bools:
+        """Whether normals of sides ``a`` may meet sides ``b`` no farther off than ``within``."""
+        off, normal = (
+            self.middle.take(b, axis=1) - self.middle.take(a, axis=1),
+            self.normal.take(a, axis=1),
+        )
+        missed = np.abs(off[0] * normal[1] - off[1] * normal[0])
+        half = self.half.take(a) + self.half.take(b)
+        may: Bools = missed <= half + within * self.lean.take(a) + BESIDE + ROOM
+        return may

@@ -7,6 +7,7 @@ Lengths are millimetres, angles radians. Every arc spans at most half a turn, so
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Final, final
 
@@ -411,3 +412,120 @@ def turns_round(edge: Edge, p: Point) -> int:
             elif not edge.ccw and left:
                 turns -= 1
     return turns
+
+
+# What is summed up over the edges of a closed chain: area, length, boxes, turns round a point.
+
+
+def enclosed_area(edges: tuple[Edge, ...]) -> float:
+    """Area in mm2 to the left of a closed chain: negative where it runs clockwise."""
+    ox, oy = edges[0].start
+    twice = 0.0
+    bulges = 0.0
+    for edge in edges:
+        x0, y0 = edge.start
+        x1, y1 = edge.end
+        twice += (x0 - ox) * (y1 - oy) - (x1 - ox) * (y0 - oy)
+        bulges += edge.segment_area
+    return twice / 2 + bulges
+
+
+def length_of(edges: tuple[Edge, ...]) -> float:
+    """Length in mm."""
+    return sum([edge.length for edge in edges])
+
+
+def boxes_of(edges: tuple[Edge, ...]) -> tuple[Bounds, ...]:
+    """The bounds of each edge."""
+    return tuple([edge.bounds for edge in edges])
+
+
+def box_round(boxes: Sequence[Bounds]) -> Bounds:
+    """The box that holds all of them; of none, one that holds nothing."""
+    left = low = math.inf
+    right = high = -math.inf
+    for box in boxes:
+        left = min(left, box[0])
+        low = min(low, box[1])
+        right = max(right, box[2])
+        high = max(high, box[3])
+    return left, low, right, high
+
+
+def times_round(edges: tuple[Edge, ...], boxes: tuple[Bounds, ...], p: Point) -> int:
+    """How many times a closed chain runs counter-clockwise round ``p`` (not on an edge)."""
+    y = p[1]
+    turns = 0
+    for edge, box in zip(edges, boxes, strict=True):
+        if box[1] - EPSILON <= y <= box[3] + EPSILON:
+            turns += turns_round(edge, p)
+    return turns
+
+
+# Edges of a closed chain gathered by the line or circle that they lie on.
+
+
+_Run = tuple[Edge, ...]
+DRIFT: Final = 4 * EPSILON
+"""mm that edges which follow each other along one line or circle may leave it by, together."""
+
+
+def runs(edges: _Run) -> Iterator[_Run]:
+    """The edges gathered by the line or circle they lie on, from the first corner on."""
+    breaks = [i for i in range(len(edges)) if not same_support(edges[i - 1], edges[i])]
+    if not breaks:
+        yield from _parted(edges)
+        return
+    for first, last in zip(breaks, [*breaks[1:], breaks[0]], strict=True):
+        yield from _parted(edges[first:last] if first < last else edges[first:] + edges[:last])
+
+
+def same_support(a: Edge, b: Edge) -> bool:
+    """Whether two edges lie on one circle, or are lines of one direction, and turn alike."""
+    if isinstance(a, Arc) and isinstance(b, Arc):
+        return (
+            a.ccw == b.ccw
+            and abs(a.radius - b.radius) < EPSILON
+            and math.dist(a.centre, b.centre) < EPSILON
+        )
+    if isinstance(a, Line) and isinstance(b, Line):
+        ux, uy = a.direction(a.start)
+        vx, vy = b.direction(b.start)
+        return ux * vx + uy * vy > 0 and abs(ux * vy - uy * vx) * (a.length + b.length) < EPSILON
+    return False
+
+
+def _parted(run: _Run) -> Iterator[_Run]:
+    """The run, in parts that each keep to one line or circle.
+
+    Edges may turn by so little from one to the next that each two look straight, and yet round a
+    corner together.
+    """
+    if len(run) < 3:
+        yield run
+        return
+    head, end = run[0], run[-1].end
+    if isinstance(head, Arc):
+        offs = [_off_circle(edge, head) for edge in run]
+        place = next((i for i, off in enumerate(offs) if off > DRIFT), 0)
+    else:
+        # Of a closed run, what lies farthest from where it starts.
+        chord = Line(head.start, end)
+        offs = [
+            math.dist(edge.start, end) if head.start == end else abs(chord.to_left(edge.start))
+            for edge in run
+        ]
+        farthest = max(range(len(run)), key=offs.__getitem__)
+        place = farthest if offs[farthest] > DRIFT else 0
+    if not place:
+        yield run
+        return
+    yield from _parted(run[:place])
+    yield from _parted(run[place:])
+
+
+def _off_circle(edge: Edge, head: Arc) -> float:
+    """How far an arc's circle is another than the first one's."""
+    if not isinstance(edge, Arc):
+        return math.inf
+    return max(abs(edge.radius - head.radius), math.dist(edge.centre, head.centre))

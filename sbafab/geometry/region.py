@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections import defaultdict
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+from operator import sub
 from typing import TYPE_CHECKING, Final
 
-from sbafab.geometry import similarity
-from sbafab.geometry.chain_sums import (
-    box_round,
-    boxes_of,
-    enclosed_area,
-    length_of,
-    times_round,
-)
+from sbafab.geometry.cache import keeping, once
 from sbafab.geometry.edges import (
     EPSILON,
     SAME,
@@ -27,14 +25,19 @@ from sbafab.geometry.edges import (
     Edge,
     Line,
     Point,
+    box_round,
+    boxes_of,
     distance_to,
+    enclosed_area,
+    length_of,
+    runs,
+    same_support,
+    times_round,
     turns_round,
     unit,
 )
+from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, close_pairs
-from sbafab.geometry.once import keeping, once
-from sbafab.geometry.runs import runs, same_support
-from sbafab.geometry.similarity import Similarity
 
 if TYPE_CHECKING:
     import shapely
@@ -200,7 +203,7 @@ class Contour:
 
     def polygon(self, sagitta: float = 0.001) -> list[Point]:
         """Vertices of a polygon whose chords stay within ``sagitta`` of the arcs."""
-        from sbafab.geometry.facets import facets
+        from sbafab.geometry.arcs import facets
 
         return facets(self, sagitta, keeps_area=False)
 
@@ -353,18 +356,18 @@ class Region:
 
     def moved(self, dx: float, dy: float) -> Region:
         """The region moved by so many mm along x and y."""
-        return self.mapped(similarity.shift(dx, dy), 1.0, False)
+        return self.mapped(shift(dx, dy), 1.0, False)
 
     def turned(self, degrees: float, about: Point = (0.0, 0.0)) -> Region:
         """The region turned counter-clockwise; quarter turns are exact."""
-        return self.mapped(similarity.turn(unit(degrees), about), 1.0, False)
+        return self.mapped(turn(unit(degrees), about), 1.0, False)
 
     def scaled(self, factor: float) -> Region:
-        return self.mapped(similarity.scale(factor), factor, False)
+        return self.mapped(scale(factor), factor, False)
 
     def mirrored(self) -> Region:
         """The region flipped over: x becomes -x."""
-        return self.mapped(similarity.flip, 1.0, True)
+        return self.mapped(flip, 1.0, True)
 
     def shapely(self, chord_error: float = 0.001) -> shapely.MultiPolygon:
         """The region for shapely; chords stay within ``chord_error`` mm of the arcs."""
@@ -385,3 +388,280 @@ class Region:
             [contour.polygon(sagitta) for contour in (*piece.outers, *piece.holes)]
             for piece in self.pieces
         ]
+
+
+# Similarities of the plane, by what they do to points.
+
+
+Similarity = Callable[[Point], Point]
+
+
+def shift(dx: float, dy: float) -> Similarity:
+    return lambda p: (p[0] + dx, p[1] + dy)
+
+
+def turn(direction: Point, about: Point) -> Similarity:
+    """What turns the x axis into a direction."""
+    (c, s), (ax, ay) = direction, about
+    return lambda p: (
+        ax + (p[0] - ax) * c - (p[1] - ay) * s,
+        ay + (p[0] - ax) * s + (p[1] - ay) * c,
+    )
+
+
+def scale(factor: float) -> Similarity:
+    return lambda p: (p[0] * factor, p[1] * factor)
+
+
+def flip(p: Point) -> Point:
+    """What makes x -x."""
+    return -p[0], p[1]
+
+
+# The centre of area of a region.
+
+
+def centroid(region: Region) -> Point:
+    """Centre of area of a region that is not empty."""
+    x, y = region.edges[0].start
+    mx = my = 0.0
+    for edge in region.edges:
+        dx, dy = _moment(edge, (x, y))
+        mx, my = mx + dx, my + dy
+    return x + mx / region.area, y + my / region.area
+
+
+def _moment(edge: Edge, origin: Point) -> Point:
+    """First moment of the triangle from ``origin`` to the edge's chord, and of what lies between
+    chord and arc.
+    """
+    ox, oy = origin
+    (x0, y0), (x1, y1) = edge.start, edge.end
+    x0, y0, x1, y1 = x0 - ox, y0 - oy, x1 - ox, y1 - oy
+    area = (x0 * y1 - x1 * y0) / 2
+    mx, my = area * (x0 + x1) / 3, area * (y0 + y1) / 3
+    if not isinstance(edge, Arc):
+        return mx, my
+    # A circular segment: (2/3) r^3 sin^3(sweep/2) from the circle's centre, along its axis.
+    (cx, cy), (px, py) = edge.centre, edge.at(0.5)
+    lever = 2 / 3 * edge.radius**2 * math.sin(edge.sweep / 2) ** 3
+    segment = edge.segment_area
+    return (
+        mx + segment * (cx - ox) + lever * (px - cx),
+        my + segment * (cy - oy) + lever * (py - cy),
+    )
+
+
+# The primitive profiles: disc, rectangle, stadium, polygon.
+
+
+@lru_cache(maxsize=256)
+def circle(centre: Point, radius: float) -> Contour:
+    """A full circle, counter-clockwise, as four quarter arcs.
+
+    The same one for all layers that a bore goes through, with what is known of it.
+    """
+    x, y = centre
+    compass = [(x + radius, y), (x, y + radius), (x - radius, y), (x, y - radius)]
+    contour = Contour(
+        tuple([Arc(compass[i], compass[(i + 1) % 4], centre, radius, True) for i in range(4)])
+    )
+    # Known without a look at the arcs.
+    contour.__dict__.update(
+        circle=(centre, radius),
+        area=math.pi * radius * radius,
+        length=math.tau * radius,
+        bounds=(x - radius, y - radius, x + radius, y + radius),
+    )
+    return contour
+
+
+def disc(centre: Point, radius: float) -> Region:
+    return Region((circle(centre, radius),))
+
+
+def polygon(points: Sequence[Point]) -> Region:
+    """The region inside straight edges through ``points``, in either order."""
+    contour = Contour(
+        tuple(Line(points[i], points[(i + 1) % len(points)]) for i in range(len(points)))
+    )
+    return Region((contour if contour.area > 0 else contour.reversed(),))
+
+
+def rectangle(low: Point, high: Point) -> Region:
+    return polygon([low, (high[0], low[1]), high, (low[0], high[1])])
+
+
+def strip(start: Point, end: Point, width: float) -> Region:
+    """A straight strip of the given width with square ends."""
+    length = math.dist(start, end)
+    nx = -(end[1] - start[1]) / length * width / 2
+    ny = (end[0] - start[0]) / length * width / 2
+    return polygon(
+        [
+            (start[0] + nx, start[1] + ny),
+            (start[0] - nx, start[1] - ny),
+            (end[0] - nx, end[1] - ny),
+            (end[0] + nx, end[1] + ny),
+        ]
+    )
+
+
+def stadium(centre: Point, width: float, length: float) -> Region:
+    """A slot shape ``width`` across x and ``length`` along y; a disc where they are equal."""
+    x, y = centre
+    r = width / 2
+    half = length / 2 - r
+    if half <= 0:
+        return disc(centre, r)
+    top, bottom = (x, y + half), (x, y - half)
+    right_low, right_high = (x + r, bottom[1]), (x + r, top[1])
+    left_low, left_high = (x - r, bottom[1]), (x - r, top[1])
+    return Region(
+        (
+            Contour(
+                (
+                    Line(right_low, right_high),
+                    Arc(right_high, (x, top[1] + r), top, r, True),
+                    Arc((x, top[1] + r), left_high, top, r, True),
+                    Line(left_high, left_low),
+                    Arc(left_low, (x, bottom[1] - r), bottom, r, True),
+                    Arc((x, bottom[1] - r), right_low, bottom, r, True),
+                )
+            ),
+        )
+    )
+
+
+# Where a straight line runs inside a region.
+
+
+Interval = tuple[float, float]
+NEAR = 1e-3
+"""mm: far more than the tolerance within which a line touches an edge."""
+
+
+def section(region: Region, origin: Point, direction: Point) -> list[Interval]:
+    """The stretches of a line inside the region, as distances in mm from ``origin``.
+
+    ``direction`` is a unit vector. The line may touch an edge but must not run along one.
+    """
+    if region.is_empty:
+        return []
+    (ox, oy), (ux, uy) = origin, direction
+    low_x, low_y, high_x, high_y = region.bounds
+    reach = max(math.dist(origin, (x, y)) for x in (low_x, high_x) for y in (low_y, high_y)) + 1.0
+    line = Line((ox - reach * ux, oy - reach * uy), (ox + reach * ux, oy + reach * uy))
+    stops = sorted(
+        (x - ox) * ux + (y - oy) * uy
+        for contour in region.contours
+        for edge, box in zip(contour.edges, contour.boxes, strict=True)
+        if _may_meet(box, origin, direction)
+        for x, y in meeting_points(edge, line)
+    )
+    inside: list[Interval] = []
+    for start, end in pairwise(stops):
+        middle = (start + end) / 2
+        if end - start < 2 * EPSILON:
+            continue
+        if not region.contains((ox + middle * ux, oy + middle * uy)):
+            continue
+        if inside and start - inside[-1][1] < 2 * EPSILON:
+            inside[-1] = (inside[-1][0], end)
+        else:
+            inside.append((start, end))
+    return inside
+
+
+def _may_meet(box: Bounds, origin: Point, direction: Point) -> bool:
+    """Whether a line comes into a box, or so near that it could touch what is in it."""
+    (ox, oy), (ux, uy) = origin, direction
+    left, low, right, high = box
+    off = ux * ((low + high) / 2 - oy) - uy * ((left + right) / 2 - ox)
+    return abs(off) <= (abs(ux) * (high - low) + abs(uy) * (right - left)) / 2 + NEAR
+
+
+# Contours that are copies of each other: what holds for the shape of one holds for all.
+
+
+COPIED = 1e-8
+"""mm: ten times what the numbers of a file are rounded by; far below what tells edges apart."""
+
+
+class Copies:
+    """Contours, each found to be a copy of an earlier one that lies elsewhere, or the first."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[int, ...], list[tuple[list[float], Contour]]] = defaultdict(list)
+        self._firsts: dict[int, tuple[Contour, Contour]] = {}
+
+    def first(self, contour: Contour) -> Contour:
+        """The first contour that this one is a copy of, edge by edge, moved: itself if none is.
+
+        Ends, centres and radii agree within ``COPIED``.
+        """
+        if id(contour) not in self._firsts:
+            self._firsts[id(contour)] = contour, self._found(contour)
+        return self._firsts[id(contour)][1]
+
+    def _found(self, contour: Contour) -> Contour:
+        ox, oy = contour.edges[0].start
+        numbers: list[float] = []
+        for edge in contour.edges:
+            x, y = edge.start
+            numbers += (x - ox, y - oy)
+            if isinstance(edge, Arc):
+                (x, y), radius = edge.centre, edge.radius
+                numbers += (x - ox, y - oy, radius if edge.ccw else -radius)
+        left, low, right, high = contour.bounds
+        # What copies nearly always agree in tells most others apart.
+        sizes = round(100 * (right - left)), round(100 * (high - low))
+        filed = self._known[len(contour.edges), len(numbers), *sizes]
+        for others, first in filed:
+            if max(map(abs, map(sub, numbers, others))) < COPIED:
+                return first
+        filed.append((numbers, contour))
+        return contour
+
+    def lying(self, contour: Contour) -> tuple[int, Point]:
+        """A number of the contour's shape, and where it lies: its centre, or where it starts."""
+        if contour.circle is not None:
+            centre, radius = contour.circle
+            return -round(radius / COPIED), centre
+        return id(self.first(contour)), contour.edges[0].start
+
+
+def between(a: Point, b: Point) -> tuple[int, int]:
+    """How the second of two points lies to the first, in ``COPIED``."""
+    return round((b[0] - a[0]) / COPIED), round((b[1] - a[1]) / COPIED)
+
+
+# SVG path data of regions: lines as L, arcs as A, nothing flattened.
+
+
+def path_data(region: Region) -> str:
+    """The ``d`` of an SVG path in mm, y up (the caller flips); holes by either fill rule."""
+    return " ".join(map(_contour_data, region.contours))
+
+
+def number(value: float) -> str:
+    """A length to the nanometre without trailing zeros."""
+    text = f"{value:.6f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
+def _contour_data(contour: Contour) -> str:
+    commands = [f"M{_point(contour.edges[0].start)}", *map(_command, contour.edges), "Z"]
+    return "".join(commands)
+
+
+def _command(edge: Edge) -> str:
+    if not isinstance(edge, Arc):
+        return f"L{_point(edge.end)}"
+    radius = number(edge.radius)
+    large = int(abs(edge.sweep) > math.pi + 1e-9)
+    return f"A{radius} {radius} 0 {large} {int(edge.ccw)} {_point(edge.end)}"
+
+
+def _point(p: Point) -> str:
+    return f"{number(p[0])} {number(p[1])}"

@@ -8,23 +8,20 @@ between corners; these are exact for lines and arcs.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import combinations
+from typing import TYPE_CHECKING, Final, NamedTuple, final
 
-from sbafab.geometry.boundary_side import BoundarySide, Foot
-from sbafab.geometry.corners import Corner, corners_of, pinch
-from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, left_normal
-from sbafab.geometry.ends import tapered_ends
+from sbafab.geometry.arcs import run_sweep
+from sbafab.geometry.cache import kept, remembered
+from sbafab.geometry.edge_table import BoundarySide, Foot
+from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, left_normal, left_turn
 from sbafab.geometry.intersect import meeting_points
-from sbafab.geometry.kept import kept
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.remembered import remembered
-from sbafab.geometry.rings import across_a_ring, bound_a_ring
-from sbafab.geometry.width_bounds import may_be_narrower, widest_least
 
 if TYPE_CHECKING:
-    from sbafab.geometry.side_table import SideTable
+    from sbafab.geometry.edge_table import SideTable
 
 ALONGSIDE: Final = 1e-3
 """Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
@@ -97,7 +94,7 @@ class Boundary:
     @property
     def table(self) -> SideTable:
         """The sides in arrays."""
-        from sbafab.geometry.side_table import SideTable
+        from sbafab.geometry.edge_table import SideTable
 
         if self._table is None:
             self._table = SideTable(self.sides)
@@ -371,3 +368,253 @@ def _corner_to_edge(corner: Corner, side: BoundarySide, foot: Foot, narrowest: _
 
 def _dot(a: Point, b: Point) -> float:
     return a[0] * b[0] + a[1] * b[1]
+
+
+# The corners of contours, and what a segment that ends at one has to be.
+
+
+@final
+class Corner:
+    """A vertex with the directions of travel into and out of it; ``turn`` > 0 is convex.
+
+    ``normal`` is the unit vector halfway between the normals of the two edges.
+    """
+
+    __slots__ = ("arriving", "box", "half_turn", "leaving", "normal", "point", "turn")
+
+    def __init__(self, point: Point, arriving: Point, leaving: Point, turn: float) -> None:
+        self.point: Final[Point] = point
+        self.arriving: Final[Point] = arriving
+        self.leaving: Final[Point] = leaving
+        self.turn: Final[float] = turn
+        self.half_turn: Final[float] = abs(turn) / 2
+        self.box: Final[Bounds] = (point[0], point[1], point[0], point[1])
+        ux, uy = arriving
+        half = turn / 2
+        c, s = math.cos(half), math.sin(half)
+        self.normal: Final[Point] = (-ux * s - uy * c, ux * c - uy * s)
+
+    def squarely(self, d: Point) -> bool:
+        """Whether a reflex corner lies nearest, among its neighbours, to what ``d`` points at."""
+        room = 1e-9 * math.hypot(*d)
+        return _dot(d, self.arriving) >= -room and _dot(d, self.leaving) <= room
+
+    def normals(self) -> tuple[Point, Point]:
+        return _left(self.arriving), _left(self.leaving)
+
+
+def corners_of(contour: Contour) -> Iterator[Corner | None]:
+    """The corner that each edge starts at; None where the path is smooth."""
+    edges = contour.edges
+    for before, after in zip((edges[-1], *edges), edges, strict=False):
+        u, v = before.direction(after.start), after.direction(after.start)
+        turn = math.atan2(u[0] * v[1] - u[1] * v[0], _dot(u, v))
+        if abs(turn) > math.pi - SMOOTH:
+            # At a cusp only the curvatures tell which side the material is on.
+            turn = math.pi if _curvature(before) + _curvature(after) < 0 else -math.pi
+        yield Corner(after.start, u, v, turn) if abs(turn) > SMOOTH else None
+
+
+def pinch(
+    contours: Iterable[Contour], corners: Iterable[Corner | None], sharp: float
+) -> Point | None:
+    """A corner sharper than allowed, or a point where the boundary meets itself."""
+    for corner in corners:
+        if corner is not None and math.degrees(math.pi - corner.turn) < sharp - ROUNDED:
+            return corner.point
+    seen: set[Point] = set()
+    for contour in contours:
+        for edge in contour.edges:
+            if edge.start in seen:
+                return edge.start
+            seen.add(edge.start)
+    return None
+
+
+def _curvature(edge: Edge) -> float:
+    if isinstance(edge, Line):
+        return 0.0
+    return (1.0 if edge.ccw else -1.0) / edge.radius
+
+
+def _left(u: Point) -> Point:
+    return -u[1], u[0]
+
+
+# The ends of arms that taper: nothing stands square on both sides there, yet they are narrow.
+#
+# An end lies between two flanks that come together towards it: a rounded corner, or an edge between
+# two bends, each a corner or its fillet. It is as wide as its flanks are apart where they stop.
+
+
+SMOOTH: Final = 1e-4
+"""Corners that turn by less, in radians, are none."""
+TAPER: Final = 30.0
+"""Degrees; flanks at a wider angle are two sides of a corner, not of an arm."""
+LEAST_TURN: Final = math.pi - math.radians(TAPER + 1)
+ROUNDED: Final = 0.1
+"""Degrees a corner may miss its angle by: coordinates read from a file are rounded."""
+
+
+class _Run:
+    """Consecutive edges on one line or circle, and how far they turn (radians, left positive)."""
+
+    __slots__ = ("first", "last", "radius", "sweep")
+
+    def __init__(self, first: Edge, last: Edge, sweep: float) -> None:
+        self.first: Final[Edge] = first
+        self.last: Final[Edge] = last
+        self.sweep: Final[float] = sweep
+        self.radius: Final[float] = first.radius if isinstance(first, Arc) else math.inf
+
+    def corner(self, after: _Run) -> float:
+        """How far the path turns from this run to the next."""
+        return left_turn(self.last, after.first)
+
+    def is_fillet(self, bottom: _Run) -> bool:
+        """Whether it rounds a corner of the run beside it, which turns less tightly."""
+        return self.sweep > 0 and (bottom.sweep <= 0 or self.radius < bottom.radius)
+
+
+def tapered_ends(contour: Contour, sharp: float) -> Iterator[tuple[Point, Point]]:
+    """Where the flanks of every end of an arm stop, in a contour with the arm on its left.
+
+    A rounded corner is an end where the corner itself would have less than ``sharp`` degrees.
+    """
+    runs = [_Run(own[0], own[-1], run_sweep(own)) for own in contour.runs]
+    corners = [runs[i - 1].corner(run) for i, run in enumerate(runs)]
+    # No end where the path can not turn far enough from the run before to the one after.
+    most = [abs(run.sweep) + abs(corner) for run, corner in zip(runs, corners, strict=True)]
+    ahead = [*range(1, len(runs)), 0]
+    for i, run in enumerate(runs):
+        turns = most[i - 1] + most[i] + most[ahead[i]] + abs(corners[ahead[ahead[i]]])
+        if turns < LEAST_TURN:
+            continue
+        before, after = runs[i - 1], runs[(i + 1) % len(runs)]
+        into, out = corners[i], corners[(i + 1) % len(runs)]
+        # A round end that turns further is wider than between its flanks.
+        if abs(into) < SMOOTH and abs(out) < SMOOTH and run.sweep < math.pi + SMOOTH:
+            yield from _between_flanks(runs, corners, i, i, min(TAPER, sharp - ROUNDED))
+        start = i - 1 if abs(into) < SMOOTH and before.is_fillet(run) else i
+        stop = i + 1 if abs(out) < SMOOTH and after.is_fillet(run) else i
+        if (start < i or into > SMOOTH) and (stop > i or out > SMOOTH):
+            yield from _between_flanks(runs, corners, start, stop, TAPER)
+
+
+def _between_flanks(
+    runs: Sequence[_Run], corners: Sequence[float], start: int, stop: int, taper: float
+) -> Iterator[tuple[Point, Point]]:
+    """The ends of the path along runs ``start`` to ``stop``, if it turns back between flanks.
+
+    ``corners``: how far it turns into each run.
+    """
+    if stop - start + 3 > len(runs):
+        return
+    count = len(runs)
+    turn: float = sum([runs[i % count].sweep for i in range(start, stop + 1)])
+    turn += sum([corners[i % count] for i in range(start, stop + 2)])
+    if abs(turn - math.pi) < math.radians(taper):
+        yield runs[start % len(runs)].first.start, runs[stop % len(runs)].last.end
+
+
+# Arcs of one centre with material between them: what lies across needs no search.
+
+
+WIDE = 1e-5
+"""mm: in narrower rings rounding may decide which edges face each other."""
+
+
+def bound_a_ring(a: Edge, b: Edge) -> bool:
+    """Whether two edges are arcs of one centre, the outer one counter-clockwise, with a ring
+    between.
+    """
+    if not (isinstance(a, Arc) and isinstance(b, Arc)) or a.ccw == b.ccw or a.centre != b.centre:
+        return False
+    return (a.radius - b.radius if a.ccw else b.radius - a.radius) > WIDE
+
+
+def across_a_ring(a: BoundarySide, b: BoundarySide) -> list[tuple[Point, Point]]:
+    """From middle and ends of each of two such arcs to the other one, where it lies across."""
+    found: list[tuple[Point, Point]] = []
+    for one, other in ((a, b), (b, a)):
+        arc = other.edge
+        assert isinstance(arc, Arc)
+        cx, cy = arc.centre
+        r = arc.radius
+        mx, my = other.middle[0] - cx, other.middle[1] - cy
+        least = r * (math.cos(other.half_turn) - 1e-9)
+        for p in (one.middle, one.edge.start, one.edge.end):
+            ux, uy = p[0] - cx, p[1] - cy
+            distance = math.hypot(ux, uy)
+            vx, vy = ux / distance, uy / distance
+            if vx * mx + vy * my >= least:
+                found.append((p, (cx + r * vx, cy + r * vy)))
+    return found
+
+
+# What is known of widths before they are measured: from circles, and from where contours lie.
+#
+# Contours have the material on their left here, too.
+
+
+MANY_CIRCLES = 24
+"""From which on looking at all pairs costs more than it saves."""
+
+
+def widest_least(contours: Sequence[Contour]) -> float:
+    """No less than the least width, mm: what circles leave between them, or across.
+
+    What lies between two of them may only make it less. Endless where no circle tells.
+    """
+    circles = [(*one.circle, one.is_hole) for one in contours if one.circle is not None]
+    least = min((2 * radius for _, radius, is_hole in circles if not is_hole), default=math.inf)
+    if len(circles) > MANY_CIRCLES:
+        return least
+    for (one, r, one_is_hole), (other, s, other_is_hole) in combinations(circles, 2):
+        gap = math.dist(one, other)
+        if one_is_hole and other_is_hole:
+            width = gap - r - s
+        elif one_is_hole != other_is_hole:
+            width = (s - r if one_is_hole else r - s) - gap
+        else:
+            continue
+        if 0 < width < least:
+            least = width
+    return least
+
+
+def may_be_narrower(contours: Sequence[Contour], than: float) -> Sequence[Contour]:
+    """The contours without circles that are as wide, and stay as far from all others.
+
+    No width below ``than`` mm begins, ends or is crossed there.
+    """
+    if math.isinf(than):
+        return contours
+    return [
+        one
+        for one in contours
+        if one.circle is None
+        or (not one.is_hole and 2 * one.circle[1] < than)
+        or _has_near(one, contours, than)
+    ]
+
+
+def _has_near(contour: Contour, others: Sequence[Contour], reach: float) -> bool:
+    """Whether another contour may come within ``reach`` of this circle."""
+    assert contour.circle is not None
+    centre, r = contour.circle
+    left, low, right, high = widened(contour.bounds, reach)
+    for other in others:
+        if other is contour:
+            continue
+        if other.circle is not None:
+            there, s = other.circle
+            gap = math.dist(centre, there)
+            if max(gap - r - s, abs(r - s) - gap) < reach:
+                return True
+        elif any(
+            box[0] <= right and box[2] >= left and box[1] <= high and box[3] >= low
+            for box in other.boxes
+        ):
+            return True
+    return False

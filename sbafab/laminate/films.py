@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from sbafab.errors import DesignError
 
@@ -108,3 +108,34 @@ def in_order(materials: Iterable[Material]) -> list[Material]:
     """Every material once: TPE, PTFE, then the others by name."""
     rank = {material: place for place, material in enumerate(FIRST)}
     return sorted(set(materials), key=lambda name: (rank.get(name, len(FIRST)), name))
+
+
+# The colours of films, alike in every picture and on every page.
+
+
+class Ink(NamedTuple):
+    """Fill and line colour of a film."""
+
+    fill: str
+    line: str
+
+
+# Blue against orange: told apart in every common colour blindness, and in grey by lightness.
+# Further films follow in hues apart from both; masks stay light, and pictures hatch them.
+STRUCTURAL = (
+    Ink("#a9cfea", "#0b4f86"),
+    Ink("#8fd0b5", "#0b6b4b"),
+    Ink("#c9b8e6", "#54308f"),
+    Ink("#b9c2cc", "#3c4650"),
+)
+MASKS = (
+    Ink("#fbe3bd", "#b35a00"),
+    Ink("#f8cfd4", "#a3213a"),
+    Ink("#ecebae", "#6f6a00"),
+)
+
+
+def ink(film: Film) -> Ink:
+    """The colours of a film; the fifth of a kind begins again with the first one's."""
+    inks = MASKS if film.is_mask else STRUCTURAL
+    return inks[film.shade % len(inks)]

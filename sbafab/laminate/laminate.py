@@ -7,15 +7,99 @@ the origin lies on the actuator's axis, z points up from the press plate.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Literal, get_args
 
+from sbafab.geometry.boolean import divided, union
+from sbafab.geometry.cache import once
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.once import once
-from sbafab.geometry.region import Region
-from sbafab.laminate.films import Film, in_order
-from sbafab.laminate.interfaces import Interface, InterfaceKind, interface_regions
-from sbafab.laminate.panel import SheetPanel
+from sbafab.geometry.region import Region, number, path_data
+from sbafab.laminate.films import Film, density_of, in_order, ink
+from sbafab.markup import escape
+from sbafab.notebook import table_html
+
+# Registered sheets: whole films on corner pins that hold several copies until a second cut.
+#
+# Of every layer the first cut leaves one sheet. Films hold their parts by bridges, mask sheets hold
+# theirs by the transfer film they lie on. All stacked and pressed, the second cut takes a slot out of
+# every bridge and so frees the actuators. Lengths mm, in the frame of the first copy.
+
+
+@dataclass(frozen=True)
+class SheetPanel:
+    """The registered sheets of a laminate, pressed together as a batch.
+
+    ``places`` are the axes of the copies, the first at the origin; ``sheets`` what the first cut
+    leaves of each layer, bottom to top and seen from above; ``second`` all slots of the second cut;
+    ``window`` the room that every film sheet leaves round one copy; ``batches`` how many such
+    panels make all copies.
+    """
+
+    outline: Region
+    places: tuple[Point, ...]
+    sheets: tuple[Region, ...]
+    second: Region
+    fiducials: tuple[Point, ...]
+    fiducial_diameter: float
+    window: Region
+    batches: int
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and length of a sheet."""
+        low_x, low_y, high_x, high_y = self.outline.bounds
+        return high_x - low_x, high_y - low_y
+
+    def holds(self, p: Point, place: Point) -> bool:
+        """Whether a point of a sheet lies in the window of the copy at ``place``."""
+        return self.window.contains((p[0] - place[0], p[1] - place[1]))
+
+
+@dataclass(frozen=True)
+class Freed:
+    """A sheet after the second cut: ``parts`` of each copy in its own frame, frame and crumbs.
+
+    A part that is still held is part of the ``frame``, and missing.
+    """
+
+    frame: Region
+    parts: tuple[Region, ...]
+    crumbs: tuple[Region, ...] = field(default=())
+
+
+def freed(panel: SheetPanel, layer: Layer) -> Freed:
+    """What the sheet of a layer falls into.
+
+    Mask sheets fall apart in the first cut; what the second one takes of a mask is past the part.
+    """
+    cut = Region() if layer.is_mask else panel.second
+    return _freed(panel.sheets[layer.index - 1], cut, panel)
+
+
+@lru_cache(maxsize=64)
+def _freed(sheet: Region, cut: Region, panel: SheetPanel) -> Freed:
+    places = panel.places
+    pieces = (sheet - cut).pieces if not cut.is_empty else sheet.pieces
+    if not pieces:
+        return Freed(Region(), tuple(Region() for _ in places))
+    frame = max(pieces, key=lambda piece: Region(piece.outers).area)
+    found: list[list[Region]] = [[] for _ in places]
+    crumbs = []
+    for piece in pieces:
+        if piece is frame:
+            continue
+        p = piece.outers[0].edges[0].at(0.5)
+        home = next((i for i, place in enumerate(places) if panel.holds(p, place)), None)
+        if home is None:
+            crumbs.append(piece)
+        else:
+            x, y = places[home]
+            found[home].append(piece.moved(-x, -y))
+    parts = tuple(Region(tuple(c for piece in own for c in piece.contours)) for own in found)
+    return Freed(frame, parts, tuple(crumbs))
+
 
 Role = Literal["base", "wall", "cap", "sheet", "chamber-mask", "separator-mask"]
 ROLES: tuple[Role, ...] = get_args(Role)
@@ -58,7 +142,6 @@ class Layer:
         return self.film.is_mask
 
     def _repr_html_(self) -> str:
-        from sbafab.laminate.picture import layer_html
 
         return layer_html(self)
 
@@ -242,7 +325,6 @@ class Laminate:
         )
 
     def _repr_html_(self) -> str:
-        from sbafab.laminate.picture import laminate_html
 
         return laminate_html(self)
 
@@ -259,3 +341,198 @@ __all__ = [
     "Pin",
     "Role",
 ]
+
+
+# Interfaces: what bonds and what stays open between two consecutive TPE layers.
+
+
+InterfaceKind = Literal["chamber", "separator", "bond"]
+"""``bond`` is an interface without a mask: the films bond all over."""
+
+
+@dataclass(frozen=True)
+class Interface:
+    """Two TPE layers, below and above, and the masks between them.
+
+    contact: where both layers are; bond: contact without mask; unbonded: contact under mask.
+    ``balloon`` is the balloon a chamber interface lies in, or the one below a separator.
+    """
+
+    index: int
+    kind: InterfaceKind
+    below: Layer
+    above: Layer
+    masks: tuple[Layer, ...]
+    mask: Region
+    contact: Region
+    bond: Region
+    unbonded: Region
+
+    @staticmethod
+    def between(
+        index: int,
+        below: Layer,
+        above: Layer,
+        masks: Sequence[Layer],
+        regions: tuple[Region, Region, Region, Region],
+    ) -> Interface:
+        kind: InterfaceKind = "bond"
+        if masks:
+            kind = "chamber" if masks[0].role == "chamber-mask" else "separator"
+        return Interface(index, kind, below, above, tuple(masks), *regions)
+
+    @property
+    def gap(self) -> float:
+        """Height in mm between the two layers: the thickness of the masks."""
+        return sum(mask.film.thickness for mask in self.masks)
+
+    @property
+    def z(self) -> float:
+        """Height of the gap's lower face."""
+        return self.below.z + self.below.film.thickness
+
+    @property
+    def layer_indices(self) -> tuple[int, ...]:
+        return (self.below.index, *(mask.index for mask in self.masks), self.above.index)
+
+    @once
+    def pattern(self) -> tuple[str, ...]:
+        """Equal for interfaces made of equal profiles."""
+        return (
+            self.below.pattern,
+            *(mask.pattern for mask in self.masks),
+            self.above.pattern,
+        )
+
+
+def interface_regions(
+    below: Region, above: Region, masks: Sequence[Region]
+) -> tuple[Region, Region, Region, Region]:
+    """Mask, contact, bond and unbonded region of two TPE profiles with masks between."""
+    mask = union(masks)
+    _, contact = (None, below) if below.contours == above.contours else divided(below, above)
+    return mask, contact, *divided(contact, mask)
+
+
+# How far a laminate reaches from its axis.
+
+
+def outline_diameter(laminate: Laminate) -> float:
+    """Diameter of the circle round the axis that holds all films, tabs and ears taken off.
+
+    The paper's 3-DoF actuator fits 15 (Sec. 2). Measured on every film as it is cut: what of it
+    lies within the laminate's outline.
+    """
+    films = {layer.pattern: layer.profile for layer in laminate.tpe_layers}
+    return _round_axis(Region(film.outers) & laminate.outline for film in films.values())
+
+
+def overall_diameter(laminate: Laminate) -> float:
+    """Diameter of the circle round the axis that holds every layer, with tabs, tails and ears."""
+    return _round_axis(layers[0].profile for layers in laminate.patterns.values())
+
+
+def beyond_the_outline(laminate: Laminate) -> str:
+    """What makes the overall diameter larger than the outline's, counted: "3 inlet tabs"."""
+    count = len(laminate.inlets)
+    tabs = f"{count} inlet tab{'s' if count > 1 else ''}"
+    return f"{tabs} and the ears" if laminate.registration == "ears" else tabs
+
+
+def film_mass(laminate: Laminate) -> float:
+    """Mass in g of all films, tabs and ears included; without tubing, glue and fluid.
+
+    Raises DesignError where the density of a film is not known.
+    """
+    return sum(
+        layer.profile.area * layer.film.thickness * density_of(layer.film) * 1e-6
+        for layer in laminate.layers
+    )
+
+
+def _round_axis(regions: Iterable[Region]) -> float:
+    return 2 * max(
+        (edge.farthest_from((0.0, 0.0)) for region in regions for edge in region.edges), default=0.0
+    )
+
+
+# Plan views of a layer and of a laminate, as a notebook shows them.
+
+
+SHOWN_MM = 80.0
+BARS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
+
+
+def laminate_html(laminate: Laminate) -> str:
+    """The laminate in plan, with what each colour is, a scale and its layers in order."""
+    rows = [
+        (f"{layers[0].pattern}", layers[0].film.material, layers[0].role, _numbers(layers))
+        for layers in laminate.patterns.values()
+    ]
+    table = table_html(("pattern", "film", "role", "layers, bottom to top"), rows)
+    return laminate_svg(laminate) + _legend(laminate.bounds, laminate.layers) + table
+
+
+def layer_html(layer: Layer) -> str:
+    """The layer in plan, with what its colour is and a scale."""
+    return layer_svg(layer) + _legend(layer.profile.bounds, (layer,))
+
+
+def _numbers(layers: Sequence[Layer]) -> str:
+    """Layer indices, many of them as first, second ... last."""
+    indices = [str(layer.index) for layer in layers]
+    return ", ".join(indices if len(indices) < 6 else [*indices[:2], "...", indices[-1]])
+
+
+def _legend(bounds: Bounds, layers: Iterable[Layer]) -> str:
+    """A scale bar in HTML, and a swatch for each film."""
+    low_x, low_y, high_x, high_y = bounds
+    longer = 1.06 * max(high_x - low_x, high_y - low_y)
+    bar = max((step for step in BARS if step < longer / 3), default=BARS[0])
+    films = dict.fromkeys(layer.film for layer in layers)
+    swatches = "".join(
+        f'<span style="background:{ink(film).fill};border:1px solid '
+        f'{ink(film).line}">&emsp;</span> {film.material}, {escape(film.product)}, '
+        f"{number(film.thickness)} mm &ensp; "
+        for film in films
+    )
+    width = number(bar * SHOWN_MM / longer)
+    return (
+        f'<div><span style="display:inline-block;width:{width}mm;border-top:2px solid">'
+        f"{bar:g} mm</span> &ensp; {swatches}</div>"
+    )
+
+
+def layer_svg(layer: Layer) -> str:
+    """The layer's exact profile in plan, enlarged to fit a notebook cell."""
+    title = f"{layer.name} ({layer.pattern})"
+    return _document(title, layer.profile.bounds, [_profile(layer, 1.0)])
+
+
+def laminate_svg(laminate: Laminate) -> str:
+    """Every distinct profile in plan, bottom to top, see-through."""
+    title = f"{laminate.name}: {len(laminate.layers)} layers, {number(laminate.thickness)} mm"
+    shapes = [_profile(layers[0], 0.45) for layers in laminate.patterns.values()]
+    return _document(title, laminate.bounds, shapes)
+
+
+def _profile(layer: Layer, opacity: float) -> str:
+    own = ink(layer.film)
+    return (
+        f'<path d="{path_data(layer.profile)}" fill="{own.fill}" stroke="{own.line}" '
+        f'fill-opacity="{number(opacity)}"/>'
+    )
+
+
+def _document(title: str, bounds: Bounds, shapes: list[str]) -> str:
+    low_x, low_y, high_x, high_y = bounds
+    margin = 0.03 * max(high_x - low_x, high_y - low_y)
+    width, height = high_x - low_x + 2 * margin, high_y - low_y + 2 * margin
+    scale = SHOWN_MM / max(width, height)
+    box = " ".join(map(number, (low_x - margin, -high_y - margin, width, height)))
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{number(width * scale)}mm" '
+        f'height="{number(height * scale)}mm" viewBox="{box}"><title>{escape(title)}</title>'
+        f'<g transform="scale(1 -1)" fill-rule="evenodd" stroke-width="{number(0.3 / scale)}">'
+        f"{''.join(shapes)}</g></svg>"
+    )

@@ -9,9 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.cavity import cavity
-from sbafab.meshing.prisms import SAGITTA, sealed
-from sbafab.meshing.solid import solid
+from sbafab.meshing.solid import SAGITTA, cavity, sealed, solid
 from sbafab.meshing.surface import Surface
 from sbafab.meshing.wrap import tube_wrap, wrapped
 from sbafab.meshing.write_3mf import write_3mf

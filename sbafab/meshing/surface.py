@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sbafab.errors import DesignError
-from sbafab.geometry.once import once
+from sbafab.geometry.cache import once
 
 if TYPE_CHECKING:
     import numpy as np

@@ -24,7 +24,7 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.laminate.films import PAPER_TPE
-from sbafab.models import banded, rim_ripple
+from sbafab.models import least_energy
 from sbafab.models.film_elements import (
     Elements,
     Flat,
@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from sbafab.models.film_elements import Array
-    from sbafab.models.rim_ripple import Ripple
 
 FILM_ELEMENTS = 24
 RIM_ELEMENTS = 5
@@ -145,9 +144,9 @@ class Balloon:
         return found
 
     @cached_property
-    def packing(self) -> banded.Packing:
+    def packing(self) -> least_energy.Packing:
         """How a band by coordinates becomes one by freedoms."""
-        return banded.packing(self.freedoms, 2 * len(self.nodes), 6)
+        return least_energy.packing(self.freedoms, 2 * len(self.nodes), 6)
 
     @property
     def level(self) -> int:
@@ -213,11 +212,9 @@ def inflate(
     elements = len(balloon.nodes) - 1
     smooth = np.where(balloon.may_wrinkle & balloon.inextensible, 0.0, math.inf)
     cap = np.broadcast_to(smooth, (len(p), elements))
-    load = BalloonLoad(p, high / 2, cap, tied, rim_ripple.smooth(balloon, len(p)))
+    load = BalloonLoad(p, high / 2, cap, tied, smooth(balloon, len(p)))
     if balloon.mate is not None:
-        from sbafab.models import two_films
-
-        return two_films.inflate((replace(balloon, mate=None), balloon.mate), load)
+        return inflate_two_films((replace(balloon, mate=None), balloon.mate), load)
     # Where no balance is found, elements may shrink to nothing on the way; that is said in the end.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         x = _settled(balloon, load, coordinates(*start(balloon, load)))
@@ -281,7 +278,7 @@ def total(balloon: Balloon, load: BalloonLoad, x: Array) -> Total:
     p = load.pressure
     bent = bending(film, balloon.rigidity, slice(balloon.held, edge), lie)
     stretched, filled = membrane(film, lie, load.cap), air(film, edge, lie)
-    eased = rim_ripple.eased(film, edge, load.ripple, r)
+    eased = eased(film, edge, load.ripple, r)
     slopes, curves = (
         [a + b - p[:, None] * c for a, b, c in zip(*parts, strict=True)]
         for parts in (
@@ -312,7 +309,7 @@ def levelled(balloon: Balloon, found: Total) -> Total:
     """The same with the heights of the neck taken for one, at ``level``."""
     for height in range(1, balloon.level, 2):
         found.gradient[balloon.level] += found.gradient[height]
-        banded.join(found.matrix, height, balloon.level)
+        least_energy.join(found.matrix, height, balloon.level)
     return found
 
 
@@ -325,7 +322,7 @@ class Energies:
 
     def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
         found = levelled(self.balloon, total(self.balloon, self.load.rows(rows), x))
-        band = banded.packed(found.matrix, self.balloon.packing)
+        band = least_energy.packed(found.matrix, self.balloon.packing)
         # The rim's radii are the last freedoms, next to each other.
         ends = len(found.rim)
         for k in range(ends):
@@ -338,7 +335,7 @@ class Energies:
         band[:, 0] += damping * np.abs(band[:, 0])
         freedoms = self.balloon.freedoms
         found = np.zeros_like(state.gradient)
-        found[freedoms] = banded.solve(band, -state.gradient[freedoms])
+        found[freedoms] = least_energy.solve(band, -state.gradient[freedoms])
         found[1 : self.balloon.level : 2] = found[self.balloon.level]
         return found
 
@@ -397,4 +394,339 @@ def rippling(films: Sequence[Balloon], shapes: Sequence[tuple[Array, Array]]) ->
         one.rigid * found.meridian[:, one.edge - 1]
         for one, found in zip(films, strains, strict=True)
     ]
-    return rim_ripple.rippling(films, strains[0].hoop[:, films[0].edge :], pulls)
+    return rim_ripples(films, strains[0].hoop[:, films[0].edge :], pulls)
+
+
+# The bonded rim of a balloon, which buckles out of its plane where its hoop is compressed.
+#
+# The films, pulled tight, hold the pocket's edge; the rim tilts about it by a cos(n turn), a in rad.
+# At s from that edge a ripple takes up the hoop strain
+#
+#     a^2 rho,    rho = (n^2 s^2 / r^2 - s / r) / 4
+#
+# the first part for the waves' length, the second for the tilt, which draws the hoop inward. It costs
+#
+#     a^2 K / 2,    K = pi int D ((1/r - n^2 s / r^2)^2 + 2 (1 - nu) n^2 (1/r - s/r^2)^2) r ds
+#                       + pi R sum sqrt(B T)
+#
+# the rim's bending and twisting (plate of both films, Kirchhoff), and the films' roots: a long film
+# of bending stiffness B under the tension T is turned at its end against sqrt(B T). With the rim's
+# hoop strain e the energy is a^2 K / 2 + int E (e + a^2 rho)^2 / 2, so that the amplitude of least
+# energy has a closed form, and what is left is quadratic in e. The number of waves is the one of
+# least energy. Nothing is fitted. Lengths mm, pressures kPa, energies uJ.
+
+
+WAVES = np.arange(2, 201)
+"""Numbers of waves round the rim that are looked at."""
+POINTS = 5
+"""Points of Gauss an element."""
+
+
+class Ripple(NamedTuple):
+    """Ripples that one film of each balloon would make, a row a balloon.
+
+    ``waves`` round the rim; ``cost`` is K / 2, infinite where none are made; ``relief`` the rho
+    of the rim's elements, ``pull`` each one's volume times modulus times rho, and ``stiff`` the
+    integral of E rho^2.
+    """
+
+    waves: Array
+    cost: Array
+    relief: Array
+    pull: Array
+    stiff: Array
+
+    def rows(self, these: NDArray[np.int_]) -> Ripple:
+        return Ripple(*(part[these] for part in self))
+
+
+def smooth(balloon: Balloon, count: int) -> Ripple:
+    """Rims that do not ripple."""
+    elements = np.zeros((count, len(balloon.nodes) - 1 - balloon.edge))
+    none = np.full(count, math.inf)
+    return Ripple(np.zeros(count), none, elements, elements, np.ones(count))
+
+
+def rim_ripples(films: Sequence[Balloon], hoop: Array, tensions: Sequence[Array]) -> list[Ripple]:
+    """The ripples of least energy at the rim's hoop strains (rows, elements), for each film its
+    share; ``tensions`` in N/m are those of the films at the pocket's edge, one row each.
+
+    One film stands for two alike.
+    """
+    pair = films if len(films) == 2 else (films[0], films[0])
+    pulls = tensions if len(films) == 2 else (tensions[0], tensions[0])
+    roots = sum(
+        np.sqrt(one.rigidity * np.maximum(pull, 0.0)) for one, pull in zip(pair, pulls, strict=True)
+    )
+    rigid = sum(one.rigid for one in pair)
+    cost, relief, weight, stiff = _modes(pair)
+    cost = cost + math.pi * pair[0].pocket * np.asarray(roots)[:, None] / 2
+    pull = rigid * weight * relief
+    drive = -(hoop @ pull.T + cost)
+    gain = np.where(drive > 0, drive**2 / stiff, 0.0)
+    best = gain.argmax(-1)
+    row = np.arange(len(hoop))
+    found = []
+    for one in films:
+        share = one.rigid / rigid
+        found.append(
+            Ripple(
+                WAVES[best].astype(float),
+                share * cost[row, best],
+                relief[best],
+                share * pull[best],
+                share * stiff[best],
+            )
+        )
+    return found
+
+
+def _modes(pair: Sequence[Balloon]) -> tuple[Array, Array, Array, Array]:
+    """By number of waves: half the cost of bending; rho of each element, and area (elements,); and
+    the integral of E rho^2 over both films.
+    """
+    one = pair[0]
+    nodes = one.nodes[one.edge :]
+    places, weights = np.polynomial.legendre.leggauss(POINTS)
+    length = np.diff(nodes)
+    r = nodes[:-1, None] + length[:, None] * (places + 1) / 2
+    area = math.tau * r * length[:, None] * weights / 2
+    s, n = r - one.pocket, WAVES[:, None, None]
+    around = 1 / r - n**2 * s / r**2
+    twist = n * (1 / r - s / r**2)
+    plate = both_bend(pair) / (1 - one.poisson**2)
+    cost = plate / 4 * (area * (around**2 + 2 * (1 - one.poisson) * twist**2)).sum((1, 2))
+    rho = (n**2 * s**2 / r**2 - s / r) / 4
+    size = area.sum(-1)
+    stiff = sum(film.rigid for film in pair) * (area * rho**2).sum((1, 2))
+    return cost, (area * rho).sum(-1) / size, size, stiff
+
+
+def both_bend(pair: Sequence[Balloon]) -> float:
+    """Bending stiffness in kPa mm3 of both films bonded, a strip that is free to narrow."""
+    (e1, t1), (e2, t2) = ((one.modulus, one.thickness) for one in pair)
+    mixed = e1 * e2 * t1 * t2 * (4 * t1**2 + 6 * t1 * t2 + 4 * t2**2)
+    return (e1**2 * t1**4 + e2**2 * t2**4 + mixed) / (12 * (e1 * t1 + e2 * t2))
+
+
+def amplitude(flat: Flat, edge: int, ripple: Ripple, r: Array) -> Array:
+    """The squared tilt a^2 of least energy, a row a balloon."""
+    return np.asarray(_drive(_hoop(flat, edge, r), ripple) / ripple.stiff)
+
+
+class Eased(NamedTuple):
+    """An energy (rows,) with its derivatives by the radii of the rim's nodes: (nodes, rows) and
+    (nodes, nodes, rows).
+    """
+
+    energy: Array
+    slopes: Array
+    curves: Array
+
+
+def eased(flat: Flat, edge: int, ripple: Ripple, r: Array) -> Eased:
+    """What ripples take off the energy of a smooth rim."""
+    drive = _drive(_hoop(flat, edge, r), ripple)
+    middles = flat.middles[edge:]
+    wide = (r[:, edge + 1 :] + r[:, edge:-1]) / (2 * middles)
+    # Slopes of the hoop strain by the radius of either node, and what they change by.
+    first = wide ** (flat.order - 1) / (2 * middles)
+    second = (flat.order - 1) * wide ** (flat.order - 2) / (2 * middles) ** 2
+    tilt = drive / ripple.stiff
+    pulled = (ripple.pull * first).T
+    steep = np.zeros((len(pulled) + 1, len(r)))
+    steep[:-1] += pulled
+    steep[1:] += pulled
+    curves = np.where(drive > 0, -1 / ripple.stiff, 0.0) * steep[:, None] * steep
+    bent = (tilt[:, None] * ripple.pull * second).T
+    number = np.arange(len(bent))
+    for i in (0, 1):
+        for j in (0, 1):
+            curves[number + i, number + j] += bent
+    return Eased(-drive * tilt / 2, tilt * steep, curves)
+
+
+def _hoop(flat: Flat, edge: int, r: Array) -> Array:
+    return strain(flat, r, np.zeros_like(r)).hoop[:, edge:]
+
+
+def _drive(hoop: Array, ripple: Ripple) -> Array:
+    """By how much the hoop's compression outdoes the ripples' cost; 0 where it does not."""
+    return np.asarray(np.maximum(-(ripple.cost + (hoop * ripple.pull).sum(-1)), 0.0))
+
+
+# A balloon whose two films are unlike: each with its thickness and modulus, bonded at one rim.
+#
+# Both films of ``models.balloon`` at once. They share the rim, which moves to where both pull alike
+# and tilts as they wring it: as a ring whose section turns. Units as there.
+
+
+REACH = 5
+"""Coordinates further on that one is joined with."""
+TwoFilms = tuple["Balloon", "Balloon"]
+Loads = tuple["BalloonLoad", "BalloonLoad"]
+
+
+def inflate_two_films(films: TwoFilms, load: BalloonLoad) -> Shapes:
+    """The shapes under a load; ``r`` and ``z`` are those of the film that stretches more easily.
+
+    Raises DesignError where no balance is found.
+    """
+    loads = (load, load)
+    basis = _basis(films[0], is_free=bool(np.isinf(load.half).any()))
+    begin = [coordinates(*start(one, load)) for one in films]
+    y = np.asarray(np.linalg.pinv(basis) @ np.concatenate(begin), dtype=float)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        y = _two_films_settled(films, loads, basis, y)
+        if films[0].wrinkles:
+            zones = [
+                compressed(one, *places(part))
+                for one, part in zip(films, np.split(basis @ y, 2), strict=True)
+            ]
+            for _ in range(ROUNDS):
+                shapes = [places(part) for part in np.split(basis @ y, 2)]
+                ripples = rippling(films, shapes)
+                loads = tuple(
+                    load._replace(cap=wrinkling(one, *shape, zone), ripple=ripple)
+                    for one, shape, zone, ripple in zip(films, shapes, zones, ripples, strict=True)
+                )  # type: ignore[assignment]
+                y = _two_films_settled(films, loads, basis, y)
+    x = basis @ y
+    energy = (_wringing(films) @ x) ** 2 / 2
+    volume, force = np.zeros_like(energy), np.zeros_like(energy)
+    shapes = []
+    for one, own, part in zip(films, loads, np.split(x, 2), strict=True):
+        r, z = (np.ascontiguousarray(each) for each in places(part))
+        found = total(one, own, part)
+        held = air(one.film, one.edge, Elements.of(r, z)).energy
+        energy, volume = energy + found.energy + load.pressure * held, volume + held
+        force = force + found.force / 2
+        shapes.append((r, z))
+    height = shapes[0][1][:, 0] + shapes[1][1][:, 0]
+    softer = shapes[int(films[1].rigid < films[0].rigid)]
+    return Shapes(load.pressure, height, volume, force, energy, *softer)
+
+
+def _wringing(films: TwoFilms) -> Array:
+    """What coordinates make of the square root of twice the energy of wringing the rim.
+
+    A ring of both films bonded turns round its middle line: hoops are bent.
+    """
+    one = films[0]
+    stiff = math.tau * both_bend(films) * math.log((one.pocket + one.ring) / one.pocket)
+    found = np.zeros(4 * len(one.nodes))
+    found[[2 * len(one.nodes) - 1, 2 * one.edge + 1]] = 1.0, -1.0
+    return np.asarray(found * math.sqrt(stiff) / one.ring)
+
+
+def _basis(one: Balloon, is_free: bool) -> Array:
+    """What a unit of each freedom moves: (coordinates of both films, freedoms).
+
+    First come those of each film alone, then those of both: the rim's radii, its tilt, and its
+    height. A free balloon's rim stays in its plane: where it is as a whole does not matter.
+    """
+    count, own = len(one.nodes), _own(one)
+    found = np.zeros((4 * count, 2 * len(own) + count - one.edge + 1 + (not is_free)))
+    for film, start in ((0, 0), (2 * count, len(own))):
+        found[film + own, start + np.arange(len(own))] = 1.0
+        found[film + 1 : film + one.level : 2, start + np.searchsorted(own, one.level)] = 1.0
+    rim, shared = np.arange(one.edge, count), 2 * len(own)
+    for film, side in ((0, 1.0), (2 * count, -1.0)):
+        found[film + 2 * rim, shared + np.arange(len(rim))] = 1.0
+        found[film + 2 * rim + 1, shared + len(rim)] = side * (one.nodes[rim] - one.pocket)
+        found[film + 2 * rim + 1, shared + len(rim) + 1 :] = side
+    return found
+
+
+def _own(one: Balloon) -> NDArray[np.int_]:
+    """The coordinates that a film moves alone: those inside the pocket's edge."""
+    return one.freedoms[one.freedoms < 2 * one.edge]
+
+
+def _two_films_settled(films: TwoFilms, loads: Loads, basis: Array, y: Array) -> Array:
+    """The freedoms (freedoms, rows) of least energy downhill of these."""
+    try:
+        return settled(_Energies(films, loads, basis), y)
+    except (NoBalance, np.linalg.LinAlgError):
+        raise DesignError(
+            f"a balloon of radius {films[0].pocket:g} mm with two unlike films finds no balance; "
+            "try another load"
+        ) from None
+
+
+class _Matrix(NamedTuple):
+    """Second derivatives, rows last: those of each film's own freedoms as bands (own, 6, 2 rows),
+    the first film's rows before the second's; of its last ones with the shared ones (``REACH``,
+    shared, 2 rows), all others are 0; and of the shared ones (rows, shared, shared).
+    """
+
+    own: Array
+    between: Array
+    shared: Array
+
+
+class _Energies:
+    """The energies of both films under their loads, by freedoms, for ``least_energy``."""
+
+    def __init__(self, films: TwoFilms, loads: Loads, basis: Array) -> None:
+        self.films, self.loads, self.basis = films, loads, basis
+        self.wrings = _wringing(films) @ basis
+        self.scale, self.close = sizes(films[0], loads[0])
+        own = _own(films[0])
+        self.packing = least_energy.packing(own, len(basis) // 2, REACH + 1)
+        self.alone = len(own)
+
+    def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
+        first = 2 * self.alone
+        by = self.wrings[first:]
+        wrung = self.wrings @ x
+        energy, slopes = wrung**2 / 2, wrung * self.wrings[:, None]
+        shared = np.tile(np.multiply.outer(by, by), (x.shape[1], 1, 1))
+        bases, parts = np.split(self.basis, 2), np.split(self.basis @ x, 2)
+        own, between = [], []
+        for one, load, part, basis in zip(self.films, self.loads, parts, bases, strict=True):
+            found = total(one, load.rows(rows), part)
+            energy = energy + found.energy
+            slopes += basis.T @ found.gradient
+            levelled(one, found)
+            own.append(least_energy.packed(found.matrix, self.packing))
+            # The rim, and what is near enough to be joined with it.
+            edge = 2 * one.edge
+            end, moved = least_energy.dense(found.matrix[edge - REACH :]), basis[edge:, first:]
+            rim = np.arange(REACH, end.shape[1], 2)
+            end[:, rim[:, None], rim] += np.moveaxis(found.rim, -1, 0)
+            between.append(np.moveaxis(end[:, :REACH, REACH:] @ moved, 0, -1))
+            shared += moved.T @ end[:, REACH:, REACH:] @ moved
+        matrix = _Matrix(np.concatenate(own, -1), np.concatenate(between, -1), shared)
+        return Descent(energy, slopes, matrix)
+
+    def ahead(self, state: Descent, damping: Array) -> Array:
+        """By the Schur complement of the shared freedoms."""
+        matrix, first = state.matrix, 2 * self.alone
+        several, rows = matrix.shared.shape[1], len(damping)
+        band, shared = matrix.own.copy(), matrix.shared.copy()
+        band[:, 0] += _firmer(band[:, 0], np.tile(damping, 2))
+        number = np.arange(several)
+        shared[:, number, number] += _firmer(shared[:, number, number].T, damping).T
+        wanted = np.zeros((self.alone, several + 1, 2 * rows))
+        wanted[-REACH:, :-1] = matrix.between
+        wanted[:, -1] = -np.concatenate(np.split(state.gradient[:first], 2), -1)
+        alone = least_energy.solve(band, wanted)
+        passed = np.einsum("iar,ibr->rab", matrix.between, alone[-REACH:])
+        passed = passed[:rows] + passed[rows:]
+        left = -state.gradient[first:].T - passed[..., -1]
+        found = np.linalg.solve(shared - passed[..., :-1], left[..., None])[..., 0].T
+        own = alone[:, -1] - (alone[:, :-1] * np.tile(found, 2)).sum(1)
+        return np.concatenate([own[:, :rows], own[:, rows:], found])
+
+    def change(self, x: Array, ahead: Array) -> Array:
+        parts = zip(np.split(self.basis @ x, 2), np.split(self.basis @ ahead, 2), strict=True)
+        return np.asarray(np.max([change(*part) for part in parts], axis=0))
+
+
+def _firmer(diagonal: Array, damping: Array) -> Array:
+    """What is added to a diagonal (n, rows). Slack films without pressure may be held by nothing:
+    rounding's share of the rest is added then.
+    """
+    size = np.abs(diagonal)
+    return np.asarray(damping * size + 1e-15 * size.max(0))

@@ -11,9 +11,8 @@ from sbafab.errors import DesignError
 
 if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
-    from sbafab.models.motion import Motion
     from sbafab.models.pneumatics import Line
-    from sbafab.models.stack import Stack
+    from sbafab.models.stack import Motion, Stack
 
 
 class ReachEnvironment(gymnasium.Env[Any, Any]):

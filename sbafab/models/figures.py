@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sbafab.errors import DesignError
-from sbafab.models.counterparts import Counterpart, is_calibrated
+from sbafab.models import paper, printed
+from sbafab.models.paper import EQ_4, Counterpart, is_calibrated
 from sbafab.notebook import table_html
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-    from sbafab.models.verdict import VerdictLine
 
 MEASURED = "measured (paper)"
 """In place of a model's name."""
@@ -268,8 +268,6 @@ class Prediction:
     @property
     def verdict(self) -> tuple[VerdictLine, ...]:
         """What it reaches, how far that is to be trusted, and what is left out: a line each."""
-        from sbafab.models.verdict import verdict
-
         return verdict(self)
 
     @property
@@ -344,3 +342,131 @@ def _rounded(value: float) -> float:
         return 0.0
     digits = 6 - math.floor(math.log10(abs(value)))
     return 0.0 if abs(value) < 1e-9 else round(float(value), digits)
+
+
+# The lines that a prediction opens with: what it reaches, how sure that is, what is left out.
+
+
+LEFT_OUT = "left out"
+STROKES = ("full stroke", "free stroke at ", "reached diameter")
+BENDS = ("bend at ", "bend with one chamber")
+RADIUS = 2.5
+"""Pocket radius in mm of the actuators whose forces were measured."""
+FULL = "as the paper measured on one actuator of d = 5, in proportion to d; its error is not known"
+
+
+class VerdictLine(NamedTuple):
+    """One line of a verdict: the ``quantity`` ("stroke", "bend", "force" or "left out"), what it
+    comes to, and in ``note`` how far that is to be trusted.
+    """
+
+    quantity: str
+    figure: str
+    note: str
+
+
+def verdict(found: Prediction) -> tuple[VerdictLine, ...]:
+    """Return the lines of a prediction: strokes, a bend, a force, then what is left out and why."""
+    lines = [VerdictLine(what, _shown(figure), _note(figure)) for what, figure in _main(found)]
+    why: dict[str, list[str]] = {}
+    for one in found.left_out:
+        why.setdefault(one.reason, []).append(one.name)
+    lines += [VerdictLine(LEFT_OUT, ", ".join(names), reason) for reason, names in why.items()]
+    return tuple(lines)
+
+
+def _main(found: Prediction) -> Iterator[tuple[str, Figure]]:
+    """What is asked of an actuator first, each by the model to design with."""
+    figures = [figure for figure in found.figures if not figure.other]
+    for begins in STROKES:
+        yield from (("stroke", one) for one in _first(figures, begins))
+    for begins in BENDS:
+        bend = _first(figures, begins)
+        if bend:
+            yield "bend", bend[0]
+            break
+    flat = [one for one in figures if one.name.startswith("blocked force") and ", flat" in one.name]
+    flat = [one for one in flat if not one.name.endswith("at most")] or flat
+    if flat:
+        # Of the highest pressure that was asked for.
+        at = f"at {max(found.asked.pressures_kpa):g} kPa"
+        yield "force", next(one for one in flat if at in one.name)
+
+
+def _first(figures: list[Figure], begins: str) -> list[Figure]:
+    return [one for one in figures if one.name.startswith(begins)][:1]
+
+
+def _shown(one: Figure) -> str:
+    return f"{one.value:.4g} {one.unit}, {one.name} ({one.model.name})"
+
+
+def _note(one: Figure) -> str:
+    """The measured counterpart, else the interval that measurements give, else the trust."""
+    if one.measured or one.between:
+        return one.aside
+    if one.model.name.startswith("the paper's full height"):
+        return FULL
+    if one.model.name.startswith(EQ_4):
+        low, high = eq_4_ratios()
+        return (
+            f"{low * one.value:.3g} to {high * one.value:.3g} N by the paper's six forces at "
+            f"{paper.FORCE_KPA:g} kPa, {low:.2f} to {high:.2f} times this model"
+        )
+    return one.model.trust
+
+
+@lru_cache(maxsize=1)
+def eq_4_ratios() -> tuple[float, float]:
+    """Return the least and the most of the paper's forces (Sec. 4.3) over virtual work on Eq. 4."""
+    full = paper.FULL_SHARE * RADIUS
+    ratios = [
+        measured.value / (chambers * paper.FORCE_KPA / 1000 * float(printed.rate(h, RADIUS)))
+        for chambers, forces in ((1, paper.FORCE_1DOF), (3, paper.FORCE_3DOF))
+        for h, measured in zip([s * full for s in paper.HEIGHTS], forces, strict=True)
+    ]
+    return min(ratios), max(ratios)
+
+
+# Which figure to design with where several models give one quantity.
+
+
+STACK = "elastic stack"
+REACHED = "lens of two arcs"
+WIDEST = "cylinder of unstretched film"
+BEHIND = (
+    # An upper bound: it says 140 degrees where the paper measured 81 and the stack says 69 to 83.
+    ("bending", "constant curvature", STACK),
+    # The modulus was measured, at a pressure that nobody knows; the stack's is a tenth of it.
+    ("stiffness", STACK, "3 E I / l^3"),
+    # No air drives a balloon to the cylinder that its film could be: short ones stay far below it.
+    ("size", WIDEST, REACHED),
+)
+"""Group, what models begin with that stand behind, and what those begin with that they yield to."""
+FREE = ", free"
+"""What the name of the elastic balloon's work ends with, beside that of the upper bound."""
+
+
+def chosen(figures: Iterable[Figure], to_come: tuple[str, ...] = ()) -> tuple[Figure, ...]:
+    """The same figures, those marked as ``other`` that are not to be designed with.
+
+    ``to_come`` are beginnings of models whose figures are left out for now. Of one name the first
+    is chosen: the paper's Eq. 4, whose force is nearest to the six that the paper measured at 100
+    kPa (0.76 to 1.24 times it; 0.74 to 1.65 times Eqs. 1-3, 0.47 to 0.86 times the elastic stack).
+    """
+    found = tuple(figures)
+    return tuple(replace(one, other=_is_other(one, found, to_come)) for one in found)
+
+
+def _is_other(one: Figure, figures: Sequence[Figure], to_come: tuple[str, ...]) -> bool:
+    own = [figure for figure in figures if figure.group == one.group]
+    if next(figure for figure in own if figure.name == one.name) is not one:
+        return True
+    if any(figure.name == one.name + FREE for figure in own):
+        return True
+    return any(
+        one.group == group
+        and one.model.name.startswith(behind)
+        and (first in to_come or any(figure.model.name.startswith(first) for figure in own))
+        for group, behind, first in BEHIND
+    )

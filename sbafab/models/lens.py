@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sbafab.models.numeric import ROUNDS, inverse, within
+from sbafab.models.parabola import ROUNDS, inverse, within
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

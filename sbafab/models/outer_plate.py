@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sbafab.models.descent import ends, limited, towards
-from sbafab.models.loads import loaded, with_blocks
+from sbafab.models.least_energy import ends, limited, towards
+from sbafab.models.stack_loads import loaded, with_blocks
 
 if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
-    from sbafab.models.loads import Load, Loaded, OuterPlate, PlateContact
-    from sbafab.models.springs import Springs
+    from sbafab.models.stack_loads import Load, Loaded, OuterPlate, PlateContact, Springs
 
 STEPS = 12
 """Steps that suffice, or another way is tried."""

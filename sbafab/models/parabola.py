@@ -1,28 +1,70 @@
-"""The paper's geometric model, Eqs. 1 to 3 solved numerically (paper, Sec. 3.1).
-
-The meridian of one half of a balloon is the parabola y = h - a x^2 down to y = 0 at x = rho; its
-arc keeps the length l of the flat pocket's radius. Eq. 1 prints an upper limit of infinity where
-rho is meant, Eq. 3 a rho under the root where x is meant. Lengths mm, volumes ul.
-
-Everything follows from the slope k = 2 a rho at the edge. With s = sqrt(1 + k^2), q = asinh(k) / k:
-
-    rho = 2 l / (s + q)    h = k rho / 2    v = pi rho^2 h / 2    dv/dh = pi rho^2 (2 q - s) / 2 q
-
-A half holds most where s = 2 q. A whole balloon is two halves, and twice as high: ``balloon_...``.
-"""
+"""What the formulas share: arrays in and out, ranges that are said, inverses by bisection."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sbafab.models.numeric import ROUNDS, inverse, within
+from sbafab.errors import DesignError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+
+ROUNDS = 60
+ROUNDING = 1e-9
+"""Share of a range's end by which a value may lie past it: what arithmetic loses."""
+
+
+def within(values: ArrayLike, most: float, what: str, unit: str, model: str) -> NDArray[np.float64]:
+    """The values as an array, if each lies from 0 to ``most``.
+
+    Raises DesignError with the first that does not and the range; its upper end is rounded down,
+    so that it is itself allowed.
+    """
+    found = np.asarray(values, dtype=float)
+    good = (found >= 0) & (found <= most * (1 + ROUNDING))
+    if not good.all():
+        worst = float(found[~good].flat[0])
+        digits = max(0, 3 - math.floor(math.log10(most)))
+        shown = math.floor(most * 10**digits) / 10**digits
+        raise DesignError(
+            f"{what} = {worst:g} {unit} is outside the range of {model}; "
+            f"give 0 to {shown:.{digits}f} {unit}"
+        )
+    return np.asarray(np.minimum(found, most))
+
+
+def inverse(
+    rising: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    wanted: NDArray[np.float64],
+    most: float,
+) -> NDArray[np.float64]:
+    """Where a function that rises from 0 to ``most`` has the wanted values."""
+    low = np.zeros_like(wanted)
+    high = np.full_like(wanted, most)
+    for _ in range(ROUNDS):
+        middle = (low + high) / 2
+        is_low = rising(middle) < wanted
+        low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
+    return np.where(wanted == 0, 0.0, high)
+
+
+# The paper's geometric model, Eqs. 1 to 3 solved numerically (paper, Sec. 3.1).
+#
+# The meridian of one half of a balloon is the parabola y = h - a x^2 down to y = 0 at x = rho; its
+# arc keeps the length l of the flat pocket's radius. Eq. 1 prints an upper limit of infinity where
+# rho is meant, Eq. 3 a rho under the root where x is meant. Lengths mm, volumes ul.
+#
+# Everything follows from the slope k = 2 a rho at the edge. With s = sqrt(1 + k^2), q = asinh(k) / k:
+#
+#     rho = 2 l / (s + q)    h = k rho / 2    v = pi rho^2 h / 2    dv/dh = pi rho^2 (2 q - s) / 2 q
+#
+# A half holds most where s = 2 q. A whole balloon is two halves, and twice as high: ``balloon_...``.
+
 
 MODEL = "Eqs. 1-3"
 

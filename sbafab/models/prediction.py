@@ -1,44 +1,416 @@
-"""All that the models say of one design, put together."""
+"""Stroke, force, work and time of an actuator whose chambers all hold the same air."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from sbafab.actuators import build
-from sbafab.design.form import Slots, Wrap
-from sbafab.design.records import Design
-from sbafab.errors import DesignError
-from sbafab.geometry.inconsistent import GeometryError
+from sbafab.design.records import Design, Slots, Wrap
+from sbafab.errors import DesignError, GeometryError
 from sbafab.geometry.region import Region
-from sbafab.laminate.extent import film_mass
-from sbafab.laminate.laminate import Laminate
-from sbafab.models import axial, elastic, lobes, paper, stacked
-from sbafab.models.actuator import NOT_MEASURED, Actuator, actuator
-from sbafab.models.choice import REACHED, STACK, WIDEST, chosen
-from sbafab.models.counterparts import counterpart
-from sbafab.models.drawn import (
-    bounded,
-    flat_forces,
-    near_discs,
-    relation_by_disc,
-    why_no_disc,
-)
+from sbafab.laminate.laminate import Laminate, film_mass
+from sbafab.models import elastic, paper, stacked
+from sbafab.models.elastic import bounded, flat_forces, near_discs, relation_by_disc, why_no_disc
 from sbafab.models.figures import (
+    REACHED,
+    STACK,
+    WIDEST,
     Asked,
     Figure,
     LeftOut,
     Model,
+    Points,
     Prediction,
     Relation,
     Trace,
+    chosen,
 )
-from sbafab.models.inlet import largest_tube
-from sbafab.models.sizes import sizes
+from sbafab.models.formulas import (
+    LOBES,
+    bend,
+    folded_diameter,
+    force,
+    largest_tube,
+    second_moments,
+    sizes,
+    tip_stiffness,
+    work_uj,
+)
+from sbafab.models.kinematics import NOT_MEASURED, Actuator, Kinematics, actuator
+from sbafab.models.paper import counterpart
+from sbafab.models.parabola import fullest
+from sbafab.models.pneumatics import seconds
 from sbafab.models.stack import Stack
-from sbafab.models.stiffness import second_moments, tip_stiffness
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+SAMPLES = 61
+SHARES = (0.0, 0.25, 0.75)
+
+
+def check_asked(actuator: Actuator, asked: Asked) -> None:
+    """Raises DesignError for pressures, flows or volumes out of every model's range."""
+    force(asked.pressures_kpa, 0.0)
+    seconds(0.0, asked.flow_ml_min)
+    if actuator.kinematics:
+        widest = max(actuator.kinematics, key=lambda k: k.largest_volume)
+        widest.stroke(asked.volumes_ul)
+
+
+def full_model(actuator: Actuator) -> Model:
+    """What "full" means."""
+    if actuator.radii:
+        return Model(
+            "the paper's full height",
+            "Sec. 4.6: 17.5 mm for 15 balloons of d = 5, in proportion to d",
+            "measured, not predicted: one actuator of d = 5; as in the paper, all of the height "
+            "counts as stroke",
+        )
+    return Model(
+        "the largest volume", actuator.kinematics[0].model.name, actuator.kinematics[0].model.trust
+    )
+
+
+def strokes(actuator: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
+    """Full state, the largest volumes, and strokes at the volumes asked for."""
+    if actuator.knows_full:
+        full = full_model(actuator)
+        yield Figure("stroke", "full stroke", actuator.full_stroke, "mm", full)
+        yield Figure("stroke", "full height", actuator.full_height, "mm", full)
+        for k in actuator.kinematics:
+            at_full = float(k.volume(actuator.full_stroke))
+            yield Figure("stroke", "volume a balloon at full stroke", at_full, "ul", k.model)
+    else:
+        yield LeftOut("full stroke, full height, and what is predicted at them", NOT_MEASURED)
+    for k in actuator.kinematics:
+        yield Figure("stroke", "largest volume a balloon", k.largest_volume, "ul", k.model)
+        yield Figure("stroke", "stroke at the largest volume", k.largest_stroke, "mm", k.model)
+    if actuator.radii:
+        widest = max(actuator.radii)
+        drawn_in = 2 * fullest(widest).radius
+        by_eqs_1_to_3 = actuator.kinematics[-1].model
+        name = "balloon's diameter at the largest volume"
+        yield Figure("stroke", name, drawn_in, "mm", by_eqs_1_to_3)
+    for volume in asked.volumes_ul:
+        for k in actuator.kinematics:
+            yield _stroke(k, volume)
+
+
+def _stroke(k: Kinematics, volume: float) -> Figure | LeftOut:
+    name = f"stroke at {volume:g} ul a balloon"
+    try:
+        return Figure("stroke", name, float(k.stroke(volume)), "mm", k.model)
+    except DesignError as error:
+        return LeftOut(f"{name}, {k.model.name}", str(error))
+
+
+def forces(actuator: Actuator, asked: Asked) -> Iterator[Figure]:
+    """Blocked force at the pressures asked for, flat and at the paper's shares of full stroke."""
+    for pressure in asked.pressures_kpa:
+        for share in SHARES if actuator.knows_full else SHARES[:1]:
+            at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
+            for k in actuator.kinematics:
+                value = _force(actuator, k, pressure, share * actuator.full_stroke, asked)
+                name = f"blocked force{_each(actuator)} at {pressure:g} kPa, {at}"
+                yield Figure("force", name, float(value), "N", _force_model(actuator, k, asked))
+
+
+def _force(
+    actuator: Actuator,
+    k: Kinematics,
+    pressure: float,
+    stroke: ArrayLike,
+    asked: Asked,
+) -> NDArray[np.float64]:
+    factor = actuator.form.pushing * asked.calibration.contact_factor
+    return factor * force(pressure, k.push(stroke))
+
+
+def _each(actuator: Actuator) -> str:
+    return "" if actuator.form.pushing == actuator.form.stacks else " of one SBA"
+
+
+def _force_model(actuator: Actuator, k: Kinematics, asked: Asked) -> Model:
+    trust = (
+        "no film tension, no stretch; for d = 5 at 100 kPa the paper measured 0.76 to 1.24 times "
+        "what Eq. 4 says, 0.74 to 1.65 times what Eqs. 1-3 say"
+        if actuator.radii
+        else "no film tension, no stretch, one balloon stack; not measured"
+    )
+    model = Model(f"virtual work on {k.model.name}", "Sec. 4.3, F = p dv/dh", trust)
+    return model.times("contact factor", asked.calibration.contact_factor)
+
+
+def power(actuator: Actuator, asked: Asked, mass_g: float | None) -> Iterator[Figure]:
+    """Time, work, speed and power density, all of it at the volume of the full stroke: where that
+    is not known only times to the volumes asked for, and without a mass no power density.
+    """
+    first = actuator.kinematics[0]
+    whole = None
+    if actuator.knows_full:
+        chamber = actuator.balloons * float(first.volume(actuator.full_stroke))
+        whole = chamber * actuator.form.stacks
+        yield Figure("actuation", "volume of all chambers at full stroke", whole, "ul", first.model)
+    flow = Model(
+        f"{first.model.name} over flow",
+        "Sec. 4.5, 7",
+        "a liquid at a steady flow into all chambers together, no lag of pump or tube: the paper's "
+        "water took 0.92 +- 0.08 s; a gas takes 10 % longer at 10 kPa, and valves much longer",
+    )
+    if whole is not None:
+        time = float(seconds(whole, asked.flow_ml_min))
+        name = f"time to full stroke at {asked.flow_ml_min:g} ml/min"
+        yield Figure("actuation", name, time, "s", flow)
+    for volume in asked.volumes_ul:
+        held = volume * actuator.balloons * actuator.form.stacks
+        name = f"time to {volume:g} ul a balloon at {asked.flow_ml_min:g} ml/min"
+        plain = Model("volume over flow", "Sec. 7", flow.trust)
+        yield Figure("actuation", name, float(seconds(held, asked.flow_ml_min)), "s", plain)
+    if whole is None:
+        return
+    bound = Model(
+        f"p v with {first.model.name}",
+        "Sec. 4.1",
+        "end pressure times volume: more than the integral of p dV that the paper means, which the "
+        "elastic balloon gives",
+    )
+    for pressure in asked.pressures_kpa:
+        name = f"pneumatic input work at {pressure:g} kPa"
+        yield Figure("actuation", name, work_uj(pressure, whole) / 1000, "mJ", bound)
+    if asked.pressures_kpa and mass_g is not None:
+        yield _power_density(actuator, asked, whole, mass_g)
+
+
+def _power_density(actuator: Actuator, asked: Asked, whole: float, mass_g: float) -> Figure:
+    """At the speed with air, which the paper takes: its pump's flow, up to 10 kPa."""
+    time = float(seconds(whole, paper.AIR_FLOW, paper.FULL_KPA))
+    highest = max(asked.pressures_kpa)
+    push = float(_force(actuator, actuator.kinematics[0], highest, 0.0, asked))
+    pushes = actuator.form.stacks / actuator.form.pushing
+    model = Model(
+        "F v / m",
+        "Sec. 7",
+        "largest force times mean speed, as in the paper; the two never occur together. No lag of "
+        "valve and pump: the paper's 0.067 s of air make it a fifth of this",
+    ).times("contact factor", asked.calibration.contact_factor)
+    watts = pushes * push * actuator.full_stroke / 1000 / time
+    return Figure(
+        "actuation",
+        f"power density, blocked force flat at {highest:g} kPa and "
+        f"{paper.AIR_FLOW / 1000:g} l/min of air",
+        watts / (mass_g / 1000),
+        "W/kg",
+        model,
+    )
+
+
+def stroke_relation(actuator: Actuator) -> Relation:
+    """Stroke against volume, by every model of the pockets."""
+    lines = []
+    for k in actuator.kinematics:
+        stroke = np.linspace(0, k.largest_stroke, SAMPLES)
+        lines.append(Trace(k.model.name, k.volume(stroke).tolist(), stroke.tolist(), k.model))
+    points = []
+    if actuator.is_like_paper(1, paper.VALID_RADIUS):
+        first = actuator.kinematics[0]
+        for fluid, volume, error in paper.VALID:
+            label = f"paper: Eq. 4 within {error.value:g} mm a balloon to here ({fluid})"
+            at, slack = float(first.stroke(volume)), error.value * actuator.balloons
+            points.append(Points(label, [volume], [at], [slack]))
+    if actuator.is_like_paper(3, 2.5) and actuator.balloons == paper.BALLOONS:
+        ends = [0.0, max(k.largest_volume for k in actuator.kinematics)]
+        label = f"paper: {paper.FULL_HEIGHT.value:g} mm high when full"
+        lines.append(Trace(label, ends, [paper.FULL_HEIGHT.value] * 2))
+    return Relation(
+        "stroke",
+        "Stroke against volume",
+        "volume a balloon, ul" if not actuator.is_tapered else "mean volume a balloon, ul",
+        "stroke of the stack, mm",
+        tuple(lines),
+        tuple(points),
+    )
+
+
+def force_relation(actuator: Actuator, asked: Asked) -> Relation:
+    """Force against stroke, to full stroke, at every pressure asked for."""
+    most = min(k.largest_stroke for k in actuator.kinematics)
+    stroke = np.linspace(0, actuator.full_stroke if actuator.knows_full else most, SAMPLES)
+    lines = []
+    for pressure in asked.pressures_kpa:
+        for k in actuator.kinematics:
+            values = _force(actuator, k, pressure, stroke, asked)
+            model = _force_model(actuator, k, asked)
+            label = f"{k.model.name}, {pressure:g} kPa"
+            lines.append(Trace(label, stroke.tolist(), values.tolist(), model))
+    measured = None
+    if actuator.is_like_paper(1, 2.5):
+        measured = "1-DoF", paper.FORCE_1DOF
+    elif actuator.is_like_paper(3, 2.5):
+        measured = "3-DoF", paper.FORCE_3DOF
+    points = []
+    if measured is not None:
+        name, values_at = measured
+        places = [share * actuator.full_stroke for share in paper.HEIGHTS]
+        label = f"paper: {name}, {paper.FORCE_KPA:g} kPa"
+        y, errors = [m.value for m in values_at], [m.error for m in values_at]
+        points.append(Points(label, places, y, errors))
+    each = _each(actuator)
+    return Relation(
+        "force",
+        f"Blocked force{each} against stroke, by virtual work",
+        "stroke at which it is blocked, mm",
+        f"blocked force{each}, N",
+        tuple(lines),
+        tuple(points),
+    )
+
+
+# Bending and workspace of parallel chambers, and how they fold.
+
+
+CURVATURE = Model(
+    "constant curvature",
+    "from chamber lengths, each at its own stroke",
+    "upper bound: chambers are taken to lengthen freely, and films between them do not hold back; "
+    "the paper's largest is 81 +- 6 deg",
+)
+
+
+class Path(NamedTuple):
+    """Chambers side by side, from flat to full stroke: stroke (mm), angle (rad), reach, height."""
+
+    chambers: int
+    stroke: NDArray[np.float64]
+    angle: NDArray[np.float64]
+    aside: NDArray[np.float64]
+    height: NDArray[np.float64]
+
+
+def paths(actuator: Actuator, others_full: bool = False) -> list[Path]:
+    """One path for 1, 2 ... chambers next to each other; the others flat, or full.
+
+    A path ends where the top has turned by half a turn.
+    """
+    axes = actuator.axes
+    stroke = np.linspace(0, actuator.full_stroke, SAMPLES)
+    rest = actuator.full_height if others_full else actuator.thickness
+    found = []
+    for chambers in range(1, len(axes)):
+        lengths = np.full((SAMPLES, len(axes)), rest)
+        lengths[:, :chambers] = actuator.lengths(stroke)[:, None]
+        bent = bend(lengths, axes)
+        good = bent.angle <= math.pi
+        aside = np.hypot(bent.tip[:, 0], bent.tip[:, 1])
+        found.append(Path(chambers, stroke[good], bent.angle[good], aside[good], bent.tip[good, 2]))
+    return found
+
+
+def bending(actuator: Actuator) -> Iterator[Figure | LeftOut]:
+    """The largest bend of each number of chambers, and how far the tip gets."""
+    if not actuator.knows_full:
+        yield LeftOut("bend and tip displacement at full stroke, constant curvature", NOT_MEASURED)
+        return
+    all_paths = paths(actuator)
+    for path in all_paths:
+        name = f"bend with {_chambers(path.chambers)} at full stroke, the others flat"
+        if len(path.stroke) < SAMPLES:
+            reason = "more than half a turn: the tip would come down through the base"
+            yield LeftOut(name, reason)
+        else:
+            yield Figure("bending", name, math.degrees(path.angle[-1]), "deg", CURVATURE)
+    every = [*all_paths, *paths(actuator, others_full=True)]
+    reach = max(float(path.aside.max()) for path in every)
+    yield Figure("bending", "maximum lateral tip displacement", reach, "mm", CURVATURE)
+
+
+def folding(actuator: Actuator, asked: Asked) -> Figure | LeftOut:
+    """Diameter of the channel that three folded lobes pass."""
+    if actuator.form.stacks != LOBES:
+        reason = f"the model is of {LOBES} lobes folded into a triangle"
+        return LeftOut("folded diameter", f"{reason}; this design has {actuator.form.stacks}")
+    model = Model(
+        "three lobes as chords of a circle",
+        "our geometry; the paper reports 9.25",
+        "one figure to compare with: 9.91 at the nominal thickness, 8.61 at the 0.95 mm that the "
+        "paper measures, between which its 9.25 lies",
+    ).times("press factor", asked.calibration.press_factor)
+    width = 2 * max(actuator.radii) + 2 * actuator.design.bond.width
+    value = folded_diameter(width, actuator.thickness)
+    return Figure("size", "folded diameter", value, "mm", model)
+
+
+def bending_relation(actuator: Actuator, asked: Asked) -> Relation:
+    """Bend against time, each chamber fed at the flow asked for."""
+    first = actuator.kinematics[0]
+    model = Model(
+        f"{CURVATURE.name}, {first.model.name} over flow",
+        CURVATURE.source,
+        f"{CURVATURE.trust}; no lag of pump or tube",
+    )
+    lines = []
+    for path in paths(actuator):
+        held = first.volume(path.stroke) * actuator.balloons
+        time = seconds(held, asked.flow_ml_min)
+        label = f"{_chambers(path.chambers)} inflated, the others flat"
+        lines.append(Trace(label, time.tolist(), np.degrees(path.angle).tolist(), model))
+    points = []
+    if actuator.is_like_paper(3, 2.5) and actuator.balloons == paper.BALLOONS:
+        ends = [0.0, max(max(line.x) for line in lines)]
+        largest = paper.LARGEST_BEND
+        if asked.flow_ml_min == paper.WATER_FLOW:
+            x = [time for time, _ in paper.BENDING]
+            y = [angle.value for _, angle in paper.BENDING]
+            label = "paper: time to steady angles"
+            points.append(Points(label, x, y, [angle.error for _, angle in paper.BENDING]))
+            ends[1] = max(x)
+        label = f"paper: largest bend, {largest.value:g} +- {largest.error:g} deg"
+        lines.append(Trace(label, ends, [largest.value] * 2))
+    return Relation(
+        "bending",
+        "Bending against time",
+        f"time with {asked.flow_ml_min:g} ml/min into each inflated chamber, s",
+        "bend of the top, deg",
+        tuple(lines),
+        tuple(points),
+    )
+
+
+def workspace_relation(actuator: Actuator) -> Relation:
+    """Where the tip gets to: the plane in which the chambers next to each other bend; no lines of
+    constant curvature where the full stroke is not known.
+    """
+    lines = []
+    rests = (("flat", False), ("full", True)) if actuator.knows_full else ()
+    for rest, others_full in rests:
+        for path in paths(actuator, others_full):
+            label = f"{_chambers(path.chambers)}, the others {rest}"
+            lines.append(Trace(label, path.aside.tolist(), path.height.tolist(), CURVATURE))
+    points = []
+    if actuator.is_like_paper(3, 2.5) and actuator.balloons == paper.BALLOONS:
+        label = f"paper: all full, {paper.FULL_HEIGHT.value:g} mm"
+        points.append(Points(label, [0.0], [paper.FULL_HEIGHT.value], [0.0]))
+    return Relation(
+        "workspace",
+        "Paths of the tip",
+        "reach aside, mm",
+        "height of the tip, mm",
+        tuple(lines),
+        tuple(points),
+    )
+
+
+def _chambers(number: int) -> str:
+    return "one chamber" if number == 1 else f"{number} chambers"
+
+
+# All that the models say of one design, put together.
+
 
 GROUPS = ("size", "inlet", "stroke", "force", "actuation", "bending", "stiffness")
 GEOMETRY = Model("plain geometry", "of the cut files", "exact for what is cut")
@@ -89,7 +461,7 @@ def predict(
     if discs is not None and not discs.is_round:
         discs = None
     one = actuator(design, flat, wish.calibration, discs and discs.form(design, discs.equal))
-    axial.check_asked(one, wish)
+    check_asked(one, wish)
     together = None if quick else stacked.stacked(one, wish)
     found = _found(one, wish, together)
     relations = () if quick else tuple(_relations(one, wish, _stack(together)))
@@ -133,7 +505,7 @@ def _all(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
     grams = None if isinstance(mass, LeftOut) else mass.value
     yield from _sizes(one, asked)
     if one.kinematics and one.form.is_parallel:
-        yield lobes.folding(one, asked)
+        yield folding(one, asked)
     yield mass
     if isinstance(mass, LeftOut) and one.kinematics:
         yield LeftOut("power density", mass.reason)
@@ -145,12 +517,12 @@ def _all(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
         for what in ("stroke", force, "actuation", "bending", "folded diameter"):
             yield LeftOut(what, why_no_disc(one.design))
         return
-    yield from axial.strokes(one, asked)
+    yield from strokes(one, asked)
     yield from elastic.free_strokes(one, asked)
-    yield from axial.forces(one, asked)
-    yield from axial.power(one, asked, grams)
+    yield from forces(one, asked)
+    yield from power(one, asked, grams)
     if one.form.is_parallel:
-        yield from lobes.bending(one)
+        yield from bending(one)
     yield from _stiffness(one)
 
 
@@ -164,9 +536,9 @@ def _place(item: Figure | LeftOut) -> int:
 def _relations(one: Actuator, asked: Asked, together: Stack | None) -> Iterator[Relation]:
     if not one.kinematics:
         return
-    yield axial.stroke_relation(one)
+    yield stroke_relation(one)
     if asked.pressures_kpa:
-        pushed = axial.force_relation(one, asked)
+        pushed = force_relation(one, asked)
         if together is not None:
             pushed = replace(
                 pushed, lines=(*pushed.lines, *stacked.force_traces(one, asked, together))
@@ -174,10 +546,10 @@ def _relations(one: Actuator, asked: Asked, together: Stack | None) -> Iterator[
         yield pushed
     if one.form.is_parallel:
         if one.knows_full:
-            yield lobes.bending_relation(one, asked)
+            yield bending_relation(one, asked)
         if together is not None:
             yield stacked.bend_relation(asked, together)
-        reached = lobes.workspace_relation(one)
+        reached = workspace_relation(one)
         if together is not None:
             more = stacked.workspace_traces(asked, together)
             reached = replace(reached, lines=(*reached.lines, *more))
@@ -264,7 +636,7 @@ def _stiffness(one: Actuator) -> Iterator[Figure | LeftOut]:
 def _diameter_relation(one: Actuator, wrap: Wrap) -> Relation:
     """Diameter round the tube against the air in a balloon."""
     k = one.kinematics[0]
-    stroke = np.linspace(0, k.largest_stroke, axial.SAMPLES)
+    stroke = np.linspace(0, k.largest_stroke, SAMPLES)
     around = wrap.tube_diameter + 2 * (one.thickness + stroke)
     lines = [Trace(k.model.name, k.volume(stroke).tolist(), around.tolist(), k.model)]
     label = f"paper: about {paper.RADIAL_FULL.value:g} mm inflated"

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sbafab.models.numeric import inverse, within
-from sbafab.models.parabola import fullest
+from sbafab.models.parabola import fullest, inverse, within
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

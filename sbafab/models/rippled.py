@@ -17,8 +17,7 @@ import numpy as np
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, Shapes, inflate, rippling
 from sbafab.models.least_energy import NoBalance, settled
-from sbafab.models.wave_energy import Waves
-from sbafab.models.waving import EDGE, PLACES, UP, R, Waving, Z
+from sbafab.models.rim_modes import EDGE, PLACES, UP, R, Waves, Waving, Z
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

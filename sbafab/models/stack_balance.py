@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.descent import FARTHEST, FINE, curves_up, ends, limited, towards
-from sbafab.models.loads import Load, Loaded, loaded, with_blocks
+from sbafab.models.least_energy import FARTHEST_STEP, FINE, curves_up, ends, limited, towards
 from sbafab.models.outer_plate import below, pressed
+from sbafab.models.stack_loads import Load, Loaded, loaded, with_blocks
 
 if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
-    from sbafab.models.loads import OuterPlate
-    from sbafab.models.springs import Springs
+    from sbafab.models.stack_loads import OuterPlate, Springs
 
 SOFTER = (1e3, 1e5)
 """mN/mm of an outer plate on the way to it."""
@@ -153,7 +152,7 @@ def _settled(
             if load.wall is None:
                 return at, 0.0, True
             return at, loaded(springs, pitch, load, at).push, True
-        share = float(limited(move).min()) if largest > FARTHEST.min() else 1.0
+        share = float(limited(move).min()) if largest > FARTHEST_STEP.min() else 1.0
         for _ in range(14):
             tried = loaded(springs, pitch, load, at + share * move)
             if tried.value <= now.value + 1e-4 * share * slope + 1e-11 * (1 + abs(now.value)):

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.models import paper
-from sbafab.models.actuator import Actuator
-from sbafab.models.contact import chamber_gap, rim_gap
+from sbafab.models.balloon import inflate
 from sbafab.models.elastic import calibrated
 from sbafab.models.figures import Asked, Figure, LeftOut, Model, Relation, Trace
-from sbafab.models.motion import Motion
+from sbafab.models.kinematics import Actuator
 from sbafab.models.pneumatics import AIR, TUBE_LENGTH, WATER, Line
-from sbafab.models.series import blocked
-from sbafab.models.stack import MOST_PRESSURE, Plate, Pose, Stack, stack
+from sbafab.models.stack import MOST_PRESSURE, Motion, Plate, Pose, Stack, stack
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from sbafab.models.balloon_map import BalloonMap
     from sbafab.models.film_elements import Array
 
 SAMPLES = 21
@@ -289,3 +291,82 @@ def _poses(
         except DesignError:
             break
     return poses
+
+
+# Where an inflated stack touches itself, and how much room is left where it does not.
+#
+# Balloons on each other meet at the plate between them, which the elastic balloon has; levels that
+# lean meet at their rims, which the stack has. Balloons side by side never do where the room below
+# is more than 0. Lengths mm.
+
+
+OPEN = 0.02
+"""mm that a balloon is taken to be open at least."""
+
+
+def rim_gap(stack: Stack, pose: Pose) -> float:
+    """Mm by which rims of neighbouring levels have left each other where they are nearest.
+
+    Flat ones lie on each other; 0 where levels lean so far that their rims do again.
+    """
+    gaps = stack.rims[stack.levels] @ pose.freedoms[..., None]
+    return max(float(gaps.min()), 0.0)
+
+
+def chamber_gap(stack: Stack, pose: Pose) -> float:
+    """Mm between the films of balloons side by side where they are nearest.
+
+    Below 0 they would pass through each other. Both stand in the frame of their level, and those
+    of other levels lie beyond a plate, so that axes and largest radii tell. Raises DesignError for
+    a balloon without a balance.
+    """
+    widest = _radii(stack, pose)
+    nearest = []
+    for one, other in combinations(range(stack.chambers), 2):
+        apart = float(np.hypot(*(stack.axes[one] - stack.axes[other])))
+        nearest.append(apart - float((widest[:, one] + widest[:, other]).max()))
+    thick = max(one.balloon.thickness for one in stack.maps)
+    return min(nearest) - thick
+
+
+def _radii(stack: Stack, pose: Pose) -> Array:
+    """Largest radius of the middle of each balloon's films: (levels, chambers)."""
+    found = np.empty_like(pose.gaps)
+    pressures = np.broadcast_to(np.array(pose.pressures), pose.gaps.shape)
+    for kind, one in enumerate(stack.maps):
+        own = stack.levels == kind
+        asked = np.stack([pressures[own], np.maximum(pose.gaps[own], OPEN).round(4)], -1)
+        alike, back = np.unique(asked.reshape(-1, 2), axis=0, return_inverse=True)
+        shapes = inflate(one.balloon, alike[:, 0], alike[:, 1], tied=True)
+        within = shapes.r[:, one.balloon.held : one.balloon.edge + 1].max(-1)
+        found[own] = within[back].reshape(asked.shape[:2])
+    return found
+
+
+# Balloons on top of each other: all carry the same force, and their strokes add up.
+
+
+SERIES_SAMPLES = 401
+
+
+def blocked(stack: Stack, pressure: float, stroke: ArrayLike) -> Array:
+    """Force in N of one straight chamber that is held at strokes in mm; 0 where it does not reach.
+
+    At most what its weakest balloon pushes with when flat. Below the stroke at which that one
+    shuts, its solid films may carry more; they are not counted.
+    """
+    curves = [_curve(one, pressure) for one in stack.maps]
+    counts = np.bincount(stack.levels, minlength=len(stack.maps))
+    force = np.linspace(0.0, min(push[0] for _, push in curves), SERIES_SAMPLES)
+    total = np.zeros(SERIES_SAMPLES)
+    for count, (heights, push) in zip(counts, curves, strict=True):
+        total += count * np.interp(force, push[::-1], heights[::-1])
+    return np.asarray(
+        np.interp(np.asarray(stroke, dtype=float), total[::-1], force[::-1], right=0.0) / 1000
+    )
+
+
+def _curve(one: BalloonMap, pressure: float) -> tuple[Array, Array]:
+    """Heights in mm and the force in mN there, made to fall."""
+    heights = np.linspace(0.0, one.most_height, SERIES_SAMPLES)
+    return heights, np.minimum.accumulate(one.force(pressure, heights))

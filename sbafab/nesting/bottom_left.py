@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Region
-from sbafab.nesting.grid import ROUNDING, Grid, TurnedShape, grid_of, strike
-from sbafab.nesting.raster import Cells
-from sbafab.nesting.records import NestPart, Placement, Stock, placed
-from sbafab.nesting.refusals import no_place
+from sbafab.geometry.arcs import ticks
+from sbafab.geometry.edges import Arc, Bounds, Edge, Point
+from sbafab.geometry.offset import grow
+from sbafab.geometry.region import Region, disc
+from sbafab.nesting.records import TURNS, NestPart, Placement, Stock, Turn, no_place, placed
 
 MANY = 600
 """Parts from which on only the first few ways to fill a sheet are tried."""
@@ -210,3 +211,298 @@ class _Free:
         for other in self.grid.forms:
             if other.shape in shapes and self.searched[other.number] < self.maps[other.number].size:
                 strike(self.maps[other.number], self.grid.clear(form, other), other, place)
+
+
+# Regions as sets of square cells, and where one set of cells would meet another.
+#
+# Every cell that a region reaches into by more than ``TOUCH`` is set, so parts whose cells are
+# disjoint are disjoint themselves. Rows count upward (y), columns to the right (x).
+
+
+Cells = NDArray[np.bool_]
+Counts = NDArray[np.intp]
+Numbers = NDArray[np.float64]
+
+AT_ONCE = 1_000_000
+"""Pairs of runs that are looked at together, which bounds the memory."""
+TOUCH = 1e-7
+"""mm by which a region may reach into a cell that is not set: regions side by side may touch."""
+
+
+class Raster(NamedTuple):
+    """``cells`` of a region and the box in mm, in the region's frame, that they fill."""
+
+    cells: Cells
+    frame: Bounds
+
+
+def raster(region: Region, cell: float) -> Raster:
+    """The cells of a region, which lies in the middle of their box: turns of it agree."""
+    low_x, low_y, high_x, high_y = region.bounds
+    columns, left = _centred(low_x, high_x, cell)
+    rows, bottom = _centred(low_y, high_y, cell)
+    cells = reached(region, (left, bottom), (rows, columns), cell)
+    return Raster(cells, (left, bottom, left + columns * cell, bottom + rows * cell))
+
+
+def aligned(region: Region, origin: Point, cell: float) -> tuple[Cells, int, int]:
+    """The cells of a region on the grid through ``origin``; row and column of the first."""
+    low_x, low_y, high_x, high_y = region.bounds
+    first_column, last_column = _span(low_x - origin[0], high_x - origin[0], cell)
+    first_row, last_row = _span(low_y - origin[1], high_y - origin[1], cell)
+    corner = (origin[0] + first_column * cell, origin[1] + first_row * cell)
+    shape = (last_row - first_row + 1, last_column - first_column + 1)
+    return reached(region, corner, shape, cell), first_row, first_column
+
+
+def reached(region: Region, corner: Point, shape: tuple[int, int], cell: float) -> Cells:
+    """The cells a region reaches into, of a grid whose lower left is ``corner``."""
+    rows, columns = shape
+    edge_counts = np.zeros((rows + 1, columns), dtype=np.int32)
+    turns = np.zeros((rows + 1, columns), dtype=np.int32)
+    for edge in region.edges:
+        for piece in _monotone(edge):
+            _add_boundary(edge_counts, piece, corner, cell)
+            _add_winding(turns, piece, corner, cell)
+    return np.asarray(
+        (np.cumsum(edge_counts[:-1], axis=0) > 0) | (np.cumsum(turns[:-1], axis=0) > 0)
+    )
+
+
+def meetings(a: Cells, b: Cells) -> Cells:
+    """Offsets at which the cells of ``b`` meet those of ``a``.
+
+    Entry (0, 0) is where b's upper right cell lies on a's lower left one; the last, the reverse.
+    """
+    rows, columns = (m + n - 1 for m, n in zip(a.shape, b.shape, strict=True))
+    a_row, a_first, a_end = _runs(a)
+    b_row, b_first, b_end = _runs(b)
+    width = columns + 1
+    counts = np.zeros(rows * width, dtype=np.int64)
+    # Where two runs of cells meet: from the offset at which they begin to, to that where they end.
+    for some in np.array_split(np.arange(len(a_row)), 1 + len(a_row) * len(b_row) // AT_ONCE):
+        line = (a_row[some, None] - b_row + b.shape[0] - 1) * width + b.shape[1]
+        counts += np.bincount((line + a_first[some, None] - b_end).ravel(), minlength=counts.size)
+        ends = line + a_end[some, None] - b_first - 1
+        counts -= np.bincount(ends.ravel(), minlength=counts.size)
+    return np.asarray(counts.reshape(rows, width).cumsum(axis=1)[:, :-1] > 0)
+
+
+def _runs(cells: Cells) -> tuple[Counts, Counts, Counts]:
+    """Row, first column and the column past the last of all runs of set cells in a row."""
+    steps = np.diff(cells.astype(np.int8), axis=1, prepend=0, append=0)
+    row, first = np.nonzero(steps > 0)
+    return row, first, np.nonzero(steps < 0)[1]
+
+
+def quarter_turned(cells: Cells, turns: int) -> Cells:
+    """The cells turned counterclockwise; rows count upward, so against numpy's own sense."""
+    return np.ascontiguousarray(np.rot90(cells, -turns))
+
+
+def _centred(low: float, high: float, cell: float) -> tuple[int, float]:
+    count = max(1, math.ceil((high - low - 2 * TOUCH) / cell))
+    return count, (low + high - count * cell) / 2
+
+
+def _span(low: float, high: float, cell: float) -> tuple[int, int]:
+    """First and last cell that an interval reaches into; first > last where it lies on a limit."""
+    return math.floor((low + TOUCH) / cell), math.ceil((high - TOUCH) / cell) - 1
+
+
+def _monotone(edge: Edge) -> list[Edge]:
+    """The edge cut where it turns back in x or in y."""
+    if not isinstance(edge, Arc):
+        return [edge]
+    corners = [edge.start, *map(edge.on_circle, ticks([edge], math.pi / 2, 1e-9)), edge.end]
+    return [edge.part(a, b) for a, b in zip(corners, corners[1:], strict=False)]
+
+
+def _heights(edge: Edge, x: Numbers) -> Numbers:
+    """Y of a monotone edge at each x, kept within its ends."""
+    (x0, y0), (x1, y1) = edge.start, edge.end
+    if isinstance(edge, Arc):
+        (cx, cy), middle = edge.centre, edge.at(0.5)
+        rise = np.sqrt(np.maximum(0.0, edge.radius**2 - (x - cx) ** 2))
+        y = cy + rise if middle[1] > cy else cy - rise
+    elif abs(x1 - x0) < TOUCH:
+        y = np.full_like(x, y0)
+    else:
+        y = y0 + (x - x0) * ((y1 - y0) / (x1 - x0))
+    return np.clip(y, min(y0, y1), max(y0, y1))
+
+
+def _add_boundary(counts: NDArray[np.int32], edge: Edge, corner: Point, cell: float) -> None:
+    """Adds the edge to every cell it runs through, as steps to be summed along y."""
+    (x0, y0), (x1, y1) = edge.start, edge.end
+    rows, columns = counts.shape[0] - 1, counts.shape[1]
+    left, right = sorted((x0, x1))
+    first, last = _span(left - corner[0], right - corner[0], cell)
+    first, last = max(0, first), min(columns - 1, last)
+    if last < first:
+        return
+    limits = corner[0] + cell * np.arange(first, last + 2)
+    y = _heights(edge, np.clip(limits, left, right))
+    low, high = np.minimum(y[:-1], y[1:]), np.maximum(y[:-1], y[1:])
+    if right - left < TOUCH:
+        low, high = np.minimum(low, min(y0, y1)), np.maximum(high, max(y0, y1))
+    bottom = np.floor((low - corner[1] + TOUCH) / cell).astype(np.int64)
+    top = np.ceil((high - corner[1] - TOUCH) / cell).astype(np.int64)
+    bottom, top = np.clip(bottom, 0, rows), np.clip(top, 0, rows)
+    there = np.flatnonzero(top > bottom)
+    counts[bottom[there], first + there] += 1
+    counts[top[there], first + there] -= 1
+
+
+def _add_winding(turns: NDArray[np.int32], edge: Edge, corner: Point, cell: float) -> None:
+    """Adds, from the edge upward, its turn round the centres of the cells."""
+    x0, x1 = edge.start[0], edge.end[0]
+    rows, columns = turns.shape[0] - 1, turns.shape[1]
+    # Half open, so that a corner on a column's middle counts once.
+    first = math.ceil((min(x0, x1) - corner[0]) / cell - 0.5)
+    last = math.ceil((max(x0, x1) - corner[0]) / cell - 0.5) - 1
+    first, last = max(0, first), min(columns - 1, last)
+    if last < first:
+        return
+    column = np.arange(first, last + 1)
+    y = _heights(edge, corner[0] + cell * (column + 0.5))
+    row = np.clip(np.ceil((y - corner[1]) / cell - 0.5).astype(np.int64), 0, rows)
+    turns[row, column] += 1 if x1 > x0 else -1
+
+
+# The usable area as a grid: shapes as cells, and which places of one shape would meet another.
+#
+# Shapes are grown by half the spacing, so cells that are disjoint keep it. A place is the row and
+# column of the lower left cell of a form.
+
+
+CELL = 0.1
+"""mm; the finest grid. It is coarser where the maps would outgrow ``MEMORY`` bytes."""
+MEMORY = 120e6
+ROUNDING = 5e-7
+"""mm by which a part may lie past the border: less than what is checked."""
+
+
+@dataclass(frozen=True)
+class TurnedShape:
+    """A shape in one of its turns.
+
+    ``cells`` fill ``frame``, ``bounds`` are those of the shape itself; both mm, in the shape's
+    own frame turned. ``number`` counts the forms of all shapes.
+    """
+
+    number: int
+    shape: int
+    turn: Turn
+    cells: Cells = field(repr=False)
+    frame: Bounds
+    bounds: Bounds
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The forms of all shapes on the grid of one usable ``area``."""
+
+    area: Bounds
+    margin: float
+    cell: float
+    forms: tuple[TurnedShape, ...]
+    _form_of: dict[tuple[int, Turn], TurnedShape] = field(repr=False)
+    _clear: dict[tuple[int, int], Cells] = field(default_factory=dict, repr=False)
+
+    @property
+    def origin(self) -> Point:
+        """The grid's corner; what is grown by the margin may reach past the border by it."""
+        return self.area[0] - self.margin, self.area[1] - self.margin
+
+    def clear(self, a: TurnedShape, b: TurnedShape) -> Cells:
+        """Offsets of ``b`` from ``a`` that keep them apart, from one less than b's size below 0."""
+        key = (a.number, b.number)
+        if key not in self._clear:
+            self._clear[key] = self._found(a, b)
+        return self._clear[key]
+
+    def _found(self, a: TurnedShape, b: TurnedShape) -> Cells:
+        opposite = self._clear.get((b.number, a.number))
+        if opposite is not None:
+            return np.ascontiguousarray(opposite[::-1, ::-1])
+        if a.turn == 0:
+            # The other way round, turned until a lies as it is drawn.
+            turned = self._form_of[a.shape, TURNS[-b.turn % len(TURNS)]]
+            twin = self._clear.get((self._form_of[b.shape, 0].number, turned.number))
+            if twin is not None:
+                return np.ascontiguousarray(quarter_turned(twin, b.turn)[::-1, ::-1])
+            return ~meetings(a.cells, b.cells)
+        # What both are turned by turns the offsets with them.
+        back = self._form_of[b.shape, TURNS[(b.turn - a.turn) % len(TURNS)]]
+        return quarter_turned(self.clear(self._form_of[a.shape, 0], back), a.turn)
+
+    def shift(self, form: TurnedShape, row: int, column: int) -> Point:
+        """What moves the turned shape to a place, in mm."""
+        x, y = self.origin
+        return x + column * self.cell - form.frame[0], y + row * self.cell - form.frame[1]
+
+    def places(self, form: TurnedShape, stock: Stock) -> Cells:
+        """Where the form lies inside the border and clear of the pins."""
+        x, y = self.shift(form, 0, 0)
+        rows = self._count(self.area[3] - form.bounds[3] - y)
+        columns = self._count(self.area[2] - form.bounds[2] - x)
+        free = np.ones((rows, columns), dtype=np.bool_)
+        for pin_x, pin_y, diameter in stock.pins:
+            pin = disc((pin_x, pin_y), diameter / 2 + self.margin)
+            cells, row, column = aligned(pin, self.origin, self.cell)
+            strike(free, ~meetings(cells, form.cells), form, (row, column))
+        return free
+
+    def _count(self, room: float) -> int:
+        return max(0, math.floor((room + ROUNDING) / self.cell) + 1)
+
+
+def strike(free: Cells, clear: Cells, form: TurnedShape, place: tuple[int, int]) -> None:
+    """Takes from a form's free places those that are not ``clear`` of what lies at ``place``."""
+    row, column = (at - size + 1 for at, size in zip(place, form.cells.shape, strict=True))
+    rows = slice(max(0, row), max(0, row + clear.shape[0]))
+    columns = slice(max(0, column), max(0, column + clear.shape[1]))
+    window = free[rows, columns]
+    top, left = rows.start - row, columns.start - column
+    window &= clear[top : top + window.shape[0], left : left + window.shape[1]]
+
+
+def grid_of(shapes: Sequence[Region], area: Bounds, spacing: float, turns: Sequence[Turn]) -> Grid:
+    """The grid for shapes, turned by ``turns``, that are to lie ``spacing`` apart in ``area``."""
+    margin = spacing / 2
+    cell = _cell_size(shapes, area, spacing, len(turns))
+    grown = [grow(shape, margin) for shape in shapes]
+    forms: list[TurnedShape] = []
+    form_of: dict[tuple[int, Turn], TurnedShape] = {}
+    for number, shape in enumerate(shapes):
+        cells, frame = raster(grown[number], cell)
+        seen: dict[tuple[tuple[int, ...], bytes], TurnedShape] = {}
+        for turn in turns:
+            turned = quarter_turned(cells, turn)
+            mark = (turned.shape, turned.tobytes())
+            # Only turns that differ on the grid.
+            if mark not in seen:
+                boxes = _turned(frame, turn), _turned(shape.bounds, turn)
+                seen[mark] = TurnedShape(len(forms), number, turn, turned, *boxes)
+                forms.append(seen[mark])
+            form_of[number, turn] = seen[mark]
+    return Grid(area, margin, cell, tuple(forms), form_of)
+
+
+def _turned(box: Bounds, turn: Turn) -> Bounds:
+    for _ in range(turn):
+        low_x, low_y, high_x, high_y = box
+        box = (-high_y, low_x, -low_y, high_x)
+    return box
+
+
+def _cell_size(shapes: Sequence[Region], area: Bounds, spacing: float, turns: int) -> float:
+    """The cell at which the maps of free places and of meetings stay within ``MEMORY``."""
+    sizes = [
+        (high_x - low_x + spacing, high_y - low_y + spacing)
+        for low_x, low_y, high_x, high_y in (shape.bounds for shape in shapes)
+    ]
+    maps = 2 * turns * len(shapes) * (area[2] - area[0]) * (area[3] - area[1])
+    pairs = sum((max(a) + max(b)) ** 2 for a in sizes for b in sizes) * turns**2
+    return CELL * max(1.0, math.sqrt((maps + pairs) / CELL**2 / MEMORY))

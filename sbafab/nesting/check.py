@@ -8,12 +8,10 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from sbafab.errors import OutputError
-from sbafab.geometry.copies import COPIED, Copies
 from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to
 from sbafab.geometry.intersect import line_circle, meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import COPIED, Copies, Region, disc
 from sbafab.nesting.records import Nest, Stock
 
 SLACK = 1e-6

@@ -5,14 +5,16 @@ Lengths are mm, areas mm2. A sheet's lower left corner is its origin.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
+from sbafab.errors import DesignError, TooLargeError
 from sbafab.geometry.edges import Bounds, Point, unit
 from sbafab.geometry.region import Region
-from sbafab.laminate.films import Material
+from sbafab.laminate.films import FIRST, Material
+from sbafab.laminate.laminate import Laminate
 
 EngineName = Literal["bottom-left", "spyrrow"]
 Turn = Literal[0, 1, 2, 3]
@@ -121,3 +123,110 @@ def placed(region: Region, turn: Turn, shift: Point) -> Region:
         # Once known, these are not counted again for every place.
         _ = contour.area, contour.length
     return region.mapped(lambda p: (p[0] * c - p[1] * s + dx, p[0] * s + p[1] * c + dy), 1.0, False)
+
+
+# The parts to cut for a laminate: the pieces of its patterns, equal ones counted together.
+
+
+def no_spares(needed: int) -> int:
+    """Return zero spares, whatever number is needed."""
+    return 0
+
+
+def parts_of(
+    laminate: Laminate,
+    paths: Mapping[str, Region],
+    copies: int,
+    spares: Callable[[int], int] = no_spares,
+) -> tuple[NestPart, ...]:
+    """Every piece of every pattern, by pattern in stacking order.
+
+    ``paths`` holds each pattern's path of the beam, kerf compensated; ``spares`` tells
+    how many more of a pattern are cut than the ``copies`` take. Pieces of one pattern that differ
+    only in their place are one part, named after the first of them. None where the layers are
+    registered sheets: these are not nested.
+    """
+    if laminate.panel is not None:
+        return ()
+    parts: list[NestPart] = []
+    for pattern, layers in laminate.patterns.items():
+        needed = len(layers) * copies
+        layers_cut = needed + spares(needed)
+        alike: dict[Region, list[int]] = {}
+        pieces = paths[pattern].pieces
+        for number, piece in enumerate(pieces):
+            low_x, low_y, _, _ = piece.bounds
+            alike.setdefault(piece.moved(-low_x, -low_y), []).append(number)
+        for numbers in alike.values():
+            parts.append(
+                NestPart(
+                    design=laminate.name,
+                    pattern=pattern,
+                    piece=numbers[0] + 1,
+                    material=layers[0].film.material,
+                    region=pieces[numbers[0]],
+                    count=len(numbers) * layers_cut,
+                )
+            )
+    return tuple(parts)
+
+
+# What a nest refuses to do, in sentences that name the field of the design file.
+
+
+def field(material: Material) -> str:
+    """The section of a design file that describes this material's sheets."""
+    name = material.lower()
+    return f"sheets.{name}" if material in FIRST else f"films.{name}.sheet"
+
+
+def no_usable_area(material: Material, stock: Stock) -> DesignError:
+    where = field(material)
+    return DesignError(
+        f"{where}.border of {stock.border:g} mm leaves nothing of a sheet of {stock.width:g} x "
+        f"{stock.length:g} mm; it must be below {min(stock.width, stock.length) / 2:g} mm."
+    )
+
+
+def too_large(part: NestPart, stock: Stock) -> TooLargeError:
+    where = field(part.material)
+    low_x, low_y, high_x, high_y = part.region.bounds
+    left, bottom, right, top = stock.usable
+    return TooLargeError(
+        f"pattern {part.pattern} of {part.design} ({high_x - low_x:.1f} x {high_y - low_y:.1f} mm) "
+        f"does not fit the usable {right - left:.1f} x {top - bottom:.1f} mm of {where}; enlarge "
+        f"{where}.width or length, or lower its border of {stock.border:g} mm."
+    )
+
+
+def no_place(part: NestPart, stock: Stock) -> DesignError:
+    where = field(part.material)
+    return DesignError(
+        f"pattern {part.pattern} of {part.design} finds no place {stock.spacing:g} mm clear of the "
+        f"{len(stock.pins)} {where}.pins; lower {where}.spacing, move the pins, or enlarge the "
+        "sheet."
+    )
+
+
+def too_many(material: Material, parts: int, needed: str, stock: Stock) -> DesignError:
+    where = field(material)
+    return DesignError(
+        f"{parts} parts of {material} need {needed} of {stock.width:g} x {stock.length:g} mm, "
+        f"{where}.most allows {stock.most}; raise it, order fewer copies, or enlarge the sheets."
+    )
+
+
+def pins_unknown(material: Material, stock: Stock) -> DesignError:
+    where = field(material)
+    return DesignError(
+        f'engine "spyrrow" cannot keep clear of the {len(stock.pins)} {where}.pins; use '
+        '"bottom-left", or take the pins out.'
+    )
+
+
+def too_tight(part: NestPart) -> DesignError:
+    where = field(part.material)
+    return DesignError(
+        f"pattern {part.pattern} of {part.design} fits {where} too tightly for engine "
+        f'"spyrrow"; use "bottom-left", or lower {where}.border by 0.1 mm.'
+    )

@@ -11,11 +11,18 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from sbafab.errors import SbafabError
+from sbafab.geometry.arcs import run_chords
 from sbafab.geometry.edges import Point
-from sbafab.geometry.facets import run_chords
 from sbafab.geometry.region import Contour
-from sbafab.nesting.records import TURNS, NestPart, Placement, Stock, placed
-from sbafab.nesting.refusals import pins_unknown, too_tight
+from sbafab.nesting.records import (
+    TURNS,
+    NestPart,
+    Placement,
+    Stock,
+    pins_unknown,
+    placed,
+    too_tight,
+)
 
 if TYPE_CHECKING:
     from spyrrow import Item, PlacedItem

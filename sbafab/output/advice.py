@@ -13,8 +13,8 @@ from typing import Literal
 from sbafab.actuators import build
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.output.settings import limits
-from sbafab.progress import Progress, unheard
+from sbafab.output.checked import limits
+from sbafab.process import Progress, unheard
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.registration_yield import SEED, Share, simulate
 

@@ -9,27 +9,35 @@ from typing import Any
 
 from sbafab.assemblies.build import Assembled, PlacedPart, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
-from sbafab.assemblies.colours import colours, linear
-from sbafab.assemblies.reading import load_assembly
+from sbafab.assemblies.files import (
+    DESIGN_FILE,
+    assembly_sha256,
+    assembly_toml,
+    load_assembly,
+    part_entry,
+)
 from sbafab.assemblies.records import Assembly
-from sbafab.assemblies.shapes import placed_surface
-from sbafab.assemblies.writing import DESIGN_FILE, assembly_sha256, assembly_toml, part_entry
+from sbafab.assemblies.shapes import colours, linear, placed_surface
 from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.cutting.sheets import SheetFile
-from sbafab.errors import DesignError
-from sbafab.geometry.inconsistent import GeometryError
+from sbafab.errors import DesignError, GeometryError
 from sbafab.meshing.write_glb import Node, write_scene
-from sbafab.output.batch import Batch, plan_batch, refuse_other_film, write_batch
-from sbafab.output.checking import checks
-from sbafab.output.contents import TRAVELLER, order_of, write_findings, write_text
+from sbafab.output.batch import (
+    TRAVELLER,
+    Batch,
+    order_of,
+    plan_batch,
+    refuse_other_film,
+    write_batch,
+    write_findings,
+    write_text,
+)
+from sbafab.output.checked import EVERYTHING, GENERATOR, PICTURES, Checked, checks, limits, plan
 from sbafab.output.earlier import would_replace
-from sbafab.output.manifest import as_json
-from sbafab.output.manifest_records import AssemblyManifest
-from sbafab.output.planned import EVERYTHING, PICTURES, Checked, plan
+from sbafab.output.manifest import AssemblyManifest, as_json
 from sbafab.output.run import Run, found_in, swapped_in
-from sbafab.output.settings import GENERATOR, limits
 from sbafab.output.swap import ASSEMBLY_SCHEMA
-from sbafab.progress import Progress, unheard
+from sbafab.process import Progress, unheard
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding
 

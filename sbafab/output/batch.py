@@ -1,28 +1,328 @@
-"""Designs that are cut from the same film, one or several: placed together, then written."""
+"""What lies in the output folder of one design."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+import json
+import re
+import shutil
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
+from sbafab.cutting.files import write_layer_files
+from sbafab.cutting.fixture import PATH as FIXTURE
+from sbafab.cutting.fixture import write_fixture
+from sbafab.cutting.lightburn import write_projects
 from sbafab.cutting.properties import CutSettings
-from sbafab.cutting.sheets import SheetFile
-from sbafab.design.records import Design
-from sbafab.errors import DesignError
-from sbafab.nesting.records import Nest
-from sbafab.output.contents import close_folder, write_contents
-from sbafab.output.manifest import job_manifest
-from sbafab.output.manifest_records import Schema
-from sbafab.output.planned import Planned
-from sbafab.output.shop import (
-    find_nests,
-    write_nested_sheets,
+from sbafab.cutting.second_cut import write_second_cut
+from sbafab.cutting.sheets import FOLDER, SheetFile, write_sheets
+from sbafab.design.files import design_sha256, design_toml, kit_names
+from sbafab.design.kits import FILE as KIT_FILE
+from sbafab.design.kits import kit_of
+from sbafab.design.records import NAME_PATTERN, Design
+from sbafab.errors import DesignError, OutputError
+from sbafab.geometry.region import Region
+from sbafab.laminate.films import Material
+from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.files import MeshFile, write_meshes
+from sbafab.nesting.check import check_nest
+from sbafab.nesting.nest import as_dict, from_dict, nest
+from sbafab.nesting.records import Nest, NestPart
+from sbafab.output.checked import (
+    EVERYTHING,
+    GENERATOR,
+    Checked,
+    Planned,
+    check,
+    checks,
+    hole_notes,
+    kerf_widths,
+    limits,
+    machine,
+    plan,
+    stocks,
 )
-from sbafab.output.swap import ASSEMBLY_SCHEMA, SCHEMA
-from sbafab.progress import Progress
+from sbafab.output.manifest import Schema, as_json, file_hashes, job_manifest, manifest
+from sbafab.output.run import Run, swapped_in
+from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
+from sbafab.pressing.cycles import batch_json, design_runs
+from sbafab.pressing.schedule import Schedule
+from sbafab.pressing.tables import press_csv, press_json
+from sbafab.process import Progress, unheard
+from sbafab.rules.finding import Finding
+
+if TYPE_CHECKING:
+    from sbafab.reports.traveller.job import Job
+
+TRAVELLER = "traveller.html"
+FINDINGS = "findings.html"
+
+
+def write_contents(
+    planned: Planned,
+    sheets: Sequence[SheetFile],
+    folder: Path,
+    tell: Progress,
+    has_page: bool = True,
+) -> dict[str, Any]:
+    """Writes what is wanted of a design; the manifest, without the files' hashes.
+
+    A folder without pages of its own gets neither findings nor a traveller, which needs cut files,
+    schedule and pictures.
+    """
+    from sbafab.reports.underlay import NAME as UNDERLAY
+    from sbafab.reports.underlay import underlay_pdf
+
+    checked, wanted = planned.checked, planned.wanted
+    meshes: list[MeshFile] = []
+    solid: bytes | None = None
+    if planned.paths:
+        write_cut_files(planned, folder, tell)
+    if planned.pressing is not None:
+        write_text(folder / "press.json", as_json(_press(checked, planned.pressing)))
+        write_text(folder / "press.csv", press_csv(planned.pressing))
+        places = design_runs(checked.design, checked.laminate).places
+        press = checked.design.press
+        platen = press.platen_width, press.platen_length
+        underlay = underlay_pdf(checked.laminate, design_sha256(checked.design), places, platen)
+        if underlay is not None:
+            (folder / UNDERLAY).write_bytes(underlay)
+    if "mesh" in wanted:
+        meshes = write_meshes(checked.laminate, folder, progress=partial(tell, "meshes"))
+    if planned.conforming is not None:
+        from sbafab.meshing.conforming.meshes import write_conforming
+
+        told = partial(tell, "conforming meshes")
+        meshes += write_conforming(planned.conforming, folder, told, planned.formats)
+    if "preview" in wanted:
+        solid = _write_pictures(checked, folder, tell)
+    if has_page and wanted >= {"cut", "press", "preview"}:
+        write_text(folder / TRAVELLER, _traveller(planned, sheets, solid))
+    if has_page and "preview" in wanted:
+        write_findings(checked.design.name, design_sha256(checked.design), [checked], (), folder)
+    found = checks(checked.findings, "design", checked.design.name, [checked.design])
+    write_text(folder / "checks.json", as_json(found))
+    _write_design(checked.design, folder)
+    return manifest(planned, sheets, meshes)
+
+
+def _press(checked: Checked, plan: Schedule) -> dict[str, Any]:
+    runs = design_runs(checked.design, checked.laminate)
+    batch = {"batch": batch_json(checked.design, checked.laminate, plan)} if runs.copies > 1 else {}
+    return {**press_json(plan), **batch}
+
+
+def write_findings(
+    name: str,
+    sha256: str,
+    designs: Sequence[Checked],
+    between: Sequence[Finding],
+    folder: Path,
+) -> None:
+    """The designer's page: of every design, and of the checks ``between`` an assembly's parts."""
+    from sbafab.reports.traveller.findings import Inspected, findings_html
+
+    inspected = [
+        Inspected(one.design.name, one.findings, one.laminate, limits(one.design))
+        for one in designs
+    ]
+    if between:
+        inspected.append(Inspected("Between the parts", between))
+    write_text(folder / FINDINGS, findings_html(name, sha256, GENERATOR, inspected))
+
+
+def close_folder(folder: Path, index: dict[str, Any]) -> None:
+    """Writes the manifest, with the hashes of all that lies in the folder."""
+    index.pop("files", None)
+    index["files"] = file_hashes(folder)
+    write_text(folder / "manifest.json", as_json(index))
+
+
+def write_text(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _traveller(planned: Planned, sheets: Sequence[SheetFile], solid: bytes | None) -> str:
+    from sbafab.reports.traveller.page import traveller_html
+
+    checked, order = planned.checked, planned.checked.design.order
+    job = replace(order_of(checked), made_for=order.made_for, note=order.note, solid_png=solid)
+    assert planned.pressing is not None
+    return traveller_html(checked.design, checked.laminate, planned.pressing, sheets, job)
+
+
+def order_of(checked: Checked, folder: str = "") -> Job:
+    """What a traveller says of the order of a design whose files lie in ``folder``."""
+    from sbafab.reports.traveller.job import Job
+    from sbafab.reports.underlay import NAME as UNDERLAY
+    from sbafab.reports.underlay import guides
+
+    design = checked.design
+    return Job(
+        design_sha256=design_sha256(design),
+        generator=GENERATOR,
+        waived=checked.waived,
+        lowered=checked.lowered,
+        findings=checked.findings,
+        fixture=f"{folder}{FIXTURE}" if checked.laminate.pins else None,
+        underlay=f"{folder}{UNDERLAY}" if guides(checked.laminate) else None,
+        kerf={str(name): kerf for name, kerf in kerf_widths(design).items()},
+        copies=design.order.quantity,
+    )
+
+
+def _marked(checked: Checked) -> Laminate:
+    """The laminate with notes for its pictures: failed and waived rules, lowered limits."""
+    failed = dict.fromkeys(f.rule for f in checked.findings if f.verdict == "fail")
+    notes = [f"must not be built; failed: {', '.join(failed)}"] if failed else []
+    notes += [f"waived: {', '.join(checked.waived)}"] if checked.waived else []
+    notes += [f"limits lowered: {', '.join(checked.lowered)}"] if checked.lowered else []
+    laminate = checked.laminate
+    return replace(laminate, notes=(*laminate.notes, *notes)) if notes else laminate
+
+
+def _write_pictures(checked: Checked, folder: Path, tell: Progress) -> bytes:
+    """Writes the pictures; that of the solid is returned as well."""
+    from sbafab.reports.layers_svg import layers_svg
+    from sbafab.reports.solid_png import solid_png
+    from sbafab.reports.stack_svg import stack_svg
+
+    laminate = _marked(checked)
+    preview = folder / "preview"
+    preview.mkdir()
+    write_text(preview / "layers.svg", layers_svg(laminate))
+    tell("pictures", 1, 3)
+    write_text(preview / "stack.svg", stack_svg(laminate))
+    tell("pictures", 2, 3)
+    solid = solid_png(laminate)
+    (preview / "solid.png").write_bytes(solid)
+    tell("pictures", 3, 3)
+    return solid
+
+
+def _write_design(design: Design, folder: Path) -> None:
+    if design.drawing is not None:
+        name = f"outline{design.drawing.suffix.lower()}"
+        shutil.copyfile(design.drawing, folder / name)
+        chamber = design.chamber.model_copy(update={"outline": name})
+        design = design.model_copy(update={"chamber": chamber})
+    if design.kit not in kit_names():
+        (folder / KIT_FILE).write_bytes(kit_of(design).text)
+        design = design.model_copy(update={"kit": KIT_FILE})
+    write_text(folder / "design.toml", design_toml(design))
+
+
+# What the cutting shop gets of one or several designs: layer files, base plates, film sheets.
+
+
+PLACES = f"{FOLDER}/nest.json"
+MOST_BYTES = 50_000_000
+"""Of saved places; more are not read but searched for again."""
+
+
+def find_nests(
+    parts: Sequence[NestPart], design: Design, old_folder: Path, tell: Progress
+) -> tuple[Nest, ...]:
+    """Places for the parts on the design's film sheets.
+
+    Places that an earlier run found for the same parts and sheets are taken over, not searched
+    for again. Raises DesignError where parts do not fit.
+    """
+    if not parts:
+        return ()
+    tell("nesting", 0, 1)
+    saved = _saved(parts, design, old_folder / PLACES)
+    return saved or nest(parts, stocks(design), design.sheets.engine, design.sheets.seconds)
+
+
+def write_cut_files(planned: Planned, folder: Path, tell: Progress) -> None:
+    """Writes the layer files and the base plate of a design."""
+    laminate, settings = planned.checked.laminate, planned.settings
+    told = partial(tell, "cut files")
+    write_layer_files(laminate, planned.paths, folder, settings, told)
+    design = planned.checked.design
+    places = design_runs(design, laminate).places
+    write_fixture(laminate, folder, settings, places, hole_notes(design, laminate))
+    write_panel(laminate, planned.paths, folder, settings)
+
+
+def write_panel(
+    laminate: Laminate, paths: Mapping[str, Region], folder: Path, settings: CutSettings
+) -> None:
+    """Writes the second cut of registered sheets and their LightBurn projects, if there are any."""
+    if laminate.panel is not None:
+        write_second_cut(laminate, folder, settings)
+        write_projects(laminate, paths, folder, settings)
+
+
+def write_nested_sheets(
+    nests: Sequence[Nest], design: Design, folder: Path, settings: CutSettings, tell: Progress
+) -> list[SheetFile]:
+    """Writes the film sheets, and beside them the places for a later run; nothing for no nest."""
+    if not nests:
+        return []
+    sheets = write_sheets(
+        nests,
+        folder,
+        settings,
+        machine(design),
+        design.sheets.label,
+        lambda done, total: tell("sheets", done, total),
+    )
+    places = json.dumps(as_dict(nests), indent=1)
+    (folder / PLACES).write_text(places + "\n", encoding="utf-8", newline="\n")
+    return sheets
+
+
+def _saved(parts: Sequence[NestPart], design: Design, path: Path) -> tuple[Nest, ...] | None:
+    """The places of an earlier run; None where there are none for these parts, or bad ones."""
+    try:
+        if not path.is_file() or path.stat().st_size > MOST_BYTES:
+            return None
+        data: Any = json.loads(path.read_text(encoding="utf-8"))
+        nests = from_dict(data, parts, stocks(design), design.sheets.engine)
+        if nests is None or not all(_is_possible(nest) for nest in nests):
+            return None
+        for nested in nests:
+            check_nest(nested)
+    except (OSError, ValueError, ArithmeticError, RecursionError, OutputError):
+        return None
+    return nests
+
+
+def _is_possible(nest: Nest) -> bool:
+    """Whether sheets and turns are ones that the stock allows."""
+    turns = nest.stock.turns
+    return nest.sheets <= nest.stock.most and all(p.turn in turns for p in nest.placements)
+
+
+def film_use(sheets: Sequence[SheetFile]) -> dict[Material, dict[str, Any]]:
+    """Sheets, their area, the parts' share and the waste in mm2, by material."""
+    used: dict[Material, dict[str, float]] = {}
+    for sheet in sheets:
+        entry = used.setdefault(sheet.material, {"sheets": 0, "sheet_area": 0.0, "parts_area": 0.0})
+        entry["sheets"] += 1
+        entry["sheet_area"] += sheet.width * sheet.length
+        entry["parts_area"] += sheet.parts_area
+    return {material: _shares(entry) for material, entry in used.items()}
+
+
+def _shares(entry: Mapping[str, float]) -> dict[str, float]:
+    area, parts = entry["sheet_area"], entry["parts_area"]
+    return {
+        "sheets": entry["sheets"],
+        "sheet_area": round(area, 3),
+        "waste": round(area - parts, 3),
+        "density": round(parts / area, 4),
+    }
+
+
+# Designs that are cut from the same film, one or several: placed together, then written.
+
 
 SHARED = ("films", "sheets", "laser")
 """Sections that must be alike in all designs that are cut from the same film."""
@@ -140,3 +440,67 @@ def _seen_from_below(sheets: Sequence[SheetFile]) -> list[SheetFile]:
         )
         for sheet in sheets
     ]
+
+
+# Several designs cut together: a folder with each design's own, and film sheets for all.
+
+
+RESERVED = {
+    "sheets": "the job's folder of film sheets",
+    "manifest.json": "the job's index",
+}
+"""What lies in a job's folder beside those of its designs."""
+
+
+def generate_job(
+    designs: Sequence[Design],
+    name: str,
+    out: Path = Path("out"),
+    progress: Progress | None = None,
+    curves: Curves = TRUE_ARCS,
+) -> Run:
+    """Writes ``out/<name>/``: a folder for each design, and ``sheets/`` with the parts of all.
+
+    Film sheets, kerf and machine are those of the first design, and must be alike in all.
+    Raises DesignError where they are not, or where two designs have one name. If a rule fails in
+    any design, nothing is written (``Run.kept``).
+    """
+    tell = progress or unheard
+    _refuse_names([design.name for design in designs], name)
+    refuse_other_film(designs)
+    checked = tuple(Checked(design, *check(design, tell)) for design in designs)
+    target = out / name
+    if any(one.failed for one in checked):
+        return Run(checked, target, kept=True)
+    planned = [plan(one, EVERYTHING, curves) for one in checked]
+    batch = plan_batch(JOB_SCHEMA, name, planned, target, tell)
+    return swapped_in(batch, target, lambda folder: write_batch(batch, folder, tell)[0], tell)
+
+
+def _refuse_names(names: Sequence[str], name: str) -> None:
+    if re.fullmatch(NAME_PATTERN.strip("^$"), name) is None:
+        raise DesignError(
+            f"--name {name!r} must be a folder's name of letters, digits, dots, dashes and "
+            "underscores; for another place use -o"
+        )
+    twice = next((own for own in names if names.count(own) > 1), None)
+    if twice is not None:
+        raise DesignError(
+            f"two designs are named {twice}; give each a name of its own, or say --copies"
+        )
+    folders = {own.lower(): own for own in reversed(names)}
+    # Some systems hold names that differ in small and capital letters for one.
+    alike = next((own for own in names if folders[own.lower()] != own), None)
+    if alike is not None:
+        raise DesignError(
+            f"two designs are named {folders[alike.lower()]} and {alike}, which is one folder on "
+            "some machines; give one of them another name"
+        )
+    kept = next((own for own in names if own.lower() in RESERVED), None)
+    if kept is not None:
+        raise DesignError(
+            f"a design is named {kept}, as {RESERVED[kept.lower()]} is; give it another name in "
+            "its design file"
+        )
+    if name.lower() in (*folders, *RESERVED):
+        raise DesignError(f"the job is named {name} as one of its folders; choose another --name")

@@ -8,9 +8,8 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sbafab.design.messages import shown
+from sbafab.design.files import dotted, resolved, shown
 from sbafab.design.records import Design
-from sbafab.design.writing import dotted, resolved
 from sbafab.errors import OutputError
 from sbafab.output.manifest import carried_over, file_hash, file_names, identity
 from sbafab.output.swap import listed_files, read_manifest

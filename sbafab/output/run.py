@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import shutil
+import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
+from sbafab.design.files import design_sha256
 from sbafab.design.records import Design
+from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
+from sbafab.models.figures import Prediction
 from sbafab.notebook import table_html
-from sbafab.output.batch import Batch, plan_batch, write_batch
-from sbafab.output.checking import check
-from sbafab.output.contents import close_folder
+from sbafab.output.batch import Batch, close_folder, plan_batch, write_batch, write_text
+from sbafab.output.checked import EVERYTHING, GENERATOR, PICTURES, Checked, RunPart, check, plan
 from sbafab.output.earlier import (
     CUT,
     MESH,
@@ -24,18 +27,19 @@ from sbafab.output.earlier import (
     removed_files,
     would_replace,
 )
-from sbafab.output.manifest import identity
-from sbafab.output.planned import EVERYTHING, PICTURES, Checked, RunPart, plan
+from sbafab.output.manifest import as_json, identity
+from sbafab.output.schemas import SIMULATE_SCHEMA
 from sbafab.output.self_check import refuse_unlike
 from sbafab.output.swap import SCHEMA, listed_files, replaced_folder
 from sbafab.pressing.schedule import Schedule
-from sbafab.progress import Progress, unheard
+from sbafab.process import Progress, unheard
 from sbafab.rules.deck import has_failed
 from sbafab.rules.finding import Finding, Findings
+from sbafab.simulators.simulator import Name, Result, Wish, simulator
 
 if TYPE_CHECKING:
+    from sbafab.meshing.conforming.layup import MeshSettings
     from sbafab.meshing.conforming.meshes import ConformingMeshes
-    from sbafab.meshing.conforming.settings import MeshSettings
 
 ExtraFiles = Callable[[Laminate, Path], None]
 """Writes something of its own for a laminate into the folder of a run."""
@@ -213,3 +217,128 @@ def with_folder(made: Path) -> ExtraFiles:
         shutil.copytree(made, folder / made.name)
 
     return put
+
+
+# ``predict.json`` and its plots, in the folder of a design.
+
+
+PREDICTION_SCHEMA = "sbafab/predict@1"
+FOLDER = "predict"
+
+
+def prediction_json(design: Design, prediction: Prediction) -> dict[str, Any]:
+    """What ``predict.json`` holds; ``plot`` of a relation is its file in the folder."""
+    found = prediction.as_dict()
+    for relation in found["relations"]:
+        relation["plot"] = f"{FOLDER}/{relation['name']}.svg"
+    return {
+        "schema": PREDICTION_SCHEMA,
+        "name": design.name,
+        "family": design.family,
+        "design_sha256": design_sha256(design),
+        "generator": GENERATOR,
+        **found,
+    }
+
+
+def with_prediction(design: Design, prediction: Prediction) -> ExtraFiles:
+    """Writes ``predict.json`` and ``predict/<relation>.svg`` into the folder of a run."""
+
+    def put(_: Laminate, folder: Path) -> None:
+        from sbafab.reports.charts import relation_svg
+
+        write_text(folder / "predict.json", as_json(prediction_json(design, prediction)))
+        if prediction.relations:
+            (folder / FOLDER).mkdir()
+        for relation in prediction.relations:
+            plot = relation_svg(design.name, relation)
+            write_text(folder / FOLDER / f"{relation.name}.svg", plot)
+
+    return put
+
+
+# A simulator run on a design, its results in the design's folder.
+
+
+UNITS = {
+    "length": "mm",
+    "pressure": "kPa",
+    "volume": "ul",
+    "stress": "MPa",
+    "work": "uJ",
+    "angle": "degrees",
+    "time": "s",
+    "rate": "steps/s",
+}
+"""Of what ``result.json`` holds."""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What a simulator found; nothing, and no folder, where a rule ``failed`` before."""
+
+    findings: Sequence[Finding]
+    folder: Path | None
+    result: Result
+
+    @property
+    def failed(self) -> bool:
+        """Whether a rule failed that the design does not waive; no simulator ran then."""
+        return self.folder is None
+
+
+def result_json(found: Result) -> dict[str, Any]:
+    """What ``result.json`` holds."""
+    head = {"schema": SIMULATE_SCHEMA, "units": UNITS}
+    return {**head, **found.figures, "stopped": found.stopped}
+
+
+def simulate(
+    design: Design,
+    name: Name,
+    wish: Wish,
+    out: Path = Path("out"),
+    progress: Progress | None = None,
+    export: bool = False,
+) -> Simulated:
+    """Runs the simulator into ``out/<design name>/<name>/``; ``export`` only writes its input.
+
+    Raises DesignError or OutputError for what it cannot do, before it starts where that can be
+    told.
+    """
+    tell = progress or unheard
+    found = Result((), {})
+    with tempfile.TemporaryDirectory() as place:
+        checked = Checked(design, *check(design, tell))
+        if checked.failed:
+            return Simulated(checked.findings, None, found)
+        # Said before a run of hours, not after it.
+        refuse_to_replace(out / design.name, design, checked.waived, (name,))
+        # A folder in the temporary one has the usual rights, the temporary one itself has not.
+        folder = Path(place) / name
+        if export:
+            simulator(name).export(checked.laminate, wish, folder)
+        else:
+            try:
+                found = simulator(name).run(checked.laminate, wish, folder, tell)
+            except OutputError as error:
+                raise _with_log(error, folder, out / f"{design.name}-{name}-failed.log") from None
+            told = as_json(result_json(found))
+            (folder / "result.json").write_text(told, encoding="utf-8", newline="\n")
+        extras = Extras(also=with_folder(folder), own=(name,))
+        run = generate(design, out, (), tell, extras=extras)
+    return Simulated(checked.findings, run.folder / name, found)
+
+
+def _with_log(error: OutputError, folder: Path, place: Path) -> OutputError:
+    """The same error, its log copied to a place that stays and named there."""
+    for log in sorted(folder.glob("*.log")):
+        said = str(error)
+        if str(log) in said:
+            try:
+                place.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(log, place)
+            except OSError:
+                return OutputError(said.replace(f" (see {log})", ""))
+            return OutputError(said.replace(str(log), str(place)))
+    return error

@@ -1,4 +1,4 @@
-"""JSON schemas of what the program reads and writes, each with a stable id."""
+"""What JSON schemas are put together from."""
 
 from __future__ import annotations
 
@@ -6,13 +6,342 @@ from collections.abc import Mapping
 from typing import Any, get_args
 
 from sbafab.errors import ERROR_SCHEMA
-from sbafab.output import printed
-from sbafab.output.checking import CHECKS_SCHEMA
-from sbafab.output.predicting import SCHEMA as PREDICT_SCHEMA
-from sbafab.output.schema_parts import COUNT, TEXT, and_perhaps, array, finding, number, table
+from sbafab.output.checked import CHECKS_SCHEMA
+from sbafab.output.run import PREDICTION_SCHEMA as PREDICT_SCHEMA
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.pressing.tables import PRESS_SCHEMA
 from sbafab.rules.finding import Verdict
+
+TEXT = {"type": "string"}
+COUNT = {"type": "integer", "minimum": 0}
+
+
+def number(*more: str) -> dict[str, Any]:
+    return {"type": ["number", *more]}
+
+
+def table(**properties: Any) -> dict[str, Any]:
+    """An object with all of these; further keys may be added."""
+    return {"type": "object", "required": list(properties), "properties": properties}
+
+
+def and_perhaps(body: dict[str, Any], **properties: Any) -> dict[str, Any]:
+    """The same with keys that may be missing: what a command prints beside what is in the file."""
+    return {**body, "properties": {**body["properties"], **properties}}
+
+
+def array(item: Mapping[str, Any]) -> dict[str, Any]:
+    return {"type": "array", "items": dict(item)}
+
+
+def finding() -> dict[str, Any]:
+    """What a rule found."""
+    where = table(
+        interface={"type": ["integer", "null"], "description": "counted from 1, bottom to top"},
+        layers=array(COUNT),
+        x={**number("null"), "description": "mm"},
+        y={**number("null"), "description": "mm"},
+    )
+    return table(
+        rule=TEXT,
+        verdict={"enum": list(get_args(Verdict))},
+        limit=number("null"),
+        measured=number("null"),
+        unit=TEXT,
+        where=where,
+        message=TEXT,
+    )
+
+
+# The ids of what commands print with ``--json``, and of what ``map`` writes (as in models).
+
+
+RUN_SCHEMA = "sbafab/run@1"
+NESTED_SCHEMA = "sbafab/nested@1"
+RECORDS_SCHEMA = "sbafab/records@1"
+REPORT_SCHEMA = "sbafab/report@1"
+SWEEP_SCHEMA = "sbafab/sweep@1"
+MAP_SCHEMA = "sbafab/balloon-map@1"
+KERF_SCHEMA = "sbafab/kerf@1"
+EXPLAIN_SCHEMA = "sbafab/explain@1"
+EXPLAINED_SCHEMA = "sbafab/explained@1"
+SIMULATE_SCHEMA = "sbafab/simulate@1"
+ASSEMBLY_PREDICT_SCHEMA = "sbafab/assembly-predict@1"
+REPRODUCTION_SCHEMA = "sbafab/reproduction@1"
+TEMPLATES_SCHEMA = "sbafab/templates@1"
+
+
+# JSON schemas of what commands print with ``--json`` of runs and records.
+
+
+YES = {"type": "boolean"}
+PATHS = {**array(TEXT), "description": "what lies in the folder"}
+SHARE = {"passed": COUNT, "tested": COUNT, "share": number(), "low": number(), "high": number()}
+
+
+def _run() -> dict[str, Any]:
+    return table(
+        schema={"const": RUN_SCHEMA},
+        folder=TEXT,
+        failed=YES,
+        findings=array(finding()),
+        notes=array(TEXT),
+        files=PATHS,
+    )
+
+
+def _nested() -> dict[str, Any]:
+    one = table(name=TEXT, failed=YES, findings=array(finding()), notes=array(TEXT))
+    return table(
+        schema={"const": NESTED_SCHEMA}, folder=TEXT, failed=YES, designs=array(one), files=PATHS
+    )
+
+
+def _records() -> dict[str, Any]:
+    numbers = {
+        "type": "object",
+        "additionalProperties": number(),
+        "description": "units stand in the keys",
+    }
+    errors = {"type": "object", "additionalProperties": array(number())}
+    texts = dict.fromkeys(("serial", "leak", "operator", "kit", "note"), TEXT)
+    one = table(
+        **texts,
+        numbers=numbers,
+        errors=errors,
+        withdrawn=YES,
+        id=COUNT,
+        recorded={**TEXT, "description": "UTC"},
+        design_sha256=TEXT,
+        corrects={"type": ["integer", "null"]},
+        attempt=COUNT,
+        actuator_sha256={**TEXT, "description": "the same for all designs that build this"},
+        design=TEXT,
+        corrected_by={"type": ["integer", "null"]},
+    )
+    return table(schema={"const": RECORDS_SCHEMA}, records=array(one))
+
+
+def _report() -> dict[str, Any]:
+    measured = table(
+        design=TEXT,
+        quantity=TEXT,
+        unit=TEXT,
+        count=COUNT,
+        mean=number(),
+        low=number("null"),
+        high=number("null"),
+        predicted=number("null"),
+        model=TEXT,
+        ratio=number("null"),
+        verdict=TEXT,
+    )
+    tolerance = table(
+        kit=TEXT,
+        operator=TEXT,
+        quantity=TEXT,
+        unit=TEXT,
+        key=TEXT,
+        stated=number(),
+        found=table(errors=COUNT, largest=number(), highest=number()),
+        verdict=TEXT,
+    )
+    by_errors = table(
+        low=number(),
+        high=number(),
+        tolerances={
+            "type": "object",
+            "additionalProperties": array(number()),
+            "description": "of each key the largest error measured and the most it leaves room for",
+        },
+    )
+    promise = table(
+        design=TEXT,
+        promised=number(),
+        by_measured_errors={**by_errors, "type": ["object", "null"]},
+        **SHARE,
+        verdict=TEXT,
+    )
+    return table(
+        schema={"const": REPORT_SCHEMA},
+        records=COUNT,
+        actuators=COUNT,
+        success=array(table(by=TEXT, name=TEXT, **SHARE, passed_later=COUNT)),
+        measured=array(measured),
+        tolerances=array(tolerance),
+        promises=array(promise),
+        contradictions=array(TEXT),
+    )
+
+
+def _sweep() -> dict[str, Any]:
+    counts = {"type": "object", "additionalProperties": COUNT}
+    return table(
+        schema={"const": SWEEP_SCHEMA},
+        folder=TEXT,
+        designs=COUNT,
+        measured_now=COUNT,
+        no_longer_asked=COUNT,
+        outcomes={**counts, "description": "designs by what became of them"},
+        files=PATHS,
+    )
+
+
+def _kerf() -> dict[str, Any]:
+    value = table(value=number(), uncertainty=number(), half_width=number())
+    maybe = {**value, "type": ["object", "null"]}
+    offsets = {
+        "type": "object",
+        "additionalProperties": value,
+        "description": "mm that each instrument reads too much; empty where it cannot be told",
+    }
+    estimate = table(kerf=value, scale=maybe, scaled=YES, offsets=offsets, count=COUNT)
+    of_axis = {**estimate, "type": ["object", "null"]}
+    return table(
+        schema={"const": KERF_SCHEMA},
+        all={**estimate, "description": "kerf in mm, scale as a ratio, with 95 % half widths"},
+        x=of_axis,
+        y=of_axis,
+        difference={**maybe, "description": "kerf along x less that along y, mm"},
+        differs=YES,
+        warnings=array(TEXT),
+        remarks=array(TEXT),
+        toml={**TEXT, "description": "lines for the design file"},
+    )
+
+
+def _explanation() -> dict[str, Any]:
+    return {"holds": TEXT, "why": TEXT, "mend": TEXT, "keys": array(TEXT)}
+
+
+def _explain() -> dict[str, Any]:
+    return table(schema={"const": EXPLAIN_SCHEMA}, rule=TEXT, **_explanation())
+
+
+def _explained() -> dict[str, Any]:
+    rules = {"type": "object", "additionalProperties": table(**_explanation())}
+    return table(schema={"const": EXPLAINED_SCHEMA}, rules=rules)
+
+
+def _templates() -> dict[str, Any]:
+    return array(table(name=TEXT, summary=TEXT))
+
+
+def _simulate() -> dict[str, Any]:
+    numbers = {"type": "object", "additionalProperties": number("null")}
+    place = {**array(number()), "minItems": 3, "maxItems": 3}
+    tip = table(time=number(), place=place, tilt=number())
+    state = {"type": "object", "description": "pressures, stroke, tip, tilt, volumes, stress, work"}
+    body = table(
+        schema={"const": SIMULATE_SCHEMA},
+        units={"type": "object", "additionalProperties": TEXT},
+        stopped={"type": ["string", "null"], "description": "why it ended early, if it did"},
+    )
+    return and_perhaps(
+        body,
+        folder=TEXT,
+        states={**array(state), "description": "calculix"},
+        scene={**TEXT, "description": "sofa"},
+        tips={**array(tip), "description": "sofa, mujoco"},
+        rate={**number("null"), "description": "sofa, mujoco"},
+        stroke={**number(), "description": "mujoco"},
+        volumes={**numbers, "description": "mujoco"},
+        drift={**number(), "description": "mujoco: mm in the last 0.5 s"},
+    )
+
+
+def _assembly_predict() -> dict[str, Any]:
+    measured = {
+        **TEXT,
+        "description": "what the paper measured of one actuator, where the model is off by more "
+        "than a quarter of it",
+    }
+    figure = table(
+        part=TEXT,
+        name=TEXT,
+        value=number(),
+        unit=TEXT,
+        model=TEXT,
+        paper=TEXT,
+        measured=measured,
+    )
+    touch = {"part": TEXT, "other": TEXT, "volume": {**number(), "description": "mm3"}}
+    bent = table(
+        **touch,
+        chambers=TEXT,
+        from_kpa=number(),
+        bend={**number(), "description": "degrees"},
+    )
+    return table(
+        schema={"const": ASSEMBLY_PREDICT_SCHEMA},
+        name=TEXT,
+        pressure_kpa=number(),
+        load_g=number(),
+        figures=array(figure),
+        touches=array(table(**touch)),
+        left_out=array(TEXT),
+        bent_touches=array(bent),
+    )
+
+
+def _balloon_map() -> dict[str, Any]:
+    rows = array(array(number()))
+    grid = {**rows, "description": "a row a pressure, a column a height"}
+    sizes = ("pocket_radius_mm", "neck_radius_mm", "bore_radius_mm", "film_mm", "modulus_kpa")
+    balloon = table(
+        **dict.fromkeys((*sizes, "poisson"), number()),
+        pressure=array(number()),
+        height=array(number()),
+        force=grid,
+        volume=grid,
+        potential=grid,
+    )
+    return table(
+        schema={"const": MAP_SCHEMA},
+        design=TEXT,
+        units={"type": "object", "additionalProperties": TEXT},
+        levels={**array(COUNT), "description": "which of the balloons stands there, from 1"},
+        flat_level_mm=number(),
+        chamber_axes_mm=rows,
+        balloons=array(balloon),
+    )
+
+
+def _reproduction() -> dict[str, Any]:
+    row = table(
+        section=TEXT,
+        figure=TEXT,
+        unit=TEXT,
+        where=TEXT,
+        paper=number("null"),
+        error=number("null"),
+        predicted=number("null"),
+        model=TEXT,
+        why=TEXT,
+    )
+    found = table(schema={"const": REPRODUCTION_SCHEMA}, rows=array(row))
+    return and_perhaps(found, folder=TEXT)
+
+
+BODIES = {
+    "run": _run,
+    "nested": _nested,
+    "records": _records,
+    "report": _report,
+    "sweep": _sweep,
+    "simulate": _simulate,
+    "assembly-predict": _assembly_predict,
+    "reproduction": _reproduction,
+    "balloon-map": _balloon_map,
+    "kerf": _kerf,
+    "explain": _explain,
+    "explained": _explained,
+    "templates": _templates,
+}
+
+
+# JSON schemas of what the program reads and writes, each with a stable id.
+
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 DESIGN_SCHEMA = "sbafab/design@1"
@@ -27,28 +356,28 @@ SCHEMAS: Mapping[str, tuple[str, str]] = {
     "press": (PRESS_SCHEMA, "`press.json`, the heat-press schedule"),
     "predict": (PREDICT_SCHEMA, "`predict.json`, and what `predict --json` prints of a design"),
     "find": (FIND_SCHEMA, "what `find --json` prints"),
-    "run": (printed.RUN_SCHEMA, "what `generate`, `cut`, `press` and `mesh` print with `--json`"),
-    "nested": (printed.NESTED_SCHEMA, "what `nest --json` prints"),
-    "records": (printed.RECORDS_SCHEMA, "what `record --json` prints of records"),
-    "report": (printed.REPORT_SCHEMA, "what `record --report --json` prints"),
-    "sweep": (printed.SWEEP_SCHEMA, "what `sweep --json` prints"),
+    "run": (RUN_SCHEMA, "what `generate`, `cut`, `press` and `mesh` print with `--json`"),
+    "nested": (NESTED_SCHEMA, "what `nest --json` prints"),
+    "records": (RECORDS_SCHEMA, "what `record --json` prints of records"),
+    "report": (REPORT_SCHEMA, "what `record --report --json` prints"),
+    "sweep": (SWEEP_SCHEMA, "what `sweep --json` prints"),
     "simulate": (
-        printed.SIMULATE_SCHEMA,
+        SIMULATE_SCHEMA,
         "`result.json` of a simulator's folder, and what `simulate --json` prints",
     ),
     "assembly-predict": (
-        printed.ASSEMBLY_PREDICT_SCHEMA,
+        ASSEMBLY_PREDICT_SCHEMA,
         "what `predict --json` prints of an assembly",
     ),
     "reproduction": (
-        printed.REPRODUCTION_SCHEMA,
+        REPRODUCTION_SCHEMA,
         "`reproduction.json`, and what `reproduce --json` prints",
     ),
-    "balloon-map": (printed.MAP_SCHEMA, "what `map --to FILE.json` writes"),
-    "kerf": (printed.KERF_SCHEMA, "what `kerf --json` prints"),
-    "explain": (printed.EXPLAIN_SCHEMA, "what `explain RULE --json` prints"),
-    "explained": (printed.EXPLAINED_SCHEMA, "what `explain --json` prints of all rules"),
-    "templates": (printed.TEMPLATES_SCHEMA, "what `templates --json` prints: a list, without id"),
+    "balloon-map": (MAP_SCHEMA, "what `map --to FILE.json` writes"),
+    "kerf": (KERF_SCHEMA, "what `kerf --json` prints"),
+    "explain": (EXPLAIN_SCHEMA, "what `explain RULE --json` prints"),
+    "explained": (EXPLAINED_SCHEMA, "what `explain --json` prints of all rules"),
+    "templates": (TEMPLATES_SCHEMA, "what `templates --json` prints: a list, without id"),
     "error": (ERROR_SCHEMA, "what any command prints with `--json` when it ends in an error"),
 }
 """Formats by name: the id that stands in the files, and what it describes."""
@@ -56,11 +385,9 @@ SCHEMAS: Mapping[str, tuple[str, str]] = {
 
 def schema_of(name: str) -> dict[str, Any]:
     """The JSON schema of a format in ``SCHEMAS``."""
-    from sbafab.output.printed_schemas import BODIES as PRINTED
-
     identity = SCHEMAS[name][0]
     head = {"$schema": DIALECT, "$id": f"urn:{identity.replace('/', ':')}"}
-    body = _BODIES.get(name) or PRINTED[name]
+    body = _BODIES.get(name) or BODIES[name]
     return {**head, **body()}
 
 
@@ -72,19 +399,19 @@ def _design() -> dict[str, Any]:
 
 
 def _manifest() -> dict[str, Any]:
-    from sbafab.output.manifest_records import Manifest
+    from sbafab.output.manifest import Manifest
 
     return Manifest.model_json_schema(by_alias=True)
 
 
 def _job() -> dict[str, Any]:
-    from sbafab.output.manifest_records import JobManifest
+    from sbafab.output.manifest import JobManifest
 
     return _of_batch(JobManifest.model_json_schema(by_alias=True), JOB_SCHEMA)
 
 
 def _assembly() -> dict[str, Any]:
-    from sbafab.output.manifest_records import AssemblyManifest
+    from sbafab.output.manifest import AssemblyManifest
 
     return _of_batch(AssemblyManifest.model_json_schema(by_alias=True), ASSEMBLY_SCHEMA)
 

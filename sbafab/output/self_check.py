@@ -6,12 +6,12 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from sbafab.as_built.check import check_written
-from sbafab.as_built.meant import Meant, RunWork
-from sbafab.as_built.records import CLAIMS, DESIGNED, INTEGRITY
+from sbafab.as_built.claims import CLAIMS, DESIGNED, INTEGRITY
+from sbafab.as_built.expected import Meant, RunWork
 from sbafab.errors import DefectError, OutputError
 from sbafab.output.batch import Batch
-from sbafab.output.planned import Planned
-from sbafab.progress import Progress
+from sbafab.output.checked import Planned
+from sbafab.process import Progress
 from sbafab.rules.finding import Finding
 
 MOST_NAMED = 3

@@ -7,9 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from sbafab.pressing.dowels import PinSetting
-from sbafab.pressing.heating import HeatPoint
-from sbafab.pressing.schedule import Schedule
-from sbafab.pressing.words import named
+from sbafab.pressing.schedule import HeatPoint, Schedule, named
 from sbafab.spreadsheet import csv_text
 
 PRESS_SCHEMA = "sbafab/press@1"

@@ -8,11 +8,8 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 from sbafab.assemblies.build import Assembled
-from sbafab.assemblies.colours import RGB, colours
-from sbafab.assemblies.shapes import placed_surface
-from sbafab.reports.canvas import INK
-from sbafab.reports.depth import Buffer, seen, view_of
-from sbafab.reports.length_bar import draw_length_bar
+from sbafab.assemblies.shapes import RGB, colours, placed_surface
+from sbafab.reports.canvas import INK, Buffer, draw_length_bar, seen, view_of
 
 if TYPE_CHECKING:
     import numpy as np

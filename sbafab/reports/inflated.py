@@ -8,27 +8,33 @@ apart as these (``models.balloon``). What is bonded round the pockets follows th
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
+from sbafab.assemblies.shapes import placed_surface
+from sbafab.design.records import Slots
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import union
-from sbafab.geometry.region import Region
-from sbafab.geometry.section import section
-from sbafab.geometry.shapes import disc, strip
+from sbafab.geometry.region import Region, disc, section, strip
 from sbafab.laminate.laminate import Inlet, Laminate
-from sbafab.meshing.prisms import Slab, fuse
+from sbafab.meshing.solid import Slab, fuse
 from sbafab.meshing.surface import Surface
 from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.formulas import inflated_diameter
 
 if TYPE_CHECKING:
+    import manifold3d
     from numpy.typing import NDArray
 
     from sbafab.models.stack import Pose, Stack
 
     Array = NDArray[np.float64]
+
+    Solids = list[manifold3d.Manifold]
 
 FINE, COARSE = 56, 28
 """Facets of a balloon round its axis."""
@@ -294,3 +300,153 @@ def _out_of_reach(wanted: Array, pose: Pose) -> DesignError:
         f"no pressures give the volumes {asked} ul: the search ended at {nearest} ul; give less"
         f"{nearer}"
     )
+
+
+# Inflated parts of an assembly as solids, where they stand.
+
+
+TOUCHING = 0.05
+"""mm3 that two parts may share: touching, as in the check of the deflated assembly."""
+
+
+def shared(own: Solids, theirs: Solids) -> float:
+    """Mm3 that lie in both."""
+    return sum(float((a ^ b).volume()) for a in own for b in theirs if apart(a, b) <= 0)
+
+
+def apart(a: manifold3d.Manifold, b: manifold3d.Manifold) -> float:
+    """Mm between the boxes of two solids; 0 or less where they meet."""
+    one, other = (np.array(solid.bounding_box()).reshape(2, 3) for solid in (a, b))
+    return float(np.maximum(one[0] - other[1], other[0] - one[1]).max())
+
+
+def lifted(
+    assembled: Assembled, placed: PlacedPart, rises: Mapping[str, NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """By what (3,) in mm a part is lifted by the actuators under it."""
+    lift = np.zeros(3)
+    while placed.part.on is not None:
+        if placed.part.at == "top":
+            lift = lift + rises.get(placed.part.on, 0.0)
+        placed = assembled[placed.part.on]
+    return lift
+
+
+def carried(assembled: Assembled, name: str) -> set[str]:
+    """A part and all that hangs on it."""
+    found = {name}
+    for part in assembled.parts:
+        if part.part.on in found:
+            found.add(part.name)
+    return found
+
+
+def solids(placed: PlacedSba, found: Stack, pose: Pose, lift: NDArray[np.float64]) -> Solids:
+    """An inflated actuator's balloons and webs in a pose, in place."""
+    pieces = []
+    for part in inflated(placed.made.laminate, found, pose, COARSE):
+        points = placed.upright(part.surface.points) + lift
+        pieces += manifold(replace(part.surface, points=points)).decompose()
+    return pieces
+
+
+def manifold(surface: Surface) -> manifold3d.Manifold:
+    import manifold3d
+
+    faces = np.ascontiguousarray(surface.faces.astype(np.uint64))
+    return manifold3d.Manifold(manifold3d.Mesh64(np.ascontiguousarray(surface.points), faces))
+
+
+def as_it_is(placed: PlacedPart, lift: NDArray[np.float64]) -> Solids:
+    """A part that no elastic stack inflates, its pockets filled; one round a tube is the cylinder
+    that it becomes, free.
+    """
+    widest = None
+    if placed.made is not None:
+        widest = inflated_diameter(placed.made.design.form, placed.made.laminate)
+    if widest is None:
+        surface = placed_surface(placed, filled=True)
+        return [manifold(replace(surface, points=surface.points + lift))]
+    import manifold3d
+
+    assert placed.made is not None
+    _, low, _, high = placed.made.laminate.layers[0].profile.turned(placed.turn).bounds
+    round_it = manifold3d.Manifold.cylinder(high - low, widest / 2).translate((0.0, 0.0, low))
+    rows = np.column_stack([np.array(placed.pose.rows), np.array(placed.pose.shift) + lift])
+    return [round_it.transform(rows)]
+
+
+# The balloons of an inflated radial actuator as a surface, to be looked at.
+
+
+ACROSS, ALONG, HALVINGS = 13, 17, 50
+
+
+def gripping(placed: PlacedSba, height: float) -> Surface:
+    """Balloons ``height`` mm high each on the tangents of their tube, in the part's own frame.
+
+    Across, a film is an arc that keeps its pocket's width (the lens of ``models.lens``); towards
+    the pocket's round ends the lens shrinks with its chord.
+    """
+    pockets = placed.made.design.form.pockets
+    assert isinstance(pockets, Slots)
+    laminate, radius = placed.made.laminate, placed.radius or 0.0
+    lens = _lens(pockets, height)
+    points: list[NDArray[np.float64]] = []
+    faces: list[NDArray[np.int_]] = []
+    for chamber in laminate.chambers:
+        for middle in dict.fromkeys(chamber.centres):
+            ((x, y, _),) = placed.turned(np.array([[*middle, 0.0]]))
+            angle = x / radius if radius else 0.0
+            for level in range(laminate.balloons):
+                out = radius + laminate.thickness + (level + 0.5) * height + lens.points[:, 2]
+                aside, along = lens.points[:, 0], lens.points[:, 1] + y
+                faces.append(lens.faces + sum(map(len, points)))
+                points.append(
+                    np.column_stack(
+                        [
+                            out * math.cos(angle) - aside * math.sin(angle),
+                            out * math.sin(angle) + aside * math.cos(angle),
+                            along,
+                        ]
+                    )
+                )
+    return Surface(np.concatenate(points), np.concatenate(faces))
+
+
+def _lens(pockets: Slots, height: float) -> Surface:
+    """One balloon about its middle: x across, y along, z up; both films, their rims apart."""
+    half = _half_angle(pockets.width, height)
+    bow = pockets.width / (2 * half)
+    long = pockets.run + pockets.width
+    t = np.linspace(-1.0, 1.0, ALONG)
+    # Denser towards the ends, which are round.
+    y = long / 2 * np.sin(t * math.pi / 2)
+    beyond = np.maximum(np.abs(y) - pockets.run / 2, 0.0) / (pockets.width / 2)
+    share = np.sqrt(np.maximum(1.0 - beyond**2, 0.0))
+    u = np.linspace(-half, half, ACROSS)
+    sheets = []
+    for side in (1, -1):
+        x = bow * np.sin(u) * share[:, None]
+        z = side * bow * (np.cos(u) - math.cos(half)) * share[:, None]
+        sheets.append(np.stack([x, np.broadcast_to(y[:, None], x.shape), z], -1).reshape(-1, 3))
+    i, j = np.meshgrid(np.arange(ALONG - 1), np.arange(ACROSS - 1), indexing="ij")
+    a = (i * ACROSS + j).ravel()
+    b, c, d = a + 1, a + ACROSS, a + ACROSS + 1
+    upper = np.concatenate([np.column_stack([a, b, c]), np.column_stack([b, d, c])])
+    lower = upper[:, ::-1] + ALONG * ACROSS
+    return Surface(np.concatenate(sheets), np.concatenate([upper, lower]))
+
+
+def _half_angle(width: float, height: float) -> float:
+    """Half the angle of an arc of length ``width`` that rises half of ``height``, up to a circle's
+    quarter: height = width (1 - cos a) / a.
+    """
+    low, high = 1e-6, math.pi / 2
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        if width * (1 - math.cos(middle)) / middle < height:
+            low = middle
+        else:
+            high = middle
+    return high

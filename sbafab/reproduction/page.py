@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
+from sbafab.errors import OutputError
 from sbafab.models.figures import Prediction, Relation
-from sbafab.reproduction import mechanics, rows
-from sbafab.reproduction.records import Row, predicted, table
+from sbafab.output.schemas import REPRODUCTION_SCHEMA
+from sbafab.reproduction import rows
+from sbafab.reproduction.rows import Row, predicted, table
 
 HEAD = """# The paper's figures beside the predictions
 
@@ -59,12 +64,12 @@ def tables(one: Prediction, three: Prediction) -> dict[str, list[Row]]:
     return {
         "Making": list(rows.process()),
         "Sizes": list(rows.sizes(three)),
-        "Stroke and volume": [*rows.strokes(), *mechanics.fuller()],
-        "Energy": list(mechanics.energy()),
-        "Force": list(mechanics.forces(one, three)),
-        "Time and bending": list(mechanics.motion(three)),
-        "Stiffness and power": list(mechanics.stiffness(one, three)),
-        "Calibrated on the 1-DoF": list(mechanics.calibrated()),
+        "Stroke and volume": [*rows.strokes(), *rows.fuller()],
+        "Energy": list(rows.energy()),
+        "Force": list(rows.forces(one, three)),
+        "Time and bending": list(rows.motion(three)),
+        "Stiffness and power": list(rows.stiffness(one, three)),
+        "Calibrated on the 1-DoF": list(rows.calibrated()),
         "Figures of the paper's own simulations": list(rows.simulators()),
     }
 
@@ -84,19 +89,19 @@ def page_of(found: dict[str, list[Row]], one: Prediction, three: Prediction) -> 
         if title.startswith("Calibrated"):
             parts.append(calibrated_said(lines))
         parts += others
-    return "\n".join([*parts, FACTORS + "\n".join(mechanics.factors(one, three)), ""])
+    return "\n".join([*parts, FACTORS + "\n".join(rows.factors(one, three)), ""])
 
 
 def calibrated_said(lines: Sequence[Row]) -> str:
     """What was fitted, and which of the held-out rows are as near as aimed at."""
-    given = mechanics.FITTED
+    given = rows.FITTED
     found: dict[bool, list[str]] = {True: [], False: []}
     for row in lines:
         name, _, role = row.what.rpartition(" (")
-        if mechanics.HELD_OUT in role and row.predicted is not None:
+        if rows.HELD_OUT in role and row.predicted is not None:
             assumed = row.model.split(" in ")[-1] if row.measured.unit == "deg" else ""
             miss = abs(row.predicted - row.measured.value)
-            is_met = miss <= mechanics.aim(row.measured)
+            is_met = miss <= rows.aim(row.measured)
             found[is_met].append(f"{name} ({assumed})" if assumed else name)
     met, missed = ("; ".join(found[kind]) or "none" for kind in (True, False))
     return CALIBRATED.format(
@@ -122,3 +127,52 @@ def charts(one: Prediction, three: Prediction) -> list[tuple[str, Relation]]:
         for relation in found.relations
         if relation.name == name
     ]
+
+
+# The reproduction as files: page, table for programs, charts.
+
+
+def reproduce(folder: Path) -> dict[str, list[Row]]:
+    """All rows, as ``reproduction.md`` and ``reproduction.json`` with charts in a folder.
+
+    Raises OutputError where the folder cannot be written.
+    """
+    from sbafab.reports.charts import relation_svg
+
+    one, three = predicted("1dof-5mm"), predicted("3dof-15mm")
+    found = tables(one, three)
+    files = {
+        "reproduction.md": page_of(found, one, three),
+        "reproduction.json": json.dumps(as_json(found), indent=1) + "\n",
+    }
+    for name, relation in charts(one, three):
+        files[f"{name}.svg"] = relation_svg(name, relation)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for file, text in files.items():
+            (folder / file).write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise OutputError(f"{folder} cannot be written: {error.strerror}") from None
+    return found
+
+
+def as_json(found: dict[str, list[Row]]) -> dict[str, Any]:
+    """What ``reproduction.json`` holds."""
+    return {
+        "schema": REPRODUCTION_SCHEMA,
+        "rows": [
+            {
+                "section": section,
+                "figure": row.what,
+                "unit": row.measured.unit,
+                "where": row.measured.where,
+                "paper": row.measured.value if row.measured.unit else None,
+                "error": row.measured.error or None,
+                "predicted": None if row.predicted is None else float(f"{row.predicted:.7g}"),
+                "model": row.model,
+                "why": row.why,
+            }
+            for section, rows in found.items()
+            for row in rows
+        ],
+    }

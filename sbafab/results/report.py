@@ -6,16 +6,52 @@ and tested again counts by its first attempt.
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from statistics import mean, stdev
 from typing import Any, Literal, NamedTuple
 
+from sbafab.cutting.calibration import Value, student_t
 from sbafab.errors import DesignError
-from sbafab.results.builds import TOLERANCES
-from sbafab.results.intervals import Most, mean_of, most_of
-from sbafab.results.records import ERRORS, NUMBERS, PASS, Build, Record
+from sbafab.results.records import ERRORS, NUMBERS, PASS, TOLERANCES, Build, Record
 from sbafab.rules.registration_yield import Share
+
+# Intervals of 95 % for what a few measurements say, by closed formulas.
+
+
+DOUBT = 0.05
+
+
+class Most(NamedTuple):
+    """The largest of some errors, and the most that it leaves room for (95 %).
+
+    An error is never larger than its tolerance, so the tolerance lies between both.
+    """
+
+    errors: int
+    largest: float
+    highest: float
+
+
+def mean_of(values: Sequence[float]) -> Value | None:
+    """The mean with Student's interval; None for fewer than two values."""
+    if len(values) < 2:
+        return None
+    uncertainty = stdev(values) / math.sqrt(len(values))
+    return Value(mean(values), uncertainty, student_t(len(values) - 1) * uncertainty)
+
+
+def most_of(errors: Sequence[float], dimensions: int) -> Most:
+    """The bound of errors that are spread evenly within it, as registration-yield assumes.
+
+    On a line (1 dimension) the largest of n stays below m with (m / bound) ** n, over a disc (2)
+    with (m / bound) ** 2n; the highest bound is the one under which that is 5 %.
+    """
+    largest = max(errors)
+    return Most(len(errors), largest, largest / DOUBT ** (1 / (dimensions * len(errors))))
+
 
 By = Literal["all", "design", "kit", "method", "operator"]
 UNSAID = "not said"
@@ -426,7 +462,7 @@ def _bounds(own: Iterable[Built], every: Iterable[Built]) -> dict[str, Most]:
 
 def _measured_yield(build: Build, bounds: Mapping[str, Most]) -> MeasuredYield | None:
     """The yield of a recorded design with measured errors for stated ones."""
-    from sbafab.results.rebuilt import rebuilt, yield_with
+    from sbafab.results.store import rebuilt, yield_with
 
     design = rebuilt(build)
     if design is None:

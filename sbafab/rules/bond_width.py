@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from sbafab.geometry.width import Width
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules.alike import Alike, distinct_interfaces, interface_name
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at, holds
-from sbafab.rules.measures import Measures
+from sbafab.rules.measures import Alike, Measures, distinct_interfaces, interface_name
 
 NAME = "bond-width"
 

@@ -9,8 +9,7 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import least_width
-from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.laminate.panel import SheetPanel, freed
+from sbafab.laminate.laminate import Laminate, Layer, SheetPanel, freed
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, at, holds
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from sbafab.laminate.laminate import Laminate
-from sbafab.progress import Progress
+from sbafab.process import Progress
 from sbafab.rules import (
     bond_width,
     bridges,
@@ -27,8 +27,7 @@ from sbafab.rules import (
     tube_fit,
 )
 from sbafab.rules.finding import Finding
-from sbafab.rules.limits import Limits
-from sbafab.rules.lowered import lowered
+from sbafab.rules.limits import Limits, lowered
 from sbafab.rules.measures import Measures
 
 

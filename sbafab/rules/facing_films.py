@@ -14,15 +14,12 @@ from typing import NamedTuple
 
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Contour, Region
-from sbafab.laminate.interfaces import Interface
-from sbafab.laminate.laminate import LOOSE, Laminate, Pin
-from sbafab.rules.alike import distinct_interfaces
-from sbafab.rules.boundary import beside, edges_along, outward_reach
-from sbafab.rules.facing import Facing, without_slivers
+from sbafab.laminate.laminate import LOOSE, Interface, Laminate, Pin
+from sbafab.rules.boundary import Facing, beside, edges_along, outward_reach, without_slivers
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, at, holds
 from sbafab.rules.margins import pin_at
-from sbafab.rules.measures import Measures
+from sbafab.rules.measures import Measures, distinct_interfaces
 
 NAME = "facing-films"
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from sbafab.geometry.beam import beam_path, place_of, widths
-from sbafab.geometry.inconsistent import GeometryError
+from sbafab.errors import GeometryError
+from sbafab.geometry.offset import beam_path, place_of, widths
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width, least_gap, least_width
 from sbafab.laminate.laminate import Laminate, Layer

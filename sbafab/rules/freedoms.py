@@ -13,11 +13,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations, pairwise
 from typing import Final, NamedTuple
 
-from sbafab.geometry.centroid import centroid
+from sbafab.geometry.boolean import nanometres
 from sbafab.geometry.edges import Point, distance_to
-from sbafab.geometry.nanometres import nanometres
 from sbafab.geometry.nearby import boxes_meet, widened
-from sbafab.geometry.region import Region
+from sbafab.geometry.region import Region, centroid
 from sbafab.laminate.assembly import AssemblyStep, assembly
 from sbafab.laminate.laminate import LOOSE, Laminate
 from sbafab.rules.boundary import beside

@@ -9,13 +9,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Point
-from sbafab.laminate.interfaces import Interface
-from sbafab.laminate.laminate import Laminate, Pin
-from sbafab.rules.alike import Alike, distinct_interfaces, interface_name
+from sbafab.laminate.laminate import Interface, Laminate, Pin
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at, holds
 from sbafab.rules.margins import pin_at
-from sbafab.rules.measures import Measures
+from sbafab.rules.measures import Alike, Measures, distinct_interfaces, interface_name
 
 NAME = "mask-overhang"
 

@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, cached_property
+from typing import NamedTuple
 
+from sbafab.geometry.cache import remembered
 from sbafab.geometry.edges import Edge
 from sbafab.geometry.region import Region
-from sbafab.geometry.remembered import remembered
 from sbafab.geometry.width import Width, least_width
-from sbafab.laminate.interfaces import Interface
-from sbafab.laminate.laminate import Laminate
-from sbafab.rules.boundary import Reach, edges_along, outward_reach
-from sbafab.rules.facing import Facing, facing_films
-from sbafab.rules.forms import LinearForms, linear_forms
+from sbafab.laminate.laminate import Interface, Laminate
+from sbafab.rules.boundary import Facing, Reach, edges_along, facing_films, outward_reach
 from sbafab.rules.freedoms import Freedoms, Laid, freedoms, lay_up
 from sbafab.rules.limits import Limits
-from sbafab.rules.margins import SHARP, Felt, InterfaceMargins, felt_alike, narrow_places
+from sbafab.rules.margins import (
+    SHARP,
+    Felt,
+    InterfaceMargins,
+    LinearForms,
+    felt_alike,
+    linear_forms,
+    narrow_places,
+)
 
 
 class Measures:
@@ -94,3 +100,32 @@ def _bond(bond: Region) -> Width | None:
 def _reaches(unbonded: Region, contact: Region, mask: Region) -> tuple[tuple[Edge, Reach], ...]:
     found = ((edge, outward_reach(edge, mask.index)) for edge in edges_along(unbonded, contact))
     return tuple([(edge, reach) for edge, reach in found if reach is not None])
+
+
+# Equal interfaces and layers, so that each is measured once however often it repeats.
+
+
+class Alike(NamedTuple):
+    """The first of the interfaces made of equal profiles, and how many they are."""
+
+    interface: Interface
+    number: int
+
+    @property
+    def others(self) -> str:
+        """What a message adds where the finding holds for more than one interface."""
+        return f" (and {self.number - 1} like it)" if self.number > 1 else ""
+
+
+def distinct_interfaces(laminate: Laminate) -> tuple[Alike, ...]:
+    """One of every pattern, bottom to top."""
+    groups: dict[tuple[str, ...], list[Interface]] = {}
+    for interface in laminate.interfaces:
+        groups.setdefault(interface.pattern, []).append(interface)
+    return tuple(Alike(group[0], len(group)) for group in groups.values())
+
+
+def interface_name(interface: Interface) -> str:
+    """An interface as messages name it, with its layers."""
+    kind = f"{interface.kind} interface"
+    return f"{kind} {interface.index} (layers {interface.below.index} and {interface.above.index})"

@@ -10,7 +10,7 @@ from sbafab.geometry.edges import Point
 from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
 from sbafab.rules.bridges import sheeted
-from sbafab.rules.channels import channels
+from sbafab.rules.channel_clear import channels
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, at
 

@@ -6,14 +6,14 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from sbafab.geometry.cache import remembered
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
-from sbafab.geometry.remembered import remembered
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
-from sbafab.rules.alike import distinct_interfaces
-from sbafab.rules.channels import Channel, channels
+from sbafab.rules.channel_clear import Channel, channels
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at
+from sbafab.rules.measures import distinct_interfaces
 
 NAME = "registration-nominal"
 

@@ -10,14 +10,12 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from sbafab.laminate.interfaces import Interface
-from sbafab.laminate.laminate import Laminate
-from sbafab.rules.alike import Alike, interface_name
+from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import Limits, Tolerances, at, holds, least_held
 from sbafab.rules.margins import InterfaceMargins, Margin, Push, Quantity, pushes
-from sbafab.rules.measures import Measures
+from sbafab.rules.measures import Alike, Measures, interface_name
 
 NAME = "registration-worst-case"
 

@@ -12,10 +12,8 @@ from typing import NamedTuple
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.nearby import widened
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import rectangle, strip
-from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.laminate.panel import SheetPanel, freed
+from sbafab.geometry.region import Region, rectangle, strip
+from sbafab.laminate.laminate import Laminate, Layer, SheetPanel, freed
 from sbafab.rules.bridges import sheeted
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at

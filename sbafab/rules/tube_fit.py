@@ -11,18 +11,16 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from sbafab.geometry.boolean import nanometres
 from sbafab.geometry.edges import Edge, Line, Point
 from sbafab.geometry.intersect import meeting_points
-from sbafab.geometry.nanometres import nanometres
 from sbafab.geometry.nearby import EdgeIndex, boxes_meet, widened
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import polygon, strip
-from sbafab.laminate.interfaces import Interface
-from sbafab.laminate.laminate import Inlet, Laminate
-from sbafab.rules.alike import distinct_interfaces
+from sbafab.geometry.region import Region, polygon, strip
+from sbafab.laminate.laminate import Inlet, Interface, Laminate
 from sbafab.rules.boundary import edges_along, outward_reach
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, at, holds
+from sbafab.rules.measures import distinct_interfaces
 
 NAME = "tube-fit"
 BOND = "the bond beside the strip"

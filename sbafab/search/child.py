@@ -15,7 +15,7 @@ import threading
 from typing import IO, Any
 
 from sbafab.process import prepare
-from sbafab.search.fingerprint import fingerprint
+from sbafab.search.measure import fingerprint
 
 
 def main() -> None:

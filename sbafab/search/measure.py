@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
+import sbafab
 from sbafab.actuators import records
-from sbafab.design.reading import checked as checked_record
+from sbafab.design.files import checked as checked_record
+from sbafab.design.files import design_sha256, keys_of
 from sbafab.design.records import Design
-from sbafab.design.writing import design_sha256, keys_of
 from sbafab.errors import SbafabError
 from sbafab.models.figures import Asked, Figure
 from sbafab.models.prediction import predict
-from sbafab.output.checking import check, refuse_undoable
-from sbafab.output.planned import Checked
-from sbafab.search.margins import margins
+from sbafab.output.checked import Checked, check, refuse_undoable
+from sbafab.rules.deck import AT_MOST
+from sbafab.rules.finding import Finding, Place, Verdict
 
 SweepOutcome = Literal["passes", "fails", "refused", "crashed", "too long"]
 """Every rule holds; a rule failed; no such design can be made; its process died; or took too long.
@@ -80,3 +82,82 @@ def named_figures(figures: Sequence[Figure]) -> dict[str, float]:
         f"[{figure.unit}]": figure.as_dict()["value"]
         for figure in figures
     }
+
+
+# How far each rule is from failing: its findings as one verdict and one margin.
+
+
+ORDER: tuple[Verdict, ...] = ("fail", "waived", "warn", "pass")
+
+
+class RuleMargin(NamedTuple):
+    """A rule's worst verdict, and by how much the worst value keeps its limit: below 0 it does not.
+
+    ``margin`` is None where nothing was measured, or where there is no limit.
+    """
+
+    rule: str
+    verdict: Verdict
+    margin: float | None
+    measured: float | None
+    limit: float | None
+    unit: str
+    where: Place
+    message: str
+
+    @property
+    def share(self) -> float | None:
+        """The margin as a share of the limit, where that is not 0."""
+        if self.margin is None:
+            return None
+        return self.margin / self.limit if self.limit else self.margin
+
+
+def margin_of(finding: Finding) -> float | None:
+    """By how much a finding keeps its limit, in its unit."""
+    if finding.measured is None or finding.limit is None:
+        return None
+    more = finding.measured - finding.limit
+    return round(-more if finding.rule in AT_MOST else more, 6)
+
+
+def margins(findings: Iterable[Finding]) -> dict[str, RuleMargin]:
+    """The worst of each rule, in the deck's order; what a rule waives by itself counts for none."""
+    found: dict[str, RuleMargin] = {}
+    for finding in findings:
+        if finding.verdict == "waived" and not finding.by_user:
+            continue
+        own = RuleMargin(
+            finding.rule,
+            finding.verdict,
+            margin_of(finding),
+            finding.measured,
+            finding.limit,
+            finding.unit,
+            finding.where,
+            finding.message,
+        )
+        before = found.get(finding.rule)
+        if before is None or _badness(own) < _badness(before):
+            found[finding.rule] = own
+    return found
+
+
+def _badness(one: RuleMargin) -> tuple[int, float]:
+    """The worse, the smaller."""
+    share = one.share
+    return ORDER.index(one.verdict), share if share is not None else 0.0
+
+
+# Which program this is, to the last line: rows of another one are not mixed with its own.
+
+
+@cache
+def fingerprint() -> str:
+    """The version, and a hash of the package's source."""
+    root = Path(sbafab.__file__).parent
+    total = hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        total.update(path.relative_to(root).as_posix().encode())
+        total.update(path.read_bytes())
+    return f"{sbafab.__version__}+{total.hexdigest()[:12]}"

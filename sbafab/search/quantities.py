@@ -16,29 +16,24 @@ from typing import Any
 
 import numpy as np
 
-from sbafab.design.form import Slots
-from sbafab.design.messages import key_paths, listed, shown
+from sbafab.design.files import key_paths, keys_of, listed, shown
 from sbafab.design.pressure_units import KILOPASCALS
-from sbafab.design.records import Design
+from sbafab.design.records import Design, Slots
 from sbafab.design.units import millimetres
-from sbafab.design.writing import keys_of
 from sbafab.errors import DesignError
-from sbafab.laminate.extent import film_mass
-from sbafab.laminate.laminate import Laminate
-from sbafab.models.actuator import NO_OUTLINE, Actuator, actuator
+from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
-from sbafab.models.counterparts import BALLOON as ELASTIC_BALLOON
-from sbafab.models.counterparts import FLAT_HEIGHT_OF_FILMS, Counterpart, counterpart
-from sbafab.models.counterparts import STACK as ELASTIC_STACK
 from sbafab.models.figures import Factors
-from sbafab.models.force import force
-from sbafab.models.paper import HEIGHTS
+from sbafab.models.formulas import force, sizes
+from sbafab.models.kinematics import NO_OUTLINE, Actuator, actuator
+from sbafab.models.paper import BALLOON as ELASTIC_BALLOON
+from sbafab.models.paper import FLAT_HEIGHT_OF_FILMS, HEIGHTS, Counterpart, counterpart
+from sbafab.models.paper import STACK as ELASTIC_STACK
 from sbafab.models.rippled import pressed, risen
-from sbafab.models.series import blocked
-from sbafab.models.sizes import sizes
 from sbafab.models.stack import Stack, stack
+from sbafab.models.stacked import blocked
 from sbafab.search.quantity_names import QUANTITIES
 
 SHARES = np.linspace(0.1, 1.0, 10)

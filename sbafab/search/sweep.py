@@ -4,31 +4,33 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from filelock import FileLock, Timeout
 
-from sbafab.design.reading import KIT, OUTLINE
+from sbafab.design.files import KIT, OUTLINE, design_sha256, kit_names, plain_tables
 from sbafab.design.records import Design
-from sbafab.design.templates import kit_names
-from sbafab.design.writing import design_sha256, plain_tables
 from sbafab.errors import OutputError
 from sbafab.output.swap import MANIFEST
-from sbafab.progress import Progress, unheard
-from sbafab.search.earlier import no_longer_asked, refuse_foreign
-from sbafab.search.fingerprint import fingerprint
-from sbafab.search.journal import Journal
-from sbafab.search.measure import SweepOutcome, SweepRow
+from sbafab.process import Progress, unheard
+from sbafab.search.measure import SweepOutcome, SweepRow, fingerprint
 from sbafab.search.page import sweep_html
-from sbafab.search.pool import dask_pool, local_pool, run_jobs
-from sbafab.search.table import Table, write_csv, write_parquet, write_times
+from sbafab.search.pool import MeasureJob, dask_pool, local_pool, run_jobs
+from sbafab.search.table import (
+    Table,
+    no_longer_asked,
+    refuse_foreign,
+    write_csv,
+    write_parquet,
+    write_times,
+)
 from sbafab.search.vary import Values, Varied, grid, latin_hypercube, refuse_unknown
-from sbafab.search.worker import MeasureJob
 
 JOURNAL, CSV = "journal.jsonl", "sweep.csv"
 SECONDS = 300.0
@@ -216,3 +218,76 @@ def _held(folder: Path) -> Iterator[None]:
         raise OutputError(
             f"{folder} cannot be written: {error.strerror or error}; choose another folder with -o"
         ) from None
+
+
+# What has been measured so far, a line a design, only ever added to: runs that end go on in it.
+
+
+class Journal:
+    """The rows in a file, by the hash of what was asked; the file is read where it is needed.
+
+    A line that a killed run left unfinished is passed over, and its design measured again; so is
+    one that took too long in less than ``seconds``. Raises OutputError where the file cannot be
+    written.
+    """
+
+    def __init__(self, path: Path, seconds: float) -> None:
+        self.path = path
+        self._seconds = seconds
+        self._places: dict[str, int] = {}
+        try:
+            self._file: IO[bytes] = path.open("a+b")
+            self._read()
+        except OSError as error:
+            raise OutputError(
+                f"{path} cannot be written: {error.strerror or error}; choose another folder "
+                "with -o"
+            ) from None
+
+    def _read(self) -> None:
+        self._file.seek(0)
+        at, line = 0, b""
+        for line in self._file:
+            key = self._key(line)
+            if key is not None:
+                self._places[key] = at
+            at += len(line)
+        if line and not line.endswith(b"\n"):
+            self._file.write(b"\n")
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._places
+
+    def add(self, key: str, row: SweepRow) -> None:
+        """Writes a row, unless there is one already."""
+        if key in self._places:
+            return
+        line = json.dumps({"key": key, "row": row}, ensure_ascii=False, separators=(",", ":"))
+        self._file.seek(0, os.SEEK_END)
+        self._places[key] = self._file.tell()
+        self._file.write(line.encode() + b"\n")
+        self._file.flush()
+
+    def rows(self, keys: Iterator[str]) -> Iterator[SweepRow]:
+        """The rows of these keys, in their order, one in memory at a time."""
+        with self.path.open("rb") as opened:
+            for key in keys:
+                opened.seek(self._places[key])
+                yield json.loads(opened.readline())["row"]
+
+    def close(self) -> None:
+        """Has what was written reach the disk."""
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._file.close()
+
+    def _key(self, line: bytes) -> str | None:
+        """The key of a whole line that need not be measured again."""
+        try:
+            entry = json.loads(line)
+            key, row = entry["key"], entry["row"]
+            was_short = row["outcome"] == "too long" and row["seconds"] < self._seconds
+        except (ValueError, KeyError, TypeError):
+            return None
+        is_whole = line.endswith(b"\n") and isinstance(key, str)
+        return key if is_whole and not was_short else None

@@ -9,9 +9,11 @@ from __future__ import annotations
 import itertools
 import random
 from collections.abc import Sequence
+from typing import Any
 
-from sbafab.search.space import SearchSpace
-from sbafab.search.trial import Steps
+from sbafab.design.files import design_sha256
+from sbafab.errors import DesignError
+from sbafab.search.trial import IMPOSSIBLE, SearchSpace, Steps
 
 GRID_SHARE = 0.25
 WALK_SHARE = 0.6
@@ -158,3 +160,100 @@ def moved(space: SearchSpace, place: Steps, move: Sequence[int]) -> Steps | None
     """The place of a step, kept within the keys' ranges; None where that leads nowhere."""
     inside = space.inside([at + by for at, by in zip(place, move, strict=True)])
     return inside if inside != place else None
+
+
+# Ranges that a family gives its keys, made wider where the best design stands at their end.
+
+
+TIMES = 4
+"""How often a range is made wider, by its own width each time."""
+
+
+def widened(space: SearchSpace) -> None:
+    """Walks on beyond the ends of ranges that may widen, as long as that leads to better ones."""
+    for _ in range(TIMES):
+        place, before = space.best()
+        ends = space.lows[:], space.highs[:]
+        if not _moved_ends(space, place):
+            return
+        refined(space)
+        if not space.best()[1].rank < before.rank:
+            space.lows, space.highs = ends
+            return
+
+
+def _moved_ends(space: SearchSpace, place: Steps) -> bool:
+    """Makes ranges wider whose end the place stands at; whether there was any."""
+    found = False
+    for axis, free in enumerate(space.free):
+        count = space.counts[axis]
+        beyond = {-1: place[axis] == space.lows[axis], 1: place[axis] == space.highs[axis]}
+        for sign, is_at_end in beyond.items():
+            other = tuple(at + sign * (own == axis) for own, at in enumerate(place))
+            value = space.number(axis, other)
+            if not free.widens or not is_at_end or value <= 0 or space.is_asked(axis, other):
+                continue
+            if sign > 0:
+                space.highs[axis] += count
+            else:
+                below = int(round((free.low + space.lows[axis] * free.step) / free.step, 6)) - 1
+                space.lows[axis] -= min(count, below)
+            found = True
+    return found
+
+
+# The same search by Optuna, whose storage keeps it, resumes it and shares it between machines.
+
+
+EXTRA = 'Optuna is not installed: pip install "sbafab[optuna]"'
+
+
+def with_optuna(search: SearchSpace, storage: str | None) -> None:
+    """Tries designs, and leaves a share for the last steps. Raises DesignError without the extra.
+
+    ``storage`` is the URL of the database in which the search goes on.
+    """
+    try:
+        import optuna
+    except ImportError:
+        raise DesignError(EXTRA) from None
+    # Of a search that is stopped it would tell a trial that failed, with a traceback.
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    tries = max(1, round(WALK_SHARE * search.tries))
+    try:
+        study = optuna.create_study(
+            storage=storage,
+            study_name=_name(search),
+            load_if_exists=True,
+            sampler=optuna.samplers.TPESampler(seed=SEED, n_startup_trials=tries // 4),
+        )
+    except Exception as error:
+        said = " ".join(str(error).split())[:200]
+        raise DesignError(
+            f"--storage {storage} cannot be used ({said}); write for example "
+            "--storage sqlite:///search.db"
+        ) from None
+
+    def objective(trial: Any) -> float:
+        place = tuple(
+            trial.suggest_int(free.key, 0, count - 1)
+            for free, count in zip(search.free, search.counts, strict=True)
+        )
+        found = search.trial(place)
+        # What misses is worse than all that holds, by how much it misses.
+        return found.cost if found.holds else IMPOSSIBLE * (1 + min(found.missed, IMPOSSIBLE))
+
+    # What is stored was tried by an earlier run: here it is looked up again, and tried no more.
+    done = study.get_trials(states=[optuna.trial.TrialState.COMPLETE])
+    for old in done:
+        search.trial(tuple(old.params[free.key] for free in search.free))
+    study.optimize(objective, n_trials=max(0, tries - len(done)))
+
+
+def _name(search: SearchSpace) -> str:
+    asked = [one.said for one in search.wanted.requirements]
+    keys = [f"{one.key} {one.low:g} to {one.high:g} by {one.step:g}" for one in search.free]
+    design = search.wanted.design
+    return "; ".join(
+        [f"{design.name} {design_sha256(design)[:12]}", *asked, search.wanted.goal.said, *keys]
+    )

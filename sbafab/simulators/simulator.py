@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import os
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Literal, Protocol, cast
+from typing import Any, Literal, NamedTuple, Protocol, cast
 
-from sbafab.errors import DesignError
+from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.progress import Progress
+from sbafab.meshing.surface import Vector
+from sbafab.process import Progress
 
 Name = Literal["calculix", "sofa", "mujoco"]
 NAMES: tuple[Name, ...] = ("calculix", "sofa", "mujoco")
@@ -119,3 +125,115 @@ def refuse_unknown(names: Sequence[str], given: Mapping[str, float], what: str) 
             f"{what} names chamber {unknown}, which is not there; "
             f"the chambers are {', '.join(names)}"
         )
+
+
+# Starting a program, watching it, and stopping it when it takes too long or is interrupted.
+
+
+LOOK_EVERY = 0.1
+"""s between two looks at how far a run is."""
+STOP_WITHIN = 10.0
+"""s that a program has to end by itself before it is killed."""
+INTERRUPTED = "it was interrupted"
+OUT_OF_TIME = "it was stopped after"
+
+
+class Ended(NamedTuple):
+    """How a program ended: its exit code, and why it was stopped, None if it ended by itself."""
+
+    code: int
+    stopped: str | None
+
+
+def program_path(name: str, install: str) -> str:
+    """Path of an installed program. Raises OutputError that says how to ``install`` it."""
+    found = shutil.which(name)
+    if found is None:
+        raise OutputError(f"{name} was not found; {install}")
+    return found
+
+
+def run_program(
+    command: Sequence[str],
+    log: Path,
+    limit: float | None,
+    look: Callable[[], None],
+) -> Ended:
+    """Runs a command in the folder of its ``log``, which takes what it prints.
+
+    ``look`` is called while it runs; after ``limit`` seconds it is stopped. Ctrl-C and SIGTERM
+    stop the run, not the program that started it, so that what was reached can be kept. One
+    thread, unless OMP_NUM_THREADS says otherwise. Raises OutputError where it cannot be started.
+    """
+    began = time.monotonic()
+    stopped: str | None = None
+    with log.open("wb") as opened:
+        try:
+            # In a session of its own: the command may be a script that starts the real program.
+            process = subprocess.Popen(
+                command,
+                cwd=log.parent,
+                stdin=subprocess.DEVNULL,
+                stdout=opened,
+                stderr=subprocess.STDOUT,
+                env={"OMP_NUM_THREADS": "1", **os.environ},
+                start_new_session=True,
+            )
+        except OSError as reason:
+            raise OutputError(
+                f"{command[0]} could not be started ({reason.strerror}); see whether it is a "
+                "program that runs on this machine"
+            ) from reason
+        try:
+            while stopped is None:
+                try:
+                    process.wait(LOOK_EVERY)
+                    break
+                except subprocess.TimeoutExpired:
+                    look()
+                if limit is not None and time.monotonic() - began >= limit:
+                    stopped = f"{OUT_OF_TIME} {limit / 60:g} minutes"
+        except KeyboardInterrupt:
+            # Hours of computing are not thrown away with the rest of them.
+            stopped = INTERRUPTED
+        finally:
+            _end(process)
+    return Ended(process.returncode, stopped)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Ends the program and what it started."""
+    for number in (signal.SIGTERM, getattr(signal, "SIGKILL", signal.SIGTERM)):
+        if process.poll() is not None:
+            return
+        if hasattr(os, "killpg"):
+            os.killpg(process.pid, number)
+        else:
+            process.terminate()
+        try:
+            process.wait(STOP_WITHIN)
+        except subprocess.TimeoutExpired:
+            continue
+
+
+# Where the tip is and how it leans, from the nodes that mark it.
+
+
+@dataclass(frozen=True)
+class Tip:
+    """The tip at a time in s: its place in mm, and how far it leans off the axis in degrees."""
+
+    time: float
+    place: Vector
+    tilt: float
+
+
+def tip_at(time: float, points: Sequence[Vector]) -> Tip:
+    """The mean of points that go round it, and the lean of their polygon's normal."""
+    x, y, z = (sum(values) / len(points) for values in zip(*points, strict=True))
+    nx = ny = nz = 0.0
+    for (ax, ay, az), (bx, by, bz) in zip(points, [*points[1:], points[0]], strict=True):
+        nx += ay * bz - az * by
+        ny += az * bx - ax * bz
+        nz += ax * by - ay * bx
+    return Tip(time, (x, y, z), math.degrees(math.atan2(math.hypot(nx, ny), nz)))

@@ -17,8 +17,8 @@ from typing import Any
 
 from sbafab import api
 from sbafab.errors import SbafabError
-from sbafab.studio import answering, requested
-from sbafab.studio.made import Made, zipped
+from sbafab.studio import forms, jobs
+from sbafab.studio.places import Made, zipped
 
 FOLDER = Path("/studio")
 """Where a design would lie; there is nothing in it that one could refer to."""
@@ -45,21 +45,21 @@ def answers(
         for answer in _answered(path, body, tell):
             yield json.dumps(answer, separators=(",", ":"))
     except SbafabError as error:
-        yield json.dumps(answering.refusal(str(error)))
+        yield json.dumps(jobs.refusal(str(error)))
 
 
 def _answered(path: str, body: str, tell: Callable[[str], None] | None) -> Iterator[dict[str, Any]]:
     if path == "/api/start":
         lacks = [name for name in WISHED if importlib.util.find_spec(name) is None]
-        yield {**requested.started(None), "lacks": lacks}
+        yield {**forms.started(None), "lacks": lacks}
     elif path.startswith("/api/template/"):
         yield {"text": api.template(path.rpartition("/")[2])}
     elif path in JOBS:
         FOLDER.mkdir(exist_ok=True)
-        job = {**requested.job(FOLDER, requested.table(body)), "do": JOBS[path]}
+        job = {**forms.job(FOLDER, forms.table(body)), "do": JOBS[path]}
         if tell is not None:
             job["tell"] = lambda answer: tell(json.dumps(answer))
-        yield from _cut(job) if path == "/api/generate" else answering.answers(job, _never)
+        yield from _cut(job) if path == "/api/generate" else jobs.answers(job, _never)
     else:
         raise SbafabError(f"a page without a server does not answer {path}")
 
@@ -70,7 +70,7 @@ def _cut(job: dict[str, Any]) -> Iterator[dict[str, Any]]:
     # The page's memory has no file locks; nobody else writes there.
     warnings.filterwarnings("ignore", "only soft file lock")
     shutil.rmtree(OUT, ignore_errors=True)
-    for answer in answering.answers({**job, "out": str(OUT)}, _never):
+    for answer in jobs.answers({**job, "out": str(OUT)}, _never):
         if answer["kind"] == "made":
             key = secrets.token_hex(8)
             _MADE[key] = Made(OUT / answer["name"], answer["name"])

@@ -6,6 +6,8 @@ wanted. Files are looked for in ``folder`` alone.
 
 from __future__ import annotations
 
+import sys
+import traceback
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -15,10 +17,17 @@ from sbafab import api
 from sbafab.errors import DesignError, SbafabError
 from sbafab.studio import places
 from sbafab.studio.editing import MOST_EDITS, edited
-from sbafab.studio.model import Beat, finding_model, laminate_model
-from sbafab.studio.moving import Filling, poses, stack_model, stack_of
-from sbafab.studio.moving_parts import moving_parts, part_poses, whole_prediction
-from sbafab.studio.parts import parts_model
+from sbafab.studio.forms import keys
+from sbafab.studio.model import Beat, finding_model, laminate_model, parts_model
+from sbafab.studio.moving import (
+    Filling,
+    moving_parts,
+    part_poses,
+    poses,
+    stack_model,
+    stack_of,
+    whole_prediction,
+)
 
 if TYPE_CHECKING:
     from sbafab.assemblies.build import Assembled
@@ -231,3 +240,57 @@ JOBS: dict[str, Callable[[StudioJob, Beat], Iterator[Answer]]] = {
     "cut": cut,
     "motion": motion,
 }
+
+
+# What a job answers, whoever runs it: a worker process or Python in the page itself.
+#
+# What goes wrong is an answer too: bad input in the command line's words, anything else as a defect.
+
+
+class SupersededError(Exception):
+    """Nobody waits for this answer any more."""
+
+
+def answers(job: StudioJob, beat: Beat) -> Iterator[Answer]:
+    """The job's answers; where it fails, the last one says why."""
+    try:
+        for answer in JOBS[job["do"]](job, beat):
+            yield answer
+            beat()
+    except SupersededError:
+        yield {"kind": "superseded"}
+    except SbafabError as error:
+        yield refusal(str(error))
+    except ModuleNotFoundError as error:
+        yield {"kind": "error", "message": f"this needs {error.name}, which is not installed here"}
+    except MemoryError:
+        yield {"kind": "error", "message": "the design takes more memory than there is"}
+    except Exception:
+        traceback.print_exc(file=sys.stderr)
+        yield {"kind": "defect", "message": _defect()}
+
+
+def refusal(sentence: str) -> Answer:
+    """The answer that refuses, with the key of a design file that the sentence names first."""
+    words = (word.strip(",;:()[]'\"") for word in sentence.split())
+    field = next((word for word in words if _is_key(word)), None)
+    return {"kind": "error", "message": sentence, **({"field": field} if field else {})}
+
+
+def _is_key(word: str) -> bool:
+    return word.startswith("parts.") or word in design_keys()
+
+
+@lru_cache(maxsize=1)
+def design_keys() -> frozenset[str]:
+    """Every dotted key that a design file may have."""
+    return frozenset(keys(api.schema()))
+
+
+def _defect() -> str:
+    kind, what = sys.exc_info()[:2]
+    name = kind.__name__ if kind else "error"
+    return (
+        f"this is a defect of sbafab ({name}: {' '.join(str(what).split())[:200]}); go back with "
+        "Undo, and report the design file"
+    )

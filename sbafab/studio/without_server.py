@@ -18,10 +18,10 @@ from importlib import metadata
 from pathlib import Path
 
 import sbafab
-from sbafab.design.templates import templates_folder
+from sbafab.design.files import templates_folder
 from sbafab.errors import DesignError, OutputError
 from sbafab.output.swap import BEGUN, put_in_place
-from sbafab.studio.made import packed
+from sbafab.studio.places import packed
 
 STATIC = Path(__file__).parent / "static"
 PURE = ("annotated-types", "filelock", "tomli-w", "tomlkit", "typing-extensions")

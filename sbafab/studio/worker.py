@@ -23,7 +23,7 @@ def serve(pipe: Connection, cancelled: Any, warm: bool) -> None:
     """Answers (number, job) with (number, JSON) until the pipe closes."""
     with contextlib.suppress(ValueError):
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-    from sbafab.studio.answering import SupersededError, answers
+    from sbafab.studio.jobs import SupersededError, answers
 
     if warm:
         _warm_up()
@@ -54,7 +54,7 @@ def _sender(pipe: Connection, number: int) -> Any:
 
 def _warm_up() -> None:
     """Has everything imported and one small design checked, so that the first answer is quick."""
-    from sbafab.studio.answering import design_keys
+    from sbafab.studio.jobs import design_keys
 
     with contextlib.suppress(SbafabError):
         design = api.load(FIRST_DESIGN, {"stack.balloons": 1})

@@ -12,12 +12,10 @@ import pytest
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Region, disc
 from sbafab.laminate.assembly import assembly
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.output.checking import check
-from sbafab.output.settings import press_settings
+from sbafab.output.checked import check, press_settings
 from sbafab.pressing.schedule import schedule
 
 DESIGNS = [

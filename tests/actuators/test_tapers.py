@@ -17,8 +17,7 @@ from shapely import Point, Polygon, union_all
 from shapely.geometry.base import BaseGeometry
 
 from sbafab.actuators import build, load_design
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Region, disc
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import facing_films
 from sbafab.rules.limits import Limits

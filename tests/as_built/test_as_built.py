@@ -17,7 +17,7 @@ import pytest
 from sbafab.actuators import load_design
 from sbafab.as_built.check import check_folder, read_folder
 from sbafab.cli import main
-from sbafab.cutting.chords import in_chords
+from sbafab.cutting.kerf import in_chords
 from sbafab.errors import OutputError
 from sbafab.geometry.offset import grow, shrink
 from sbafab.output.run import generate

@@ -12,10 +12,10 @@ import shapely
 from shapely import LinearRing, Polygon
 
 from sbafab.actuators import build, load_design
-from sbafab.cutting.chords import in_chords
 from sbafab.cutting.dxf_write import Curves
+from sbafab.cutting.kerf import in_chords
 from sbafab.errors import DesignError
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import disc, rectangle
 from sbafab.output.run import generate
 from tests.as_built.doctoring import Doctor
 

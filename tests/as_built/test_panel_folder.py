@@ -11,15 +11,15 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.as_built.check import check_folder, read_folder
-from sbafab.as_built.meant import drawn_settings
+from sbafab.as_built.expected import drawn_settings
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Curves
-from sbafab.cutting.lightburn_read import Project, read_project
+from sbafab.cutting.lightburn import Project, read_project
 from sbafab.cutting.second_cut import PATH, laser_path, properties_of, severed, stack_kerf
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.geometry.shapes import strip
-from sbafab.output.job import generate_job
+from sbafab.geometry.region import strip
+from sbafab.output.batch import generate_job
 from sbafab.output.run import generate
 from sbafab.rules import bridges
 from tests.as_built.doctoring import Doctor

@@ -13,7 +13,7 @@ import pytest
 from sbafab.actuators import load_design
 from sbafab.as_built import check as as_built
 from sbafab.as_built.check import check_folder
-from sbafab.cli.ending import ended_plainly
+from sbafab.cli.exit import ended_plainly
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Curves, dxf_text
 from sbafab.cutting.order import cutting_order
@@ -23,14 +23,12 @@ from sbafab.models.figures import Asked, Factors
 from sbafab.models.prediction import predict
 from sbafab.nesting.bottom_left import bottom_left
 from sbafab.nesting.records import NestPart, Placement, Stock
-from sbafab.output import contents, self_check
-from sbafab.output.job import generate_job
+from sbafab.output import batch, self_check
+from sbafab.output.batch import generate_job, write_cut_files
+from sbafab.output.checked import Planned
 from sbafab.output.manifest import file_hashes
-from sbafab.output.planned import Planned
-from sbafab.output.predicting import with_prediction
-from sbafab.output.run import Extras, generate
-from sbafab.output.shop import write_cut_files
-from sbafab.progress import Progress
+from sbafab.output.run import Extras, generate, with_prediction
+from sbafab.process import Progress
 from sbafab.rules.deck import Rule
 from sbafab.rules.finding import Finding, Place
 from tests.as_built.doctoring import Doctor
@@ -75,7 +73,7 @@ def test_a_run_whose_files_are_not_its_design_changes_nothing(
     design = load_design("1dof-5mm", FEW)
     before = file_hashes(generate(design, tmp_path, ("cut",)).folder)
     with (
-        patch.object(contents, "write_cut_files", spoilt(edit)),
+        patch.object(batch, "write_cut_files", spoilt(edit)),
         pytest.raises(DefectError, match=f"(?s){said}.*a defect of sbafab.*report"),
     ):
         generate(design, tmp_path, ("cut",))
@@ -143,7 +141,7 @@ def test_a_job_is_made_again_whole(tmp_path: Path) -> None:
 def test_chords_that_are_too_coarse_are_the_users_choice(tmp_path: Path) -> None:
     design = load_design("1dof-5mm", FEW)
     with (
-        patch.object(contents, "write_cut_files", spoilt(in_inches)),
+        patch.object(batch, "write_cut_files", spoilt(in_inches)),
         pytest.raises(OutputError, match=r"smaller --chord-error than 0\.005"),
     ):
         generate(design, tmp_path, ("cut",), curves=Curves("chords"))

@@ -7,11 +7,10 @@ import math
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.as_built.uncut import uncut
+from sbafab.as_built.kerf_removed import uncut
 from sbafab.cutting.kerf import compensate
 from sbafab.errors import OutputError
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle, stadium
+from sbafab.geometry.region import Region, disc, rectangle, stadium
 
 ROUNDED = [
     disc((0.0, 0.0), 3.25) - disc((0.0, 0.0), 0.5),

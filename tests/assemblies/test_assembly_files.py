@@ -10,8 +10,7 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.assemblies.build import Assembled, assemble
-from sbafab.assemblies.loading import load
-from sbafab.assemblies.reading import load_assembly
+from sbafab.assemblies.files import load, load_assembly
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 

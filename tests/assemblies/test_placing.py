@@ -8,12 +8,20 @@ import numpy as np
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.assemblies.build import assemble
-from sbafab.assemblies.poses import FLIPPED, LYING, OUTWARD, PartPose, about_axis, along, shifted
-from sbafab.assemblies.reading import load_assembly
+from sbafab.assemblies.build import (
+    FLIPPED,
+    LYING,
+    OUTWARD,
+    PartPose,
+    about_axis,
+    along,
+    assemble,
+    shifted,
+)
+from sbafab.assemblies.files import load_assembly
 from sbafab.assemblies.shapes import placed_surface
-from sbafab.geometry.shapes import rectangle
-from sbafab.meshing.prisms import Slab, fuse
+from sbafab.geometry.region import rectangle
+from sbafab.meshing.solid import Slab, fuse
 from sbafab.meshing.surface import open_edges
 from sbafab.meshing.wrap import bent, cut_along
 

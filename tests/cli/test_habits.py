@@ -14,8 +14,8 @@ from click.shell_completion import ShellComplete
 import sbafab
 from sbafab.assemblies.checks import CHECKS
 from sbafab.cli import app, main
-from sbafab.cli.verdicts import limit_said
-from sbafab.cli.watching import repeated, stamps
+from sbafab.cli.check import repeated, stamps
+from sbafab.cli.printing import limit_said
 from sbafab.rules.deck import rule_names
 from sbafab.rules.explained import AS_BUILT, BETWEEN_PARTS, DECK, EXPLAINED
 from sbafab.rules.finding import Finding, Place
@@ -178,7 +178,7 @@ def test_every_rule_and_check_is_explained(capsys: pytest.CaptureFixture[str]) -
 def test_the_keys_that_are_named_are_keys(capsys: pytest.CaptureFixture[str]) -> None:
     from sbafab.actuators import records
     from sbafab.assemblies.records import Assembly
-    from sbafab.design.messages import key_paths
+    from sbafab.design.files import key_paths
 
     known = set(key_paths(Assembly))
     for record in records().values():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 import pytest
 
-from sbafab.cli.quantities import FLOW, PRESSURE, VOLUME, MeasuredQuantity, OfChamber, by_chamber
+from sbafab.cli.options import FLOW, PRESSURE, VOLUME, MeasuredQuantity, OfChamber, by_chamber
 
 OPTION = click.Option(["--volume"], multiple=True)
 CONTEXT = click.Context(click.Command("any"))

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from sbafab.cli import main
-from sbafab.reports.traveller.code import record_text
+from sbafab.reports.traveller.page import record_text
 from tests.site.formats import hold
 
 FLAT = 12 * 0.038 + 11 * 0.025

@@ -11,8 +11,7 @@ import pytest
 
 from sbafab.cutting.order import cutting_order, travel
 from sbafab.geometry.boolean import union
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import Region, disc, rectangle
 
 
 def grid(columns: int, rows: int, pitch: float, radius: float) -> Region:

@@ -14,8 +14,7 @@ import shapely
 from sbafab.design.outline import read_outline, understood
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Arc, Line
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, stadium
+from sbafab.geometry.region import Region, disc, stadium
 from tests.design.drawing import ARROW, PAGE, dxf, svg
 
 SLOT = stadium((0, 0), 4, 10).turned(90)

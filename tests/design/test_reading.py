@@ -8,11 +8,19 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design, records
-from sbafab.design.reading import ASSEMBLY, read_toml
+from sbafab.design.files import (
+    ASSEMBLY,
+    design_sha256,
+    design_toml,
+    read_toml,
+    resolved,
+    template_names,
+    template_summaries,
+    templates_folder,
+    write_new,
+)
 from sbafab.design.records import Design
-from sbafab.design.templates import template_names, template_summaries, templates_folder, write_new
 from sbafab.design.units import millimetres
-from sbafab.design.writing import design_sha256, design_toml, resolved
 from sbafab.errors import DesignError
 
 DESIGNS = [

@@ -12,9 +12,9 @@ from unittest.mock import patch
 
 from sbafab.as_built import check as as_built
 from sbafab.as_built import derived
-from sbafab.design.writing import design_sha256
-from sbafab.output.manifest_records import Manifest
-from sbafab.output.planned import Checked
+from sbafab.design.files import design_sha256
+from sbafab.output.checked import Checked
+from sbafab.output.manifest import Manifest
 
 
 def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:

@@ -7,10 +7,10 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-from sbafab.cutting.cut_layers import CUT_SHEET, ENGRAVE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.order import cutting_order
+from sbafab.cutting.properties import CUT_SHEET, ENGRAVE
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Contour, Region

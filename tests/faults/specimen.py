@@ -15,19 +15,17 @@ from sbafab.as_built import check as as_built
 from sbafab.as_built import cut_files, stack
 from sbafab.as_built.check import check_folder, design_problems_of, read_folder
 from sbafab.as_built.cut_files import CutPart, read_part
-from sbafab.as_built.meant import Expected
+from sbafab.as_built.expected import Expected
 from sbafab.as_built.sheets import sheet_problems
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.order import cutting_order
 from sbafab.geometry.region import Region
 from sbafab.laminate import laminate
-from sbafab.laminate.interfaces import interface_regions
-from sbafab.laminate.laminate import Laminate, Layer, Role
-from sbafab.output import checking
+from sbafab.laminate.laminate import Laminate, Layer, Role, interface_regions
+from sbafab.output import checked
+from sbafab.output.checked import Checked, Planned, cut_settings
 from sbafab.output.manifest import manifest
-from sbafab.output.planned import Checked, Planned
-from sbafab.output.settings import cut_settings
 from sbafab.rules import registration_worst_case, registration_yield
 from sbafab.rules.deck import RULES, run_deck
 from tests.as_built.doctoring import Doctor
@@ -117,7 +115,7 @@ def quick(parts: dict[str, CutPart]) -> Iterator[None]:
         patch.object(as_built, "RULES", rules),
         patch.object(as_built, "sheet_problems", lambda *_: []),
         patch.object(as_built, "design_problems_of", lambda *_: []),
-        patch.object(checking, "run_deck", lambda *_: ()),
+        patch.object(checked, "run_deck", lambda *_: ()),
     ):
         yield
 
@@ -128,7 +126,7 @@ def unabridged() -> Iterator[None]:
     with (
         patch.object(as_built, "RULES", RULES),
         patch.object(as_built, "design_problems_of", design_problems_of),
-        patch.object(checking, "run_deck", run_deck),
+        patch.object(checked, "run_deck", run_deck),
     ):
         yield
 

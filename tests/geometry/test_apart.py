@@ -7,12 +7,10 @@ import random
 
 import pytest
 
-from sbafab.geometry.apart import FAR, alone, chains_of, grouped
-from sbafab.geometry.boolean import divided, union, wound
+from sbafab.geometry.boolean import FAR, alone, chains_of, divided, grouped, union, wound
 from sbafab.geometry.edges import Edge
 from sbafab.geometry.offset import grow, shrink
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import circle, disc, polygon, rectangle, stadium
+from sbafab.geometry.region import Contour, Region, circle, disc, polygon, rectangle, stadium
 
 
 def laid_over(above: int, *regions: Region) -> Region:

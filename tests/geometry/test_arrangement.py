@@ -6,14 +6,12 @@ import math
 
 import pytest
 
+from sbafab.errors import GeometryError, InconsistentError
 from sbafab.geometry import arrangement
-from sbafab.geometry.arrangement import Arrangement
+from sbafab.geometry.arrangement import Arrangement, Overlay, Piece, by_owner, overlaid, split_edges
 from sbafab.geometry.boolean import union, wound
 from sbafab.geometry.edges import EPSILON, Arc, Line, Point, distance_to, left_normal
-from sbafab.geometry.inconsistent import GeometryError, InconsistentError
-from sbafab.geometry.pieces import Overlay, Piece, by_owner, overlaid, split_edges
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import Region, disc, rectangle
 
 
 def arranged(*regions: Region) -> Arrangement:

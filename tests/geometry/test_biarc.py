@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import pytest
 
-from sbafab.geometry.biarc import (
+from sbafab.geometry.arcs import (
     TOLERANCE,
     FitError,
     bezier,

@@ -9,8 +9,7 @@ import pytest
 
 from sbafab.geometry.boolean import union, wound
 from sbafab.geometry.edges import Arc, Line
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, polygon, rectangle, stadium, strip
+from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip
 
 
 def lens(r: float, s: float, gap: float) -> float:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from sbafab.geometry.copies import Copies
-from sbafab.geometry.shapes import disc, polygon, stadium
+from sbafab.geometry.region import Copies, disc, polygon, stadium
 
 
 def test_moved_contours_are_copies_and_others_are_not() -> None:

@@ -7,8 +7,7 @@ import math
 import pytest
 
 from sbafab.geometry.facing_places import facing_places
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import Region, disc, rectangle
 from sbafab.geometry.width import Width, least_width
 
 RING = disc((0.0, 0.0), 3.0) - disc((0.0, 0.0), 2.0)

@@ -10,8 +10,7 @@ import pytest
 
 from sbafab.geometry.edges import Line
 from sbafab.geometry.offset import grow
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Contour, Region, disc
 from tests.hunt import oracle
 from tests.hunt.__main__ import CHUNK, hunted
 

@@ -6,8 +6,8 @@ import math
 import pickle
 from dataclasses import dataclass
 
+from sbafab.geometry.cache import once
 from sbafab.geometry.edges import Arc, Line
-from sbafab.geometry.once import once
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ import pytest
 
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Arc, Point
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import disc, polygon, rectangle, stadium
+from sbafab.geometry.region import Contour, Region, disc, polygon, rectangle, stadium
 
 RING = disc((0, 0), 3) - disc((0.5, 0), 1)
 

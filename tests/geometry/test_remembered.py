@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from sbafab.geometry.boolean import difference
-from sbafab.geometry.region import Region
-from sbafab.geometry.remembered import MOST, remembered
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.cache import MOST, remembered
+from sbafab.geometry.region import Region, disc, rectangle
 
 
 def test_what_differs_by_a_hair_is_asked_for_again_and_few_answers_are_kept() -> None:

@@ -7,11 +7,9 @@ from itertools import pairwise
 
 import pytest
 
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, unit
-from sbafab.geometry.region import Contour
-from sbafab.geometry.runs import runs, same_support
-from sbafab.geometry.shapes import circle
-from sbafab.geometry.tidy import tidy
+from sbafab.geometry.boolean import tidy
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, runs, same_support, unit
+from sbafab.geometry.region import Contour, circle
 
 
 def closed(points: list[Point]) -> tuple[Edge, ...]:

@@ -10,8 +10,7 @@ import shapely
 
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Arc
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import disc, polygon, rectangle, stadium, strip
+from sbafab.geometry.region import Contour, Region, disc, polygon, rectangle, stadium, strip
 from sbafab.geometry.width import (
     Boundary,
     Gathered,

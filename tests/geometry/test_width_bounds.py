@@ -9,10 +9,8 @@ import pytest
 
 from sbafab.geometry import width
 from sbafab.geometry.boolean import union
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, polygon, rectangle
-from sbafab.geometry.width import least_gap, least_width
-from sbafab.geometry.width_bounds import may_be_narrower, widest_least
+from sbafab.geometry.region import Region, disc, polygon, rectangle
+from sbafab.geometry.width import least_gap, least_width, may_be_narrower, widest_least
 
 AXIS = (0.0, 0.0)
 CLOSED = {

@@ -16,15 +16,13 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.assemblies.build import assemble
-from sbafab.assemblies.reading import load
+from sbafab.assemblies.files import assembly_toml, load
 from sbafab.assemblies.records import Assembly
-from sbafab.assemblies.writing import assembly_toml
+from sbafab.design.files import design_toml, template_names, templates_folder
 from sbafab.design.records import Design
-from sbafab.design.templates import template_names, templates_folder
-from sbafab.design.writing import design_toml
 from sbafab.errors import SbafabError
 from sbafab.output.assembly import check_assembly
-from sbafab.output.checking import check
+from sbafab.output.checked import check
 
 COUNT = int(os.environ.get("SBAFAB_MUTATIONS", "120"))
 BATCHES = 8

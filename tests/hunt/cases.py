@@ -13,8 +13,7 @@ from random import Random
 from shapely import Polygon
 
 from sbafab.geometry.edges import Arc, Edge, Line, Point, edge_from_bulge
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import circle, disc, polygon, rectangle, stadium, strip
+from sbafab.geometry.region import Contour, Region, circle, disc, polygon, rectangle, stadium, strip
 
 Pair = tuple[Region, Region]
 ANGLES = [0.0, 0.0, 30.0, 45.0, 90.0, 17.3, 211.123]

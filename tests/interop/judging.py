@@ -17,8 +17,8 @@ from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width, least_gap, least_width
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import film_limits, margins, mask_overhang
-from sbafab.rules.alike import distinct_interfaces
 from sbafab.rules.limits import Limits
+from sbafab.rules.measures import distinct_interfaces
 
 UNIT = 1e-5
 """mm of one step of KLayout's grid."""

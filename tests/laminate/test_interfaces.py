@@ -8,10 +8,8 @@ from dataclasses import replace
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
-from sbafab.laminate.interfaces import interface_regions
-from sbafab.laminate.laminate import LOOSE, Laminate, Pin
+from sbafab.geometry.region import Region, disc
+from sbafab.laminate.laminate import LOOSE, Laminate, Pin, interface_regions
 
 AXIS = (0.0, 0.0)
 

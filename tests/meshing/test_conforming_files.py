@@ -12,13 +12,13 @@ import trimesh
 
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.elements import FACES, volumes
+from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.meshing.conforming.meshes import (
     FORMATS,
     ConformingMeshes,
     conforming_meshes,
     write_conforming,
 )
-from sbafab.meshing.conforming.settings import MeshSettings
 from sbafab.meshing.files import MeshFile
 
 Written = tuple[ConformingMeshes, list[MeshFile], Path]

@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 
 import sbafab
-from sbafab.models.motion import CLOSE, LITTLE, SUCTION, Motion
 from sbafab.models.pneumatics import AIR, WATER, Line
-from sbafab.models.stack import Stack
+from sbafab.models.stack import CLOSE, LITTLE, SUCTION, Motion, Stack
 
 COUNT = int(os.environ.get("SBAFAB_HISTORIES", "3"))
 STEPS = 15

@@ -8,8 +8,7 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.models.flow import ATMOSPHERE_KPA
-from sbafab.models.pneumatics import AIR, WATER, Line
+from sbafab.models.pneumatics import AIR, ATMOSPHERE_KPA, WATER, Line
 from sbafab.models.stack import Stack
 from sbafab.models.stacked import filled
 

@@ -6,12 +6,12 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
-from sbafab.laminate.extent import film_mass
+from sbafab.laminate.laminate import film_mass
 from sbafab.models.figures import Asked, Prediction
 from sbafab.models.prediction import predict
 from sbafab.models.stack import stack
-from sbafab.simulators.calculix.settings import deck_settings
-from sbafab.simulators.coarse.actuator import actuator as coarse
+from sbafab.simulators.calculix.deck import deck_settings
+from sbafab.simulators.coarse.shell import actuator as coarse
 
 TPU = ("films.tpe.product=TPU 85A", "films.tpe.thickness=0.05")
 KNOWN = (*TPU, "films.tpe.modulus=20", "films.tpe.poisson=0.45")

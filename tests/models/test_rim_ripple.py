@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sbafab.models import rim_ripple
+from sbafab.models import balloon
 from sbafab.models.balloon import Balloon, inflate, rippling
-from sbafab.models.balloon_loads import stresses
+from sbafab.models.balloons import stresses
 
 WIDE = Balloon(pocket=60.0)
 """So wide that its rim is nearly a straight strip."""
@@ -22,10 +22,10 @@ def onset(one: Balloon, tension: float) -> tuple[float, float]:
     shape = (1, len(one.nodes) - 1 - one.edge)
     for _ in range(60):
         middle = (low + high) / 2
-        (found,) = rim_ripple.rippling((one,), np.full(shape, -middle), [np.array([tension])])
+        (found,) = balloon.rim_ripples((one,), np.full(shape, -middle), [np.array([tension])])
         ripples = (found.cost - middle * found.pull.sum(-1) < 0).all()
         low, high = (low, middle) if ripples else (middle, high)
-    (found,) = rim_ripple.rippling((one,), np.full(shape, -high), [np.array([tension])])
+    (found,) = balloon.rim_ripples((one,), np.full(shape, -high), [np.array([tension])])
     return 2 * one.rigid * high, float(found.waves[0])
 
 
@@ -52,13 +52,13 @@ def test_what_ripples_take_off_has_the_slopes_that_it_says() -> None:
     (ripple,) = rippling((lone,), ((found.r, found.z),))
     for law in (2, 0):
         flat = lone.film._replace(order=law)
-        term = rim_ripple.eased(flat, lone.edge, ripple, found.r)
+        term = balloon.eased(flat, lone.edge, ripple, found.r)
         assert term.energy[0] < 0
         for node in (lone.edge, lone.edge + 2, len(lone.nodes) - 1):
             step = np.zeros_like(found.r)
             step[0, node] = 1e-5
             up, down = (
-                rim_ripple.eased(flat, lone.edge, ripple, found.r + sign * step) for sign in (1, -1)
+                balloon.eased(flat, lone.edge, ripple, found.r + sign * step) for sign in (1, -1)
             )
             slope = (up.energy - down.energy) / 2e-5
             own = node - lone.edge
@@ -95,7 +95,7 @@ def test_the_amplitude_is_the_one_of_least_energy_and_the_waves_too() -> None:
 
     tilts = np.linspace(0, 0.6, 601)
     best = min((energy(tilt, n), tilt, n) for tilt in tilts for n in range(2, 20))
-    told = math.sqrt(rim_ripple.amplitude(lone.film, lone.edge, ripple, found.r)[0])
+    told = math.sqrt(balloon.amplitude(lone.film, lone.edge, ripple, found.r)[0])
     assert ripple.waves[0] == pytest.approx(best[2], abs=1)
     assert told == pytest.approx(
         min((energy(tilt, int(ripple.waves[0])), tilt) for tilt in tilts)[1], rel=0.05
@@ -107,7 +107,7 @@ def test_low_pressures_leave_the_rim_smooth_and_high_ones_relieve_its_outside() 
     lone = Balloon()
     found = inflate(lone, [0.1, 2.0])
     (ripple,) = rippling((lone,), ((found.r, found.z),))
-    tilt = rim_ripple.amplitude(lone.film, lone.edge, ripple, found.r)
+    tilt = balloon.amplitude(lone.film, lone.edge, ripple, found.r)
     assert tilt[0] == 0 < tilt[1]
     hoop = stresses(lone, found).hoop[:, lone.edge :]
     assert (np.diff(hoop[1]) > 0).all()

@@ -11,13 +11,12 @@ import pytest
 
 from docs.scripts.ripple_sector import Sector, sector_states
 from sbafab.errors import DesignError
-from sbafab.models import banded
+from sbafab.models import least_energy
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import balloon_map
 from sbafab.models.film_elements import Elements, air, bending, membrane
+from sbafab.models.rim_modes import EDGE, OVERTONES, PLACES, UP, R, Waves, Waving, Z, first_of
 from sbafab.models.rippled import pressed, resolved, rippled, risen, taller
-from sbafab.models.wave_energy import Waves
-from sbafab.models.waving import EDGE, OVERTONES, PLACES, UP, R, Waving, Z, first_of
 
 WIDE = Balloon(5.0)
 INNER = Balloon(5.0, neck=1.27, bore=0.52)
@@ -50,7 +49,7 @@ def test_slopes_are_those_of_the_energy(one: Balloon) -> None:
     assert (found.gradient * ahead).sum() == pytest.approx(slope[0], rel=1e-6)
     free = problem.of.freedoms
     turned = ((more.gradient - less.gradient) / (2 * step))[free, 0]
-    own = banded.dense(found.band)[0] @ ahead[free, 0]
+    own = least_energy.dense(found.band)[0] @ ahead[free, 0]
     assert own == pytest.approx(turned, abs=1e-6 * np.abs(turned).max())
 
 

@@ -13,12 +13,11 @@ import sbafab
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import BalloonMap
-from sbafab.models.chain import chain
-from sbafab.models.loads import RIM, loaded, with_blocks
 from sbafab.models.rippled import risen
-from sbafab.models.series import blocked
 from sbafab.models.stack import Plate, Stack
 from sbafab.models.stack_balance import MOST_STEPS, _met, _settled, free
+from sbafab.models.stack_loads import RIM, chain, loaded, with_blocks
+from sbafab.models.stacked import blocked
 
 LOADS: dict[str, dict[str, Any]] = {
     "7 mN on the tip": {"tip_load": (0.0, 0.005, -0.005)},
@@ -278,7 +277,7 @@ def test_wide_pockets_are_mapped_as_far_as_they_hold() -> None:
 def test_a_pushed_column_buckles_the_sooner_the_longer_and_the_freer_it_is() -> None:
     """Flat, none does; at 25 % six balloons do where the tip may slide, ten where it may not."""
     from sbafab.models.stack import stack
-    from sbafab.reproduction.mechanics import FITTED
+    from sbafab.reproduction.rows import FITTED
 
     def is_straight(balloons: int, share: float, sticks: bool) -> bool:
         found = stack(sbafab.load("1dof-5mm", f"stack.balloons={balloons}"), factors=FITTED)

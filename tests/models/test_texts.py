@@ -10,8 +10,8 @@ import pytest
 
 import sbafab
 from sbafab.models import paper, stacked
-from sbafab.models.series import blocked
 from sbafab.models.stack import Stack
+from sbafab.models.stacked import blocked
 
 DOCS = Path(__file__).parents[2] / "docs"
 

@@ -12,8 +12,7 @@ from shapely import unary_union
 from shapely.geometry import Point as ShapelyPoint
 from shapely.geometry import Polygon, box
 
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, polygon, rectangle, stadium
+from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import nest
 from sbafab.nesting.records import Nest, NestPart, Stock

@@ -12,8 +12,7 @@ from shapely.geometry import Polygon
 
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Arc, Line
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, polygon, rectangle, stadium
+from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
 from sbafab.nesting.check import check_nest, check_placed, edge_distance, least_distance
 from sbafab.nesting.records import Nest, NestPart, Placement, Stock
 

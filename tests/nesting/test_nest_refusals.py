@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sbafab.errors import DesignError
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import disc, rectangle
 from sbafab.nesting.nest import nest
 from sbafab.nesting.records import NestPart, Stock
 

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 from shapely.geometry import Polygon, box
 
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, polygon, rectangle, stadium
-from sbafab.nesting.grid import grid_of
-from sbafab.nesting.raster import aligned, meetings, quarter_turned, raster
+from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
+from sbafab.nesting.bottom_left import aligned, grid_of, meetings, quarter_turned, raster
 from sbafab.nesting.records import TURNS
 
 SHAPES = {

@@ -8,10 +8,9 @@ from typing import Any
 
 import pytest
 
-from sbafab.geometry.shapes import disc, rectangle
-from sbafab.nesting.nest import nest
+from sbafab.geometry.region import disc, rectangle
+from sbafab.nesting.nest import as_dict, from_dict, nest
 from sbafab.nesting.records import NestPart, Stock
-from sbafab.nesting.saved import as_dict, from_dict
 
 PARTS = (
     NestPart("demo", "P01", 1, "TPE", rectangle((0.1, 0.2), (9.3, 7.7)), 7),

@@ -8,8 +8,7 @@ import pytest
 from shapely.geometry import Polygon
 
 from sbafab.errors import DesignError, SbafabError
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle, stadium
+from sbafab.geometry.region import Region, disc, rectangle, stadium
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import nest
 from sbafab.nesting.records import Nest, NestPart, Stock

@@ -9,15 +9,15 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.as_built.check import check_folder
-from sbafab.assemblies.loading import load
+from sbafab.assemblies.files import load
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.dxf_write import Curves
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.conforming.settings import MeshSettings
+from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.output.assembly import generate_assembly
+from sbafab.output.checked import RunPart
 from sbafab.output.manifest import file_hashes
-from sbafab.output.planned import RunPart
 from sbafab.output.run import Conforming, Extras, generate
 
 SMALL = ("stack.balloons=1",)

@@ -13,9 +13,9 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.as_built.check import check_folder
-from sbafab.design.writing import design_sha256
-from sbafab.meshing.conforming.settings import MeshSettings
-from sbafab.output import contents
+from sbafab.design.files import design_sha256
+from sbafab.meshing.conforming.layup import MeshSettings
+from sbafab.output import batch
 from sbafab.output.run import Conforming, Extras, generate
 
 TEMPLATES = ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"]
@@ -143,7 +143,7 @@ def test_a_run_that_dies_half_way_leaves_the_old_output(
     def dies(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(contents, "write_meshes", dies)
+    monkeypatch.setattr(batch, "write_meshes", dies)
     with pytest.raises(KeyboardInterrupt):
         generate(load_design("1dof-5mm", ["bond.width=0.8"]), tmp_path)
     assert hashes(run.folder) == before

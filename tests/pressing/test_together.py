@@ -8,8 +8,7 @@ from sbafab.actuators import build, load_design
 from sbafab.cutting.fixture import fixture
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.build_up import footprint
-from sbafab.pressing.schedule import PressSettings, schedule
-from sbafab.pressing.together import (
+from sbafab.pressing.cycles import (
     Runs,
     a_day,
     are_apart,
@@ -18,6 +17,7 @@ from sbafab.pressing.together import (
     press_runs,
     runs_of,
 )
+from sbafab.pressing.schedule import PressSettings, schedule
 
 INCH = 25.4
 

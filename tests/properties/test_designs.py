@@ -20,7 +20,7 @@ from sbafab.actuators import load_design
 from sbafab.as_built.check import check_folder
 from sbafab.cli import main
 from sbafab.errors import DesignError
-from sbafab.output.checking import check
+from sbafab.output.checked import check
 from sbafab.output.run import generate
 from tests.properties.designs import Draft, lobed, one_dof, radial, valid
 from tests.properties.faults import REFUSALS, RULES

@@ -8,10 +8,9 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.as_built.check import check_folder
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Region, disc
 from sbafab.output.run import generate
-from sbafab.reports.traveller.placing import over_tab
+from sbafab.reports.traveller.step_pictures import over_tab
 from sbafab.rules.finding import Finding
 from tests.as_built.doctoring import Doctor
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.output.settings import limits
+from sbafab.output.checked import limits
 from sbafab.rules import bond_width
 
 POCKET = """\

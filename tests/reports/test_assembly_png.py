@@ -10,12 +10,12 @@ import pytest
 from PIL import Image
 
 from sbafab.assemblies.build import assemble
-from sbafab.assemblies.colours import BOUGHT, FILMS, linear
-from sbafab.assemblies.reading import load_assembly
-from sbafab.geometry.shapes import disc, rectangle
-from sbafab.meshing.prisms import Slab, fuse
+from sbafab.assemblies.files import load_assembly
+from sbafab.assemblies.shapes import BOUGHT, FILMS, linear
+from sbafab.geometry.region import disc, rectangle
+from sbafab.meshing.solid import Slab, fuse
 from sbafab.reports.assembly_png import assembly_png
-from sbafab.reports.depth import View, seen
+from sbafab.reports.canvas import View, seen
 
 DOWN = View(np.eye(3), 10.0, (200.0, 150.0))
 """From straight above, 10 pixels a mm."""

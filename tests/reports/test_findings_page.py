@@ -8,7 +8,7 @@ from typing import Any
 from lxml import html as lxml_html
 
 from sbafab.actuators import build, load_design
-from sbafab.output.settings import limits
+from sbafab.output.checked import limits
 from sbafab.reports.traveller.findings import Inspected, findings_html
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding, Place

@@ -16,8 +16,7 @@ from PIL import Image
 import sbafab
 from sbafab.cli import app
 from sbafab.errors import DesignError
-from sbafab.laminate.extent import outline_diameter
-from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.laminate import Laminate, outline_diameter
 from sbafab.models.stack import Stack
 from sbafab.reports.inflated import InflatedPart, inflated, pressed
 from sbafab.reports.inflated_picture import PictureWish, picture_png, pose_of, write_picture

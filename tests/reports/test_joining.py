@@ -10,11 +10,10 @@ from typing import Any
 import pytest
 
 from sbafab.assemblies.build import Assembled, assemble
-from sbafab.assemblies.reading import assembly_of
-from sbafab.assemblies.supply import runs
-from sbafab.design.reading import read_toml
-from sbafab.design.templates import templates_folder
-from sbafab.reports.traveller.joining import join_pages
+from sbafab.assemblies.checks import runs
+from sbafab.assemblies.files import assembly_of
+from sbafab.design.files import read_toml, templates_folder
+from sbafab.reports.traveller.assembly_page import join_pages
 
 
 def together(template: str, **parts: dict[str, Any]) -> Assembled:

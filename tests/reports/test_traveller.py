@@ -22,14 +22,14 @@ from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.settings import press_settings
+from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.drawing import TIMES
-from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller import job as say
 from sbafab.reports.traveller.bill import cut_list
 from sbafab.reports.traveller.job import Job, Work
-from sbafab.reports.traveller.layup import rounds
 from sbafab.reports.traveller.page import traveller_html
+from sbafab.reports.traveller.shapes import rounds
 from sbafab.rules.finding import Finding, Place
 
 SHA = hashlib.sha256(b"design").hexdigest()
@@ -205,7 +205,7 @@ def test_a_blank_stands_where_nobody_is_named(sheet_files: Any) -> None:
 PRINTS = """
 import hashlib
 from sbafab.actuators import build, load_design
-from sbafab.output.settings import press_settings
+from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.job import Job
 from sbafab.reports.traveller.page import traveller_html

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from sbafab.geometry.shapes import disc, rectangle, strip
+from sbafab.geometry.region import disc, rectangle, strip
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import channel_clear, sealing, tube_fit
 from sbafab.rules.finding import Finding, Place

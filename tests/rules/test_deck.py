@@ -11,8 +11,7 @@ import pytest
 
 from sbafab.design.records import RuleName
 from sbafab.geometry.offset import grow
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle, strip
+from sbafab.geometry.region import Region, disc, rectangle, strip
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.deck import has_failed, rule_names, run_deck
 from sbafab.rules.limits import Limits, Tolerances

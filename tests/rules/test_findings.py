@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Region, disc
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import bond_width, film_limits, mask_overhang, piece_count
 from sbafab.rules.finding import Finding, Place

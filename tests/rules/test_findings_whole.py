@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import disc, rectangle
 from sbafab.laminate.laminate import Laminate, Pin
 from sbafab.rules import press_fit, registration_nominal
 from sbafab.rules.deck import Rule, run_rule

@@ -10,8 +10,7 @@ import pytest
 from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Arc, Edge, Line
 from sbafab.geometry.nearby import EdgeIndex
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import circle, disc, rectangle, strip
+from sbafab.geometry.region import Region, circle, disc, rectangle, strip
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import (
     bond_width,

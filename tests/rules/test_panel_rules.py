@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, strip
+from sbafab.geometry.region import Region, disc, strip
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import bridges, scrap
 from sbafab.rules.deck import run_deck

@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import Region, disc, rectangle
 from sbafab.laminate.laminate import Laminate, Pin
 from sbafab.rules import pin_holes
 from sbafab.rules.deck import run_deck

@@ -11,10 +11,9 @@ import shapely
 from shapely import affinity
 
 from sbafab.actuators import load_design
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Region, disc
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.settings import limits
+from sbafab.output.checked import limits
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding
 from sbafab.rules.freedoms import Part, freedoms

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import disc, rectangle
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.registration_yield import Share, check, simulate

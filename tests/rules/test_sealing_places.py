@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from sbafab.geometry.shapes import disc, strip
+from sbafab.geometry.region import disc, strip
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits

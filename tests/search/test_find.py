@@ -13,15 +13,14 @@ from click.testing import CliRunner
 
 import sbafab
 from sbafab.cli import app
-from sbafab.design.form import Free
+from sbafab.design.records import Free
 from sbafab.errors import DesignError
-from sbafab.search import space as module
+from sbafab.search import trial as module
 from sbafab.search.find import FindRequest, find, free_keys
-from sbafab.search.free import read_free
 from sbafab.search.quantities import read_quantity
 from sbafab.search.quantity_names import QUANTITIES
-from sbafab.search.requirements import read_all
-from sbafab.search.trial import Trial, Wanted
+from sbafab.search.trial import Trial, Wanted, read_all
+from sbafab.search.vary import read_free
 
 FREE = (Free("chamber.diameter", 3.0, 12.0, 0.1), Free("stack.balloons", 2, 20, 1))
 

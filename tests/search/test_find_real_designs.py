@@ -12,10 +12,9 @@ from click.testing import CliRunner
 
 import sbafab
 from sbafab.cli import app
-from sbafab.design.form import Free
+from sbafab.design.records import Free
 from sbafab.errors import DesignError
-from sbafab.search.requirements import read_all
-from sbafab.search.trial import Wanted, tried
+from sbafab.search.trial import Wanted, read_all, tried
 
 CASES = {
     # The paper's 1-DoF actuator (Sec. 4): pockets of 5 in an outline of 6.5, 7 mm at 10 kPa.

@@ -10,7 +10,7 @@ import pytest
 import sbafab
 from sbafab.errors import DesignError
 from sbafab.search.quantities import AskedQuantity, Subject, read_limit, read_quantity
-from sbafab.search.requirements import read_all
+from sbafab.search.trial import read_all
 
 
 def _value(text: str, name: str = "1dof-5mm", **tables: Any) -> float:

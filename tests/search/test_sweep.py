@@ -14,13 +14,13 @@ from pyarrow import parquet
 
 import sbafab
 from sbafab.cli.sweep import _as_json
-from sbafab.design.writing import design_sha256
+from sbafab.design.files import design_sha256
 from sbafab.errors import OutputError
 from sbafab.search import sweep as module
 from sbafab.search.measure import measured
-from sbafab.search.plots import Dots, Objective, passes_svg, trades_svg
+from sbafab.search.page import Dots, Objective, passes_svg, trades_svg
+from sbafab.search.pool import MeasureJob
 from sbafab.search.sweep import SweptDesigns
-from sbafab.search.worker import MeasureJob
 from tests.site.formats import hold
 
 VARY = ("chamber.diameter=2,5", "bond.width=0.7,0.75")

@@ -15,16 +15,21 @@ import pyvista
 from sbafab.actuators import build, load_design
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.conforming.layup import MeshSettings, Symmetry
 from sbafab.meshing.conforming.model import Mesh
-from sbafab.meshing.conforming.settings import MeshSettings, Symmetry
-from sbafab.simulators.calculix.frd import Frame, read_frd, read_sta
-from sbafab.simulators.calculix.history import State, history, history_csv
-from sbafab.simulators.calculix.job import converged_frames, deck_mesh
-from sbafab.simulators.calculix.picture import deformed_png
-from sbafab.simulators.calculix.plot import history_svg
-from sbafab.simulators.calculix.run import Ending
-from sbafab.simulators.calculix.settings import DeckSettings
-from sbafab.simulators.calculix.vtu import write_deformed
+from sbafab.simulators.calculix.deck import DeckSettings
+from sbafab.simulators.calculix.results import (
+    Frame,
+    State,
+    deformed_png,
+    history,
+    history_csv,
+    history_svg,
+    read_frd,
+    read_sta,
+    write_deformed,
+)
+from sbafab.simulators.calculix.run import Ending, converged_frames, deck_mesh
 
 pytest.importorskip("netgen")
 

@@ -31,7 +31,7 @@ def test_the_page_of_commands_has_every_command_and_option() -> None:
 
 def test_the_page_of_keys_has_every_key_of_every_family() -> None:
     from sbafab.actuators import records
-    from sbafab.design.messages import key_paths
+    from sbafab.design.files import key_paths
 
     page = reference_keys.page()
     for record in records().values():

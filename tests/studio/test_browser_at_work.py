@@ -16,7 +16,7 @@ import pytest
 from PIL import Image
 
 from sbafab import api
-from sbafab.studio.links import packed
+from sbafab.studio.app import packed
 from tests.studio.browsing import (
     DESIGN,
     FILE,

@@ -10,7 +10,7 @@ import pytest
 
 from sbafab import api
 from sbafab.studio.app import Studio, app
-from sbafab.studio.made import Made, zipped
+from sbafab.studio.places import Made, zipped
 from tests.studio.asking import Client
 
 TOKEN = "right-token"

@@ -19,18 +19,18 @@ import sbafab
 from docs.scripts.gallery import figures_of
 from sbafab.cli import app
 from sbafab.models import paper
-from sbafab.models.counterparts import (
-    AIR_TIME,
+from sbafab.models.figures import Figure, Prediction
+from sbafab.models.formulas import modulus
+from sbafab.models.paper import (
     COUNTERPARTS,
     MODULUS,
     OFF,
     POCKET_AREA,
+    TIME_WITH_AIR,
     Counterpart,
     counterpart_of_column,
 )
-from sbafab.models.figures import Figure, Prediction
-from sbafab.models.flow import seconds
-from sbafab.models.stiffness import modulus
+from sbafab.models.pneumatics import seconds
 from sbafab.studio.jobs import elastic
 from sbafab.studio.moving import stack_model
 from tests.cli.test_predict_command import run as run_predict
@@ -47,7 +47,7 @@ def predictions() -> dict[str, Prediction]:
 
 def _model_value(row: Counterpart, found: Prediction) -> float:
     """What a row's model gives for the actuator that was measured, as validation works it out."""
-    if row.recorded == AIR_TIME:
+    if row.recorded == TIME_WITH_AIR:
         held = found.value("volume of all chambers at full stroke")
         return float(seconds(held, paper.AIR_FLOW, paper.FULL_KPA))
     if row.recorded == POCKET_AREA:

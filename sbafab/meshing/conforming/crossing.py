@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.errors import OutputError
-from sbafab.meshing.conforming.cavities import TRIANGLE_PARTS
-from sbafab.meshing.conforming.form import FormedFilm
-from sbafab.meshing.conforming.layup import Layup
+from sbafab.meshing.conforming.layup import FormedFilm, Layup
+from sbafab.meshing.conforming.sweep import TRIANGLE_PARTS
 
 if TYPE_CHECKING:
     from matplotlib.tri import TriFinder

@@ -1,31 +1,339 @@
-"""Fill: films lifted off each other by the air of their balloons.
-
-The lift is vertical in the frame of each balloon, so no element changes its volume; balloons
-are then set on each other by their neck discs, leaning where chambers hold unlike amounts, and
-refused where they would lean into each other. Films stretch along the meridian (1 % at 5 ul in the
-paper's 5 mm balloon) and thin by as much; the flat mesh is the rest position for a solver that
-takes one.
-"""
+"""The lift of a film by air: Poisson's equation on the triangles of a pocket."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.meshing.conforming.bodies import bodies
+from sbafab.geometry.edges import Arc, Point
+from sbafab.laminate.laminate import Interface
 from sbafab.meshing.conforming.crossing import crossing, said
-from sbafab.meshing.conforming.form import FormedFilm, flat
-from sbafab.meshing.conforming.layup import Layup
-from sbafab.meshing.conforming.pockets import Pocket, pockets
-from sbafab.meshing.conforming.poses import UPRIGHT, RigidMotion, set_on, slopes_of
+from sbafab.meshing.conforming.elements import integrals
+from sbafab.meshing.conforming.layup import FormedFilm, Layup, bodies, flat
+from sbafab.meshing.conforming.plane import MISSING, Plane
+from sbafab.models.lens import fullest as fullest_slot
+from sbafab.models.parabola import fullest
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+
+class Lift(NamedTuple):
+    """Shapes (3, plane nodes) of a film over a pocket, in mm2, mm and mm.
+
+    The first is what even pressure gives; the others are a neck disc that leans by one along x
+    or y. ``plateaus`` (3,) are their heights at the middle of the neck disc (of the first one),
+    ``volumes`` (3,) what they enclose.
+    """
+
+    shapes: NDArray[np.float64]
+    plateaus: NDArray[np.float64]
+    volumes: NDArray[np.float64]
+
+
+def lift(
+    plane: Plane,
+    pocket: NDArray[np.bool_],
+    held: NDArray[np.int64],
+    discs: list[tuple[NDArray[np.int64], tuple[float, float]]],
+) -> Lift:
+    """How far the film over a pocket rises: -lap w = 1, w = 0 at the ``held`` nodes.
+
+    ``discs`` are the nodes of each neck and its middle: they rise as one. For a round pocket
+    without a neck this is the paraboloid of the paper's Eq. 1.
+    """
+    try:
+        from scipy.sparse import coo_matrix, csr_matrix
+        from scipy.sparse.linalg import splu
+    except ImportError:
+        raise DesignError(MISSING.format("scipy")) from None
+    triangles = plane.triangles[pocket]
+    stiffness, load = integrals(plane.points, triangles)
+    count = len(plane.points)
+    rows = np.repeat(triangles, 6, axis=1).ravel()
+    columns = np.tile(triangles, (1, 6)).ravel()
+    matrix = coo_matrix((stiffness.ravel(), (rows, columns)), shape=(count, count)).tocsr()
+    weights = np.bincount(triangles.ravel(), load.ravel(), count)
+
+    # Each unknown moves one node, or all nodes of one neck disc.
+    unknown = np.full(count, -1)
+    active = np.unique(triangles)
+    unknown[active] = 0
+    unknown[held] = -1
+    for nodes, _ in discs:
+        unknown[nodes] = -1
+    free = np.flatnonzero(unknown == 0)
+    unknown[free] = np.arange(len(free))
+    lean = np.zeros((2, count))
+    for number, (nodes, middle) in enumerate(discs):
+        unknown[nodes] = len(free) + number
+        lean[:, nodes] = (plane.points[nodes] - middle).T
+    size = len(free) + len(discs)
+    moved = np.flatnonzero(unknown >= 0)
+    spread = csr_matrix((np.ones(len(moved)), (moved, unknown[moved])), shape=(count, size))
+    factors = splu((spread.T @ matrix @ spread).tocsc())
+    shapes = np.empty((3, count))
+    shapes[0] = spread @ factors.solve(spread.T @ weights)
+    for axis in range(2):
+        push = spread.T @ (matrix @ lean[axis])
+        shapes[1 + axis] = lean[axis] - spread @ factors.solve(push)
+    plateaus = np.zeros(3)
+    if discs:
+        first = discs[0][0][0]
+        plateaus = shapes[:, first] - np.array([0.0, *lean[:, first]])
+    return Lift(shapes, plateaus, shapes @ weights)
+
+
+# The pockets of a laminate as the fill needs them.
+
+
+NEAR = 1e-3
+"""mm by which a round pocket may stand off its chamber's axis."""
+
+
+@dataclass(frozen=True)
+class Pocket:
+    """One pocket of a chamber, under film ``ply``, with the lift of the films below and above.
+
+    ``centres`` are its stacks, as places in the layup's. ``share`` of each of them is meshed;
+    ``flat_ul`` is what the meshed part holds before it is filled, ``largest_ul`` the most air
+    that a balloon can hold.
+    """
+
+    chamber: str
+    ply: int
+    layer: int
+    centres: tuple[int, ...]
+    lower: Lift
+    upper: Lift
+    share: float
+    flat_ul: float
+    largest_ul: float
+
+    def pressure(self, ul: float, lean: NDArray[np.float64]) -> float:
+        """The amount of the even shape, in 1/mm, at which each balloon holds ``ul``.
+
+        ``lean`` (2, 2) are the slopes of the lower and the upper neck disc. Raises DesignError
+        where a balloon cannot hold that much.
+        """
+        if ul > self.largest_ul:
+            raise DesignError(
+                f"fill of {self.chamber} = {ul:g} ul is more than the balloon under layer "
+                f"{self.layer} can hold with a film of constant length: "
+                f"ask for {math.floor(self.largest_ul * 100) / 100:.2f} ul at most"
+            )
+        wanted = ul * len(self.centres) * self.share
+        if 0 < wanted < self.flat_ul:
+            raise DesignError(
+                f"fill of {self.chamber} = {ul:g} ul is less than the gaps between flat films "
+                f"hold; ask for {self.flat_ul / len(self.centres) / self.share:.2f} ul or more"
+            )
+        if ul == 0:
+            return 0.0
+        even = self.lower.volumes[0] + self.upper.volumes[0]
+        leaning = lean[0] @ self.lower.volumes[1:] + lean[1] @ self.upper.volumes[1:]
+        return float((wanted - self.flat_ul - leaning) / even)
+
+
+def pockets(stack: Layup) -> list[Pocket]:
+    """The pockets of every chamber, bottom to top; equal ones are worked out once."""
+    known: dict[tuple[bytes, ...], Lift] = {}
+    limits: dict[tuple[bytes, bytes], float] = {}
+    return [
+        _pocket(stack, chamber, ply, known, limits)
+        for ply, interface in enumerate(stack.laminate.interfaces, start=1)
+        if interface.kind == "chamber"
+        for chamber, void in stack.voids.items()
+        if ply in void.under
+    ]
+
+
+def _pocket(
+    stack: Layup,
+    chamber: str,
+    ply: int,
+    known: dict[tuple[bytes, ...], Lift],
+    limits: dict[tuple[bytes, bytes], float],
+) -> Pocket:
+    plane, plies = stack.plane, stack.plies
+    cells = stack.voids[chamber].under[ply]
+    inner = np.unique(plane.triangles[cells])
+    held = np.intersect1d(inner, np.unique(plane.triangles[plies[ply].bonded]))
+    centres = tuple(i for i, owner in enumerate(stack.centre_chambers) if owner == chamber)
+    places = [stack.centres[i] for i in centres]
+
+    def lift_of(necks: NDArray[np.bool_]) -> Lift:
+        key = cells.tobytes(), held.tobytes(), necks.tobytes()
+        if key not in known:
+            discs = list(_discs(stack, necks, held, places))
+            known[key] = lift(plane, cells, held, discs)
+        return known[key]
+
+    above = plies[ply + 1].bonded if ply + 1 < len(plies) else cells & False
+    lower = lift_of(cells & (plies[ply - 1].bonded | ~plies[ply - 1].cells))
+    upper = lift_of(cells & (above | ~plies[ply].cells))
+    share = stack.shares[chamber]
+    key = cells.tobytes(), held.tobytes()
+    if key not in limits:
+        interface = stack.laminate.interfaces[ply - 1]
+        limits[key] = _largest(stack, interface, lift_of(cells & False), held, places, share)
+    return Pocket(
+        chamber,
+        ply,
+        plies[ply].layer.index,
+        centres,
+        lower,
+        upper,
+        share,
+        float(plane.areas()[cells].sum()) * plies[ply].gap,
+        limits[key],
+    )
+
+
+def _discs(
+    stack: Layup, necks: NDArray[np.bool_], held: NDArray[np.int64], places: list[Point]
+) -> Iterator[tuple[NDArray[np.int64], Point]]:
+    """The nodes of each neck disc, and the axis it is on."""
+    nodes = np.setdiff1d(np.unique(stack.plane.triangles[necks]), held)
+    offsets = stack.plane.points[nodes][:, None] - np.array(places)
+    nearest = np.linalg.norm(offsets, axis=2).argmin(axis=1)
+    for number, place in enumerate(places):
+        if (nearest == number).any():
+            yield nodes[nearest == number], place
+
+
+def _largest(
+    stack: Layup,
+    interface: Interface,
+    even: Lift,
+    held: NDArray[np.int64],
+    places: list[Point],
+    share: float,
+) -> float:
+    """Most air in ul that a balloon can hold, of which ``share`` is meshed.
+
+    A round pocket's is that of two paraboloids whose meridian keeps its length (paper Eqs. 1 to
+    3), an oblong one's that of two arcs (as ``predict`` says); a drawn one holds as much more than
+    the disc in it as the even lift of equal height does.
+    """
+    ends = _round_ends(interface, places[0])
+    if len(ends) == 1:
+        return 2 * fullest(ends[0][1]).volume
+    if len(ends) == 2:
+        (first, radius), (last, _) = ends
+        return fullest_slot(2 * radius, math.dist(first, last)).volume
+    offsets = stack.plane.points[held][:, None] - np.array(places)
+    half = float(np.linalg.norm(offsets, axis=2).min())
+    disc = math.pi * half**2 / 2
+    wider = float(even.volumes[0] / even.shapes[0].max()) / disc
+    return 2 * fullest(half).volume * wider / len(places) / share
+
+
+def _round_ends(interface: Interface, centre: Point) -> list[tuple[Point, float]]:
+    """Middles and radii of the circles that the pocket round a centre ends in.
+
+    One on the centre where most of its edge is that circle; two of one radius and at equal
+    distances on either side of it for a slot, of which at least a third of a turn is left beside
+    inlet and manifold.
+    """
+    turns: dict[tuple[Point, float], float] = {}
+    for outer in interface.unbonded.outers:
+        for edge in outer.edges:
+            if isinstance(edge, Arc):
+                x, y = edge.centre
+                place = (round(x, 5), round(y, 5)), round(edge.radius, 5)
+                turns[place] = turns.get(place, 0.0) + abs(edge.sweep)
+    found = sorted(place for place, turn in turns.items() if turn > math.tau / 3)
+    on_centre = [one for one in found if math.dist(one[0], centre) < NEAR and turns[one] > math.pi]
+    if on_centre:
+        return on_centre[:1]
+    for number, (first, radius) in enumerate(found):
+        for last, other in found[number + 1 :]:
+            middle = (first[0] + last[0]) / 2, (first[1] + last[1]) / 2
+            if abs(other - radius) < NEAR and math.dist(middle, centre) < NEAR:
+                return [(first, radius), (last, other)]
+    return []
+
+
+# Balloons set on each other by the planes of their neck discs.
+
+
+FLATNESS = 0.01
+"""Part of the lift by which necks may miss a common plane."""
+
+
+class RigidMotion(NamedTuple):
+    """A rigid motion: ``turn`` (3, 3) first, then ``shift`` (3,) in mm."""
+
+    turn: NDArray[np.float64]
+    shift: NDArray[np.float64]
+
+
+UPRIGHT = RigidMotion(np.eye(3), np.zeros(3))
+
+
+def slopes_of(centres: NDArray[np.float64], heights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Slopes along x and y of the plane through the heights at the centres (n, 2).
+
+    Raises DesignError where they have no common plane.
+    """
+    offsets = centres - centres.mean(axis=0)
+    rises = heights - heights.mean()
+    slopes: NDArray[np.float64] = np.linalg.lstsq(offsets, rises, rcond=1e-9)[0]
+    worst = float(np.abs(rises - offsets @ slopes).max())
+    if worst > FLATNESS * float(np.abs(heights).max()):
+        raise DesignError(
+            f"the fills asked for lift the chambers {worst:.3f} mm off a common plane; fill more "
+            "than three chambers, or chambers in one row, alike"
+        )
+    return slopes
+
+
+def set_on(
+    below: RigidMotion,
+    centres: NDArray[np.float64],
+    top: NDArray[np.float64],
+    bottom: NDArray[np.float64],
+    gap: float,
+) -> RigidMotion:
+    """The pose of a balloon whose neck discs at heights ``bottom`` meet those at ``top`` of the
+    balloon below, ``gap`` mm apart.
+    """
+    middle = centres.mean(axis=0)
+    turn = below.turn @ _frame(slopes_of(centres, top)) @ _frame(slopes_of(centres, bottom)).T
+    meeting = below.turn @ np.array([*middle, top.mean()]) + below.shift
+    normal = below.turn @ _frame(slopes_of(centres, top))[:, 2]
+    start = turn @ np.array([*middle, bottom.mean()])
+    return RigidMotion(turn, meeting + gap * normal - start)
+
+
+def _frame(slopes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The turn (3, 3) by the least angle of the upright axis onto the normal of a plane."""
+    normal = np.array([-slopes[0], -slopes[1], 1.0])
+    normal /= np.linalg.norm(normal)
+    x, y, z = normal.tolist()
+    return np.array(
+        [
+            [1 - x * x / (1 + z), -x * y / (1 + z), x],
+            [-x * y / (1 + z), 1 - y * y / (1 + z), y],
+            [-x, -y, z],
+        ]
+    )
+
+
+# Fill: films lifted off each other by the air of their balloons.
+#
+# The lift is vertical in the frame of each balloon, so no element changes its volume; balloons
+# are then set on each other by their neck discs, leaning where chambers hold unlike amounts, and
+# refused where they would lean into each other. Films stretch along the meridian (1 % at 5 ul in the
+# paper's 5 mm balloon) and thin by as much; the flat mesh is the rest position for a solver that
+# takes one.
+
 
 ROUNDS = 4
 """Leaning discs change volumes, and these the lean, by less each round."""

@@ -6,25 +6,22 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, TypedDict
 
 import numpy as np
 
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.conforming.checks import skin_surface
-from sbafab.meshing.conforming.fill import Fill, filled, formed
-from sbafab.meshing.conforming.form import FormedFilm, flat
-from sbafab.meshing.conforming.layup import Layup, layup
-from sbafab.meshing.conforming.model import Mesh
-from sbafab.meshing.conforming.pockets import pockets
-from sbafab.meshing.conforming.settings import MeshSettings, Symmetry
-from sbafab.meshing.conforming.shell_mesh import shell_mesh, thin
-from sbafab.meshing.conforming.statistics import (
-    Statistics,
-    Thinning,
-    mesh_statistics,
-    thinning,
+from sbafab.meshing.conforming.element_mesh import (
+    shell_mesh,
+    skin_surface,
+    swept_points,
+    thin,
+    volume_mesh,
 )
-from sbafab.meshing.conforming.volume_mesh import swept_points, volume_mesh
+from sbafab.meshing.conforming.elements import aspects, jacobians, scaled_jacobians, volumes
+from sbafab.meshing.conforming.fill import Fill, filled, formed, pockets
+from sbafab.meshing.conforming.layup import FormedFilm, Layup, MeshSettings, Symmetry, flat, layup
+from sbafab.meshing.conforming.model import Mesh
 from sbafab.meshing.conforming.write_inp import write_inp
 from sbafab.meshing.conforming.write_msh import write_msh
 from sbafab.meshing.conforming.write_obj import write_obj
@@ -34,6 +31,9 @@ from sbafab.meshing.conforming.write_vtu import write_cavity_vtu, write_vtu
 from sbafab.meshing.files import MeshFile, MeshKind
 from sbafab.meshing.surface import Surface
 from sbafab.meshing.write_stl import write_stl
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 MESH_WRITERS: dict[str, Callable[[Mesh, Path], None]] = {
     "vtu": write_vtu,
@@ -234,3 +234,76 @@ def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path],
         for suffix, write_surface in SURFACE_WRITERS.items():
             name = f"mesh/cavity_{chamber}_conforming.{suffix}"
             yield replace(described, file=name), partial(write_surface, surface)
+
+
+# How large and how good a mesh is.
+
+
+class Statistics(TypedDict):
+    """How large and how good a mesh is. Aspect is longest edge over shortest.
+
+    ``thinnest_film_mm`` is the least thickness of a film that air has lifted.
+    """
+
+    nodes: int
+    elements: int
+    element: str
+    least_scaled_jacobian: float
+    worst_aspect: float
+    volume_mm3: float
+    height_mm: float
+    thinnest_film_mm: float
+
+
+class Thinning(NamedTuple):
+    """By what part films over the pockets are larger than flat, in the mean and at most, and how
+    thin they are there: no film changes its volume.
+    """
+
+    mean: float
+    most: float
+    thinnest_mm: float
+
+
+def thinning(shell: Mesh, flat: Mesh) -> Thinning:
+    """How much thinner the films of a shell are than in the same shell when flat."""
+    import numpy as np
+
+    pockets = np.unique(np.concatenate([faces[:, 0] for faces in shell.face_sets.values()]))
+    thickness = np.zeros(len(shell.cells))
+    for name, value in shell.thickness.items():
+        thickness[shell.cell_sets[name]] = value
+
+    def areas(mesh: Mesh) -> NDArray[np.float64]:
+        slopes = jacobians(mesh.kind, mesh.points, mesh.cells[pockets], integration=True)
+        found: NDArray[np.float64] = np.linalg.norm(
+            np.cross(slopes[..., 0], slopes[..., 1]), axis=2
+        )
+        return found
+
+    raised, before = areas(shell), areas(flat)
+    growth = np.maximum((raised / before).max(axis=1), 1.0)
+    return Thinning(
+        float(raised.sum() / before.sum()) - 1,
+        float(growth.max()) - 1,
+        float((thickness[pockets] / growth).min()),
+    )
+
+
+def mesh_statistics(mesh: Mesh, thinnest_film_mm: float) -> Statistics:
+    """Counts, quality and volume of a mesh; a shell's volume is area x thickness."""
+    sizes = volumes(mesh.kind, mesh.points, mesh.cells)
+    for name, thickness in mesh.thickness.items():
+        sizes[mesh.cell_sets[name]] *= thickness
+    least = scaled_jacobians(mesh.kind, mesh.points, mesh.cells)
+    heights = mesh.points[:, 2]
+    return Statistics(
+        nodes=len(mesh.points),
+        elements=len(mesh.cells),
+        element=mesh.kind,
+        least_scaled_jacobian=float(least.min()),
+        worst_aspect=float(aspects(mesh.kind, mesh.points, mesh.cells).max()),
+        volume_mm3=float(sizes.sum()),
+        height_mm=float(heights.max() - heights.min()),
+        thinnest_film_mm=thinnest_film_mm,
+    )

@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.meshing.conforming.bodies import bodies
-from sbafab.meshing.conforming.form import FormedFilm
-from sbafab.meshing.conforming.layup import Layup, Ply
+from sbafab.meshing.conforming.layup import FormedFilm, Layup, Ply, bodies
 from sbafab.meshing.wrap import TubeWrap, tube_wrap
 
 if TYPE_CHECKING:

@@ -2,30 +2,43 @@
 
 from __future__ import annotations
 
+import math
 import re
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from string import ascii_uppercase
 from typing import Any
 
-from sbafab.assemblies.build import Assembled
-from sbafab.assemblies.colours import colours
+from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
+from sbafab.assemblies.checks import runs
+from sbafab.assemblies.records import Base, Cup, Line, Magnet, Sba, Tube
+from sbafab.assemblies.shapes import colours
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
-from sbafab.pressing.together import Runs
-from sbafab.pressing.words import listed
-from sbafab.reports.traveller import base_plate, bench, bill, joining, notes, times
-from sbafab.reports.traveller import quantities as say
-from sbafab.reports.traveller.cautions import cautions, for_the_designer
-from sbafab.reports.traveller.code import code_svg, record_text
-from sbafab.reports.traveller.day import before_the_day, tools
-from sbafab.reports.traveller.job import Work
-from sbafab.reports.traveller.page import context, environment, frame, sheet_rows
+from sbafab.models.formulas import inflated_diameter, reached_diameter
+from sbafab.pressing.cycles import Runs
+from sbafab.pressing.schedule import listed
+from sbafab.reports.traveller import base_plate, bench, bill, times
+from sbafab.reports.traveller import job as say
+from sbafab.reports.traveller.bill import Item
+from sbafab.reports.traveller.job import Action, Work
+from sbafab.reports.traveller.page import (
+    before_the_day,
+    cautions,
+    code_svg,
+    context,
+    environment,
+    for_the_designer,
+    frame,
+    record_text,
+    sheet_rows,
+    tools,
+)
 from sbafab.reports.traveller.shapes import definitions, pattern_regions
 from sbafab.reports.traveller.sheet_map import part_regions
 from sbafab.rules.finding import Finding
-from sbafab.rules.lowered import CHECKED_AGAINST
+from sbafab.rules.limits import CHECKED_AGAINST
 
 PAGE, CHAPTER = "assembly.html.j2", "chapter.html.j2"
 _NAMES = re.compile(r'(\b(?:id|aria-labelledby)="|\bhref="#|url\(#)')
@@ -102,11 +115,11 @@ def assembly_html(job: AssemblyJob) -> str:
                 _chapter(one, number, _marks(job)[one.name])
                 for number, one in enumerate(job.works, 1)
             ],
-            joins=joining.join_pages(job.assembled),
-            finals=joining.final_checks(job.assembled),
+            joins=join_pages(job.assembled),
+            finals=final_checks(job.assembled),
             times=_times(job),
-            kerf_notes=list(dict.fromkeys(n for work in works for n in notes.kerf_notes(work))),
-            expected_sizes=list(dict.fromkeys(s for w in works for s in notes.expected_sizes(w))),
+            kerf_notes=list(dict.fromkeys(n for work in works for n in bill.kerf_notes(work))),
+            expected_sizes=list(dict.fromkeys(s for w in works for s in bill.expected_sizes(w))),
         )
     )
 
@@ -174,7 +187,7 @@ def _bill(job: AssemblyJob) -> list[bill.Item]:
     items = _films(job)
     for one in job.works:
         items += [_named(item, one) for item in bill.bill(one.work) if not _is_elsewhere(item)]
-    items += joining.bought(job.assembled, job.copies)
+    items += bought(job.assembled, job.copies)
     return list(dict.fromkeys(items))
 
 
@@ -280,3 +293,378 @@ def _times(job: AssemblyJob) -> list[times.Time]:
         )
     )
     return rows
+
+
+# What the technician does to put an assembly together, part by part, each with a box to tick.
+
+
+@dataclass(frozen=True)
+class JoinPage:
+    """One part's step."""
+
+    title: str
+    actions: tuple[Action, ...]
+
+
+def join_pages(assembled: Assembled) -> list[JoinPage]:
+    """A step for each part: make it ready, then fix it."""
+    pages = []
+    for placed in _in_order(assembled):
+        other = assembled.on(placed)
+        what = _what(placed)
+        title = placed.name if what == placed.name else f"{placed.name} ({what})"
+        lines = [line.name for line in _lines_through(assembled, placed)]
+        early = bool(lines) and other is not None
+        actions = list(_ready(placed))
+        if early:
+            actions = [Action(f"Take {placed.name} with {listed(lines)} in it.")]
+        if other is not None:
+            title += f", {_where(placed)} of {other.name}"
+            if early and isinstance(other.part, Tube):
+                actions.append(Action(f"Lead {listed(lines)} through {other.name}."))
+            actions += _fix(placed, other)
+        actions += _supply(placed, other, assembled)
+        if placed.part.note:
+            actions.append(Action(placed.part.note))
+        if actions:
+            pages.append(JoinPage(title, tuple(actions)))
+    return pages
+
+
+def _in_order(assembled: Assembled) -> Iterator[PlacedPart]:
+    """Building order, but a line goes through a lumen while both its ends can still be reached."""
+    parts = assembled.parts
+    for placed in parts:
+        if placed.made is not None and placed.part.on is not None:
+            yield from _lines_through(assembled, placed)
+        other = assembled.on(placed)
+        early = placed.part.at == "lumen" and other is not None and other.made is not None
+        if not (early and other is not None and other.part.on is not None):
+            yield placed
+
+
+def _lines_through(assembled: Assembled, placed: PlacedPart) -> list[PlacedPart]:
+    return [
+        part for part in assembled.parts if part.part.at == "lumen" and part.part.on == placed.name
+    ]
+
+
+def _what(placed: PlacedPart) -> str:
+    if placed.made is not None:
+        return placed.made.design.name
+    names = {"line": "vacuum or fluid line", "cup": "suction cup"}
+    return names.get(placed.part.kind, placed.part.kind)
+
+
+def _where(placed: PlacedPart) -> str:
+    words = {"start": "at the start", "end": "at the end", "outside": "on the outside"}
+    at = str(placed.part.at)
+    return words.get(at, f"in the {at}" if at in ("lumen", "inlet") else f"on the {at}")
+
+
+def _ready(placed: PlacedPart) -> Iterator[Action]:
+    part = placed.part
+    if isinstance(part, Tube):
+        yield Action(
+            f"Cut {say.millimetres(part.length)} of {part.material} tube, outer diameter "
+            f"{say.millimetres(part.outer_diameter)}, inner "
+            f"{say.millimetres(part.inner_diameter)}, square. Mark its start, and a straight line "
+            "along it: that is angle 0."
+        )
+    elif isinstance(part, Base):
+        yield Action(
+            f"Have a {part.kind} of {part.material} ready, {say.size(part.width, part.length)}, "
+            f"{say.millimetres(part.thickness)} thick. Mark its top, and on both faces an arrow "
+            f"along the {say.millimetres(part.width)}, the same way."
+        )
+    elif isinstance(part, Magnet):
+        yield Action(
+            f"Measure {part.part}: {say.millimetres(part.diameter)} across, "
+            f"{say.millimetres(part.thickness)} thick. If it differs, change the file and check."
+        )
+        yield Action(
+            "Hold it to the magnet that will hold it through the wall, and mark the face that is "
+            "drawn to it: that face goes outward."
+        )
+    elif isinstance(part, Cup):
+        yield Action(
+            f"Cast the cup in {part.material} as its package says: rim "
+            f"{say.millimetres(part.diameter)}, neck {say.millimetres(part.neck)}, height "
+            f"{say.millimetres(part.height)}, wall {say.millimetres(part.wall)}, hole for the line "
+            f"{say.millimetres(part.bore)}."
+        )
+    elif isinstance(part, Line):
+        yield Action(
+            f"Cut {part.tubing}, outer diameter {say.millimetres(part.outer_diameter)}, square and "
+            f"without burr; {say.millimetres(part.length)} are drawn, your rig may need more."
+        )
+    else:
+        yield Action(
+            f"Take a {_what(placed)} that has passed its leak test; its inlet tubes stay open."
+        )
+
+
+def _fix(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
+    part = placed.part
+    if isinstance(part, Line):
+        yield from _thread(placed, part, other)
+    elif isinstance(placed, PlacedSba) and placed.radius is not None:
+        yield from _bend(placed, other)
+    else:
+        yield Action(
+            f"Lay it {_where(placed)} of {other.name}: {_spot(placed, other)}. Try it dry."
+        )
+    yield from _glue(placed, other)
+
+
+def _spot(placed: PlacedPart, other: PlacedPart) -> str:
+    """Where the middle of a part lies, and which way the part is turned."""
+    part = placed.part
+    x, y = part.offset
+    if part.at == "outside":
+        spot = f"{_round(part.angle)}, {say.millimetres(part.along)} from the tube's start"
+        return spot if not part.turn else f"{spot}, turned {part.turn:g} degrees anti-clockwise"
+    has_mark = isinstance(part, Sba | Tube | Base)
+    words = [f"looking at that face, with {_mark(other)} to the right"]
+    if not (x or y or has_mark):
+        return "axis on axis"
+    if x or y:
+        # What is up on an upper face is down on a lower one, looked at from below.
+        up = -y if _is_below(placed) else y
+        sides = [_aside(x, "right", "left"), _aside(up, "up", "down")]
+        words.append(f"its middle {' and '.join(filter(None, sides))}")
+    else:
+        words.append("axis on axis")
+    if has_mark:
+        words.append(_heading(placed, other))
+    return ", ".join(words)
+
+
+def _is_below(placed: PlacedPart) -> bool:
+    """Whether a part is fixed on a lower face, upside down."""
+    return placed.part.at in ("bottom", "start")
+
+
+def _aside(value: float, plus: str, minus: str) -> str:
+    return f"{say.millimetres(abs(value))} {plus if value > 0 else minus}" if value else ""
+
+
+def _mark(placed: PlacedPart) -> str:
+    """What shows a part's direction x."""
+    if placed.made is not None:
+        return f"the tab of {placed.made.laminate.inlets[0].chamber}"
+    marks = {"tube": "the marked line", "base": "the arrow", "sheet": "the arrow"}
+    return marks.get(placed.part.kind, "any side")
+
+
+def _heading(placed: PlacedPart, other: PlacedPart) -> str:
+    """Which face of a part is glued, and which way its mark points: an SBA bends by its tabs."""
+    face = {"sba": "base", "tube": "start"}.get(placed.part.kind, "underside")
+    # On a lower face the part lies upside down, and is looked at from below.
+    turn = _angle(placed) + placed.turn
+    turn += _angle(other) - 180 if _is_below(placed) else -_angle(other)
+    turn = round(turn, 6) % 360
+    way = f"over {_mark(other)}" if turn == 0 else f"{turn:g} degrees anti-clockwise from there"
+    return f"its {face} glued, {_mark(placed)} {way}"
+
+
+def _angle(placed: PlacedPart) -> float:
+    """Degrees from a part's x to its mark."""
+    if placed.made is None:
+        return 0.0
+    x, y = placed.made.laminate.inlets[0].direction
+    return math.degrees(math.atan2(y, x))
+
+
+def _round(angle: float) -> str:
+    if not angle:
+        return "on the marked line"
+    way = "anti-clockwise" if angle > 0 else "clockwise"
+    return f"{abs(angle):g} degrees {way} from the marked line, looking at the tube's end"
+
+
+def _bend(placed: PlacedSba, other: PlacedPart) -> Iterator[Action]:
+    part = placed.part
+    form = placed.made.design.form
+    middle = say.millimetres(part.along)
+    if form.wrap is None:
+        yield Action(
+            f"Bend it round {other.name}, base inward: its lumen {_round(part.angle)}, {middle} "
+            f"from the tube's start; {_tab(placed)}. Try it dry."
+        )
+        return
+    end = "start" if part.turn % 360 == 180 else "end"
+    yield Action(
+        f"Wrap the sheet round {other.name}, balloons outward, its straight edges along the tube: "
+        f"the middle of the SBAs {middle} from the tube's start, tabs toward its {end}, the middle "
+        f"SBA {_round(part.angle)}. Try it dry."
+    )
+    yield Action(
+        f"Check: the edges of the sheet meet, and the {form.stacks} SBAs lie {360 / form.stacks:g} "
+        f"degrees apart ({say.millimetres(form.wrap.pitch)} round the tube, measured on the sheet)."
+    )
+
+
+def _tab(placed: PlacedPart) -> str:
+    """Where chamber1's tab points: at no turn round the tube, then on toward the tube's end."""
+    turn = placed.part.turn % 360
+    plain = {
+        0: "round the tube, anti-clockwise as you look at its end",
+        90: "to the tube's end",
+        180: "round the tube, clockwise as you look at its end",
+        270: "to the tube's start",
+    }
+    if turn in plain:
+        return f"the tab of chamber1 points {plain[int(turn)]}"
+    return (
+        f"the tab of chamber1 points {turn:g} degrees from the anti-clockwise way round the tube, "
+        "by way of the tube's end"
+    )
+
+
+def _thread(placed: PlacedPart, line: Line, other: PlacedPart) -> Iterator[Action]:
+    if line.at == "inlet":
+        yield Action(
+            f"Push it into the inlet of {line.chamber} of {other.name}, beside the PTFE strip, in "
+            "place of a tube fitted earlier."
+        )
+        return
+    if other.part.on is not None and other.made is not None:
+        yield Action(f"Take {other.name}, not fixed yet: a {_what(other)} without leaks.")
+    past = line.along + line.length - other.height
+    face = "top" if other.made is not None else "end"
+    side = f"{say.millimetres(abs(past))} {'past' if past >= 0 else 'short of'} its {face}"
+    yield Action(f"Thread it through the lumen of {other.name} until it ends {side}.")
+
+
+def _glue(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
+    glue = _adhesive(placed)
+    if glue is None:
+        if placed.part.at == "outside" or not isinstance(placed.part, Line):
+            yield Action("No adhesive is named for this joint: say how it holds, or it is loose.")
+        return
+    how = (
+        "a small drop"
+        if isinstance(placed.part, Magnet)
+        else "a thin bead round the line at each face that it comes out of"
+        if isinstance(placed.part, Line)
+        else "a thin, even film"
+    )
+    clear = "the line" if isinstance(placed.part, Line) else "lumen"
+    yield Action(f"Glue: {glue}, {how}. Keep it out of {clear}, bores, inlets and balloons.")
+    yield Action("Hold it in place and let it cure as the package says before the next step.")
+
+
+def _adhesive(placed: PlacedPart) -> str | None:
+    """The part's own; a sheet that is wrapped round its tube has its design's else."""
+    wrap = None if placed.made is None else placed.made.design.form.wrap
+    return placed.part.glue or (wrap.glue if wrap is not None else None)
+
+
+def _supply(placed: PlacedPart, other: PlacedPart | None, assembled: Assembled) -> Iterator[Action]:
+    """Where an actuator's tubes run, and how its tabs are folded."""
+    if placed.made is None or not placed.made.laminate.inlets:
+        return
+    tie = "tie them there with a turn of thread, loose enough for tubes to slide"
+    own = runs(placed, assembled)
+    if other is not None and own:
+        away = "start" if placed.part.at == "end" else "end"
+        over = listed(list(dict.fromkeys(name for run in own for name in run.over)))
+        past = f"; where one crosses {over}, leave it slack" if over else ""
+        places = listed([f"{run.chamber} at {round(run.angle, 1) % 360:g}" for run in own])
+        yield Action(
+            f"Fold each tab back over the rim, round its tube and not flat, and lead the tubes "
+            f"along the outside of {other.name} toward its {away}: {places} degrees{past}; {tie}."
+        )
+    elif other is not None and placed.radius is not None:
+        yield Action(
+            f"Lead its tubes along {other.name}, the way the tabs point, off all balloons; {tie}."
+        )
+    else:
+        yield Action(
+            "Gather its tubes below the base, away from what bends or opens, and tie them 10 mm "
+            "behind the tabs, so that they trail and no pull reaches a tab."
+        )
+
+
+def _leak_pressures(made: Sequence[PlacedSba]) -> str:
+    """The leak tests' pressures, one number where the designs agree."""
+    pressures = {one.made.design.acceptance.leak_pressure_kpa for one in made}
+    return " or ".join(f"{pressure:g}" for pressure in sorted(pressures))
+
+
+def final_checks(assembled: Assembled) -> list[Action]:
+    """What the finished assembly must do; figures are predictions."""
+    made = [placed for placed in assembled.parts if isinstance(placed, PlacedSba)]
+    deploy = assembled.assembly.deploy
+    actions = [
+        Action(
+            f"Raise each actuator to {_leak_pressures(made)} kPa again: no leak, no joint opens.",
+            (),
+            tuple(placed.name for placed in made) if len(made) > 1 else (),
+        )
+    ]
+    if any(isinstance(placed.part, Line) for placed in assembled.parts):
+        actions.append(Action("Draw air through every line: it is open from end to end."))
+    if any(isinstance(placed.part, Cup) for placed in assembled.parts):
+        actions.append(Action("Press the cup on glass and draw vacuum: it holds on."))
+    if deploy.aperture_diameter is not None:
+        hole = say.millimetres(deploy.aperture_diameter)
+        actions.append(Action(f"Deflated and folded, it goes through a hole of {hole}."))
+    if deploy.lumen_diameter is not None:
+        lumen = say.millimetres(deploy.lumen_diameter)
+        actions.append(Action(f"Deflated, it slides through a tube of inner diameter {lumen}."))
+        actions += [
+            Action(
+                f"Inflated in the open until its films are taut, {placed.name} measures about "
+                f"{across}; in the tube of {lumen} it holds against a pull."
+            )
+            for placed in made
+            if (across := _across(placed)) is not None
+        ]
+    if any(isinstance(placed.part, Magnet) for placed in assembled.parts):
+        actions.append(Action("The outer magnet draws and holds the base through the wall."))
+    return actions
+
+
+def _across(placed: PlacedSba) -> str | None:
+    form, laminate = placed.made.design.form, placed.made.laminate
+    reached, widest = reached_diameter(form, laminate), inflated_diameter(form, laminate)
+    if reached is None or widest is None:
+        return None
+    return f"{reached:.1f} mm across, {widest:.1f} mm at most"
+
+
+def bought(assembled: Assembled, copies: int) -> list[Item]:
+    """Rows of the bill of materials for what is not cut from film."""
+    items = [_item(placed, copies) for placed in assembled.parts if placed.made is None]
+    glues = dict.fromkeys(filter(None, map(_adhesive, assembled.parts)))
+    for glue in glues:
+        joints = [placed.name for placed in assembled.parts if _adhesive(placed) == glue]
+        items.append(Item("Adhesive", f"{glue}, for {listed(joints)}", "as needed"))
+    return items
+
+
+def _item(placed: PlacedPart, copies: int) -> Item:
+    part, name = placed.part, f"{placed.part.kind.capitalize()} “{placed.name}”"
+    if isinstance(part, Tube):
+        size = (
+            f"{part.material}, outer diameter {say.millimetres(part.outer_diameter)}, inner "
+            f"{say.millimetres(part.inner_diameter)}, {say.millimetres(part.length)} long"
+        )
+    elif isinstance(part, Magnet):
+        size = (
+            f"{part.part}, {say.millimetres(part.diameter)} across, "
+            f"{say.millimetres(part.thickness)} thick"
+        )
+    elif isinstance(part, Cup):
+        size = f"cast from {part.material}, rim {say.millimetres(part.diameter)}"
+    elif isinstance(part, Line):
+        size = (
+            f"{part.tubing}, outer diameter {say.millimetres(part.outer_diameter)}, "
+            f"{say.millimetres(part.length)}"
+        )
+    else:
+        assert isinstance(part, Base)
+        size = f"{part.material}, {say.size(part.width, part.length)}"
+    return Item(name, size, str(copies))

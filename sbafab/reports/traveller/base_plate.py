@@ -10,9 +10,8 @@ from sbafab.laminate.base_plate import MAKINGS, most_play
 from sbafab.laminate.laminate import Pin
 from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, RELEASE, UNDERLAY, pieces
 from sbafab.pressing.dowels import PinHole, pin_holes
-from sbafab.pressing.schedule import Schedule, Step
-from sbafab.pressing.words import listed
-from sbafab.reports.traveller import quantities as say
+from sbafab.pressing.schedule import Schedule, Step, listed
+from sbafab.reports.traveller import job as say
 from sbafab.reports.traveller.bench import TAPE
 from sbafab.reports.traveller.job import Work
 

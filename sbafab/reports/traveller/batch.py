@@ -5,13 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sbafab.cutting.fixture import whole_plate
-from sbafab.geometry.svg import number, path_data
-from sbafab.pressing.together import Runs, batch_times, most_together, working_days
-from sbafab.pressing.working_days import CUT_SHARE, FINISH_SHARE, Entry
+from sbafab.geometry.region import number, path_data
+from sbafab.pressing.cycles import (
+    CUT_SHARE,
+    FINISH_SHARE,
+    Entry,
+    Runs,
+    batch_times,
+    most_together,
+    working_days,
+)
 from sbafab.reports import drawing as draw
-from sbafab.reports.traveller import quantities as say
-from sbafab.reports.traveller.action import Action
-from sbafab.reports.traveller.job import Work
+from sbafab.reports.traveller import job as say
+from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.traveller.shapes import Picture, flat, label, pattern_id
 
 WIDEST = 110.0

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 from sbafab.design.records import HoldDown
 from sbafab.laminate.assembly import AssemblyStep, distinct_layers
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.heating import Heating
-from sbafab.pressing.schedule import Step
-from sbafab.pressing.words import listed
-from sbafab.reports.traveller import quantities as say
-from sbafab.reports.traveller.action import Action
-from sbafab.reports.traveller.job import Work
-from sbafab.reports.traveller.warming import closing_words
+from sbafab.pressing.schedule import END, MELTING, PATIENCE, START, Heating, HeatPoint, Step, listed
+from sbafab.reports.traveller import job as say
+from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.underlay import guides
 from sbafab.rules.pin_fit import NAME as PIN_FIT
 from sbafab.rules.pin_fit import most_on_a_pin
@@ -197,3 +194,172 @@ def reseat(laminate: Laminate, adds: Sequence[int], pinned: bool) -> list[Action
 def closing(step: Step, heating: Heating, cycles: tuple[str, ...] = ()) -> Action:
     """When the clock starts, as the plate goes in cold; a box for each of the ``cycles``."""
     return Action(closing_words(step, heating), (), cycles)
+
+
+# How the plate warms, as the bench reads it: the time-temperature line and its blanks.
+
+
+MOST_RAISED = 5.0
+"""C by which the platens may be set hotter than the schedule says: ours."""
+
+
+class HeatBlank(NamedTuple):
+    """A point of a step's time-temperature line, in words, with a blank for the time read; ``id``
+    tells that from the others.
+    """
+
+    point: str
+    said: str
+    id: str
+
+
+def line(step: Step) -> list[HeatBlank]:
+    """Return the line of a step, from the melting point to the end of its clock."""
+    return [
+        HeatBlank(point.point, _said(point, step), f"heat-{step.step}-{number}")
+        for number, point in enumerate(step.time_temperature, 1)
+    ]
+
+
+def _said(point: HeatPoint, step: Step) -> str:
+    """The point as short as one line of the page asks for three of them."""
+    if point.point == END:
+        return f"end ({say.minutes(step.minutes)} later)"
+    what = "melting" if point.point == MELTING else point.point
+    minutes = point.after_minutes
+    after = f"{point.after_constants:.2f} τ" if minutes is None else say.minutes(minutes)
+    return f"{point.edge_c:g} °C ({what}, {after})"
+
+
+def note(work: Work) -> str:
+    """Return what the paper says of time, what we add, and the line that all steps share."""
+    found = work.schedule.heating
+    platens, warms = found.platen_c, found.platen_c - found.start_c
+    points = work.schedule.steps[0].time_temperature
+    [start] = [point for point in points if point.point == START]
+    words = (
+        "Time. The paper says 135 °C and minutes for each step; it does not say when its clock "
+        "starts. Ours: plate and films go in cold, and the clock starts when a thermocouple taped "
+        f"to the plate's edge reads {found.clock_c:g} °C, not before. A first-order estimate of "
+        f"that edge is T = {platens:g} - {warms:g} exp(-t/τ) °C from {found.start_c:g} °C, τ of "
+        f"this bench {say.plain(found.time_constant_minutes)} min (Before the day says how it is "
+        "measured). After closing, "
+    )
+    starts = f"the clock starts after {_after(start)}"
+    if found.melting_c is None:
+        words += f"{starts}; the films' melting point is not known."
+    else:
+        [melting] = [point for point in points if point.point == MELTING]
+        apart = (start.after_constants or 0.0) - (melting.after_constants or 0.0)
+        words += (
+            f"the films' melting point, {found.melting_c:g} °C, is reached after "
+            f"{_after(melting)}, and {starts}: for {apart:.2f} τ they melt beside the minutes."
+        )
+    return words + (
+        f" Where the edge does not read {found.clock_c:g} °C within {PATIENCE:g} τ "
+        f"({_patience(found)}): do not start the clock; open, set these films aside as a sample, "
+        "for nobody knows how long they were pressed, and find the cause as under Before the day."
+    )
+
+
+def _after(point: HeatPoint) -> str:
+    return f"{point.after_constants:.2f} τ = {say.minutes(point.after_minutes)}"
+
+
+def closing_words(step: Step, heating: Heating) -> str:
+    """Return when the clock of a step starts; one line of the page."""
+    return (
+        f"Close the press. Start the clock, {say.minutes(step.minutes)}, only when the plate's "
+        f"edge reads {heating.clock_c:g} °C (see Time, above)."
+    )
+
+
+def _patience(heating: Heating) -> str:
+    tau = heating.time_constant_minutes
+    return say.minutes(None if tau is None else PATIENCE * tau)
+
+
+def before_the_day(heating: Heating, steps: int) -> Iterator[str]:
+    """Yield how τ is measured, and what to do where the plate's edge stays too cold."""
+    hot, ready = say.temperature(heating.platen_c), say.temperature(heating.clock_c)
+    reach = heating.platen_c - (heating.platen_c - heating.start_c) * math.exp(-1)
+    yield (
+        "Time constant τ of the plate, once for a bench: lay the whole build-up without films, "
+        f"plate at {heating.start_c:g} °C, a thermocouple taped to its edge; close it between "
+        f"platens at {hot} and write the reading every half minute. τ is the time to {reach:.0f} "
+        "°C, 63 % of the way: ________ min. Give it to press.time_constant. "
+        f"{heating.constants_to(heating.clock_c):.2f} τ come on top of each of the "
+        f"{say.count(steps, 'press step')}."
+    )
+    yield (
+        f"Where the edge ends after {PATIENCE:g} τ: ________ °C. It must be {ready} or more. If it "
+        "is less: is the thermocouple right (100 °C in boiling water at sea level) and taped down; "
+        "do both platens read what they are set to, with the same thermocouple; does the plate lie "
+        "flat and the pad cover it? Then set the platens hotter by what is missing, by "
+        f"{MOST_RAISED:g} °C at most, here: ________ °C, and measure again. More is missing: do "
+        "not press."
+    )
+
+
+# What the press's gauge and a pressure-indicating film must resolve.
+
+
+class FilmClass(NamedTuple):
+    """A class of pressure-indicating film: its name, its product, and its range in kPa."""
+
+    name: str
+    product: str
+    low: float
+    high: float
+
+
+FILM_CLASSES = (
+    FilmClass("extreme low pressure", "4LW", 50, 200),
+    FilmClass("ultra super low pressure", "LLLW", 200, 600),
+    FilmClass("super low pressure", "LLW", 500, 2500),
+)
+"""Two-sheet films of Fujifilm Prescale, by the ranges that its maker lists as far as we know: the
+list was not opened, so the page has them compared with the box."""
+COLD = "once, cold, to find the pressure; compare its range with the box"
+WANTED = 0.05
+"""Share to which a gauge should set the pressure: ours."""
+
+
+def pressure_range(works: Sequence[Work]) -> tuple[float, float]:
+    """Return the least and the largest pressure in kPa that any place of the films gets."""
+    steps = [step for work in works for step in work.schedule.steps]
+    low = min(min(step.film_kpa, step.bond_kpa, step.plate_kpa) for step in steps)
+    return low, max(max(step.edge_kpa, step.film_kpa) for step in steps)
+
+
+def film_classes(low: float, high: float) -> list[FilmClass]:
+    """Return the fewest classes that cover a range in kPa, as far as classes do."""
+    return [one for one in FILM_CLASSES if one.low < high and one.high > low]
+
+
+def film_words(works: Sequence[Work]) -> str:
+    """Return which pressure-indicating film covers what the films get."""
+    low, high = pressure_range(works)
+    found = film_classes(low, high)
+    names = listed(
+        [f"{one.name} ({one.product}, {one.low:g} to {one.high:g} kPa)" for one in found]
+    )
+    return (
+        f"pressure-indicating film for {low:.0f} to {high:.0f} kPa: Fujifilm Prescale, {names}"
+        if found
+        else f"pressure-indicating film for {low:.0f} to {high:.0f} kPa"
+    )
+
+
+def notes(work: Work) -> tuple[str, ...]:
+    """Return what a reading of the press's gauge is worth on the platen."""
+    step = work.schedule.steps[0]
+    pound = step.pressure_kpa / step.force_n * say.NEWTONS_PER_POUND
+    finest = 2 * WANTED * step.pressure_kpa / pound
+    return (
+        f"The gauge: {say.force(step.force_n)} is the reading, 1 lbf of it {pound:.2g} kPa. Read "
+        f"to half a division, a gauge sets {step.pressure_kpa:g} kPa to {WANTED:.0%} if it has a "
+        f"division every {finest:.0f} lbf ({finest * say.NEWTONS_PER_POUND:.0f} N) or finer; what "
+        "the gauge of the paper's press (Carver 5420) has, we do not know. A coarser one: set the "
+        "force by a load cell between the platens, cold, and mark the gauge.",
+    )

@@ -11,10 +11,9 @@ from dataclasses import replace
 
 from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, UNDERLAY, BuildUpPart
 from sbafab.pressing.dowels import PinSetting, push_out
-from sbafab.pressing.schedule import Step
-from sbafab.pressing.words import listed
+from sbafab.pressing.schedule import Step, listed
 from sbafab.reports import drawing as draw
-from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller import job as say
 from sbafab.reports.traveller.shapes import Picture
 
 WIDE, LABELS, EDGE = 26.0, 43.0, 1.0

@@ -10,15 +10,13 @@ from dataclasses import dataclass
 
 from sbafab.cutting.fixture import shown
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Region
-from sbafab.geometry.svg import number, path_data
+from sbafab.geometry.region import Region, number, path_data
 from sbafab.laminate.assembly import AssemblyStep, distinct_layers, stack_count
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.reports import drawing as draw
-from sbafab.reports.features import layer_numbers
-from sbafab.reports.traveller import quantities as say
-from sbafab.reports.traveller.layup import Bed, Round, rounds
-from sbafab.reports.traveller.shapes import Picture, pattern_id
+from sbafab.reports.drawing import layer_numbers
+from sbafab.reports.traveller import job as say
+from sbafab.reports.traveller.shapes import Bed, Picture, Round, pattern_id, rounds
 
 WIDE = 58.0
 TILT = 0.34

@@ -5,22 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from sbafab.cutting.cut_layers import CUT_OUTER
+from sbafab.cutting.properties import CUT_OUTER
 from sbafab.cutting.second_cut import PATH as SECOND_CUT
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Region
-from sbafab.geometry.svg import number, path_data
-from sbafab.laminate.inks import ink
-from sbafab.laminate.laminate import Laminate, Layer, Pin
-from sbafab.laminate.panel import SheetPanel
-from sbafab.pressing.words import listed
+from sbafab.geometry.region import Region, number, path_data
+from sbafab.laminate.films import ink
+from sbafab.laminate.laminate import Laminate, Layer, Pin, SheetPanel
+from sbafab.pressing.schedule import listed
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller import bench, process
-from sbafab.reports.traveller import quantities as say
-from sbafab.reports.traveller.action import Action
-from sbafab.reports.traveller.bill import Cut, Item, bill, cut_list
-from sbafab.reports.traveller.job import Work
-from sbafab.reports.traveller.notes import expected_sizes
+from sbafab.reports.traveller import job as say
+from sbafab.reports.traveller.bill import Cut, Item, bill, cut_list, expected_sizes
+from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.traveller.process import COVER, StepPage
 from sbafab.reports.traveller.shapes import Picture, label
 from sbafab.reports.traveller.times import PAPER_MINUTES, Time

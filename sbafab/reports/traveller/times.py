@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sbafab.pressing.together import batch_times
-from sbafab.reports.traveller import quantities as say
+from sbafab.pressing.cycles import batch_times
+from sbafab.reports.traveller import job as say
 from sbafab.reports.traveller.job import Work
 
 PAPER_MINUTES = 105.0

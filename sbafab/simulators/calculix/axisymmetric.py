@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.errors import OutputError
-from sbafab.simulators.calculix.frd import read_frd
+from sbafab.simulators.calculix.deck import TPE, Elastic
+from sbafab.simulators.calculix.results import read_frd
 from sbafab.simulators.calculix.run import run_ccx
-from sbafab.simulators.calculix.settings import TPE, Elastic
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -7,12 +7,10 @@ from typing import cast
 
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.conforming.settings import MeshSettings, Symmetry
-from sbafab.meshing.conforming.symmetry import images
-from sbafab.progress import Progress
-from sbafab.simulators.calculix.deck import write_deck
-from sbafab.simulators.calculix.job import deck_mesh, simulate
-from sbafab.simulators.calculix.settings import DeckSettings, Procedure, deck_settings
+from sbafab.meshing.conforming.layup import MeshSettings, Symmetry, images
+from sbafab.process import Progress
+from sbafab.simulators.calculix.deck import DeckSettings, Procedure, deck_settings, write_deck
+from sbafab.simulators.calculix.run import deck_mesh, simulate
 from sbafab.simulators.simulator import Result, Wish
 
 USES = ("h", "symmetry", "procedure")

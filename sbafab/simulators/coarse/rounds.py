@@ -8,11 +8,9 @@ from dataclasses import dataclass, replace
 
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Arc, Point
-from sbafab.geometry.region import Contour
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Contour, disc
 from sbafab.laminate.films import Film
-from sbafab.laminate.interfaces import Interface
-from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.laminate import Interface, Laminate
 
 ON_AXIS = 1e-6
 SUPPORTED = "the coarse shell is made for stacks of round pockets on common plates"

@@ -13,10 +13,9 @@ from typing import Any
 
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.progress import Progress
-from sbafab.simulators.coarse.tip import Tip, tip_at
-from sbafab.simulators.mujoco.files import DATA, MODEL, SECTORS, write_model
-from sbafab.simulators.simulator import refuse_time
+from sbafab.process import Progress
+from sbafab.simulators.mujoco.model import DATA, MODEL, SECTORS, write_model
+from sbafab.simulators.simulator import Tip, refuse_time, tip_at
 
 SECONDS = 5.0
 RAMP = 1.0

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from sbafab.laminate.laminate import Laminate
-from sbafab.progress import Progress
-from sbafab.simulators.coarse.actuator import PRESSURE
-from sbafab.simulators.mujoco.files import why_no_model, write_model
+from sbafab.process import Progress
+from sbafab.simulators.coarse.shell import PRESSURE
+from sbafab.simulators.mujoco.model import why_no_model, write_model
 from sbafab.simulators.mujoco.run import LEAST_TIME, RAMP, SECONDS, simulate
 from sbafab.simulators.simulator import Result, Wish, chamber_pressures, refuse_time
 

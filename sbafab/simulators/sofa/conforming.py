@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 from sbafab.laminate.films import density_of
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Vector
-from sbafab.simulators.coarse.actuator import PRESSURE, checked
 from sbafab.simulators.coarse.rounds import elastic_of
-from sbafab.simulators.coarse.web import Triangle
+from sbafab.simulators.coarse.shell import PRESSURE, Triangle, checked
 from sbafab.simulators.sofa.shell import FilmGroup, Shell
 
 if TYPE_CHECKING:
@@ -33,11 +32,9 @@ def conforming_shell(laminate: Laminate, pressures: Mapping[str, float] | None =
     The mouths of inlets are open and free. Raises DesignError where a chamber is unknown, a
     film's modulus is not known, or the mesher is not installed.
     """
+    from sbafab.meshing.conforming.element_mesh import shell_mesh, thin
     from sbafab.meshing.conforming.elements import volumes
-    from sbafab.meshing.conforming.form import flat
-    from sbafab.meshing.conforming.layup import layup, narrowest_ring
-    from sbafab.meshing.conforming.settings import MeshSettings
-    from sbafab.meshing.conforming.shell_mesh import shell_mesh, thin
+    from sbafab.meshing.conforming.layup import MeshSettings, flat, layup, narrowest_ring
 
     names = tuple(chamber.name for chamber in laminate.chambers)
     told = checked(names, pressures, PRESSURE, "pressure", "kPa")

@@ -11,8 +11,14 @@ from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.simulators.coarse.rounds import elastic_of, why_not_round
 from sbafab.simulators.sofa.conforming import conforming_shell
-from sbafab.simulators.sofa.frames import FRAMES_START, beam_scene, frames_scene
-from sbafab.simulators.sofa.parts import nodal_stiffness
+from sbafab.simulators.sofa.scenes import (
+    FRAMES_START,
+    beam_scene,
+    frames_scene,
+    nodal_stiffness,
+    shell_scene,
+    volume_scene,
+)
 from sbafab.simulators.sofa.shell import (
     COARSE_SECTORS,
     FilmGroup,
@@ -21,7 +27,6 @@ from sbafab.simulators.sofa.shell import (
     round_actuator,
     round_shell,
 )
-from sbafab.simulators.sofa.shell_scene import shell_scene, volume_scene
 
 SHELL, FRAMES, VOLUME, BEAM = (
     "actuator.scn",

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
+import math
+import re
 import signal
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.progress import Progress
-from sbafab.simulators.coarse.actuator import PRESSURE, checked
+from sbafab.meshing.surface import Vector
+from sbafab.process import Progress
 from sbafab.simulators.coarse.rounds import why_not_round
-from sbafab.simulators.coarse.tip import Tip
-from sbafab.simulators.program import Ended, program_path, run_program
-from sbafab.simulators.simulator import refuse_time
+from sbafab.simulators.coarse.shell import PRESSURE, checked
+from sbafab.simulators.simulator import Ended, Tip, program_path, refuse_time, run_program, tip_at
+from sbafab.simulators.sofa.conforming import pocket_radii
 from sbafab.simulators.sofa.files import BEAM, FRAMES, SHELL, VOLUME, write_scenes
-from sbafab.simulators.sofa.frames import BEAM_DT, FRAMES_DT
-from sbafab.simulators.sofa.judge import TipLimits, impossible, limits
-from sbafab.simulators.sofa.parts import TIP_FILE, TIP_PERIOD
-from sbafab.simulators.sofa.shell_scene import DT
-from sbafab.simulators.sofa.tip import Log, plugins_needed, read_log, read_tips
+from sbafab.simulators.sofa.scenes import BEAM_DT, DT, FRAMES_DT, TIP_FILE, TIP_PERIOD
 
 Scene = Literal["shell", "frames", "volume", "beam"]
 
@@ -187,4 +185,130 @@ def _trouble(ended: Ended, log: Log, tips: list[Tip], seconds: float) -> str | N
         return f"it wrote no place of the tip into {TIP_FILE}"
     if tips[-1].time < seconds - 1.5 * TIP_PERIOD:
         return f"the tip's record ends before {seconds:g} s or is no finite number from there on"
+    return None
+
+
+# What SOFA wrote: the tip's record, and the log that tells whether to believe it.
+
+
+TROUBLE = re.compile(r"\[ERROR\]|\bnan\b|Division by zero|Null determinant", re.IGNORECASE)
+NO_PLUGIN = re.compile(r"\[ERROR\].*Plugin not found: \"([^\"]*)\"")
+NEEDED = re.compile(r'<RequiredPlugin name="([^"]*)"')
+DONE = re.compile(r"(\d+) iterations done in (\S+) s \(\s*(\S+) FPS\s*\)")
+
+
+@dataclass(frozen=True)
+class Log:
+    """What the log tells: its first line of trouble, steps done, s taken and steps per s."""
+
+    trouble: str | None
+    steps: int | None
+    seconds: float | None
+    rate: float | None
+
+
+def read_tips(path: Path) -> list[Tip]:
+    """The tip's records in time up to the first that is cut short or is no finite number."""
+    return [tip_at(time, points) for time, points in read_points(path)]
+
+
+def read_points(path: Path) -> list[tuple[float, list[Vector]]]:
+    """Time in s and places in mm of the recorded nodes, as far as ``read_tips`` reads them."""
+    if not path.is_file():
+        return []
+    found: list[tuple[float, list[Vector]]] = []
+    time: float | None = None
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True):
+        key, _, values = line.strip().partition("=")
+        numbers = _numbers(values)
+        if numbers is None or not line.endswith("\n"):
+            break
+        if key == "T" and len(numbers) == 1:
+            time = numbers[0]
+        elif key == "X" and time is not None:
+            if len(numbers) < 9 or len(numbers) % 3:
+                break
+            found.append((time, list(_points(numbers))))
+    return found
+
+
+def plugins_needed(scene: Path) -> list[str]:
+    """The plugins that a scene asks for."""
+    return NEEDED.findall(scene.read_text(encoding="utf-8")) if scene.is_file() else []
+
+
+def read_log(text: str, plugins: Collection[str] = ()) -> Log:
+    """What a log tells of a run whose scene asks for these plugins; others may be missing."""
+
+    def voids(line: str) -> bool:
+        missing = NO_PLUGIN.search(line)
+        return missing is None or missing[1] in plugins
+
+    lines = (line.strip() for line in text.splitlines() if TROUBLE.search(line))
+    trouble = next(filter(voids, lines), None)
+    done = DONE.search(text)
+    if done is None:
+        return Log(trouble, None, None, None)
+    return Log(trouble, int(done[1]), float(done[2]), float(done[3]))
+
+
+def _numbers(text: str) -> list[float] | None:
+    try:
+        numbers = [float(word) for word in text.split()]
+    except ValueError:
+        return None
+    return numbers if all(map(math.isfinite, numbers)) else None
+
+
+def _points(numbers: list[float]) -> Iterator[Vector]:
+    for i in range(0, len(numbers), 3):
+        yield numbers[i], numbers[i + 1], numbers[i + 2]
+
+
+# Whether what a scene gave can be: where the tip is, how high, how far it leans.
+
+
+LEAST_RISE = 0.01
+"""mm that a tip must stand above its base: no scene starts as low and stays there."""
+MOST_LEAN = 1.0
+"""Degrees of tilt where all chambers are alike; shells that hold stand within 0.1."""
+STRETCH = 1.3
+"""Times its flat length that a film may be along its meridian; more has burst it long before."""
+
+
+@dataclass(frozen=True)
+class TipLimits:
+    """What a tip can do: stand ``highest`` mm over its base at most, and lean or not."""
+
+    highest: float
+    must_stand: bool
+
+
+def limits(laminate: Laminate, told: Collection[float]) -> TipLimits | None:
+    """The limits of a laminate whose chambers are told these pressures or volumes.
+
+    A balloon is no higher than its two films are long; equal chambers lift a plate evenly, where
+    the mesh has no inlets. None for a laminate on a tube, whose balloons have no common tip.
+    """
+    if laminate.tube is not None:
+        return None
+    reach = sum(pocket_radii(laminate)) / len(laminate.chambers)
+    return TipLimits(2 * STRETCH * reach, len(set(told)) == 1 and why_not_round(laminate) is None)
+
+
+def impossible(tips: Sequence[Tip], limit: TipLimits) -> str | None:
+    """What the last tip does that cannot be, None if it can."""
+    last = tips[-1]
+    z = last.place[2]
+    if all(abs(value) < LEAST_RISE for value in last.place):
+        return "the tip lies at 0, 0, 0"
+    if limit.must_stand and z < LEAST_RISE:
+        return f"all chambers are told the same, and the tip has not risen (z {z:.3f} mm)"
+    if z > limit.highest:
+        return f"the tip is {z:.3f} mm high, and the films reach {limit.highest:.3g} mm at most"
+    if limit.must_stand and last.tilt > MOST_LEAN:
+        return (
+            f"all chambers are told the same, and the tip leans by {last.tilt:.1f} degrees "
+            f"(more than {MOST_LEAN:g})"
+        )
     return None

@@ -8,10 +8,16 @@ from typing import Literal, NamedTuple
 
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Vector
-from sbafab.simulators.coarse.actuator import CoarseActuator, actuator
-from sbafab.simulators.coarse.meridian import Meridian, Start, holding, standing
-from sbafab.simulators.coarse.mesh import CoarseMesh
-from sbafab.simulators.coarse.web import Triangle
+from sbafab.simulators.coarse.shell import (
+    CoarseActuator,
+    CoarseMesh,
+    Meridian,
+    Start,
+    Triangle,
+    actuator,
+    holding,
+    standing,
+)
 
 Reading = Literal["tip", "crowns"]
 """What the recorded nodes tell: a tip and its tilt, or crowns round a tube and their radius."""

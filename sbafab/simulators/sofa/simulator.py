@@ -8,13 +8,12 @@ from typing import cast
 
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-from sbafab.progress import Progress
-from sbafab.simulators.coarse.actuator import PRESSURE
+from sbafab.process import Progress
+from sbafab.simulators.coarse.shell import PRESSURE
 from sbafab.simulators.simulator import Result, Wish, chamber_pressures, refuse_time
 from sbafab.simulators.sofa.files import why_no_scene, write_scenes
-from sbafab.simulators.sofa.parts import TIP_FILE, TIP_PERIOD
-from sbafab.simulators.sofa.run import USUAL, Scene, SofaJob, SofaRun, simulate
-from sbafab.simulators.sofa.tip import read_points
+from sbafab.simulators.sofa.run import USUAL, Scene, SofaJob, SofaRun, read_points, simulate
+from sbafab.simulators.sofa.scenes import TIP_FILE, TIP_PERIOD
 
 USES = ("scene", "seconds", "volumes")
 

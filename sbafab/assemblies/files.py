@@ -1,0 +1,253 @@
+"""Assembly files in and out: TOML to records, and one clear sentence if not."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, get_args
+
+from sbafab.actuators import load_design, records
+from sbafab.assemblies.build import Assembled, PlacedPart
+from sbafab.assemblies.records import FAMILY, KINDS, AnyPart, Assembly, CheckName, Sba
+from sbafab.design.files import (
+    ASSEMBLY,
+    Change,
+    actuator_sha256,
+    add_waivers,
+    changed_keys,
+    checked,
+    design_path,
+    design_sha256,
+    kit_names,
+    listed,
+    override,
+    read_toml,
+    shown,
+    toml_tables,
+    validated,
+)
+from sbafab.design.records import Design, RuleName
+from sbafab.errors import DesignError
+
+
+def load_text(text: str, path: Path) -> Design | Assembly:
+    """The same from the text of a file that would lie at ``path``. Raises DesignError."""
+    data = toml_tables(text, path.name)
+    if data.get("family") == FAMILY:
+        return assembly_of(data, path)
+    data.setdefault("name", path.stem)
+    return validated(data, records(), path.parent)
+
+
+def load_assembly(
+    source: str | Path, changes: Iterable[Change] = (), waivers: Sequence[str] = ()
+) -> Assembly:
+    """An assembly from a template's name or a TOML file. Raises DesignError."""
+    found = load(source, changes, waivers)
+    if isinstance(found, Assembly):
+        return found
+    raise DesignError(
+        f'{found.name} is no assembly; give a file with family = "{FAMILY}" and [parts.NAME] tables'
+    )
+
+
+def changed_assembly(
+    data: dict[str, Any], path: Path, changes: Sequence[Change], waivers: Sequence[str]
+) -> Assembly:
+    """The assembly of a file's tables in which the changes are made. Raises DesignError."""
+    _start_where_the_user_stands(data, changes)
+    known = (*get_args(RuleName), *get_args(CheckName))
+    return assembly_of(add_waivers(data, waivers, known), path)
+
+
+def assembly_of(data: Mapping[str, Any], path: Path) -> Assembly:
+    """The record of an assembly file's tables. Raises DesignError with one sentence."""
+    tables = data.get("parts")
+    if not isinstance(tables, dict) or not tables:
+        raise DesignError(
+            "an assembly has a table for each part; add [parts.NAME] with kind = one of "
+            f"{listed(KINDS)}"
+        )
+    parts = {name: _part(name, table) for name, table in tables.items()}
+    whole = checked(Assembly, {"name": path.stem, **data, "parts": parts}, {})
+    return whole.placed(path.parent)
+
+
+def _part(name: str, table: object) -> AnyPart:
+    where = f"parts.{shown(name).strip(chr(39))}"
+    if not isinstance(table, dict):
+        raise DesignError(f"{where} = {shown(table)} must be a table of keys, [{where}]")
+    kind = table.get("kind")
+    if kind is None:
+        raise DesignError(f"{where}.kind is missing; add kind = one of {listed(KINDS)}")
+    if not isinstance(kind, str) or kind not in KINDS:
+        near = difflib.get_close_matches(shown(kind).strip("'"), KINDS, 1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise DesignError(f"{where}.kind = {shown(kind)} must be one of {listed(KINDS)}{hint}")
+    return checked(KINDS[kind], table, {}, f"{where}.")
+
+
+def part_design(assembly: Assembly, name: str, part: Sba) -> Design:
+    """The design of an SBA part, with the part's and the assembly's own keys set.
+
+    Raises DesignError that names the part.
+    """
+    try:
+        path = design_path(_place_of(part.design, assembly.folder))
+        table = read_toml(path)
+        if table.get("family") == FAMILY:
+            raise DesignError(
+                f"design = {shown(part.design)} is an assembly; a part is made from the design of "
+                "one actuator"
+            )
+        data = override(table, [part.set, assembly.shared])
+        data.setdefault("name", path.stem)
+        _keep_outline(data, part, assembly.folder)
+        _keep_kit(data, part, assembly)
+        own = _waivers(data)
+        rules = [r for r in assembly.rules.waive if r in _deck_names() and r not in own]
+        return validated(add_waivers(data, rules), records(), path.parent)
+    except DesignError as error:
+        raise DesignError(f"parts.{name}: {error}") from None
+
+
+def _place_of(design: str, folder: Path) -> str | Path:
+    """A bare word names a template; what looks like a path starts at the assembly's file."""
+    return folder / design if Path(design).name != design or "." in design else design
+
+
+def _waivers(data: Mapping[str, Any]) -> list[Any]:
+    """The rules that a design file's tables waive, as far as they are written as they should."""
+    rules = data.get("rules")
+    waived = rules.get("waive") if isinstance(rules, dict) else None
+    return waived if isinstance(waived, list) else []
+
+
+def _deck_names() -> frozenset[str]:
+    from sbafab.rules.deck import RULES
+
+    return frozenset(rule.name for rule in RULES)
+
+
+def _keep_outline(data: dict[str, Any], part: Sba, folder: Path) -> None:
+    """An outline that the assembly's file names lies beside that file, not beside the design."""
+    chamber = part.set.get("chamber")
+    if isinstance(chamber, dict) and isinstance(chamber.get("outline"), str):
+        data["chamber"]["outline"] = str((folder / chamber["outline"]).absolute())
+
+
+def _keep_kit(data: dict[str, Any], part: Sba, assembly: Assembly) -> None:
+    """Likewise a kit's file."""
+    kit = data.get("kit")
+    is_named_here = assembly.kit is not None or "kit" in part.set
+    if is_named_here and isinstance(kit, str) and kit not in kit_names():
+        data["kit"] = str((assembly.folder / kit).absolute())
+
+
+def _start_where_the_user_stands(data: dict[str, Any], changes: Sequence[Change]) -> None:
+    """A design's path typed on the command line starts there, not at the assembly's file."""
+    for key in changed_keys(changes):
+        match key.split("."):
+            case ["parts", name, "design"] if said := data["parts"][name].get("design"):
+                if isinstance(_place_of(str(said), Path()), Path):
+                    data["parts"][name]["design"] = str(Path(str(said)).absolute())
+
+
+# Assemblies out: resolved TOML and hash.
+
+
+DESIGN_FILE = "design.toml"
+
+
+def plain_tables(assembly: Assembly) -> dict[str, Any]:
+    """The assembly's own keys as tables, with every default written out."""
+    return _without_none(assembly.model_dump(mode="json"))
+
+
+def resolved(assembled: Assembled) -> dict[str, Any]:
+    """The assembly with every default written out; designs are those of the parts' folders."""
+    assembly = assembled.assembly
+    table = assembly.model_dump(mode="json", exclude={"kit", "sheets", "laser", "press"})
+    for name, part in table["parts"].items():
+        made = assembled[name].made
+        if made is not None:
+            # The folder's design holds the keys that were set, the assembly's own among them.
+            part["design"] = f"{made.design.name}/{DESIGN_FILE}"
+            del part["set"]
+    return _without_none(table)
+
+
+def _without_none(table: dict[str, Any]) -> dict[str, Any]:
+    return {
+        key: _without_none(value) if isinstance(value, dict) else value
+        for key, value in table.items()
+        if value is not None
+    }
+
+
+def assembly_toml(assembled: Assembled) -> str:
+    """``design.toml`` of an assembly's output folder; it builds the same assembly again."""
+    import tomli_w
+
+    return tomli_w.dumps(resolved(assembled))
+
+
+def assembly_sha256(assembled: Assembled) -> str:
+    """Hash of all that decides the output, the designs of the parts included."""
+    table = resolved(assembled)
+    digests = {made.design.name: design_sha256(made.design) for made in assembled.designs}
+    text = json.dumps([table, digests], sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def assembled_sha256(assembled: Assembled) -> str:
+    """Return the hash of what the assembly is: parts, places, glue, and the actuators among them.
+
+    Left out are name, order, pose of the pictures, notes and limits.
+    """
+    parts = {}
+    for name, part in resolved(assembled)["parts"].items():
+        made = assembled[name].made
+        actuator = {} if made is None else {"design": actuator_sha256(made.design)}
+        parts[name] = {**part, **actuator, "note": None}
+    text = json.dumps(parts, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def part_entry(placed: PlacedPart) -> dict[str, Any]:
+    """A part and its place: turned about its own axis, bent round a radius, then rows and shift."""
+    part = placed.part
+    rounded = [[round(value, 9) + 0.0 for value in row] for row in placed.pose.rows]
+    return {
+        "name": placed.name,
+        "kind": part.kind,
+        "design": None if placed.made is None else placed.made.design.name,
+        "on": part.on,
+        "at": part.at,
+        "glue": part.glue,
+        "turn": part.turn,
+        "bent_radius": placed.radius,
+        "rows": rounded,
+        "shift": [round(value, 6) + 0.0 for value in placed.pose.shift],
+    }
+
+
+# A design or an assembly from a file, whichever it holds.
+#
+# The records of assemblies are loaded for an assembly alone: most files hold a design.
+
+
+def load(
+    source: str | Path, changes: Iterable[Change] = (), waivers: Sequence[str] = ()
+) -> Design | Assembly:
+    """A design or an assembly, whichever the file holds. Raises DesignError."""
+    changes = list(changes)
+    path = design_path(source)
+    data = override(read_toml(path), changes)
+    if data.get("family") != ASSEMBLY:
+        return load_design(source, changes, waivers)
+
+    return changed_assembly(data, path, changes, waivers)

@@ -1,0 +1,676 @@
+"""What is wrong with a design file, in one sentence: field, value, what is allowed."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import json
+import re
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from copy import deepcopy
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from sbafab.design.films import UNCALIBRATED, LayerFilms, without_other_products
+from sbafab.design.records import Acceptance, Design, Inlet, Order, Press, Registration, RuleName
+from sbafab.errors import DesignError
+from sbafab.laminate.films import PAPER_PRODUCT, PAPER_TPE
+
+
+def listed(values: Iterable[object]) -> str:
+    return ", ".join(f'"{value}"' for value in values)
+
+
+def shown(value: object) -> str:
+    """A value as it may appear in a message: short, on one line."""
+    try:
+        text = repr(str(value)) if isinstance(value, str | Path) else str(value)
+        if isinstance(value, bool):
+            text = text.lower()
+    except ValueError:
+        # Python does not write out integers of thousands of digits.
+        text = "a number of thousands of digits"
+    text = " ".join(text.split())
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def sentence(
+    error: ValidationError,
+    record: type[BaseModel],
+    families: Mapping[str, type[Design]],
+    prefix: str,
+) -> str:
+    problems = error.errors(include_url=False)
+    unknown = [problem for problem in problems if problem["type"] == "extra_forbidden"]
+    first = (unknown or problems)[0]
+    # Alternatives of a union put their own name in the location; a key is what the file holds.
+    where = [_plain(part) for part in first["loc"] if not _is_alternative(part)]
+    field = (prefix + ".".join(where)).rstrip(".")
+    count = len({tuple(problem["loc"][:2]) for problem in problems}) - 1
+    more = f" (and {count} more problem{'s' if count > 1 else ''} like it)" if count > 0 else ""
+    if first["type"] == "extra_forbidden":
+        return prefix + _unknown_key(where, record, families) + more
+    if first["type"] == "missing" and isinstance(first["loc"][-1], int):
+        short = ".".join(where[:-1])
+        return f"{short} is a list without value {first['loc'][-1] + 1}; add it{more}"
+    if first["type"] == "missing":
+        return f"{field} is missing; add it to the design file{more}"
+    if not where:
+        return f"{field} {_allowed(first)}{more}"
+    return f"{field} = {shown(first['input'])} {_allowed(first)}{more}"
+
+
+def _plain(part: int | str) -> str:
+    """A key as it may appear in a message."""
+    text = str(part)
+    return text if text.isprintable() and len(text) <= 60 else shown(text)
+
+
+def _is_alternative(part: int | str) -> bool:
+    text = str(part)
+    return text in {"float", "int", "str"} or "[" in text or "(" in text
+
+
+def _allowed(problem: Any) -> str:
+    kind, context = problem["type"], problem.get("ctx", {})
+    if kind == "value_error":
+        return str(context["error"])
+    limits = {
+        "greater_than": "must be greater than {gt}",
+        "greater_than_equal": "must be at least {ge}",
+        "less_than": "must be less than {lt}",
+        "less_than_equal": "must be at most {le}",
+        "string_too_long": "must have at most {max_length} letters",
+        "too_long": "must have at most {max_length} entries",
+        "too_short": "must have at least {min_length} entries",
+    }
+    if kind == "literal_error":
+        near = difflib.get_close_matches(
+            str(problem["input"]), re.findall("'([^']*)'", context["expected"]), 1
+        )
+        hint = f"; did you mean {near[0]}?" if near else ""
+        return f"must be {context['expected']}{hint}"
+    if kind in limits:
+        return limits[kind].format(**context)
+    plain = {
+        "string_pattern_mismatch": "must be 1 to 64 letters, digits, dots, dashes or underscores, "
+        "beginning with a letter or digit",
+        "finite_number": "must be a finite number",
+        "int_type": "must be a whole number",
+        "int_from_float": "must be a whole number",
+        "int_parsing_size": "is out of range",
+        "float_type": "must be a number",
+        "string_type": "must be a text in quotes",
+        "string_unicode": "must be plain text; remove what is no letter in it",
+        "bool_type": "must be true or false",
+        "model_type": "must be a table of keys",
+        "model_attributes_type": "must be a table of keys",
+        "tuple_type": "must be a list in brackets",
+        "list_type": "must be a list in brackets",
+    }
+    return plain.get(kind, f"is not allowed: {problem['msg'].lower()}")
+
+
+def _unknown_key(
+    where: Sequence[str], record: type[BaseModel], families: Mapping[str, type[Design]]
+) -> str:
+    field = ".".join(where)
+    other = [name for name, model in families.items() if field in key_paths(model)]
+    if other:
+        return f"{field} is not a key of this family; it belongs to {listed(other)}"
+    known = key_paths(record)
+    siblings = [path for path in known if path.split(".")[:-1] == list(where[:-1])]
+    near = _nearest(where[-1], siblings, 0.6) or _nearest(where[-1], known, 0.75)
+    if near:
+        return f"{field} is not a key of a design file; did you mean {near}?"
+    return f"{field} is not a key of a design file; known here: {', '.join(siblings)}"
+
+
+def _nearest(key: str, paths: Iterable[str], cutoff: float) -> str | None:
+    """The path whose last part is most like ``key``."""
+    leaves = {path.split(".")[-1]: path for path in paths}
+    near = difflib.get_close_matches(key, leaves, 1, cutoff)
+    return leaves[near[0]] if near else None
+
+
+def key_paths(record: type[BaseModel], prefix: str = "") -> dict[str, object]:
+    """Every dotted key a record knows, as a file spells it, with its annotation."""
+    found: dict[str, object] = {}
+    for name, info in record.model_fields.items():
+        key = info.alias or name
+        found[prefix + key] = info.annotation
+        if isinstance(info.annotation, type) and issubclass(info.annotation, BaseModel):
+            found.update(key_paths(info.annotation, f"{prefix}{key}."))
+    return found
+
+
+# Design files and templates in: TOML to validated records, and one clear sentence if not.
+
+
+Change = str | Mapping[str, Any]
+"""A key to set: "key.path=value", or a table of keys, which may be dotted, with their values."""
+OUTLINE = "chamber.outline"
+DIAMETER = "chamber.diameter"
+KIT = "kit"
+AnyRecord = TypeVar("AnyRecord", bound=BaseModel)
+AnyDesign = TypeVar("AnyDesign", bound=Design)
+MOST_BYTES = 1_000_000
+ASSEMBLY = "assembly"
+"""The family of files that name several designs; :mod:`sbafab.assemblies` reads them."""
+DEEPEST = 8
+"""Most parts of a dotted key; a design file needs three."""
+_PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*"""
+_TOO_DEEP = re.compile(rf"(?<![A-Za-z0-9_-])(?:{_PART}){{{DEEPEST}}}")
+_AT_LINE = re.compile(r"\(at line (\d+), column \d+\)")
+_UNQUOTED = re.compile(r"[^=#]*=\s*([-+.\d]+\s*[A-Za-z\u00b5\u03bc]+)\s*(?:#.*)?")
+"""A line whose value is a number and a unit without quotes."""
+
+
+def design_path(source: str | Path) -> Path:
+    """The file behind a template's name or a path. Raises DesignError if there is none."""
+    names = template_names()
+    if str(source) in names:
+        return templates_folder() / f"{source}.toml"
+    path = Path(source)
+    try:
+        if path.is_file():
+            return path
+        is_folder = path.is_dir()
+    except (OSError, ValueError):
+        is_folder = False
+    if is_folder:
+        raise DesignError(f"{shown(source)} is a folder; give a design file (.toml) or a template")
+    raise DesignError(f"{shown(source)} is neither a template nor a design file; {_hint(path)}")
+
+
+def _hint(missing: Path) -> str:
+    """What may have been meant by a design that is not there."""
+    names = template_names()
+    with suppress(OSError, ValueError):
+        beside = [path.name for path in missing.parent.iterdir() if _may_be_a_design(path)]
+        exact = f"{missing.name}.toml"
+        near = [exact] if exact in beside else difflib.get_close_matches(missing.name, beside, 1)
+        if near:
+            return f"did you mean {missing.with_name(near[0])}?"
+    near = difflib.get_close_matches(str(missing), names, 1)
+    return f"did you mean {near[0]}?" if near else f"the templates are {', '.join(names)}"
+
+
+def _may_be_a_design(path: Path) -> bool:
+    return path.suffix == ".toml" or (path / "design.toml").is_file()
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a design file. Raises DesignError where it cannot be read."""
+    try:
+        with path.open("rb") as opened:
+            content = opened.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            size = path.stat().st_size
+            raise DesignError(
+                f"{path} has {size:,} bytes; a design file has at most {MOST_BYTES:,}"
+            )
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise DesignError(f"{path} is not a text file in UTF-8; save it as UTF-8") from None
+    except OSError as error:
+        raise DesignError(f"{path} cannot be read: {error.strerror or error}") from None
+    return toml_tables(text, path)
+
+
+def toml_tables(text: str, path: str | Path) -> dict[str, Any]:
+    """The tables of a design file's text; ``path`` names it in messages. Raises DesignError."""
+    # The parser's time grows with the square of the parts of a key.
+    deep = _TOO_DEEP.search(text)
+    if deep is not None:
+        raise DesignError(
+            f"{path} has a key of {DEEPEST} or more parts in line "
+            f"{text.count(chr(10), 0, deep.start()) + 1}; write [table] and key = value"
+        )
+    try:
+        return deepcopy(_parsed(text))
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        reason = str(error) or "nested too deeply"
+        # The parser names no key, but its line shows it.
+        number = _AT_LINE.search(reason)
+        line = text.split("\n")[int(number[1]) - 1] if number else text.rstrip().split("\n")[-1]
+        quotes = _UNQUOTED.fullmatch(line)
+        hint = f'; a value with a unit stands in quotes: "{quotes[1]}"' if quotes else ""
+        raise DesignError(
+            f"{path} is not valid TOML: {reason[:1].lower()}{reason[1:]}, "
+            f"{shown(line.strip())}{hint}"
+        ) from None
+
+
+@lru_cache(maxsize=8)
+def _parsed(text: str) -> dict[str, Any]:
+    """The tables of a text; a file that is varied is read again and again."""
+    return tomllib.loads(text)
+
+
+def override(data: Mapping[str, Any], changes: Iterable[Change]) -> dict[str, Any]:
+    """``data`` with every change made: keys set by ``key.path=value`` texts or by tables.
+
+    The value in a text is TOML, or else plain text. Raises DesignError for what is no change.
+    """
+    changed = _copied(data)
+    for change in changes:
+        if isinstance(change, str):
+            key, equals, text = change.partition("=")
+            if not equals or not all(_key_parts(key)):
+                raise DesignError(
+                    f"--set {shown(change)} is not KEY=VALUE; write for example "
+                    "--set chamber.diameter=6"
+                )
+            _set(changed, key, _value(text.strip()))
+        else:
+            for key, value in change.items():
+                _set(changed, key, value)
+    return changed
+
+
+def changed_keys(changes: Iterable[Change]) -> Iterator[str]:
+    """Every dotted key that the changes set."""
+    for change in changes:
+        if isinstance(change, str):
+            yield ".".join(_key_parts(change.partition("=")[0]))
+            continue
+        for key, value in change.items():
+            inner = changed_keys([value]) if isinstance(value, Mapping) else ()
+            yield from (f"{key}.{name}" for name in inner)
+            yield key
+
+
+def _key_parts(key: str) -> list[str]:
+    return [part.strip() for part in key.split(".")]
+
+
+def _set(table: dict[str, Any], key: str, value: Any) -> None:
+    """Sets a dotted key; a table as value changes only the keys that it holds."""
+    parts = _key_parts(key)
+    if len(parts) > DEEPEST:
+        raise DesignError(f"--set {shown(key)} has {len(parts)} parts; a design's keys have three")
+    for part in parts[:-1]:
+        inner = table.setdefault(part, {})
+        if not isinstance(inner, dict):
+            raise DesignError(f"--set {key}: {part} is a value, not a table")
+        table = inner
+    own = table.get(parts[-1])
+    if isinstance(value, Mapping):
+        table[parts[-1]] = override(own if isinstance(own, dict) else {}, [value])
+    else:
+        table[parts[-1]] = list(value) if isinstance(value, tuple) else value
+
+
+def start_where_the_user_stands(data: dict[str, Any], changes: Iterable[Change]) -> None:
+    """The path of a drawing or a kit that a change names starts there, not at the design file."""
+    keys = set(changed_keys(changes))
+    if OUTLINE in keys:
+        chamber = data["chamber"]
+        chamber["outline"] = str(Path(str(chamber["outline"])).absolute())
+    if KIT in keys and isinstance(data[KIT], str) and data[KIT] not in kit_names():
+        data[KIT] = str(Path(data[KIT]).absolute())
+
+
+def open_what_fits(data: dict[str, Any], changes: Iterable[Change]) -> None:
+    """A change to what the design must fit opens its chamber, unless a change names that too."""
+    keys = set(changed_keys(changes))
+    chamber = data.get("chamber")
+    fits = DIAMETER not in keys and any(key.startswith(f"{FITS}.") for key in keys)
+    if fits and isinstance(chamber, dict):
+        chamber.pop("diameter", None)
+
+
+def changed(design: AnyDesign, changes: Iterable[Change]) -> AnyDesign:
+    """The same design with changes made to its keys. Raises DesignError with one sentence."""
+    from sbafab.design.kits import under_kit, without_kit
+
+    changes = list(changes)
+    data = plain_tables(design)
+    if KIT in changed_keys(changes):
+        data = without_kit(data, design)
+    films = override({"films": {}}, changes).get("films")
+    if isinstance(films, dict):
+        data["films"] = without_other_products(data.get("films", {}), films)
+    data = override(data, changes)
+    start_where_the_user_stands(data, changes)
+    open_what_fits(data, changes)
+    data = under_kit(data, design.folder)
+    family = type(design)
+    return checked(family, data, {design.family: family}).placed(design.folder).fitted()
+
+
+def add_waivers(
+    data: dict[str, Any], waivers: Sequence[str], known: Sequence[str] = get_args(RuleName)
+) -> dict[str, Any]:
+    """``data`` with rule names added to ``rules.waive``.
+
+    Raises DesignError for a name that is not among the ``known``, in the command line's words.
+    """
+    for name in waivers:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 3) or [
+                rule for rule in known if rule.startswith(name)
+            ]
+            hint = f"did you mean {' or '.join(near)}" if near else f"it may be {', '.join(known)}"
+            raise DesignError(f"--waive {shown(name)}: no rule has that name; {hint}")
+    rules = data.get("rules", {})
+    if not waivers or not isinstance(rules, dict) or not isinstance(rules.get("waive", []), list):
+        return data
+    return {**data, "rules": {**rules, "waive": [*rules.get("waive", []), *waivers]}}
+
+
+def _copied(data: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        key: _copied(value) if isinstance(value, dict) else value for key, value in data.items()
+    }
+
+
+def _value(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError):
+        return text
+
+
+def validated(
+    data: Mapping[str, Any], families: Mapping[str, type[Design]], folder: Path
+) -> Design:
+    """The design record of the family that ``data`` names.
+
+    Raises DesignError with one sentence: field, value, what is allowed, what would fix it.
+    """
+    family = data.get("family")
+    if family is None:
+        raise DesignError(f"family is missing; add family = one of {listed(families)}")
+    if family == ASSEMBLY:
+        raise DesignError(
+            f"{shown(data.get('name', folder.name))} is an assembly of several designs; it goes "
+            "with generate, check, predict and studio, and other commands take one of its designs"
+        )
+    if not isinstance(family, str) or family not in families:
+        near = difflib.get_close_matches(shown(family).strip("'"), families, 1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise DesignError(f"family = {shown(family)} must be one of {listed(families)}{hint}")
+    from sbafab.design.kits import under_kit
+
+    return checked(families[family], under_kit(data, folder), families).placed(folder).fitted()
+
+
+def checked(
+    record: type[AnyRecord],
+    data: Mapping[str, Any],
+    families: Mapping[str, type[Design]],
+    prefix: str = "",
+) -> AnyRecord:
+    """The record of a table; ``prefix`` leads to it. Raises DesignError with one sentence."""
+    try:
+        return record.model_validate(data)
+    except ValidationError as error:
+        raise DesignError(sentence(error, record, families, prefix)) from None
+
+
+# Designs out: resolved TOML, design hash, JSON schema.
+
+
+FITS = "fits"
+LATER: Mapping[str, Sequence[str]] = {
+    "order": ("success_rate", "certainty", "shift_hours"),
+    "laser": ("hold_tpe", "hold_ptfe"),
+    "panel": ("carrier_adhesive", "carrier_limit_c"),
+}
+"""Keys that came after the first hashes, which have none of them."""
+FIRST_SPARES = 2
+"""What ``order.spares`` was by default, of masks alone; today's default keeps its hash."""
+
+
+def resolved(design: Design) -> dict[str, Any]:
+    """The design with every default written out, as plain TOML values."""
+    return _tables(design.completed())
+
+
+def plain_tables(design: Design) -> dict[str, Any]:
+    """The design as tables of a TOML file, defaults that depend on other values left open."""
+    tables = _tables(design)
+    if design.is_solved:
+        del tables["chamber"]["diameter"]
+    return tables
+
+
+def _tables(design: Design) -> dict[str, Any]:
+    tables = _without_none(design.model_dump(mode="json"))
+    if not tables.get(FITS):
+        # Nothing is asked for: an empty table would say nothing.
+        tables.pop(FITS, None)
+    return tables
+
+
+def _without_none(table: dict[str, Any]) -> dict[str, Any]:
+    return {
+        key: _without_none(value) if isinstance(value, dict) else value
+        for key, value in table.items()
+        if value is not None
+    }
+
+
+def keys_of(design: Design) -> list[tuple[str, object, object]]:
+    """Dotted key, value and default of every key, the default only where the value differs."""
+    plain = type(design).model_validate({"name": design.name, "family": design.family})
+    usual = dict(dotted(resolved(plain)))
+    return [
+        (key, value, usual.get(key) if usual.get(key) != value else None)
+        for key, value in dotted(resolved(design))
+    ]
+
+
+def dotted(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, object]]:
+    """Dotted key and value of every key of nested tables."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from dotted(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def design_toml(design: Design) -> str:
+    """``design.toml`` of an output folder."""
+    import tomli_w
+
+    return tomli_w.dumps(resolved(design))
+
+
+def _as_first_hashed(table: dict[str, Any], design: Design) -> dict[str, Any]:
+    """The table with the kit's hash for its path, and without what came later and is not used.
+
+    A design that says nothing of kit and layup keeps the hash that it had before there were any.
+    """
+    from sbafab.design.kits import DEFAULT, kit_of
+
+    table["kit"] = kit_of(design).sha256 if design.kit != DEFAULT else None
+    if design.layup == LayerFilms():
+        table["layup"] = None
+    if design.inlet.adhesive == Inlet().adhesive:
+        table["inlet"]["adhesive"] = None
+    # What came later, where it says what was always so.
+    if design.acceptance == Acceptance():
+        table["acceptance"] = None
+    for key in ("minutes_for", "time_constant"):
+        if getattr(design.press, key) == getattr(Press(), key):
+            table["press"][key] = None
+    tpe = design.films.tpe
+    if (tpe.product, tpe.modulus, tpe.poisson) == (PAPER_PRODUCT, *PAPER_TPE):
+        table["films"]["tpe"] |= {"modulus": None, "poisson": None}
+    _as_first_ordered(table, design)
+    table["registration"]["pin_error"] = design.pin_error
+    for name, key, usual in (
+        ("registration", "plate_made_by", Registration().plate_made_by),
+        ("press", "underlay_thickness", Press().underlay_thickness),
+    ):
+        if table[name][key] == usual:
+            table[name][key] = None
+    return _without_none(table)
+
+
+def _as_first_ordered(table: dict[str, Any], design: Design) -> None:
+    """Take out keys that came later and have their defaults, and what only allows a method."""
+    table["registration"].pop("experimental")
+    has_usual_spares = all(
+        getattr(design.order, key) == getattr(Order(), key) for key in ("spares", "spare_share")
+    )
+    if has_usual_spares:
+        table["order"] |= {"spares": FIRST_SPARES, "spare_share": None}
+    for section, keys in LATER.items():
+        asked = getattr(design, section)
+        usual = type(asked)()
+        for key in keys:
+            if getattr(asked, key) == getattr(usual, key):
+                table[section][key] = None
+
+
+def design_sha256(design: Design) -> str:
+    """Hash of all that decides the output; a drawn outline counts by its content, not its path."""
+    return _sha256(_with_drawing(_as_first_hashed(resolved(design), design), design))
+
+
+def actuator_sha256(design: Design) -> str:
+    """Return the hash of what an actuator of the design is, however many are made, and on what.
+
+    It counts shapes, the films' kind, product and thickness, tube and adhesive, how films are
+    registered and bonded, and whether a kerf is compensated: uncompensated parts are narrower.
+    Left out are name, kit, order, sheets, rules, tolerances, tools, and the kerf's width.
+    """
+    table = _with_drawing(resolved(design), design)
+    for section in NO_ACTUATOR:
+        table.pop(section, None)
+    films = _films(design)
+    table["layup"] = {role: films.get(name) for role, name in table["layup"].items()}
+    table["bore"] = {"diameter": design.bore.diameter}
+    method = design.registration.method
+    table["registration"] = [
+        method,
+        *(getattr(design.registration, key) for key in PINNED if method != "channel-pin"),
+    ]
+    table["panel"] = [getattr(design.panel, key) for key in BRIDGED if method == "sheet"]
+    table["press"] = [getattr(design.press, key) for key in BONDED]
+    return _sha256(table)
+
+
+NO_ACTUATOR = (
+    *("name", "kit", "films", "laser", "sheets", "order", "rules", "acceptance"),
+    FITS,
+)
+"""Sections that do not make another actuator; of films and laser the layup says what counts."""
+PINNED = ("pin_diameter", "pin_clearance", "full_bond_pins")
+BRIDGED = ("bridge_width", "stub", "tack_minutes")
+BONDED = (
+    *("temperature_c", "pressure_kpa", "platen_width", "platen_length", "flash_bottom_minutes"),
+    *("bond_bottom_minutes", "flash_middle_minutes", "bond_all_minutes"),
+)
+
+
+def _films(design: Design) -> dict[str, list[object]]:
+    """What a film is, by its table's name: kind, product, thickness, and if its kerf is known."""
+    kerfs = {name: film.kerf for name, film in design.films.others.items()}
+    kerfs |= {"tpe": design.laser.kerf_tpe, "ptfe": design.laser.kerf_ptfe}
+    return {
+        name: [film.kind, film.product, film.thickness, kerfs[name] != UNCALIBRATED]
+        for name, film in design.films.stock.items()
+    }
+
+
+def _with_drawing(table: dict[str, Any], design: Design) -> dict[str, Any]:
+    """The table with the drawn outline's content in place of its path."""
+    if design.drawing is not None:
+        table["chamber"]["outline"] = hashlib.sha256(design.drawing.read_bytes()).hexdigest()
+    return table
+
+
+def _sha256(table: dict[str, Any]) -> str:
+    text = json.dumps(table, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+# The designs and kits that ship, and files that start from them.
+
+
+KITS = "kits"
+"""The folder of the kits that ship, among the templates."""
+
+
+@cache
+def templates_folder() -> Path:
+    """The designs that ship: in the installed package, or beside it in a source checkout."""
+    packaged = Path(__file__).parents[1] / "templates"
+    return packaged if packaged.is_dir() else packaged.parents[1] / "templates"
+
+
+def template_names() -> list[str]:
+    return list(_designs_in(templates_folder()))
+
+
+def kit_names() -> list[str]:
+    """The kits that ship."""
+    return list(_designs_in(templates_folder() / KITS))
+
+
+@cache
+def _designs_in(folder: Path) -> tuple[str, ...]:
+    """Names of what ships in a folder, which stays as it is while a process runs."""
+    return tuple(sorted(path.stem for path in folder.glob("*.toml")))
+
+
+def template_text(name: str) -> str:
+    """The commented text of a design that ships. Raises DesignError if there is none."""
+    if name not in template_names():
+        raise DesignError(
+            f"{shown(name)} is not a template; there are {', '.join(template_names())}"
+        )
+    return (templates_folder() / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def template_summaries() -> dict[str, str]:
+    """Template names with the first comment line of each."""
+    return {
+        name: (templates_folder() / f"{name}.toml")
+        .read_text(encoding="utf-8")
+        .partition("\n")[0]
+        .lstrip("# ")
+        for name in template_names()
+    }
+
+
+def write_new(template: str, file: Path | None) -> Path:
+    """Copies a template's commented file, named after the new file; never over an old one."""
+    names = template_names()
+    if template not in names:
+        near = difflib.get_close_matches(template, names, 1)
+        hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
+        raise DesignError(f"{shown(template)} is not a template; {hint}")
+    return write_copy(templates_folder() / f"{template}.toml", file or Path(f"{template}.toml"))
+
+
+def name_of(file: Path) -> str:
+    """A design's name from that of its file; empty where nothing of it may be in a name."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", file.stem).strip("-._")[:64]
+
+
+def write_copy(source: Path, target: Path) -> Path:
+    """Copies a commented file, named after the new one; never over an old one."""
+    text = source.read_text(encoding="utf-8")
+    name = name_of(target) or source.stem
+    text = text.replace(f'name = "{source.stem}"', f'name = "{name}"', 1)
+    try:
+        with target.open("x", encoding="utf-8", newline="\n") as opened:
+            opened.write(text)
+    except FileExistsError:
+        raise DesignError(f"{target} exists; choose another name or remove it first") from None
+    except OSError as error:
+        missing = f"; make the folder {target.parent} first"
+        hint = missing if isinstance(error, FileNotFoundError) else "; name another place"
+        raise DesignError(f"{target} cannot be written: {error.strerror or error}{hint}") from None
+    return target

@@ -1,0 +1,295 @@
+"""Smooth curves fitted by circular arcs: biarcs, two arcs that share a tangent where they join.
+
+A curve is a function of a parameter that gives the point and the derivative there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+from sbafab.geometry.edges import (
+    EPSILON,
+    Arc,
+    Edge,
+    Line,
+    Point,
+    distance_to,
+    edge_from_bulge,
+    quarter_arcs,
+)
+from sbafab.geometry.region import Contour
+
+Curve = Callable[[float], tuple[Point, Point]]
+
+TOLERANCE = 0.0005
+"""Farthest a fitted arc may lie from its curve, in mm."""
+SAMPLES = 24
+"""Points of a span that are compared with its two arcs."""
+STRAIGHT = 1e-6
+"""An arc that bulges less than this, in mm, is written as a line."""
+LEAST_TURN = 1e-7
+"""Radians: what turns less is a line. No offset tells it from one, and its centre is far away."""
+MOST_ARCS = 2000
+MOST_TRIALS = 40
+"""Doublings and halvings of one span: more than these leave nothing of any curve."""
+LARGEST_TURN = math.radians(80)
+"""Farthest the tangent may turn along one arc."""
+
+
+class FitError(ArithmeticError):
+    """A curve that arcs cannot follow; the message names the place."""
+
+
+def bezier(controls: Sequence[Point]) -> Curve:
+    """The Bézier curve of three or four control points, parameter 0 to 1."""
+
+    def between(a: Point, b: Point, t: float) -> Point:
+        return a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])
+
+    def curve(t: float) -> tuple[Point, Point]:
+        points = list(controls)
+        while len(points) > 2:
+            points = [between(a, b, t) for a, b in pairwise(points)]
+        a, b = points
+        return between(a, b, t), (b[0] - a[0], b[1] - a[1])
+
+    return curve
+
+
+def ellipse(centre: Point, major: Point, minor: Point) -> Curve:
+    """Centre + major cos t + minor sin t: the half axes are vectors (conjugate ones will do)."""
+
+    def curve(t: float) -> tuple[Point, Point]:
+        c, s = math.cos(t), math.sin(t)
+        return (
+            (centre[0] + c * major[0] + s * minor[0], centre[1] + c * major[1] + s * minor[1]),
+            (c * minor[0] - s * major[0], c * minor[1] - s * major[1]),
+        )
+
+    return curve
+
+
+def elliptical_arc(
+    centre: Point, major: Point, minor: Point, first: float, last: float
+) -> tuple[Edge, ...]:
+    """Edges along centre + major cos t + minor sin t; exact where the half axes are a circle's."""
+    if last < first:
+        forward = elliptical_arc(centre, major, minor, last, first)
+        return tuple(edge.reversed() for edge in reversed(forward))
+    curve = ellipse(centre, major, minor)
+    radius = math.hypot(*major)
+    skew = major[0] * minor[0] + major[1] * minor[1]
+    if abs(radius - math.hypot(*minor)) > EPSILON or abs(skew) > EPSILON * radius:
+        return fit_arcs(curve, first, last)
+    start = curve(first)[0]
+    end = start if last - first > math.tau - 1e-9 else curve(last)[0]
+    ccw = major[0] * minor[1] > major[1] * minor[0]
+    return tuple(quarter_arcs(start, end, centre, radius, (last - first) * (1 if ccw else -1)))
+
+
+def fit_arcs(
+    curve: Curve, first: float, last: float, tolerance: float = TOLERANCE
+) -> tuple[Edge, ...]:
+    """Arcs and lines within ``tolerance`` mm of the curve from parameter ``first`` to ``last``.
+
+    Neighbours share a tangent, and each biarc reaches as far as the tolerance lets it. Raises
+    FitError where the curve has a cusp, or is far too long or rugged.
+    """
+    edges: list[Edge] = []
+    at, step = first, (last - first) / 4
+    while at < last:
+        reach, fitted = _longest_span(curve, at, last, step, tolerance)
+        if reach < last and last - reach < (reach - at) / 2:
+            # Two even spans in place of a long one and a sliver.
+            middle = (at + last) / 2
+            even = _biarc(curve, at, middle, tolerance)
+            reach, fitted = (middle, even) if even else (reach, fitted)
+        edges += fitted
+        at, step = reach, reach - at
+        if len(edges) > MOST_ARCS:
+            (x, y), _ = curve(at)
+            raise FitError(f"curve that {MOST_ARCS} arcs do not follow past x {x:.4f}, y {y:.4f}")
+    return tuple(edge for edge in edges if edge.length > EPSILON)
+
+
+def _longest_span(
+    curve: Curve, at: float, last: float, step: float, tolerance: float
+) -> tuple[float, list[Edge]]:
+    """The farthest parameter that one biarc from ``at`` reaches, by doubling, then bisection."""
+    good, bad, end = at, math.inf, min(last, at + step)
+    fitted: list[Edge] = []
+    for _ in range(MOST_TRIALS):
+        edges = _biarc(curve, at, end, tolerance)
+        if edges:
+            good, fitted = end, edges
+        else:
+            bad = end
+        if good == last or bad - good < 0.02 * (good - at):
+            return good, fitted
+        end = min(last, 2 * end - at) if bad == math.inf else (good + bad) / 2
+    (x, y), _ = curve(at)
+    raise FitError(f"cusp near x {x:.4f}, y {y:.4f}")
+
+
+def _biarc(curve: Curve, first: float, last: float, tolerance: float) -> list[Edge]:
+    """Two edges that touch the curve at both parameters; none if they stray from it between."""
+    start, u = curve(first)[0], _unit_tangent(curve, first, last)
+    end, v = curve(last)[0], _unit_tangent(curve, last, first)
+    edges = biarc(start, u, end, v)
+    if not edges:
+        return []
+    for k in range(1, SAMPLES):
+        p = curve(first + (last - first) * k / SAMPLES)[0]
+        if min(distance_to(edge, p) for edge in edges) > 0.99 * tolerance:
+            return []
+    return edges
+
+
+def biarc(start: Point, u: Point, end: Point, v: Point, straight: float = STRAIGHT) -> list[Edge]:
+    """Two edges from start along ``u`` to end along ``v``; none where these turn too far apart.
+
+    An arc that bulges less than ``straight`` mm is a line, which leaves a kink where they join.
+    """
+    # One tangent length d on both sides: |end - start - d (u + v)| = 2 d, solved so that it
+    # keeps its digits where the tangents are parallel.
+    chord = end[0] - start[0], end[1] - start[1]
+    along = chord[0] * (u[0] + v[0]) + chord[1] * (u[1] + v[1])
+    square = chord[0] ** 2 + chord[1] ** 2
+    if along <= 0 or square < EPSILON**2:
+        return []
+    open_angle = 2 * (1 - u[0] * v[0] - u[1] * v[1])
+    d = square / (along + math.sqrt(along**2 + open_angle * square))
+    joint = (
+        (start[0] + end[0] + d * (u[0] - v[0])) / 2,
+        (start[1] + end[1] + d * (u[1] - v[1])) / 2,
+    )
+    if min(math.dist(start, joint), math.dist(joint, end)) ** 2 < square / 100:
+        return []
+    turn = _angle(u, (joint[0] - start[0], joint[1] - start[1]))
+    other = _angle((end[0] - joint[0], end[1] - joint[1]), v)
+    if max(abs(turn), abs(other)) > LARGEST_TURN / 2:
+        return []
+    return [_edge(start, joint, turn, straight), _edge(joint, end, other, straight)]
+
+
+def _edge(start: Point, end: Point, turn: float, straight: float) -> Edge:
+    """The arc from start to end whose tangent at the start is ``turn`` right of the chord."""
+    bulge = math.tan(turn / 2)
+    if abs(bulge) * math.dist(start, end) / 2 < straight or abs(turn) < LEAST_TURN:
+        return Line(start, end)
+    return edge_from_bulge(start, end, bulge)
+
+
+def _unit_tangent(curve: Curve, at: float, towards: float) -> Point:
+    """Unit derivative at a parameter, or just beside it where it vanishes."""
+    for nudge in (0.0, 1e-6, 1e-4):
+        dx, dy = curve(at + nudge * (towards - at))[1]
+        size = math.hypot(dx, dy)
+        if size > 1e-9:
+            return dx / size, dy / size
+    (x, y), _ = curve(at)
+    raise FitError(f"cusp near x {x:.4f}, y {y:.4f}")
+
+
+def _angle(u: Point, v: Point) -> float:
+    """Angle that turns u into v, counter-clockwise positive."""
+    return math.atan2(u[0] * v[1] - u[1] * v[0], u[0] * v[0] + u[1] * v[1])
+
+
+# Arcs as chords. On one circle they end at the same angles, whichever contour asks: at whole
+# multiples of one step, of which a number makes a quarter turn.
+
+
+ROOM = 0.05
+"""Share of a chord's angle within which no vertex stands beside the end of a run of chords that
+keep to one side of it.
+"""
+
+
+def chord_step(half: float, least: int) -> float:
+    """Angle of a chord: no more than twice ``half``, at most a ``least``-th of a whole turn."""
+    return math.tau / (4 * math.ceil(max(least, math.ceil(math.pi / half)) / 4))
+
+
+def ticks(run: Sequence[Edge], step: float, room: float) -> list[float]:
+    """Angles, in the run's direction, of the chords' ends on a run of arcs of one circle.
+
+    Nearer than ``room`` steps to the run's ends there is none; a whole circle has all.
+    """
+    first = run[0]
+    assert isinstance(first, Arc)
+    sweep = run_sweep(run)
+    if run[-1].end == first.start:
+        numbers = range(round(math.tau / step))
+    else:
+        low, high = sorted((first.start_angle / step, (first.start_angle + sweep) / step))
+        numbers = range(math.ceil(low + room), math.floor(high - room) + 1)
+    return [number * step for number in (numbers if first.ccw else reversed(numbers))]
+
+
+def run_sweep(run: Sequence[Edge]) -> float:
+    """The angle that a run of arcs of one circle turns through, positive counter-clockwise."""
+    return sum([edge.sweep for edge in run if isinstance(edge, Arc)])
+
+
+def facets(contour: Contour, sagitta: float, keeps_area: bool = True) -> list[Point]:
+    """Vertices in mm of a polygon that stands in for the contour.
+
+    The height of an arc over its chord is ``sagitta`` mm at most. To keep the area, vertices on a
+    circle stand two thirds of the sagitta outside it; corners, where arcs meet other edges, do not.
+    """
+    points: list[Point] = []
+    for run in contour.runs:
+        first = run[0]
+        if not isinstance(first, Arc):
+            points += [edge.start for edge in run]
+            continue
+        if contour.circle is None:
+            points.append(first.start)
+        half = math.acos(1 - min(1.0, sagitta / first.radius))
+        if keeps_area:
+            step = chord_step(half, 12)
+            # Half a step from the ends: nearer, a vertex outside the circle would make a dent.
+            angles = ticks(run, step, 0.5)
+            radius = first.radius * math.sqrt(step / math.sin(step))
+            if not angles:
+                points.append(first.on_circle(first.start_angle + run_sweep(run) / 2))
+        else:
+            angles = ticks(run, chord_step(half, 8), 1e-7)
+            radius = first.radius
+        circle = Arc(first.start, first.end, first.centre, radius, first.ccw)
+        points += [circle.on_circle(math.remainder(angle, math.tau)) for angle in angles]
+    if len(points) < 3:
+        return [edge.at(t) for edge in contour.edges for t in (0.0, 0.5)]
+    return points
+
+
+def run_chords(run: Sequence[Edge], grows: bool, error: float) -> list[Point]:
+    """Vertices of chords within ``error`` mm of a run, but for the last, where the next run begins.
+
+    What lies to the left of the run lies left of the chords too if it ``grows``, and there is
+    nowhere more of it if not.
+    """
+    first = run[0]
+    if isinstance(first, Line):
+        return [first.start]
+    step = chord_step(math.acos(first.radius / (first.radius + error)) / (1 + ROOM), 8)
+    angles = ticks(run, step, ROOM)
+    is_whole = run[-1].end == first.start
+    if is_whole:
+        angles.append(angles[0] + (math.tau if first.ccw else -math.tau))
+    else:
+        angles = [first.start_angle, *angles, first.start_angle + run_sweep(run)]
+    if first.ccw == grows:
+        corners = [_apex(first, a, b) for a, b in pairwise(angles)]
+    else:
+        corners = [first.on_circle(angle) for angle in angles[not is_whole : -1]]
+    return corners if is_whole else [first.start, *corners]
+
+
+def _apex(arc: Arc, a: float, b: float) -> Point:
+    """Where the tangents at two angles meet."""
+    middle, radius = (a + b) / 2, arc.radius / math.cos((b - a) / 2)
+    return arc.centre[0] + radius * math.cos(middle), arc.centre[1] + radius * math.sin(middle)

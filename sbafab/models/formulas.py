@@ -1,0 +1,260 @@
+"""Bending of parallel chambers: constant curvature from their lengths.
+
+A plane through the chambers' ends, the nearest one where there are more than three, gives the
+length on the axis and the gradient across it; the axis is then an arc.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from sbafab.design.records import Design, Discs, Form, Slots, Wrap
+from sbafab.errors import DesignError
+from sbafab.geometry.region import Region, centroid
+from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS
+from sbafab.laminate.laminate import (
+    Laminate,
+    beyond_the_outline,
+    outline_diameter,
+    overall_diameter,
+)
+from sbafab.models.paper import BURST, FLAT_HEIGHT_OF_FILMS, counterpart
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+class Bend(NamedTuple):
+    """Angle of the top (radians), where it leans to (radians from x), length of the axis (mm),
+    tip (..., 3) in mm, from the middle of the base.
+    """
+
+    angle: NDArray[np.float64]
+    towards: NDArray[np.float64]
+    length: NDArray[np.float64]
+    tip: NDArray[np.float64]
+
+
+def bend(lengths: ArrayLike, axes: ArrayLike) -> Bend:
+    """The bend of chambers with ``lengths`` (..., n) mm at ``axes`` (n, 2) mm, n >= 2.
+
+    Valid to about half a turn: past pi the tip would come down through the base.
+    """
+    places = np.asarray(axes, dtype=float)
+    to_plane = np.linalg.pinv(np.column_stack([np.ones(len(places)), places]))
+    plane = np.asarray(lengths, dtype=float) @ to_plane.T
+    length, across = plane[..., 0], plane[..., 1:]
+    angle = np.hypot(across[..., 0], across[..., 1])
+    # It leans away from its long side.
+    towards = np.arctan2(-across[..., 1], -across[..., 0])
+    safe = np.where(angle > 0, angle, 1.0)
+    # 2 sin^2(x/2) is 1 - cos x without its cancellation.
+    aside = np.where(angle > 0, length * 2 * np.sin(safe / 2) ** 2 / safe, 0.0)
+    up = np.where(angle > 0, length * np.sin(safe) / safe, length)
+    tip = np.stack([aside * np.cos(towards), aside * np.sin(towards), up], axis=-1)
+    return Bend(angle, towards, length, tip)
+
+
+# Burst pressure, scaled from the paper's three actuators: for a proof test, not to design with.
+#
+# The paper burst three actuators with pockets of 5 mm in its film of 0.038 mm, at 367 +- 18 kPa
+# (Sec. 4, 7). A thin film of radius r and thickness t under p carries p r / 2 t where it is a
+# sphere's and p r / t where it is a cylinder's. Taken in proportion, nothing else is known.
+
+
+RADIUS = 2.5
+"""mm, of the pockets that burst."""
+
+
+def burst_pressure(form: Form, laminate: Laminate) -> float | None:
+    """Return an estimate in kPa of the pressure at which the widest pocket bursts.
+
+    An oblong pocket of width w becomes a cylinder of radius w / pi, whose film carries twice what
+    a sphere's does. None for a film of another product, or a drawn pocket: nothing was measured.
+    """
+    films = {layer.film for layer in laminate.layers if not layer.is_mask}
+    if any(film.product != PAPER_PRODUCT for film in films):
+        return None
+    if isinstance(form.pockets, Discs):
+        radius = max(form.pockets.diameters) / 2
+    elif isinstance(form.pockets, Slots):
+        radius = 2 * form.pockets.width / math.pi
+    else:
+        return None
+    thickness = min(film.thickness for film in films)
+    return BURST.value * RADIUS / radius * thickness / PAPER_THICKNESS
+
+
+# Diameter of a folded actuator (paper, Sec. 2: three lobes pass a channel of 9.25 mm).
+
+
+LOBES = 3
+
+
+def folded_diameter(width: float, thickness: float) -> float:
+    """Circle (mm) round three lobes folded into a triangle, their outer corners on it.
+
+    Each lobe is a bar ``width`` long and ``thickness`` deep, a chord of the circle; their inner
+    faces are the triangle's sides.
+    """
+    inside = width / (2 * math.tan(math.pi / LOBES))
+    return 2 * math.hypot(inside + thickness, width / 2)
+
+
+# Force of a chamber that is held at a height: virtual work, F dh = p dv (paper, Sec. 4.3).
+
+
+def force(pressure_kpa: ArrayLike, rate: ArrayLike) -> NDArray[np.float64]:
+    """Newtons from a pressure and dv/dh in mm2. Raises DesignError past the burst pressure."""
+    pressure = np.asarray(pressure_kpa, dtype=float)
+    good = (pressure >= 0) & (pressure <= BURST.value)
+    if not good.all():
+        raise DesignError(
+            f"pressure = {float(pressure[~good].flat[0]):g} kPa is out of range; give 0 to "
+            f"{BURST.value:g} kPa, where the paper's actuators burst"
+        )
+    return np.asarray(pressure * np.asarray(rate, dtype=float) / 1000)
+
+
+def work_uj(pressure_kpa: float, volume_ul: float) -> float:
+    """Microjoules that air at constant pressure puts in: 1 kPa x 1 ul = 1 uJ.
+
+    An upper bound of the integral of p dv up to that pressure.
+    """
+    return pressure_kpa * volume_ul
+
+
+# Which tube goes into an inlet strip.
+
+
+def largest_tube(width: float, strip: float = 0.0) -> float:
+    """Outer diameter (mm) of the tube that fills a flat channel ``width`` mm wide, opened round.
+
+    Half the perimeter of what lies in it is the channel's width: the tube, and along one side of it
+    a PTFE strip ``strip`` mm thick.
+    """
+    return 2 * width / math.pi - strip
+
+
+# The cantilever formula E = F l^3 / (3 delta I) (paper, Sec. 4.4), and the I it takes.
+
+
+SAGITTA = 1e-4
+
+
+def tip_stiffness(modulus_kpa: float, second_moment: float, length: float) -> float:
+    """F / delta in N/mm of a cantilever, from E (kPa), I (mm4) and length (mm)."""
+    return 3 * modulus_kpa * 1e-3 * second_moment / length**3
+
+
+def modulus(force: float, deflection: float, length: float, second_moment: float) -> float:
+    """E in kPa, from tip force (N), deflection and length (mm), I (mm4)."""
+    return force * length**3 / (3 * deflection * second_moment) * 1e3
+
+
+def second_moments(region: Region) -> tuple[float, float]:
+    """Least and largest second moment of area (mm4) of a section about its centre."""
+    x0, y0 = centroid(region)
+    xx = yy = xy = 0.0
+    for piece in region.polygons(SAGITTA):
+        for ring in piece:
+            for (xa, ya), (xb, yb) in zip(ring, [*ring[1:], ring[0]], strict=True):
+                ax, ay, bx, by = xa - x0, ya - y0, xb - x0, yb - y0
+                cross = ax * by - bx * ay
+                xx += cross * (ay * ay + ay * by + by * by) / 12
+                yy += cross * (ax * ax + ax * bx + bx * bx) / 12
+                xy += cross * (ax * by + 2 * ax * ay + 2 * bx * by + bx * ay) / 24
+    middle, half = (xx + yy) / 2, ((xx - yy) ** 2 / 4 + xy * xy) ** 0.5
+    return middle - half, middle + half
+
+
+# Overall sizes in closed form, each with the paper's figure it answers to.
+
+
+def sizes(design: Design, laminate: Laminate) -> dict[str, float]:
+    """Sizes in mm by name: of the flat laminate and, for radial designs, round the tube.
+
+    Width, length and overall diameter are those of all that is cut: masks, inlet tabs and ears
+    belong to them. The outline diameter is that of the films without tabs and ears.
+    """
+    low_x, low_y, high_x, high_y = laminate.bounds
+    found = {
+        "thickness": laminate.thickness,
+        "width": high_x - low_x,
+        "length": high_y - low_y,
+    }
+    form = design.form
+    if form.wrap is not None:
+        found["pitch"] = form.wrap.pitch
+        found["deflated_diameter"] = deflated_diameter(form.wrap, laminate)
+        reached, inflated = reached_diameter(form, laminate), inflated_diameter(form, laminate)
+        if reached is not None and inflated is not None:
+            found["reached_diameter"] = reached
+            found["inflated_diameter"] = inflated
+    else:
+        if not laminate.outline.is_empty:
+            found["outline_diameter"] = outline_diameter(laminate)
+        found["overall_diameter"] = overall_diameter(laminate)
+    return found
+
+
+def deflated_diameter(wrap: Wrap, laminate: Laminate) -> float:
+    """Tube plus the flat laminate on both sides; the paper gives 15.33 (Sec. 2.1)."""
+    return wrap.tube_diameter + 2 * laminate.thickness
+
+
+def reached_diameter(form: Form, laminate: Laminate) -> float | None:
+    """Tube plus SBAs that hold the most their films let them: what they must reach lies within it.
+
+    None without a tube, or for pockets of another shape. Balloons are lenses of two arcs
+    (``models.lens``); the paper's reach 27.29, about 28 (Sec. 2.1).
+    """
+    if not isinstance(form.pockets, Slots):
+        return None
+    from sbafab.models.lens import fullest
+
+    return _round_the_tube(form, laminate, fullest(form.pockets.width, form.pockets.run).stroke)
+
+
+def inflated_diameter(form: Form, laminate: Laminate) -> float | None:
+    """Tube plus SBAs as wide as can be: what they must not touch lies outside.
+
+    None without a tube, or for pockets of another shape. A flat pocket of width w whose films do
+    not stretch becomes a cylinder of diameter 2 w / pi where its ends do not hold it back: 28.06
+    for the paper's, about 28 (Sec. 2.1).
+    """
+    if not isinstance(form.pockets, Slots):
+        return None
+    return _round_the_tube(form, laminate, 2 * form.pockets.width / math.pi)
+
+
+def _round_the_tube(form: Form, laminate: Laminate, rise: float) -> float | None:
+    """Diameter with every balloon ``rise`` mm high."""
+    if form.wrap is None:
+        return None
+    return form.wrap.tube_diameter + 2 * (laminate.balloons * rise + laminate.thickness)
+
+
+def size_said(design: Design, laminate: Laminate) -> tuple[str, ...]:
+    """The size in phrases: across with what stands out of it, without, flat, and its height.
+
+    Films flow in the press: beside the height stands what the paper measured of its own.
+    """
+    found = sizes(design, laminate)
+    said = []
+    if "overall_diameter" in found:
+        over = beyond_the_outline(laminate)
+        said.append(f"{found['overall_diameter']:.2f} mm overall diameter with {over}")
+    if "outline_diameter" in found:
+        said.append(f"{found['outline_diameter']:.2f} without")
+    if "deflated_diameter" in found:
+        said.append(f"{found['deflated_diameter']:.2f} mm round its tube")
+    form = design.form
+    flat = "flat, " if form.wrap is not None else ""
+    said.append(f"{flat}{found['width']:.2f} x {found['length']:.2f} mm")
+    row = counterpart(form, "deflated height", FLAT_HEIGHT_OF_FILMS)
+    height = f"folded height {laminate.thickness:.3f} mm"
+    return (*said, f"{height} {row.brief}" if row else height)
