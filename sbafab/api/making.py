@@ -12,7 +12,7 @@ from sbafab.design.files import Change
 if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
     from sbafab.cutting.calibration import Calibration
-    from sbafab.cutting.dxf_write import DxfProfile
+    from sbafab.cutting.properties import DxfProfile
     from sbafab.output.run import Run, Simulated
     from sbafab.process import Progress
     from sbafab.results.records import Record
@@ -58,7 +58,7 @@ def cut(
     for the last. ``progress`` is told what is done, as in ``generate``. Raises DesignError,
     OutputError and DefectError.
     """
-    from sbafab.cutting.dxf_write import Curves
+    from sbafab.cutting.properties import Curves
     from sbafab.output.run import generate as run_generate
 
     design = load(source, *changes, **tables)

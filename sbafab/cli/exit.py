@@ -28,7 +28,7 @@ from sbafab.errors import (
 )
 
 if TYPE_CHECKING:
-    from sbafab.cutting.dxf_write import Curves
+    from sbafab.cutting.properties import Curves
     from sbafab.design.records import Design
     from sbafab.output.checked import RunPart
     from sbafab.output.run import Extras, Run
@@ -187,7 +187,7 @@ def run_design(
 ) -> None:
     """The same with a design that is loaded."""
     from sbafab.cli.printing import print_run, run_json, shown_progress
-    from sbafab.cutting.dxf_write import TRUE_ARCS
+    from sbafab.cutting.properties import TRUE_ARCS
     from sbafab.output.run import NO_EXTRAS, generate
 
     with shown_progress(request.as_json) as progress:

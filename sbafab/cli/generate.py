@@ -12,7 +12,7 @@ from sbafab.cli.options import Request, dxf_options, run_options, sheet_options
 
 if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
-    from sbafab.cutting.dxf_write import Curves
+    from sbafab.cutting.properties import Curves
     from sbafab.laminate.laminate import Laminate
 
 

@@ -10,7 +10,7 @@ from sbafab.cli.exit import tell
 from sbafab.cli.options import Request, dxf_options, several_run_options, sheet_options
 
 if TYPE_CHECKING:
-    from sbafab.cutting.dxf_write import Curves
+    from sbafab.cutting.properties import Curves
 
 
 @click.command()

@@ -21,7 +21,7 @@ from sbafab.design.pressure_units import KILOPASCALS
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from sbafab.cutting.dxf_write import DxfProfile
+    from sbafab.cutting.properties import DxfProfile
 
 _WRITTEN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
 
@@ -356,7 +356,7 @@ def dxf_options(command: Command) -> Command:
     def said(dxf_profile: DxfProfile, chord_error: float | None, **others: Any) -> Any:
         if chord_error is not None and dxf_profile != "chords":
             raise click.UsageError("--chord-error goes with --dxf-profile chords; add it")
-        from sbafab.cutting.dxf_write import Curves
+        from sbafab.cutting.properties import Curves
 
         curves = Curves(dxf_profile)
         if chord_error is not None:

@@ -195,7 +195,8 @@ def _predict_assembly(
 
 # What ``sbafab predict`` prints of a design: a verdict, on request all figures and their validity.
 #
-# Of the figures what to design with comes first, each quantity once; other models of the same follow.
+# Of the figures what to design with comes first, each quantity once; other models of the same
+# follow.
 
 
 NAME, VALUE = 56, 10

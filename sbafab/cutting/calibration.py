@@ -347,10 +347,10 @@ def _within(t: float, degrees: int) -> float:
 
 # The calibration piece: four frames of film whose sizes tell how wide the beam cuts.
 #
-# A frame's outside comes out smaller by the kerf, its window larger, and the piece that falls out of
-# the window smaller again. Sides along x and y differ, so that a frame that fell out still tells
-# which is which. A window and its piece are drawn alike, so that they tell a reading error, which
-# makes both larger, from kerf; several sizes tell a scale from both.
+# A frame's outside comes out smaller by the kerf, its window larger, and the piece that falls out
+# of the window smaller again. Sides along x and y differ, so that a frame that fell out still
+# tells which is which. A window and its piece are drawn alike, so that they tell a reading error,
+# which makes both larger, from kerf; several sizes tell a scale from both.
 
 
 SIZE = 60.0

@@ -319,8 +319,8 @@ def _rows(text: str) -> Iterator[tuple[float, ...]]:
 
 # Cut files read back into exact contours, and refused where they could not be cut.
 #
-# Those that stand letter by letter as this program writes them are read by that form; of all others,
-# and so of all that was touched by hand or another program, ezdxf says what they hold.
+# Those that stand letter by letter as this program writes them are read by that form; of all
+# others, and so of all that was touched by hand or another program, ezdxf says what they hold.
 
 
 DRAWN = ("LWPOLYLINE", "POLYLINE", "CIRCLE", "LINE", "ARC")

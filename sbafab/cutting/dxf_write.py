@@ -8,28 +8,19 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from io import StringIO
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
-from sbafab.cutting.properties import COLOURS, CUT_INNER, CUT_OUTER, CUT_SHEET, ENGRAVE, REFERENCE
+from sbafab.cutting.properties import (
+    COLOURS,
+    CUT_INNER,
+    CUT_OUTER,
+    CUT_SHEET,
+    ENGRAVE,
+    REFERENCE,
+    DxfProfile,
+)
 from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, quarter_arcs
 from sbafab.geometry.region import Contour
-
-DxfProfile = Literal["bulges", "arcs", "chords"]
-
-
-class Curves(NamedTuple):
-    """How cut files draw arcs; ``chord_error`` in mm counts for chords only."""
-
-    profile: DxfProfile = "bulges"
-    chord_error: float = 0.005
-
-    @property
-    def in_chords(self) -> bool:
-        return self.profile == "chords"
-
-
-TRUE_ARCS = Curves()
-"""How curves are written: polylines with bulges, LINE and ARC, or polylines of short chords."""
 
 QUARTER = math.sqrt(2)
 """The chord of a quarter turn, in radii."""

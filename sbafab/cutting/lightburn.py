@@ -32,7 +32,7 @@ from sbafab.cutting.second_cut import PATH, laser_path, marks, properties_of
 from sbafab.cutting.verify import TOLERANCE
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to
-from sbafab.geometry.region import Contour, Copies, Region, number
+from sbafab.geometry.region import Contour, Copies, Region, coord
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.markup import quoteattr
 
@@ -155,14 +155,14 @@ def _shape(serial: int, run: LaserRun, outlines: _Outlines) -> str:
     index = INDICES[run.layer]
     if run.circle is not None:
         (x, y), radius = run.circle
-        size = f'Rx="{number(radius)}" Ry="{number(radius)}"'
-        place = f"<XForm>1 0 0 1 {number(x)} {number(y)}</XForm>"
+        size = f'Rx="{coord(radius)}" Ry="{coord(radius)}"'
+        place = f"<XForm>1 0 0 1 {coord(x)} {coord(y)}</XForm>"
         return f'<Shape Type="Ellipse" CutIndex="{index}" {size}>{place}</Shape>'
     vertices, primitives = outlines.drawn(run)
     x, y = run.edges[0].start
     return (
         f'<Shape Type="Path" CutIndex="{index}" VertID="{serial}" PrimID="{serial}">'
-        f"<XForm>1 0 0 1 {number(x)} {number(y)}</XForm><VertList>{vertices}</VertList>"
+        f"<XForm>1 0 0 1 {coord(x)} {coord(y)}</XForm><VertList>{vertices}</VertList>"
         f"<PrimList>{primitives}</PrimList></Shape>"
     )
 
@@ -192,7 +192,7 @@ def _outline(contour: Contour, closed: bool) -> tuple[str, str]:
     vertices = []
     for k in range(count):
         u, v = parts[k].start if k < len(parts) else parts[-1].end
-        vertices.append(f"V{number(u - x)} {number(v - y)}")
+        vertices.append(f"V{coord(u - x)} {coord(v - y)}")
         handles = (
             ("c0", leaving[k][0] if k < len(parts) else None),
             ("c1", leaving[k - 1][1] if closed or k else None),
@@ -200,7 +200,7 @@ def _outline(contour: Contour, closed: bool) -> tuple[str, str]:
         for name, place in handles:
             # A control point that is not there is said by a 1.
             vertices.append(
-                f"{name}x{number(place[0] - x)}{name}y{number(place[1] - y)}"
+                f"{name}x{coord(place[0] - x)}{name}y{coord(place[1] - y)}"
                 if place is not None
                 else f"{name}x1"
             )

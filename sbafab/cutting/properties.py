@@ -5,12 +5,30 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
 
-from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.design.films import is_kerf
 from sbafab.errors import OutputError
 from sbafab.geometry.offset import Kerf, widths
 from sbafab.laminate.films import PTFE_WARNING, Material
+
+DxfProfile = Literal["bulges", "arcs", "chords"]
+
+
+class Curves(NamedTuple):
+    """How cut files draw arcs; ``chord_error`` in mm counts for chords only."""
+
+    profile: DxfProfile = "bulges"
+    chord_error: float = 0.005
+
+    @property
+    def in_chords(self) -> bool:
+        return self.profile == "chords"
+
+
+TRUE_ARCS = Curves()
+"""How curves are written: polylines with bulges, LINE and ARC, or polylines of short chords."""
+
 
 UNCALIBRATED = "uncalibrated: nominal edges"
 COMPENSATED = "compensated"

@@ -29,7 +29,7 @@ from sbafab.cutting.properties import (
 from sbafab.cutting.verify import check_surroundings, verify_file
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Contour, Region, number, path_data
+from sbafab.geometry.region import Contour, Region, coord, path_data
 from sbafab.laminate.films import Material
 from sbafab.nesting.records import Nest, Placement, Stock
 from sbafab.process import Counted
@@ -345,8 +345,8 @@ def sheet_svg(
     }
     return "\n".join(
         (
-            f'<svg xmlns="http://www.w3.org/2000/svg" width="{number(width)}mm" '
-            f'height="{number(height)}mm" viewBox="0 0 {number(width)} {number(height)}">',
+            f'<svg xmlns="http://www.w3.org/2000/svg" width="{coord(width)}mm" '
+            f'height="{coord(height)}mm" viewBox="0 0 {coord(width)} {coord(height)}">',
             f"<title>{escape(title)}</title>",
             *_groups(drawn),
             "</svg>\n",
@@ -359,7 +359,7 @@ def _groups(drawn: dict[str, list[str]]) -> Iterator[str]:
         if shapes:
             yield (
                 f'<g id="{layer}" fill="none" stroke="{COLOURS[layer]}" '
-                f'stroke-width="{number(STROKE)}">'
+                f'stroke-width="{coord(STROKE)}">'
             )
             yield from shapes
             yield "</g>"
@@ -372,12 +372,12 @@ def _rectangle(x: float, y: float) -> list[Point]:
 def _closed(contour: Contour, height: float) -> str:
     if contour.circle is not None:
         (x, y), radius = contour.circle
-        return f'<circle cx="{number(x)}" cy="{number(height - y)}" r="{number(radius)}"/>'
+        return f'<circle cx="{coord(x)}" cy="{coord(height - y)}" r="{coord(radius)}"/>'
     flipped = Region((contour,)).mapped(lambda p: (p[0], height - p[1]), 1.0, True)
     return f'<path d="{path_data(flipped)}"/>'
 
 
 def _run(run: Sequence[Point], height: float) -> str:
-    points = [f"{number(x)} {number(height - y)}" for x, y in run]
+    points = [f"{coord(x)} {coord(height - y)}" for x, y in run]
     closed = "Z" if run[0] == run[-1] else ""
     return f'<path d="M{"L".join(points[:-1] if closed else points)}{closed}"/>'

@@ -16,7 +16,7 @@ from typing import Final, TypeVar
 from sbafab.errors import GeometryError, InconsistentError
 from sbafab.geometry.arcs import run_sweep
 from sbafab.geometry.arrangement import DIGIT, Arrangement, by_owner, overlaid, overlay
-from sbafab.geometry.cache import MOST, kept, remembered
+from sbafab.geometry.cache import MOST, cached, stored
 from sbafab.geometry.edges import (
     EPSILON,
     Arc,
@@ -50,7 +50,7 @@ def union(regions: Iterable[Region]) -> Region:
     return _union(*solid)
 
 
-@remembered
+@cached
 def _union(*regions: Region) -> Region:
     return enclosed([contour for region in regions for contour in region.contours])
 
@@ -61,7 +61,7 @@ def intersection(a: Region, b: Region) -> Region:
     return _intersection(a, b)
 
 
-@remembered
+@cached
 def _intersection(a: Region, b: Region) -> Region:
     return enclosed([*a.contours, *b.contours], 1)
 
@@ -72,7 +72,7 @@ def difference(a: Region, b: Region) -> Region:
     return _difference(a, b)
 
 
-@remembered
+@cached
 def _difference(a: Region, b: Region) -> Region:
     own, other = ((contour, 1) for contour in a.contours), ((c, -1) for c in b.contours)
     (found,) = _enclosed([*own, *other], [_more_than(0)])
@@ -89,7 +89,7 @@ def divided(region: Region, by: Region) -> tuple[Region, Region]:
     return _divided(region, by)
 
 
-@remembered
+@cached
 def _divided(region: Region, by: Region) -> tuple[Region, Region]:
     own, other = ((c, 1) for c in region.contours), ((c, 1 << DIGIT) for c in by.contours)
     outside, inside = _enclosed([*own, *other], [_is_outside, _is_inside])
@@ -214,9 +214,9 @@ def _in_some_way(read: Callable[[float], Found]) -> Found:
 
 # Closed chains of edges told apart: which of them meet, and which lie inside which.
 #
-# Bores, lumens and outlines one inside the other make most of a laminate. Chains that stay clear of
-# all others are not cut and need no arrangement: how often the others wind round one of their points
-# says what lies on both sides of them.
+# Bores, lumens and outlines one inside the other make most of a laminate. Chains that stay clear
+# of all others are not cut and need no arrangement: how often the others wind round one of their
+# points says what lies on both sides of them.
 
 
 FAR: Final = 1e-3
@@ -441,7 +441,7 @@ def meets_itself(contour: Contour) -> Contour:
 
 def turned_round(contour: Contour) -> Contour:
     """What a boolean leaves of a contour that is alone where the material is on its other side."""
-    return kept(contour, "turned_round", _turned)
+    return stored(contour, "turned_round", _turned)
 
 
 def _turned(contour: Contour) -> Contour:

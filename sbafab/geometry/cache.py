@@ -1,4 +1,4 @@
-"""What is worked out of a contour and kept with it: bores and outlines bound several regions."""
+"""Values kept once computed: attributes of records, values of contours, results of functions."""
 
 from __future__ import annotations
 
@@ -7,178 +7,156 @@ from functools import wraps
 from threading import Lock
 from typing import Any, Generic, ParamSpec, TypeVar, overload
 
-from sbafab.geometry.region import Contour, Region
-
-Value = TypeVar("Made")
-
-
-def kept(contour: Contour, name: str, make: Callable[[Contour], Value]) -> Value:
-    """What ``make`` says of a contour, asked once; it must not hold the contour itself."""
-    known = contour.__dict__
-    if name not in known:
-        known[name] = make(contour)
-    found: Value = known[name]
-    return found
-
-
-# Values of records that do not change, worked out once.
-
-
-Made = TypeVar("Made")
+Value = TypeVar("Value")
 Record = TypeVar("Record")
+Arguments = ParamSpec("Arguments")
+Several = TypeVar("Several", bound=tuple[object, ...])
+
+MOST = 256
+"""Results that a function keeps; this bounds the memory over any number of designs."""
 
 
-def keeping(kind: type[Record]) -> type[Record]:
-    """Says that records of this class keep values: compiled, too, each has its dictionary."""
-    return kind
-
-
-class once(Generic[Made]):  # noqa: N801
-    """An attribute that is worked out when it is first asked for, and then stays with its record.
+class cached_attribute(Generic[Value]):  # noqa: N801
+    """An attribute computed at its first use and then stored in its frozen record.
 
     As ``functools.cached_property``, but without the lock that it takes before Python 3.12.
     """
 
-    def __init__(self, make: Callable[[Any], Made]) -> None:
-        self.make = make
-        self.__doc__ = make.__doc__
+    def __init__(self, compute: Callable[[Any], Value]) -> None:
+        self.compute = compute
+        self.__doc__ = compute.__doc__
 
     def __set_name__(self, kind: type, name: str) -> None:
         self.name = name
 
     @overload
-    def __get__(self, record: None, kind: type) -> once[Made]: ...
+    def __get__(self, record: None, kind: type) -> cached_attribute[Value]: ...
     @overload
-    def __get__(self, record: object, kind: type) -> Made: ...
-    def __get__(self, record: object | None, kind: type) -> once[Made] | Made:
+    def __get__(self, record: object, kind: type) -> Value: ...
+    def __get__(self, record: object | None, kind: type) -> cached_attribute[Value] | Value:
         if record is None:
             return self
-        found = record.__dict__[self.name] = self.make(record)
-        return found
+        value = record.__dict__[self.name] = self.compute(record)
+        return value
 
 
-# Questions about regions, told apart by their very numbers.
+def stored(record: Record, name: str, compute: Callable[[Record], Value]) -> Value:
+    """Return ``compute(record)``, computed once and stored in the record under ``name``.
 
-
-class Question:
-    """What a function is asked: regions, tuples of them, and other values that hash.
-
-    Only the same numbers make the same question; regions themselves equal within SAME.
+    For values of a record that another module defines. The value must not hold the record.
     """
+    values = record.__dict__
+    if name not in values:
+        values[name] = compute(record)
+    value: Value = values[name]
+    return value
 
-    __slots__ = ("_hash", "asked")
 
-    def __init__(self, asked: tuple[object, ...]) -> None:
-        self.asked = asked
-        self._hash = hash(tuple([_hash(one) for one in asked]))
+class Exact:
+    """A record that equals others within a tolerance, but is a key by its exact numbers."""
+
+    def exact_hash(self) -> int:
+        """Return a hash of the exact numbers."""
+        raise NotImplementedError
+
+    def is_exactly(self, other: object) -> bool:
+        """Whether the other record holds the very same numbers."""
+        raise NotImplementedError
+
+
+class _Key:
+    """The arguments of a call: Exact records, tuples of them, and other values that hash."""
+
+    __slots__ = ("_hash", "arguments")
+
+    def __init__(self, arguments: tuple[object, ...]) -> None:
+        self.arguments = arguments
+        self._hash = hash(tuple([_hash(value) for value in arguments]))
 
     def __hash__(self) -> int:
         return self._hash
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Question) and _are_same(self.asked, other.asked)
+        return isinstance(other, _Key) and _are_same(self.arguments, other.arguments)
 
 
-def _hash(asked: object) -> int:
-    if isinstance(asked, Region):
-        known = asked.__dict__
-        if "exact_hash" not in known:
-            known["exact_hash"] = hash(
-                tuple([kept(one, "edges_hash", _edges_hash) for one in asked.contours])
-            )
-        found: int = known["exact_hash"]
-        return found
-    if isinstance(asked, tuple) and asked and isinstance(asked[0], Region):
-        return hash(tuple([_hash(one) for one in asked]))
-    return hash(asked)
+def _hash(value: object) -> int:
+    if isinstance(value, Exact):
+        return value.exact_hash()
+    if isinstance(value, tuple) and value and isinstance(value[0], Exact):
+        return hash(tuple([_hash(item) for item in value]))
+    return hash(value)
 
 
-def _edges_hash(contour: Contour) -> int:
-    """Alike for equal edges: where they start tells nearly all others apart."""
-    return hash(tuple([edge.start for edge in contour.edges]))
+def _are_same(values: tuple[object, ...], others: tuple[object, ...]) -> bool:
+    return len(values) == len(others) and all(map(_is_same, values, others))
 
 
-def _are_same(one: tuple[object, ...], other: tuple[object, ...]) -> bool:
-    return len(one) == len(other) and all(map(_is_same, one, other))
+def _is_same(value: object, other: object) -> bool:
+    if isinstance(value, Exact):
+        return value.is_exactly(other)
+    if isinstance(value, tuple) and value and isinstance(value[0], Exact):
+        return isinstance(other, tuple) and _are_same(value, other)
+    return value == other
 
 
-def _is_same(one: object, other: object) -> bool:
-    if isinstance(one, Region):
-        return isinstance(other, Region) and (
-            one.contours is other.contours
-            or [own.edges for own in one.contours] == [own.edges for own in other.contours]
-        )
-    if isinstance(one, tuple) and one and isinstance(one[0], Region):
-        return isinstance(other, tuple) and _are_same(one, other)
-    return one == other
-
-
-# What was found of regions is kept for a while: rules, pages and designs ask for it again.
-
-
-Asked = ParamSpec("Asked")
-Found = TypeVar("Found")
-Several = TypeVar("Several", bound=tuple[object, ...])
-
-MOST = 256
-"""Answers that a function keeps, which bounds the memory over any number of designs."""
-
-
-class _Answers(Generic[Found]):
-    """The last answers of a function."""
+class _Results(Generic[Value]):
+    """The last results of a function, by the arguments of their calls."""
 
     def __init__(self, most: int) -> None:
         self.most = most
-        self.known: dict[Question, Found] = {}
+        self.by_key: dict[_Key, Value] = {}
         self.lock = Lock()
 
-    def keep(self, question: Question, found: Found) -> None:
+    def add(self, key: _Key, value: Value) -> None:
         with self.lock:
-            self.known[question] = found
-            if len(self.known) > self.most:
-                del self.known[next(iter(self.known))]
+            self.by_key[key] = value
+            if len(self.by_key) > self.most:
+                del self.by_key[next(iter(self.by_key))]
 
 
-def remembered(ask: Callable[Asked, Found], most: int = MOST) -> Callable[Asked, Found]:
-    """A function of regions and other values that hash, whose last answers are kept.
+def cached(function: Callable[Arguments, Value], most: int = MOST) -> Callable[Arguments, Value]:
+    """Return the function with its last ``most`` results kept.
 
-    What it returns is handed out again, and so must not be changed.
+    Arguments are regions, tuples of them, and other values that hash. A result is returned again,
+    and so must not be changed.
     """
-    answers: _Answers[tuple[Found]] = _Answers(most)
-    known = answers.known
+    results: _Results[tuple[Value]] = _Results(most)
+    by_key = results.by_key
 
-    @wraps(ask)
-    def answer(*asked: Asked.args, **named: Asked.kwargs) -> Found:
-        question = Question((*asked, *named.items()) if named else asked)
-        kept = known.get(question)
-        if kept is None:
-            kept = (ask(*asked, **named),)
-            answers.keep(question, kept)
-        return kept[0]
+    @wraps(function)
+    def cached_function(*arguments: Arguments.args, **named: Arguments.kwargs) -> Value:
+        key = _Key((*arguments, *named.items()) if named else arguments)
+        result = by_key.get(key)
+        if result is None:
+            result = (function(*arguments, **named),)
+            results.add(key, result)
+        return result[0]
 
-    return answer
+    return cached_function
 
 
-def remembered_together(
-    ask: Callable[[list[Several]], Sequence[Found]], most: int = MOST
-) -> Callable[[Sequence[Several]], list[Found]]:
-    """A function that answers several questions at once, of which it keeps the last answers.
+def cached_batch(
+    function: Callable[[list[Several]], Sequence[Value]], most: int = MOST
+) -> Callable[[Sequence[Several]], list[Value]]:
+    """Return a function of many argument tuples at once, with its last ``most`` results kept.
 
-    A question is a tuple of regions and other values that hash. What it is asked for the first time
-    is worked out together; answers must not be changed.
+    Only tuples without a kept result are passed on, all together. Results must not be changed.
     """
-    answers: _Answers[Found] = _Answers(most)
-    known = answers.known
+    results: _Results[Value] = _Results(most)
+    by_key = results.by_key
 
-    @wraps(ask)
-    def answer(asked: Sequence[Several]) -> list[Found]:
-        questions = [Question(one) for one in asked]
-        found = {one: known[one] for one in questions if one in known}
-        new = {one: own for one, own in zip(questions, asked, strict=True) if one not in found}
+    @wraps(function)
+    def cached_function(batch: Sequence[Several]) -> list[Value]:
+        keys = [_Key(arguments) for arguments in batch]
+        values = {key: by_key[key] for key in keys if key in by_key}
+        new = {
+            key: arguments for key, arguments in zip(keys, batch, strict=True) if key not in values
+        }
         if new:
-            for one, own in zip(new, ask(list(new.values())), strict=True):
-                found[one] = own
-                answers.keep(one, own)
-        return [found[one] for one in questions]
+            for key, value in zip(new, function(list(new.values())), strict=True):
+                values[key] = value
+                results.add(key, value)
+        return [values[key] for key in keys]
 
-    return answer
+    return cached_function

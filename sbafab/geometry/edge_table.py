@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal
-from sbafab.geometry.width import ALONGSIDE
+
+ALONGSIDE: Final = 1e-3
+"""Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from sbafab.geometry.cache import remembered_together
+from sbafab.geometry.cache import cached_batch
 from sbafab.geometry.edge_table import (
     SideTable,
     boxes_round,
@@ -103,7 +103,7 @@ def facing_places(
     return found
 
 
-@remembered_together
+@cached_batch
 def facing_places_of(asked: Sequence[FacingAsked]) -> Sequence[FacingPlaces]:
     """The same of several regions."""
     found = [NOWHERE] * len(asked)

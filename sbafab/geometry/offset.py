@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 from sbafab.errors import GeometryError
 from sbafab.geometry.arcs import biarc, ellipse
 from sbafab.geometry.boolean import FAR, alone, enclosed, meets_itself, wound
-from sbafab.geometry.cache import remembered
+from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import (
     EPSILON,
     Arc,
@@ -40,7 +40,7 @@ def grow(region: Region, distance: float) -> Region:
     return _grown(region, distance)
 
 
-@remembered
+@cached
 def _grown(region: Region, distance: float) -> Region:
     chains = [_chain(contour, distance) for contour in region.contours]
     return enclosed([chain for chain in chains if chain.edges])
@@ -55,7 +55,7 @@ def shrink(region: Region, distance: float) -> Region:
     return _shrunk(region, distance)
 
 
-@remembered
+@cached
 def _shrunk(region: Region, distance: float) -> Region:
     # What is outside grows: the chains wind round it 0 times, or more; round what is left, -1.
     outside = [contour.reversed() for contour in region.contours]
@@ -310,9 +310,9 @@ def _through(start: Point, middle: Point, end: Point) -> Edge:
 
 # The path of a beam of some width: regions grown by half of it, contour by contour.
 #
-# A beam that is as wide along x as along y grows a region by a disc, and arcs stay arcs. One that is
-# not grows it by an ellipse: straight edges stay straight, and every other piece of the path, known
-# in closed form, is drawn through its points by arcs.
+# A beam that is as wide along x as along y grows a region by a disc, and arcs stay arcs. One that
+# is not grows it by an ellipse: straight edges stay straight, and every other piece of the path,
+# known in closed form, is drawn through its points by arcs.
 
 
 Kerf = float | tuple[float, float]

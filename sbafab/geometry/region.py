@@ -16,7 +16,7 @@ from itertools import pairwise
 from operator import sub
 from typing import TYPE_CHECKING, Final
 
-from sbafab.geometry.cache import keeping, once
+from sbafab.geometry.cache import Exact, cached_attribute
 from sbafab.geometry.edges import (
     EPSILON,
     SAME,
@@ -47,36 +47,40 @@ MANY: Final = 32
 """Edges from which on filing them by place is worth its cost."""
 
 
-@keeping
 @dataclass(frozen=True)
 class Contour:
     """One closed chain of edges; each edge starts where the one before it ends."""
 
     edges: tuple[Edge, ...]
 
-    @once
+    @cached_attribute
     def area(self) -> float:
         """Enclosed area in mm2: positive counter-clockwise, negative for a hole."""
         return enclosed_area(self.edges)
 
-    @once
+    @cached_attribute
     def length(self) -> float:
         return length_of(self.edges)
 
-    @once
+    @cached_attribute
     def boxes(self) -> tuple[Bounds, ...]:
         """The bounds of each edge."""
         return boxes_of(self.edges)
 
-    @once
+    @cached_attribute
     def bounds(self) -> Bounds:
         return box_round(self.boxes)
 
-    @once
+    @cached_attribute
     def is_hole(self) -> bool:
         return self.area < 0
 
-    @once
+    @cached_attribute
+    def start_hash(self) -> int:
+        """Equal for equal edges; where edges start tells nearly all other contours apart."""
+        return hash(tuple([edge.start for edge in self.edges]))
+
+    @cached_attribute
     def circle(self) -> tuple[Point, float] | None:
         """Centre and radius if the contour is one full circle."""
         first = self.edges[0]
@@ -87,7 +91,7 @@ class Contour:
                 return None
         return first.centre, first.radius
 
-    @once
+    @cached_attribute
     def runs(self) -> tuple[tuple[Edge, ...], ...]:
         """The edges gathered by the line or circle they lie on, from the first corner on."""
         return tuple(runs(self.edges))
@@ -97,7 +101,7 @@ class Contour:
         """x, y and bulge of each vertex, as a DXF polyline carries them."""
         return tuple((*edge.start, edge.bulge) for edge in self.edges)
 
-    @once
+    @cached_attribute
     def marks(self) -> tuple[Mark, ...]:
         """What the contour is known by: its vertices with their bulges, or one circle (which may be
         split anywhere) with its radius, negative round a hole.
@@ -159,7 +163,7 @@ class Contour:
             image.__dict__["bounds"] = x - radius, y - radius, x + radius, y + radius
         return image.reversed() if mirror else image
 
-    @once
+    @cached_attribute
     def _round_once(self) -> tuple[Point, float, int] | None:
         """Centre, radius and direction of a full circle that runs round once."""
         if self.circle is None:
@@ -187,7 +191,7 @@ class Contour:
             [turns_round(edge, p) for edge in rows[min(len(rows) - 1, int((py - low) / step))]]
         )
 
-    @once
+    @cached_attribute
     def _rows(self) -> tuple[float, float, list[list[Edge]]]:
         """Edges by level: lowest y, height of a row, and each row's edges."""
         _, low, _, high = self.bounds
@@ -212,19 +216,18 @@ def _same(a: Edge, b: Edge) -> bool:
     return math.dist(a.start, b.start) < SAME and math.dist(a.at(0.5), b.at(0.5)) < SAME
 
 
-@keeping
 @dataclass(frozen=True)
-class Region:
+class Region(Exact):
     """A planar region, possibly of several pieces, possibly empty."""
 
     contours: tuple[Contour, ...] = ()
 
-    @once
+    @cached_attribute
     def area(self) -> float:
         """Area in mm2."""
         return sum(contour.area for contour in self.contours)
 
-    @once
+    @cached_attribute
     def bounds(self) -> Bounds:
         """Least x, least y, largest x, largest y, mm."""
         return box_round([contour.bounds for contour in self.contours])
@@ -233,21 +236,21 @@ class Region:
     def is_empty(self) -> bool:
         return not self.contours
 
-    @once
+    @cached_attribute
     def outers(self) -> tuple[Contour, ...]:
         """The outer contours, counter-clockwise."""
         return tuple(contour for contour in self.contours if not contour.is_hole)
 
-    @once
+    @cached_attribute
     def holes(self) -> tuple[Contour, ...]:
         """The contours of holes, clockwise."""
         return tuple(contour for contour in self.contours if contour.is_hole)
 
-    @once
+    @cached_attribute
     def edges(self) -> tuple[Edge, ...]:
         return tuple(edge for contour in self.contours for edge in contour.edges)
 
-    @once
+    @cached_attribute
     def index(self) -> EdgeIndex:
         """The edges filed by place."""
         return EdgeIndex(self.edges, [box for contour in self.contours for box in contour.boxes])
@@ -258,7 +261,7 @@ class Region:
         # A region that kept itself would be freed late.
         return (self,) if len(self.outers) == 1 else self._several
 
-    @once
+    @cached_attribute
     def _several(self) -> tuple[Region, ...]:
         held: list[list[Contour]] = [[outer] for outer in self.outers]
         places = [hole.edges[0].at(0.5) for hole in self.holes]
@@ -277,7 +280,7 @@ class Region:
             min(inside, key=lambda group: group[0].area).append(contour)
         return tuple(Region(tuple(group)) for group in held)
 
-    @once
+    @cached_attribute
     def key(self) -> str:
         """A name for the shape, from its corners rounded to 1 nm; the same on every machine.
 
@@ -292,12 +295,28 @@ class Region:
             rings.append(ring[first:] + ring[:first])
         return hashlib.sha256(repr(sorted(rings)).encode()).hexdigest()[:16]
 
-    @once
+    @cached_attribute
     def _hash(self) -> int:
         return hash(tuple(sorted(len(contour.marks) for contour in self.contours)))
 
     def __hash__(self) -> int:
         return self._hash
+
+    def exact_hash(self) -> int:
+        """Return a hash of the contours' exact numbers, in their order."""
+        return self._exact_hash
+
+    @cached_attribute
+    def _exact_hash(self) -> int:
+        return hash(tuple([contour.start_hash for contour in self.contours]))
+
+    def is_exactly(self, other: object) -> bool:
+        """Whether the other region has the very same contours, in the same order."""
+        return isinstance(other, Region) and (
+            self.contours is other.contours
+            or [contour.edges for contour in self.contours]
+            == [contour.edges for contour in other.contours]
+        )
 
     def __eq__(self, other: object) -> bool:
         """Whether the same corners and arcs lie within SAME of each other, wherever they start."""
@@ -644,7 +663,7 @@ def path_data(region: Region) -> str:
     return " ".join(map(_contour_data, region.contours))
 
 
-def number(value: float) -> str:
+def coord(value: float) -> str:
     """A length to the nanometre without trailing zeros."""
     text = f"{value:.6f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
@@ -658,10 +677,10 @@ def _contour_data(contour: Contour) -> str:
 def _command(edge: Edge) -> str:
     if not isinstance(edge, Arc):
         return f"L{_point(edge.end)}"
-    radius = number(edge.radius)
+    radius = coord(edge.radius)
     large = int(abs(edge.sweep) > math.pi + 1e-9)
     return f"A{radius} {radius} 0 {large} {int(edge.ccw)} {_point(edge.end)}"
 
 
 def _point(p: Point) -> str:
-    return f"{number(p[0])} {number(p[1])}"
+    return f"{coord(p[0])} {coord(p[1])}"

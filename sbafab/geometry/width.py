@@ -10,21 +10,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, Final, NamedTuple, final
+from typing import Final, NamedTuple, final
 
 from sbafab.geometry.arcs import run_sweep
-from sbafab.geometry.cache import kept, remembered
-from sbafab.geometry.edge_table import BoundarySide, Foot
+from sbafab.geometry.cache import cached, stored
+from sbafab.geometry.edge_table import ALONGSIDE, BoundarySide, Foot, SideTable
 from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, left_normal, left_turn
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Contour, Region
 
-if TYPE_CHECKING:
-    from sbafab.geometry.edge_table import SideTable
-
-ALONGSIDE: Final = 1e-3
-"""Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
 SHORTER: Final = 1e-9
 """mm by which a segment must be shorter than another to be the narrowest."""
 ROUNDING: Final = 1e-12
@@ -51,7 +46,7 @@ class Width(NamedTuple):
         return (self.start[0] + self.end[0]) / 2, (self.start[1] + self.end[1]) / 2
 
 
-@remembered
+@cached
 def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) -> Width | None:
     """The narrowest place of the material, if under ``below`` mm; None if no edge faces another.
 
@@ -63,10 +58,10 @@ def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) ->
     return least_of(boundary_of(region, sharp), below)
 
 
-@remembered
+@cached
 def least_gap(region: Region, sharp: float = 90.0, below: float = math.inf) -> Width | None:
     """The narrowest slot, hole or gap between pieces, likewise."""
-    outside = [kept(one, "from_outside", Contour.reversed) for one in region.contours]
+    outside = [stored(one, "from_outside", Contour.reversed) for one in region.contours]
     return least_of(Boundary(may_be_narrower(outside, below), sharp), below)
 
 
@@ -74,13 +69,13 @@ class Boundary:
     """Contours with the material on their left, made ready for the search."""
 
     def __init__(self, contours: Sequence[Contour], sharp: float) -> None:
-        self.sides = [side for one in contours for side in kept(one, "sides", _sides)]
-        self.corners = [corner for one in contours for corner in kept(one, "corners", _corners)]
+        self.sides = [side for one in contours for side in stored(one, "sides", _sides)]
+        self.corners = [corner for one in contours for corner in stored(one, "corners", _corners)]
         """What corner each side starts at, if any."""
         self.ends = [
             ends
             for one in contours
-            for ends in kept(one, f"ends{sharp}", lambda c: list(tapered_ends(c, sharp)))
+            for ends in stored(one, f"ends{sharp}", lambda c: list(tapered_ends(c, sharp)))
         ]
         self.pinch = pinch(contours, self.corners, sharp)
         self.widest_least = widest_least(contours)
@@ -94,8 +89,6 @@ class Boundary:
     @property
     def table(self) -> SideTable:
         """The sides in arrays."""
-        from sbafab.geometry.edge_table import SideTable
-
         if self._table is None:
             self._table = SideTable(self.sides)
         return self._table
@@ -105,7 +98,7 @@ def _made_ready(region: Region, sharp: float) -> Boundary:
     return Boundary(region.contours, sharp)
 
 
-boundary_of = remembered(_made_ready, most=16)
+boundary_of = cached(_made_ready, most=16)
 
 
 class _Narrowest:

@@ -13,18 +13,18 @@ from functools import lru_cache
 from typing import Literal, get_args
 
 from sbafab.geometry.boolean import divided, union
-from sbafab.geometry.cache import once
+from sbafab.geometry.cache import cached_attribute
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Region, number, path_data
+from sbafab.geometry.region import Region, coord, path_data
 from sbafab.laminate.films import Film, density_of, in_order, ink
 from sbafab.markup import escape
 from sbafab.notebook import table_html
 
 # Registered sheets: whole films on corner pins that hold several copies until a second cut.
 #
-# Of every layer the first cut leaves one sheet. Films hold their parts by bridges, mask sheets hold
-# theirs by the transfer film they lie on. All stacked and pressed, the second cut takes a slot out of
-# every bridge and so frees the actuators. Lengths mm, in the frame of the first copy.
+# Of every layer the first cut leaves one sheet. Films hold their parts by bridges, mask sheets
+# hold theirs by the transfer film they lie on. All stacked and pressed, the second cut takes a
+# slot out of every bridge and so frees the actuators. Lengths mm, in the frame of the first copy.
 
 
 @dataclass(frozen=True)
@@ -236,7 +236,7 @@ class Laminate:
     def __repr__(self) -> str:
         return f"Laminate({self.name!r}, {self.family!r}, {len(self.layers)} layers)"
 
-    @once
+    @cached_attribute
     def interfaces(self) -> tuple[Interface, ...]:
         """One between every two consecutive TPE layers, bottom to top."""
         known: dict[tuple[str, str, tuple[str, ...]], tuple[Region, Region, Region, Region]] = {}
@@ -257,7 +257,7 @@ class Laminate:
             below, masks = layer, []
         return tuple(found)
 
-    @once
+    @cached_attribute
     def tpe_layers(self) -> tuple[Layer, ...]:
         """The layers that bond: all of structural films, TPE or further ones."""
         return tuple(layer for layer in self.layers if not layer.is_mask)
@@ -267,7 +267,7 @@ class Laminate:
         """The materials of the films that bond, in words."""
         return ", ".join(in_order(layer.film.material for layer in self.tpe_layers))
 
-    @once
+    @cached_attribute
     def patterns(self) -> dict[str, tuple[Layer, ...]]:
         """The layers of every distinct pattern, in stacking order."""
         groups: dict[str, list[Layer]] = {}
@@ -281,7 +281,7 @@ class Laminate:
         top = self.layers[-1]
         return top.z + top.film.thickness
 
-    @once
+    @cached_attribute
     def bounds(self) -> Bounds:
         """Least x, least y, largest x, largest y of all layers, mm."""
         boxes = [layers[0].profile.bounds for layers in self.patterns.values()]
@@ -395,7 +395,7 @@ class Interface:
     def layer_indices(self) -> tuple[int, ...]:
         return (self.below.index, *(mask.index for mask in self.masks), self.above.index)
 
-    @once
+    @cached_attribute
     def pattern(self) -> tuple[str, ...]:
         """Equal for interfaces made of equal profiles."""
         return (
@@ -493,10 +493,10 @@ def _legend(bounds: Bounds, layers: Iterable[Layer]) -> str:
     swatches = "".join(
         f'<span style="background:{ink(film).fill};border:1px solid '
         f'{ink(film).line}">&emsp;</span> {film.material}, {escape(film.product)}, '
-        f"{number(film.thickness)} mm &ensp; "
+        f"{coord(film.thickness)} mm &ensp; "
         for film in films
     )
-    width = number(bar * SHOWN_MM / longer)
+    width = coord(bar * SHOWN_MM / longer)
     return (
         f'<div><span style="display:inline-block;width:{width}mm;border-top:2px solid">'
         f"{bar:g} mm</span> &ensp; {swatches}</div>"
@@ -511,7 +511,7 @@ def layer_svg(layer: Layer) -> str:
 
 def laminate_svg(laminate: Laminate) -> str:
     """Every distinct profile in plan, bottom to top, see-through."""
-    title = f"{laminate.name}: {len(laminate.layers)} layers, {number(laminate.thickness)} mm"
+    title = f"{laminate.name}: {len(laminate.layers)} layers, {coord(laminate.thickness)} mm"
     shapes = [_profile(layers[0], 0.45) for layers in laminate.patterns.values()]
     return _document(title, laminate.bounds, shapes)
 
@@ -520,7 +520,7 @@ def _profile(layer: Layer, opacity: float) -> str:
     own = ink(layer.film)
     return (
         f'<path d="{path_data(layer.profile)}" fill="{own.fill}" stroke="{own.line}" '
-        f'fill-opacity="{number(opacity)}"/>'
+        f'fill-opacity="{coord(opacity)}"/>'
     )
 
 
@@ -529,10 +529,10 @@ def _document(title: str, bounds: Bounds, shapes: list[str]) -> str:
     margin = 0.03 * max(high_x - low_x, high_y - low_y)
     width, height = high_x - low_x + 2 * margin, high_y - low_y + 2 * margin
     scale = SHOWN_MM / max(width, height)
-    box = " ".join(map(number, (low_x - margin, -high_y - margin, width, height)))
+    box = " ".join(map(coord, (low_x - margin, -high_y - margin, width, height)))
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{number(width * scale)}mm" '
-        f'height="{number(height * scale)}mm" viewBox="{box}"><title>{escape(title)}</title>'
-        f'<g transform="scale(1 -1)" fill-rule="evenodd" stroke-width="{number(0.3 / scale)}">'
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{coord(width * scale)}mm" '
+        f'height="{coord(height * scale)}mm" viewBox="{box}"><title>{escape(title)}</title>'
+        f'<g transform="scale(1 -1)" fill-rule="evenodd" stroke-width="{coord(0.3 / scale)}">'
         f"{''.join(shapes)}</g></svg>"
     )

@@ -212,7 +212,7 @@ def inflate(
     elements = len(balloon.nodes) - 1
     smooth = np.where(balloon.may_wrinkle & balloon.inextensible, 0.0, math.inf)
     cap = np.broadcast_to(smooth, (len(p), elements))
-    load = BalloonLoad(p, high / 2, cap, tied, smooth(balloon, len(p)))
+    load = BalloonLoad(p, high / 2, cap, tied, smooth_rim(balloon, len(p)))
     if balloon.mate is not None:
         return inflate_two_films((replace(balloon, mate=None), balloon.mate), load)
     # Where no balance is found, elements may shrink to nothing on the way; that is said in the end.
@@ -278,7 +278,7 @@ def total(balloon: Balloon, load: BalloonLoad, x: Array) -> Total:
     p = load.pressure
     bent = bending(film, balloon.rigidity, slice(balloon.held, edge), lie)
     stretched, filled = membrane(film, lie, load.cap), air(film, edge, lie)
-    eased = eased(film, edge, load.ripple, r)
+    eased = eased_by_ripple(film, edge, load.ripple, r)
     slopes, curves = (
         [a + b - p[:, None] * c for a, b, c in zip(*parts, strict=True)]
         for parts in (
@@ -399,21 +399,22 @@ def rippling(films: Sequence[Balloon], shapes: Sequence[tuple[Array, Array]]) ->
 
 # The bonded rim of a balloon, which buckles out of its plane where its hoop is compressed.
 #
-# The films, pulled tight, hold the pocket's edge; the rim tilts about it by a cos(n turn), a in rad.
-# At s from that edge a ripple takes up the hoop strain
+# The films, pulled tight, hold the pocket's edge; the rim tilts about it by a cos(n turn), a in
+# rad. At s from that edge a ripple takes up the hoop strain
 #
 #     a^2 rho,    rho = (n^2 s^2 / r^2 - s / r) / 4
 #
-# the first part for the waves' length, the second for the tilt, which draws the hoop inward. It costs
+# the first part for the waves' length, the second for the tilt, which draws the hoop inward. It
+# costs
 #
 #     a^2 K / 2,    K = pi int D ((1/r - n^2 s / r^2)^2 + 2 (1 - nu) n^2 (1/r - s/r^2)^2) r ds
 #                       + pi R sum sqrt(B T)
 #
-# the rim's bending and twisting (plate of both films, Kirchhoff), and the films' roots: a long film
-# of bending stiffness B under the tension T is turned at its end against sqrt(B T). With the rim's
-# hoop strain e the energy is a^2 K / 2 + int E (e + a^2 rho)^2 / 2, so that the amplitude of least
-# energy has a closed form, and what is left is quadratic in e. The number of waves is the one of
-# least energy. Nothing is fitted. Lengths mm, pressures kPa, energies uJ.
+# the rim's bending and twisting (plate of both films, Kirchhoff), and the films' roots: a long
+# film of bending stiffness B under the tension T is turned at its end against sqrt(B T). With the
+# rim's hoop strain e the energy is a^2 K / 2 + int E (e + a^2 rho)^2 / 2, so that the amplitude of
+# least energy has a closed form, and what is left is quadratic in e. The number of waves is the
+# one of least energy. Nothing is fitted. Lengths mm, pressures kPa, energies uJ.
 
 
 WAVES = np.arange(2, 201)
@@ -440,7 +441,7 @@ class Ripple(NamedTuple):
         return Ripple(*(part[these] for part in self))
 
 
-def smooth(balloon: Balloon, count: int) -> Ripple:
+def smooth_rim(balloon: Balloon, count: int) -> Ripple:
     """Rims that do not ripple."""
     elements = np.zeros((count, len(balloon.nodes) - 1 - balloon.edge))
     none = np.full(count, math.inf)
@@ -524,7 +525,7 @@ class Eased(NamedTuple):
     curves: Array
 
 
-def eased(flat: Flat, edge: int, ripple: Ripple, r: Array) -> Eased:
+def eased_by_ripple(flat: Flat, edge: int, ripple: Ripple, r: Array) -> Eased:
     """What ripples take off the energy of a smooth rim."""
     drive = _drive(_hoop(flat, edge, r), ripple)
     middles = flat.middles[edge:]

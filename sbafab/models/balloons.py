@@ -10,7 +10,7 @@ import numpy as np
 
 from sbafab.design.records import Discs, Form
 from sbafab.errors import DesignError
-from sbafab.models.balloon import Balloon, Shapes, inflate, rippling
+from sbafab.models.balloon import Balloon, Shapes, amplitude, inflate, rippling
 from sbafab.models.film_elements import strain
 from sbafab.models.paper import BURST
 
@@ -202,7 +202,7 @@ def stresses(balloon: Balloon, shapes: Shapes) -> FilmStress:
     s2 = np.where(wrinkled, 0.0, plane * (e2 + nu * e1))
     if balloon.wrinkles and not balloon.inextensible:
         (ripple,) = rippling((balloon,), ((shapes.r, shapes.z),))
-        tilt = balloon.amplitude(film, balloon.edge, ripple, shapes.r)
+        tilt = amplitude(film, balloon.edge, ripple, shapes.r)
         s2[:, balloon.edge :] += film.modulus * tilt[:, None] * ripple.relief
     along = np.hypot(np.diff(shapes.r), np.diff(shapes.z)) / film.lengths
     around = (shapes.r[:, 1:] + shapes.r[:, :-1]) / (2 * film.middles)

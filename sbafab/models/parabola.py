@@ -59,11 +59,13 @@ def inverse(
 # arc keeps the length l of the flat pocket's radius. Eq. 1 prints an upper limit of infinity where
 # rho is meant, Eq. 3 a rho under the root where x is meant. Lengths mm, volumes ul.
 #
-# Everything follows from the slope k = 2 a rho at the edge. With s = sqrt(1 + k^2), q = asinh(k) / k:
+# Everything follows from the slope k = 2 a rho at the edge. With s = sqrt(1 + k^2), q = asinh(k) /
+# k:
 #
 #     rho = 2 l / (s + q)    h = k rho / 2    v = pi rho^2 h / 2    dv/dh = pi rho^2 (2 q - s) / 2 q
 #
-# A half holds most where s = 2 q. A whole balloon is two halves, and twice as high: ``balloon_...``.
+# A half holds most where s = 2 q. A whole balloon is two halves, and twice as high:
+# ``balloon_...``.
 
 
 MODEL = "Eqs. 1-3"

@@ -18,7 +18,7 @@ from sbafab.assemblies.files import (
 )
 from sbafab.assemblies.records import Assembly
 from sbafab.assemblies.shapes import colours, linear, placed_surface
-from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
+from sbafab.cutting.properties import TRUE_ARCS, Curves
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DesignError, GeometryError
 from sbafab.meshing.write_glb import Node, write_scene

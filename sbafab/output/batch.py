@@ -12,12 +12,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.cutting.files import write_layer_files
 from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.lightburn import write_projects
-from sbafab.cutting.properties import CutSettings
+from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings
 from sbafab.cutting.second_cut import write_second_cut
 from sbafab.cutting.sheets import FOLDER, SheetFile, write_sheets
 from sbafab.design.files import design_sha256, design_toml, kit_names

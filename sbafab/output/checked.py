@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from sbafab import __version__
 from sbafab.actuators import build
 from sbafab.actuators.stacking import used_films
-from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.cutting.files import compensated_paths
-from sbafab.cutting.properties import CutSettings
+from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings
 from sbafab.design.files import design_sha256
 from sbafab.design.films import KerfWidth, Sheet, material
 from sbafab.design.kits import citation

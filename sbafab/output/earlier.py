@@ -15,9 +15,9 @@ from sbafab.output.manifest import carried_over, file_hash, file_names, identity
 from sbafab.output.swap import listed_files, read_manifest
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 
-CUT = ("layers", "sheets", "traveller.html")
-PRESS = ("press.json", "press.csv", "underlay.pdf")
-MESH = ("mesh",)
+CUT: tuple[str, ...] = ("layers", "sheets", "traveller.html")
+PRESS: tuple[str, ...] = ("press.json", "press.csv", "underlay.pdf")
+MESH: tuple[str, ...] = ("mesh",)
 PREDICTION = ("predict", "predict.json")
 MOST_KEYS = 3
 """Keys that a message names, at most."""

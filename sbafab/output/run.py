@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
+from sbafab.cutting.properties import TRUE_ARCS, Curves
 from sbafab.design.files import design_sha256
 from sbafab.design.records import Design
 from sbafab.errors import OutputError

@@ -73,9 +73,10 @@ def named(layers: Sequence[int]) -> str:
 # How a cold plate warms between hot platens: a time-temperature line, first order.
 #
 # The paper states minutes at 135 C (Sec. 2); it does not say when its clock starts, nor what lay
-# between platens and films. Ours: the plate goes in cold, its edge follows T(t) = platen - (platen -
-# start) exp(-t / tau), and the clock starts when the edge reads 5 C less than the platens, or the
-# melting point where that is higher. tau is the bench's own, measured once. Temperatures are C.
+# between platens and films. Ours: the plate goes in cold, its edge follows T(t) = platen - (platen
+# - start) exp(-t / tau), and the clock starts when the edge reads 5 C less than the platens, or
+# the melting point where that is higher. tau is the bench's own, measured once. Temperatures are
+# C.
 
 
 ROOM = 20.0
@@ -379,7 +380,7 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
     tacking = None
     if laminate.panel is not None:
         low = tack_pins(laminate, press)
-        tacking = tacking(laminate, press.tack, press.temperature_c, plate, low)
+        tacking = tacking_of(laminate, press.tack, press.temperature_c, plate, low)
     hands = HANDLING_MINUTES + (0.0 if tacking is None else tacking.total_minutes)
     pressed = "no minutes stated for this film" if total is None else f"{total:g} min"
     return Schedule(
@@ -465,7 +466,7 @@ def _step(
     title = TITLES[part.name] if count == 1 else TITLES_OF_SEVERAL[part.name]
     words = _instructions(part, count) + after
     if laminate.panel is not None:
-        title, words = title(part), instructions(part)
+        title, words = title_of_sheets(part), instructions(part)
     return Step(
         step=part.number,
         title=title,
@@ -704,7 +705,7 @@ CUT_FREE = (
 )
 
 
-def title(part: AssemblyStep) -> str:
+def title_of_sheets(part: AssemblyStep) -> str:
     """The name of a step in which whole sheets are pressed."""
     return "All sheets but the cap's" if part.bond == "flash" else "The whole stack of sheets"
 
@@ -764,7 +765,7 @@ def tack_stack(laminate: Laminate) -> float:
     return round(max(films) + max(masks), 6)
 
 
-def tacking(
+def tacking_of(
     laminate: Laminate, minutes: float, platen_c: float, plate: float, pins: tuple[PinSetting, ...]
 ) -> Tacking:
     """Return how the masks of registered sheets are tacked, on a base plate ``plate`` mm thick.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from sbafab.geometry.edges import Arc, Point
-from sbafab.geometry.region import Contour, Region, number, section
+from sbafab.geometry.region import Contour, Region, coord, section
 from sbafab.laminate.films import MASKS, Film, Ink, ink
 from sbafab.laminate.laminate import Inlet, Laminate, Layer
 from sbafab.markup import escape
@@ -30,7 +30,7 @@ FONT = "Helvetica, Arial, 'Liberation Sans', sans-serif"
 
 def document(width: float, height: float, title: str, elements: Iterable[str]) -> str:
     """A whole SVG file, ``width`` x ``height`` mm, on white."""
-    w, h = number(width), number(height)
+    w, h = coord(width), coord(height)
     drawn = "\n".join(elements)
     return "\n".join(
         [
@@ -82,8 +82,8 @@ def text(
     turned: bool = False,
 ) -> str:
     """One line of text on its baseline; ``turned`` reads upward."""
-    x, y = map(number, at)
-    extra = f' font-size="{number(size)}"' if size != TEXT else ""
+    x, y = map(coord, at)
+    extra = f' font-size="{coord(size)}"' if size != TEXT else ""
     extra += f' text-anchor="{anchor}"' if anchor != "start" else ""
     extra += ' font-weight="bold"' if bold else ""
     extra += f' fill="{colour}"' if colour != DARK else ""
@@ -98,16 +98,16 @@ def text_width(words: str, size: float = TEXT) -> float:
 
 
 def line(points: Sequence[Point], *, colour: str = DARK, width: float = THIN) -> str:
-    path = "M" + "L".join(f"{number(x)} {number(y)}" for x, y in points)
-    return f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="{number(width)}"/>'
+    path = "M" + "L".join(f"{coord(x)} {coord(y)}" for x, y in points)
+    return f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="{coord(width)}"/>'
 
 
 def box(low: Point, high: Point, *, fill: str, stroke: str = "none", width: float = THIN) -> str:
     """A rectangle between two corners."""
     return (
-        f'<rect x="{number(low[0])}" y="{number(low[1])}" width="{number(high[0] - low[0])}" '
-        f'height="{number(high[1] - low[1])}" fill="{fill}" stroke="{stroke}" '
-        f'stroke-width="{number(width)}"/>'
+        f'<rect x="{coord(low[0])}" y="{coord(low[1])}" width="{coord(high[0] - low[0])}" '
+        f'height="{coord(high[1] - low[1])}" fill="{fill}" stroke="{stroke}" '
+        f'stroke-width="{coord(width)}"/>'
     )
 
 
@@ -117,7 +117,7 @@ def arrow(tip: Point, toward: Point) -> str:
     bx, by = x - ARROW * u, y - ARROW * v
     half = ARROW * 0.18
     corners = [tip, (bx - half * v, by + half * u), (bx + half * v, by - half * u)]
-    data = "M" + "L".join(f"{number(px)} {number(py)}" for px, py in corners) + "Z"
+    data = "M" + "L".join(f"{coord(px)} {coord(py)}" for px, py in corners) + "Z"
     return f'<path d="{data}"/>'
 
 
@@ -156,7 +156,7 @@ def dimension(a: Point, b: Point, words: str, away: Point, distance: float) -> l
 def leader(feature: Point, elbow: Point, label: Point, *, dot: bool = True) -> list[str]:
     """A leader line from a feature by an elbow to a label; a dot or an arrow on the feature."""
     end = (
-        f'<circle cx="{number(feature[0])}" cy="{number(feature[1])}" r="0.45" fill="{DARK}"/>'
+        f'<circle cx="{coord(feature[0])}" cy="{coord(feature[1])}" r="0.45" fill="{DARK}"/>'
         if dot
         else arrow(feature, _unit(elbow, feature))
     )

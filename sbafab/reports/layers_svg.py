@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import number, path_data
+from sbafab.geometry.region import coord, path_data
 from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.films import ink
 from sbafab.laminate.laminate import Laminate, Layer, Pin
@@ -91,7 +91,7 @@ def _title_block(laminate: Laminate, grid: PageGrid, block: float, pinned: bool)
     facts = (
         f"{laminate.family}: {balloons(laminate)}, "
         f"{_count(len(laminate.chambers), 'chamber')}, {needed} layers of "
-        f"{len(laminate.patterns)} patterns, {number(laminate.thickness)} thick (nominal)"
+        f"{len(laminate.patterns)} patterns, {coord(laminate.thickness)} thick (nominal)"
     )
     return [
         draw.box(low, (width - MARGIN, height - MARGIN), fill="none", stroke=draw.DARK, width=0.25),
@@ -129,7 +129,7 @@ def _films(laminate: Laminate, pinned: bool, at: Point) -> list[str]:
         parts.append(draw.box((x, y), (x + 6.0, y + 3.6), fill=fill, stroke=ink(film).line))
         known = film.product.startswith(film.material)
         name = film.product if known else f"{film.material}, {film.product}"
-        words = f"{name}, {number(film.thickness)} thick"
+        words = f"{name}, {coord(film.thickness)} thick"
         parts.append(draw.text((x + 8.0, y + 2.8), words))
     if pinned:
         x, y = at[0] + 3.0, at[1] + 3.4 + FILM_ROW * len(films) + 1.4
@@ -149,7 +149,7 @@ def _scale_bar(scale: float, end: Point) -> list[str]:
         a, b = x0 + (x1 - x0) * i / ticks, x0 + (x1 - x0) * (i + 1) / ticks
         fill = draw.DARK if i % 2 == 0 else "#ffffff"
         parts.append(draw.box((a, y - 0.6), (b, y + 0.6), fill=fill, stroke=draw.DARK))
-    ratio = f"{number(scale)}:1" if scale >= 1 else f"1:{number(1 / scale)}"
+    ratio = f"{coord(scale)}:1" if scale >= 1 else f"1:{coord(1 / scale)}"
     return [
         *parts,
         draw.text((x0, y - 1.8), "0", anchor="middle", size=draw.SMALL),
@@ -206,7 +206,7 @@ class Card:
         word = "layer" if len(self.layers) == 1 else "layers"
         return (
             f"{first.pattern}  {roles}",
-            f"{first.film.material} film {number(first.film.thickness)}, {len(self.layers)} needed",
+            f"{first.film.material} film {coord(first.film.thickness)}, {len(self.layers)} needed",
             f"{word} {layer_numbers([layer.index for layer in self.layers])}",
         )
 
@@ -294,7 +294,7 @@ def _outline(card: Card, frame: CardFrame) -> list[str]:
         if isinstance(mark, Circle) and mark.phantom:
             (cx, cy), r = frame.at(mark.centre), mark.radius * frame.scale
             parts.append(
-                f'<circle cx="{number(cx)}" cy="{number(cy)}" r="{number(r)}" fill="none" '
+                f'<circle cx="{coord(cx)}" cy="{coord(cy)}" r="{coord(r)}" fill="none" '
                 f'stroke="{draw.GREY}" stroke-width="{draw.THIN}" '
                 'stroke-dasharray="3 0.8 0.6 0.8"/>'
             )
@@ -309,8 +309,7 @@ def pin_mark(centre: Point, radius: float) -> str:
     """A dowel pin in its hole, seen from above."""
     x, y = centre
     return (
-        f'<circle cx="{number(x)}" cy="{number(y)}" r="{number(0.62 * radius)}" '
-        f'fill="{draw.DARK}"/>'
+        f'<circle cx="{coord(x)}" cy="{coord(y)}" r="{coord(0.62 * radius)}" fill="{draw.DARK}"/>'
     )
 
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Interval, number, section
+from sbafab.geometry.region import Interval, coord, section
 from sbafab.laminate.assembly import assembly
 from sbafab.laminate.films import Film, ink
 from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer, Pin
@@ -317,7 +317,7 @@ def _rod(rod: Rod, view: StackView) -> list[str]:
 def _heading(laminate: Laminate, view: StackView) -> list[str]:
     what = (
         f"Section through {view.section.chamber} along its inlet. "
-        f"Height exaggerated {view.factor}{draw.TIMES}, {number(laminate.thickness)} in all "
+        f"Height exaggerated {view.factor}{draw.TIMES}, {coord(laminate.thickness)} in all "
         "(nominal). All dimensions in mm."
     )
     return [
@@ -474,7 +474,7 @@ def _legend(view: StackView, page: float) -> list[str]:
     y = page - 10.0
     films = dict.fromkeys(slab.layer.film for slab in view.section.slabs)
     entries = [
-        (f"{film.material} film, {number(film.thickness)}", draw.film_fill(film)) for film in films
+        (f"{film.material} film, {coord(film.thickness)}", draw.film_fill(film)) for film in films
     ]
     entries.append((f"bond: the gap filled with {_bonding(films)}", BOND))
     entries.append(("unbonded: drawn as a slit beside the mask", "#ffffff"))

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from sbafab.cutting.fixture import whole_plate
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point
-from sbafab.geometry.region import Contour, Region, disc, number
+from sbafab.geometry.region import Contour, Region, coord, disc
 from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.pressing.schedule import listed
@@ -355,9 +355,9 @@ class PdfPage:
 
     def stroke(self, colour: Rgb, width: float, dashes: Iterable[float] = ()) -> None:
         """What the lines that follow look like; widths and dashes are mm."""
-        shades = " ".join(map(number, colour))
-        on = " ".join(map(number, dashes))
-        self._drawn.append(f"{shades} RG {number(width)} w [{on}] 0 d")
+        shades = " ".join(map(coord, colour))
+        on = " ".join(map(coord, dashes))
+        self._drawn.append(f"{shades} RG {coord(width)} w [{on}] 0 d")
 
     def contour(self, contour: Contour) -> None:
         """A closed line of straight edges and arcs."""
@@ -370,7 +370,7 @@ class PdfPage:
     def text(self, at: Point, words: str, size: float, bold: bool = False) -> None:
         """Words that begin at a point, ``size`` mm; what Windows-1252 does not hold becomes "?"."""
         font = "F2" if bold else "F1"
-        self._drawn.append(f"BT /{font} {number(size)} Tf {_at(at)} Td {_string(words)} Tj ET")
+        self._drawn.append(f"BT /{font} {coord(size)} Tf {_at(at)} Td {_string(words)} Tj ET")
 
     def objects(self, number: int) -> tuple[bytes, bytes]:
         """The page and what is drawn on it, as objects of a file; the latter has this number."""
@@ -422,7 +422,7 @@ def _string(words: str) -> str:
 
 
 def _at(p: Point) -> str:
-    return f"{number(p[0])} {number(p[1])}"
+    return f"{coord(p[0])} {coord(p[1])}"
 
 
 def _drawn(edge: Edge) -> str:

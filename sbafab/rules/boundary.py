@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 from sbafab.geometry.arrangement import DIGIT, Piece, by_owner, overlay
 from sbafab.geometry.boolean import ChainGroup, chains_of, divided, grouped, union
-from sbafab.geometry.cache import remembered
+from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal
 from sbafab.geometry.intersect import line_circle
 from sbafab.geometry.nearby import EdgeIndex, widened
@@ -31,7 +31,7 @@ ROUNDING: Final = 1e-12
 """mm: more than what heights are rounded by."""
 
 
-@remembered
+@cached
 def edges_along(region: Region, other: Region) -> tuple[Edge, ...]:
     """The stretches of ``region``'s edges that run along edges of ``other``, the same way."""
     along = []
@@ -254,8 +254,8 @@ def _on_ray(origin: Point, unit: Point, edge: Edge) -> list[Point]:
 # Films that face each other past films that end between them: every pair, found in one sweep.
 #
 # Seen from above, a stack of films is a patchwork: at each place the highest film so far. A film
-# laid on top faces the film just below it over most of its area, which is their interface, and lower
-# ones where those in between have ended or are open.
+# laid on top faces the film just below it over most of its area, which is their interface, and
+# lower ones where those in between have ended or are open.
 
 
 class Facing(NamedTuple):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 import numpy as np
 
-from sbafab.geometry.cache import remembered, remembered_together
+from sbafab.geometry.cache import cached, cached_batch
 from sbafab.geometry.edge_table import (
     CellOrder,
     EdgeTable,
@@ -377,7 +377,7 @@ def profiles_of(interface: Interface) -> tuple[Region, ...]:
     return tuple([one.profile for one in (interface.below, interface.above, *interface.masks)])
 
 
-@remembered_together
+@cached_batch
 def places_of(asked: Sequence[PlacesAsked]) -> Sequence[Places]:
     """The narrow places of each bond and overhang, found together."""
     bonds = [one for one in asked if isinstance(one, BondAsked)]
@@ -575,7 +575,7 @@ class _Profile(NamedTuple):
     pieces: list[int]
 
 
-@remembered
+@cached
 def _profile(profile: Region) -> _Profile:
     numbered = [(n, c) for n, region in enumerate(profile.pieces) for c in region.contours]
     return _Profile(

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cache, cached_property
 from typing import NamedTuple
 
-from sbafab.geometry.cache import remembered
+from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Edge
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width, least_width
@@ -96,7 +96,7 @@ def _bond(bond: Region) -> Width | None:
     return None if bond.is_empty else least_width(bond, SHARP)
 
 
-@remembered
+@cached
 def _reaches(unbonded: Region, contact: Region, mask: Region) -> tuple[tuple[Edge, Reach], ...]:
     found = ((edge, outward_reach(edge, mask.index)) for edge in edges_along(unbonded, contact))
     return tuple([(edge, reach) for edge, reach in found if reach is not None])

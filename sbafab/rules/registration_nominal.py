@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from sbafab.geometry.cache import remembered
+from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
@@ -112,7 +112,7 @@ def _off_outline(laminate: Laminate) -> Iterator[_Departure]:
         )
 
 
-@remembered
+@cached
 def _farthest(one: Region, other: Region) -> tuple[float, Point]:
     """How far the ends and middles of all edges of ``one`` lie from ``other``, and where most."""
     return max(

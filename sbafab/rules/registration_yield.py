@@ -368,11 +368,11 @@ def picked(some: Bools) -> Indices:
 
 # Random builds: in which of them every margin of an interface keeps its limit.
 #
-# What is left at a margin beyond its limit is a row: its room and a sum over the errors drawn. Most
-# builds are decided without that sum: by the cuts alone where the films hardly move, and by the
-# length of all shifts together, which no normal can lose more than. What rests is summed up, row by
-# row, and what is summed decides: bounds only say where it need not be done. All interfaces are asked
-# at once, in arrays.
+# What is left at a margin beyond its limit is a row: its room and a sum over the errors drawn.
+# Most builds are decided without that sum: by the cuts alone where the films hardly move, and by
+# the length of all shifts together, which no normal can lose more than. What rests is summed up,
+# row by row, and what is summed decides: bounds only say where it need not be done. All interfaces
+# are asked at once, in arrays.
 
 
 SURE = 1e-9 - TOLERANCE

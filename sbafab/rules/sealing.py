@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
 
 from sbafab.geometry.boolean import alone, in_reading_order, tidy, turned_round
-from sbafab.geometry.cache import remembered
+from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point
 from sbafab.geometry.nearby import widened
 from sbafab.geometry.region import Region, rectangle
@@ -317,7 +317,7 @@ def void_graph(laminate: Laminate) -> VoidGraph:
     return graph
 
 
-@remembered
+@cached
 def _gap(unbonded: Region, contact: Region, frame: Region) -> _Gap:
     pieces = unbonded.pieces
     missing = _around(contact, frame).pieces

@@ -244,7 +244,8 @@ JOBS: dict[str, Callable[[StudioJob, Beat], Iterator[Answer]]] = {
 
 # What a job answers, whoever runs it: a worker process or Python in the page itself.
 #
-# What goes wrong is an answer too: bad input in the command line's words, anything else as a defect.
+# What goes wrong is an answer too: bad input in the command line's words, anything else as a
+# defect.
 
 
 class SupersededError(Exception):

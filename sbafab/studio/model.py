@@ -104,8 +104,8 @@ def finding_model(finding: Finding) -> dict[str, Any]:
 
 # What the page draws of an assembly: each part's surface once, and where it stands.
 #
-# A surface is sent under its key once, in the part's own frame, and not again to a page that says it
-# has it: a part that is moved costs nothing but its place.
+# A surface is sent under its key once, in the part's own frame, and not again to a page that says
+# it has it: a part that is moved costs nothing but its place.
 
 
 PLACED_BY = {"on", "at", "angle", "along", "offset", "glue", "note", "design", "set"}

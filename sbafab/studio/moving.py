@@ -156,8 +156,8 @@ def numbers(values: Any) -> Any:
 
 # What moves in an assembly: poses of its actuators, and what the whole does inflated.
 #
-# Each actuator is a fast stack by itself; the page carries along what stands on its top. Where parts
-# meet, and what hangs on tips, is the prediction's.
+# Each actuator is a fast stack by itself; the page carries along what stands on its top. Where
+# parts meet, and what hangs on tips, is the prediction's.
 
 
 PRESSURE_KPA, LOAD_G = 10.0, 1.2

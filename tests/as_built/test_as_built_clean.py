@@ -10,7 +10,7 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.as_built.check import check_folder, read_folder
-from sbafab.cutting.dxf_write import Curves, DxfProfile
+from sbafab.cutting.properties import Curves, DxfProfile
 from sbafab.output.run import generate
 from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding

@@ -13,8 +13,8 @@ from sbafab.actuators import build, load_design
 from sbafab.as_built.check import check_folder, read_folder
 from sbafab.as_built.expected import drawn_settings
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import Curves
 from sbafab.cutting.lightburn import Project, read_project
+from sbafab.cutting.properties import Curves
 from sbafab.cutting.second_cut import PATH, laser_path, properties_of, severed, stack_kerf
 from sbafab.design.records import Design
 from sbafab.errors import DesignError

@@ -20,7 +20,7 @@ from ezdxf.document import Drawing
 
 from sbafab.actuators import load_design
 from sbafab.as_built.check import check_folder
-from sbafab.cutting.dxf_write import Curves, DxfProfile
+from sbafab.cutting.properties import Curves, DxfProfile
 from sbafab.output.run import generate
 from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding

@@ -15,8 +15,9 @@ from sbafab.as_built import check as as_built
 from sbafab.as_built.check import check_folder
 from sbafab.cli.exit import ended_plainly
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import Curves, dxf_text
+from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.order import cutting_order
+from sbafab.cutting.properties import Curves
 from sbafab.errors import DefectError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.models.figures import Asked, Factors

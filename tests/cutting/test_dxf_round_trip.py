@@ -9,9 +9,10 @@ import pytest
 import shapely
 
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import DxfProfile, Surroundings, dxf_text, number
+from sbafab.cutting.dxf_write import Surroundings, dxf_text, number
 from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.order import cutting_order
+from sbafab.cutting.properties import DxfProfile
 from sbafab.geometry.edges import Arc, Line, Point
 from sbafab.geometry.region import Contour, Region, disc
 

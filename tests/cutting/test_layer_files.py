@@ -14,9 +14,8 @@ import pytest
 import sbafab
 from sbafab.cutting import files
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import Curves, DxfProfile
 from sbafab.cutting.files import CutFile, compensated_paths, write_layer_files
-from sbafab.cutting.properties import CutSettings
+from sbafab.cutting.properties import Curves, CutSettings, DxfProfile
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.process import Counted

@@ -6,7 +6,7 @@ import math
 import pickle
 from dataclasses import dataclass
 
-from sbafab.geometry.cache import once
+from sbafab.geometry.cache import cached_attribute
 from sbafab.geometry.edges import Arc, Line
 
 
@@ -14,7 +14,7 @@ from sbafab.geometry.edges import Arc, Line
 class Asked:
     times: list[int]
 
-    @once
+    @cached_attribute
     def value(self) -> float:
         """A value."""
         self.times.append(1)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from sbafab.geometry.boolean import difference
-from sbafab.geometry.cache import MOST, remembered
+from sbafab.geometry.cache import MOST, cached
 from sbafab.geometry.region import Region, disc, rectangle
 
 
 def test_what_differs_by_a_hair_is_asked_for_again_and_few_answers_are_kept() -> None:
     asked: list[Region] = []
 
-    @remembered
+    @cached
     def area(region: Region, times: float = 1.0) -> float:
         asked.append(region)
         return times * region.area

@@ -9,7 +9,7 @@ import shapely
 from pyogrio import raw
 
 from sbafab.actuators import load_design
-from sbafab.cutting.dxf_write import Curves, DxfProfile
+from sbafab.cutting.properties import Curves, DxfProfile
 from sbafab.laminate.films import Material
 from sbafab.output.run import Run, generate
 

@@ -10,9 +10,10 @@ import ezdxf
 import pytest
 from ezdxf.document import Drawing
 
-from sbafab.cutting.dxf_write import DxfProfile, dxf_text
+from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.order import cutting_order
+from sbafab.cutting.properties import DxfProfile
 from sbafab.geometry.boolean import union
 from sbafab.geometry.region import Region, disc, strip
 

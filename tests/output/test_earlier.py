@@ -11,7 +11,7 @@ from sbafab.actuators import load_design
 from sbafab.as_built.check import check_folder
 from sbafab.assemblies.files import load
 from sbafab.assemblies.records import Assembly
-from sbafab.cutting.dxf_write import Curves
+from sbafab.cutting.properties import Curves
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.layup import MeshSettings

@@ -328,11 +328,11 @@ def _frame(slopes: NDArray[np.float64]) -> NDArray[np.float64]:
 
 # Fill: films lifted off each other by the air of their balloons.
 #
-# The lift is vertical in the frame of each balloon, so no element changes its volume; balloons
-# are then set on each other by their neck discs, leaning where chambers hold unlike amounts, and
-# refused where they would lean into each other. Films stretch along the meridian (1 % at 5 ul in the
-# paper's 5 mm balloon) and thin by as much; the flat mesh is the rest position for a solver that
-# takes one.
+# The lift is vertical in the frame of each balloon, so no element changes its volume; balloons are
+# then set on each other by their neck discs, leaning where chambers hold unlike amounts, and
+# refused where they would lean into each other. Films stretch along the meridian (1 % at 5 ul in
+# the paper's 5 mm balloon) and thin by as much; the flat mesh is the rest position for a solver
+# that takes one.
 
 
 ROUNDS = 4

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sbafab.cutting.fixture import whole_plate
-from sbafab.geometry.region import number, path_data
+from sbafab.geometry.region import coord, path_data
 from sbafab.pressing.cycles import (
     CUT_SHARE,
     FINISH_SHARE,
@@ -253,7 +253,7 @@ def _picture(work: Work, runs: Runs) -> str:
         middle = (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
         spot = moved[0] + scale * middle[0], moved[1] - scale * middle[1] + size / 3
         picture.add(label(spot, str(place), size))
-    size_said = f"{number(round(wide, 6))} x {number(round(high, 6))} mm"
+    size_said = f"{coord(round(wide, 6))} x {coord(round(high, 6))} mm"
     said = f"base plate and heated area, {size_said}, from above; the cut corner at the back right"
     picture.add(draw.text((1.0, scale * high + 6), said, size=2.2))
     return picture.svg()

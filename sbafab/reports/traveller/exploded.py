@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from sbafab.cutting.fixture import shown
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Region, number, path_data
+from sbafab.geometry.region import Region, coord, path_data
 from sbafab.laminate.assembly import AssemblyStep, distinct_layers, stack_count
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.reports import drawing as draw
@@ -110,10 +110,10 @@ def _view(bounds: Bounds, levels: int, plate: bool) -> _View:
 
 
 def _plate(plate: Region, view: _View) -> list[str]:
-    moved = " ".join(map(number, view.matrix(view.ground)))
+    moved = " ".join(map(coord, view.matrix(view.ground)))
     shape = (
         f'<path d="{path_data(plate)}" fill="#f1f1ef" fill-rule="evenodd" stroke="{draw.GREY}" '
-        f'stroke-width="{number(0.25 / view.scale)}" transform="matrix({moved})"/>'
+        f'stroke-width="{coord(0.25 / view.scale)}" transform="matrix({moved})"/>'
     )
     edge = view.middle + plate.bounds[2] * view.scale, view.ground
     return [shape, *_beside(edge, "base plate", "cut corner: back right", view.gap)]
@@ -184,8 +184,8 @@ def _pins(pins: Sequence[Pin], view: _View, under: float, over: float) -> list[s
         back = pin.centre[1] * view.scale * TILT
         width = max(pin.diameter * view.scale * 0.8, 0.6)
         parts.append(
-            f'<path d="M{number(x)} {number(under - back)}V{number(over - back)}" fill="none" '
-            f'stroke="#6b7178" stroke-width="{number(width)}" stroke-linecap="round"/>'
+            f'<path d="M{coord(x)} {coord(under - back)}V{coord(over - back)}" fill="none" '
+            f'stroke="#6b7178" stroke-width="{coord(width)}" stroke-linecap="round"/>'
         )
     return parts
 

@@ -8,7 +8,7 @@ from typing import Any
 from sbafab.cutting.properties import CUT_OUTER
 from sbafab.cutting.second_cut import PATH as SECOND_CUT
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Region, number, path_data
+from sbafab.geometry.region import Region, coord, path_data
 from sbafab.laminate.films import ink
 from sbafab.laminate.laminate import Laminate, Layer, Pin, SheetPanel
 from sbafab.pressing.schedule import listed
@@ -408,6 +408,6 @@ def _pin(pin: Pin, at: Point, scale: float) -> tuple[str, str]:
     x, y = at
     r = pin.diameter * scale / 2
     return (
-        f'<circle cx="{number(x)}" cy="{number(y)}" r="{number(r)}" fill="{draw.DARK}"/>',
+        f'<circle cx="{coord(x)}" cy="{coord(y)}" r="{coord(r)}" fill="{draw.DARK}"/>',
         label((x, y + r + 2.4), pin.name, 1.9),
     )

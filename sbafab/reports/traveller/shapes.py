@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Region, number, path_data
+from sbafab.geometry.region import Region, coord, path_data
 from sbafab.laminate.assembly import AssemblyStep, distinct_layers
 from sbafab.laminate.films import Film, Ink, ink
 from sbafab.laminate.laminate import Inlet, Laminate, Layer
@@ -65,10 +65,10 @@ class Picture:
         scale = abs(matrix[0]) or abs(matrix[1])
         fill = "#e4e7ea" if look == "made" else self._fill(film, scale)
         opacity = ' fill-opacity="0.6"' if look == "clear" else ""
-        moved = " ".join(map(number, matrix))
+        moved = " ".join(map(coord, matrix))
         self.add(
             f'<use href="#{shape}" transform="matrix({moved})" fill="{fill}"{opacity} '
-            f'stroke="{ink(film).line}" stroke-width="{number(LINE / scale)}"/>'
+            f'stroke="{ink(film).line}" stroke-width="{coord(LINE / scale)}"/>'
         )
 
     def _fill(self, film: Film, scale: float) -> str:
@@ -79,20 +79,20 @@ class Picture:
         return f"url(#{self._hatches[scale, own]})"
 
     def svg(self) -> str:
-        w, h = number(self.width), number(self.height)
+        w, h = coord(self.width), coord(self.height)
         hatches = "".join(_hatch(name, scale, own) for (scale, own), name in self._hatches.items())
         return (
             f'<svg class="picture" role="img" aria-label={quoteattr(self.words)} '
             f'width="{w}mm" height="{h}mm" viewBox="0 0 {w} {h}" font-family="{draw.FONT}" '
-            f'font-size="{number(draw.TEXT)}" fill="{draw.DARK}">'
+            f'font-size="{coord(draw.TEXT)}" fill="{draw.DARK}">'
             f"<defs>{hatches}</defs>{''.join(self._elements)}</svg>"
         )
 
 
 def _hatch(name: str, scale: float, own: Ink) -> str:
     """Oblique lines, as dense on the page whatever the scale of what they fill."""
-    turned = f"rotate(45) scale({number(1 / scale)})"
-    step = number(HATCH_STEP)
+    turned = f"rotate(45) scale({coord(1 / scale)})"
+    step = coord(HATCH_STEP)
     return (
         f'<pattern id="{name}" patternUnits="userSpaceOnUse" width="{step}" height="{step}" '
         f'patternTransform="{turned}"><rect width="{step}" height="{step}" fill="{own.fill}"/>'
@@ -107,10 +107,10 @@ def flat(scale: float, at: Point) -> tuple[float, ...]:
 
 def label(at: Point, words: str, size: float = draw.SMALL, anchor: str = "middle") -> str:
     """Words over a drawing, with a white rim that keeps them legible."""
-    x, y = map(number, at)
+    x, y = map(coord, at)
     return (
-        f'<text x="{x}" y="{y}" font-size="{number(size)}" text-anchor="{anchor}" stroke="#ffffff" '
-        f'stroke-width="{number(size / 4)}" stroke-linejoin="round" paint-order="stroke" '
+        f'<text x="{x}" y="{y}" font-size="{coord(size)}" text-anchor="{anchor}" stroke="#ffffff" '
+        f'stroke-width="{coord(size / 4)}" stroke-linejoin="round" paint-order="stroke" '
         f'fill="{draw.DARK}">{escape(words)}</text>'
     )
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from sbafab.cutting.sheets import SheetFile
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Region, number
+from sbafab.geometry.region import Region, coord
 from sbafab.laminate.films import Film
 from sbafab.nesting.records import Placement
 from sbafab.reports import drawing as draw
@@ -156,9 +156,9 @@ def _used(sheet: SheetFile) -> float:
 def _window(strip: _Strip) -> list[str]:
     """Opens a picture in the picture that shows nothing beside the strip."""
     (x, y), (wide, high) = strip.corner, strip.size
-    place = " ".join(map(number, (x, y, wide, high)))
+    place = " ".join(map(coord, (x, y, wide, high)))
     return [
-        f'<svg x="{number(x)}" y="{number(y)}" width="{number(wide)}" height="{number(high)}" '
+        f'<svg x="{coord(x)}" y="{coord(y)}" width="{coord(wide)}" height="{coord(high)}" '
         f'viewBox="{place}">',
         draw.box(strip.corner, (x + wide, y + high), fill="#ffffff", stroke="none"),
     ]
@@ -178,9 +178,9 @@ def _draw(
         picture.part(name, film, strip.matrix(placement), "fresh")
     for x, y, diameter in sheet.nest.stock.pins:
         at = strip.at((x, y))
-        radius = number(diameter * strip.scale / 2)
+        radius = coord(diameter * strip.scale / 2)
         picture.add(
-            f'<circle cx="{number(at[0])}" cy="{number(at[1])}" r="{radius}" fill="#777777"/>'
+            f'<circle cx="{coord(at[0])}" cy="{coord(at[1])}" r="{radius}" fill="#777777"/>'
         )
     _label(picture, sheet, strip, marks, seen)
 

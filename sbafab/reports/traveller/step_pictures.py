@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from sbafab.cutting.fixture import shown
-from sbafab.geometry.cache import remembered
+from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Region, number, path_data, section
+from sbafab.geometry.region import Region, coord, path_data, section
 from sbafab.laminate.assembly import AssemblyStep, distinct_layers
 from sbafab.laminate.laminate import Inlet, Laminate, Layer, Pin
 from sbafab.reports import drawing as draw
@@ -122,7 +122,7 @@ AT_DATUM = 1e-3
 """mm from the datum within which a pin hides it."""
 
 
-_section = remembered(section)
+_section = cached(section)
 """Every step of a laminate asks for the same."""
 
 
@@ -229,7 +229,7 @@ def _pin(at: Point, r: float, is_in: bool) -> str:
     x, y = at
     fill = draw.DARK if is_in else "#ffffff"
     return (
-        f'<circle cx="{number(x)}" cy="{number(y)}" r="{number(r)}" fill="{fill}" '
+        f'<circle cx="{coord(x)}" cy="{coord(y)}" r="{coord(r)}" fill="{fill}" '
         f'stroke="{draw.DARK}" stroke-width="0.3"/>'
     )
 
@@ -265,9 +265,9 @@ def _captions(view: _View, plate: bool, pinned: bool, datum: str) -> list[str]:
         return parts
     mark = '<circle cx="{}" cy="{}" r="0.8" fill="{}" stroke="#1a1a1a" stroke-width="0.3"/>'
     parts += [
-        mark.format(number(EDGE + 0.8), number(y - 0.8), draw.DARK),
+        mark.format(coord(EDGE + 0.8), coord(y - 0.8), draw.DARK),
         draw.text((EDGE + 2.4, y), "pin in", size=2.2),
-        mark.format(number(EDGE + 13.0), number(y - 0.8), "#ffffff"),
+        mark.format(coord(EDGE + 13.0), coord(y - 0.8), "#ffffff"),
         draw.text((EDGE + 14.6, y), "no pin", size=2.2),
     ]
     words = "on the base plate, cut corner back right" if pinned else "no pins in"
@@ -370,7 +370,7 @@ def over_tab(laminate: Laminate, layers: Sequence[int]) -> Layer | None:
     return None
 
 
-@remembered
+@cached
 def lip(region: Region, other: Region) -> Lip | None:
     """How the outline of a region follows another's; None where it mostly does not."""
     outline = Region(other.outers)

@@ -247,8 +247,8 @@ def _triangulated(places: dict[WebNode, Point]) -> tuple[tuple[WebNode, WebNode,
 # The coarse shell of a whole actuator: mid-surfaces that share the nodes of what is bonded.
 #
 # In each pocket rings of eight nodes or more at bore, neck, between them and the edge; the web
-# between the pockets and the neck rings are one layer of double thickness. Inlet tabs and strips are
-# left out. Lengths mm, volumes ul.
+# between the pockets and the neck rings are one layer of double thickness. Inlet tabs and strips
+# are left out. Lengths mm, volumes ul.
 
 
 SECTORS = 8
