@@ -8,23 +8,13 @@ from pathlib import Path
 
 from sbafab.actuators import build, load_design, records
 from sbafab.as_built.claims import (
-    CLAIMS,
-    DESIGNED,
-    INTEGRITY,
-    Problem,
     claim,
     design_problems,
     file_problems,
-    findings_of,
     height_problems,
-    is_job,
-    is_joined,
     lowered_problems,
     order_problems,
     property_problems,
-    read_claims,
-    read_job,
-    read_joined,
 )
 from sbafab.as_built.cut_files import CutPart, LayerFile, inside, read_layers
 from sbafab.as_built.expected import Meant, RunWork, departure, meant_by
@@ -39,11 +29,24 @@ from sbafab.as_built.measures import (
     size_problems,
     with_plate_pins,
 )
+from sbafab.as_built.records import (
+    CLAIMS,
+    DESIGNED,
+    INTEGRITY,
+    Problem,
+    findings_of,
+    is_job,
+    is_joined,
+    read_claims,
+    read_job,
+    read_joined,
+)
 from sbafab.as_built.sheets import Lot, SheetOrder, read_panel, sheet_problems
 from sbafab.as_built.stack import laminate_of, stacked_layers
 from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
-from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, load_assembly, part_entry
+from sbafab.assemblies.files import load_assembly
+from sbafab.assemblies.writing import DESIGN_FILE, assembly_sha256, part_entry
 from sbafab.design.files import design_sha256, validated
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError
@@ -52,7 +55,7 @@ from sbafab.laminate.laminate import Laminate, SheetPanel
 from sbafab.models.formulas import sizes
 from sbafab.output.checked import Checked
 from sbafab.output.checked import limits as limits_of
-from sbafab.output.manifest import AssemblyManifest, Manifest
+from sbafab.output.manifest_records import AssemblyManifest, Manifest
 from sbafab.rules import film_limits
 from sbafab.rules.deck import RULES, Rule, run_deck, run_rule
 from sbafab.rules.finding import Finding, Place

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path, PurePosixPath
 
-from sbafab.as_built.claims import INTEGRITY, Problem
 from sbafab.as_built.expected import Expected, departure, in_agreement, with_circles, without_specks
 from sbafab.as_built.kerf_removed import chorded_place, uncut
+from sbafab.as_built.records import INTEGRITY, Problem
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.properties import (
     CUT_INNER,
@@ -28,7 +28,7 @@ from sbafab.cutting.verify import check_datum
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
-from sbafab.output.manifest import LayerClaim, Manifest
+from sbafab.output.manifest_records import LayerClaim, Manifest
 
 MOST_BYTES = 20_000_000
 MOST_MARKS = 300_000

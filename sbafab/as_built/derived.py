@@ -22,9 +22,10 @@ from zipfile import BadZipFile, ZipFile
 
 from pydantic import BaseModel
 
-from sbafab.as_built.claims import CUT_ENDINGS, DESIGNED, Problem, could_be_cut, is_joined
+from sbafab.as_built.claims import CUT_ENDINGS, could_be_cut
 from sbafab.as_built.cut_files import sound_digest
 from sbafab.as_built.expected import drawn_settings
+from sbafab.as_built.records import DESIGNED, Problem, is_joined
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.lightburn import ENDING
@@ -36,16 +37,7 @@ from sbafab.errors import DesignError, GeometryError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.meshing.surface import Surface, open_edges
 from sbafab.nesting.records import NestPart, parts_of
-from sbafab.output.batch import (
-    FINDINGS,
-    TRAVELLER,
-    find_nests,
-    plan_batch,
-    write_batch,
-    write_contents,
-    write_nested_sheets,
-    write_panel,
-)
+from sbafab.output.batch import FINDINGS, TRAVELLER, plan_batch, write_batch, write_contents
 from sbafab.output.checked import (
     EVERYTHING,
     GENERATOR,
@@ -57,7 +49,9 @@ from sbafab.output.checked import (
     schedule_of,
 )
 from sbafab.output.earlier import MESH, PREDICTION, PRESS
-from sbafab.output.manifest import JobManifest, Manifest, as_json, file_names
+from sbafab.output.manifest import as_json, file_names
+from sbafab.output.manifest_records import JobManifest, Manifest
+from sbafab.output.shop import find_nests, write_nested_sheets, write_panel
 from sbafab.pressing.cycles import design_runs
 from sbafab.process import unheard
 from sbafab.simulators.simulator import NAMES as SIMULATORS

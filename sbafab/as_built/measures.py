@@ -7,15 +7,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from sbafab.as_built.claims import CLAIMS, INTEGRITY, Problem, claim, waiver_properties
+from sbafab.as_built.claims import claim, waiver_properties
 from sbafab.as_built.cut_files import CutPart, LayerFile, read_part, told_of
+from sbafab.as_built.records import CLAIMS, INTEGRITY, Problem
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.assembly import PLATE_MARGIN
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
-from sbafab.output.manifest import Manifest
+from sbafab.output.manifest_records import Manifest
 from sbafab.pressing.cycles import APART, are_apart
 from sbafab.rules.limits import TOLERANCE, at
 

@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
-from sbafab.as_built.claims import CLAIMS, INTEGRITY, Problem, bare_problem, claim
+from sbafab.as_built.claims import bare_problem, claim
 from sbafab.as_built.cut_files import LayerFile, check_sequence, inside, sound_digest
 from sbafab.as_built.expected import AGREED, Meant, departure
 from sbafab.as_built.kerf_removed import uncut
 from sbafab.as_built.measures import SHARE
+from sbafab.as_built.records import CLAIMS, INTEGRITY, Problem
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import Surroundings
 from sbafab.cutting.lightburn import ENDING
@@ -39,7 +40,13 @@ from sbafab.laminate.laminate import Layer, SheetPanel, freed
 from sbafab.nesting.check import check_placed
 from sbafab.nesting.records import TURNS, Stock, Turn, no_spares
 from sbafab.output.checked import stocks
-from sbafab.output.manifest import FilmUseClaim, JobManifest, KerfClaim, Manifest, SheetClaim
+from sbafab.output.manifest_records import (
+    FilmUseClaim,
+    JobManifest,
+    KerfClaim,
+    Manifest,
+    SheetClaim,
+)
 from sbafab.rules.bridges import apart
 
 # The pieces on film sheets, each held against the pieces that the layers' files cut.

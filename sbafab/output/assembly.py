@@ -9,15 +9,10 @@ from typing import Any
 
 from sbafab.assemblies.build import Assembled, PlacedPart, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
-from sbafab.assemblies.files import (
-    DESIGN_FILE,
-    assembly_sha256,
-    assembly_toml,
-    load_assembly,
-    part_entry,
-)
+from sbafab.assemblies.files import load_assembly
 from sbafab.assemblies.records import Assembly
 from sbafab.assemblies.shapes import colours, linear, placed_surface
+from sbafab.assemblies.writing import DESIGN_FILE, assembly_sha256, assembly_toml, part_entry
 from sbafab.cutting.properties import TRUE_ARCS, Curves
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DesignError, GeometryError
@@ -34,7 +29,8 @@ from sbafab.output.batch import (
 )
 from sbafab.output.checked import EVERYTHING, GENERATOR, PICTURES, Checked, checks, limits, plan
 from sbafab.output.earlier import would_replace
-from sbafab.output.manifest import AssemblyManifest, as_json
+from sbafab.output.manifest import as_json
+from sbafab.output.manifest_records import AssemblyManifest
 from sbafab.output.run import Run, found_in, swapped_in
 from sbafab.output.swap import ASSEMBLY_SCHEMA
 from sbafab.process import Progress, unheard

@@ -399,19 +399,19 @@ def _design() -> dict[str, Any]:
 
 
 def _manifest() -> dict[str, Any]:
-    from sbafab.output.manifest import Manifest
+    from sbafab.output.manifest_records import Manifest
 
     return Manifest.model_json_schema(by_alias=True)
 
 
 def _job() -> dict[str, Any]:
-    from sbafab.output.manifest import JobManifest
+    from sbafab.output.manifest_records import JobManifest
 
     return _of_batch(JobManifest.model_json_schema(by_alias=True), JOB_SCHEMA)
 
 
 def _assembly() -> dict[str, Any]:
-    from sbafab.output.manifest import AssemblyManifest
+    from sbafab.output.manifest_records import AssemblyManifest
 
     return _of_batch(AssemblyManifest.model_json_schema(by_alias=True), ASSEMBLY_SCHEMA)
 

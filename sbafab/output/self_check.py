@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from sbafab.as_built.check import check_written
-from sbafab.as_built.claims import CLAIMS, DESIGNED, INTEGRITY
 from sbafab.as_built.expected import Meant, RunWork
+from sbafab.as_built.records import CLAIMS, DESIGNED, INTEGRITY
 from sbafab.errors import DefectError, OutputError
 from sbafab.output.batch import Batch
 from sbafab.output.checked import Planned

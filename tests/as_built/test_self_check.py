@@ -25,10 +25,11 @@ from sbafab.models.prediction import predict
 from sbafab.nesting.bottom_left import bottom_left
 from sbafab.nesting.records import NestPart, Placement, Stock
 from sbafab.output import batch, self_check
-from sbafab.output.batch import generate_job, write_cut_files
+from sbafab.output.batch import generate_job
 from sbafab.output.checked import Planned
 from sbafab.output.manifest import file_hashes
 from sbafab.output.run import Extras, generate, with_prediction
+from sbafab.output.shop import write_cut_files
 from sbafab.process import Progress
 from sbafab.rules.deck import Rule
 from sbafab.rules.finding import Finding, Place

@@ -14,7 +14,7 @@ from sbafab.as_built import check as as_built
 from sbafab.as_built import derived
 from sbafab.design.files import design_sha256
 from sbafab.output.checked import Checked
-from sbafab.output.manifest import Manifest
+from sbafab.output.manifest_records import Manifest
 
 
 def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:

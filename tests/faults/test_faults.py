@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from sbafab.as_built.claims import CLAIMS, DESIGNED, INTEGRITY
 from sbafab.as_built.cut_files import CutPart
+from sbafab.as_built.records import CLAIMS, DESIGNED, INTEGRITY
 from sbafab.errors import DesignError
 from sbafab.rules.deck import rule_names
 from tests.faults.catalogue import FAULTS, KINDS, TEMPLATES, Goods, caught_by, cell
