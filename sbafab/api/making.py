@@ -104,7 +104,7 @@ def nest(sources: Sequence[Source], name: str = "job", out: str | Path = "out") 
 
     Their films, sheets and kerf must be alike. Raises DesignError, OutputError and DefectError.
     """
-    from sbafab.output.batch import generate_job
+    from sbafab.output.job import generate_job
 
     return generate_job([load(source) for source in sources], name, Path(out))
 

@@ -16,7 +16,7 @@ def explain(rule: str | None, as_json: bool) -> None:
     Without RULE: a line for every rule and check.
     """
     from sbafab.cli.printing import print_json
-    from sbafab.output.schemas import EXPLAIN_SCHEMA, EXPLAINED_SCHEMA
+    from sbafab.output.schema_ids import EXPLAIN_SCHEMA, EXPLAINED_SCHEMA
     from sbafab.rules.explained import EXPLAINED
 
     if rule is None:

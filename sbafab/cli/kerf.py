@@ -61,7 +61,7 @@ def kerf(
     from sbafab.cli.printing import print_json
     from sbafab.cutting.calibration import calibrated, read_measurements
     from sbafab.errors import DesignError
-    from sbafab.output.schemas import KERF_SCHEMA
+    from sbafab.output.schema_ids import KERF_SCHEMA
 
     sizes = read_measurements(measurements, instrument or "")
     found = calibrated(sizes, resolution)

@@ -26,7 +26,7 @@ def nest(request: Request, name: str, curves: Curves) -> None:
     """
     from sbafab.actuators import load_design
     from sbafab.cli.printing import job_json, print_job, shown_progress
-    from sbafab.output.batch import generate_job
+    from sbafab.output.job import generate_job
 
     designs = [
         load_design(design, request.assignments, request.waivers) for design in request.designs

@@ -181,7 +181,7 @@ def _predict_assembly(
 ) -> None:
     from sbafab.assemblies.build import assemble
     from sbafab.cli.printing import print_assembly_prediction, print_json
-    from sbafab.output.schemas import ASSEMBLY_PREDICT_SCHEMA
+    from sbafab.output.schema_ids import ASSEMBLY_PREDICT_SCHEMA
     from sbafab.reports.assembly_prediction import as_json, predict_assembly
 
     found = predict_assembly(assemble(assembly), pressure_kpa, load_g)

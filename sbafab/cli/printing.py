@@ -235,7 +235,7 @@ def print_job(job: Run) -> None:
 
 def job_json(job: Run) -> dict[str, object]:
     """The result of a job for programs."""
-    from sbafab.output.schemas import NESTED_SCHEMA
+    from sbafab.output.schema_ids import NESTED_SCHEMA
 
     return {
         "schema": NESTED_SCHEMA,
@@ -384,7 +384,7 @@ def film_said(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], copi
 
 def run_json(run: Run) -> dict[str, object]:
     """The result of a run for programs."""
-    from sbafab.output.schemas import RUN_SCHEMA
+    from sbafab.output.schema_ids import RUN_SCHEMA
 
     return {
         "schema": RUN_SCHEMA,

@@ -10,7 +10,7 @@ import click
 
 from sbafab.cli.options import LENGTH, PRESSURE, json_option, set_option
 from sbafab.cli.printing import console, print_json
-from sbafab.output.schemas import RECORDS_SCHEMA, REPORT_SCHEMA
+from sbafab.output.schema_ids import RECORDS_SCHEMA, REPORT_SCHEMA
 
 if TYPE_CHECKING:
     from sbafab.results.records import Build, LabResult, Record

@@ -103,7 +103,7 @@ def sweep(
 
 
 def _as_json(found: SweptDesigns) -> dict[str, object]:
-    from sbafab.output.schemas import SWEEP_SCHEMA
+    from sbafab.output.schema_ids import SWEEP_SCHEMA
 
     return {
         "schema": SWEEP_SCHEMA,

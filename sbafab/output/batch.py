@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import re
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,36 +11,32 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sbafab.cutting.fixture import PATH as FIXTURE
-from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings
+from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.files import design_sha256, design_toml, kit_names
 from sbafab.design.kits import FILE as KIT_FILE
 from sbafab.design.kits import kit_of
-from sbafab.design.records import NAME_PATTERN, Design
+from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.files import MeshFile, write_meshes
 from sbafab.nesting.records import Nest
 from sbafab.output.checked import (
-    EVERYTHING,
     GENERATOR,
     Checked,
     Planned,
-    check,
     checks,
     kerf_widths,
     limits,
-    plan,
 )
 from sbafab.output.manifest import as_json, file_hashes, job_manifest, manifest
 from sbafab.output.manifest_records import Schema
-from sbafab.output.run import Run, swapped_in
 from sbafab.output.shop import find_nests, write_cut_files, write_nested_sheets
-from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
+from sbafab.output.swap import ASSEMBLY_SCHEMA, SCHEMA
 from sbafab.pressing.cycles import batch_json, design_runs
 from sbafab.pressing.schedule import Schedule
 from sbafab.pressing.tables import press_csv, press_json
-from sbafab.process import Progress, unheard
+from sbafab.process import Progress
 from sbafab.rules.finding import Finding
 
 if TYPE_CHECKING:
@@ -330,64 +325,3 @@ def _seen_from_below(sheets: Sequence[SheetFile]) -> list[SheetFile]:
 
 
 # Several designs cut together: a folder with each design's own, and film sheets for all.
-
-
-RESERVED = {
-    "sheets": "the job's folder of film sheets",
-    "manifest.json": "the job's index",
-}
-"""What lies in a job's folder beside those of its designs."""
-
-
-def generate_job(
-    designs: Sequence[Design],
-    name: str,
-    out: Path = Path("out"),
-    progress: Progress | None = None,
-    curves: Curves = TRUE_ARCS,
-) -> Run:
-    """Writes ``out/<name>/``: a folder for each design, and ``sheets/`` with the parts of all.
-
-    Film sheets, kerf and machine are those of the first design, and must be alike in all.
-    Raises DesignError where they are not, or where two designs have one name. If a rule fails in
-    any design, nothing is written (``Run.kept``).
-    """
-    tell = progress or unheard
-    _refuse_names([design.name for design in designs], name)
-    refuse_other_film(designs)
-    checked = tuple(Checked(design, *check(design, tell)) for design in designs)
-    target = out / name
-    if any(one.failed for one in checked):
-        return Run(checked, target, kept=True)
-    planned = [plan(one, EVERYTHING, curves) for one in checked]
-    batch = plan_batch(JOB_SCHEMA, name, planned, target, tell)
-    return swapped_in(batch, target, lambda folder: write_batch(batch, folder, tell)[0], tell)
-
-
-def _refuse_names(names: Sequence[str], name: str) -> None:
-    if re.fullmatch(NAME_PATTERN.strip("^$"), name) is None:
-        raise DesignError(
-            f"--name {name!r} must be a folder's name of letters, digits, dots, dashes and "
-            "underscores; for another place use -o"
-        )
-    twice = next((own for own in names if names.count(own) > 1), None)
-    if twice is not None:
-        raise DesignError(
-            f"two designs are named {twice}; give each a name of its own, or say --copies"
-        )
-    folders = {own.lower(): own for own in reversed(names)}
-    # Some systems hold names that differ in small and capital letters for one.
-    alike = next((own for own in names if folders[own.lower()] != own), None)
-    if alike is not None:
-        raise DesignError(
-            f"two designs are named {folders[alike.lower()]} and {alike}, which is one folder on "
-            "some machines; give one of them another name"
-        )
-    kept = next((own for own in names if own.lower() in RESERVED), None)
-    if kept is not None:
-        raise DesignError(
-            f"a design is named {kept}, as {RESERVED[kept.lower()]} is; give it another name in "
-            "its design file"
-        )
-    if name.lower() in (*folders, *RESERVED):
-        raise DesignError(f"the job is named {name} as one of its folders; choose another --name")

@@ -28,7 +28,7 @@ from sbafab.output.earlier import (
     would_replace,
 )
 from sbafab.output.manifest import as_json, identity
-from sbafab.output.schemas import SIMULATE_SCHEMA
+from sbafab.output.schema_ids import SIMULATE_SCHEMA
 from sbafab.output.self_check import refuse_unlike
 from sbafab.output.swap import SCHEMA, listed_files, replaced_folder
 from sbafab.pressing.schedule import Schedule

@@ -8,6 +8,21 @@ from typing import Any, get_args
 from sbafab.errors import ERROR_SCHEMA
 from sbafab.output.checked import CHECKS_SCHEMA
 from sbafab.output.run import PREDICTION_SCHEMA as PREDICT_SCHEMA
+from sbafab.output.schema_ids import (
+    ASSEMBLY_PREDICT_SCHEMA,
+    EXPLAIN_SCHEMA,
+    EXPLAINED_SCHEMA,
+    KERF_SCHEMA,
+    MAP_SCHEMA,
+    NESTED_SCHEMA,
+    RECORDS_SCHEMA,
+    REPORT_SCHEMA,
+    REPRODUCTION_SCHEMA,
+    RUN_SCHEMA,
+    SIMULATE_SCHEMA,
+    SWEEP_SCHEMA,
+    TEMPLATES_SCHEMA,
+)
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.pressing.tables import PRESS_SCHEMA
 from sbafab.rules.finding import Verdict
@@ -54,21 +69,6 @@ def finding() -> dict[str, Any]:
 
 
 # The ids of what commands print with ``--json``, and of what ``map`` writes (as in models).
-
-
-RUN_SCHEMA = "sbafab/run@1"
-NESTED_SCHEMA = "sbafab/nested@1"
-RECORDS_SCHEMA = "sbafab/records@1"
-REPORT_SCHEMA = "sbafab/report@1"
-SWEEP_SCHEMA = "sbafab/sweep@1"
-MAP_SCHEMA = "sbafab/balloon-map@1"
-KERF_SCHEMA = "sbafab/kerf@1"
-EXPLAIN_SCHEMA = "sbafab/explain@1"
-EXPLAINED_SCHEMA = "sbafab/explained@1"
-SIMULATE_SCHEMA = "sbafab/simulate@1"
-ASSEMBLY_PREDICT_SCHEMA = "sbafab/assembly-predict@1"
-REPRODUCTION_SCHEMA = "sbafab/reproduction@1"
-TEMPLATES_SCHEMA = "sbafab/templates@1"
 
 
 # JSON schemas of what commands print with ``--json`` of runs and records.

@@ -9,7 +9,7 @@ from typing import Any
 
 from sbafab.errors import OutputError
 from sbafab.models.figures import Prediction, Relation
-from sbafab.output.schemas import REPRODUCTION_SCHEMA
+from sbafab.output.schema_ids import REPRODUCTION_SCHEMA
 from sbafab.reproduction import rows
 from sbafab.reproduction.rows import Row, predicted, table
 

@@ -17,7 +17,7 @@ from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.order import cutting_order
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region, disc
-from sbafab.output.batch import generate_job
+from sbafab.output.job import generate_job
 from sbafab.output.run import generate
 from tests.as_built.doctoring import Doctor
 

@@ -14,7 +14,7 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.as_built.check import check_folder
-from sbafab.output.batch import generate_job
+from sbafab.output.job import generate_job
 from sbafab.output.manifest import file_hash
 from sbafab.output.run import generate
 from sbafab.rules.finding import Finding

@@ -19,7 +19,7 @@ from sbafab.cutting.second_cut import PATH, laser_path, properties_of, severed, 
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.geometry.region import strip
-from sbafab.output.batch import generate_job
+from sbafab.output.job import generate_job
 from sbafab.output.run import generate
 from sbafab.rules import bridges
 from tests.as_built.doctoring import Doctor

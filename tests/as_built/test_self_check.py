@@ -25,8 +25,8 @@ from sbafab.models.prediction import predict
 from sbafab.nesting.bottom_left import bottom_left
 from sbafab.nesting.records import NestPart, Placement, Stock
 from sbafab.output import batch, self_check
-from sbafab.output.batch import generate_job
 from sbafab.output.checked import Planned
+from sbafab.output.job import generate_job
 from sbafab.output.manifest import file_hashes
 from sbafab.output.run import Extras, generate, with_prediction
 from sbafab.output.shop import write_cut_files

@@ -11,7 +11,7 @@ from sbafab.actuators import load_design
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.output.batch import generate_job
+from sbafab.output.job import generate_job
 from sbafab.output.manifest import file_hashes
 from sbafab.output.run import Run
 from tests.site.formats import hold

@@ -90,7 +90,7 @@ def test_what_is_printed_of_a_measured_coupon_is_of_its_schema(
 
 
 def test_what_is_predicted_of_an_assembly_is_of_its_schema() -> None:
-    from sbafab.output.schemas import ASSEMBLY_PREDICT_SCHEMA
+    from sbafab.output.schema_ids import ASSEMBLY_PREDICT_SCHEMA
     from sbafab.reports.assembly_prediction import (
         AssemblyFigure,
         AssemblyPrediction,
