@@ -62,7 +62,7 @@ def test_the_readme_s_poses_a_second_are_the_record_s() -> None:
 
 
 def test_a_statistic_is_called_by_its_name() -> None:
-    for name in ("plates", "decks", "compiled", "processes", "poses", "commands", "versions"):
+    for name in ("plates", "decks", "processes", "poses", "commands", "versions"):
         assert statistic(TABLES[name]) in {"median", "least"}, name
     for name in ("versions", "poses"):
         assert re.search(

@@ -16,7 +16,7 @@ from tests.studio.browsing import Watched, chromium, colours, picture, served, s
 
 pytestmark = [
     pytest.mark.long,
-    pytest.mark.skipif(chromium() is None, reason="no Chromium"),
+    pytest.mark.skipif(chromium() is None, reason="Chromium or Playwright is not installed"),
 ]
 BRACE = api.template("brace")
 
