@@ -1,12 +1,12 @@
-"""A design checked: its laminate, what the rules find, and whether shop and press can do it."""
+"""A design checked and planned: laminate, findings, settings, press schedule, beam paths."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from sbafab import __version__
 from sbafab.actuators import build
 from sbafab.actuators.stacking import used_films
 from sbafab.cutting.files import compensated_paths
@@ -30,27 +30,51 @@ from sbafab.process import Progress
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding, summary
 from sbafab.rules.limits import CHECKED_AGAINST, Limits, Tolerances, lowered
+from sbafab.simulators.simulator import Name
+from sbafab.version import GENERATOR
 
 if TYPE_CHECKING:
     from sbafab.cutting.sheets import Machine
     from sbafab.meshing.conforming.meshes import ConformingMeshes
+    from sbafab.models.figures import Prediction
 
 CHECKS_SCHEMA = "sbafab/checks@1"
 
 
-def check(design: Design, progress: Progress | None = None) -> tuple[Laminate, tuple[Finding, ...]]:
-    """The laminate of a design and what the rule deck finds in it."""
+# A design with its laminate and findings.
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A design, its laminate, and the findings of the rules."""
+
+    design: Design
+    laminate: Laminate
+    findings: tuple[Finding, ...]
+
+    @property
+    def failed(self) -> bool:
+        """True if a rule failed that the design does not waive."""
+        return has_failed(self.findings)
+
+    @property
+    def waived(self) -> tuple[str, ...]:
+        """The rules that fail and that the design waives by name."""
+        return tuple(dict.fromkeys(finding.rule for finding in self.findings if finding.by_user))
+
+    @property
+    def lowered(self) -> tuple[str, ...]:
+        """The limits that the design sets below the usual ones."""
+        return lowered(limits(self.design))
+
+
+def check(design: Design, progress: Progress | None = None) -> Checked:
+    """Build the laminate of a design and run the rule deck on it. Raises DesignError."""
     try:
         laminate = build(design)
-        return laminate, run_deck(laminate, limits(design), progress)
+        return Checked(design, laminate, run_deck(laminate, limits(design), progress))
     except GeometryError as error:
         raise DesignError(f"design {design.name} cannot be resolved: {error}") from None
-
-
-def refuse_undoable(checked: Sequence[Checked]) -> None:
-    """Raises DesignError where press, kerf or film sheets cannot do designs that hold."""
-    for one in checked:
-        refuse_unfit(plan(one, ("press", "cut")).parts, stocks(one.design))
 
 
 def checks(
@@ -71,9 +95,6 @@ def checks(
 
 
 # A design's sections as the settings that rules, cutting and pressing take.
-
-
-GENERATOR = f"sbafab {__version__}"
 
 
 def kerf_widths(design: Design) -> dict[Material, Kerf | None]:
@@ -208,45 +229,23 @@ def _stock(sheet: Sheet, kerf: object) -> Stock:
     )
 
 
-# A design on its way to its folder: checked by the rules, then planned, before it is written.
+# The plan of a design: computed before anything is written.
 
 
-RunPart = Literal["cut", "press", "mesh", "preview"]
+RunPart = Literal["cut", "press", "mesh", "preview", "predict"] | Name
+"""What a run writes of a design: by rules and geometry, by models, or for a simulator."""
 EVERYTHING: tuple[RunPart, ...] = ("cut", "press", "mesh", "preview")
 PICTURES: tuple[RunPart, ...] = ("preview",)
 """What is left, beside the findings, of a design that is not to be cut."""
 
 
 @dataclass(frozen=True)
-class Checked:
-    """A design, its laminate, and what the rules found in it."""
-
-    design: Design
-    laminate: Laminate
-    findings: tuple[Finding, ...]
-
-    @property
-    def failed(self) -> bool:
-        """Whether a rule failed that the design does not waive."""
-        return has_failed(self.findings)
-
-    @property
-    def waived(self) -> tuple[str, ...]:
-        """The rules that fail and that the design waives by name."""
-        return tuple(dict.fromkeys(finding.rule for finding in self.findings if finding.by_user))
-
-    @property
-    def lowered(self) -> tuple[str, ...]:
-        """The limits that the design sets below the usual ones."""
-        return lowered(limits(self.design))
-
-
-@dataclass(frozen=True)
-class Planned:
-    """What of a design is ``wanted``, and all that is worked out before its folder is begun.
+class DesignPlan:
+    """The parts ``wanted`` of a design, and all that is computed before its folder is begun.
 
     ``paths``: the beam's path for every pattern, ``parts``: what goes on film sheets; both empty
-    where nothing is cut. ``conforming`` is written in the ``formats`` of these file endings.
+    where nothing is cut. ``conforming`` is written in the ``formats`` of these file endings;
+    ``simulated`` is the folder in which a simulator has run.
     """
 
     checked: Checked
@@ -257,14 +256,18 @@ class Planned:
     parts: tuple[NestPart, ...] = ()
     conforming: ConformingMeshes | None = None
     formats: tuple[str, ...] = ()
+    prediction: Prediction | None = None
+    simulated: Path | None = None
 
 
-def plan(checked: Checked, wanted: Collection[RunPart], curves: Curves = TRUE_ARCS) -> Planned:
-    """The plan of a design. Raises DesignError where press, kerf or chords cannot do it."""
+def plan_design(
+    checked: Checked, wanted: Collection[RunPart], curves: Curves = TRUE_ARCS
+) -> DesignPlan:
+    """Return the plan of a design. Raises DesignError where press or kerf cannot do it."""
     design, laminate = checked.design, checked.laminate
     settings = cut_settings(design, checked.waived, curves)
     pressing = schedule_of(checked) if "press" in wanted else None
-    planned = Planned(checked, frozenset(wanted), settings, pressing)
+    planned = DesignPlan(checked, frozenset(wanted), settings, pressing)
     if "cut" not in wanted:
         return planned
     if laminate.panel is not None and curves.in_chords:
@@ -273,10 +276,6 @@ def plan(checked: Checked, wanted: Collection[RunPart], curves: Curves = TRUE_AR
             "bulges or arcs"
         )
     paths = compensated_paths(laminate, settings)
-    if curves.in_chords:
-        from sbafab.as_built.expected import refuse_coarse
-
-        refuse_coarse(laminate, paths, settings, limits(design))
     parts = parts_of(laminate, paths, design.order.quantity, design.order.spare_parts)
     return replace(planned, paths=paths, parts=parts)
 
@@ -297,3 +296,9 @@ def schedule_of(checked: Checked) -> Schedule:
     words = " ".join(f"{one[:1].upper()}{one[1:]}." for one in said)
     marked = replace(first, instructions=f"{words} {first.instructions}")
     return replace(made, steps=(marked, *others), warnings=(*said, *made.warnings))
+
+
+def refuse_undoable(checked: Sequence[Checked]) -> None:
+    """Raises DesignError where press, kerf or film sheets cannot do designs that pass the rules."""
+    for design in checked:
+        refuse_unfit(plan_design(design, ("press", "cut")).parts, stocks(design.design))

@@ -7,7 +7,6 @@ from typing import Any, get_args
 
 from sbafab.errors import ERROR_SCHEMA
 from sbafab.output.checked import CHECKS_SCHEMA
-from sbafab.output.run import PREDICTION_SCHEMA as PREDICT_SCHEMA
 from sbafab.output.schema_ids import (
     ASSEMBLY_PREDICT_SCHEMA,
     EXPLAIN_SCHEMA,
@@ -15,6 +14,7 @@ from sbafab.output.schema_ids import (
     KERF_SCHEMA,
     MAP_SCHEMA,
     NESTED_SCHEMA,
+    PREDICTION_SCHEMA,
     RECORDS_SCHEMA,
     REPORT_SCHEMA,
     REPRODUCTION_SCHEMA,
@@ -354,7 +354,7 @@ SCHEMAS: Mapping[str, tuple[str, str]] = {
     "job": (JOB_SCHEMA, "`manifest.json` of several designs cut together by `nest`"),
     "assembly": (ASSEMBLY_SCHEMA, "`manifest.json` of an assembly's folder"),
     "press": (PRESS_SCHEMA, "`press.json`, the heat-press schedule"),
-    "predict": (PREDICT_SCHEMA, "`predict.json`, and what `predict --json` prints of a design"),
+    "predict": (PREDICTION_SCHEMA, "`predict.json`, and what `predict --json` prints of a design"),
     "find": (FIND_SCHEMA, "what `find --json` prints"),
     "run": (RUN_SCHEMA, "what `generate`, `cut`, `press` and `mesh` print with `--json`"),
     "nested": (NESTED_SCHEMA, "what `nest --json` prints"),
@@ -399,19 +399,19 @@ def _design() -> dict[str, Any]:
 
 
 def _manifest() -> dict[str, Any]:
-    from sbafab.output.manifest_records import Manifest
+    from sbafab.output.manifest import Manifest
 
     return Manifest.model_json_schema(by_alias=True)
 
 
 def _job() -> dict[str, Any]:
-    from sbafab.output.manifest_records import JobManifest
+    from sbafab.output.manifest import JobManifest
 
     return _of_batch(JobManifest.model_json_schema(by_alias=True), JOB_SCHEMA)
 
 
 def _assembly() -> dict[str, Any]:
-    from sbafab.output.manifest_records import AssemblyManifest
+    from sbafab.output.manifest import AssemblyManifest
 
     return _of_batch(AssemblyManifest.model_json_schema(by_alias=True), ASSEMBLY_SCHEMA)
 
@@ -549,7 +549,7 @@ def _predict() -> dict[str, Any]:
         plot={**TEXT, "description": "its file in the folder"},
     )
     found = table(
-        schema={"const": PREDICT_SCHEMA},
+        schema={"const": PREDICTION_SCHEMA},
         name=TEXT,
         family=TEXT,
         design_sha256=TEXT,

@@ -16,7 +16,6 @@ from sbafab.cutting.calibration import table_text
 from sbafab.design.files import Change, design_sha256
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.output.checked import GENERATOR
 from sbafab.results.records import (
     COLUMNS,
     ERRORS,
@@ -31,6 +30,7 @@ from sbafab.results.records import (
     promised_assembly,
 )
 from sbafab.results.store import Lab
+from sbafab.version import GENERATOR
 
 SAID = (*TEXTS, "leak", *(quantity.name for quantity in (*NUMBERS, *ERRORS)))
 """What can be said of an actuator, by its name."""

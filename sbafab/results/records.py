@@ -19,7 +19,8 @@ from sbafab.models.figures import Asked, Prediction
 from sbafab.models.formulas import burst_pressure
 from sbafab.models.paper import BURST
 from sbafab.models.prediction import predict
-from sbafab.output.checked import GENERATOR, limits
+from sbafab.output.checked import limits
+from sbafab.version import GENERATOR
 
 PASS, FAIL = "pass", "fail"
 LONGEST = {"serial": 64, "operator": 80, "kit": 120, "note": 400}

@@ -11,8 +11,8 @@ import pytest
 import sbafab
 from sbafab.cli import main
 from sbafab.cli.schema import FORMATS
-from sbafab.output.run import prediction_json
 from sbafab.output.schemas import SCHEMAS, schema_of
+from sbafab.runs.run import prediction_json
 from tests.site.formats import hold
 
 ONE = "stack.balloons=1"

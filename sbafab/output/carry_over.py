@@ -11,24 +11,25 @@ from typing import Any
 from sbafab.design.files import dotted, resolved, shown
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
+from sbafab.output.artefacts import ARTEFACTS, tops_of
 from sbafab.output.manifest import carried_over, file_hash, file_names, identity
 from sbafab.output.swap import listed_files, read_manifest
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 
-CUT: tuple[str, ...] = ("layers", "sheets", "traveller.html")
-PRESS: tuple[str, ...] = ("press.json", "press.csv", "underlay.pdf")
-MESH: tuple[str, ...] = ("mesh",)
-PREDICTION = ("predict", "predict.json")
+CUT = tops_of("cut")
+PRESS = tops_of("press")
+MESH = tops_of("mesh")
+PREDICTION = tops_of("predict")
 MOST_KEYS = 3
 """Keys that a message names, at most."""
 RESULTS = "result.json"
-"""Of a simulator's folder: what a run has found, not only what the simulator reads."""
+"""Of a simulator's folder that has run, not only got its input."""
 WORTH_KEEPING = {*CUT, *PRESS, *MESH, *PREDICTION, *SIMULATORS}
 """Files and folders that a design which breaks a rule does not get."""
 WHOLE = {"layers", "sheets", "preview", "predict"}
 """Folders that a run which writes into them writes whole."""
-PARTS = {*WORTH_KEEPING, *WHOLE, "findings.html"}
-"""All that runs write of one design's parts; a listed file elsewhere is none of theirs."""
+PARTS = {row.top for row in ARTEFACTS if row.part}
+"""Files and folders of the parts of runs; a listed file elsewhere is none of theirs."""
 
 
 def would_replace(
