@@ -117,8 +117,8 @@ class Artefact:
 
     ``part`` of a run has it written, "" every run; ``needs``: further parts without which it is
     left out. ``render`` returns the file's contents, or writes a folder itself and returns None;
-    without one it is written for all designs of a job together. ``is_page``: an assembly has one
-    for all its designs.
+    without one it is written for all designs of a job together. ``schema``: the id of its format, if
+    programs may rely on it. ``is_page``: an assembly has one for all its designs.
     """
 
     path: str
