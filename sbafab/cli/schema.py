@@ -20,7 +20,7 @@ def schema(name: str) -> None:
 
     Editors complete and check design files from it; the other formats are what programs read.
     """
-    from sbafab.cli.printing import print_json
     from sbafab.cli.formats import schema_of
+    from sbafab.cli.printing import print_json
 
     print_json(schema_of(name))

@@ -117,8 +117,8 @@ class Artefact:
 
     ``part`` of a run has it written, "" every run; ``needs``: further parts without which it is
     left out. ``render`` returns the file's contents, or writes a folder itself and returns None;
-    without one it is written for all designs of a job together. ``schema``: the id of its format, if
-    programs may rely on it. ``is_page``: an assembly has one for all its designs.
+    without one it is written for all designs of a job together. ``schema``: the id of its format,
+    if programs may rely on it. ``is_page``: an assembly has one for all its designs.
     """
 
     path: str
@@ -136,8 +136,8 @@ class Artefact:
 
     def belongs_in(self, folder: DesignFolder) -> bool:
         """Return True if the folder's plan asks for it."""
-        wanted = folder.plan.wanted
-        is_wanted = not self.part or (self.part in wanted and self.needs <= wanted)
+        parts = folder.plan.wanted
+        is_wanted = not self.part or (self.part in parts and self.needs <= parts)
         return is_wanted and (folder.has_pages or not self.is_page)
 
 
@@ -198,8 +198,8 @@ def write_nested_sheets(
     if not nests:
         return []
     label = design.sheets.label
-    told = partial(tell, "sheets")
-    sheets = write_sheets(nests, folder, settings, machine(design), label, told)
+    progress = partial(tell, "sheets")
+    sheets = write_sheets(nests, folder, settings, machine(design), label, progress)
     write_text(folder / PLACES, json.dumps(as_dict(nests), indent=1) + "\n")
     return sheets
 
@@ -235,14 +235,14 @@ def _underlay(folder: DesignFolder) -> bytes | None:
 
 
 def _write_meshes(folder: DesignFolder) -> None:
-    told = partial(folder.tell, "meshes")
-    folder.meshes += write_meshes(folder.laminate, folder.path, progress=told)
+    progress = partial(folder.tell, "meshes")
+    folder.meshes += write_meshes(folder.laminate, folder.path, progress=progress)
     conforming = folder.plan.conforming
     if conforming is not None:
         from sbafab.meshing.conforming.meshes import write_conforming
 
-        told = partial(folder.tell, "conforming meshes")
-        folder.meshes += write_conforming(conforming, folder.path, told, folder.plan.formats)
+        progress = partial(folder.tell, "conforming meshes")
+        folder.meshes += write_conforming(conforming, folder.path, progress, folder.plan.formats)
 
 
 def _layers_svg(folder: DesignFolder) -> str:

@@ -80,9 +80,9 @@ def check(design: Design, progress: Progress | None = None) -> Checked:
 def checks(
     findings: Sequence[Finding], source: str, name: str, designs: Sequence[Design] = ()
 ) -> dict[str, Any]:
-    """``checks.json``: of the design, assembly or folder called ``name``.
+    """Return the contents of ``checks.json`` for the design, assembly or folder called ``name``.
 
-    ``source`` is "design" or "as-built", ``designs`` are what was checked.
+    ``source`` is "design" or "as-built", ``designs`` are those that were checked.
     """
     return {
         "schema": CHECKS_SCHEMA,
@@ -98,18 +98,18 @@ def checks(
 
 
 def kerf_widths(design: Design) -> dict[Material, Kerf | None]:
-    """Full kerf width (or that along x and y) by material, None where it was not measured."""
+    """Return the full kerf width (or that along x and y) by material, None if not measured."""
     widths = _kerfs(design).items()
     return {name: None if isinstance(kerf, str) else kerf for name, kerf in widths}
 
 
 def _kerfs(design: Design) -> dict[Material, KerfWidth]:
-    others = {material(name): film.kerf for name, film in design.films.others.items()}
-    return {"TPE": design.laser.kerf_tpe, "PTFE": design.laser.kerf_ptfe, **others}
+    further = {material(name): film.kerf for name, film in design.films.others.items()}
+    return {"TPE": design.laser.kerf_tpe, "PTFE": design.laser.kerf_ptfe, **further}
 
 
 def warnings(design: Design) -> dict[Material, str]:
-    """What cut files of a film must say, by material."""
+    """Return the warning that cut files of a film must carry, by material."""
     return {name: film.warning for name, film in used_films(design).items() if film.warning}
 
 
@@ -187,9 +187,9 @@ def press_settings(design: Design) -> PressSettings:
 
 
 def hole_notes(design: Design, laminate: Laminate) -> tuple[str, ...]:
-    """Return what a shop must know of the base plate's holes, line by line; none without pins.
+    """Return notes for the shop on the base plate's holes, line by line; none without pins.
 
-    Raises DesignError where no pin or plate does.
+    Raises DesignError where no standard pin or plate fits.
     """
     if not laminate.pins:
         return ()
@@ -210,7 +210,7 @@ def machine(design: Design) -> Machine:
 
 
 def stocks(design: Design) -> dict[Material, Stock]:
-    """The film sheets by material."""
+    """Return the film sheets by material."""
     sheets = {"TPE": design.sheets.tpe, "PTFE": design.sheets.ptfe}
     sheets |= {material(name): film.sheet for name, film in design.films.others.items()}
     return {name: _stock(sheets[name], kerf) for name, kerf in _kerfs(design).items()}
@@ -281,21 +281,21 @@ def plan_design(
 
 
 def schedule_of(checked: Checked) -> Schedule:
-    """The press schedule; its first step and its warnings name waived rules and lowered limits."""
+    """Return the press schedule; first step and warnings name waived rules and lowered limits."""
     cycles = design_runs(checked.design, checked.laminate).cycles
-    made = schedule(checked.laminate, press_settings(checked.design), cycles)
-    said = []
+    plain = schedule(checked.laminate, press_settings(checked.design), cycles)
+    remarks = []
     if checked.waived:
         rules = ", ".join(checked.waived)
-        said.append(f"made although it breaks rules that the design waives: {rules}")
+        remarks.append(f"made although it breaks rules that the design waives: {rules}")
     if checked.lowered:
-        said.append(f"{CHECKED_AGAINST}{', '.join(checked.lowered)}")
-    if not said:
-        return made
-    first, *others = made.steps
-    words = " ".join(f"{one[:1].upper()}{one[1:]}." for one in said)
+        remarks.append(f"{CHECKED_AGAINST}{', '.join(checked.lowered)}")
+    if not remarks:
+        return plain
+    first, *later = plain.steps
+    words = " ".join(f"{remark[:1].upper()}{remark[1:]}." for remark in remarks)
     marked = replace(first, instructions=f"{words} {first.instructions}")
-    return replace(made, steps=(marked, *others), warnings=(*said, *made.warnings))
+    return replace(plain, steps=(marked, *later), warnings=(*remarks, *plain.warnings))
 
 
 def refuse_undoable(checked: Sequence[Checked]) -> None:

@@ -54,7 +54,7 @@ class CheckedJob:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Those of the designs, of several each with its name; then those between parts."""
+        """The findings of the designs, of several each with its name; then those between parts."""
         if len(self.designs) == 1 and self.between is None:
             return self.designs[0].findings
         named = (
@@ -128,8 +128,8 @@ def refuse_other_film(designs: Sequence[Design]) -> None:
                 "designs; make it by itself with sbafab generate, or use "
                 'registration.method = "ears"'
             )
-    first, *others = designs
-    for design in others:
+    first, *rest = designs
+    for design in rest:
         for section in SHARED:
             if getattr(design, section) != getattr(first, section):
                 raise DesignError(
@@ -198,7 +198,7 @@ def plan_job(
 
 
 def _shared_settings(job: CheckedJob, designs: Sequence[DesignPlan]) -> CutSettings:
-    """Those of shared sheets: one hash over all designs, every waiver and limit of any."""
+    """Return settings of shared sheets: one hash over all designs, the waivers and limits of all."""
     each = [plan.settings for plan in designs]
     hashes = "".join(settings.design_sha256 for settings in each)
     waived = [rule for settings in each for rule in settings.waived]

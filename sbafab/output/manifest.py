@@ -1,7 +1,7 @@
-"""What ``manifest.json`` holds: the records that a run writes it from, and that it is read with.
+"""``manifest.json``: the records that it is written from and read with, and the hashes of files.
 
-A key with a default may be missing in a folder that is read. What the manifest claims is held
-against the files by ``as_built``, which measures it there and asks nothing that wrote it.
+A key with a default may be missing in a folder that is read. The claims of a manifest are held
+against the files by ``as_built``, which measures them there and asks nothing that wrote them.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class _Claim(BaseModel):
     )
 
     def as_dict(self) -> dict[str, Any]:
-        """What stands in the file: keys in the order of the fields, but for unset ones."""
+        """Return the keys of the file in the order of the fields, without unset ones."""
         return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
 
 
@@ -140,7 +140,7 @@ class FilmUseClaim(_OfFilm):
 
 
 class FilmClaim(FilmUseClaim, _FilmNeed):
-    """What a design needs of a film and the sheets it is cut from, in this order of the keys."""
+    """A design's need of a film and the sheets it is cut from; keys in this order."""
 
 
 class SheetPinClaim(_Claim):
@@ -195,7 +195,7 @@ class PlaceClaim(_Claim):
 
 
 class BatchClaim(_Claim):
-    """How several copies are pressed: where each of a cycle lies, and how many cycles take."""
+    """Press cycles of several copies, and the place of each copy of a cycle on the base plate."""
 
     at_once: Count
     cycles: Annotated[tuple[Count, ...], Field(max_length=1000)]
@@ -288,7 +288,7 @@ class JobManifest(_Claim):
 
 
 class AssemblyManifest(JobManifest):
-    """That of an assembly, which says more than that of a job."""
+    """``manifest.json`` of an assembly: that of a job, with the parts and their places."""
 
     family: str = ""
     design_sha256: str
@@ -307,14 +307,14 @@ class AssemblyManifest(JobManifest):
 
 
 def as_json(value: object) -> str:
-    """Text of a JSON file: readable, and the same for the same value."""
+    """Return the text of a JSON file: readable, and equal for equal values."""
     return json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def manifest(
     plan: DesignPlan, sheets: Sequence[SheetFile], meshes: Sequence[MeshFile]
 ) -> dict[str, Any]:
-    """The index of an output folder, but for the hashes of its files."""
+    """Return the manifest of a design's folder, without the hashes of its files."""
     checked, is_cut = plan.checked, "cut" in plan.wanted
     design, laminate = checked.design, checked.laminate
     curves = said_of(plan.settings.curves) if is_cut else None
@@ -385,7 +385,7 @@ def job_manifest(
     designs: Sequence[Design],
     sheets: Sequence[SheetFile],
 ) -> dict[str, Any]:
-    """The index of the folder of several designs, but for the hashes of its files.
+    """Return the manifest of the folder of several designs, without the hashes of its files.
 
     ``settings`` are those of the shared ``sheets``.
     """
@@ -420,7 +420,7 @@ def kerf_claim(width: Kerf | None) -> KerfClaim:
 
 
 def _batch(runs: Runs) -> BatchClaim:
-    """How several copies are pressed, and where each lies on the base plate."""
+    """Return press cycles and places of several copies."""
     places = tuple(PlaceClaim(**_place(place)) for place in runs.places)
     return BatchClaim(at_once=runs.together, cycles=runs.cycles, places=places)
 
@@ -448,7 +448,7 @@ def _place(point: tuple[float, float]) -> dict[str, float]:
 
 
 def _sheet(sheet: SheetFile) -> SheetClaim:
-    """A film sheet as the manifest lists it; lengths mm, areas mm2."""
+    """Return a film sheet as the manifest lists it; lengths mm, areas mm2."""
     stock = sheet.nest.stock
     return SheetClaim(
         file=sheet.path,
@@ -478,7 +478,7 @@ def _sheet(sheet: SheetFile) -> SheetClaim:
 
 
 def _film_use(sheets: Sequence[SheetFile]) -> dict[Material, dict[str, Any]]:
-    """Sheets, their area, the parts' share and the waste in mm2, by material."""
+    """Return number and area of sheets, share of the parts and waste in mm2, by material."""
     used: dict[Material, dict[str, float]] = {}
     for sheet in sheets:
         entry = used.setdefault(sheet.material, {"sheets": 0, "sheet_area": 0.0, "parts_area": 0.0})
@@ -508,11 +508,11 @@ def _films(laminate: Laminate, sheets: Sequence[SheetFile]) -> tuple[FilmClaim, 
             material=film.material,
             product=film.product,
             thickness=film.thickness,
-            layers=len(own),
-            area=round(sum(layer.profile.area for layer in own), 6),
+            layers=len(stack),
+            area=round(sum(layer.profile.area for layer in stack), 6),
             **use.get(film.material, {}),
         )
-        for film, own in layers.items()
+        for film, stack in layers.items()
     )
 
 
@@ -551,27 +551,27 @@ def _interface(interface: Interface) -> InterfaceClaim:
 
 
 def file_hashes(folder: Path) -> dict[str, str]:
-    """sha256 of every file of a folder, by relative path."""
+    """Return the sha256 of every file of a folder, by relative path."""
     return {name: file_hash(folder / name) for name in file_names(folder)}
 
 
 def file_names(folder: Path) -> list[str]:
-    """The relative paths of all files of a folder."""
+    """Return the relative paths of all files of a folder."""
     paths = (path for path in sorted(folder.rglob("*")) if path.is_file())
     return [path.relative_to(folder).as_posix() for path in paths]
 
 
 def file_hash(path: Path) -> str:
-    """sha256 of what a file holds."""
+    """Return the sha256 of a file's contents."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def identity(design: Design, waived: Sequence[str]) -> dict[str, Any]:
-    """What a manifest says of the design and version that its files are of."""
+    """Return the manifest's keys that identify the design and version of its files."""
     sha256 = design_sha256(design)
     return {"design_sha256": sha256, "generator": GENERATOR, "waived": list(waived)}
 
 
 def carried_over(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
-    """Whether files of the old run still belong to the new one's design and version."""
+    """True if files of the old run belong to the new one's design and version."""
     return all(old.get(key) == new.get(key) for key in ("design_sha256", "generator", "waived"))

@@ -162,10 +162,10 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
     tell = progress or unheard
     job = check_job(request.source, request.name, tell)
     target = request.out / job.name
-    wanted = _wanted(request, job, target)
-    if wanted is None:
+    parts = _parts_to_write(request, job, target)
+    if parts is None:
         return Run(job, target, kept=True)
-    plan = _plan(request, job, wanted, target, tell)
+    plan = _plan(request, job, parts, target, tell)
     listed = listed_files(target)
     with replaced_folder(target) as folder:
         written = write_folder(plan, folder, tell)
@@ -178,29 +178,29 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
     return Run(job, target, written.index, plan, removed, left_out=written.left_out)
 
 
-def _wanted(request: RunRequest, job: CheckedJob, target: Path) -> set[RunPart] | None:
+def _parts_to_write(request: RunRequest, job: CheckedJob, target: Path) -> set[RunPart] | None:
     """Return the parts to be written, of a job that failed only pictures; None to leave all as is.
 
     Raises OutputError where some parts alone would take the place of another design's files.
     """
-    wanted = set(request.parts) if job.schema == SCHEMA else set(EVERYTHING)
+    parts = set(request.parts) if job.schema == SCHEMA else set(EVERYTHING)
     checked = job.designs[0]
     if job.failed:
         mine = identity(checked.design, checked.waived) if job.schema == SCHEMA else None
         if job.schema == JOB_SCHEMA or would_replace(target, mine):
             return None
-        return wanted & set(PICTURES)
-    if not wanted >= set(EVERYTHING):
-        written = tops_of(*(wanted - set(PICTURES)))
+        return parts & set(PICTURES)
+    if not parts >= set(EVERYTHING):
+        written = tops_of(*(parts - set(PICTURES)))
         refuse_to_replace(target, checked.design, checked.waived, written)
-    return wanted
+    return parts
 
 
 def _plan(
-    request: RunRequest, job: CheckedJob, wanted: set[RunPart], target: Path, tell: Progress
+    request: RunRequest, job: CheckedJob, parts: set[RunPart], target: Path, tell: Progress
 ) -> Plan:
     """Compute schedule, nest and meshes before anything is written: they may refuse the design."""
-    designs = [plan_design(checked, wanted, request.curves) for checked in job.designs]
+    designs = [plan_design(checked, parts, request.curves) for checked in job.designs]
     for each in designs:
         if each.paths and request.curves.in_chords:
             checked = each.checked
@@ -210,7 +210,7 @@ def _plan(
         return plan
     (design,) = designs
     design = replace(design, prediction=request.prediction, simulated=request.simulated)
-    if request.conforming is not None and "mesh" in wanted:
+    if request.conforming is not None and "mesh" in parts:
         from sbafab.meshing.conforming.meshes import conforming_meshes
 
         tell("meshing", 0, 1)
