@@ -55,7 +55,7 @@ from sbafab.laminate.laminate import Laminate, SheetPanel
 from sbafab.models.formulas import sizes
 from sbafab.output.checked import Checked
 from sbafab.output.checked import limits as limits_of
-from sbafab.output.manifest_records import AssemblyManifest, Manifest
+from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.rules import film_limits
 from sbafab.rules.deck import RULES, Rule, run_deck, run_rule
 from sbafab.rules.finding import Finding, Place
@@ -82,6 +82,8 @@ class AsBuilt:
     meant: Meant | None
     known: tuple[Finding, ...] | None = None
     """What the rules found in ``meant``, where a run has just measured it."""
+    measured: tuple[Finding, ...] = ()
+    """What the rules find in the layers as they are cut."""
 
     @property
     def is_meant(self) -> bool:
@@ -91,33 +93,38 @@ class AsBuilt:
         return all(file.part is not None and file.part.is_meant for file in self.files)
 
 
-def check_folder(folder: Path) -> tuple[Finding, ...]:
-    """Everything found in an output folder: file integrity, the manifest's claims, the deck, and
-    whether all that lies in it is what its design makes.
+@dataclass(frozen=True)
+class FolderReadBack:
+    """An output folder read back and measured, nothing of it made again.
 
-    Of a job's folder, that of every design, and of the film sheets they share. Raises OutputError
-    with one sentence for a folder that holds no sound manifest or no cut files.
+    ``findings`` are those on files, claims, rules, and on the layers of each design of a job;
+    ``problems``: where a folder of one design cuts other layers than its ``design.toml`` makes.
+    """
+
+    findings: tuple[Finding, ...]
+    problems: tuple[Problem, ...]
+    designs: tuple[AsBuilt, ...]
+    job: JobManifest | None = None
+
+    def against_design(self, problems: Sequence[Problem]) -> tuple[Finding, ...]:
+        """Return the findings, last whether all is as designed, with its ``problems``."""
+        return (*self.findings, *findings_of(DESIGNED, [*problems], AS_DESIGNED))
+
+
+def read_back(folder: Path, works: Mapping[str, RunWork] | None = None) -> FolderReadBack:
+    """Return an output folder, of one design or several, as it lies on the disk.
+
+    ``works``: the laminates that are expected, by their designs' names, and what the rules found in
+    them: where every layer's file cuts just that it is not measured again. Without, both are made
+    from each ``design.toml``. Raises OutputError with one sentence for a folder that holds no sound
+    manifest or no cut files.
     """
     if is_job(folder):
-        return _check_job(folder)
-    built = read_folder(folder)
-    measured = _deck(built)
-    problems = design_problems_of(folder, built, measured)
-    return (*_findings(built, measured), *findings_of(DESIGNED, problems, AS_DESIGNED))
-
-
-def check_written(folder: Path, works: Mapping[str, RunWork]) -> tuple[Finding, ...]:
-    """What is found in a folder that has just been written, of ``works`` by their designs' names.
-
-    Everything is read from the disk. Where every layer's file cuts what the design check measured,
-    its findings hold and are not measured again; what was written beside the cut files is not made
-    a second time to be compared with itself.
-    """
-    if is_job(folder):
-        return _check_job(folder, works)
-    built = read_folder(folder, work=next(iter(works.values())))
-    problems = _layer_problems(built)
-    return (*_findings(built, _deck(built)), *findings_of(DESIGNED, problems, AS_DESIGNED))
+        return _read_job(folder, works)
+    work = next(iter(works.values())) if works is not None else None
+    built = read_folder(folder, work=work)
+    built = replace(built, measured=_deck(built))
+    return FolderReadBack(_findings(built), tuple(layer_departures(built)), (built,))
 
 
 def _deck(built: AsBuilt) -> tuple[Finding, ...]:
@@ -130,23 +137,22 @@ def _deck(built: AsBuilt) -> tuple[Finding, ...]:
     return tuple(finding for rule in RULES for finding in findings_as_built(rule, measures))
 
 
-def _findings(built: AsBuilt, measured: Sequence[Finding]) -> tuple[Finding, ...]:
-    problems = [*built.problems, *_unsaid_waivers(measured, built.claims)]
+def _findings(built: AsBuilt) -> tuple[Finding, ...]:
+    problems = [*built.problems, *_unsaid_waivers(built.measured, built.claims)]
     count = len(built.files)
     return (
         *findings_of(
             INTEGRITY, problems, f"{count} cut files read back: closed contours in millimetres"
         ),
         *findings_of(CLAIMS, problems, "the manifest's claims hold for what lies on disk"),
-        *measured,
+        *built.measured,
     )
 
 
-def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tuple[Finding, ...]:
-    """What is found in every design of a job, its name before it, and on the job's sheets.
+def _read_job(folder: Path, works: Mapping[str, RunWork] | None) -> FolderReadBack:
+    """Return what is found in every design of a job, its name before it, and on the job's sheets.
 
-    In an assembly's folder, also what is found between its parts. ``works``: what the run that has
-    just written the folder knows of its designs.
+    In an assembly's folder, also what is found between its parts.
     """
     job = read_job(folder)
     found: list[Finding] = []
@@ -154,18 +160,16 @@ def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tupl
     problems: list[Problem] = []
     weak: list[str] = []
     folders: list[AsBuilt] = []
-    checked: list[Checked | None] = []
     for told in job.designs:
         work = works.get(told.name) if works is not None else None
         built = read_folder(inside(folder, told.folder), of_job=True, work=work)
+        built = replace(built, measured=_deck(built))
         folders.append(built)
         weak += lowered(limits_of(built.design))
-        measured = _deck(built)
-        named = [*_findings(built, measured)]
-        layers = _layer_problems(built)
+        named = [*_findings(built)]
+        layers = layer_departures(built)
         named += findings_of(DESIGNED, layers, AS_DESIGNED) if layers else []
         found += [replace(f, message=f"{told.name}: {f.message}") for f in named]
-        checked.append(_as_designed(built, measured) if works is None else None)
         lots.append(Lot(told.name, told.copies, built.files, built.design.order.spare_parts))
         own = (built.claims.name, built.claims.copies, built.claims.design_sha256)
         if own != (told.name, told.copies, told.design_sha256):
@@ -181,25 +185,21 @@ def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tupl
         found += between
         problems += wrong
     problems += lowered_problems(job.lowered_limits, weak)
-    whole = [one for one in checked if one is not None]
-    if works is None and len(whole) == len(checked):
-        from sbafab.as_built.derived import derived_job_problems
-
-        problems += derived_job_problems(folder, job, whole, folders[0].claims.curves)
     count = len(job.sheets)
-    return (
+    findings = (
         *found,
         *findings_of(INTEGRITY, problems, f"{count} sheets read back: closed contours, no overlap"),
         *findings_of(CLAIMS, problems, "the sheets hold what the job's designs are made of"),
-        *findings_of(DESIGNED, problems, AS_DESIGNED),
     )
+    designed = tuple(problem for problem in problems if problem.rule == DESIGNED)
+    return FolderReadBack(findings, designed, tuple(folders), job)
 
 
 def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None) -> AsBuilt:
     """The laminate that a folder's cut files make, and what is wrong with files and claims.
 
     The folder of a design ``of_job`` has no film sheets of its own. ``work``: what the run that has
-    just written it knows. Raises OutputError as ``check_folder`` does.
+    just written it knows. Raises OutputError as ``read_back`` does.
     """
     claims = read_claims(folder)
     if all(layer.file is None for layer in claims.layers):
@@ -270,19 +270,7 @@ def _laminate(
     return replace(meant.laminate, layers=cut, panel=panel)
 
 
-def design_problems_of(folder: Path, built: AsBuilt, measured: Sequence[Finding]) -> list[Problem]:
-    """Layers, and all that lies beside them, that are not what the folder's design makes."""
-    problems = _layer_problems(built)
-    checked = _as_designed(built, measured)
-    if checked is not None and built.meant is not None:
-        from sbafab.as_built.derived import derived_problems
-
-        of_job = is_job(folder.absolute().parent)
-        problems += derived_problems(folder, built.claims, checked, built.meant.paths, of_job)
-    return problems
-
-
-def _layer_problems(built: AsBuilt) -> list[Problem]:
+def layer_departures(built: AsBuilt) -> list[Problem]:
     """Layers whose files cut something else than the design makes there."""
     if built.meant is None:
         return [Problem(DESIGNED, "design.toml makes no laminate to hold the cut files against")]
@@ -302,14 +290,14 @@ def _layer_problems(built: AsBuilt) -> list[Problem]:
     return problems
 
 
-def _as_designed(built: AsBuilt, measured: Sequence[Finding]) -> Checked | None:
+def as_designed(built: AsBuilt) -> Checked | None:
     """The folder's design with what the rules find in it; None where it makes no laminate."""
     if built.meant is None:
         return None
     in_chords = built.claims.curves is not None
     laminate = build(built.design) if in_chords else built.meant.laminate
     is_known = built.is_meant and not in_chords
-    findings = tuple(measured) if is_known else run_deck(laminate, limits_of(built.design))
+    findings = built.measured if is_known else run_deck(laminate, limits_of(built.design))
     return Checked(built.design, laminate, findings)
 
 

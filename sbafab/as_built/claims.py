@@ -21,8 +21,14 @@ from sbafab.cutting.properties import (
 from sbafab.design.records import Design
 from sbafab.laminate.laminate import Layer
 from sbafab.output.checked import kerf_widths, limits, warnings
-from sbafab.output.manifest import file_hashes, kerf_claim
-from sbafab.output.manifest_records import JobManifest, KerfClaim, LayerClaim, Manifest
+from sbafab.output.manifest import (
+    JobManifest,
+    KerfClaim,
+    LayerClaim,
+    Manifest,
+    file_hashes,
+    kerf_claim,
+)
 from sbafab.output.swap import (
     is_among_cut_files,
 )

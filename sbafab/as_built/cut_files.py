@@ -28,7 +28,7 @@ from sbafab.cutting.verify import check_datum
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
-from sbafab.output.manifest_records import LayerClaim, Manifest
+from sbafab.output.manifest import LayerClaim, Manifest
 
 MOST_BYTES = 20_000_000
 MOST_MARKS = 300_000

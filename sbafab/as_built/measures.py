@@ -16,7 +16,7 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.assembly import PLATE_MARGIN
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
-from sbafab.output.manifest_records import Manifest
+from sbafab.output.manifest import Manifest
 from sbafab.pressing.cycles import APART, are_apart
 from sbafab.rules.limits import TOLERANCE, at
 

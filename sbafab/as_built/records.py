@@ -9,7 +9,7 @@ from typing import TypeVar
 from pydantic import ValidationError
 
 from sbafab.errors import OutputError
-from sbafab.output.manifest_records import AssemblyManifest, JobManifest, Manifest
+from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.output.swap import (
     ASSEMBLY_SCHEMA,
     JOB_SCHEMA,

@@ -40,7 +40,7 @@ from sbafab.laminate.laminate import Layer, SheetPanel, freed
 from sbafab.nesting.check import check_placed
 from sbafab.nesting.records import TURNS, Stock, Turn, no_spares
 from sbafab.output.checked import stocks
-from sbafab.output.manifest_records import (
+from sbafab.output.manifest import (
     FilmUseClaim,
     JobManifest,
     KerfClaim,

@@ -25,7 +25,7 @@ from sbafab.laminate.laminate import (
     Pin,
     interface_regions,
 )
-from sbafab.output.manifest_records import LayerClaim, Manifest
+from sbafab.output.manifest import LayerClaim, Manifest
 from sbafab.rules.boundary import edges_along
 from sbafab.rules.limits import TOLERANCE
 

@@ -190,18 +190,17 @@ def _of_source(asked: CheckRequest) -> Told:
 
 def _of_design(design: Design, progress: Progress) -> Told:
     """The findings and notes; what press and sheets cannot do is refused, as a run would do."""
-    from sbafab.output.checked import Checked
     from sbafab.output.checked import check as run_check
 
-    checked = Checked(design, *run_check(design, progress))
+    checked = run_check(design, progress)
     return _of_checked(design.name, checked.findings, [checked])
 
 
 def _of_assembly(assembly: Assembly, progress: Progress) -> Told:
     """Those of its designs and between its parts, likewise."""
-    from sbafab.output.assembly import check_assembly
+    from sbafab.output.job import check_job
 
-    checked = check_assembly(assembly, progress)
+    checked = check_job(assembly, progress=progress)
     return _of_checked(assembly.name, checked.findings, checked.designs, checked.between)
 
 
@@ -242,9 +241,9 @@ def _of_folder(asked: CheckRequest) -> Told:
     """What is found in the files of an output folder."""
     import logging
 
-    from sbafab.as_built.check import check_folder
     from sbafab.cli.printing import Group
     from sbafab.errors import DesignError
+    from sbafab.runs.check_folder import check_folder
 
     if asked.assignments or asked.waivers or asked.target is not None:
         raise DesignError(

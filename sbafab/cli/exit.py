@@ -29,9 +29,8 @@ from sbafab.errors import (
 
 if TYPE_CHECKING:
     from sbafab.cutting.properties import Curves
-    from sbafab.design.records import Design
     from sbafab.output.checked import RunPart
-    from sbafab.output.run import Extras, Run
+    from sbafab.runs.run import Conforming, Run, RunRequest
 
 BAD_INPUT = 2
 LATER = 0.01
@@ -169,32 +168,29 @@ def run_parts(
     request: Request,
     parts: Sequence[RunPart],
     curves: Curves | None = None,
-    extras: Extras | None = None,
+    conforming: Conforming | None = None,
 ) -> None:
     """Generates the parts of a design and exits with 1 if a rule failed."""
     from sbafab.actuators import load_design
+    from sbafab.cutting.properties import TRUE_ARCS
+    from sbafab.runs.run import RunRequest
 
     design = load_design(request.designs[0], request.assignments, request.waivers)
-    run_design(design, request, parts, curves, extras)
+    run_request(
+        RunRequest(design, request.out, parts, curves or TRUE_ARCS, conforming=conforming), request
+    )
 
 
-def run_design(
-    design: Design,
-    request: Request,
-    parts: Sequence[RunPart],
-    curves: Curves | None,
-    extras: Extras | None,
-) -> None:
-    """The same with a design that is loaded."""
-    from sbafab.cli.printing import print_run, run_json, shown_progress
-    from sbafab.cutting.properties import TRUE_ARCS
-    from sbafab.output.run import NO_EXTRAS, generate
+def run_request(asked: RunRequest, request: Request) -> None:
+    """Writes a folder, prints what was made and exits with 1 if a rule failed."""
+    from sbafab.cli.printing import print_assembly, print_run, run_json, shown_progress
+    from sbafab.runs.run import generate
 
     with shown_progress(request.as_json) as progress:
-        run = generate(
-            design, request.out, parts, progress, curves or TRUE_ARCS, extras or NO_EXTRAS
-        )
-    tell(run, request, run_json, print_run)
+        run = generate(asked, progress)
+    for name, reason in run.left_out:
+        say(f"nothing for {name}: {reason}")
+    tell(run, request, run_json, print_run if run.between is None else print_assembly)
 
 
 def tell(

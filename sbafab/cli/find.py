@@ -11,7 +11,7 @@ import click
 from sbafab.cli.exit import RULE_FAILED
 from sbafab.cli.options import json_option, set_option
 from sbafab.cli.printing import print_line, print_wrapped
-from sbafab.output.schemas import FIND_SCHEMA
+from sbafab.output.schema_ids import FIND_SCHEMA
 from sbafab.search.find import FoundDesign
 from sbafab.search.quantities import AskedQuantity, shown_value
 from sbafab.search.quantity_names import quantity_lines

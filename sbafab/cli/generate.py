@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from sbafab.cli.exit import run_design, tell
+from sbafab.cli.exit import run_request
 from sbafab.cli.options import Request, dxf_options, run_options, sheet_options
 
 if TYPE_CHECKING:
-    from sbafab.assemblies.records import Assembly
     from sbafab.cutting.properties import Curves
-    from sbafab.laminate.laminate import Laminate
 
 
 @click.command()
@@ -30,29 +27,11 @@ def generate(request: Request, curves: Curves, decks: bool) -> None:
     from sbafab.assemblies.files import load
     from sbafab.design.records import Design
     from sbafab.output.checked import EVERYTHING
-    from sbafab.output.run import Extras
+    from sbafab.runs.run import RunRequest
+    from sbafab.simulators.simulator import NAMES
 
     found = load(request.designs[0], request.assignments, request.waivers)
-    if not isinstance(found, Design):
-        if decks:
-            raise click.UsageError("--decks goes with one design; leave it out for an assembly")
-        _generate_assembly(found, request, curves)
-        return
-    extras = Extras(also=_write_decks) if decks else None
-    run_design(found, request, EVERYTHING, curves, extras)
-
-
-def _generate_assembly(assembly: Assembly, request: Request, curves: Curves) -> None:
-    from sbafab.cli.printing import print_assembly, run_json, shown_progress
-    from sbafab.output.assembly import generate_assembly
-
-    with shown_progress(request.as_json) as progress:
-        run = generate_assembly(assembly, request.out, progress, curves)
-    tell(run, request, run_json, print_assembly)
-
-
-def _write_decks(laminate: Laminate, folder: Path) -> None:
-    from sbafab.output.decks import write_decks
-
-    for name, why in write_decks(laminate, folder):
-        click.echo(f"sbafab: nothing for {name}: {why}", err=True)
+    if decks and not isinstance(found, Design):
+        raise click.UsageError("--decks goes with one design; leave it out for an assembly")
+    parts = (*EVERYTHING, *NAMES) if decks else EVERYTHING
+    run_request(RunRequest(found, request.out, parts, curves), request)

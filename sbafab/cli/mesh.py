@@ -89,8 +89,8 @@ def mesh(  # noqa: PLR0913, PLR0917 - one an option
     The conforming ones take the extra "mesh": pip install "sbafab[mesh]".
     """
     from sbafab.meshing.conforming.layup import MeshSettings
-    from sbafab.output.run import Conforming, Extras
+    from sbafab.runs.run import Conforming
 
     settings = MeshSettings(size, element, symmetry, fill, gaps, not flat)
     conforming = Conforming(settings, formats or FORMATS)
-    run_parts(request, ("mesh",), extras=Extras(conforming))
+    run_parts(request, ("mesh",), conforming=conforming)

@@ -26,11 +26,11 @@ def nest(request: Request, name: str, curves: Curves) -> None:
     """
     from sbafab.actuators import load_design
     from sbafab.cli.printing import job_json, print_job, shown_progress
-    from sbafab.output.job import generate_job
+    from sbafab.runs.run import RunRequest, generate
 
     designs = [
         load_design(design, request.assignments, request.waivers) for design in request.designs
     ]
     with shown_progress(request.as_json) as progress:
-        job = generate_job(designs, name, request.out, progress, curves)
+        job = generate(RunRequest(designs, request.out, curves=curves, name=name), progress)
     tell(job, request, job_json, print_job)

@@ -47,7 +47,7 @@ def _kit(file: Path) -> None:
 
 def _coupon(folder: Path) -> None:
     from sbafab.cutting.calibration import write_coupon
-    from sbafab.output.checked import GENERATOR
+    from sbafab.version import GENERATOR
 
     drawing, picture, table = write_coupon(folder, GENERATOR)
     click.echo(f"Cut {drawing} (picture: {picture}) from each film, with a kerf offset of 0.")

@@ -113,8 +113,8 @@ def predict(
     from sbafab.models.figures import Asked, Factors
     from sbafab.models.formulas import size_said
     from sbafab.models.prediction import predict as predicted
-    from sbafab.output.earlier import PREDICTION
-    from sbafab.output.run import Extras, generate, prediction_json, with_prediction
+    from sbafab.output.artefacts import prediction_json
+    from sbafab.runs.run import RunRequest, generate
 
     design = load(request.designs[0], request.assignments, request.waivers)
     if not isinstance(design, Design):
@@ -126,9 +126,9 @@ def predict(
     with shown_progress(request.as_json) as tell:
         tell("predicting", 0, 1)
         found = predicted(design, wish)
-        extras = Extras(also=with_prediction(design, found), own=PREDICTION)
+        asked = RunRequest(design, request.out, ("predict",), prediction=found)
         try:
-            run = generate(design, request.out, (), tell, extras=extras)
+            run = generate(asked, tell)
         except OutputError:
             # What was asked is known, only not written.
             if not request.as_json:

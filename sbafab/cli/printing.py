@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from sbafab.output.checked import Checked
-    from sbafab.output.run import Run
     from sbafab.reports.assembly_prediction import AssemblyPrediction
     from sbafab.rules.finding import Finding, Verdict
+    from sbafab.runs.run import Run
 
 KEPT = "\u00a0"
 """A space at which no line is broken."""

@@ -10,7 +10,7 @@ FORMATS = (
     *("sweep", "simulate", "assembly-predict", "reproduction"),
     *("balloon-map", "kerf", "explain", "explained", "templates", "error"),
 )
-"""As in ``sbafab.output.schemas``, whose imports would slow ``--help`` down."""
+"""As in ``sbafab.cli.formats``, whose imports would slow ``--help`` down."""
 
 
 @click.command()
@@ -20,7 +20,7 @@ def schema(name: str) -> None:
 
     Editors complete and check design files from it; the other formats are what programs read.
     """
+    from sbafab.cli.formats import schema_of
     from sbafab.cli.printing import print_json
-    from sbafab.output.schemas import schema_of
 
     print_json(schema_of(name))

@@ -100,8 +100,8 @@ def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> N
     from sbafab.cli.printing import Group, print_findings, print_json, shown_progress
     from sbafab.models.paper import BURST
     from sbafab.output.checked import checks
-    from sbafab.output.run import result_json
-    from sbafab.output.run import simulate as run
+    from sbafab.runs.run import result_json
+    from sbafab.runs.run import simulate as run
     from sbafab.simulators.simulator import Wish
 
     wish = Wish(**asked)

@@ -1,12 +1,12 @@
-"""A design checked: its laminate, what the rules find, and whether shop and press can do it."""
+"""A design checked and planned: laminate, findings, settings, press schedule, beam paths."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from sbafab import __version__
 from sbafab.actuators import build
 from sbafab.actuators.stacking import used_films
 from sbafab.cutting.files import compensated_paths
@@ -30,35 +30,59 @@ from sbafab.process import Progress
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding, summary
 from sbafab.rules.limits import CHECKED_AGAINST, Limits, Tolerances, lowered
+from sbafab.simulators.simulator import Name
+from sbafab.version import GENERATOR
 
 if TYPE_CHECKING:
     from sbafab.cutting.sheets import Machine
     from sbafab.meshing.conforming.meshes import ConformingMeshes
+    from sbafab.models.figures import Prediction
 
 CHECKS_SCHEMA = "sbafab/checks@1"
 
 
-def check(design: Design, progress: Progress | None = None) -> tuple[Laminate, tuple[Finding, ...]]:
-    """The laminate of a design and what the rule deck finds in it."""
+# A design with its laminate and findings.
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A design, its laminate, and the findings of the rules."""
+
+    design: Design
+    laminate: Laminate
+    findings: tuple[Finding, ...]
+
+    @property
+    def failed(self) -> bool:
+        """True if a rule failed that the design does not waive."""
+        return has_failed(self.findings)
+
+    @property
+    def waived(self) -> tuple[str, ...]:
+        """The rules that fail and that the design waives by name."""
+        return tuple(dict.fromkeys(finding.rule for finding in self.findings if finding.by_user))
+
+    @property
+    def lowered(self) -> tuple[str, ...]:
+        """The limits that the design sets below the usual ones."""
+        return lowered(limits(self.design))
+
+
+def check(design: Design, progress: Progress | None = None) -> Checked:
+    """Build the laminate of a design and run the rule deck on it. Raises DesignError."""
     try:
         laminate = build(design)
-        return laminate, run_deck(laminate, limits(design), progress)
+        return Checked(design, laminate, run_deck(laminate, limits(design), progress))
     except GeometryError as error:
         raise DesignError(f"design {design.name} cannot be resolved: {error}") from None
-
-
-def refuse_undoable(checked: Sequence[Checked]) -> None:
-    """Raises DesignError where press, kerf or film sheets cannot do designs that hold."""
-    for one in checked:
-        refuse_unfit(plan(one, ("press", "cut")).parts, stocks(one.design))
 
 
 def checks(
     findings: Sequence[Finding], source: str, name: str, designs: Sequence[Design] = ()
 ) -> dict[str, Any]:
-    """``checks.json``: of the design, assembly or folder called ``name``.
+    """Return the contents of ``checks.json`` for the design, assembly or folder called ``name``.
 
-    ``source`` is "design" or "as-built", ``designs`` are what was checked.
+    ``source`` is "design" or "as-built", ``designs`` are those that were checked.
     """
     return {
         "schema": CHECKS_SCHEMA,
@@ -73,22 +97,19 @@ def checks(
 # A design's sections as the settings that rules, cutting and pressing take.
 
 
-GENERATOR = f"sbafab {__version__}"
-
-
 def kerf_widths(design: Design) -> dict[Material, Kerf | None]:
-    """Full kerf width (or that along x and y) by material, None where it was not measured."""
+    """Return the full kerf width (or that along x and y) by material, None if not measured."""
     widths = _kerfs(design).items()
     return {name: None if isinstance(kerf, str) else kerf for name, kerf in widths}
 
 
 def _kerfs(design: Design) -> dict[Material, KerfWidth]:
-    others = {material(name): film.kerf for name, film in design.films.others.items()}
-    return {"TPE": design.laser.kerf_tpe, "PTFE": design.laser.kerf_ptfe, **others}
+    further = {material(name): film.kerf for name, film in design.films.others.items()}
+    return {"TPE": design.laser.kerf_tpe, "PTFE": design.laser.kerf_ptfe, **further}
 
 
 def warnings(design: Design) -> dict[Material, str]:
-    """What cut files of a film must say, by material."""
+    """Return the warning that cut files of a film must carry, by material."""
     return {name: film.warning for name, film in used_films(design).items() if film.warning}
 
 
@@ -166,9 +187,9 @@ def press_settings(design: Design) -> PressSettings:
 
 
 def hole_notes(design: Design, laminate: Laminate) -> tuple[str, ...]:
-    """Return what a shop must know of the base plate's holes, line by line; none without pins.
+    """Return notes for the shop on the base plate's holes, line by line; none without pins.
 
-    Raises DesignError where no pin or plate does.
+    Raises DesignError where no standard pin or plate fits.
     """
     if not laminate.pins:
         return ()
@@ -189,7 +210,7 @@ def machine(design: Design) -> Machine:
 
 
 def stocks(design: Design) -> dict[Material, Stock]:
-    """The film sheets by material."""
+    """Return the film sheets by material."""
     sheets = {"TPE": design.sheets.tpe, "PTFE": design.sheets.ptfe}
     sheets |= {material(name): film.sheet for name, film in design.films.others.items()}
     return {name: _stock(sheets[name], kerf) for name, kerf in _kerfs(design).items()}
@@ -208,45 +229,23 @@ def _stock(sheet: Sheet, kerf: object) -> Stock:
     )
 
 
-# A design on its way to its folder: checked by the rules, then planned, before it is written.
+# The plan of a design: computed before anything is written.
 
 
-RunPart = Literal["cut", "press", "mesh", "preview"]
+RunPart = Literal["cut", "press", "mesh", "preview", "predict"] | Name
+"""What a run writes of a design: by rules and geometry, by models, or for a simulator."""
 EVERYTHING: tuple[RunPart, ...] = ("cut", "press", "mesh", "preview")
 PICTURES: tuple[RunPart, ...] = ("preview",)
 """What is left, beside the findings, of a design that is not to be cut."""
 
 
 @dataclass(frozen=True)
-class Checked:
-    """A design, its laminate, and what the rules found in it."""
-
-    design: Design
-    laminate: Laminate
-    findings: tuple[Finding, ...]
-
-    @property
-    def failed(self) -> bool:
-        """Whether a rule failed that the design does not waive."""
-        return has_failed(self.findings)
-
-    @property
-    def waived(self) -> tuple[str, ...]:
-        """The rules that fail and that the design waives by name."""
-        return tuple(dict.fromkeys(finding.rule for finding in self.findings if finding.by_user))
-
-    @property
-    def lowered(self) -> tuple[str, ...]:
-        """The limits that the design sets below the usual ones."""
-        return lowered(limits(self.design))
-
-
-@dataclass(frozen=True)
-class Planned:
-    """What of a design is ``wanted``, and all that is worked out before its folder is begun.
+class DesignPlan:
+    """The parts ``wanted`` of a design, and all that is computed before its folder is begun.
 
     ``paths``: the beam's path for every pattern, ``parts``: what goes on film sheets; both empty
-    where nothing is cut. ``conforming`` is written in the ``formats`` of these file endings.
+    where nothing is cut. ``conforming`` is written in the ``formats`` of these file endings;
+    ``simulated`` is the folder in which a simulator has run.
     """
 
     checked: Checked
@@ -257,14 +256,18 @@ class Planned:
     parts: tuple[NestPart, ...] = ()
     conforming: ConformingMeshes | None = None
     formats: tuple[str, ...] = ()
+    prediction: Prediction | None = None
+    simulated: Path | None = None
 
 
-def plan(checked: Checked, wanted: Collection[RunPart], curves: Curves = TRUE_ARCS) -> Planned:
-    """The plan of a design. Raises DesignError where press, kerf or chords cannot do it."""
+def plan_design(
+    checked: Checked, wanted: Collection[RunPart], curves: Curves = TRUE_ARCS
+) -> DesignPlan:
+    """Return the plan of a design. Raises DesignError where press or kerf cannot do it."""
     design, laminate = checked.design, checked.laminate
     settings = cut_settings(design, checked.waived, curves)
     pressing = schedule_of(checked) if "press" in wanted else None
-    planned = Planned(checked, frozenset(wanted), settings, pressing)
+    planned = DesignPlan(checked, frozenset(wanted), settings, pressing)
     if "cut" not in wanted:
         return planned
     if laminate.panel is not None and curves.in_chords:
@@ -273,27 +276,29 @@ def plan(checked: Checked, wanted: Collection[RunPart], curves: Curves = TRUE_AR
             "bulges or arcs"
         )
     paths = compensated_paths(laminate, settings)
-    if curves.in_chords:
-        from sbafab.as_built.expected import refuse_coarse
-
-        refuse_coarse(laminate, paths, settings, limits(design))
     parts = parts_of(laminate, paths, design.order.quantity, design.order.spare_parts)
     return replace(planned, paths=paths, parts=parts)
 
 
 def schedule_of(checked: Checked) -> Schedule:
-    """The press schedule; its first step and its warnings name waived rules and lowered limits."""
+    """Return the press schedule; first step and warnings name waived rules and lowered limits."""
     cycles = design_runs(checked.design, checked.laminate).cycles
-    made = schedule(checked.laminate, press_settings(checked.design), cycles)
-    said = []
+    plain = schedule(checked.laminate, press_settings(checked.design), cycles)
+    remarks = []
     if checked.waived:
         rules = ", ".join(checked.waived)
-        said.append(f"made although it breaks rules that the design waives: {rules}")
+        remarks.append(f"made although it breaks rules that the design waives: {rules}")
     if checked.lowered:
-        said.append(f"{CHECKED_AGAINST}{', '.join(checked.lowered)}")
-    if not said:
-        return made
-    first, *others = made.steps
-    words = " ".join(f"{one[:1].upper()}{one[1:]}." for one in said)
+        remarks.append(f"{CHECKED_AGAINST}{', '.join(checked.lowered)}")
+    if not remarks:
+        return plain
+    first, *later = plain.steps
+    words = " ".join(f"{remark[:1].upper()}{remark[1:]}." for remark in remarks)
     marked = replace(first, instructions=f"{words} {first.instructions}")
-    return replace(made, steps=(marked, *others), warnings=(*said, *made.warnings))
+    return replace(plain, steps=(marked, *later), warnings=(*remarks, *plain.warnings))
+
+
+def refuse_undoable(checked: Sequence[Checked]) -> None:
+    """Raises DesignError where press, kerf or film sheets cannot do designs that pass the rules."""
+    for design in checked:
+        refuse_unfit(plan_design(design, ("press", "cut")).parts, stocks(design.design))

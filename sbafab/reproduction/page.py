@@ -59,16 +59,16 @@ for every actuator, so that one number would only move the residuals about.
 """
 
 
-def tables(one: Prediction, three: Prediction) -> dict[str, list[Row]]:
+def tables(single: Prediction, three: Prediction) -> dict[str, list[Row]]:
     """All rows, by section."""
     return {
         "Making": list(rows.process()),
         "Sizes": list(rows.sizes(three)),
         "Stroke and volume": [*rows.strokes(), *rows.fuller()],
         "Energy": list(rows.energy()),
-        "Force": list(rows.forces(one, three)),
+        "Force": list(rows.forces(single, three)),
         "Time and bending": list(rows.motion(three)),
-        "Stiffness and power": list(rows.stiffness(one, three)),
+        "Stiffness and power": list(rows.stiffness(single, three)),
         "Calibrated on the 1-DoF": list(rows.calibrated()),
         "Figures of the paper's own simulations": list(rows.simulators()),
     }
@@ -76,46 +76,46 @@ def tables(one: Prediction, three: Prediction) -> dict[str, list[Row]]:
 
 def page() -> str:
     """The text of the page."""
-    one, three = predicted("1dof-5mm"), predicted("3dof-15mm")
-    return page_of(tables(one, three), one, three)
+    single, three = predicted("1dof-5mm"), predicted("3dof-15mm")
+    return page_of(tables(single, three), single, three)
 
 
-def page_of(found: dict[str, list[Row]], one: Prediction, three: Prediction) -> str:
-    """The same of rows that are known."""
+def page_of(sections: dict[str, list[Row]], single: Prediction, three: Prediction) -> str:
+    """Return the page of rows that are computed already."""
     parts = [HEAD]
-    for title, lines in found.items():
-        first, *others = table(title, lines)
+    for title, lines in sections.items():
+        first, *lines_below = table(title, lines)
         parts.append(first)
         if title.startswith("Calibrated"):
             parts.append(calibrated_said(lines))
-        parts += others
-    return "\n".join([*parts, FACTORS + "\n".join(rows.factors(one, three)), ""])
+        parts += lines_below
+    return "\n".join([*parts, FACTORS + "\n".join(rows.factors(single, three)), ""])
 
 
 def calibrated_said(lines: Sequence[Row]) -> str:
-    """What was fitted, and which of the held-out rows are as near as aimed at."""
-    given = rows.FITTED
-    found: dict[bool, list[str]] = {True: [], False: []}
+    """Return the fitted values, and which of the held-out rows are as near as aimed at."""
+    factors = rows.FITTED
+    names: dict[bool, list[str]] = {True: [], False: []}
     for row in lines:
-        name, _, role = row.what.rpartition(" (")
+        name, _, role = row.figure.rpartition(" (")
         if rows.HELD_OUT in role and row.predicted is not None:
             assumed = row.model.split(" in ")[-1] if row.measured.unit == "deg" else ""
             miss = abs(row.predicted - row.measured.value)
             is_met = miss <= rows.aim(row.measured)
-            found[is_met].append(f"{name} ({assumed})" if assumed else name)
-    met, missed = ("; ".join(found[kind]) or "none" for kind in (True, False))
+            names[is_met].append(f"{name} ({assumed})" if assumed else name)
+    met, missed = ("; ".join(names[kind]) or "none" for kind in (True, False))
     return CALIBRATED.format(
-        loss=given.pocket_loss, press=given.press_factor, met=met, missed=missed
+        loss=factors.pocket_loss, press=factors.press_factor, met=met, missed=missed
     )
 
 
-def charts(one: Prediction, three: Prediction) -> list[tuple[str, Relation]]:
-    """The charts of what the paper shows as figures: name of the file, and relation."""
+def charts(single: Prediction, three: Prediction) -> list[tuple[str, Relation]]:
+    """Return the charts of the paper's figures: name of the file, and relation."""
     ten = predicted("1dof-10mm")
-    wanted = (
+    figures = (
         ("figure-7a-stroke-d10", ten, "stroke"),
-        ("figure-7b-stroke-d5", one, "stroke"),
-        ("figure-8a-force-1dof", one, "force"),
+        ("figure-7b-stroke-d5", single, "stroke"),
+        ("figure-8a-force-1dof", single, "force"),
         ("figure-8a-force-3dof", three, "force"),
         ("figure-9a-bending", three, "bending"),
         ("figure-9-bend-by-pressure", three, "bend"),
@@ -123,8 +123,8 @@ def charts(one: Prediction, three: Prediction) -> list[tuple[str, Relation]]:
     )
     return [
         (file, relation)
-        for file, found, name in wanted
-        for relation in found.relations
+        for file, prediction, name in figures
+        for relation in prediction.relations
         if relation.name == name
     ]
 
@@ -139,13 +139,13 @@ def reproduce(folder: Path) -> dict[str, list[Row]]:
     """
     from sbafab.reports.charts import relation_svg
 
-    one, three = predicted("1dof-5mm"), predicted("3dof-15mm")
-    found = tables(one, three)
+    single, three = predicted("1dof-5mm"), predicted("3dof-15mm")
+    sections = tables(single, three)
     files = {
-        "reproduction.md": page_of(found, one, three),
-        "reproduction.json": json.dumps(as_json(found), indent=1) + "\n",
+        "reproduction.md": page_of(sections, single, three),
+        "reproduction.json": json.dumps(as_json(sections), indent=1) + "\n",
     }
-    for name, relation in charts(one, three):
+    for name, relation in charts(single, three):
         files[f"{name}.svg"] = relation_svg(name, relation)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -153,17 +153,17 @@ def reproduce(folder: Path) -> dict[str, list[Row]]:
             (folder / file).write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
         raise OutputError(f"{folder} cannot be written: {error.strerror}") from None
-    return found
+    return sections
 
 
-def as_json(found: dict[str, list[Row]]) -> dict[str, Any]:
-    """What ``reproduction.json`` holds."""
+def as_json(sections: dict[str, list[Row]]) -> dict[str, Any]:
+    """Return the contents of ``reproduction.json``."""
     return {
         "schema": REPRODUCTION_SCHEMA,
         "rows": [
             {
                 "section": section,
-                "figure": row.what,
+                "figure": row.figure,
                 "unit": row.measured.unit,
                 "where": row.measured.where,
                 "paper": row.measured.value if row.measured.unit else None,
@@ -172,7 +172,7 @@ def as_json(found: dict[str, list[Row]]) -> dict[str, Any]:
                 "model": row.model,
                 "why": row.why,
             }
-            for section, rows in found.items()
+            for section, rows in sections.items()
             for row in rows
         ],
     }

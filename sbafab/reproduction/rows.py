@@ -27,7 +27,7 @@ NONE = "none"
 class Row(NamedTuple):
     """A figure of the paper; ``predicted`` None where no model knows it."""
 
-    what: str
+    figure: str
     measured: paper.Measured
     predicted: float | None
     model: str
@@ -45,7 +45,7 @@ def table(title: str, rows: Sequence[Row]) -> Iterator[str]:
     for row in rows:
         measured = str(row.measured) if row.measured.unit else ""
         yield (
-            f"| {row.what} | {measured} | {row.measured.where} | {_predicted(row)} | "
+            f"| {row.figure} | {measured} | {row.measured.where} | {_predicted(row)} | "
             f"{_residual(row)} | {row.model} | {row.why} |"
         )
     yield ""
@@ -67,7 +67,7 @@ def _residual(row: Row) -> str:
 def predicted(
     template: str, factors: Factors | None = None, pressures: tuple[float, ...] = (10.0, 100.0)
 ) -> Prediction:
-    """What is predicted of a template."""
+    """Return the prediction of a template."""
     return predict(load_design(template), Asked(pressures, calibration=factors or Factors()))
 
 
@@ -222,7 +222,7 @@ def press_factor(three: Prediction) -> float:
 
 
 def simulators() -> Iterator[Row]:
-    for what, value, unit, why in (
+    for figure, value, unit, why in (
         (
             "Abaqus: over-predicts beyond",
             0.95,
@@ -233,7 +233,7 @@ def simulators() -> Iterator[Row]:
         ("SOFA: largest error after a shift of 0.075 mm", 4.9, "%", "likewise"),
         ("SOFA: speed", 10, "Hz", "depends on machine and mesh; docs/sofa.md"),
     ):
-        yield Row(what, exact(value, unit, "Sec. 4.2, 3.2"), None, NONE, why)
+        yield Row(figure, exact(value, unit, "Sec. 4.2, 3.2"), None, NONE, why)
 
 
 # Rows of energy, force, time, bending and stiffness.
@@ -258,7 +258,7 @@ LENGTHS = (50.0, 100.0, 150.0)
 
 
 def energy() -> Iterator[Row]:
-    found = predicted("1dof-10mm", pressures=(1.0, 10.0))
+    prediction = predicted("1dof-10mm", pressures=(1.0, 10.0))
     reasons = {
         1: "low: {least:.3g} ul a balloon at the least would take it, and the model holds "
         "{held:.3g}, so that the figure can be; but here most of the air goes in far below 1 kPa, "
@@ -268,13 +268,13 @@ def energy() -> Iterator[Row]:
     }
     for pressure, measured in ((1, 0.531), (10, 45.3)):
         least = 1000 * measured / pressure / ENERGY_BALLOONS
-        held = found.value(f"volume a balloon at {pressure} kPa")
+        volume = prediction.value(f"volume a balloon at {pressure} kPa")
         yield Row(
             f"energy in at {pressure} kPa, {ENERGY_BALLOONS} balloons, d = 10",
             exact(measured, "mJ", "Sec. 4.1"),
-            found.value(f"pneumatic input work at {pressure} kPa, free"),
+            prediction.value(f"pneumatic input work at {pressure} kPa, free"),
             "elastic balloon, integral of p dV",
-            reasons[pressure].format(least=least, held=held),
+            reasons[pressure].format(least=least, held=volume),
         )
     for pressure, lost in ((1, 0.055), (10, 4.2)):
         yield Row(
@@ -325,15 +325,15 @@ FORCE_WHY = {
 }
 
 
-def forces(one: Prediction, three: Prediction) -> Iterator[Row]:
-    for name, found, measured in (
-        ("1-DoF", one, paper.FORCE_1DOF),
+def forces(single: Prediction, three: Prediction) -> Iterator[Row]:
+    for name, prediction, measured in (
+        ("1-DoF", single, paper.FORCE_1DOF),
         ("3-DoF", three, paper.FORCE_3DOF),
     ):
         for model in ("virtual work on Eq. 4", "virtual work on Eqs. 1-3", STACK):
             whys = FORCE_WHY[name, model]
             for at, value, why in zip(heights(), measured, whys, strict=True):
-                yield Row(f"{name}, 100 kPa, {at}", value, force(found, at, model), model, why)
+                yield Row(f"{name}, 100 kPa, {at}", value, force(prediction, at, model), model, why)
     bent_whys = {
         30: "near, with two chambers pressed against a plate square to the tip, which sticks",
         60: "high: the paper does not say which chambers push, nor how the sensor holds the tip",
@@ -342,16 +342,16 @@ def forces(one: Prediction, three: Prediction) -> Iterator[Row]:
     for angle, value in paper.FORCE_BENT:
         chambers = "one chamber" if angle == 90 else "2 chambers"
         name = f"force at 100 kPa in {chambers}, bent by {angle} deg"
-        what = f"3-DoF, 100 kPa, bent by {angle} deg"
-        yield Row(what, value, three.value(name), f"{STACK}, {chambers}", bent_whys[angle])
+        figure = f"3-DoF, 100 kPa, bent by {angle} deg"
+        yield Row(figure, value, three.value(name), f"{STACK}, {chambers}", bent_whys[angle])
 
 
 def heights() -> list[str]:
     return ["flat", *(f"at {100 * share:g} % of full stroke" for share in paper.HEIGHTS[1:])]
 
 
-def force(found: Prediction, at: str, model: str) -> float:
-    return found.value(f"blocked force at 100 kPa, {at}", model)
+def force(prediction: Prediction, at: str, model: str) -> float:
+    return prediction.value(f"blocked force at 100 kPa, {at}", model)
 
 
 def motion(three: Prediction) -> Iterator[Row]:
@@ -370,15 +370,16 @@ def _times(three: Prediction, whole: Stack) -> Iterator[Row]:
         f"the chambers films take in half as much again; {AVERAGED}",
     )
     for length in LENGTHS:
-        time, found = filled(whole, paper.WATER_FLOW, paper.FULL_KPA, length)
-        held = found.pressures[0]
+        time, poses = filled(whole, paper.WATER_FLOW, paper.FULL_KPA, length)
+        pressure = poses.pressures[0]
         yield Row(
             "time to 10 kPa, water, 35 ml/min",
             paper.WATER_TIME,
             time,
             f"{STACK} in time, {length:g} mm of tube to each of three chambers",
             f"not a test, for the paper gives no length, and 150 mm is near the one that makes it "
-            f"come out: of the 10 kPa that the pump's sensor shows the chambers have {held:.2g}; "
+            "come out: of the 10 kPa that the pump's sensor shows the chambers have "
+            f"{pressure:.2g}; "
             f"{AVERAGED}",
         )
     full = whole.pose((paper.FULL_KPA,) * whole.chambers).height
@@ -442,8 +443,8 @@ def _bends(three: Prediction, whole: Stack) -> Iterator[Row]:
         (2, "high: {}, nor which chambers"),
     ):
         pose = whole.pose((full,) * count + (0.0,) * (3 - count))
-        what = "one chamber" if count == 1 else "2 chambers"
-        model = f"{STACK}, {full:g} kPa in {what}"
+        chambers = "one chamber" if count == 1 else "2 chambers"
+        model = f"{STACK}, {full:g} kPa in {chambers}"
         yield Row("largest bend", paper.LARGEST_BEND, pose.bend, model, why.format(WORKSPACE))
     empty = whole.pose((0.0, 0.0, 0.0)).volumes[0]
     for time, angle in paper.BENDING:
@@ -460,14 +461,14 @@ def _bends(three: Prediction, whole: Stack) -> Iterator[Row]:
         )
 
 
-def stiffness(one: Prediction, three: Prediction) -> Iterator[Row]:
-    for name, found, value in (
-        ("1-DoF", one, paper.MODULUS_1DOF),
+def stiffness(single: Prediction, three: Prediction) -> Iterator[Row]:
+    for name, prediction, value in (
+        ("1-DoF", single, paper.MODULUS_1DOF),
         ("3-DoF", three, paper.MODULUS_3DOF),
     ):
-        tip = found.value("lateral tip stiffness at 10 kPa, chambers shut")
-        height = found.value("free height at 10 kPa")
-        second = found.value("second moment of area of the plate")
+        tip = prediction.value("lateral tip stiffness at 10 kPa, chambers shut")
+        height = prediction.value("free height at 10 kPa")
+        second = prediction.value("second moment of area of the plate")
         yield Row(
             f"cantilever modulus, {name}",
             value,
@@ -508,23 +509,23 @@ CALIBRATED_WHY = {
 
 
 def calibrated() -> Iterator[Row]:
-    """The elastic models with what the 1-DoF's force when flat makes of the pockets."""
-    found = {}
+    """Yield rows of the elastic models, pocket loss fitted to the 1-DoF's force when flat."""
+    predictions = {}
     for name, template, measured in (
         ("1-DoF", "1dof-5mm", paper.FORCE_1DOF),
         ("3-DoF", "3dof-15mm", paper.FORCE_3DOF),
     ):
-        found[name] = predicted(template, FITTED)
+        predictions[name] = predicted(template, FITTED)
         for at, value, why in zip(heights(), measured, CALIBRATED_WHY[name], strict=True):
             role = "fitted" if (name, at) == ("1-DoF", "flat") else HELD_OUT
             yield Row(
                 f"{name}, 100 kPa, {at} ({role})",
                 value,
-                _named(found[name], f"blocked force at 100 kPa, {at}"),
+                _named(predictions[name], f"blocked force at 100 kPa, {at}"),
                 CALIBRATED,
                 why,
             )
-    yield from _calibrated_bent(found["3-DoF"])
+    yield from _calibrated_bent(predictions["3-DoF"])
     yield from _calibrated_motion(stack(load_design("3dof-15mm"), factors=FITTED))
 
 
@@ -532,7 +533,7 @@ HELD_OUT = "held out"
 CALIBRATED = f"{STACK}, calibrated"
 
 
-def _calibrated_bent(found: Prediction) -> Iterator[Row]:
+def _calibrated_bent(prediction: Prediction) -> Iterator[Row]:
     chambers = "2 chambers"
     whys = {
         30: "low: the paper does not say which chambers push, nor how the sensor holds the tip; "
@@ -545,20 +546,20 @@ def _calibrated_bent(found: Prediction) -> Iterator[Row]:
         yield Row(
             f"3-DoF, 100 kPa, bent by {angle} deg ({HELD_OUT})",
             value,
-            _named(found, f"force at 100 kPa in {chambers}, bent by {angle} deg"),
+            _named(prediction, f"force at 100 kPa in {chambers}, bent by {angle} deg"),
             f"{CALIBRATED}, {chambers}",
             whys[angle],
         )
 
 
 def aim(measured: paper.Measured) -> float:
-    """How near a held-out figure was to come, in its unit."""
+    """Return the aimed-at deviation of a held-out figure, in its unit."""
     within = {"N": 0.1 * measured.value, "mm": 0.05 * measured.value, "deg": 6.0, "s": 0.08}
     return within[measured.unit]
 
 
 def _calibrated_motion(three: Stack) -> Iterator[Row]:
-    """What 10 kPa in the chambers do, tubes left out: the paper speaks of the SBA's internal
+    """Yield rows at 10 kPa in the chambers, tubes left out: the paper speaks of the SBA's internal
     pressure.
     """
     full = paper.FULL_KPA
@@ -602,15 +603,15 @@ def _calibrated_motion(three: Stack) -> Iterator[Row]:
 
 def fuller() -> Iterator[Row]:
     """Strokes of Fig. 7a, which the paper gives as Eq. 4 and the largest error up to a volume."""
-    for given, of in ((Factors(), "elastic balloon"), (FITTED, "elastic balloon, calibrated")):
+    for factors, of in ((Factors(), "elastic balloon"), (FITTED, "elastic balloon, calibrated")):
         why = (
             "Eq. 4 with the largest error that the paper gives up to this volume"
-            if given == Factors()
+            if factors == Factors()
             else "high: the calibration makes this worse than the pocket as drawn; the film's "
             "pocket loss is fitted to a force of d = 5"
         )
         design = load_design("1dof-10mm")
-        (balloon,) = set(balloons_of(design, build(design), given))
+        (balloon,) = set(balloons_of(design, build(design), factors))
         shapes = risen(balloon, np.geomspace(0.01, 20.0, 60))
         for fluid, volume, error in paper.VALID:
             expected = float(printed.stroke(volume, paper.VALID_RADIUS))
@@ -623,29 +624,29 @@ def fuller() -> Iterator[Row]:
             )
 
 
-def _named(found: Prediction, name: str) -> float:
+def _named(prediction: Prediction, name: str) -> float:
     (value,) = [
         figure.value
-        for figure in found.figures
+        for figure in prediction.figures
         if figure.name == name and figure.model.name.startswith(STACK)
     ]
     return value
 
 
-def factors(one: Prediction, three: Prediction) -> Iterator[str]:
+def factors(single: Prediction, three: Prediction) -> Iterator[str]:
     """Lines of the table of factors."""
     flat = three.value("deflated height")
     yield (
         f"| press factor | 3-DoF deflated: {paper.FLAT_HEIGHT.value:g} over {flat:g} | "
         f"{paper.FLAT_HEIGHT.value / flat:.3f} |"
     )
-    for name, found, measured in (
-        ("1-DoF", one, paper.FORCE_1DOF),
+    for name, prediction, measured in (
+        ("1-DoF", single, paper.FORCE_1DOF),
         ("3-DoF", three, paper.FORCE_3DOF),
     ):
         for model in ("virtual work on Eq. 4", "virtual work on Eqs. 1-3", STACK):
             shares = [
-                value.value / force(found, at, model)
+                value.value / force(prediction, at, model)
                 for at, value in zip(heights(), measured, strict=True)
             ]
             shown = ", ".join(f"{share:.2f}" for share in np.array(shares))

@@ -1,4 +1,4 @@
-"""What is recorded of an actuator that was built: what came out, by whom, and what was measured."""
+"""Records of built actuators: test results, operator, measurements, promises of the design."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from sbafab.models.figures import Asked, Prediction
 from sbafab.models.formulas import burst_pressure
 from sbafab.models.paper import BURST
 from sbafab.models.prediction import predict
-from sbafab.output.checked import GENERATOR, limits
+from sbafab.output.checked import limits
+from sbafab.version import GENERATOR
 
 PASS, FAIL = "pass", "fail"
 LONGEST = {"serial": 64, "operator": 80, "kit": 120, "note": 400}
@@ -28,7 +29,7 @@ _UNWRITABLE = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 
 
 class Measurand(NamedTuple):
-    """A number that is measured: its unit, the most that can be meant, and the option's name."""
+    """A measured number: its unit, the largest plausible value, and the option's name."""
 
     name: str
     unit: str
@@ -59,7 +60,7 @@ COLUMNS = (*TEXTS[:3], "leak", *(q.name for q in (*NUMBERS, *ERRORS)), "note")
 
 @dataclass(frozen=True)
 class LabResult:
-    """What one record says of the actuator ``serial``; what it does not say is empty.
+    """A record of the actuator ``serial``; a field that it does not state is empty.
 
     ``leak`` is "pass", "fail" or "". ``operator`` built it. Units stand in the names of NUMBERS
     and ERRORS; errors are sizes without sign.
@@ -76,26 +77,26 @@ class LabResult:
 
     @property
     def is_empty(self) -> bool:
-        """Whether it says nothing that came out."""
+        """True if no result is stated."""
         return not (self.leak or self.note or self.numbers or self.errors)
 
     @property
     def once(self) -> dict[str, str | float]:
-        """What only one record of an actuator may say."""
+        """The values that only one record of an actuator may state."""
         texts = {"leak": self.leak, "operator": self.operator, "kit": self.kit}
         return {**{name: text for name, text in texts.items() if text}, **self.numbers}
 
-    def changed(self, other: LabResult) -> LabResult:
-        """The same with all that ``other`` says in its place."""
+    def changed(self, change: LabResult) -> LabResult:
+        """Return the result with all that ``change`` states in its place."""
         texts = {
-            name: getattr(other, name) for name in (*TEXTS, "leak") if getattr(other, name) != ""
+            name: getattr(change, name) for name in (*TEXTS, "leak") if getattr(change, name) != ""
         }
         return replace(
             self,
             **texts,
-            numbers={**self.numbers, **other.numbers},
-            errors={**self.errors, **other.errors},
-            withdrawn=other.withdrawn,
+            numbers={**self.numbers, **change.numbers},
+            errors={**self.errors, **change.errors},
+            withdrawn=change.withdrawn,
         )
 
 
@@ -115,7 +116,7 @@ class Record(LabResult):
     def as_dict(self) -> dict[str, Any]:
         """The record for JSON; units stand in the keys."""
         plain = {f.name: getattr(self, f.name) for f in fields(self)}
-        return {**plain, "errors": {name: list(found) for name, found in self.errors.items()}}
+        return {**plain, "errors": {name: list(sizes) for name, sizes in self.errors.items()}}
 
 
 @dataclass(frozen=True)
@@ -217,18 +218,15 @@ def promised(design: Design) -> Build:
 
 
 def promised_assembly(assembled: Assembled) -> Build:
-    """The same of a whole assembly: it holds where every part holds. Raises DesignError.
-
-    No figure of a whole is predicted. Of the tolerances of its designs each is the widest.
-    """
+    """Return the promises of an assembly: it holds where every part holds. Raises DesignError."""
     from sbafab.rules.registration_yield import simulate
 
     good, builds = 1.0, 0
-    for made in assembled.designs:
-        share = simulate(made.laminate, limits(made.design)).whole
-        good *= (share.good / share.builds) ** len(made.parts)
+    for part in assembled.designs:
+        share = simulate(part.laminate, limits(part.design)).whole
+        good *= (share.good / share.builds) ** len(part.parts)
         builds = max(builds, share.builds)
-    designs = [made.design for made in assembled.designs]
+    designs = [part.design for part in assembled.designs]
     return Build(
         sha256=assembly_sha256(assembled),
         generator=GENERATOR,
@@ -252,16 +250,16 @@ def kit_name(design: Design) -> str:
 
 
 def _predicted(prediction: Prediction, burst: float | None) -> dict[str, tuple[float, str]]:
-    """What is predicted of each quantity, and by which model; the paper's burst pressure, scaled
+    """Return the prediction of each quantity and its model; the paper's burst pressure, scaled
     to the design's pockets.
     """
-    found = {}
+    figures = {}
     if burst is not None:
-        said = f"the paper's balloons of 5 mm ({BURST.where}), film stress in proportion"
-        found["burst_kpa"] = (burst, said)
+        rows = f"the paper's balloons of 5 mm ({BURST.where}), film stress in proportion"
+        figures["burst_kpa"] = (burst, rows)
     for quantity, (name, model) in FIGURES.items():
         for figure in prediction.figures:
             if figure.name == name and figure.model.title.startswith(model):
-                found[quantity] = (figure.value, figure.model.title)
+                figures[quantity] = (figure.value, figure.model.title)
                 break
-    return found
+    return figures

@@ -107,7 +107,7 @@ class Lab:
         self.path, self.patience, self.clock = path, patience, clock
 
     def knows(self, sha256: str, generator: str) -> bool:
-        """Whether this design is stored as this version predicts it."""
+        """True if this design is stored with the predictions of this version."""
         if not self.path.exists():
             return False
         with self._reading() as (rows, _):
@@ -143,11 +143,11 @@ class Lab:
             return added
 
     def correct(self, number: int, change: LabResult) -> Record:
-        """Stores a record that says what ``number`` says but for what ``change`` says."""
+        """Store a record that repeats ``number`` but for what ``change`` states."""
         if not self.path.exists():
             raise OutputError(f"{self.path} does not exist, so there is no record to correct")
         with self._writing() as rows:
-            old = _one(rows, number)
+            old = _record_numbered(rows, number)
             if old is None:
                 raise DesignError(
                     f"{self.path} holds no record {number}; see: sbafab record --find"
@@ -183,9 +183,9 @@ class Lab:
         live: Sequence[Record],
     ) -> Record:
         if not result.withdrawn:
-            for other in live:
-                if other.id != corrects and other.attempt == attempt:
-                    _refuse_contradiction(result, other)
+            for live_record in live:
+                if live_record.id != corrects and live_record.attempt == attempt:
+                    _refuse_contradiction(result, live_record)
         values = (
             *(None, self.clock().strftime("%Y-%m-%dT%H:%M:%SZ"), sha256, corrects),
             int(result.withdrawn),
@@ -199,14 +199,14 @@ class Lab:
             f"INSERT INTO result ({', '.join(_RESULT)}) VALUES ({marks})", values
         ).lastrowid
         assert added is not None
-        stored = _one(rows, added)
+        stored = _record_numbered(rows, added)
         assert stored is not None
         return stored
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
         """One transaction, in a file that is made where there is none."""
-        with self._told(), closing(self._open()) as rows:
+        with self._sqlite_errors(), closing(self._open()) as rows:
             rows.execute("BEGIN IMMEDIATE")
             try:
                 _bring_up_to_date(rows, self._version(rows))
@@ -224,7 +224,7 @@ class Lab:
                 f"{self.path} is no file of records; record something first, or name the lab's "
                 "file with --lab"
             )
-        with self._told(), closing(self._open("?mode=ro")) as rows:
+        with self._sqlite_errors(), closing(self._open("?mode=ro")) as rows:
             rows.execute("BEGIN")
             version = self._version(rows)
             if version == 0:
@@ -266,8 +266,8 @@ class Lab:
         return int(version)
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
-        """Turns what SQLite says into one sentence."""
+    def _sqlite_errors(self) -> Iterator[None]:
+        """Turn SQLite's errors into one sentence."""
         try:
             yield
         except sqlite3.Error as error:
@@ -297,7 +297,7 @@ def _shape(rows: sqlite3.Connection) -> set[tuple[object, ...]]:
 
 @cache
 def _shape_of(version: int) -> set[tuple[object, ...]]:
-    """What a new file of a version holds."""
+    """Return the tables, indices and triggers of a new file of a version."""
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as rows:
         _make(rows)
         if version > 1:
@@ -341,25 +341,25 @@ def _make(rows: sqlite3.Connection) -> None:
     """Makes the tables of version 1."""
     for statement in _SCHEMA.split(";"):
         rows.execute(statement)
-    for name, what in _TRIGGERS.items():
-        rows.execute(_KEPT.format(name=name, what=what))
+    for name, event in _TRIGGERS.items():
+        rows.execute(_KEPT.format(name=name, what=event))
     rows.execute(f"PRAGMA application_id = {APPLICATION}")
     rows.execute("PRAGMA user_version = 1")
 
 
 def _is_known(rows: sqlite3.Connection, sha256: str, generator: str) -> bool:
-    asked = "SELECT 1 FROM design WHERE sha256 = ? AND generator = ?"
-    return rows.execute(asked, (sha256, generator)).fetchone() is not None
+    query = "SELECT 1 FROM design WHERE sha256 = ? AND generator = ?"
+    return rows.execute(query, (sha256, generator)).fetchone() is not None
 
 
 def _put_build(rows: sqlite3.Connection, build: Build) -> None:
     plain = [getattr(build, name) for name in _BUILD[:6]]
-    told = [
+    tables = [
         json.dumps(value, sort_keys=True)
         for value in (dict(build.predicted), dict(build.tolerances), list(build.good_builds))
     ]
     marks = ", ".join("?" * len(_BUILD))
-    values = [*plain, *told, build.actuator_sha256]
+    values = [*plain, *tables, build.actuator_sha256]
     rows.execute(f"INSERT INTO design ({', '.join(_BUILD)}) VALUES ({marks})", values)
 
 
@@ -367,10 +367,10 @@ def _builds(
     rows: sqlite3.Connection, version: int = VERSION, sha256: Sequence[str] = ()
 ) -> list[Build]:
     """The designs, or those of the hashes, in the order in which they were recorded."""
-    asked = f"SELECT {', '.join(_columns(_BUILD, version))} FROM design"
+    query = f"SELECT {', '.join(_columns(_BUILD, version))} FROM design"
     if sha256:
-        asked += f" WHERE sha256 IN ({', '.join('?' * len(sha256))})"
-    return [_build(row) for row in rows.execute(f"{asked} ORDER BY rowid", sha256)]
+        query += f" WHERE sha256 IN ({', '.join('?' * len(sha256))})"
+    return [_build(row) for row in rows.execute(f"{query} ORDER BY rowid", sha256)]
 
 
 def _live(rows: sqlite3.Connection, sha256: str, serial: str) -> list[Record]:
@@ -401,7 +401,7 @@ def _build(row: Sequence[str]) -> Build:
     return replace(build, actuator_sha256=actuator_of(build))
 
 
-def _one(rows: sqlite3.Connection, number: int) -> Record | None:
+def _record_numbered(rows: sqlite3.Connection, number: int) -> Record | None:
     row = rows.execute(f"{_select()} WHERE id = ?", (number,)).fetchone()
     return None if row is None else _record(row)
 
@@ -431,17 +431,17 @@ def _record(row: Sequence[object]) -> Record:
     return record
 
 
-def _refuse_contradiction(result: LabResult, other: Record) -> None:
+def _refuse_contradiction(result: LabResult, stored: Record) -> None:
     for name, value in result.once.items():
-        if name in other.once and other.once[name] != value:
+        if name in stored.once and stored.once[name] != value:
             raise DesignError(
-                f"serial {result.serial} has {name} = {other.once[name]} in record {other.id}; "
-                f"where that is wrong, add: sbafab record --correct {other.id}; where it was "
+                f"serial {result.serial} has {name} = {stored.once[name]} in record {stored.id}; "
+                f"where that is wrong, add: sbafab record --correct {stored.id}; where it was "
                 "mended and tested again, record that with --again"
             )
-        if name in other.once and name not in ("operator", "kit"):
+        if name in stored.once and name not in ("operator", "kit"):
             raise DesignError(
-                f"serial {result.serial} has {name} = {value} in record {other.id} already; leave "
+                f"serial {result.serial} has {name} = {value} in record {stored.id} already; leave "
                 "it out, or choose another serial"
             )
 

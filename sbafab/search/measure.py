@@ -18,7 +18,7 @@ from sbafab.design.records import Design
 from sbafab.errors import SbafabError
 from sbafab.models.figures import Asked, Figure
 from sbafab.models.prediction import predict
-from sbafab.output.checked import Checked, check, refuse_undoable
+from sbafab.output.checked import check, refuse_undoable
 from sbafab.rules.deck import AT_MOST
 from sbafab.rules.finding import Finding, Place, Verdict
 
@@ -56,21 +56,20 @@ def _base(tables: str, folder: str) -> Design:
 
 
 def _measure(design: Design, pressures: Sequence[float], row: SweepRow) -> None:
-    laminate, findings = check(design)
-    found = margins(findings)
+    checked = check(design)
+    found = margins(checked.findings)
     row["rules"] = {
         name: [one.verdict, one.margin, one.measured, one.limit, one.unit]
         for name, one in found.items()
     }
-    prediction = predict(design, Asked(tuple(pressures)), laminate)
+    prediction = predict(design, Asked(tuple(pressures)), checked.laminate)
     row["figures"] = named_figures(prediction.figures)
-    one = Checked(design, laminate, findings)
-    if one.failed:
+    if checked.failed:
         failed = [rule for rule in found.values() if rule.verdict == "fail"]
         row["outcome"] = "fails"
         row["reason"] = " | ".join(f"{rule.rule}: {rule.message}" for rule in failed)
         return
-    refuse_undoable([one])
+    refuse_undoable([checked])
     row["outcome"] = "passes"
 
 

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from sbafab.design.files import design_sha256
 from sbafab.design.records import Design
 from sbafab.models.paper import counterpart_of_column
-from sbafab.output.checked import GENERATOR
 from sbafab.reports.charts import PLAIN, STYLE
 from sbafab.search.table import Table
 from sbafab.search.vary import Varied
+from sbafab.version import GENERATOR
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

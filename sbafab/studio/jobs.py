@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
     from sbafab.design.records import Design
     from sbafab.laminate.laminate import Laminate
-    from sbafab.output.run import Run
+    from sbafab.runs.run import Run
 
 StudioJob = dict[str, Any]
 Answer = dict[str, Any]

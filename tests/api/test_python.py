@@ -12,8 +12,8 @@ import shapely
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.output.run import Run
 from sbafab.rules.finding import Finding, Place
+from sbafab.runs.run import Run
 
 SMALL = {"stack.balloons": 2, "rules": {"yield_builds": 100}}
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.as_built.check import check_folder, read_folder
+from sbafab.as_built.check import read_folder
 from sbafab.as_built.expected import drawn_settings
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.lightburn import Project, read_project
@@ -19,9 +19,9 @@ from sbafab.cutting.second_cut import PATH, laser_path, properties_of, severed, 
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.geometry.region import strip
-from sbafab.output.job import generate_job
-from sbafab.output.run import generate
 from sbafab.rules import bridges
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
 KERF = 0.12
@@ -39,7 +39,7 @@ def design(*changes: str) -> Design:
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     kerf = (f"laser.kerf_tpe={KERF}", f"laser.kerf_ptfe={KERF}")
     return generate(
-        design(*kerf), tmp_path_factory.mktemp("panel"), ("cut", "press", "preview")
+        RunRequest(design(*kerf), tmp_path_factory.mktemp("panel"), ("cut", "press", "preview"))
     ).folder
 
 
@@ -171,9 +171,12 @@ def test_a_folder_without_second_cut_fails(whole: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("refused", "said"),
     [
-        (lambda out: generate(design(), out, curves=Curves("chords")), "are not drawn in chords"),
         (
-            lambda out: generate_job([design(), design("name=other")], "job", out),
+            lambda out: generate(RunRequest(design(), out, curves=Curves("chords"))),
+            "are not drawn in chords",
+        ),
+        (
+            lambda out: generate(RunRequest([design(), design("name=other")], out, name="job")),
             "made in registered sheets",
         ),
     ],

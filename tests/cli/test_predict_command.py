@@ -10,7 +10,7 @@ import pytest
 
 import sbafab
 from sbafab.cli import main
-from sbafab.output.run import generate
+from sbafab.runs.run import RunRequest, generate
 from tests.site.formats import hold
 
 OVAL = str(Path(__file__).parents[2] / "docs" / "gallery" / "oval.toml")
@@ -94,7 +94,7 @@ def test_twice_the_same_bytes_and_a_later_run_keeps_them(
         for f in (tmp_path / "a" / "1dof-5mm", tmp_path / "b" / "1dof-5mm")
     )
     assert a == b
-    kept = generate(sbafab.load("1dof-5mm"), tmp_path / "a", ("press",))
+    kept = generate(RunRequest(sbafab.load("1dof-5mm"), tmp_path / "a", ("press",)))
     assert {"predict.json", "predict/force.svg", "press.json"} <= set(kept.manifest["files"])
     code, out, err = run(
         ["1dof-5mm", "-o", str(tmp_path / "a"), "--set", "stack.balloons=3"], capsys

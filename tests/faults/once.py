@@ -11,10 +11,10 @@ from typing import Any
 from unittest.mock import patch
 
 from sbafab.as_built import check as as_built
-from sbafab.as_built import derived
 from sbafab.design.files import design_sha256
 from sbafab.output.checked import Checked
-from sbafab.output.manifest_records import Manifest
+from sbafab.output.manifest import Manifest
+from sbafab.runs import check_folder as derived
 
 
 def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:

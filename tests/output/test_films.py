@@ -11,14 +11,14 @@ import math
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.as_built.check import check_folder
 from sbafab.design.kits import kit_of, write_kit
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.output.checked import press_settings
-from sbafab.output.run import Run, generate
 from sbafab.pressing.schedule import schedule
 from sbafab.rules.deck import has_failed
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import Run, RunRequest, generate
 from sbafab.simulators.calculix.deck import deck_settings
 from sbafab.simulators.coarse.rounds import why_not_round
 from sbafab.simulators.coarse.shell import actuator
@@ -64,7 +64,9 @@ def design(tmp_path_factory: pytest.TempPathFactory) -> Design:
 
 @pytest.fixture(scope="module")
 def run(design: Design, tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return generate(design, tmp_path_factory.mktemp("films"), ("cut", "press", "preview"))
+    return generate(
+        RunRequest(design, tmp_path_factory.mktemp("films"), ("cut", "press", "preview"))
+    )
 
 
 def test_every_film_has_its_files_sheets_and_rows(run: Run) -> None:

@@ -9,10 +9,10 @@ import jsonschema
 import pytest
 
 import sbafab
-from sbafab.cli import main
+from sbafab.cli import formats, main
+from sbafab.cli.formats import schema_of
 from sbafab.cli.schema import FORMATS
-from sbafab.output.run import prediction_json
-from sbafab.output.schemas import SCHEMAS, schema_of
+from sbafab.output.artefacts import prediction_json
 from tests.site.formats import hold
 
 ONE = "stack.balloons=1"
@@ -24,16 +24,16 @@ def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     return capsys.readouterr().out
 
 
-@pytest.mark.parametrize("name", SCHEMAS)
+@pytest.mark.parametrize("name", formats.FORMATS)
 def test_a_schema_is_one_and_has_an_id(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     schema = json.loads(run(["schema", name], capsys))
     assert schema == schema_of(name)
     jsonschema.Draft202012Validator.check_schema(schema)
-    assert schema["$id"] == f"urn:{SCHEMAS[name][0].replace('/', ':')}"
+    assert schema["$id"] == f"urn:{formats.FORMATS[name].identity.replace('/', ':')}"
 
 
 def test_the_command_offers_every_schema() -> None:
-    assert tuple(SCHEMAS) == FORMATS
+    assert tuple(formats.FORMATS) == FORMATS
 
 
 def test_files_of_a_folder_are_of_their_schemas(tmp_path: Path) -> None:

@@ -1,32 +1,40 @@
-"""What JSON schemas are put together from."""
+"""The formats of files and of what commands print with ``--json``: a JSON schema and an id each.
+
+What a document holds of a record as it is comes from the record's own types (``of``); the rest is
+written here.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, get_args
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, get_args, get_type_hints
 
+from pydantic import TypeAdapter
+
+from sbafab import actuators
+from sbafab.assemblies.records import Assembly
+from sbafab.cutting.calibration import Value
 from sbafab.errors import ERROR_SCHEMA
+from sbafab.models.figures import Asked, Factors, LeftOut, Points, VerdictLine
+from sbafab.output import schema_ids as ids
 from sbafab.output.checked import CHECKS_SCHEMA
-from sbafab.output.run import PREDICTION_SCHEMA as PREDICT_SCHEMA
-from sbafab.output.schema_ids import (
-    ASSEMBLY_PREDICT_SCHEMA,
-    EXPLAIN_SCHEMA,
-    EXPLAINED_SCHEMA,
-    KERF_SCHEMA,
-    MAP_SCHEMA,
-    NESTED_SCHEMA,
-    RECORDS_SCHEMA,
-    REPORT_SCHEMA,
-    REPRODUCTION_SCHEMA,
-    RUN_SCHEMA,
-    SIMULATE_SCHEMA,
-    SWEEP_SCHEMA,
-    TEMPLATES_SCHEMA,
-)
+from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
+from sbafab.pressing.schedule import Schedule
 from sbafab.pressing.tables import PRESS_SCHEMA
-from sbafab.rules.finding import Verdict
+from sbafab.reports.assembly_prediction import (
+    AssemblyFigure,
+    AssemblyPrediction,
+    BentTouch,
+    Touch,
+)
+from sbafab.results.records import Record
+from sbafab.results.report import Comparison, MeasuredYield, Most, Success, Tolerance
+from sbafab.rules.explained import Explanation
+from sbafab.rules.finding import Finding, Place, Verdict
+from sbafab.search.find import Binding, RangeEnd, Spare
 
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
 TEXT = {"type": "string"}
 COUNT = {"type": "integer", "minimum": 0}
 
@@ -40,8 +48,18 @@ def table(**properties: Any) -> dict[str, Any]:
     return {"type": "object", "required": list(properties), "properties": properties}
 
 
+def of(record: type, *left_out: str, **changed: Any) -> dict[str, Any]:
+    """Return an object with the fields of a record but those left out, each of its own type."""
+    own = {
+        name: TypeAdapter(hint).json_schema()
+        for name, hint in get_type_hints(record, include_extras=True).items()
+        if name not in (*left_out, *changed)
+    }
+    return table(**own, **changed)
+
+
 def and_perhaps(body: dict[str, Any], **properties: Any) -> dict[str, Any]:
-    """The same with keys that may be missing: what a command prints beside what is in the file."""
+    """Add keys that may be missing, as those which a command prints beside what is in the file."""
     return {**body, "properties": {**body["properties"], **properties}}
 
 
@@ -50,28 +68,18 @@ def array(item: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def finding() -> dict[str, Any]:
-    """What a rule found."""
-    where = table(
+    """Return the schema of a finding."""
+    where = of(
+        Place,
         interface={"type": ["integer", "null"], "description": "counted from 1, bottom to top"},
         layers=array(COUNT),
         x={**number("null"), "description": "mm"},
         y={**number("null"), "description": "mm"},
     )
-    return table(
-        rule=TEXT,
-        verdict={"enum": list(get_args(Verdict))},
-        limit=number("null"),
-        measured=number("null"),
-        unit=TEXT,
-        where=where,
-        message=TEXT,
-    )
+    return of(Finding, "by_user", "remedy", where=where)
 
 
-# The ids of what commands print with ``--json``, and of what ``map`` writes (as in models).
-
-
-# JSON schemas of what commands print with ``--json`` of runs and records.
+# Runs, records, measurements.
 
 
 YES = {"type": "boolean"}
@@ -81,7 +89,7 @@ SHARE = {"passed": COUNT, "tested": COUNT, "share": number(), "low": number(), "
 
 def _run() -> dict[str, Any]:
     return table(
-        schema={"const": RUN_SCHEMA},
+        schema={"const": ids.RUN_SCHEMA},
         folder=TEXT,
         failed=YES,
         findings=array(finding()),
@@ -93,7 +101,11 @@ def _run() -> dict[str, Any]:
 def _nested() -> dict[str, Any]:
     one = table(name=TEXT, failed=YES, findings=array(finding()), notes=array(TEXT))
     return table(
-        schema={"const": NESTED_SCHEMA}, folder=TEXT, failed=YES, designs=array(one), files=PATHS
+        schema={"const": ids.NESTED_SCHEMA},
+        folder=TEXT,
+        failed=YES,
+        designs=array(one),
+        files=PATHS,
     )
 
 
@@ -103,52 +115,23 @@ def _records() -> dict[str, Any]:
         "additionalProperties": number(),
         "description": "units stand in the keys",
     }
-    errors = {"type": "object", "additionalProperties": array(number())}
-    texts = dict.fromkeys(("serial", "leak", "operator", "kit", "note"), TEXT)
-    one = table(
-        **texts,
+    record = of(
+        Record,
         numbers=numbers,
-        errors=errors,
-        withdrawn=YES,
-        id=COUNT,
         recorded={**TEXT, "description": "UTC"},
-        design_sha256=TEXT,
-        corrects={"type": ["integer", "null"]},
-        attempt=COUNT,
-        actuator_sha256={**TEXT, "description": "the same for all designs that build this"},
+        actuator_sha256={**TEXT, "description": "equal for all designs that build this"},
         design=TEXT,
         corrected_by={"type": ["integer", "null"]},
     )
-    return table(schema={"const": RECORDS_SCHEMA}, records=array(one))
+    return table(schema={"const": ids.RECORDS_SCHEMA}, records=array(record))
 
 
 def _report() -> dict[str, Any]:
-    measured = table(
-        design=TEXT,
-        quantity=TEXT,
-        unit=TEXT,
-        count=COUNT,
-        mean=number(),
-        low=number("null"),
-        high=number("null"),
-        predicted=number("null"),
-        model=TEXT,
-        ratio=number("null"),
-        verdict=TEXT,
-    )
-    tolerance = table(
-        kit=TEXT,
-        operator=TEXT,
-        quantity=TEXT,
-        unit=TEXT,
-        key=TEXT,
-        stated=number(),
-        found=table(errors=COUNT, largest=number(), highest=number()),
-        verdict=TEXT,
-    )
-    by_errors = table(
-        low=number(),
-        high=number(),
+    verdict = {"verdict": TEXT}
+    measured = of(Comparison, ratio=number("null"), **verdict)
+    tolerance = of(Tolerance, found=of(Most), **verdict)
+    by_errors = of(
+        MeasuredYield,
         tolerances={
             "type": "object",
             "additionalProperties": array(number()),
@@ -163,10 +146,10 @@ def _report() -> dict[str, Any]:
         verdict=TEXT,
     )
     return table(
-        schema={"const": REPORT_SCHEMA},
+        schema={"const": ids.REPORT_SCHEMA},
         records=COUNT,
         actuators=COUNT,
-        success=array(table(by=TEXT, name=TEXT, **SHARE, passed_later=COUNT)),
+        success=array(of(Success, "share", **SHARE)),
         measured=array(measured),
         tolerances=array(tolerance),
         promises=array(promise),
@@ -177,7 +160,7 @@ def _report() -> dict[str, Any]:
 def _sweep() -> dict[str, Any]:
     counts = {"type": "object", "additionalProperties": COUNT}
     return table(
-        schema={"const": SWEEP_SCHEMA},
+        schema={"const": ids.SWEEP_SCHEMA},
         folder=TEXT,
         designs=COUNT,
         measured_now=COUNT,
@@ -188,7 +171,7 @@ def _sweep() -> dict[str, Any]:
 
 
 def _kerf() -> dict[str, Any]:
-    value = table(value=number(), uncertainty=number(), half_width=number())
+    value = of(Value)
     maybe = {**value, "type": ["object", "null"]}
     offsets = {
         "type": "object",
@@ -198,7 +181,7 @@ def _kerf() -> dict[str, Any]:
     estimate = table(kerf=value, scale=maybe, scaled=YES, offsets=offsets, count=COUNT)
     of_axis = {**estimate, "type": ["object", "null"]}
     return table(
-        schema={"const": KERF_SCHEMA},
+        schema={"const": ids.KERF_SCHEMA},
         all={**estimate, "description": "kerf in mm, scale as a ratio, with 95 % half widths"},
         x=of_axis,
         y=of_axis,
@@ -210,17 +193,13 @@ def _kerf() -> dict[str, Any]:
     )
 
 
-def _explanation() -> dict[str, Any]:
-    return {"holds": TEXT, "why": TEXT, "mend": TEXT, "keys": array(TEXT)}
-
-
 def _explain() -> dict[str, Any]:
-    return table(schema={"const": EXPLAIN_SCHEMA}, rule=TEXT, **_explanation())
+    return of(Explanation, schema={"const": ids.EXPLAIN_SCHEMA}, rule=TEXT)
 
 
 def _explained() -> dict[str, Any]:
-    rules = {"type": "object", "additionalProperties": table(**_explanation())}
-    return table(schema={"const": EXPLAINED_SCHEMA}, rules=rules)
+    rules = {"type": "object", "additionalProperties": of(Explanation)}
+    return table(schema={"const": ids.EXPLAINED_SCHEMA}, rules=rules)
 
 
 def _templates() -> dict[str, Any]:
@@ -233,7 +212,7 @@ def _simulate() -> dict[str, Any]:
     tip = table(time=number(), place=place, tilt=number())
     state = {"type": "object", "description": "pressures, stroke, tip, tilt, volumes, stress, work"}
     body = table(
-        schema={"const": SIMULATE_SCHEMA},
+        schema={"const": ids.SIMULATE_SCHEMA},
         units={"type": "object", "additionalProperties": TEXT},
         stopped={"type": ["string", "null"], "description": "why it ended early, if it did"},
     )
@@ -256,31 +235,14 @@ def _assembly_predict() -> dict[str, Any]:
         "description": "what the paper measured of one actuator, where the model is off by more "
         "than a quarter of it",
     }
-    figure = table(
-        part=TEXT,
-        name=TEXT,
-        value=number(),
-        unit=TEXT,
-        model=TEXT,
-        paper=TEXT,
-        measured=measured,
-    )
-    touch = {"part": TEXT, "other": TEXT, "volume": {**number(), "description": "mm3"}}
-    bent = table(
-        **touch,
-        chambers=TEXT,
-        from_kpa=number(),
-        bend={**number(), "description": "degrees"},
-    )
-    return table(
-        schema={"const": ASSEMBLY_PREDICT_SCHEMA},
-        name=TEXT,
-        pressure_kpa=number(),
-        load_g=number(),
-        figures=array(figure),
-        touches=array(table(**touch)),
-        left_out=array(TEXT),
-        bent_touches=array(bent),
+    volume = {**number(), "description": "mm3"}
+    bend = {**number(), "description": "degrees"}
+    return of(
+        AssemblyPrediction,
+        schema={"const": ids.ASSEMBLY_PREDICT_SCHEMA},
+        figures=array(of(AssemblyFigure, measured=measured)),
+        touches=array(of(Touch, volume=volume)),
+        bent_touches=array(of(BentTouch, volume=volume, bend=bend)),
     )
 
 
@@ -297,7 +259,7 @@ def _balloon_map() -> dict[str, Any]:
         potential=grid,
     )
     return table(
-        schema={"const": MAP_SCHEMA},
+        schema={"const": ids.MAP_SCHEMA},
         design=TEXT,
         units={"type": "object", "additionalProperties": TEXT},
         levels={**array(COUNT), "description": "which of the balloons stands there, from 1"},
@@ -319,105 +281,17 @@ def _reproduction() -> dict[str, Any]:
         model=TEXT,
         why=TEXT,
     )
-    found = table(schema={"const": REPRODUCTION_SCHEMA}, rows=array(row))
+    found = table(schema={"const": ids.REPRODUCTION_SCHEMA}, rows=array(row))
     return and_perhaps(found, folder=TEXT)
 
 
-BODIES = {
-    "run": _run,
-    "nested": _nested,
-    "records": _records,
-    "report": _report,
-    "sweep": _sweep,
-    "simulate": _simulate,
-    "assembly-predict": _assembly_predict,
-    "reproduction": _reproduction,
-    "balloon-map": _balloon_map,
-    "kerf": _kerf,
-    "explain": _explain,
-    "explained": _explained,
-    "templates": _templates,
-}
-
-
-# JSON schemas of what the program reads and writes, each with a stable id.
-
-
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
-DESIGN_SCHEMA = "sbafab/design@1"
-FIND_SCHEMA = "sbafab/find@1"
-
-SCHEMAS: Mapping[str, tuple[str, str]] = {
-    "design": (DESIGN_SCHEMA, "design and assembly files (TOML)"),
-    "checks": (CHECKS_SCHEMA, "`checks.json`, and what `check --json` prints"),
-    "manifest": (SCHEMA, "`manifest.json` of a design's folder"),
-    "job": (JOB_SCHEMA, "`manifest.json` of several designs cut together by `nest`"),
-    "assembly": (ASSEMBLY_SCHEMA, "`manifest.json` of an assembly's folder"),
-    "press": (PRESS_SCHEMA, "`press.json`, the heat-press schedule"),
-    "predict": (PREDICT_SCHEMA, "`predict.json`, and what `predict --json` prints of a design"),
-    "find": (FIND_SCHEMA, "what `find --json` prints"),
-    "run": (RUN_SCHEMA, "what `generate`, `cut`, `press` and `mesh` print with `--json`"),
-    "nested": (NESTED_SCHEMA, "what `nest --json` prints"),
-    "records": (RECORDS_SCHEMA, "what `record --json` prints of records"),
-    "report": (REPORT_SCHEMA, "what `record --report --json` prints"),
-    "sweep": (SWEEP_SCHEMA, "what `sweep --json` prints"),
-    "simulate": (
-        SIMULATE_SCHEMA,
-        "`result.json` of a simulator's folder, and what `simulate --json` prints",
-    ),
-    "assembly-predict": (
-        ASSEMBLY_PREDICT_SCHEMA,
-        "what `predict --json` prints of an assembly",
-    ),
-    "reproduction": (
-        REPRODUCTION_SCHEMA,
-        "`reproduction.json`, and what `reproduce --json` prints",
-    ),
-    "balloon-map": (MAP_SCHEMA, "what `map --to FILE.json` writes"),
-    "kerf": (KERF_SCHEMA, "what `kerf --json` prints"),
-    "explain": (EXPLAIN_SCHEMA, "what `explain RULE --json` prints"),
-    "explained": (EXPLAINED_SCHEMA, "what `explain --json` prints of all rules"),
-    "templates": (TEMPLATES_SCHEMA, "what `templates --json` prints: a list, without id"),
-    "error": (ERROR_SCHEMA, "what any command prints with `--json` when it ends in an error"),
-}
-"""Formats by name: the id that stands in the files, and what it describes."""
-
-
-def schema_of(name: str) -> dict[str, Any]:
-    """The JSON schema of a format in ``SCHEMAS``."""
-    identity = SCHEMAS[name][0]
-    head = {"$schema": DIALECT, "$id": f"urn:{identity.replace('/', ':')}"}
-    body = _BODIES.get(name) or BODIES[name]
-    return {**head, **body()}
-
-
 def _design() -> dict[str, Any]:
-    from sbafab.actuators import schema
-    from sbafab.assemblies.records import Assembly
-
-    return {key: value for key, value in schema(Assembly).items() if key != "$schema"}
+    schema = actuators.schema(Assembly)
+    return {key: value for key, value in schema.items() if key != "$schema"}
 
 
-def _manifest() -> dict[str, Any]:
-    from sbafab.output.manifest_records import Manifest
-
-    return Manifest.model_json_schema(by_alias=True)
-
-
-def _job() -> dict[str, Any]:
-    from sbafab.output.manifest_records import JobManifest
-
-    return _of_batch(JobManifest.model_json_schema(by_alias=True), JOB_SCHEMA)
-
-
-def _assembly() -> dict[str, Any]:
-    from sbafab.output.manifest_records import AssemblyManifest
-
-    return _of_batch(AssemblyManifest.model_json_schema(by_alias=True), ASSEMBLY_SCHEMA)
-
-
-def _of_batch(body: dict[str, Any], identity: str) -> dict[str, Any]:
-    """The schema of a record that two formats share, for the one with this id."""
+def _manifest(record: type[Manifest | JobManifest], identity: str) -> dict[str, Any]:
+    body = record.model_json_schema(by_alias=True)
     body["properties"]["schema"] = {"const": identity}
     return body
 
@@ -460,10 +334,6 @@ def _error() -> dict[str, Any]:
 
 
 def _press() -> dict[str, Any]:
-    from pydantic import TypeAdapter
-
-    from sbafab.pressing.schedule import Schedule
-
     body = TypeAdapter(Schedule).json_schema(mode="serialization")
     body["properties"] = {"schema": {"const": PRESS_SCHEMA}, **body["properties"]}
     body["properties"]["batch"] = _batch()
@@ -502,15 +372,9 @@ def _batch() -> dict[str, Any]:
 
 
 def _predict() -> dict[str, Any]:
-    asked = table(
-        pressures_kpa=array(number()),
-        flow_ml_min=number(),
-        volumes_ul=array(number()),
-        press_factor=number(),
-        contact_factor=number(),
-        pocket_loss={**number(), "description": "mm"},
-        modulus_mpa=number("null"),
-    )
+    loss = {**number(), "description": "mm"}
+    factors = of(Factors, pocket_loss=loss)["properties"]
+    asked = of(Asked, "calibration", **factors)
     design_with = {
         "type": "boolean",
         "description": "false where another model gives the same quantity, and that one is to "
@@ -538,26 +402,25 @@ def _predict() -> dict[str, Any]:
         measured=measured,
         between=between,
     )
-    curve = {"label": TEXT, "x": array(number()), "y": array(number())}
     relation = table(
         name=TEXT,
         title=TEXT,
         x={**TEXT, "description": "label of the axis, with its unit"},
         y={**TEXT, "description": "label of the axis, with its unit"},
-        lines=array(table(**curve, model=TEXT, trust=TEXT)),
-        measured=array(table(**curve, error=array(number()))),
+        lines=array(of(Points, "error", model=TEXT, trust=TEXT)),
+        measured=array(of(Points)),
         plot={**TEXT, "description": "its file in the folder"},
     )
     found = table(
-        schema={"const": PREDICT_SCHEMA},
+        schema={"const": ids.PREDICTION_SCHEMA},
         name=TEXT,
         family=TEXT,
         design_sha256=TEXT,
         generator=TEXT,
         asked=asked,
-        verdict=array(table(quantity=TEXT, figure=TEXT, note=TEXT)),
+        verdict=array(of(VerdictLine)),
         figures=array(figure),
-        left_out=array(table(name=TEXT, reason=TEXT)),
+        left_out=array(of(LeftOut)),
         relations=array(relation),
     )
     return and_perhaps(found, failed=array(TEXT), folder=TEXT)
@@ -582,7 +445,7 @@ def _find() -> dict[str, Any]:
         figures={**figures, "description": "quantities in mm, deg, N, g or a share"},
     )
     return table(
-        schema={"const": FIND_SCHEMA},
+        schema={"const": ids.FIND_SCHEMA},
         holds={"type": "boolean"},
         file={"type": ["string", "null"], "description": "the design file, null where none holds"},
         started_from=TEXT,
@@ -597,22 +460,87 @@ def _find() -> dict[str, Any]:
             "additionalProperties": _counterpart(),
         },
         missed=array(TEXT),
-        binds=array(table(key=TEXT, value={}, breaks=TEXT)),
-        range_ends=array(table(key=TEXT, value={}, low=number(), high=number())),
-        without_room=array(table(rule=TEXT, measured=number(), unit=TEXT, place=TEXT)),
+        binds=array(of(Binding)),
+        range_ends=array(of(RangeEnd, "step")),
+        without_room=array(of(Spare)),
         front=array(shown),
         on_front=COUNT,
     )
 
 
-_BODIES = {
-    "design": _design,
-    "checks": _checks,
-    "manifest": _manifest,
-    "job": _job,
-    "assembly": _assembly,
-    "press": _press,
-    "predict": _predict,
-    "find": _find,
-    "error": _error,
+# All formats.
+
+
+class Format(NamedTuple):
+    """A format: the id that stands in the files, what it describes, and what makes its schema."""
+
+    identity: str
+    about: str
+    body: Callable[[], dict[str, Any]]
+
+
+FORMATS: Mapping[str, Format] = {
+    "design": Format(ids.DESIGN_SCHEMA, "design and assembly files (TOML)", _design),
+    "checks": Format(CHECKS_SCHEMA, "`checks.json`, and what `check --json` prints", _checks),
+    "manifest": Format(
+        SCHEMA, "`manifest.json` of a design's folder", lambda: _manifest(Manifest, SCHEMA)
+    ),
+    "job": Format(
+        JOB_SCHEMA,
+        "`manifest.json` of several designs cut together by `nest`",
+        lambda: _manifest(JobManifest, JOB_SCHEMA),
+    ),
+    "assembly": Format(
+        ASSEMBLY_SCHEMA,
+        "`manifest.json` of an assembly's folder",
+        lambda: _manifest(AssemblyManifest, ASSEMBLY_SCHEMA),
+    ),
+    "press": Format(PRESS_SCHEMA, "`press.json`, the heat-press schedule", _press),
+    "predict": Format(
+        ids.PREDICTION_SCHEMA,
+        "`predict.json`, and what `predict --json` prints of a design",
+        _predict,
+    ),
+    "find": Format(ids.FIND_SCHEMA, "what `find --json` prints", _find),
+    "run": Format(
+        ids.RUN_SCHEMA, "what `generate`, `cut`, `press` and `mesh` print with `--json`", _run
+    ),
+    "nested": Format(ids.NESTED_SCHEMA, "what `nest --json` prints", _nested),
+    "records": Format(ids.RECORDS_SCHEMA, "what `record --json` prints of records", _records),
+    "report": Format(ids.REPORT_SCHEMA, "what `record --report --json` prints", _report),
+    "sweep": Format(ids.SWEEP_SCHEMA, "what `sweep --json` prints", _sweep),
+    "simulate": Format(
+        ids.SIMULATE_SCHEMA,
+        "`result.json` of a simulator's folder, and what `simulate --json` prints",
+        _simulate,
+    ),
+    "assembly-predict": Format(
+        ids.ASSEMBLY_PREDICT_SCHEMA,
+        "what `predict --json` prints of an assembly",
+        _assembly_predict,
+    ),
+    "reproduction": Format(
+        ids.REPRODUCTION_SCHEMA,
+        "`reproduction.json`, and what `reproduce --json` prints",
+        _reproduction,
+    ),
+    "balloon-map": Format(ids.MAP_SCHEMA, "what `map --to FILE.json` writes", _balloon_map),
+    "kerf": Format(ids.KERF_SCHEMA, "what `kerf --json` prints", _kerf),
+    "explain": Format(ids.EXPLAIN_SCHEMA, "what `explain RULE --json` prints", _explain),
+    "explained": Format(
+        ids.EXPLAINED_SCHEMA, "what `explain --json` prints of all rules", _explained
+    ),
+    "templates": Format(
+        ids.TEMPLATES_SCHEMA, "what `templates --json` prints: a list, without id", _templates
+    ),
+    "error": Format(
+        ERROR_SCHEMA, "what any command prints with `--json` when it ends in an error", _error
+    ),
 }
+
+
+def schema_of(name: str) -> dict[str, Any]:
+    """Return the JSON schema of a format in ``FORMATS``."""
+    form = FORMATS[name]
+    head = {"$schema": DIALECT, "$id": f"urn:{form.identity.replace('/', ':')}"}
+    return {**head, **form.body()}

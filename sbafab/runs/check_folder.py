@@ -1,4 +1,4 @@
-"""What lies in a folder beside its layers, made again from its design and compared with it.
+"""An output folder read back, made again from its design and compared.
 
 The design is that of the folder's ``design.toml``, whose layers the cut files have been held
 against; the places of the parts on their film sheets are those of the folder's ``nest.json``.
@@ -22,12 +22,15 @@ from zipfile import BadZipFile, ZipFile
 
 from pydantic import BaseModel
 
+from sbafab.as_built.check import FolderReadBack, as_designed, read_back
 from sbafab.as_built.claims import CUT_ENDINGS, could_be_cut
 from sbafab.as_built.cut_files import sound_digest
 from sbafab.as_built.expected import drawn_settings
-from sbafab.as_built.records import DESIGNED, Problem, is_joined
+from sbafab.as_built.records import DESIGNED, Problem, is_job, is_joined
+from sbafab.assemblies.build import assemble
+from sbafab.assemblies.files import load_assembly
+from sbafab.assemblies.writing import DESIGN_FILE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
-from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.lightburn import ENDING
 from sbafab.cutting.properties import FOLDER as LAYERS
 from sbafab.cutting.properties import curves_of
@@ -37,24 +40,32 @@ from sbafab.errors import DesignError, GeometryError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.meshing.surface import Surface, open_edges
 from sbafab.nesting.records import NestPart, parts_of
-from sbafab.output.batch import FINDINGS, TRAVELLER, plan_batch, write_batch, write_contents
+from sbafab.output.artefacts import (
+    ARTEFACTS,
+    FINDINGS,
+    TRAVELLER,
+    DesignFolder,
+    write_artefacts,
+    write_nested_sheets,
+    write_plates,
+)
+from sbafab.output.carry_over import MESH, PREDICTION, PRESS
 from sbafab.output.checked import (
     EVERYTHING,
-    GENERATOR,
+    PICTURES,
     Checked,
-    Planned,
+    DesignPlan,
     RunPart,
-    hole_notes,
-    plan,
+    plan_design,
     schedule_of,
 )
-from sbafab.output.earlier import MESH, PREDICTION, PRESS
-from sbafab.output.manifest import as_json, file_names
-from sbafab.output.manifest_records import JobManifest, Manifest
-from sbafab.output.shop import find_nests, write_nested_sheets, write_panel
-from sbafab.pressing.cycles import design_runs
+from sbafab.output.folder import write_design, write_folder
+from sbafab.output.job import CheckedJob, find_nests, of_assembly, plan_job
+from sbafab.output.manifest import JobManifest, Manifest, as_json, file_names
 from sbafab.process import unheard
+from sbafab.rules.finding import Finding
 from sbafab.simulators.simulator import NAMES as SIMULATORS
+from sbafab.version import GENERATOR
 
 if TYPE_CHECKING:
     import numpy as np
@@ -69,13 +80,38 @@ NOT_COMPARED = ("files", "mesh_statistics", "meshes")
 """Keys of a manifest with hashes, and with meshes of more than one command."""
 
 
-def derived_problems(
-    folder: Path, claims: Manifest, checked: Checked, paths: Mapping[str, Region], of_job: bool
+def check_folder(folder: Path) -> tuple[Finding, ...]:
+    """Everything found in an output folder: file integrity, the manifest's claims, the deck, and
+    whether all that lies in it is what its design makes.
+
+    Of a job's folder, that of every design, and of the film sheets they share. Raises OutputError
+    with one sentence for a folder that holds no sound manifest or no cut files.
+    """
+    read = read_back(folder)
+    return read.against_design(design_problems_of(folder, read))
+
+
+def design_problems_of(folder: Path, read: FolderReadBack) -> list[Problem]:
+    """Layers, and all that lies beside them, that are not what the folder's designs make."""
+    checked = [as_designed(built) for built in read.designs]
+    whole = [design for design in checked if design is not None]
+    if len(whole) < len(checked):
+        return [*read.problems]
+    if read.job is not None:
+        return [*read.problems, *_job_problems(folder, read.job, whole, read.designs[0].claims)]
+    (built,) = read.designs
+    assert built.meant is not None
+    return [*read.problems, *_problems(folder, built.claims, whole[0], built.meant.paths)]
+
+
+def _problems(
+    folder: Path, claims: Manifest, checked: Checked, paths: Mapping[str, Region]
 ) -> list[Problem]:
     """Files of one design that are not what it makes; of a job's design, all but its sheets.
 
     ``paths`` holds the beam's path for every pattern of the design's laminate.
     """
+    of_job = is_job(folder.absolute().parent)
     with _made_anew(folder) as (fresh, problems):
         order = checked.design.order
         parts = parts_of(checked.laminate, paths, order.quantity, order.spare_parts)
@@ -90,25 +126,21 @@ def derived_problems(
     return problems
 
 
-def derived_job_problems(
-    folder: Path, job: JobManifest, checked: Sequence[Checked], curves: str | None
+def _job_problems(
+    folder: Path, job: JobManifest, checked: Sequence[Checked], claims: Manifest
 ) -> list[Problem]:
     """Files of a job, and of its designs' folders, that are not what the designs make.
 
-    ``curves`` is what the manifests of the designs say of their chords.
+    ``claims`` are those of one of the designs, which say how chords were drawn.
     """
+    curves = curves_of(claims.curves)
     with _made_anew(folder) as (fresh, problems):
+        whole = CheckedJob(job.schema_name, job.name, tuple(checked))
         if is_joined(job):
-            # An assembly's run checks what it has written, and so imports this module.
-            from sbafab.output.assembly import checked_again, plan_assembly, write_assembly
-
-            whole = checked_again(folder, checked)
-            batch = plan_assembly(whole, folder, unheard, curves_of(curves))
-            write_assembly(whole, batch, fresh, unheard)
-        else:
-            planned = [plan(one, EVERYTHING, curves_of(curves)) for one in checked]
-            batch = plan_batch(job.schema_name, job.name, planned, folder, unheard)
-            write_batch(batch, fresh, unheard)
+            whole = of_assembly(assemble(load_assembly(folder / DESIGN_FILE)), checked)
+        wanted = PICTURES if is_joined(job) and whole.failed else EVERYTHING
+        designs = [plan_design(design, wanted, curves) for design in checked]
+        write_folder(plan_job(whole, designs, folder, unheard), fresh, unheard)
         problems.extend(_foreign_problems(job, file_names(fresh)))
         problems.extend(_differences(folder, fresh, job.files, job.generator))
     return problems
@@ -157,7 +189,7 @@ def _write_anew(
 
     The ``parts`` go on film sheets of their own; a design of a job has none.
     """
-    design, laminate = checked.design, checked.laminate
+    design = checked.design
     settings = drawn_settings(design, checked.waived, claims.curves)
     wanted = _parts(claims.files)
     # Pictures come with a run that makes everything: then there is a page as well.
@@ -167,12 +199,10 @@ def _write_anew(
     if parts is not None:
         nests = find_nests(parts, design, folder, unheard)
         sheets = write_nested_sheets(nests, design, fresh, settings, unheard)
-    places = design_runs(design, laminate).places
-    write_fixture(laminate, fresh, settings, places, hole_notes(design, laminate))
-    write_panel(laminate, paths, fresh, settings)
+    write_plates(checked, paths, fresh, settings)
     pressing = schedule_of(checked) if "press" in wanted else None
-    planned = Planned(checked, frozenset(wanted), settings, pressing)
-    return write_contents(planned, sheets, fresh, unheard, parts is not None)
+    plan = DesignPlan(checked, frozenset(wanted), settings, pressing)
+    return write_design(DesignFolder(plan, sheets, fresh, unheard, parts is not None))
 
 
 def _parts(files: Collection[str]) -> set[RunPart]:
@@ -274,16 +304,19 @@ def _prediction_problems(
         return []
     from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict
-    from sbafab.output.run import FOLDER, with_prediction
 
     try:
         told = _Predicted.model_validate_json((folder / "predict.json").read_bytes()).asked
         measured = told.pocket_loss, told.modulus_mpa
         factors = Factors(told.press_factor, told.contact_factor, *measured)
         wish = Asked(told.pressures_kpa, told.flow_ml_min, told.volumes_ul, factors)
-        apart = fresh / FOLDER
+        apart = fresh / "prediction"
         apart.mkdir()
-        with_prediction(checked.design, predict(checked.design, wish))(checked.laminate, apart)
+        settings = drawn_settings(checked.design, checked.waived, claims.curves)
+        prediction = predict(checked.design, wish)
+        plan = DesignPlan(checked, frozenset(("predict",)), settings, prediction=prediction)
+        rows = [row for row in ARTEFACTS if row.part == "predict"]
+        write_artefacts(DesignFolder(plan, (), apart, unheard), rows)
     except (ValueError, OSError) as error:
         said = f"predict.json does not say what was asked for ({error})"
         return [_other(said, claims.generator, is_done=False)]
