@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Container, Iterable, Iterator, Sequence
 from functools import cmp_to_key
 from itertools import pairwise
-from typing import Final, NamedTuple, final
+from typing import NamedTuple
 
 from sbafab.errors import InconsistentError
 from sbafab.geometry.edges import (
@@ -26,11 +26,11 @@ from sbafab.geometry.edges import (
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
 
-CELLS: Final = 16
+CELLS = 16
 """Cells of the grid are so many times as wide as points are pooled: most points touch one only."""
 
 
-ASLANT: Final = 0.7548776662466927
+ASLANT = 0.7548776662466927
 """Slope of a line along which points of drawings hardly ever lie side by side."""
 
 
@@ -103,9 +103,9 @@ class PointPool:
 
 _Entry = tuple[float, int, Edge, int]
 """How far the middle of an edge is off its chord, the edge's number, the edge, its turns."""
-DIGIT: Final = 16
+DIGIT = 16
 """Bits: how often the edges of several owners wind stands in one whole number, a digit an owner."""
-ROUNDS: Final = 4
+ROUNDS = 4
 """Most times that edges are cut over again."""
 
 
@@ -348,23 +348,22 @@ def _plainest(entry: _Entry) -> tuple[float, Point, int]:
 # lead to a face they must agree, so what comes out is consistent or it is not returned.
 
 
-NEAR: Final = 0.05
+NEAR = 0.05
 """Radians: edges that leave a point at less than this angle are compared farther on."""
 
 
-@final
 class _Leaving:
     """A piece as it leaves a point: its direction there, its chord, how it bends, where it ends."""
 
     __slots__ = ("bend", "chord", "edge", "end", "half", "heading")
 
     def __init__(self, half: int, edge: Edge, heading: float, chord: float, bend: float) -> None:
-        self.half: Final[int] = half
-        self.edge: Final[Edge] = edge
-        self.heading: Final[float] = heading
-        self.chord: Final[float] = chord
-        self.bend: Final[float] = bend
-        self.end: Final[Point] = edge.start if half & 1 else edge.end
+        self.half = half
+        self.edge = edge
+        self.heading = heading
+        self.chord = chord
+        self.bend = bend
+        self.end = edge.start if half & 1 else edge.end
 
     def to_left(self, p: Point) -> float:
         """How far ``p`` lies to the left of the line or circle the piece is a part of."""

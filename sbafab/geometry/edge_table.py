@@ -6,14 +6,14 @@ import math
 from collections.abc import Iterable, Sequence
 from itertools import chain
 from operator import mul
-from typing import Final, final
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal
 
-ALONGSIDE: Final = 1e-3
+ALONGSIDE = 1e-3
 """Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
 
 Floats = NDArray[np.float64]
@@ -26,7 +26,7 @@ Bools = NDArray[np.bool_]
 
 FEW = 20_000
 """Pairs of boxes up to which all are compared at once."""
-TOGETHER: Final = 64
+TOGETHER = 64
 """Boxes that are compared together with those about them, where there are more."""
 
 
@@ -241,22 +241,17 @@ def crossings(
 # An edge of a boundary, with what a search for places that face each other asks of it.
 
 
-BESIDE: Final = 1e-5
+BESIDE = 1e-5
 """mm that an edge may miss another's normals by, for rounding."""
 
 
-@final
-class Foot:
+class Foot(NamedTuple):
     """A point of an edge, and the unit normal into the material there."""
 
-    __slots__ = ("normal", "point")
-
-    def __init__(self, point: Point, normal: Point) -> None:
-        self.point: Final[Point] = point
-        self.normal: Final[Point] = normal
+    point: Point
+    normal: Point
 
 
-@final
 class BoundarySide:
     """An edge with what the search asks of it again and again.
 
@@ -268,13 +263,13 @@ class BoundarySide:
     def __init__(
         self, edge: Edge, box: Bounds, middle: Point, half_turn: float, half: float
     ) -> None:
-        self.edge: Final[Edge] = edge
-        self.box: Final[Bounds] = box
-        self.middle: Final[Point] = middle
-        self.normal: Final[Point] = left_normal(edge, middle)
-        self.half_turn: Final[float] = half_turn
-        self.half: Final[float] = half
-        self.lean: Final[float] = math.sin(min(half_turn, math.pi / 2))
+        self.edge = edge
+        self.box = box
+        self.middle = middle
+        self.normal = left_normal(edge, middle)
+        self.half_turn = half_turn
+        self.half = half
+        self.lean = math.sin(min(half_turn, math.pi / 2))
 
     def may_hold_feet(self, other: BoundarySide, within: float) -> bool:
         """Whether a normal of this edge may meet the other no farther off than ``within``."""
@@ -316,7 +311,7 @@ class BoundarySide:
 # The sides of a boundary in arrays: which of them may face each other is asked of all at once.
 
 
-ROOM: Final = 1e-9
+ROOM = 1e-9
 """More than the rounding of what is asked once more of each pair."""
 
 

@@ -9,23 +9,22 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import Final, final
 
 Point = tuple[float, float]
 Bounds = tuple[float, float, float, float]
 
-EPSILON: Final = 2e-6
+EPSILON = 2e-6
 """mm: a point nearer to an edge than this, 2 nm, lies on it."""
-SAME: Final = 2 * EPSILON
+SAME = 2 * EPSILON
 """mm: points nearer to each other than this, 4 nm, are one point, and so are all that hang together
 by such steps. Far below the 1 um that the cut files promise.
 """
 
-BENT: Final = EPSILON / 4
+BENT = EPSILON / 4
 """mm: an edge whose points were moved off its line or circle by more may run where none was looked
 for. Two edges bent by less still are within EPSILON of each other where they meet.
 """
-UNKNOWN: Final = 1e9
+UNKNOWN = 1e9
 """Radians: an angle that has not been worked out."""
 
 
@@ -40,15 +39,14 @@ def _along(p: Point, origin: Point, unit: Point) -> float:
     return (p[0] - origin[0]) * unit[0] + (p[1] - origin[1]) * unit[1]
 
 
-@final
 class Line:
     """A straight edge from ``start`` to ``end``."""
 
     __slots__ = ("_length", "end", "start")
 
     def __init__(self, start: Point, end: Point) -> None:
-        self.start: Final[Point] = start
-        self.end: Final[Point] = end
+        self.start: Final = start
+        self.end: Final = end
         self._length = 0.0
 
     def __eq__(self, other: object) -> bool:
@@ -139,7 +137,6 @@ class Line:
         return Line((x0 + nx, y0 + ny), (x1 + nx, y1 + ny))
 
 
-@final
 class Arc:
     """A circular edge round ``centre``, counter-clockwise if ``ccw``; at most half a turn.
 
@@ -149,11 +146,11 @@ class Arc:
     __slots__ = ("_bounds", "_start_angle", "_sweep", "ccw", "centre", "end", "radius", "start")
 
     def __init__(self, start: Point, end: Point, centre: Point, radius: float, ccw: bool) -> None:
-        self.start: Final[Point] = start
-        self.end: Final[Point] = end
-        self.centre: Final[Point] = centre
-        self.radius: Final[float] = radius
-        self.ccw: Final[bool] = ccw
+        self.start: Final = start
+        self.end: Final = end
+        self.centre: Final = centre
+        self.radius: Final = radius
+        self.ccw: Final = ccw
         self._start_angle = UNKNOWN
         self._sweep = UNKNOWN
         self._bounds: Bounds | None = None
@@ -414,32 +411,6 @@ def turns_round(edge: Edge, p: Point) -> int:
     return turns
 
 
-# What is summed up over the edges of a closed chain: area, length, boxes, turns round a point.
-
-
-def enclosed_area(edges: tuple[Edge, ...]) -> float:
-    """Area in mm2 to the left of a closed chain: negative where it runs clockwise."""
-    ox, oy = edges[0].start
-    twice = 0.0
-    bulges = 0.0
-    for edge in edges:
-        x0, y0 = edge.start
-        x1, y1 = edge.end
-        twice += (x0 - ox) * (y1 - oy) - (x1 - ox) * (y0 - oy)
-        bulges += edge.segment_area
-    return twice / 2 + bulges
-
-
-def length_of(edges: tuple[Edge, ...]) -> float:
-    """Length in mm."""
-    return sum([edge.length for edge in edges])
-
-
-def boxes_of(edges: tuple[Edge, ...]) -> tuple[Bounds, ...]:
-    """The bounds of each edge."""
-    return tuple([edge.bounds for edge in edges])
-
-
 def box_round(boxes: Sequence[Bounds]) -> Bounds:
     """The box that holds all of them; of none, one that holds nothing."""
     left = low = math.inf
@@ -452,21 +423,11 @@ def box_round(boxes: Sequence[Bounds]) -> Bounds:
     return left, low, right, high
 
 
-def times_round(edges: tuple[Edge, ...], boxes: tuple[Bounds, ...], p: Point) -> int:
-    """How many times a closed chain runs counter-clockwise round ``p`` (not on an edge)."""
-    y = p[1]
-    turns = 0
-    for edge, box in zip(edges, boxes, strict=True):
-        if box[1] - EPSILON <= y <= box[3] + EPSILON:
-            turns += turns_round(edge, p)
-    return turns
-
-
 # Edges of a closed chain gathered by the line or circle that they lie on.
 
 
 _Run = tuple[Edge, ...]
-DRIFT: Final = 4 * EPSILON
+DRIFT = 4 * EPSILON
 """mm that edges which follow each other along one line or circle may leave it by, together."""
 
 

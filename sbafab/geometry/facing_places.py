@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from sbafab.geometry.width import ASIDE, TOUCH, Gathered, Width, boundary_of, le
 if TYPE_CHECKING:
     from sbafab.geometry.edge_table import Bools, Floats, Indices
 
-STEP: Final = math.radians(15)
+STEP = math.radians(15)
 """Widest step of samples along an arc: 7.5 degrees aside a shift counts 0.99 of its length."""
 
 
@@ -67,7 +67,7 @@ def _places_along(edge: Edge, shares: list[float]) -> list[Point]:
 # All narrow places of a region, in arrays: every sample against every edge at once.
 
 
-NEAR: Final = 10 * TOUCH
+NEAR = 10 * TOUCH
 """mm from its ends within which what meets a segment does not cross it."""
 
 

@@ -10,8 +10,9 @@ from typing import Literal, NamedTuple
 
 from sbafab.errors import GeometryError
 from sbafab.geometry.arcs import biarc, ellipse
-from sbafab.geometry.boolean import FAR, alone, enclosed, meets_itself, wound
+from sbafab.geometry.boolean import FAR, alone, meets_itself
 from sbafab.geometry.cache import cached
+from sbafab.geometry.contour import Contour, circle
 from sbafab.geometry.edges import (
     EPSILON,
     Arc,
@@ -24,7 +25,7 @@ from sbafab.geometry.edges import (
 )
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
-from sbafab.geometry.region import Contour, Region, circle
+from sbafab.geometry.region import Region, enclosed, wound
 from sbafab.geometry.width import least_gap
 
 CUSP = 3.0

@@ -10,27 +10,27 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import combinations
-from typing import Final, NamedTuple, final
+from typing import NamedTuple
 
-from sbafab.geometry.arcs import run_sweep
 from sbafab.geometry.cache import cached, stored
+from sbafab.geometry.contour import Contour, run_sweep
 from sbafab.geometry.edge_table import ALONGSIDE, BoundarySide, Foot, SideTable
 from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, left_normal, left_turn
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, widened
-from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.region import Region
 
-SHORTER: Final = 1e-9
+SHORTER = 1e-9
 """mm by which a segment must be shorter than another to be the narrowest."""
-ROUNDING: Final = 1e-12
+ROUNDING = 1e-12
 """mm: more than what distances are rounded by."""
-TOUCH: Final = 1e-6
+TOUCH = 1e-6
 """mm within which two points are one."""
-ASIDE: Final = math.acos(0.9)
+ASIDE = math.acos(0.9)
 """Radians (25 degrees) that the normals of samples which still face each other may turn aside."""
-SQUARE: Final = 0.05
+SQUARE = 0.05
 """The same for edges square on each other: room for rounding, and for those alongside."""
-MANY_SIDES: Final = 100
+MANY_SIDES = 100
 """From which on looking at all pairs in arrays is worth it."""
 
 
@@ -366,7 +366,6 @@ def _dot(a: Point, b: Point) -> float:
 # The corners of contours, and what a segment that ends at one has to be.
 
 
-@final
 class Corner:
     """A vertex with the directions of travel into and out of it; ``turn`` > 0 is convex.
 
@@ -376,16 +375,16 @@ class Corner:
     __slots__ = ("arriving", "box", "half_turn", "leaving", "normal", "point", "turn")
 
     def __init__(self, point: Point, arriving: Point, leaving: Point, turn: float) -> None:
-        self.point: Final[Point] = point
-        self.arriving: Final[Point] = arriving
-        self.leaving: Final[Point] = leaving
-        self.turn: Final[float] = turn
-        self.half_turn: Final[float] = abs(turn) / 2
-        self.box: Final[Bounds] = (point[0], point[1], point[0], point[1])
+        self.point = point
+        self.arriving = arriving
+        self.leaving = leaving
+        self.turn = turn
+        self.half_turn = abs(turn) / 2
+        self.box = (point[0], point[1], point[0], point[1])
         ux, uy = arriving
         half = turn / 2
         c, s = math.cos(half), math.sin(half)
-        self.normal: Final[Point] = (-ux * s - uy * c, ux * c - uy * s)
+        self.normal = (-ux * s - uy * c, ux * c - uy * s)
 
     def squarely(self, d: Point) -> bool:
         """Whether a reflex corner lies nearest, among its neighbours, to what ``d`` points at."""
@@ -440,12 +439,12 @@ def _left(u: Point) -> Point:
 # two bends, each a corner or its fillet. It is as wide as its flanks are apart where they stop.
 
 
-SMOOTH: Final = 1e-4
+SMOOTH = 1e-4
 """Corners that turn by less, in radians, are none."""
-TAPER: Final = 30.0
+TAPER = 30.0
 """Degrees; flanks at a wider angle are two sides of a corner, not of an arm."""
-LEAST_TURN: Final = math.pi - math.radians(TAPER + 1)
-ROUNDED: Final = 0.1
+LEAST_TURN = math.pi - math.radians(TAPER + 1)
+ROUNDED = 0.1
 """Degrees a corner may miss its angle by: coordinates read from a file are rounded."""
 
 
@@ -455,10 +454,10 @@ class _Run:
     __slots__ = ("first", "last", "radius", "sweep")
 
     def __init__(self, first: Edge, last: Edge, sweep: float) -> None:
-        self.first: Final[Edge] = first
-        self.last: Final[Edge] = last
-        self.sweep: Final[float] = sweep
-        self.radius: Final[float] = first.radius if isinstance(first, Arc) else math.inf
+        self.first = first
+        self.last = last
+        self.sweep = sweep
+        self.radius = first.radius if isinstance(first, Arc) else math.inf
 
     def corner(self, after: _Run) -> float:
         """How far the path turns from this run to the next."""

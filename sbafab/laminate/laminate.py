@@ -12,10 +12,9 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Literal, get_args
 
-from sbafab.geometry.boolean import divided, union
 from sbafab.geometry.cache import cached_attribute
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Region, coord, path_data
+from sbafab.geometry.region import Region, coord, divided, path_data, union
 from sbafab.laminate.films import Film, density_of, in_order, ink
 from sbafab.markup import escape
 from sbafab.notebook import table_html

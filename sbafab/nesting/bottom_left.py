@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbafab.geometry.arcs import ticks
+from sbafab.geometry.contour import ticks
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region, disc

@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from sbafab.errors import SbafabError
-from sbafab.geometry.arcs import run_chords
+from sbafab.geometry.contour import Contour, run_chords
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Contour
 from sbafab.nesting.records import (
     TURNS,
     NestPart,
