@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
+from typing import Final
 
 Point = tuple[float, float]
 Bounds = tuple[float, float, float, float]
