@@ -28,7 +28,7 @@ SAMPLES = 24
 STRAIGHT = 1e-6
 """An arc that bulges less than this, in mm, is written as a line."""
 LEAST_TURN = 1e-7
-"""Radians: what turns less is a line. No offset tells it from one, and its centre is far away."""
+"""Radians: an arc that turns less is written as a line; no offset of it differs from a line's."""
 MOST_ARCS = 2000
 MOST_TRIALS = 40
 """Doublings and halvings of one span: more than these leave nothing of any curve."""
@@ -165,11 +165,11 @@ def biarc(start: Point, u: Point, end: Point, v: Point, straight: float = STRAIG
     )
     if min(math.dist(start, joint), math.dist(joint, end)) ** 2 < square / 100:
         return []
-    turn = _angle(u, (joint[0] - start[0], joint[1] - start[1]))
-    other = _angle((end[0] - joint[0], end[1] - joint[1]), v)
-    if max(abs(turn), abs(other)) > LARGEST_TURN / 2:
+    first_turn = _angle(u, (joint[0] - start[0], joint[1] - start[1]))
+    second_turn = _angle((end[0] - joint[0], end[1] - joint[1]), v)
+    if max(abs(first_turn), abs(second_turn)) > LARGEST_TURN / 2:
         return []
-    return [_edge(start, joint, turn, straight), _edge(joint, end, other, straight)]
+    return [_edge(start, joint, first_turn, straight), _edge(joint, end, second_turn, straight)]
 
 
 def _edge(start: Point, end: Point, turn: float, straight: float) -> Edge:
@@ -194,7 +194,3 @@ def _unit_tangent(curve: Curve, at: float, towards: float) -> Point:
 def _angle(u: Point, v: Point) -> float:
     """Angle that turns u into v, counter-clockwise positive."""
     return math.atan2(u[0] * v[1] - u[1] * v[0], u[0] * v[0] + u[1] * v[1])
-
-
-# Arcs as chords. On one circle they end at the same angles, whichever contour asks: at whole
-# multiples of one step, of which a number makes a quarter turn.

@@ -22,11 +22,11 @@ by such steps. Far below the 1 um that the cut files promise.
 """
 
 BENT = EPSILON / 4
-"""mm: an edge whose points were moved off its line or circle by more may run where none was looked
-for. Two edges bent by less still are within EPSILON of each other where they meet.
+"""mm: an edge whose points were moved off its line or circle by more may cross others where no
+crossing was searched. Two edges bent by less are within EPSILON of each other where they meet.
 """
 UNKNOWN = 1e9
-"""Radians: an angle that has not been worked out."""
+"""Radians: an angle that is not computed yet."""
 
 
 def unit(degrees: float) -> Point:
@@ -116,11 +116,11 @@ class Line:
         return max(math.dist(p, self.start), math.dist(p, self.end))
 
     def farthest_along(self, origin: Point, unit: Point) -> float:
-        """How far the edge reaches from ``origin`` along a unit direction."""
+        """Return the farthest reach of the edge from ``origin`` along a unit direction, mm."""
         return max(_along(self.start, origin, unit), _along(self.end, origin, unit))
 
     def to_left(self, p: Point) -> float:
-        """How far ``p`` lies to the left of the infinite line."""
+        """Return the distance of ``p`` to the left of the infinite line, mm."""
         x, y = self.start
         ux, uy = self.direction(self.start)
         return ux * (p[1] - y) - uy * (p[0] - x)
@@ -141,7 +141,7 @@ class Line:
 class Arc:
     """A circular edge round ``centre``, counter-clockwise if ``ccw``; at most half a turn.
 
-    Rules ask for its sweep and bounds again and again: they are worked out once.
+    Its sweep and bounds are computed once.
     """
 
     __slots__ = ("_bounds", "_start_angle", "_sweep", "ccw", "centre", "end", "radius", "start")
@@ -180,7 +180,7 @@ class Arc:
 
     @property
     def ends_lie_on_circle(self) -> bool:
-        """Whether both ends lie on the circle, to within BENT."""
+        """True if both ends lie on the circle, to within BENT."""
         first = math.dist(self.start, self.centre) - self.radius
         last = math.dist(self.end, self.centre) - self.radius
         return -BENT < first < BENT and -BENT < last < BENT
@@ -228,10 +228,10 @@ class Arc:
 
     @property
     def bounds(self) -> Bounds:
-        found = self._bounds
-        if found is None:
-            found = self._bounds = self._box()
-        return found
+        bounds = self._bounds
+        if bounds is None:
+            bounds = self._bounds = self._box()
+        return bounds
 
     def _box(self) -> Bounds:
         cx, cy = self.centre
@@ -239,14 +239,14 @@ class Arc:
         first, last = (self.start, self.end) if self.ccw else (self.end, self.start)
         x0, y0 = first
         x1, y1 = last
-        left, right = (x0, x1) if x0 < x1 else (x1, x0)
-        low, high = (y0, y1) if y0 < y1 else (y1, y0)
+        low_x, high_x = (x0, x1) if x0 < x1 else (x1, x0)
+        low_y, high_y = (y0, y1) if y0 < y1 else (y1, y0)
         # The ends may lie off the circle by a rounding: they are within the box, too.
         return (
-            cx - r if y0 >= cy >= y1 and cx - r < left else left,
-            cy - r if x0 <= cx <= x1 and cy - r < low else low,
-            cx + r if y0 <= cy <= y1 and cx + r > right else right,
-            cy + r if x0 >= cx >= x1 and cy + r > high else high,
+            cx - r if y0 >= cy >= y1 and cx - r < low_x else low_x,
+            cy - r if x0 <= cx <= x1 and cy - r < low_y else low_y,
+            cx + r if y0 <= cy <= y1 and cx + r > high_x else high_x,
+            cy + r if x0 >= cx >= x1 and cy + r > high_y else high_y,
         )
 
     def reversed(self) -> Arc:
@@ -302,7 +302,7 @@ class Arc:
         return max(math.dist(p, self.start), math.dist(p, self.end))
 
     def farthest_along(self, origin: Point, unit: Point) -> float:
-        """How far the edge reaches from ``origin`` along a unit direction."""
+        """Return the farthest reach of the edge from ``origin`` along a unit direction, mm."""
         cx, cy = self.centre
         r = self.radius
         top = (cx + unit[0] * r, cy + unit[1] * r)
@@ -310,7 +310,7 @@ class Arc:
         return _along(top, origin, unit) if 0.0 <= self.parameter(top) <= 1.0 else ends
 
     def to_left(self, p: Point) -> float:
-        """How far ``p`` lies to the left of the whole circle."""
+        """Return the distance of ``p`` to the left of the whole circle, mm."""
         inside = self.radius - math.dist(p, self.centre)
         return inside if self.ccw else -inside
 
@@ -360,7 +360,7 @@ def quarter_arcs(
 
 
 def from_end_to_end(edge: Edge) -> Edge:
-    """The edge; where an end was taken off an arc's circle by more than BENT, the arc of its sweep
+    """The edge; for an arc with an end off its circle by more than BENT, the arc of its sweep
     through both ends.
     """
     if not isinstance(edge, Arc) or edge.ends_lie_on_circle:
@@ -387,7 +387,7 @@ def distance_to(edge: Edge, p: Point) -> float:
 
 
 def turns_round(edge: Edge, p: Point) -> int:
-    """What an edge adds to the times its contour runs counter-clockwise round ``p``."""
+    """Return the share of an edge in its contour's winding number round ``p``."""
     px, py = p
     x0, y0 = edge.start
     x1, y1 = edge.end
@@ -404,32 +404,32 @@ def turns_round(edge: Edge, p: Point) -> int:
         beside = 0 <= (px - x0) * dx + (py - y0) * dy <= dx * dx + dy * dy
         if beside and (px - cx) * (px - cx) + (py - cy) * (py - cy) < edge.radius * edge.radius:
             # A point exactly on the chord belongs to the side the count above gave it.
-            left = side > 0 or (side == 0 and (y0 > y1 or (y0 == y1 and x1 > x0)))
-            if edge.ccw and not left:
+            is_left = side > 0 or (side == 0 and (y0 > y1 or (y0 == y1 and x1 > x0)))
+            if edge.ccw and not is_left:
                 turns += 1
-            elif not edge.ccw and left:
+            elif not edge.ccw and is_left:
                 turns -= 1
     return turns
 
 
 def box_round(boxes: Sequence[Bounds]) -> Bounds:
-    """The box that holds all of them; of none, one that holds nothing."""
-    left = low = math.inf
-    right = high = -math.inf
+    """Return the box that holds all boxes; of none, one that holds nothing."""
+    low_x = low_y = math.inf
+    high_x = high_y = -math.inf
     for box in boxes:
-        left = min(left, box[0])
-        low = min(low, box[1])
-        right = max(right, box[2])
-        high = max(high, box[3])
-    return left, low, right, high
+        low_x = min(low_x, box[0])
+        low_y = min(low_y, box[1])
+        high_x = max(high_x, box[2])
+        high_y = max(high_y, box[3])
+    return low_x, low_y, high_x, high_y
 
 
-# Edges of a closed chain gathered by the line or circle that they lie on.
+# Runs: edges of a closed chain gathered by the line or circle that they lie on.
 
 
 _Run = tuple[Edge, ...]
 DRIFT = 4 * EPSILON
-"""mm that edges which follow each other along one line or circle may leave it by, together."""
+"""mm by which edges on one line or circle may leave it together."""
 
 
 def runs(edges: _Run) -> Iterator[_Run]:
@@ -443,7 +443,7 @@ def runs(edges: _Run) -> Iterator[_Run]:
 
 
 def same_support(a: Edge, b: Edge) -> bool:
-    """Whether two edges lie on one circle, or are lines of one direction, and turn alike."""
+    """True if two edges lie on one circle, or are lines of one direction, and turn the same way."""
     if isinstance(a, Arc) and isinstance(b, Arc):
         return (
             a.ccw == b.ccw
@@ -458,10 +458,9 @@ def same_support(a: Edge, b: Edge) -> bool:
 
 
 def _parted(run: _Run) -> Iterator[_Run]:
-    """The run, in parts that each keep to one line or circle.
+    """Yield the run in parts that each follow one line or circle.
 
-    Edges may turn by so little from one to the next that each two look straight, and yet round a
-    corner together.
+    Each two neighbours may look straight and the edges yet turn a corner together.
     """
     if len(run) < 3:
         yield run
@@ -487,7 +486,7 @@ def _parted(run: _Run) -> Iterator[_Run]:
 
 
 def _off_circle(edge: Edge, head: Arc) -> float:
-    """How far an arc's circle is another than the first one's."""
+    """Return the difference of an arc's circle from another arc's, mm."""
     if not isinstance(edge, Arc):
         return math.inf
     return max(abs(edge.radius - head.radius), math.dist(edge.centre, head.centre))

@@ -1,4 +1,4 @@
-"""Where two edges meet: crossings, touches, and the ends of a shared stretch."""
+"""Meeting points of two edges: crossings, touches, and the ends of a shared stretch."""
 
 from __future__ import annotations
 
@@ -15,44 +15,46 @@ def meeting_points(
     tolerance: float = EPSILON,
     boxes: tuple[Bounds, Bounds] = (EVERYWHERE, EVERYWHERE),
 ) -> list[Point]:
-    """Points that both edges hold, to within the tolerance.
+    """Return the points that lie on both edges, to within the tolerance.
 
-    Edges that run along each other give the ends of the shared stretch. ``boxes`` hold all that
-    lies within the tolerance of either edge, where such are known: nothing is found outside them.
+    Edges that run along each other give the ends of the shared stretch. ``boxes`` hold all points
+    within the tolerance of each edge, if computed already; no point outside them is returned.
     """
-    one, two = boxes
-    left, low = max(one[0], two[0]), max(one[1], two[1])
-    right, high = min(one[2], two[2]), min(one[3], two[3])
+    near_a, near_b = boxes
+    low_x, low_y = max(near_a[0], near_b[0]), max(near_a[1], near_b[1])
+    high_x, high_y = min(near_a[2], near_b[2]), min(near_a[3], near_b[3])
     a0, a1, b0, b1 = a.start, a.end, b.start, b.end
-    found: list[Point] = []
+    points: list[Point] = []
     if a0 in (b0, b1) or (
-        left <= a0[0] <= right and low <= a0[1] <= high and distance_to(b, a0) < tolerance
+        low_x <= a0[0] <= high_x and low_y <= a0[1] <= high_y and distance_to(b, a0) < tolerance
     ):
-        found.append(a0)
+        points.append(a0)
     if a1 in (b0, b1) or (
-        left <= a1[0] <= right and low <= a1[1] <= high and distance_to(b, a1) < tolerance
+        low_x <= a1[0] <= high_x and low_y <= a1[1] <= high_y and distance_to(b, a1) < tolerance
     ):
-        found.append(a1)
+        points.append(a1)
     for p in (b0, b1):
-        within = left <= p[0] <= right and low <= p[1] <= high
+        within = low_x <= p[0] <= high_x and low_y <= p[1] <= high_y
         if within and p not in (a0, a1) and distance_to(a, p) < tolerance:
-            found.append(p)
-    if found and _holds(found[0], 2 * tolerance, left, low, right, high):
-        return found
+            points.append(p)
+    if points and _holds(points[0], 2 * tolerance, low_x, low_y, high_x, high_y):
+        return points
     for p in _support_crossings(a, b, tolerance):
-        if not (left <= p[0] <= right and low <= p[1] <= high):
+        if not (low_x <= p[0] <= high_x and low_y <= p[1] <= high_y):
             continue
         # A known end wins over a computed point: at a touch the computed one is less exact.
-        if any(math.dist(p, known) <= 2 * tolerance for known in found):
+        if any(math.dist(p, q) <= 2 * tolerance for q in points):
             continue
         if distance_to(a, p) < tolerance and distance_to(b, p) < tolerance:
-            found.append(p)
-    return found
+            points.append(p)
+    return points
 
 
-def _holds(p: Point, reach: float, left: float, low: float, right: float, high: float) -> bool:
-    """Whether a whole box lies within ``reach`` of a point."""
-    return math.hypot(max(right - p[0], p[0] - left), max(high - p[1], p[1] - low)) <= reach
+def _holds(
+    p: Point, reach: float, low_x: float, low_y: float, high_x: float, high_y: float
+) -> bool:
+    """Return True if a whole box lies within ``reach`` of a point."""
+    return math.hypot(max(high_x - p[0], p[0] - low_x), max(high_y - p[1], p[1] - low_y)) <= reach
 
 
 def _support_crossings(a: Edge, b: Edge, tolerance: float) -> list[Point]:
@@ -80,7 +82,7 @@ def _line_line(a: Line, b: Line) -> list[Point]:
 def line_circle(
     origin: Point, unit: Point, centre: Point, radius: float, tolerance: float = EPSILON
 ) -> list[Point]:
-    """Crossings of the infinite line through ``origin`` with a circle; a touch counts once."""
+    """The crossings of the infinite line through ``origin`` with a circle; a touch counts once."""
     ox, oy = origin
     ux, uy = unit
     cx, cy = centre

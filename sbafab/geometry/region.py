@@ -1,6 +1,5 @@
-"""Planar regions bounded by exact lines and arcs.
+"""Planar regions bounded by lines and arcs: booleans, primitive profiles, sections, SVG paths.
 
-A contour keeps the material on its left: outer contours run counter-clockwise, holes clockwise.
 Contours of one region never cross. Everything here is immutable; operators return new regions.
 """
 
@@ -93,29 +92,29 @@ class Region(Exact):
 
     @cached_attribute
     def _several(self) -> tuple[Region, ...]:
-        held: list[list[Contour]] = [[outer] for outer in self.outers]
+        groups: list[list[Contour]] = [[outer] for outer in self.outers]
         places = [hole.edges[0].at(0.5) for hole in self.holes]
         boxes = [*(outer.bounds for outer in self.outers), *((*p, *p) for p in places)]
         near: list[list[int]] = [[] for _ in places]
         for pair in close_pairs(boxes, 0.0):
-            outer, hole = min(pair), max(pair) - len(held)
-            if outer < len(held) and hole >= 0:
+            outer, hole = min(pair), max(pair) - len(groups)
+            if outer < len(groups) and hole >= 0:
                 near[hole].append(outer)
         for contour, place, numbers in zip(self.holes, places, near, strict=True):
-            inside = [
-                held[number]
+            enclosing = [
+                groups[number]
                 for number in sorted(numbers)
-                if held[number][0].winding(place) != 0 and held[number][0].area > -contour.area
+                if groups[number][0].winding(place) != 0 and groups[number][0].area > -contour.area
             ]
-            min(inside, key=lambda group: group[0].area).append(contour)
-        return tuple(Region(tuple(group)) for group in held)
+            min(enclosing, key=lambda group: group[0].area).append(contour)
+        return tuple(Region(tuple(group)) for group in groups)
 
     @cached_attribute
     def key(self) -> str:
         """A name for the shape, from its corners rounded to 1 nm; the same on every machine.
 
-        Equal keys are of equal shapes. Shapes that differ by a hair may round to two keys: ``==``
-        tells whether they are one.
+        Equal keys are of equal shapes. Shapes that differ by a hair may round to two keys; compare
+        with ``==``.
         """
         rings = []
         for contour in self.contours:
@@ -141,7 +140,7 @@ class Region(Exact):
         return hash(tuple([contour.start_hash for contour in self.contours]))
 
     def is_exactly(self, other: object) -> bool:
-        """Whether the other region has the very same contours, in the same order."""
+        """Return True if the other region has exactly the same contours, in the same order."""
         return isinstance(other, Region) and (
             self.contours is other.contours
             or [contour.edges for contour in self.contours]
@@ -149,25 +148,25 @@ class Region(Exact):
         )
 
     def __eq__(self, other: object) -> bool:
-        """Whether the same corners and arcs lie within SAME of each other, wherever they start."""
+        """True if corners and arcs lie within SAME of each other, wherever contours start."""
         if not isinstance(other, Region) or len(self.contours) != len(other.contours):
             return False
         if self is other:
             return True
-        left = list(other.contours)
+        candidates = list(other.contours)
         for contour in self.contours:
-            twin = next((c for c in left if contour.coincides(c)), None)
+            twin = next((c for c in candidates if contour.coincides(c)), None)
             if twin is None:
                 return False
-            left.remove(twin)
+            candidates.remove(twin)
         return True
 
     def contains(self, p: Point) -> bool:
-        """Whether ``p``, not on an edge, lies in the region."""
+        """Return True if ``p``, not on an edge, lies in the region."""
         return sum(contour.winding(p) for contour in self.contours) > 0
 
     def distance_to_edge(self, p: Point) -> float:
-        """Least distance in mm from ``p`` to any edge."""
+        """Return the least distance in mm from ``p`` to any edge."""
         if len(self.edges) >= 2 * MANY:
             return self.index.distance(p)
         x, y = p
@@ -194,22 +193,22 @@ class Region(Exact):
         return difference(self, other)
 
     def mapped(self, point: Similarity, scale: float, mirror: bool) -> Region:
-        """The region under a similarity given by its effect on points."""
-        return Region(tuple([one.mapped(point, scale, mirror) for one in self.contours]))
+        """Return the region under a similarity given by its effect on points."""
+        return Region(tuple([contour.mapped(point, scale, mirror) for contour in self.contours]))
 
     def moved(self, dx: float, dy: float) -> Region:
-        """The region moved by so many mm along x and y."""
+        """Return the region moved by so many mm along x and y."""
         return self.mapped(shift(dx, dy), 1.0, False)
 
     def turned(self, degrees: float, about: Point = (0.0, 0.0)) -> Region:
-        """The region turned counter-clockwise; quarter turns are exact."""
+        """Return the region turned counter-clockwise; quarter turns are exact."""
         return self.mapped(turn(unit(degrees), about), 1.0, False)
 
     def scaled(self, factor: float) -> Region:
         return self.mapped(scale(factor), factor, False)
 
     def mirrored(self) -> Region:
-        """The region flipped over: x becomes -x."""
+        """Return the region mirrored in the y axis."""
         return self.mapped(flip, 1.0, True)
 
     def shapely(self, chord_error: float = 0.001) -> shapely.MultiPolygon:
@@ -318,9 +317,6 @@ def _wound(above: int, arrangement: Arrangement) -> list[Contour]:
     return bounding(arrangement, more_than(above))
 
 
-# The centre of area of a region.
-
-
 def centroid(region: Region) -> Point:
     """Centre of area of a region that is not empty."""
     x, y = region.edges[0].start
@@ -332,9 +328,7 @@ def centroid(region: Region) -> Point:
 
 
 def _moment(edge: Edge, origin: Point) -> Point:
-    """First moment of the triangle from ``origin`` to the edge's chord, and of what lies between
-    chord and arc.
-    """
+    """First moment about ``origin`` of the triangle to the edge's chord and the arc's segment."""
     ox, oy = origin
     (x0, y0), (x1, y1) = edge.start, edge.end
     x0, y0, x1, y1 = x0 - ox, y0 - oy, x1 - ox, y1 - oy
@@ -412,7 +406,7 @@ def stadium(centre: Point, width: float, length: float) -> Region:
     )
 
 
-# Where a straight line runs inside a region.
+# Sections of regions by straight lines.
 
 
 Interval = tuple[float, float]
@@ -453,26 +447,23 @@ def section(region: Region, origin: Point, direction: Point) -> list[Interval]:
 
 
 def _may_meet(box: Bounds, origin: Point, direction: Point) -> bool:
-    """Whether a line comes into a box, or so near that it could touch what is in it."""
+    """Return True if a line comes into a box, or so near that it could touch an edge in it."""
     (ox, oy), (ux, uy) = origin, direction
-    left, low, right, high = box
-    off = ux * ((low + high) / 2 - oy) - uy * ((left + right) / 2 - ox)
-    return abs(off) <= (abs(ux) * (high - low) + abs(uy) * (right - left)) / 2 + NEAR
+    low_x, low_y, high_x, high_y = box
+    off = ux * ((low_y + high_y) / 2 - oy) - uy * ((low_x + high_x) / 2 - ox)
+    return abs(off) <= (abs(ux) * (high_y - low_y) + abs(uy) * (high_x - low_x)) / 2 + NEAR
 
 
-# Contours that are copies of each other: what holds for the shape of one holds for all.
-
-
-# SVG path data of regions: lines as L, arcs as A, nothing flattened.
+# SVG path data: lines as L, arcs as A, nothing flattened.
 
 
 def path_data(region: Region) -> str:
-    """The ``d`` of an SVG path in mm, y up (the caller flips); holes by either fill rule."""
+    """Return the ``d`` of an SVG path in mm, y up (the caller flips); holes by either fill rule."""
     return " ".join(map(_contour_data, region.contours))
 
 
 def coord(value: float) -> str:
-    """A length to the nanometre without trailing zeros."""
+    """Return a length to the nanometre without trailing zeros."""
     text = f"{value:.6f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
