@@ -1,4 +1,4 @@
-"""Assembly files in and out: TOML to records, and one clear sentence if not."""
+"""Assembly files: TOML to records, with one sentence for each error."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from sbafab.actuators import load_design, records
-from sbafab.assemblies.records import FAMILY, KINDS, AnyPart, Assembly, CheckName, Sba
+from sbafab.assemblies.records import KINDS, AnyPart, Assembly, CheckName, Sba
 from sbafab.design.files import (
     ASSEMBLY,
     Change,
@@ -28,10 +28,22 @@ from sbafab.design.records import Design, RuleName
 from sbafab.errors import DesignError
 
 
+def load(
+    source: str | Path, changes: Iterable[Change] = (), waivers: Sequence[str] = ()
+) -> Design | Assembly:
+    """Return a design or an assembly, whichever the file holds. Raises DesignError."""
+    changes = list(changes)
+    path = design_path(source)
+    data = override(read_toml(path), changes)
+    if data.get("family") != ASSEMBLY:
+        return load_design(source, changes, waivers)
+    return changed_assembly(data, path, changes, waivers)
+
+
 def load_text(text: str, path: Path) -> Design | Assembly:
-    """The same from the text of a file that would lie at ``path``. Raises DesignError."""
+    """Return the design or assembly of a text as if read from ``path``. Raises DesignError."""
     data = toml_tables(text, path.name)
-    if data.get("family") == FAMILY:
+    if data.get("family") == ASSEMBLY:
         return assembly_of(data, path)
     data.setdefault("name", path.stem)
     return validated(data, records(), path.parent)
@@ -40,26 +52,27 @@ def load_text(text: str, path: Path) -> Design | Assembly:
 def load_assembly(
     source: str | Path, changes: Iterable[Change] = (), waivers: Sequence[str] = ()
 ) -> Assembly:
-    """An assembly from a template's name or a TOML file. Raises DesignError."""
-    found = load(source, changes, waivers)
-    if isinstance(found, Assembly):
-        return found
+    """Return an assembly from a template's name or a TOML file. Raises DesignError."""
+    result = load(source, changes, waivers)
+    if isinstance(result, Assembly):
+        return result
     raise DesignError(
-        f'{found.name} is no assembly; give a file with family = "{FAMILY}" and [parts.NAME] tables'
+        f'{result.name} is no assembly; give a file with family = "{ASSEMBLY}" and [parts.NAME] '
+        "tables"
     )
 
 
 def changed_assembly(
     data: dict[str, Any], path: Path, changes: Sequence[Change], waivers: Sequence[str]
 ) -> Assembly:
-    """The assembly of a file's tables in which the changes are made. Raises DesignError."""
+    """Return the assembly of a file's tables with the changes made. Raises DesignError."""
     _start_where_the_user_stands(data, changes)
-    known = (*get_args(RuleName), *get_args(CheckName))
-    return assembly_of(add_waivers(data, waivers, known), path)
+    names = (*get_args(RuleName), *get_args(CheckName))
+    return assembly_of(add_waivers(data, waivers, names), path)
 
 
 def assembly_of(data: Mapping[str, Any], path: Path) -> Assembly:
-    """The record of an assembly file's tables. Raises DesignError with one sentence."""
+    """Return the record of an assembly file's tables. Raises DesignError with one sentence."""
     tables = data.get("parts")
     if not isinstance(tables, dict) or not tables:
         raise DesignError(
@@ -86,14 +99,14 @@ def _part(name: str, table: object) -> AnyPart:
 
 
 def part_design(assembly: Assembly, name: str, part: Sba) -> Design:
-    """The design of an SBA part, with the part's and the assembly's own keys set.
+    """Return the design of an SBA part, with the part's and the assembly's own keys set.
 
     Raises DesignError that names the part.
     """
     try:
         path = design_path(_place_of(part.design, assembly.folder))
         table = read_toml(path)
-        if table.get("family") == FAMILY:
+        if table.get("family") == ASSEMBLY:
             raise DesignError(
                 f"design = {shown(part.design)} is an assembly; a part is made from the design of "
                 "one actuator"
@@ -102,40 +115,34 @@ def part_design(assembly: Assembly, name: str, part: Sba) -> Design:
         data.setdefault("name", path.stem)
         _keep_outline(data, part, assembly.folder)
         _keep_kit(data, part, assembly)
-        own = _waivers(data)
-        rules = [r for r in assembly.rules.waive if r in _deck_names() and r not in own]
+        waived = _waivers(data)
+        rules = [r for r in assembly.rules.waive if r in get_args(RuleName) and r not in waived]
         return validated(add_waivers(data, rules), records(), path.parent)
     except DesignError as error:
         raise DesignError(f"parts.{name}: {error}") from None
 
 
 def _place_of(design: str, folder: Path) -> str | Path:
-    """A bare word names a template; what looks like a path starts at the assembly's file."""
+    """The source of a design: a bare word names a template, a path starts at the file's folder."""
     return folder / design if Path(design).name != design or "." in design else design
 
 
 def _waivers(data: Mapping[str, Any]) -> list[Any]:
-    """The rules that a design file's tables waive, as far as they are written as they should."""
+    """Return the rules that a design file's tables waive, if they are a list."""
     rules = data.get("rules")
     waived = rules.get("waive") if isinstance(rules, dict) else None
     return waived if isinstance(waived, list) else []
 
 
-def _deck_names() -> frozenset[str]:
-    from sbafab.rules.deck import RULES
-
-    return frozenset(rule.name for rule in RULES)
-
-
 def _keep_outline(data: dict[str, Any], part: Sba, folder: Path) -> None:
-    """An outline that the assembly's file names lies beside that file, not beside the design."""
+    """Resolve an outline that the assembly's file names against its folder, not the design's."""
     chamber = part.set.get("chamber")
     if isinstance(chamber, dict) and isinstance(chamber.get("outline"), str):
         data["chamber"]["outline"] = str((folder / chamber["outline"]).absolute())
 
 
 def _keep_kit(data: dict[str, Any], part: Sba, assembly: Assembly) -> None:
-    """Likewise a kit's file."""
+    """Resolve a kit's file likewise."""
     kit = data.get("kit")
     is_named_here = assembly.kit is not None or "kit" in part.set
     if is_named_here and isinstance(kit, str) and kit not in kit_names():
@@ -143,30 +150,9 @@ def _keep_kit(data: dict[str, Any], part: Sba, assembly: Assembly) -> None:
 
 
 def _start_where_the_user_stands(data: dict[str, Any], changes: Sequence[Change]) -> None:
-    """A design's path typed on the command line starts there, not at the assembly's file."""
+    """Resolve a design's path on the command line against the current folder."""
     for key in changed_keys(changes):
         match key.split("."):
-            case ["parts", name, "design"] if said := data["parts"][name].get("design"):
-                if isinstance(_place_of(str(said), Path()), Path):
-                    data["parts"][name]["design"] = str(Path(str(said)).absolute())
-
-
-# Assemblies out: resolved TOML and hash.
-
-
-# A design or an assembly from a file, whichever it holds.
-#
-# The records of assemblies are loaded for an assembly alone: most files hold a design.
-
-
-def load(
-    source: str | Path, changes: Iterable[Change] = (), waivers: Sequence[str] = ()
-) -> Design | Assembly:
-    """A design or an assembly, whichever the file holds. Raises DesignError."""
-    changes = list(changes)
-    path = design_path(source)
-    data = override(read_toml(path), changes)
-    if data.get("family") != ASSEMBLY:
-        return load_design(source, changes, waivers)
-
-    return changed_assembly(data, path, changes, waivers)
+            case ["parts", name, "design"] if source := data["parts"][name].get("design"):
+                if isinstance(_place_of(str(source), Path()), Path):
+                    data["parts"][name]["design"] = str(Path(str(source)).absolute())

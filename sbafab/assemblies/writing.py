@@ -1,4 +1,4 @@
-"""Assemblies out: resolved TOML and hash."""
+"""Assemblies out: resolved TOML, hashes, and the entries of parts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ DESIGN_FILE = "design.toml"
 
 
 def plain_tables(assembly: Assembly) -> dict[str, Any]:
-    """The assembly's own keys as tables, with every default written out."""
+    """Return the assembly's own keys as tables, with every default written out."""
     return _without_none(assembly.model_dump(mode="json"))
 
 
@@ -26,10 +26,10 @@ def resolved(assembled: Assembled) -> dict[str, Any]:
     assembly = assembled.assembly
     table = assembly.model_dump(mode="json", exclude={"kit", "sheets", "laser", "press"})
     for name, part in table["parts"].items():
-        made = assembled[name].made
-        if made is not None:
+        source = assembled[name].made
+        if source is not None:
             # The folder's design holds the keys that were set, the assembly's own among them.
-            part["design"] = f"{made.design.name}/{DESIGN_FILE}"
+            part["design"] = f"{source.design.name}/{DESIGN_FILE}"
             del part["set"]
     return _without_none(table)
 
@@ -43,36 +43,36 @@ def _without_none(table: dict[str, Any]) -> dict[str, Any]:
 
 
 def assembly_toml(assembled: Assembled) -> str:
-    """``design.toml`` of an assembly's output folder; it builds the same assembly again."""
+    """Return the ``design.toml`` of an output folder; it builds the same assembly again."""
     import tomli_w
 
     return tomli_w.dumps(resolved(assembled))
 
 
 def assembly_sha256(assembled: Assembled) -> str:
-    """Hash of all that decides the output, the designs of the parts included."""
+    """Return the hash of all inputs of the output, the designs of the parts included."""
     table = resolved(assembled)
-    digests = {made.design.name: design_sha256(made.design) for made in assembled.designs}
+    digests = {source.design.name: design_sha256(source.design) for source in assembled.designs}
     text = json.dumps([table, digests], sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def assembled_sha256(assembled: Assembled) -> str:
-    """Return the hash of what the assembly is: parts, places, glue, and the actuators among them.
+    """Return the hash of the assembly itself: parts, places, glue, and the actuators among them.
 
-    Left out are name, order, pose of the pictures, notes and limits.
+    Without name, order, pose of the pictures, notes and limits.
     """
     parts = {}
     for name, part in resolved(assembled)["parts"].items():
-        made = assembled[name].made
-        actuator = {} if made is None else {"design": actuator_sha256(made.design)}
+        source = assembled[name].made
+        actuator = {} if source is None else {"design": actuator_sha256(source.design)}
         parts[name] = {**part, **actuator, "note": None}
     text = json.dumps(parts, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def part_entry(placed: PlacedPart) -> dict[str, Any]:
-    """A part and its place: turned about its own axis, bent round a radius, then rows and shift."""
+    """A part and its place: turned about its own axis, bent round a radius, rows and shift."""
     part = placed.part
     rounded = [[round(value, 9) + 0.0 for value in row] for row in placed.pose.rows]
     return {

@@ -65,10 +65,8 @@ def _nest(
     seconds: float,
 ) -> Nest:
     _check_fit(material, parts, stock)
-    if engine == "spyrrow":
-        placements = strip(parts, stock, seconds)
-    else:
-        placements = bottom_left(parts, stock)
+    is_strip = engine == "spyrrow"
+    placements = strip(parts, stock, seconds) if is_strip else bottom_left(parts, stock)
     result = Nest(engine, material, stock, parts, placements)
     if result.sheets > stock.most:
         total = sum(part.count for part in parts)

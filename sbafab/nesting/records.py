@@ -184,7 +184,8 @@ def no_usable_area(material: Material, stock: Stock) -> DesignError:
     where = field(material)
     return DesignError(
         f"{where}.border of {stock.border:g} mm leaves no usable area on a sheet of "
-        f"{stock.width:g} x {stock.length:g} mm; it must be below {min(stock.width, stock.length) / 2:g} mm."
+        f"{stock.width:g} x {stock.length:g} mm; it must be below "
+        f"{min(stock.width, stock.length) / 2:g} mm."
     )
 
 
