@@ -26,7 +26,6 @@ from sbafab.geometry.edges import (
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
 from sbafab.geometry.region import Region, enclosed, wound
-from sbafab.geometry.width import least_gap
 
 CUSP = 3.0
 """Radians: a path that turns by more is taken to turn back on itself."""
@@ -331,8 +330,6 @@ SMOOTH = 1e-3
 PROJECTIONS, BEND = 3, 0.01
 """Steps to the point of a track nearest to another; its radius (mm) where its way counts as much.
 """
-SHARP = 15.0
-"""Degrees: notches sharper than this are no slots."""
 
 
 class Lost(NamedTuple):
@@ -387,16 +384,6 @@ def beam_path(region: Region, kerf: Kerf) -> BeamPath:
         tracks = [_track(edge, sources) for edge in contour.edges]
         contours.append(_untangled(_drawn(contour.edges, tracks, (sx, sy))))
     return BeamPath(Region(tuple(contours)), lost)
-
-
-def place_of(region: Region, lost: Lost, kerf: Kerf) -> Point:
-    """Return the place of a lost contour: the slot that closes, or else the contour's middle."""
-    if lost.fate != "vanishes":
-        slot = least_gap(region, SHARP, max(widths(kerf)))
-        if slot is not None:
-            return slot.middle
-    low_x, low_y, high_x, high_y = lost.contour.bounds
-    return (low_x + high_x) / 2, (low_y + high_y) / 2
 
 
 class _Source(NamedTuple):

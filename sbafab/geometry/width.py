@@ -15,9 +15,18 @@ from typing import NamedTuple
 from sbafab.geometry.cache import cached, stored
 from sbafab.geometry.contour import Contour, run_sweep
 from sbafab.geometry.edge_table import ALONGSIDE, BoundarySide, Foot, SideTable
-from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, left_normal, left_turn
+from sbafab.geometry.edges import (
+    Arc,
+    Bounds,
+    Edge,
+    Line,
+    Point,
+    left_normal,
+    left_turn,
+)
 from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, widened
+from sbafab.geometry.offset import Kerf, Lost, widths
 from sbafab.geometry.region import Region
 
 SHORTER = 1e-9
@@ -30,6 +39,8 @@ ASIDE = math.acos(0.9)
 """Radians (25 degrees) that the normals of samples which still face each other may turn aside."""
 SQUARE = 0.05
 """As ASIDE for edges square on each other: room for rounding, and for those alongside."""
+NOTCH = 15.0
+"""Degrees: notches sharper than this are no slots."""
 MANY_SIDES = 100
 """Number from which comparing all pairs in arrays is faster."""
 
@@ -63,6 +74,16 @@ def least_gap(region: Region, sharp: float = 90.0, below: float = math.inf) -> W
     """Return the narrowest slot, hole or gap between pieces, likewise."""
     outside = [stored(contour, "from_outside", Contour.reversed) for contour in region.contours]
     return least_of(Boundary(may_be_narrower(outside, below), sharp), below)
+
+
+def place_of(region: Region, lost: Lost, kerf: Kerf) -> Point:
+    """Return the place where a beam's path loses a contour: the slot that closes, or its middle."""
+    if lost.fate != "vanishes":
+        slot = least_gap(region, NOTCH, max(widths(kerf)))
+        if slot is not None:
+            return slot.middle
+    low_x, low_y, high_x, high_y = lost.contour.bounds
+    return (low_x + high_x) / 2, (low_y + high_y) / 2
 
 
 class Boundary:
