@@ -1,4 +1,4 @@
-"""Assemblies put together: rigid poses, and each part with its design and place."""
+"""Assemblies put together: rigid poses, the tree of parts, their designs and places."""
 
 from __future__ import annotations
 
@@ -6,13 +6,24 @@ import difflib
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
-from sbafab.actuators import build
-from sbafab.assemblies.files import part_design
+from sbafab.actuators import build, records
 from sbafab.assemblies.records import AnyPart, Assembly, Base, Cup, Line, Magnet, Sba, Seat, Tube
-from sbafab.design.files import design_sha256, listed, shown
-from sbafab.design.records import Design
+from sbafab.design.files import (
+    ASSEMBLY,
+    add_waivers,
+    design_path,
+    design_sha256,
+    kit_names,
+    listed,
+    override,
+    read_toml,
+    shown,
+    validated,
+)
+from sbafab.design.records import Design, RuleName
 from sbafab.errors import DesignError, GeometryError
 from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.meshing.surface import Vector
@@ -313,7 +324,7 @@ def _designs(assembly: Assembly) -> tuple[PartDesign, ...]:
     by_hash: dict[str, tuple[Design, list[str]]] = {}
     for name, part in assembly.parts.items():
         if isinstance(part, Sba):
-            design = part_design(assembly, name, part)
+            design = _read_part(assembly, name, part)
             by_hash.setdefault(design_sha256(design), (design, []))[1].append(name)
     if not by_hash:
         raise DesignError(
@@ -327,11 +338,62 @@ def _designs(assembly: Assembly) -> tuple[PartDesign, ...]:
         plain = name_of_design.lower()
         if names.count(plain) > 1 or plain in RESERVED or plain == assembly.name.lower():
             name_of_design = f"{name_of_design}-{parts[0]}"
-        sources.append(_part_design(design, name_of_design, parts, assembly))
+        sources.append(_build_part(design, name_of_design, parts, assembly))
     return tuple(sources)
 
 
-def _part_design(design: Design, name: str, parts: list[str], assembly: Assembly) -> PartDesign:
+def _read_part(assembly: Assembly, name: str, part: Sba) -> Design:
+    """Return the design of an SBA part, with the part's and the assembly's own keys set.
+
+    Raises DesignError that names the part.
+    """
+    try:
+        path = design_path(design_source(part.design, assembly.folder))
+        table = read_toml(path)
+        if table.get("family") == ASSEMBLY:
+            raise DesignError(
+                f"design = {shown(part.design)} is an assembly; a part is made from the design of "
+                "one actuator"
+            )
+        data = override(table, [part.set, assembly.shared])
+        data.setdefault("name", path.stem)
+        _keep_outline(data, part, assembly.folder)
+        _keep_kit(data, part, assembly)
+        waived = _waivers(data)
+        rules = [r for r in assembly.rules.waive if r in get_args(RuleName) and r not in waived]
+        return validated(add_waivers(data, rules), records(), path.parent)
+    except DesignError as error:
+        raise DesignError(f"parts.{name}: {error}") from None
+
+
+def design_source(design: str, folder: Path) -> str | Path:
+    """The source of a design: a bare word names a template, a path starts at the file's folder."""
+    return folder / design if Path(design).name != design or "." in design else design
+
+
+def _waivers(data: Mapping[str, Any]) -> list[Any]:
+    """Return the rules that a design file's tables waive, if they are a list."""
+    rules = data.get("rules")
+    waived = rules.get("waive") if isinstance(rules, dict) else None
+    return waived if isinstance(waived, list) else []
+
+
+def _keep_outline(data: dict[str, Any], part: Sba, folder: Path) -> None:
+    """Resolve an outline that the assembly's file names against its folder, not the design's."""
+    chamber = part.set.get("chamber")
+    if isinstance(chamber, dict) and isinstance(chamber.get("outline"), str):
+        data["chamber"]["outline"] = str((folder / chamber["outline"]).absolute())
+
+
+def _keep_kit(data: dict[str, Any], part: Sba, assembly: Assembly) -> None:
+    """Resolve a kit's file likewise."""
+    kit = data.get("kit")
+    is_named_here = assembly.kit is not None or "kit" in part.set
+    if is_named_here and isinstance(kit, str) and kit not in kit_names():
+        data["kit"] = str((assembly.folder / kit).absolute())
+
+
+def _build_part(design: Design, name: str, parts: list[str], assembly: Assembly) -> PartDesign:
     order = assembly.order.model_copy(update={"copies": len(parts) * assembly.order.copies})
     named = design.model_copy(update={"name": name, "order": order})
     try:

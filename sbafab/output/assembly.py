@@ -9,10 +9,15 @@ from typing import Any
 
 from sbafab.assemblies.build import Assembled, PlacedPart, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
-from sbafab.assemblies.files import load_assembly
+from sbafab.assemblies.files import (
+    DESIGN_FILE,
+    assembly_sha256,
+    assembly_toml,
+    load_assembly,
+    part_entry,
+)
 from sbafab.assemblies.records import Assembly
 from sbafab.assemblies.shapes import colours, linear, placed_surface
-from sbafab.assemblies.writing import DESIGN_FILE, assembly_sha256, assembly_toml, part_entry
 from sbafab.cutting.properties import TRUE_ARCS, Curves
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DesignError, GeometryError

@@ -14,8 +14,7 @@ from lxml import html as lxml_html
 
 from sbafab.as_built.check import check_folder
 from sbafab.assemblies.build import assemble
-from sbafab.assemblies.files import load_assembly
-from sbafab.assemblies.writing import assembly_sha256
+from sbafab.assemblies.files import assembly_sha256, load_assembly
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.output.assembly import generate_assembly
 from sbafab.output.manifest import file_hashes
