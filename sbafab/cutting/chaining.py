@@ -9,8 +9,15 @@ from collections.abc import Sequence
 from sbafab.cutting.properties import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import COPIED, LEAST_AREA, Contour, Copies, between, circle, tidy
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, edge_from_bulge, same_support
-from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.edges import (
+    EPSILON,
+    Arc,
+    Edge,
+    Point,
+    edge_from_bulge,
+    meeting_points,
+    same_support,
+)
 from sbafab.geometry.nearby import close_pairs, widened
 from sbafab.geometry.region import Region
 

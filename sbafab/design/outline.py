@@ -26,8 +26,7 @@ from sbafab.errors import DesignError
 from sbafab.geometry.arcs import FitError, elliptical_arc, fit_arcs
 from sbafab.geometry.arrangement import split_edges
 from sbafab.geometry.contour import Contour, tidy
-from sbafab.geometry.edges import EPSILON, Edge, Line, Point
-from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.edges import EPSILON, Edge, Line, Point, meeting_points
 from sbafab.geometry.nearby import close_pairs
 from sbafab.geometry.region import Region, centroid
 

@@ -21,9 +21,9 @@ from sbafab.geometry.edges import (
     distance_to,
     from_end_to_end,
     left_normal,
+    meeting_points,
     turns_round,
 )
-from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
 
 CELLS = 16

@@ -17,8 +17,16 @@ from sbafab.errors import GeometryError, InconsistentError
 from sbafab.geometry.arrangement import Arrangement, overlaid, overlay
 from sbafab.geometry.cache import stored
 from sbafab.geometry.contour import LEAST_AREA, Contour, in_reading_order, tidy
-from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, from_end_to_end
-from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.edges import (
+    EPSILON,
+    Arc,
+    Bounds,
+    Edge,
+    Line,
+    Point,
+    from_end_to_end,
+    meeting_points,
+)
 from sbafab.geometry.nearby import close_pairs, widened
 
 Result = TypeVar("Result")

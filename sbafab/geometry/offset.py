@@ -22,8 +22,8 @@ from sbafab.geometry.edges import (
     distance_to,
     edge_from_bulge,
     left_turn,
+    meeting_points,
 )
-from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
 from sbafab.geometry.region import Region, enclosed, wound
 

@@ -36,9 +36,9 @@ from sbafab.geometry.edges import (
     Point,
     box_round,
     distance_to,
+    meeting_points,
     unit,
 )
-from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, close_pairs
 
 if TYPE_CHECKING:
@@ -213,6 +213,7 @@ class Region(Exact):
 
     def shapely(self, chord_error: float = 0.001) -> shapely.MultiPolygon:
         """The region for shapely; chords stay within ``chord_error`` mm of the arcs."""
+        # No other code needs it.
         import shapely
 
         pieces = self.polygons(chord_error)

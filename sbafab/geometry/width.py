@@ -23,8 +23,8 @@ from sbafab.geometry.edges import (
     Point,
     left_normal,
     left_turn,
+    meeting_points,
 )
-from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.offset import Kerf, Lost, widths
 from sbafab.geometry.region import Region

@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import COPIED, Copies
-from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to
-from sbafab.geometry.intersect import line_circle, meeting_points
+from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to, line_circle, meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
 from sbafab.geometry.region import Region, disc
 from sbafab.nesting.records import Nest, Stock

@@ -11,8 +11,7 @@ from sbafab.geometry.arrangement import DIGIT, Piece, by_owner, overlay
 from sbafab.geometry.boolean import ChainGroup, chains_of, grouped
 from sbafab.geometry.cache import cached
 from sbafab.geometry.contour import Contour
-from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal
-from sbafab.geometry.intersect import line_circle
+from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal, line_circle
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Region, disc, divided, union
 from sbafab.laminate.laminate import LOOSE, Interface, Laminate, Layer
