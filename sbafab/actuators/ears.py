@@ -15,10 +15,9 @@ from typing import Literal
 
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import fillet, grow
-from sbafab.geometry.region import Region, disc, strip
+from sbafab.geometry.region import Region, disc, strip, union
 from sbafab.laminate.laminate import Inlet, Pin
 
 Holder = Literal["film", "mask", "sheet"]

@@ -29,11 +29,10 @@ from sbafab.design.records import Design, Form, Free, degrees_of_freedom
 from sbafab.design.section import Section
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point, unit
 from sbafab.geometry.nearby import boxes_meet
 from sbafab.geometry.offset import fillet, grow
-from sbafab.geometry.region import Region, disc
+from sbafab.geometry.region import Region, disc, union
 from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Pin
 
 ROUNDING = 1e-9

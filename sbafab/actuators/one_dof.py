@@ -22,10 +22,9 @@ from sbafab.actuators.stacking import (
     tab_and_strip,
 )
 from sbafab.design.records import Design, Form, Free, degrees_of_freedom
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import unit
 from sbafab.geometry.offset import fillet
-from sbafab.geometry.region import Region
+from sbafab.geometry.region import Region, union
 from sbafab.laminate.laminate import Bore, Chamber, Laminate
 
 AXIS = (0.0, 0.0)

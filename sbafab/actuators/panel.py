@@ -15,10 +15,10 @@ from itertools import combinations
 from sbafab.actuators.stacking import BalloonShape
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import union
+from sbafab.geometry.contour import Contour, circle
 from sbafab.geometry.edges import Point, unit
 from sbafab.geometry.offset import grow
-from sbafab.geometry.region import Contour, Region, circle, disc, polygon, stadium, strip
+from sbafab.geometry.region import Region, disc, polygon, stadium, strip, union
 from sbafab.laminate.laminate import Inlet, Laminate, Pin, SheetPanel
 
 METHOD = "sheet"

@@ -39,10 +39,9 @@ from sbafab.design.records import Design, Drawn, Form, Free, Inlet, Slots, Stack
 from sbafab.design.section import Section
 from sbafab.design.units import Length, LengthOrZero
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import fillet, grow
-from sbafab.geometry.region import Region, rectangle, section, stadium, strip
+from sbafab.geometry.region import Region, rectangle, section, stadium, strip, union
 from sbafab.laminate.laminate import Bore, Chamber, Laminate
 from sbafab.laminate.laminate import Inlet as LaminateInlet
 

@@ -24,10 +24,9 @@ from sbafab.design.records import Bore as BoreSection
 from sbafab.design.records import Chamber, Design, Discs, Drawn, Free
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import grow
-from sbafab.geometry.region import Region, disc, strip
+from sbafab.geometry.region import Region, disc, strip, union
 from sbafab.laminate.films import Film, in_order
 from sbafab.laminate.laminate import ROLES, Inlet, Layer, Pin, Role
 

@@ -12,9 +12,9 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.errors import OutputError
-from sbafab.geometry.arcs import facets
+from sbafab.geometry.contour import Contour, facets
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Contour, Region, rectangle
+from sbafab.geometry.region import Region, rectangle
 from sbafab.laminate.laminate import Chamber, Interface, Laminate
 from sbafab.meshing.surface import Surface, open_edges
 

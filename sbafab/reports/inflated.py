@@ -18,8 +18,7 @@ from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
 from sbafab.assemblies.shapes import placed_surface
 from sbafab.design.records import Slots
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import union
-from sbafab.geometry.region import Region, disc, section, strip
+from sbafab.geometry.region import Region, disc, section, strip, union
 from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.meshing.solid import Slab, fuse
 from sbafab.meshing.surface import Surface

@@ -8,12 +8,12 @@ from functools import cache
 from typing import Final, NamedTuple
 
 from sbafab.geometry.arrangement import DIGIT, Piece, by_owner, overlay
-from sbafab.geometry.boolean import ChainGroup, chains_of, divided, grouped, union
+from sbafab.geometry.boolean import ChainGroup, chains_of, grouped
 from sbafab.geometry.cache import cached
-from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal
-from sbafab.geometry.intersect import line_circle
+from sbafab.geometry.contour import Contour
+from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal, line_circle
 from sbafab.geometry.nearby import EdgeIndex, widened
-from sbafab.geometry.region import Contour, Region, disc
+from sbafab.geometry.region import Region, disc, divided, union
 from sbafab.laminate.laminate import LOOSE, Interface, Laminate, Layer
 from sbafab.rules.limits import TOLERANCE
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Edge, Point, distance_to
-from sbafab.geometry.region import Contour
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at, holds

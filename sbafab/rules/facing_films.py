@@ -12,8 +12,9 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import LOOSE, Interface, Laminate, Pin
 from sbafab.rules.boundary import Facing, beside, edges_along, outward_reach, without_slivers
 from sbafab.rules.finding import Finding, Place

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from sbafab.errors import GeometryError
-from sbafab.geometry.offset import beam_path, place_of, widths
+from sbafab.geometry.offset import beam_path, widths
 from sbafab.geometry.region import Region
-from sbafab.geometry.width import Width, least_gap, least_width
+from sbafab.geometry.width import Width, least_gap, least_width, place_of
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at, holds

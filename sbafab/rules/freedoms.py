@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations, pairwise
 from typing import Final, NamedTuple
 
-from sbafab.geometry.boolean import nanometres
+from sbafab.geometry.contour import nanometres
 from sbafab.geometry.edges import Point, distance_to
 from sbafab.geometry.nearby import boxes_meet, widened
 from sbafab.geometry.region import Region, centroid

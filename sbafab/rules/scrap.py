@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.nearby import widened
-from sbafab.geometry.region import Region, rectangle, strip
+from sbafab.geometry.region import Region, rectangle, strip, union
 from sbafab.laminate.laminate import Laminate, Layer, SheetPanel, freed
 from sbafab.rules.bridges import sheeted
 from sbafab.rules.finding import Finding, Place

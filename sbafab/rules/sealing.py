@@ -10,8 +10,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
 
-from sbafab.geometry.boolean import alone, in_reading_order, tidy, turned_round
+from sbafab.geometry.boolean import alone, turned_round
 from sbafab.geometry.cache import cached
+from sbafab.geometry.contour import in_reading_order, tidy
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point
 from sbafab.geometry.nearby import widened
 from sbafab.geometry.region import Region, rectangle

@@ -11,9 +11,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sbafab.geometry.boolean import nanometres
-from sbafab.geometry.edges import Edge, Line, Point
-from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.contour import nanometres
+from sbafab.geometry.edges import Edge, Line, Point, meeting_points
 from sbafab.geometry.nearby import EdgeIndex, boxes_meet, widened
 from sbafab.geometry.region import Region, polygon, strip
 from sbafab.laminate.laminate import Inlet, Interface, Laminate

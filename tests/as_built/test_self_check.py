@@ -22,7 +22,7 @@ from sbafab.errors import DefectError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.models.figures import Asked, Factors
 from sbafab.models.prediction import predict
-from sbafab.nesting.bottom_left import bottom_left
+from sbafab.nesting.engines import bottom_left
 from sbafab.nesting.records import NestPart, Placement, Stock
 from sbafab.output import artefacts
 from sbafab.output.artefacts import write_cut_files
@@ -161,7 +161,7 @@ def test_parts_of_a_nest_that_lie_badly_are_not_let_through(
         return (replace(first, shift=(x + shift[0], y + shift[1])), *others)
 
     with (
-        patch("sbafab.nesting.bottom_left.bottom_left", moved),
+        patch("sbafab.nesting.engines.bottom_left", moved),
         pytest.raises(DefectError, match=said),
     ):
         generate(RunRequest(load_design("1dof-5mm", FEW), tmp_path, ("cut",)))

@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import pytest
 
-from sbafab.geometry.boolean import union
+from sbafab.geometry.contour import circle
 from sbafab.geometry.edges import Arc, Edge, Line
 from sbafab.geometry.nearby import EdgeIndex
-from sbafab.geometry.region import Region, circle, disc, rectangle, strip
+from sbafab.geometry.region import Region, disc, rectangle, strip, union
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import (
     bond_width,

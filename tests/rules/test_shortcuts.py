@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sbafab.geometry.boolean import divided, union
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Line
-from sbafab.geometry.region import Contour, Region, disc, polygon, rectangle, strip
+from sbafab.geometry.region import Region, disc, divided, polygon, rectangle, strip, union
 from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.rules import boundary, freedoms, margins, registration_yield, sealing, tube_fit
 from sbafab.rules.boundary import facing_films, outward_reach
