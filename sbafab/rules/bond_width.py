@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from sbafab.geometry.width import Width
-from sbafab.laminate.laminate import Laminate
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at, holds
 from sbafab.rules.measures import Alike, Measures, distinct_interfaces, interface_name
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "bond-width"
 
 
-def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """The least width of any bond, measured between facing edges."""
-    measures = measures or Measures(laminate, limits)
+    laminate, limits = measures.laminate, measures.limits
     worst: tuple[float, Width | None, Alike] | None = None
     for alike in distinct_interfaces(laminate):
         bond = alike.interface.bond
@@ -30,6 +30,18 @@ def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) 
     x, y = width.middle if width else (None, None)
     place = Place(interface.index, interface.layer_indices, x, y)
     return [_finding(value, limits, place, _message(value, width, alike, limits))]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "every bond is at least 0.75 mm wide between facing edges",
+        "A narrower ring peels or leaks under pressure; the paper found 0.75 mm to hold (Sec. 2).",
+        "Make bond.width larger, move what lies near the edge away from it, or round the outline.",
+        ("rules.bond_width", "bond.width"),
+    ),
+)
 
 
 def _finding(value: float | None, limits: Limits, place: Place, message: str) -> Finding:

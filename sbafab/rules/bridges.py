@@ -12,6 +12,8 @@ from sbafab.geometry.width import least_width
 from sbafab.laminate.laminate import Laminate, Layer, SheetPanel, freed
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, at, holds
+from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "bridges"
 LEAST = 0.5
@@ -32,8 +34,9 @@ class _Wrong(NamedTuple):
     message: str
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """The narrowest bridge; fails as well where a part is loose, or not freed as it should be."""
+    laminate, limits = measures.laminate, measures.limits
     limit = max(LEAST, limits.least_feature)
     panel = laminate.panel
     if panel is None:
@@ -57,6 +60,18 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
         message += f"; {limit:g} is needed: make panel.bridge_width larger"
     place = Place(None, (narrow.layer.index,), *narrow.at)
     return [Finding(NAME, "pass" if good else "fail", limit, narrow.width, "mm", place, message)]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "every part hangs in its registered sheet by bridges that the second cut frees",
+        "A part that hangs on too little shifts; one that is not freed is torn off.",
+        "Make panel.bridge_width larger, or move the copies apart with panel.web.",
+        ("panel.bridge_width", "panel.second_cut_error"),
+    ),
+)
 
 
 def sheeted(laminate: Laminate, masks: bool = False) -> list[Layer]:

@@ -10,7 +10,9 @@ from sbafab.geometry.edges import Edge, Point, distance_to
 from sbafab.geometry.region import Contour
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import Limits, at, holds
+from sbafab.rules.limits import at, holds
+from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Explanation, Rule
 
 # The channels of a laminate: chamber bores and the lumen, and the layers each runs through.
 
@@ -62,9 +64,9 @@ class _Clear(NamedTuple):
     layer: Layer
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """The diameter that passes through each channel, worst against what the design states."""
-    del limits
+    laminate = measures.laminate
     found = [_clear(channel) for channel in channels(laminate)]
     if not found:
         message = "no balloon is joined to another, so there is no channel to keep clear"
@@ -80,6 +82,18 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
         )
     place = Place(None, (worst.layer.index,), *worst.at)
     return [Finding(NAME, "pass" if good else "fail", stated, worst.diameter, "mm", place, message)]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "all openings along a bore, and along the lumen, together pass its diameter",
+        "One layer off its axis narrows the channel to what all openings have in common.",
+        "Draw the openings about one axis, or ask for less: bore.diameter, lumen.diameter.",
+        ("bore.diameter", "lumen.diameter"),
+    ),
+)
 
 
 def _clear(channel: Channel) -> _Clear:

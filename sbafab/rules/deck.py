@@ -1,78 +1,25 @@
-"""The rule deck: all rules in the order they are reported."""
+"""The rule deck: all rules in the order they are reported, and what runs them.
+
+A rule is a file of this folder with a ``RULE``; ``design.records.RuleName`` lists them in order.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from importlib import import_module
+from typing import get_args
 
+from sbafab.design.records import RuleName
 from sbafab.laminate.laminate import Laminate
 from sbafab.process import Progress
-from sbafab.rules import (
-    bond_width,
-    bridges,
-    channel_clear,
-    facing_films,
-    film_limits,
-    mask_overhang,
-    piece_count,
-    pin_fit,
-    pin_holes,
-    press_fit,
-    registration_nominal,
-    registration_worst_case,
-    registration_yield,
-    scrap,
-    sealing,
-    tube_fit,
-)
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import Limits, lowered
 from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Rule
 
-
-class Rule(NamedTuple):
-    """A rule's stable name and the function that measures it.
-
-    ``at_most``: its limit is the most that may be measured; of all others it is the least.
-    """
-
-    name: str
-    check: Callable[[Measures], list[Finding]]
-    at_most: bool = False
-
-
-def _alone(
-    check: Callable[[Laminate, Limits], list[Finding]],
-) -> Callable[[Measures], list[Finding]]:
-    """A rule that shares nothing with others."""
-    return lambda own: check(own.laminate, own.limits)
-
-
-def _sharing(
-    check: Callable[[Laminate, Limits, Measures], list[Finding]],
-) -> Callable[[Measures], list[Finding]]:
-    """A rule that asks for what others ask for as well."""
-    return lambda own: check(own.laminate, own.limits, own)
-
-
-RULES = (
-    Rule(bond_width.NAME, _sharing(bond_width.check)),
-    Rule(mask_overhang.NAME, _sharing(mask_overhang.check)),
-    Rule(facing_films.NAME, _sharing(facing_films.check), at_most=True),
-    Rule(sealing.NAME, _alone(sealing.check), at_most=True),
-    Rule(channel_clear.NAME, _alone(channel_clear.check)),
-    Rule(tube_fit.NAME, _alone(tube_fit.check)),
-    Rule(piece_count.NAME, _alone(piece_count.check), at_most=True),
-    Rule(pin_holes.NAME, _alone(pin_holes.check), at_most=True),
-    Rule(pin_fit.NAME, _alone(pin_fit.check), at_most=True),
-    Rule(bridges.NAME, _alone(bridges.check)),
-    Rule(scrap.NAME, _alone(scrap.check), at_most=True),
-    Rule(film_limits.NAME, _alone(film_limits.check)),
-    Rule(press_fit.NAME, _alone(press_fit.check), at_most=True),
-    Rule(registration_nominal.NAME, _alone(registration_nominal.check), at_most=True),
-    Rule(registration_worst_case.NAME, _sharing(registration_worst_case.check)),
-    Rule(registration_yield.NAME, _sharing(registration_yield.check)),
+RULES: tuple[Rule, ...] = tuple(
+    import_module(f"sbafab.rules.{name.replace('-', '_')}").RULE for name in get_args(RuleName)
 )
 
 AT_MOST = frozenset(rule.name for rule in RULES if rule.at_most)

@@ -20,6 +20,7 @@ from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, at, holds
 from sbafab.rules.margins import pin_at
 from sbafab.rules.measures import Measures, distinct_interfaces
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "facing-films"
 
@@ -38,9 +39,9 @@ class _Overhang(NamedTuple):
     gap: Interface
 
 
-def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """The largest place where films weld that should not; with none, the least overhang there."""
-    measures = measures or Measures(laminate, limits)
+    laminate, limits = measures.laminate, measures.limits
     pairs = _distinct(measures.facing)
     welds = [*_past_films(pairs), *_at_rims(laminate)]
     if welds:
@@ -49,6 +50,19 @@ def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) 
     clear = Finding(NAME, "pass", 0.0, 0.0, "mm2", Place(), message)
     overhangs = [o for pair, _ in pairs for o in _overhangs(pair.gap, laminate.pins, measures)]
     return [clear, _least(overhangs, limits)] if overhangs else [clear]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "films of two balloons meet where they are meant to bond, and nowhere else",
+        "The press welds any two films with neither film nor mask between them, neighbours or not.",
+        "Make balloons more alike, tabs shorter, or masks larger where the message says.",
+        ("rules.mask_overhang", "mask.overhang", "chamber.diameter"),
+    ),
+    at_most=True,
+)
 
 
 def _distinct(pairs: Iterable[Facing]) -> list[tuple[Facing, int]]:

@@ -13,6 +13,8 @@ from sbafab.geometry.width import Width, least_gap, least_width
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at, holds
+from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "film-limits"
 
@@ -29,8 +31,9 @@ class _Feature(NamedTuple):
     width: Width
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """The finest web, slot or gap of any layer; and whether the cut path keeps every contour."""
+    laminate, limits = measures.laminate, measures.limits
     limit = limits.least_feature
     lost = _lost_to_kerf(laminate, limits)
     if lost is not None:
@@ -49,6 +52,18 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
         message += f"; the laser needs {limit:g}: widen it or leave it out"
     place = Place(None, (layer.index,), *width.middle)
     return [Finding(NAME, "pass" if good else "fail", limit, width.value, "mm", place, message)]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "nothing is finer than the laser cuts, before and after kerf",
+        "A slot or web below the beam's own width burns away or stays uncut.",
+        "Make the feature at the place named wider, or measure the kerf.",
+        ("laser.least_feature", "laser.kerf_tpe", "laser.kerf_ptfe"),
+    ),
+)
 
 
 def _finest(laminate: Laminate) -> _Feature | None:

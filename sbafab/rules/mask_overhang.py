@@ -9,11 +9,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Point
-from sbafab.laminate.laminate import Interface, Laminate, Pin
+from sbafab.laminate.laminate import Interface, Pin
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at, holds
 from sbafab.rules.margins import pin_at
 from sbafab.rules.measures import Alike, Measures, distinct_interfaces, interface_name
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "mask-overhang"
 
@@ -24,9 +25,9 @@ class _Overhang(NamedTuple):
     alike: Alike
 
 
-def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """The least reach of any mask past an edge that bounds unbonded film, and pins' waivers."""
-    measures = measures or Measures(laminate, limits)
+    laminate, limits = measures.laminate, measures.limits
     free: list[_Overhang] = []
     pinned: dict[str, list[_Overhang]] = {}
     bare: list[Alike] = []
@@ -42,6 +43,18 @@ def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) 
                 free.append(overhang)
     waived = [_waived(pin, pinned[pin.name], limits) for pin in laminate.pins if pin.name in pinned]
     return [_main(free, bare, limits), *waived]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "every mask reaches at least 0.50 mm past the film edges it keeps apart",
+        "Film that melts at an edge runs round the end of a short mask and welds the pocket shut.",
+        "Make mask.overhang larger. A flush mask at a pinned bore is meant, and waived by itself.",
+        ("rules.mask_overhang", "mask.overhang"),
+    ),
+)
 
 
 def _main(free: list[_Overhang], bare: list[Alike], limits: Limits) -> Finding:

@@ -16,6 +16,8 @@ from sbafab.laminate.base_plate import pin_deviations
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, at
+from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "pin-fit"
 
@@ -41,8 +43,9 @@ class _Fit(NamedTuple):
         return max(0.0, self.most / self.least - 1)
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """The most by which a film must stretch over a pin, against the share that is allowed."""
+    laminate, limits = measures.laminate, measures.limits
     fits = list(_fits(laminate, limits))
     if not fits:
         message = "no pin holds a layer"
@@ -69,6 +72,19 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     return [
         Finding(NAME, "pass" if good else "fail", limits.pin_stretch, value, "", place, message)
     ]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "every film goes on its pins with hole and pin at their worst: 30 % stretch at most",
+        "Holes come out narrower than drawn; a film stretched further over its pin tears.",
+        "Use a thinner pin, a wider bore, or registration.pin_clearance.",
+        ("registration.pin_stretch", "bore.clearance", "bore.pin_diameter"),
+    ),
+    at_most=True,
+)
 
 
 def _stretch_said(fit: _Fit) -> str:

@@ -12,7 +12,9 @@ from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
 from sbafab.rules.bridges import sheeted
 from sbafab.rules.channel_clear import channels
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import TOLERANCE, Limits, at
+from sbafab.rules.limits import TOLERANCE, at
+from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "pin-holes"
 
@@ -29,9 +31,9 @@ class _Miss(NamedTuple):
     layers: tuple[int, ...]
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """How many pins miss a hole, meet film, or leave a layer that they should hold."""
-    del limits
+    laminate = measures.laminate
     if laminate.panel is not None:
         found = [*_sheets_off(laminate)]
     else:
@@ -45,6 +47,19 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     if not laminate.pins:
         message = "no pin holds a layer"
     return [Finding(NAME, "pass", 0.0, 0.0, "misses", Place(), message)]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "every pin finds its holes, no film stands in its way, two pins hold what ears pin",
+        "A pin without a hole lifts the film; a film on one pin turns about it.",
+        "Use the registration method's own holes; see the place named.",
+        ("registration.method", "registration.pin_diameter"),
+    ),
+    at_most=True,
+)
 
 
 def _sheets_off(laminate: Laminate) -> Iterator[_Miss]:

@@ -7,13 +7,16 @@ from __future__ import annotations
 from sbafab.laminate.films import unstated
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import TOLERANCE, Limits
+from sbafab.rules.limits import TOLERANCE
+from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "press-fit"
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """How far the laminate, laid either way round, fills the platen; a warning on many balloons."""
+    laminate, limits = measures.laminate, measures.limits
     panel = laminate.panel
     low_x, low_y, high_x, high_y = laminate.bounds if panel is None else panel.outline.bounds
     short, long = sorted((high_x - low_x, high_y - low_y))
@@ -53,6 +56,26 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
             )
         )
     return found + _unstated(laminate, limits.minutes_for)
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "the laminate lies in the heated area; more than 20 balloons, and films whose minutes "
+        "nobody stated, draw a warning",
+        "What lies outside the platen is not bonded; heat may not reach a tall stack's middle.",
+        "Make the actuator smaller, tell press.platen_width of a larger press, stack fewer; try "
+        "another film on a sample and name it in press.minutes_for.",
+        (
+            "press.platen_width",
+            "press.platen_length",
+            "rules.validated_balloons",
+            "press.minutes_for",
+        ),
+    ),
+    at_most=True,
+)
 
 
 def _unstated(laminate: Laminate, stated: tuple[tuple[str, float], ...]) -> list[Finding]:

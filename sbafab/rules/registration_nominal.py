@@ -12,8 +12,9 @@ from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
 from sbafab.rules.channel_clear import Channel, channels
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import Limits, at
-from sbafab.rules.measures import distinct_interfaces
+from sbafab.rules.limits import at
+from sbafab.rules.measures import Measures, distinct_interfaces
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "registration-nominal"
 
@@ -28,8 +29,9 @@ class _Departure(NamedTuple):
     what: str
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """The largest departure of a hole from its axis or pin, or of an outline from its twin."""
+    laminate, limits = measures.laminate, measures.limits
     limit = limits.registration_tolerance
     departures = [*_off_axis(laminate), *_off_pins(laminate), *_off_outline(laminate)]
     if not departures:
@@ -44,6 +46,18 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
         message += f"; {limit:g} is allowed: draw both from the same edge"
     place = Place(None, worst.layers, *worst.at)
     return [Finding(NAME, "pass" if good else "fail", limit, worst.value, "mm", place, message)]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "bores are coaxial and the two outlines of a balloon congruent, to 1 um",
+        "What is drawn off its place is off before any hand has touched it.",
+        "Draw both from the same edge.",
+    ),
+    at_most=True,
+)
 
 
 def _off_axis(laminate: Laminate) -> Iterator[_Departure]:

@@ -16,6 +16,7 @@ from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import Limits, Tolerances, at, holds, least_held
 from sbafab.rules.margins import InterfaceMargins, Margin, Push, Quantity, pushes
 from sbafab.rules.measures import Alike, Measures, interface_name
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "registration-worst-case"
 
@@ -92,14 +93,26 @@ def least_remaining(
     ]
 
 
-def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """The least remaining bond and overhang, each with its place and the largest contribution."""
-    measures = measures or Measures(laminate, limits)
+    laminate, limits = measures.laminate, measures.limits
     found = least_remaining(laminate, limits, measures)
     return [
         _finding("bond", limits.worst_bond_width, found, measures, limits),
         _finding("overhang", limits.worst_mask_overhang, found, measures, limits),
     ]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "with every error at its worst 0.5 mm of a bond and 0.25 mm of an overhang are left",
+        "Cutting and pins must leave that (else it fails); what a hand may take only warns.",
+        'Lay up with care, set registration.method = "ears", or make bond and overhang larger.',
+        ("rules.worst_bond_width", "rules.worst_mask_overhang", "registration.hand_placement"),
+    ),
+)
 
 
 def _finding(

@@ -16,7 +16,9 @@ from sbafab.geometry.region import Region, rectangle, strip
 from sbafab.laminate.laminate import Laminate, Layer, SheetPanel, freed
 from sbafab.rules.bridges import sheeted
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import Limits, at
+from sbafab.rules.limits import at
+from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "scrap"
 AHEAD = 1.0
@@ -31,9 +33,9 @@ class _Held(NamedTuple):
     what: str
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """How many pieces of scrap do not come off the parts, or close an inlet."""
-    del limits
+    laminate = measures.laminate
     panel = laminate.panel
     if panel is None:
         message = "no sheet is left round the parts"
@@ -46,6 +48,19 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     place = Place(None, (first.layer.index,), *first.at)
     message = f"{first.what}, {at(first.at)}; give every sheet the window of the whole laminate"
     return [Finding(NAME, "fail", 0.0, float(len(found)), "pieces", place, message)]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "all scrap of registered sheets comes off, and every inlet is free",
+        "Scrap that is welded to a part, or locked in it, cannot be taken away after pressing.",
+        "Move the copies apart with panel.web, or make the tab longer.",
+        ("panel.web", "inlet.tab_length"),
+    ),
+    at_most=True,
+)
 
 
 def _held(laminate: Laminate, panel: SheetPanel) -> Iterator[_Held]:

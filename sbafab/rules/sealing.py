@@ -18,8 +18,9 @@ from sbafab.geometry.region import Region, rectangle
 from sbafab.laminate.laminate import Chamber, Inlet, Interface, Laminate
 from sbafab.rules.boundary import beside, edges_along
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import TOLERANCE, Limits, at
-from sbafab.rules.measures import distinct_interfaces
+from sbafab.rules.limits import TOLERANCE, at
+from sbafab.rules.measures import Measures, distinct_interfaces
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "sealing"
 
@@ -32,9 +33,9 @@ class _Offence(NamedTuple):
     at: Point | None
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """How many pockets leak, reach a foreign one, are cut off or missing, and films lie loose."""
-    del limits
+    laminate = measures.laminate
     graph = void_graph(laminate)
     owners = _owners(laminate, graph)
     offences = [
@@ -56,6 +57,19 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
         message += f" (and {len(offences) - 1} more)"
     place = Place(first.interface, layers, x, y)
     return [Finding(NAME, "fail", 0.0, float(len(offences)), "voids", place, message)]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "every pocket is reached from its own chamber's inlet and from nowhere else",
+        "A pocket that opens elsewhere leaks; one that is cut off never inflates.",
+        "Look at the place named: an opening too near another, or a mask that crosses a bond.",
+        ("bore.diameter", "lumen.diameter", "inlet.width"),
+    ),
+    at_most=True,
+)
 
 
 def _owners(laminate: Laminate, graph: VoidGraph) -> dict[Void, frozenset[str]]:

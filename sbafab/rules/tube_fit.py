@@ -20,7 +20,8 @@ from sbafab.laminate.laminate import Inlet, Interface, Laminate
 from sbafab.rules.boundary import edges_along, outward_reach
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, at, holds
-from sbafab.rules.measures import distinct_interfaces
+from sbafab.rules.measures import Measures, distinct_interfaces
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "tube-fit"
 BOND = "the bond beside the strip"
@@ -42,8 +43,9 @@ class _Fit(NamedTuple):
     drawn: float = 0.0
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """The strip's width at the mouth and along its straight run, and the bond on both sides."""
+    laminate, limits = measures.laminate, measures.limits
     fits = [fit for inlet in laminate.inlets for fit in _fits(inlet, laminate, limits)]
     if not fits:
         message = "the laminate has no inlet, so no tube can be fitted; give every chamber one"
@@ -71,6 +73,18 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     return [
         Finding(NAME, "pass" if good else "fail", worst.limit, worst.value, "mm", place, message)
     ]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "the inlet strip, cut at its narrowest, opens to the tube and its own film",
+        "A flat channel opens to half the perimeter of what goes in; less, and the tube tears it.",
+        "Leave inlet.width out, so that it follows the tube, or use a thinner tube.",
+        ("inlet.width", "inlet.tube_outer_diameter", "laser.unknown_kerf"),
+    ),
+)
 
 
 def _fits(inlet: Inlet, laminate: Laminate, limits: Limits) -> list[_Fit]:

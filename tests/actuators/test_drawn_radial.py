@@ -20,6 +20,7 @@ from sbafab.output.run import generate
 from sbafab.rules import pin_holes
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.limits import Limits
+from sbafab.rules.measures import Measures
 
 COUNT = int(os.environ.get("SBAFAB_EAR_OUTLINES", "4"))
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" width="100mm" height="100mm" viewBox="0 0 100 100">'
@@ -59,7 +60,7 @@ def assert_held(laminate: Laminate) -> None:
             for piece in layers[0].profile.pieces:
                 tools = [p for p in laminate.pins_in(piece) if p.centre not in bores]
                 assert len(tools) >= 2, layers[0].name
-    assert [f.verdict for f in pin_holes.check(laminate, Limits())] == ["pass"]
+    assert [f.verdict for f in pin_holes.check(Measures(laminate, Limits()))] == ["pass"]
 
 
 @pytest.mark.parametrize("name", SHAPES)

@@ -22,6 +22,7 @@ from sbafab.geometry.region import strip
 from sbafab.output.job import generate_job
 from sbafab.output.run import generate
 from sbafab.rules import bridges
+from sbafab.rules.measures import Measures
 from tests.as_built.doctoring import Doctor
 
 KERF = 0.12
@@ -158,7 +159,7 @@ def test_a_copy_that_is_cut_otherwise_stands_for_its_layer(whole: Path, tmp_path
     assert clean.layer(7).profile.area - cap.area == pytest.approx(
         1.12 * (3.25 - 2.84) - 0.04, abs=0.03
     )
-    (found,) = bridges.check(built.laminate, built.limits)
+    (found,) = bridges.check(Measures(built.laminate, built.limits))
     assert found.verdict == "fail"
 
 

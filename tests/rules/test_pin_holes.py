@@ -13,6 +13,7 @@ from sbafab.rules import pin_holes
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import Limits, Tolerances
+from sbafab.rules.measures import Measures
 
 Good = Callable[..., Laminate]
 Spoil = Callable[..., Laminate]
@@ -21,7 +22,7 @@ LIMITS = Limits(tolerances=Tolerances(0, 0, 0, 0), yield_builds=100)
 
 
 def found(laminate: Laminate) -> Finding:
-    (finding,) = pin_holes.check(laminate, LIMITS)
+    (finding,) = pin_holes.check(Measures(laminate, LIMITS))
     return finding
 
 
