@@ -90,7 +90,7 @@ def counted(findings: Iterable[Finding]) -> str:
     counts = summary(findings)
     words = [
         f"{counts['pass']} {'rule passes' if counts['pass'] == 1 else 'rules pass'}",
-        f"{counts['warn']} warn{'s' if counts['warn'] == 1 else ''}" if counts["warn"] else "",
+        f"{counts['warn']} warning{'s' if counts['warn'] > 1 else ''}" if counts["warn"] else "",
         f"{counts['waived']} waived" if counts["waived"] else "",
         f"{counts['fail']} fail{'s' if counts['fail'] == 1 else ''}" if counts["fail"] else "",
     ]
