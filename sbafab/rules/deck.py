@@ -23,13 +23,13 @@ RULES: tuple[Rule, ...] = tuple(
 )
 
 AT_MOST = frozenset(rule.name for rule in RULES if rule.at_most)
-"""Rules whose limit is the most that may be measured."""
+"""Rules whose limit is the largest value allowed."""
 
 
 def run_deck(
     laminate: Laminate, limits: Limits, progress: Progress | None = None
 ) -> tuple[Finding, ...]:
-    """What every rule finds, in the deck's order; failures the user waived say so."""
+    """Return the findings of every rule in the deck's order; failures the user waived say so."""
     findings: list[Finding] = []
     measures = Measures(laminate, limits)
     for number, rule in enumerate(RULES):
@@ -42,21 +42,19 @@ def run_deck(
 def run_rule(
     rule: Rule, laminate: Laminate, limits: Limits, measures: Measures | None = None
 ) -> list[Finding]:
-    """What one rule finds; failures the user waived and weakened limits say so.
+    """Return the findings of a rule; failures the user waived and lowered limits are marked.
 
     ``measures`` are those of the same laminate and limits, for rules that share them.
     """
     weak = lowered(limits, rule.name)
-    return [
-        _waived(finding) if rule.name in limits.waive and finding.verdict == "fail" else finding
-        for finding in (
-            _against(weak, found) for found in rule.check(measures or Measures(laminate, limits))
-        )
-    ]
+    findings = [_against(weak, f) for f in rule.check(measures or Measures(laminate, limits))]
+    if rule.name not in limits.waive:
+        return findings
+    return [_waived(finding) if finding.verdict == "fail" else finding for finding in findings]
 
 
 def has_failed(findings: Iterable[Finding]) -> bool:
-    """Whether a rule failed that nobody waived: then nothing may be cut."""
+    """Return True if a rule failed and is not waived; then nothing may be cut."""
     return any(finding.verdict == "fail" for finding in findings)
 
 
@@ -65,7 +63,7 @@ def rule_names() -> tuple[str, ...]:
 
 
 def _against(weak: Sequence[str], finding: Finding) -> Finding:
-    """The finding with the limits that the design lowers; a rule's own waivers need none."""
+    """Return the finding with the limits that the design lowers; a rule's own waivers need none."""
     if not weak or finding.verdict == "waived":
         return finding
     return replace(finding, message=f"{finding.message}; limits lowered: {', '.join(weak)}")

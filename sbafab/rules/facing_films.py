@@ -26,7 +26,7 @@ NAME = "facing-films"
 
 
 class _Weld(NamedTuple):
-    """A place where two films weld that should not; ``number`` of them are alike."""
+    """A place at which two films weld unintentionally, and the ``number`` of such places."""
 
     region: Region
     gap: Interface
@@ -40,7 +40,7 @@ class _Overhang(NamedTuple):
 
 
 def check(measures: Measures) -> list[Finding]:
-    """The largest place where films weld that should not; with none, the least overhang there."""
+    """Return the largest unintended weld; without any, the least overhang of masks there."""
     laminate, limits = measures.laminate, measures.limits
     pairs = _distinct(measures.facing)
     welds = [*_past_films(pairs), *_at_rims(laminate)]
@@ -66,7 +66,7 @@ RULE = Rule(
 
 
 def _distinct(pairs: Iterable[Facing]) -> list[tuple[Facing, int]]:
-    """The first of those that are alike, and how many they are."""
+    """Return the first of each set of equal pairs, with their number."""
     groups: dict[object, list[Facing]] = {}
     for pair in pairs:
         key = pair.gap.pattern, pair.gap.unbonded, pair.bare
@@ -82,8 +82,8 @@ def _past_films(pairs: Iterable[tuple[Facing, int]]) -> Iterator[_Weld]:
 
 def _at_rims(laminate: Laminate) -> Iterator[_Weld]:
     """Bonds between neighbouring balloons that reach an edge of film that is no bore's."""
-    for alike in distinct_interfaces(laminate):
-        gap = alike.interface
+    for distinct in distinct_interfaces(laminate):
+        gap = distinct.interface
         if gap.kind == "chamber":
             continue
         rim = Region(tuple(c for c in gap.contact.contours if not _is_bore(c, laminate)))
@@ -91,11 +91,11 @@ def _at_rims(laminate: Laminate) -> Iterator[_Weld]:
             if _is_apart(piece, rim) or _is_ear(piece, laminate):
                 continue
             if edges_along(piece, rim):
-                yield _Weld(piece, gap, alike.number)
+                yield _Weld(piece, gap, distinct.number)
 
 
 def _is_apart(piece: Region, rim: Region) -> bool:
-    """Whether a circle round the piece lies so far from the rim that no edge of it can be one."""
+    """Return True if a circle round the piece lies too far from the rim to share an edge."""
     low_x, low_y, high_x, high_y = piece.bounds
     middle = (low_x + high_x) / 2, (low_y + high_y) / 2
     return rim.distance_to_edge(middle) > math.dist(middle, (high_x, high_y)) + TOLERANCE
@@ -106,7 +106,7 @@ def _is_bore(contour: Contour, laminate: Laminate) -> bool:
 
 
 def _is_ear(piece: Region, laminate: Laminate) -> bool:
-    """Whether it lies round a tooling hole, nowhere twice as far from it as at the nearest."""
+    """Return True if the piece surrounds a tooling hole, within twice its least radius."""
     for pin in laminate.pins:
         if any(math.dist(pin.centre, bore.centre) < LOOSE for bore in laminate.bores):
             continue
@@ -117,7 +117,7 @@ def _is_ear(piece: Region, laminate: Laminate) -> bool:
 
 
 def _overhangs(gap: Interface, pins: tuple[Pin, ...], measures: Measures) -> Iterator[_Overhang]:
-    """How far the masks reach past the edges of either film where these face each other."""
+    """Reach of the masks past the edges of either film where these face each other."""
     for edge, reach in measures.reaches(gap):
         if not pin_at(edge, pins):
             yield _Overhang(reach.value, edge.nearest(reach.at), gap)
@@ -132,9 +132,9 @@ def _welded(welds: Sequence[_Weld], laminate: Laminate) -> Finding:
         f"weld there; let the mask below layer {gap.above.index} reach over that place"
     )
     masks = laminate.interfaces[gap.index - 1].masks
-    others = sum(weld.number for weld in welds) - 1
-    if others:
-        message += f" (and {others} more such place{'s' if others > 1 else ''})"
+    more = sum(weld.number for weld in welds) - 1
+    if more:
+        message += f" (and {more} more such place{'s' if more > 1 else ''})"
     layers = (gap.below.index, *(mask.index for mask in masks), gap.above.index)
     place = Place(gap.index, layers, *p)
     return Finding(NAME, "fail", 0.0, area, "mm2", place, message)
