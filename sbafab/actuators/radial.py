@@ -11,7 +11,6 @@ from typing import Literal, Self
 from pydantic import Field
 
 from sbafab.actuators.ears import (
-    NOTE,
     Ear,
     Ray,
     head_reach,
@@ -26,12 +25,10 @@ from sbafab.actuators.stacking import (
     BalloonShape,
     BalloonStack,
     CutFilm,
-    balloon_cuts,
     bonded,
-    channel_pin,
     check_neck,
     drawn_pocket,
-    layers,
+    stacked,
     tab_and_strip,
 )
 from sbafab.design.records import Chamber as ChamberSection
@@ -43,7 +40,7 @@ from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import fillet, grow
 from sbafab.geometry.region import Region, rectangle, section, stadium, strip
-from sbafab.laminate.laminate import Bore, Chamber, Laminate
+from sbafab.laminate.laminate import Chamber, Laminate
 from sbafab.laminate.laminate import Inlet as LaminateInlet
 
 
@@ -154,7 +151,7 @@ def build(design: RadialDesign) -> Laminate:
         )
     bond, overhang = design.bond.width, design.mask.overhang
     pocket = _pocket(design)
-    check_neck(design, [pocket], [(0.0, 0.0)])
+    check_neck(design, [pocket])
     outline = bonded(pocket, bond)
     count = design.chamber.count
     centres = tuple(((i - (count - 1) / 2) * design.pitch, 0.0) for i in range(count))
@@ -179,32 +176,14 @@ def build(design: RadialDesign) -> Laminate:
         CutFilm("sheet", with_sheet_ears(sheet, ears, fillet_radius), None, 1),
         CutFilm("separator-mask", carrier_mask, None, bottom.outline_pieces),
     ]
-    manifold = design.inlet.manifold
-    names = ["chamber1"] * count if manifold else [f"chamber{i + 1}" for i in range(count)]
-    bored = zip(names, centres, strict=True) if design.stack.balloons > 1 else ()
-    bores = tuple(Bore(name, centre, design.bore.diameter) for name, centre in bored)
-    return Laminate(
-        name=design.name,
-        family=design.family,
-        layers=layers([*carrier, *balloon_cuts(stack, design)], design),
-        chambers=(Chamber("chamber1", centres),)
-        if manifold
-        else tuple(Chamber(n, (centre,)) for n, centre in zip(names, centres, strict=True)),
-        bores=bores,
-        inlets=inlets,
-        pins=(
-            *(
-                channel_pin(f"channel{number}", bore.centre, design.bore)
-                for number, bore in enumerate(bores, start=1)
-            ),
-            *(ear.pin for ear in ears),
-            *(pin for tail in held for pin in tail.pins),
-        ),
-        lumen=None,
-        balloons=design.stack.balloons,
-        registration=design.registration.method,
-        pins_in_full_bonds=design.registration.full_bond_pins == "in",
-        notes=(NOTE,) if ears else (),
+    parts = [centres] if design.inlet.manifold else [(centre,) for centre in centres]
+    return stacked(
+        design,
+        stack,
+        [Chamber(f"chamber{number}", part) for number, part in enumerate(parts, start=1)],
+        inlets,
+        carrier=carrier,
+        channel="channel",
         tube=design.tube.outer_diameter,
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated
@@ -11,6 +11,7 @@ from typing import Annotated
 from pydantic import Field
 
 from sbafab.actuators.ears import (
+    NOTE,
     Ear,
     Tail,
     film_holes,
@@ -21,7 +22,8 @@ from sbafab.actuators.ears import (
 )
 from sbafab.design.files import listed, shown
 from sbafab.design.records import Bore as BoreSection
-from sbafab.design.records import Chamber, Design, Discs, Drawn, Free
+from sbafab.design.records import Chamber as ChamberSection
+from sbafab.design.records import Design, Discs, Drawn, Free
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
 from sbafab.geometry.boolean import union
@@ -29,7 +31,17 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region, disc, strip
 from sbafab.laminate.films import Film, in_order
-from sbafab.laminate.laminate import ROLES, Inlet, Layer, Pin, Role
+from sbafab.laminate.laminate import (
+    NOTHING,
+    ROLES,
+    Bore,
+    Chamber,
+    Inlet,
+    Laminate,
+    Layer,
+    Pin,
+    Role,
+)
 
 
 @dataclass(frozen=True)
@@ -191,6 +203,53 @@ def layers(cuts: Iterable[CutFilm], design: Design) -> tuple[Layer, ...]:
     return tuple(placed)
 
 
+def stacked(
+    design: Design,
+    stack: BalloonStack,
+    chambers: Sequence[Chamber],
+    inlets: tuple[Inlet, ...],
+    *,
+    carrier: Sequence[CutFilm] = (),
+    channel: str = "chamber",
+    lumen_pin: float = 0.0,
+    notes: tuple[str, ...] = (),
+    outline: Region = NOTHING,
+    tube: float | None = None,
+) -> Laminate:
+    """Return the laminate of a stack of balloons on its ``carrier`` films, with bores and pins.
+
+    Pins in bores are named ``channel`` and a number; with ears the lumen has no pin.
+    """
+    balloons = len(stack.shape_of)
+    bores = tuple(
+        Bore(chamber.name, centre, design.bore.diameter)
+        for chamber in chambers
+        for centre in chamber.centres
+        if balloons > 1
+    )
+    pins = [channel_pin(f"{channel}{n}", b.centre, design.bore) for n, b in enumerate(bores, 1)]
+    if stack.lumen is not None and not stack.ears:
+        pins.append(Pin("lumen", (0.0, 0.0), lumen_pin, stack.lumen - lumen_pin))
+    pins += [ear.pin for ear in stack.ears]
+    pins += [pin for tail in stack.tails for pin in tail.pins]
+    return Laminate(
+        name=design.name,
+        family=design.family,
+        layers=layers([*carrier, *balloon_cuts(stack, design)], design),
+        chambers=tuple(chambers),
+        bores=bores,
+        inlets=inlets,
+        pins=tuple(pins),
+        lumen=stack.lumen,
+        balloons=balloons,
+        registration=design.registration.method,
+        pins_in_full_bonds=design.registration.full_bond_pins == "in",
+        notes=(*notes, NOTE) if stack.ears else notes,
+        outline=outline,
+        tube=tube,
+    )
+
+
 # Pockets of discs or of a drawn outline, tapered or not, and their inlet strips and tabs.
 
 
@@ -198,7 +257,7 @@ MOST_SIZES = 40
 """Different pockets in a stack: twice the balloons that have been built (paper Sec. 6)."""
 
 
-class RoundChamber(Chamber):
+class RoundChamber(ChamberSection):
     """The chamber of a family whose pockets are discs, or one drawn outline."""
 
     diameter: Length | Annotated[tuple[Length, ...], Field(strict=False, min_length=1)] = 5.0
@@ -246,13 +305,17 @@ def drawn_pocket(design: Design) -> Region | None:
 
 
 def pocket_shapes(design: Design, chamber: RoundChamber) -> tuple[list[Region], tuple[int, ...]]:
-    """The distinct pockets round (0, 0), and the index of each balloon's own."""
+    """Return the distinct pockets round (0, 0), and the index of each balloon's.
+
+    Raises DesignError where a pocket has no room for bore and neck ring.
+    """
     if chamber.outline is not None and not isinstance(chamber.diameter, float):
         raise DesignError(
             "chamber.outline and a list in chamber.diameter exclude each other; remove one"
         )
     drawn = drawn_pocket(design)
     if drawn is not None:
+        check_neck(design, [drawn])
         return [drawn], (0,) * design.stack.balloons
     sizes = diameters(design, chamber)
     distinct = list(dict.fromkeys(sizes))
@@ -261,18 +324,17 @@ def pocket_shapes(design: Design, chamber: RoundChamber) -> tuple[list[Region], 
             f"chamber.diameter lists {len(distinct)} different diameters, where at most "
             f"{MOST_SIZES} are allowed; let neighbouring balloons share one"
         )
-    return (
-        [disc((0.0, 0.0), size / 2) for size in distinct],
-        tuple(distinct.index(size) for size in sizes),
-    )
+    pockets = [disc((0.0, 0.0), size / 2) for size in distinct]
+    check_neck(design, pockets)
+    return pockets, tuple(distinct.index(size) for size in sizes)
 
 
-def check_neck(design: Design, pockets: list[Region], centres: list[Point]) -> None:
+def check_neck(design: Design, pockets: list[Region]) -> None:
     """Raises DesignError where bore and neck ring leave no free film in the smallest pocket."""
     if design.stack.balloons == 1:
         return
     ring = design.bore.diameter / 2 + film_setback(design) + design.bond.width
-    room = min(pocket.distance_to_edge(centre) for pocket in pockets for centre in centres)
+    room = min(pocket.distance_to_edge((0.0, 0.0)) for pocket in pockets)
     if ring >= room:
         largest = design.bore.diameter - 2 * (ring - room)
         remedy = f"make the bore less than {largest:.3f}" if largest > 0 else "widen the pocket"

@@ -656,8 +656,8 @@ def _on(edges: EdgeTable, q: Floats) -> Bools:
 
 # Linear forms of the width left at every margin.
 #
-# Margins between edges of the same two parts depend on the same moves: they differ in nominal width,
-# normal and levers. Worst case and yield read these forms, of all interfaces at once.
+# Margins between edges of the same two parts depend on the same moves: they differ in nominal
+# width, normal and levers. Worst case and yield read these forms, of all interfaces at once.
 
 
 class MarginRun(NamedTuple):

@@ -29,8 +29,8 @@ from sbafab.rules.rule import Explanation, Rule
 if TYPE_CHECKING:
     from sbafab.geometry.edge_table import Bools, Floats, Indices
 
-# Random numbers: a stream that begins equally for every laminate. Its beginning is cached, as the next
-# laminate reads it again.
+# Random numbers: a stream that begins equally for every laminate. Its beginning is cached, as the
+# next laminate reads it again.
 
 
 STREAM_LENGTH = 4_000_000
@@ -364,8 +364,8 @@ def picked(some: Bools) -> Indices:
 
 # Random builds in which every margin of an interface keeps its limit.
 #
-# Most builds are decided without the sum of a row: by the cuts alone where the films hardly move, and
-# by the length of all shifts together, the most that any normal loses. The rest is summed up row by
+# Most builds are decided without the sum of a row: by the cuts alone where the films hardly move,
+# and by the length of all shifts together, the most that any normal loses. The rest is summed up row by
 # row, and the sum decides. All interfaces are queried at once, in arrays.
 
 

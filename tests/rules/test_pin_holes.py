@@ -105,7 +105,7 @@ def test_film_in_the_way_of_a_pin(aside: float, good: Good, spoil: Spoil) -> Non
     over = laminate.layer(3).profile | rectangle((x - 6, y + aside), (x + 6, y + 3))
     finding = found(spoil(laminate, 3, over))
     assert finding.verdict == "fail"
-    blocked = [miss.what for miss in pin_holes._blocked(spoil(laminate, 3, over))]
+    blocked = [miss.fault for miss in pin_holes._blocked(spoil(laminate, 3, over))]
     assert any(
         what.startswith("layer 3 (003_TPE_wall) stands in the way of the pin strip1")
         and what.endswith("which layer 2 is laid on in step 1")

@@ -229,8 +229,8 @@ def test_likely_builds_are_those_of_plain_sums(need: float) -> None:
     )
     drawn = batch.numbers
     likely = registration_yield._builds_below(batch, errors, np.full(2, need))
-    told = zip(likely.asked.tolist(), likely.build.tolist(), strict=True)
-    found = dict(zip(told, likely.left, strict=True))
+    told = zip(likely.query.tolist(), likely.build.tolist(), strict=True)
+    found = dict(zip(told, likely.remaining, strict=True))
     places = {one: place for place, one in enumerate(found)}
     for asked in (0, 1):
         for build in range(200):
