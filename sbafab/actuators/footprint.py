@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sbafab.actuators.ears import Ear, Holder, Ray, placed, tails
 from sbafab.actuators.panel import on_panel, roots, with_stubs
@@ -89,19 +89,13 @@ def build_footprint(design: Design, footprint: Footprint) -> Laminate:
         footprint.shape_of,
         footprint.axes,
         footprint.lumen,
+        footprint.lumen_pin,
         ears,
         tails(inlets, body, ears, design),
     )
-    laminate = stacked(
-        design,
-        stack,
-        chambers,
-        inlets,
-        lumen_pin=footprint.lumen_pin,
-        notes=footprint.notes,
-        outline=plates,
-    )
-    return on_panel(laminate, bridges, design)
+    laminate = stacked(design, stack, chambers, inlets)
+    notes = (*footprint.notes, *laminate.notes)
+    return on_panel(replace(laminate, notes=notes, outline=plates), bridges, design)
 
 
 def _plate(design: Design, hub: Region | None, pockets: Sequence[Region]) -> BalloonShape:

@@ -82,10 +82,10 @@ class LobedDesign(Design):
 
 
 def axis_radius(design: LobedDesign, pockets: list[Region]) -> tuple[float, str | None]:
-    """Distance of the chamber axes from the lumen's axis, and a note where it was raised.
+    """Return the distance of the chamber axes from the lumen's axis, and a note if it was raised.
 
-    One bond width lies between lumen and pockets, and between neighbouring pockets, each of
-    which is kept within its own sector. Raises DesignError if a radius asked for is too small.
+    One bond width lies between lumen and pockets, and between neighbouring pockets, each of which
+    is kept within its own sector. Raises DesignError if the given radius is too small.
     """
     half = math.pi / design.chamber.count
     bond = design.bond.width
@@ -100,15 +100,15 @@ def axis_radius(design: LobedDesign, pockets: list[Region]) -> tuple[float, str 
     )
     by_neighbour = (bond / 2 + spread) / math.sin(half)
     least = max(by_lumen, by_neighbour)
-    asked = design.chamber.axis_radius
-    if asked is not None:
-        if asked < least - ROUNDING:
-            other = "the lumen" if by_lumen >= by_neighbour else "each other"
+    radius = design.chamber.axis_radius
+    if radius is not None:
+        if radius < least - ROUNDING:
+            obstacle = "the lumen" if by_lumen >= by_neighbour else "each other"
             raise DesignError(
-                f"chamber.axis_radius = {asked:g} brings the chambers nearer than bond.width = "
-                f"{bond:g} to {other}; it must be at least {least:.4f}"
+                f"chamber.axis_radius = {radius:g} brings the chambers nearer than bond.width = "
+                f"{bond:g} to {obstacle}; it must be at least {least:.4f}"
             )
-        return asked, None
+        return radius, None
     if by_neighbour > by_lumen + ROUNDING:
         return by_neighbour, (
             f"axis radius raised from {by_lumen:.3f} to {by_neighbour:.3f} mm so that "

@@ -40,7 +40,7 @@ class OneDofDesign(Design):
 
 
 def footprint(design: OneDofDesign) -> Footprint:
-    """Return pockets on one axis; ears in the five sixths of the circle that the tab leaves free."""
+    """Return pockets on one axis, with ears in the sector that the tab leaves free."""
     pockets, shape_of = pocket_shapes(design, design.chamber)
     return Footprint(
         pockets=[[pocket] for pocket in pockets],

@@ -1,4 +1,4 @@
-"""What every family shares: balloons of given outlines and pockets become a stack of layers."""
+"""Stacks of balloons as layers, and the pockets, tabs and strips that families share."""
 
 from __future__ import annotations
 
@@ -32,7 +32,6 @@ from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region, disc, strip
 from sbafab.laminate.films import Film, in_order
 from sbafab.laminate.laminate import (
-    NOTHING,
     ROLES,
     Bore,
     Chamber,
@@ -48,7 +47,7 @@ from sbafab.laminate.laminate import (
 class BalloonShape:
     """One balloon seen from above, before bores and lumen are cut: its outline and pockets.
 
-    The counts say how many separate parts outline and pockets are meant to have.
+    The counts are the numbers of separate parts that outline and pockets should have.
     """
 
     outline: Region
@@ -70,6 +69,7 @@ class BalloonStack:
     shape_of: tuple[int, ...]
     axes: tuple[Point, ...]
     lumen: float | None = None
+    lumen_pin: float = 0.0
     ears: tuple[Ear, ...] = ()
     tails: tuple[Tail, ...] = ()
 
@@ -85,7 +85,7 @@ class CutFilm:
 
 
 def balloon_cuts(stack: BalloonStack, design: Design) -> list[CutFilm]:
-    """The films of a stack of balloons, base to cap (geometry of the laminate table)."""
+    """Return the films of a stack of balloons, base to cap (geometry of the laminate table)."""
     count = len(stack.shape_of)
     back, ears = film_setback(design), stack.ears
     radius = design.bore.diameter / 2
@@ -153,20 +153,20 @@ def balloon_cuts(stack: BalloonStack, design: Design) -> list[CutFilm]:
 
 
 def channel_pin(name: str, centre: Point, bore: BoreSection) -> Pin:
-    """The dowel pin of a channel bore."""
+    """Return the dowel pin of a channel bore."""
     return Pin(name, centre, bore.pin, round(bore.diameter - bore.pin, 9))
 
 
 def film_of(design: Design, role: Role) -> Film:
-    """The film that a design's layup gives to the layers of a role.
+    """Return the film that a design's layup gives to the layers of a role.
 
-    Raises DesignError where it names none, or one that cannot do the role's work.
+    Raises DesignError if it names none, or one of the wrong kind.
     """
     key = role.replace("-", "_")
     name: str = getattr(design.layup, key)
     stock = design.films.stock
-    wanted = "mask" if role.endswith("-mask") else "structural"
-    fit = [known for known, film in stock.items() if film.kind == wanted]
+    kind = "mask" if role.endswith("-mask") else "structural"
+    fit = [name_of_film for name_of_film, film in stock.items() if film.kind == kind]
     if name not in stock:
         raise DesignError(
             f"layup.{key} = {shown(name)} names no film; there are {listed(fit)} for it, and "
@@ -175,19 +175,19 @@ def film_of(design: Design, role: Role) -> Film:
     if name not in fit:
         raise DesignError(
             f"layup.{key} = {shown(name)} is a {stock[name].kind} film, and a {role} is cut from a "
-            f"{wanted} one: {listed(fit)}"
+            f"{kind} one: {listed(fit)}"
         )
     return stock[name]
 
 
 def used_films(design: Design) -> dict[str, Film]:
-    """The films that a design's layup names, by material, TPE first. Raises DesignError."""
+    """Return the films that a design's layup names, by material, TPE first. Raises DesignError."""
     named = {film.material: film for role in ROLES for film in [film_of(design, role)]}
     return {material: named[material] for material in in_order(named)}
 
 
 def layers(cuts: Iterable[CutFilm], design: Design) -> tuple[Layer, ...]:
-    """The films in their order, with heights and pattern names."""
+    """Return the films as layers, with heights and pattern names."""
     films = {role: film_of(design, role) for role in ROLES}
     patterns: dict[tuple[str, Region], str] = {}
     placed: list[Layer] = []
@@ -208,13 +208,8 @@ def stacked(
     stack: BalloonStack,
     chambers: Sequence[Chamber],
     inlets: tuple[Inlet, ...],
-    *,
     carrier: Sequence[CutFilm] = (),
     channel: str = "chamber",
-    lumen_pin: float = 0.0,
-    notes: tuple[str, ...] = (),
-    outline: Region = NOTHING,
-    tube: float | None = None,
 ) -> Laminate:
     """Return the laminate of a stack of balloons on its ``carrier`` films, with bores and pins.
 
@@ -229,7 +224,7 @@ def stacked(
     )
     pins = [channel_pin(f"{channel}{n}", b.centre, design.bore) for n, b in enumerate(bores, 1)]
     if stack.lumen is not None and not stack.ears:
-        pins.append(Pin("lumen", (0.0, 0.0), lumen_pin, stack.lumen - lumen_pin))
+        pins.append(Pin("lumen", (0.0, 0.0), stack.lumen_pin, stack.lumen - stack.lumen_pin))
     pins += [ear.pin for ear in stack.ears]
     pins += [pin for tail in stack.tails for pin in tail.pins]
     return Laminate(
@@ -244,9 +239,7 @@ def stacked(
         balloons=balloons,
         registration=design.registration.method,
         pins_in_full_bonds=design.registration.full_bond_pins == "in",
-        notes=(*notes, NOTE) if stack.ears else notes,
-        outline=outline,
-        tube=tube,
+        notes=(NOTE,) if stack.ears else (),
     )
 
 
@@ -265,21 +258,24 @@ class RoundChamber(ChamberSection):
 
 
 def free_diameter(chamber: RoundChamber) -> tuple[Free, ...]:
-    """A search may change the diameter that all balloons share, or the largest of a list."""
+    """Return the diameter as a search variable: that of all balloons, or the largest of a list."""
     if chamber.outline is not None:
         return ()
     return (Free("chamber.diameter", 2.6, 16.0, 0.1, widens=True),)
 
 
-def free_of_round(chamber: RoundChamber, others: tuple[Free, ...]) -> tuple[Free, ...]:
-    """Its diameter and the ``others``; a list of diameters settles how many balloons there are."""
+def free_of_round(chamber: RoundChamber, further: tuple[Free, ...]) -> tuple[Free, ...]:
+    """Return the search variables of a round chamber and ``further`` ones.
+
+    A list of diameters fixes the number of balloons.
+    """
     is_list = chamber.outline is None and not isinstance(chamber.diameter, float)
     settled = ("stack.balloons",) if is_list else ()
-    return (*free_diameter(chamber), *(one for one in others if one.key not in settled))
+    return (*free_diameter(chamber), *(free for free in further if free.key not in settled))
 
 
 def diameters(design: Design, chamber: RoundChamber) -> tuple[float, ...]:
-    """The pocket diameter of every balloon, bottom to top."""
+    """Return the pocket diameter of every balloon, bottom to top. Raises DesignError."""
     if isinstance(chamber.diameter, float):
         return (chamber.diameter,) * design.stack.balloons
     if len(chamber.diameter) != design.stack.balloons:
@@ -291,12 +287,12 @@ def diameters(design: Design, chamber: RoundChamber) -> tuple[float, ...]:
 
 
 def round_pockets(design: Design, chamber: RoundChamber) -> Discs | Drawn:
-    """The form of these pockets."""
+    """Return the form of these pockets."""
     return Drawn() if chamber.outline is not None else Discs(diameters(design, chamber))
 
 
 def drawn_pocket(design: Design) -> Region | None:
-    """The pocket that the user drew, if any. Raises DesignError for what cannot be read."""
+    """Return the drawn pocket, or None. Raises DesignError if it cannot be read."""
     if design.drawing is None:
         return None
     from sbafab.design.outline import read_outline
@@ -330,7 +326,7 @@ def pocket_shapes(design: Design, chamber: RoundChamber) -> tuple[list[Region], 
 
 
 def check_neck(design: Design, pockets: list[Region]) -> None:
-    """Raises DesignError where bore and neck ring leave no free film in the smallest pocket."""
+    """Raise DesignError if bore and neck ring leave no free film in the smallest pocket."""
     if design.stack.balloons == 1:
         return
     ring = design.bore.diameter / 2 + film_setback(design) + design.bond.width
@@ -346,7 +342,7 @@ def check_neck(design: Design, pockets: list[Region]) -> None:
 
 
 def reach(region: Region, direction: Point) -> float:
-    """How far the region extends from (0, 0) along a unit direction."""
+    """Return the extent of the region from (0, 0) along a unit direction, mm."""
     turn = -math.degrees(math.atan2(direction[1], direction[0]))
     return region.turned(turn).bounds[2]
 
@@ -354,7 +350,7 @@ def reach(region: Region, direction: Point) -> float:
 def tab_and_strip(
     design: Design, chamber: str, pocket: Region, start: Point, direction: Point, edge: float
 ) -> tuple[Region, Region, Inlet]:
-    """Inlet tab, mask strip and inlet of a chamber.
+    """Return inlet tab, mask strip and inlet of a chamber.
 
     The strip starts at ``start`` inside the pocket and runs along ``direction``; the outline ends
     ``edge`` mm from there. The strip reaches one overhang past the tab's end. Raises DesignError
@@ -390,5 +386,5 @@ def tab_and_strip(
 
 
 def bonded(pockets: Region, width: float) -> Region:
-    """The outline of pockets with a bonded ring round them; filled inside."""
+    """Return the outline of pockets with a bonded ring round them; filled inside."""
     return Region(grow(pockets, width).outers)
