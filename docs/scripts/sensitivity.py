@@ -17,9 +17,9 @@ from sbafab.models import paper
 from sbafab.models.balloon import inflate
 from sbafab.models.balloon_map import balloon_map
 from sbafab.models.balloons import balloons_of
+from sbafab.models.elastic import bent, blocked
 from sbafab.models.figures import Factors
 from sbafab.models.stack import Plate, Pose, Stack, stack
-from sbafab.models.stacked import bent, blocked
 from sbafab.reproduction.rows import FITTED
 
 OWN_LOSS = 0.18

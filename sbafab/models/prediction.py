@@ -14,8 +14,8 @@ from sbafab.design.records import Design, Slots, Wrap
 from sbafab.errors import DesignError, GeometryError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, film_mass
-from sbafab.models import elastic, paper, stacked
-from sbafab.models.elastic import bounded, flat_forces, near_discs, relation_by_disc, why_no_disc
+from sbafab.models import elastic, paper
+from sbafab.models.drawn import bounded, flat_forces, near_discs, relation_by_disc, why_no_disc
 from sbafab.models.figures import (
     REACHED,
     STACK,
@@ -462,7 +462,7 @@ def predict(
         discs = None
     one = actuator(design, flat, wish.calibration, discs and discs.form(design, discs.equal))
     check_asked(one, wish)
-    together = None if quick else stacked.stacked(one, wish)
+    together = None if quick else elastic.stacked(one, wish)
     found = _found(one, wish, together)
     relations = () if quick else tuple(_relations(one, wish, _stack(together)))
     if discs is not None:
@@ -470,7 +470,7 @@ def predict(
             actuator(design, flat, wish.calibration, discs.form(design, diameter))
             for diameter in (discs.inner, discs.outer)
         ]
-        each = [_found(end, wish, None if quick else stacked.stacked(end, wish)) for end in bounds]
+        each = [_found(end, wish, None if quick else elastic.stacked(end, wish)) for end in bounds]
         found = list(bounded(found, each, discs))
         relations = tuple(relation_by_disc(relation, discs) for relation in relations)
     to_come = (STACK,) if quick and one.radii else ()
@@ -496,7 +496,7 @@ def _found(one: Actuator, asked: Asked, together: Stack | LeftOut | None) -> lis
     if isinstance(together, LeftOut):
         found.append(together)
     elif together is not None:
-        found += stacked.figures(one, asked, together)
+        found += elastic.figures(one, asked, together)
     return sorted(found, key=_place)
 
 
@@ -541,17 +541,17 @@ def _relations(one: Actuator, asked: Asked, together: Stack | None) -> Iterator[
         pushed = force_relation(one, asked)
         if together is not None:
             pushed = replace(
-                pushed, lines=(*pushed.lines, *stacked.force_traces(one, asked, together))
+                pushed, lines=(*pushed.lines, *elastic.force_traces(one, asked, together))
             )
         yield pushed
     if one.form.is_parallel:
         if one.knows_full:
             yield bending_relation(one, asked)
         if together is not None:
-            yield stacked.bend_relation(asked, together)
+            yield elastic.bend_relation(asked, together)
         reached = workspace_relation(one)
         if together is not None:
-            more = stacked.workspace_traces(asked, together)
+            more = elastic.workspace_traces(asked, together)
             reached = replace(reached, lines=(*reached.lines, *more))
         if reached.lines:
             yield reached

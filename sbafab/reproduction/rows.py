@@ -10,13 +10,13 @@ import numpy as np
 from sbafab.actuators import build, load_design
 from sbafab.models import paper, parabola, printed
 from sbafab.models.balloons import balloons_of
+from sbafab.models.elastic import bent, filled
 from sbafab.models.figures import Asked, Factors, Prediction
 from sbafab.models.formulas import modulus
 from sbafab.models.pneumatics import AIR, Line, seconds
 from sbafab.models.prediction import predict
 from sbafab.models.rippled import risen
 from sbafab.models.stack import Stack, stack
-from sbafab.models.stacked import bent, filled
 from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
 

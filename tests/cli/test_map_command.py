@@ -147,9 +147,9 @@ def test_reproduce_writes_every_figure_with_the_papers_error_bars(
 @pytest.mark.long
 def test_the_calibration_is_the_best_of_its_neighbours() -> None:
     from sbafab.models import paper
+    from sbafab.models.elastic import blocked
     from sbafab.models.figures import Factors
     from sbafab.models.stack import stack
-    from sbafab.models.stacked import blocked
     from sbafab.reproduction.rows import FITTED
 
     design = sbafab.load("1dof-5mm")

@@ -10,9 +10,9 @@ import pytest
 
 import sbafab
 from sbafab.models.balloon import Balloon
+from sbafab.models.elastic import chamber_gap, rim_gap
 from sbafab.models.stack import Stack
 from sbafab.models.stack_loads import RING
-from sbafab.models.stacked import chamber_gap, rim_gap
 
 OUTER = -4.25 / 2 - 3.25
 """x of the rims opposite the first chamber: its axis lies at 4.25, lobes have a radius of 3.25."""

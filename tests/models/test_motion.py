@@ -8,9 +8,9 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError
+from sbafab.models.elastic import filled
 from sbafab.models.pneumatics import AIR, ATMOSPHERE_KPA, WATER, Line
 from sbafab.models.stack import Stack
-from sbafab.models.stacked import filled
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from sbafab.errors import DesignError
 from sbafab.models import parabola, printed
 from sbafab.models.balloon import inflate
 from sbafab.models.balloons import balloons_of
-from sbafab.models.elastic import FLAT
+from sbafab.models.drawn import FLAT
 from sbafab.models.figures import Prediction
 from sbafab.models.kinematics import round_stack, slot_stack
 

@@ -13,11 +13,11 @@ import sbafab
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import BalloonMap
+from sbafab.models.elastic import blocked
 from sbafab.models.rippled import risen
 from sbafab.models.stack import Plate, Stack
 from sbafab.models.stack_balance import MOST_STEPS, _met, _settled, free
 from sbafab.models.stack_loads import RIM, chain, loaded, with_blocks
-from sbafab.models.stacked import blocked
 
 LOADS: dict[str, dict[str, Any]] = {
     "7 mN on the tip": {"tip_load": (0.0, 0.005, -0.005)},
