@@ -1,4 +1,6 @@
-"""Strokes, volumes and stored energy at a pressure, by the elastic balloon, free to rise."""
+"""Predictions by the elastic balloon and the elastic stack: free strokes, blocked forces, bending,
+clearances, times, stiffness, and the curves of these.
+"""
 
 from __future__ import annotations
 
@@ -39,29 +41,33 @@ ELASTIC = Model(
 
 
 def calibrated(model: Model, factors: Factors) -> Model:
-    """The same model with the factors it took, named unless they are the defaults."""
-    said = []
+    """Return a model with its calibration factors in its name, unless they are the defaults."""
+    factor_names = []
     if factors.press_factor != 1:
-        said.append(f"press factor {factors.press_factor:g}")
+        factor_names.append(f"press factor {factors.press_factor:g}")
     if factors.pocket_loss:
-        said.append(f"pocket loss {factors.pocket_loss:g} mm")
+        factor_names.append(f"pocket loss {factors.pocket_loss:g} mm")
     if factors.modulus_mpa is not None:
-        said.append(f"E = {factors.modulus_mpa:g} MPa")
-    return replace(model, name=f"{model.name}, {', '.join(said)}") if said else model
+        factor_names.append(f"E = {factors.modulus_mpa:g} MPa")
+    return (
+        replace(model, name=f"{model.name}, {', '.join(factor_names)}") if factor_names else model
+    )
 
 
-def free_strokes(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
-    """What a stack of round pockets rises by, holds and stores at the pressures asked for."""
-    if not one.radii:
+def free_strokes(actuator: Actuator, request: Asked) -> Iterator[Figure | LeftOut]:
+    """Yield stroke, volume and input work of a free stack of round pockets at each pressure."""
+    if not actuator.radii:
         return
     try:
-        kinds = Counter(balloons_of(one.design, one.laminate, asked.calibration, one.form))
+        kinds = Counter(
+            balloons_of(actuator.design, actuator.laminate, request.calibration, actuator.form)
+        )
     except DesignError as error:
         yield LeftOut("free stroke, elastic balloon", str(error))
         return
-    model = calibrated(ELASTIC, asked.calibration)
-    together = _inflated(kinds, asked.pressures_kpa)
-    for row, pressure in enumerate(asked.pressures_kpa):
+    model = calibrated(ELASTIC, request.calibration)
+    together = _inflated(kinds, request.pressures_kpa)
+    for row, pressure in enumerate(request.pressures_kpa):
         at = f"at {pressure:g} kPa"
         try:
             stroke, volume, stored = _risen(kinds, pressure, together[row] if together else None)
@@ -69,31 +75,35 @@ def free_strokes(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
             yield LeftOut(f"free stroke {at}, elastic balloon", str(error))
             continue
         yield Figure("stroke", f"free stroke {at}", stroke, "mm", model)
-        yield Figure("stroke", f"free height {at}", one.thickness + stroke, "mm", model)
-        yield Figure("stroke", f"volume a balloon {at}", volume / one.balloons, "ul", model)
-        work = stored * one.form.stacks / 1000
+        yield Figure("stroke", f"free height {at}", actuator.thickness + stroke, "mm", model)
+        yield Figure("stroke", f"volume a balloon {at}", volume / actuator.balloons, "ul", model)
+        work = stored * actuator.form.stacks / 1000
         yield Figure("actuation", f"pneumatic input work {at}, free", work, "mJ", model)
 
 
 def _inflated(kinds: Iterable[Balloon], pressures: Sequence[float]) -> list[Inflated] | None:
-    """The balloons at each pressure, all in one go; None where one finds no balance."""
+    """Return the balloons at each pressure, all solved at once; None where one finds no
+    equilibrium.
+    """
     try:
-        found = {kind: risen(kind, pressures) for kind in kinds}
+        shapes = {kind: risen(kind, pressures) for kind in kinds}
     except DesignError:
         return None
     return [
-        {kind: Shapes(*(values[row : row + 1] for values in found[kind])) for kind in found}
+        {kind: Shapes(*(values[row : row + 1] for values in shapes[kind])) for kind in shapes}
         for row in range(len(pressures))
     ]
 
 
 def _risen(
-    kinds: Counter[Balloon], pressure: float, known: Inflated | None
+    kinds: Counter[Balloon], pressure: float, shapes: Inflated | None
 ) -> tuple[float, float, float]:
-    """Stroke in mm, air in ul and energy in uJ (to 3 % the integral of p dV) of one stack."""
+    """Return stroke in mm, air in ul and energy in uJ (to 3 % the integral of p dV) of one
+    stack.
+    """
     stroke = volume = stored = 0.0
     for kind, count in kinds.items():
-        shape = known[kind] if known else risen(kind, pressure)
+        shape = shapes[kind] if shapes else risen(kind, pressure)
         longer = float(stretch(kind, shape)[0])
         if longer > MOST_STRETCH:
             raise DesignError(
@@ -120,8 +130,8 @@ def _risen(
 SAMPLES = 21
 SHARES = (0.0, 0.25, 0.75)
 ANGLES = (30.0, 60.0, 90.0)
-SLIGHT = 1e-5
-"""N on the tip by which its stiffness is found."""
+PROBE_FORCE = 1e-5
+"""Lateral force in N on the tip with which its stiffness is probed."""
 SOURCE = "membrane of revolution between plates, the film's modulus"
 FORCE = Model(
     "elastic stack",
@@ -148,100 +158,106 @@ TIME = Model(
     "the paper gives no length, and this one makes its 0.92 s come out; the sensor is taken to sit "
     "at the pump; no lag of valve and pump",
 )
-HELD = Model(
+AT_PRESSURE = Model(
     "elastic stack",
     SOURCE,
     "no shear between plates; the paper's moduli would make it 15 times as firm, at a pressure "
     "that it does not give",
 )
-SHUT = Model(
+CHAMBERS_SHUT = Model(
     "elastic stack, chambers shut",
     SOURCE,
     "the air that is in the chambers stays in, tubes left out; no shear between plates",
 )
 
 
-def stacked(one: Actuator, asked: Asked) -> Stack | LeftOut | None:
-    """The stack of an actuator with round pockets, or why there is none."""
-    if not one.radii:
+def elastic_stack(actuator: Actuator, request: Asked) -> Stack | LeftOut | None:
+    """Return the stack of an actuator with round pockets, None for others, or the reason against
+    it.
+    """
+    if not actuator.radii:
         return None
-    most = max(MOST_PRESSURE, *asked.pressures_kpa, 0.0)
+    most = max(MOST_PRESSURE, *request.pressures_kpa, 0.0)
     try:
-        return stack(one.design, one.laminate, most, asked.calibration, one.form)
+        return stack(actuator.design, actuator.laminate, most, request.calibration, actuator.form)
     except DesignError as error:
         return LeftOut("elastic stack", str(error))
 
 
-def figures(one: Actuator, asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
-    """Forces, bending, times and stiffness of the stack."""
-    yield from _forces(one, asked, found)
-    if one.form.is_parallel:
-        yield from _bends(asked, found)
-        yield from _bent_forces(asked, found)
-    yield from _times(asked, found)
-    yield from _stiffness(asked, found)
+def stack_figures(actuator: Actuator, request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
+    """Yield forces, bending, times and stiffness of the stack."""
+    yield from _forces(actuator, request, stack)
+    if actuator.form.is_parallel:
+        yield from _bends(request, stack)
+        yield from _bent_forces(request, stack)
+    yield from _times(request, stack)
+    yield from _stiffness(request, stack)
 
 
-def stroke_at(one: Actuator, share: float) -> float:
-    """Stroke in mm at a share of the way from the flat to the paper's full height."""
-    return max(share * (one.full_height - one.thickness), 0.0)
+def stroke_at(actuator: Actuator, share: float) -> float:
+    """Return the stroke in mm at a share of the way from the flat to the paper's full height."""
+    return max(share * (actuator.full_height - actuator.thickness), 0.0)
 
 
-def _forces(one: Actuator, asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
-    model = calibrated(FORCE, asked.calibration)
-    for pressure in asked.pressures_kpa:
-        for share in SHARES if one.knows_full else SHARES[:1]:
+def _forces(actuator: Actuator, request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
+    model = calibrated(FORCE, request.calibration)
+    for pressure in request.pressures_kpa:
+        for share in SHARES if actuator.knows_full else SHARES[:1]:
             at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
             name = f"blocked force at {pressure:g} kPa, {at}"
             try:
-                value = float(blocked(found, pressure, stroke_at(one, share)))
+                value = float(blocked_force(stack, pressure, stroke_at(actuator, share)))
             except DesignError as error:
                 yield LeftOut(f"{name}, elastic stack", str(error))
                 continue
-            yield Figure("force", name, one.form.pushing * value, "N", model)
+            yield Figure("force", name, actuator.form.pushing * value, "N", model)
 
 
-def _some(found: Stack, chambers: int, pressure: float, rest: float = 0.0) -> tuple[float, ...]:
-    return (pressure,) * chambers + (rest,) * (found.chambers - chambers)
+def _pressures(
+    stack: Stack, chambers: int, pressure: float, rest: float = 0.0
+) -> tuple[float, ...]:
+    return (pressure,) * chambers + (rest,) * (stack.chambers - chambers)
 
 
 def _chambers(number: int) -> str:
     return "one chamber" if number == 1 else f"{number} chambers"
 
 
-def _bends(asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
-    model = calibrated(BEND, asked.calibration)
-    for pressure in asked.pressures_kpa:
-        for chambers in range(1, found.chambers):
+def _bends(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
+    model = calibrated(BEND, request.calibration)
+    for pressure in request.pressures_kpa:
+        for chambers in range(1, stack.chambers):
             name = f"bend at {pressure:g} kPa in {_chambers(chambers)}, the others empty"
             try:
-                pose = found.pose(_some(found, chambers, pressure))
+                pose = stack.pose(_pressures(stack, chambers, pressure))
             except DesignError as error:
                 yield LeftOut(name, str(error))
                 continue
             yield Figure("bending", name, pose.bend, "deg", model)
-            yield from _rooms(name.replace("bend at ", "", 1), asked, found, pose)
+            yield from _clearances(name.replace("bend at ", "", 1), request, stack, pose)
             aside = float(np.hypot(*pose.tip[:2]))
             yield Figure("bending", name.replace("bend", "tip aside", 1), aside, "mm", model)
 
 
-def _rooms(where: str, asked: Asked, found: Stack, pose: Pose) -> Iterator[Figure]:
-    """How near a bent stack comes to itself."""
-    model = calibrated(CONTACT, asked.calibration)
-    room = rim_gap(found, pose)
+def _clearances(where: str, request: Asked, stack: Stack, pose: Pose) -> Iterator[Figure]:
+    """Yield the clearances of a bent stack: between rims, and between chambers."""
+    model = calibrated(CONTACT, request.calibration)
+    room = rim_gap(stack, pose)
     yield Figure("bending", f"room between rims on the inner side, {where}", room, "mm", model)
-    room = chamber_gap(found, pose)
+    room = chamber_gap(stack, pose)
     yield Figure("bending", f"clearance between chambers, {where}", room, "mm", model)
 
 
-def bent(found: Stack, chambers: int, angle: float) -> Pose | None:
-    """The pose in which some chambers, the others empty, bend it by so many degrees."""
-    low, high = 0.01, found.most_pressure
+def pose_bent_by(stack: Stack, chambers: int, angle: float) -> Pose | None:
+    """Return the pose bent by an angle in degrees with some chambers pressurised and the others
+    empty; None where no pressure gives it.
+    """
+    low, high = 0.01, stack.most_pressure
     pose = None
     for _ in range(40):
         middle = math.sqrt(low * high)
         try:
-            pose = found.pose(_some(found, chambers, middle), near=pose)
+            pose = stack.pose(_pressures(stack, chambers, middle), near=pose)
         except DesignError:
             high = middle
             continue
@@ -251,26 +267,28 @@ def bent(found: Stack, chambers: int, angle: float) -> Pose | None:
     return pose if pose is not None and abs(pose.bend - angle) < 0.01 else None
 
 
-def _bent_forces(asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
-    """Force on a plate that lies square on the bent tip, as those chambers are pressed harder."""
-    if not asked.pressures_kpa:
+def _bent_forces(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
+    """Yield forces on a plate square to the bent tip, as the bending chambers are pressurised
+    further.
+    """
+    if not request.pressures_kpa:
         return
-    model = calibrated(FORCE, asked.calibration)
-    pressure = max(asked.pressures_kpa)
-    for chambers in range(1, min(found.chambers, 3)):
+    model = calibrated(FORCE, request.calibration)
+    pressure = max(request.pressures_kpa)
+    for chambers in range(1, min(stack.chambers, 3)):
         for angle in ANGLES:
             name = f"force at {pressure:g} kPa in {_chambers(chambers)}, bent by {angle:g} deg"
-            pose = bent(found, chambers, angle)
+            pose = pose_bent_by(stack, chambers, angle)
             if pose is None or pose.pressures[0] > pressure:
                 yield LeftOut(name, "it does not bend so far")
                 continue
             plate = Plate(_three(pose.tip), _three(pose.frames[1][-1][:, 2]))
             try:
-                held = found.pose(_some(found, chambers, pressure), plate=plate, near=pose)
+                pressed = stack.pose(_pressures(stack, chambers, pressure), plate=plate, near=pose)
             except DesignError as error:
                 yield LeftOut(name, str(error))
                 continue
-            yield Figure("force", name, held.force, "N", model)
+            yield Figure("force", name, pressed.force, "N", model)
 
 
 def _three(values: Array) -> tuple[float, float, float]:
@@ -278,28 +296,29 @@ def _three(values: Array) -> tuple[float, float, float]:
     return (x, y, z)
 
 
-def filled(
-    found: Stack, flow_ml_min: float, until: float, length: float = TUBE_LENGTH
+def time_to_fill(
+    stack: Stack, flow_ml_min: float, until: float, length: float = TUBE_LENGTH
 ) -> tuple[float, Pose]:
-    """Seconds of water at a flow, shared by all chambers through tubes of a ``length`` in mm, until
-    the pump shows a pressure in kPa; and the pose by then. Raises DesignError where the tubes
-    alone take that pressure.
+    """Return the seconds of water at a flow, shared by all chambers through tubes of a ``length``
+    in mm, until the pump shows a pressure in kPa; and the pose by then.
+
+    Raises DesignError where the pressure drop of the tubes alone is as large.
     """
-    flow = flow_ml_min * 1000 / 60 / found.chambers
+    flow = flow_ml_min * 1000 / 60 / stack.chambers
     tube = Line(WATER, length).source_pressure(flow, 0.0)
     if tube >= until:
         raise DesignError(f"at this flow a tube of {length:g} mm alone takes {tube:.3g} kPa")
-    pose = found.pose((until - tube,) * found.chambers)
-    empty = found.pose((0.0,) * found.chambers)
+    pose = stack.pose((until - tube,) * stack.chambers)
+    empty = stack.pose((0.0,) * stack.chambers)
     return float((pose.volumes - empty.volumes).mean()) / flow, pose
 
 
-def _times(asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
-    model = calibrated(TIME, asked.calibration)
+def _times(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
+    model = calibrated(TIME, request.calibration)
     until = f"{paper.FULL_KPA:g} kPa at the pump"
-    name = f"time to {until}, water at {asked.flow_ml_min:g} ml/min in all"
+    name = f"time to {until}, water at {request.flow_ml_min:g} ml/min in all"
     try:
-        time, pose = filled(found, asked.flow_ml_min, paper.FULL_KPA)
+        time, pose = time_to_fill(stack, request.flow_ml_min, paper.FULL_KPA)
     except DesignError as error:
         yield LeftOut(name, str(error))
         return
@@ -308,49 +327,49 @@ def _times(asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
     yield Figure("actuation", name, pose.height, "mm", model)
 
 
-def _stiffness(asked: Asked, found: Stack) -> Iterator[Figure | LeftOut]:
-    for pressure in asked.pressures_kpa[:1]:
+def _stiffness(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
+    for pressure in request.pressures_kpa[:1]:
         name = f"lateral tip stiffness at {pressure:g} kPa"
         try:
-            start = found.pose((pressure,) * found.chambers)
-            aside = (SLIGHT, 0.0, 0.0)
-            held = found.pose(start.pressures, aside, near=start)
-            yield _per_mm(f"{name}, pressure held", held, HELD, asked)
-            shut = Motion(found, Line(AIR, length=1e-3), {"tip_load": aside}, start)
-            shut.step(1.0, flows=(0.0,) * found.chambers)
-            yield _per_mm(f"{name}, chambers shut", shut.pose, SHUT, asked)
+            start = stack.pose((pressure,) * stack.chambers)
+            aside = (PROBE_FORCE, 0.0, 0.0)
+            pushed = stack.pose(start.pressures, aside, near=start)
+            yield _tip_stiffness(f"{name}, pressure held", pushed, AT_PRESSURE, request)
+            shut = Motion(stack, Line(AIR, length=1e-3), {"tip_load": aside}, start)
+            shut.step(1.0, flows=(0.0,) * stack.chambers)
+            yield _tip_stiffness(f"{name}, chambers shut", shut.pose, CHAMBERS_SHUT, request)
         except DesignError as error:
             yield LeftOut(name, str(error))
 
 
-def _per_mm(name: str, pose: Pose, model: Model, asked: Asked) -> Figure:
-    value = SLIGHT / float(pose.tip[0])
-    return Figure("stiffness", name, value, "N/mm", calibrated(model, asked.calibration))
+def _tip_stiffness(name: str, pose: Pose, model: Model, request: Asked) -> Figure:
+    value = PROBE_FORCE / float(pose.tip[0])
+    return Figure("stiffness", name, value, "N/mm", calibrated(model, request.calibration))
 
 
-def force_traces(one: Actuator, asked: Asked, found: Stack) -> list[Trace]:
-    """Force against stroke at every pressure asked for."""
-    most = one.full_height - one.thickness
-    if not one.knows_full:
-        most = min(k.largest_stroke for k in one.kinematics)
+def force_traces(actuator: Actuator, request: Asked, stack: Stack) -> list[Trace]:
+    """Return curves of force against stroke, one a pressure."""
+    most = actuator.full_height - actuator.thickness
+    if not actuator.knows_full:
+        most = min(k.largest_stroke for k in actuator.kinematics)
     strokes = np.linspace(0, most, SAMPLES)
-    model = calibrated(FORCE, asked.calibration)
+    model = calibrated(FORCE, request.calibration)
     lines = []
-    for pressure in asked.pressures_kpa:
-        if pressure > found.most_pressure:
+    for pressure in request.pressures_kpa:
+        if pressure > stack.most_pressure:
             continue
-        values = (one.form.pushing * blocked(found, pressure, strokes)).tolist()
+        values = (actuator.form.pushing * blocked_force(stack, pressure, strokes)).tolist()
         lines.append(Trace(f"elastic stack, {pressure:g} kPa", strokes.tolist(), values, model))
     return lines
 
 
-def bend_relation(asked: Asked, found: Stack) -> Relation:
-    """Bend against pressure."""
-    model = calibrated(BEND, asked.calibration)
+def bend_relation(request: Asked, stack: Stack) -> Relation:
+    """Return the curves of bend against pressure."""
+    model = calibrated(BEND, request.calibration)
     pressures = np.geomspace(0.01, 20.0, SAMPLES)
     lines = []
-    for chambers in range(1, found.chambers):
-        poses = _poses(found, chambers, pressures)
+    for chambers in range(1, stack.chambers):
+        poses = _poses(stack, chambers, pressures)
         label = f"{_chambers(chambers)}, the others empty"
         x = [pose.pressures[0] for pose in poses]
         lines.append(Trace(label, x, [pose.bend for pose in poses], model))
@@ -359,14 +378,14 @@ def bend_relation(asked: Asked, found: Stack) -> Relation:
     )
 
 
-def workspace_traces(asked: Asked, found: Stack) -> list[Trace]:
-    """Paths of the tip with 1, 2 ... chambers up to 10 kPa, the others empty or full."""
-    model = calibrated(BEND, asked.calibration)
+def workspace_traces(request: Asked, stack: Stack) -> list[Trace]:
+    """Return paths of the tip with 1, 2 ... chambers up to 10 kPa, the others empty or full."""
+    model = calibrated(BEND, request.calibration)
     pressures = np.linspace(0.1, paper.FULL_KPA**0.5, SAMPLES) ** 2
     lines = []
     for rest, words in ((0.0, "empty"), (paper.FULL_KPA, f"at {paper.FULL_KPA:g} kPa")):
-        for chambers in range(1, found.chambers):
-            poses = _poses(found, chambers, pressures, rest)
+        for chambers in range(1, stack.chambers):
+            poses = _poses(stack, chambers, pressures, rest)
             label = f"elastic stack, {_chambers(chambers)} to 10 kPa, the others {words}"
             aside = [float(np.hypot(*pose.tip[:2])) for pose in poses]
             lines.append(Trace(label, aside, [pose.height for pose in poses], model))
@@ -374,13 +393,13 @@ def workspace_traces(asked: Asked, found: Stack) -> list[Trace]:
 
 
 def _poses(
-    found: Stack, chambers: int, pressures: Sequence[float] | Array, rest: float = 0.0
+    stack: Stack, chambers: int, pressures: Sequence[float] | Array, rest: float = 0.0
 ) -> list[Pose]:
     poses: list[Pose] = []
     for pressure in pressures:
         try:
             near = poses[-1] if poses else None
-            poses.append(found.pose(_some(found, chambers, float(pressure), rest), near=near))
+            poses.append(stack.pose(_pressures(stack, chambers, float(pressure), rest), near=near))
         except DesignError:
             break
     return poses
@@ -393,47 +412,47 @@ def _poses(
 # is more than 0. Lengths mm.
 
 
-OPEN = 0.02
-"""mm that a balloon is taken to be open at least."""
+LEAST_GAP = 0.02
+"""Least gap in mm of a balloon whose radius is computed."""
 
 
 def rim_gap(stack: Stack, pose: Pose) -> float:
-    """Mm by which rims of neighbouring levels have left each other where they are nearest.
+    """Return the smallest gap in mm between rims of neighbouring levels.
 
-    Flat ones lie on each other; 0 where levels lean so far that their rims do again.
+    0 for flat levels, and where levels lean so far that their rims touch.
     """
     gaps = stack.rims[stack.levels] @ pose.freedoms[..., None]
     return max(float(gaps.min()), 0.0)
 
 
 def chamber_gap(stack: Stack, pose: Pose) -> float:
-    """Mm between the films of balloons side by side where they are nearest.
+    """Return the smallest clearance in mm between the films of balloons side by side.
 
-    Below 0 they would pass through each other. Both stand in the frame of their level, and those
-    of other levels lie beyond a plate, so that axes and largest radii tell. Raises DesignError for
-    a balloon without a balance.
+    Below 0 they would pass through each other. Both stand in the frame of their level, and those of
+    other levels lie beyond a plate, so that axes and largest radii suffice. Raises DesignError for
+    a balloon without an equilibrium.
     """
     widest = _radii(stack, pose)
     nearest = []
-    for one, other in combinations(range(stack.chambers), 2):
-        apart = float(np.hypot(*(stack.axes[one] - stack.axes[other])))
-        nearest.append(apart - float((widest[:, one] + widest[:, other]).max()))
-    thick = max(one.balloon.thickness for one in stack.maps)
+    for first, second in combinations(range(stack.chambers), 2):
+        apart = float(np.hypot(*(stack.axes[first] - stack.axes[second])))
+        nearest.append(apart - float((widest[:, first] + widest[:, second]).max()))
+    thick = max(first.balloon.thickness for first in stack.maps)
     return min(nearest) - thick
 
 
 def _radii(stack: Stack, pose: Pose) -> Array:
-    """Largest radius of the middle of each balloon's films: (levels, chambers)."""
-    found = np.empty_like(pose.gaps)
+    """Return the largest radius of each balloon's middle surface: (levels, chambers)."""
+    radii = np.empty_like(pose.gaps)
     pressures = np.broadcast_to(np.array(pose.pressures), pose.gaps.shape)
-    for kind, one in enumerate(stack.maps):
-        own = stack.levels == kind
-        asked = np.stack([pressures[own], np.maximum(pose.gaps[own], OPEN).round(4)], -1)
-        alike, back = np.unique(asked.reshape(-1, 2), axis=0, return_inverse=True)
-        shapes = inflate(one.balloon, alike[:, 0], alike[:, 1], tied=True)
-        within = shapes.r[:, one.balloon.held : one.balloon.edge + 1].max(-1)
-        found[own] = within[back].reshape(asked.shape[:2])
-    return found
+    for kind, balloon in enumerate(stack.maps):
+        rows = stack.levels == kind
+        states = np.stack([pressures[rows], np.maximum(pose.gaps[rows], LEAST_GAP).round(4)], -1)
+        unique, back = np.unique(states.reshape(-1, 2), axis=0, return_inverse=True)
+        shapes = inflate(balloon.balloon, unique[:, 0], unique[:, 1], tied=True)
+        within = shapes.r[:, balloon.balloon.neck_edge : balloon.balloon.edge + 1].max(-1)
+        radii[rows] = within[back].reshape(states.shape[:2])
+    return radii
 
 
 # Balloons on top of each other: all carry the same force, and their strokes add up.
@@ -442,13 +461,14 @@ def _radii(stack: Stack, pose: Pose) -> Array:
 SERIES_SAMPLES = 401
 
 
-def blocked(stack: Stack, pressure: float, stroke: ArrayLike) -> Array:
-    """Force in N of one straight chamber that is held at strokes in mm; 0 where it does not reach.
+def blocked_force(stack: Stack, pressure: float, stroke: ArrayLike) -> Array:
+    """Return the force in N of one straight chamber blocked at strokes in mm; 0 beyond its free
+    stroke.
 
-    At most what its weakest balloon pushes with when flat. Below the stroke at which that one
-    shuts, its solid films may carry more; they are not counted.
+    At most the force of its weakest balloon when flat. Below the stroke at which that one shuts,
+    its solid films may carry more; they are not counted.
     """
-    curves = [_curve(one, pressure) for one in stack.maps]
+    curves = [_curve(balloon, pressure) for balloon in stack.maps]
     counts = np.bincount(stack.levels, minlength=len(stack.maps))
     force = np.linspace(0.0, min(push[0] for _, push in curves), SERIES_SAMPLES)
     total = np.zeros(SERIES_SAMPLES)
@@ -459,7 +479,7 @@ def blocked(stack: Stack, pressure: float, stroke: ArrayLike) -> Array:
     )
 
 
-def _curve(one: BalloonMap, pressure: float) -> tuple[Array, Array]:
-    """Heights in mm and the force in mN there, made to fall."""
-    heights = np.linspace(0.0, one.most_height, SERIES_SAMPLES)
-    return heights, np.minimum.accumulate(one.force(pressure, heights))
+def _curve(balloon: BalloonMap, pressure: float) -> tuple[Array, Array]:
+    """Return heights in mm and the force in mN there, made monotonic."""
+    heights = np.linspace(0.0, balloon.most_height, SERIES_SAMPLES)
+    return heights, np.minimum.accumulate(balloon.force(pressure, heights))

@@ -14,7 +14,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.least_energy import FARTHEST_STEP, FINE, curves_up, ends, limited, towards
+from sbafab.models.least_energy import (
+    LARGEST_MOVE,
+    SMALLEST_STEP,
+    is_last_step,
+    is_positive_definite,
+    newton_step,
+    step_limit,
+)
 from sbafab.models.stack_loads import Load, Loaded, loaded, with_blocks
 
 if TYPE_CHECKING:
@@ -86,14 +93,14 @@ def pressed(
         flat, touch, is_found = step
         move = flat.reshape(-1, 3)
         largest = float(np.abs(move).max())
-        if ends(largest, before, PLATE_FINE):
+        if is_last_step(largest, before, PLATE_FINE):
             if is_found:
                 return at + move, touch.push, True
             # A rim or a point that just touches is met in one round and parts in the next.
             end = loaded(springs, pitch, load, at + move)
             if np.abs(end.gradient).max() < SLIGHT * (1 + end.push):
                 return at + move, end.push, True
-        share = float(limited(move).min())
+        share = float(step_limit(move).min())
         if share < 1.0 and not wall.sticks:
             return None
         before = largest if share == 1.0 else 0.0
@@ -165,7 +172,7 @@ def _more(
         if met is not None:
             against = with_blocks(against, met[1])
             pushes = pushes + met[0].ravel()
-        found, is_firm = towards(pushes[None], (matrix + against)[None])
+        found, is_firm = newton_step(pushes[None], (matrix + against)[None])
         if not is_firm:
             return None
         ahead = deep + lines @ found[0] > touch.least
@@ -213,16 +220,16 @@ FEW_STEPS = 12
 
 def free(springs: Springs, start: Array) -> Array:
     """Rise and tilt of each row with nothing outside acting: (rows, 3). Raises DesignError."""
-    at, before = start, FINE
+    at, before = start, SMALLEST_STEP
     value, gradient, matrix = springs.energy(at)
     for _ in range(MOST_STEPS):
         if np.abs(gradient).max() < CLOSE:
             return at
-        move, is_firm = towards(gradient, matrix)
+        move, is_firm = newton_step(gradient, matrix)
         largest = float(np.abs(move).max())
-        if is_firm and ends(largest, before, FINEST):
+        if is_firm and is_last_step(largest, before, FINEST):
             return at + move
-        share = limited(move)
+        share = step_limit(move)
         slope = (move * gradient).sum(-1)
         for _ in range(12):
             step = share[:, None] * move
@@ -249,7 +256,7 @@ def held(
     """
     wall = load.wall
     if wall is None:
-        fine = FINE if is_near else FINEST
+        fine = SMALLEST_STEP if is_near else FINEST
         found = _settled(springs, pitch, load, start, FEW_STEPS, quick=fine)
         if found is None:
             found = _settled(springs, pitch, load, start, MOST_STEPS)
@@ -291,12 +298,12 @@ def _settled(
     """What ``held`` gives, or None where so many steps do not get there. A step that is no larger
     than ``enough`` ends it. ``quick`` makes fewer and larger ones, until less than it is left.
     """
-    fine = quick or FINE
+    fine = quick or SMALLEST_STEP
     at, before, last = start, fine, None
     now = loaded(springs, pitch, load, at)
     for _ in range(most):
         if np.abs(now.gradient).max() < CLOSE * (1 + 1e-3 * now.push):
-            return at, now.push, curves_up(with_blocks(now.rest(), now.blocks))
+            return at, now.push, is_positive_definite(with_blocks(now.rest(), now.blocks))
         if last is not None:
             # The matrix of a step so small is still good enough for the last one.
             matrix, blocks = last
@@ -313,31 +320,31 @@ def _settled(
         largest = float(np.abs(move).max())
         slope = float(flat @ now.gradient)
         fits = load.wall is None or (largest < CLOSELY and slope > -LITTLE)
-        is_last = largest <= enough or (fits and ends(largest, before, fine))
-        if is_last and (curves_up(matrix) if is_firm is None else is_firm):
+        is_last = largest <= enough or (fits and is_last_step(largest, before, fine))
+        if is_last and (is_positive_definite(matrix) if is_firm is None else is_firm):
             at = at + move
             if load.wall is None:
                 return at, 0.0, True
             return at, loaded(springs, pitch, load, at).push, True
-        share = float(limited(move).min()) if largest > FARTHEST_STEP.min() else 1.0
+        share = float(step_limit(move).min()) if largest > LARGEST_MOVE.min() else 1.0
         for _ in range(14):
             tried = loaded(springs, pitch, load, at + share * move)
             if tried.value <= now.value + 1e-4 * share * slope + 1e-11 * (1 + abs(now.value)):
                 break
             share /= 2
         before = largest if share == 1.0 else 0.0
-        may_last = load.wall is None and 0 < before < SMALL and curves_up(matrix)
+        may_last = load.wall is None and 0 < before < SMALL and is_positive_definite(matrix)
         last = (matrix, now.blocks) if may_last else None
         at = at + share * move
         now = tried
         if abs(slope) < 1e-11 * (1 + abs(now.value)):
-            return at, now.push, curves_up(with_blocks(now.rest(), now.blocks))
+            return at, now.push, is_positive_definite(with_blocks(now.rest(), now.blocks))
     return None
 
 
 def _careful(gradient: Array, matrix: Array) -> tuple[Array, bool]:
     """Newton's step of all levels, and whether the energy curves the right way."""
-    found, is_firm = towards(gradient[None], matrix[None])
+    found, is_firm = newton_step(gradient[None], matrix[None])
     return found[0], is_firm
 
 
@@ -365,7 +372,7 @@ def _held_off(
             break
         push, stiffer = met
         matrix = with_blocks(rest, blocks + stiffer)
-        tried, _ = towards((gradient + push.ravel())[None], matrix[None])
+        tried, _ = newton_step((gradient + push.ravel())[None], matrix[None])
         if float((tried @ gradient)[0]) >= 0:
             break  # it would lead uphill
         flat = tried[0]
