@@ -116,15 +116,7 @@ def _risen(
     return stroke, volume, stored
 
 
-# Drawn pockets: what holds of any outline, and discs in place of one that is nearly round.
-#
-# A pocket holds every disc within it and lies in every disc round it: its films are bonded where
-# the outer disc's are free, and free where the inner disc's are bonded. So the figures of both
-# discs, round the chamber's axis, bound its own, where a wider pocket rises more and pushes
-# harder.
-
-
-# What the stack of elastic balloons says of a design: forces, bending, time, stiffness.
+# The elastic stack: forces, bending, time, stiffness.
 
 
 SAMPLES = 21

@@ -69,7 +69,7 @@ class ReachEnvironment(gymnasium.Env[Any, Any]):
         self._target = np.asarray(target, dtype=float)
         self._motion = self.stack.motion(line=self.line, **self.load)
         self._left = self.steps
-        return self._seen(self._motion), {}
+        return self._observation(self._motion), {}
 
     def step(self, action: Any) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Return the observation ``dt`` s later, the reward, and True for a target reached, then
@@ -80,10 +80,10 @@ class ReachEnvironment(gymnasium.Env[Any, Any]):
         valves = (np.clip(np.asarray(action, dtype=float), -1.0, 1.0) + 1) / 2 * self.most_pressure
         self._motion.step(self.dt, pressures=valves.tolist())
         self._left -= 1
-        observation = self._seen(self._motion)
+        observation = self._observation(self._motion)
         away = float(np.linalg.norm(observation[6:9]))
         return observation, -away, away <= self.near, self._left <= 0, {"time": self._motion.time}
 
-    def _seen(self, motion: Motion) -> Array:
+    def _observation(self, motion: Motion) -> Array:
         tip = motion.pose.tip
         return np.concatenate([tip, self._target, self._target - tip, motion.pressures])

@@ -319,7 +319,7 @@ class Prediction:
             },
             "verdict": [line._asdict() for line in self.verdict],
             "figures": [figure.as_dict() for figure in self.figures],
-            "left_out": [{"name": left.name, "reason": left.reason} for left in self.left_out],
+            "left_out": [{"name": item.name, "reason": item.reason} for item in self.left_out],
             "relations": [relation.as_dict() for relation in self.relations],
         }
 
