@@ -431,7 +431,7 @@ def ripples_at(films: Sequence[Balloon], shapes: Sequence[tuple[Array, Array]]) 
 # the rim's bending and twisting (plate of both films, Kirchhoff), and the films' roots: a long
 # film of bending stiffness B under the tension T is turned at its end against sqrt(B T). With the
 # rim's hoop strain e the energy is a^2 K / 2 + int E (e + a^2 rho)^2 / 2, so that the amplitude of
-# least energy has a closed form, and what is left is quadratic in e. The number of waves is the
+# least energy has a closed form, and the rest is quadratic in e. The number of waves is the
 # one of least energy. Nothing is fitted. Lengths mm, pressures kPa, energies uJ.
 
 
@@ -575,10 +575,10 @@ def _ripple_drive(hoop: Array, ripple: Ripple) -> Array:
     return np.asarray(np.maximum(-(ripple.cost + (hoop * ripple.pull).sum(-1)), 0.0))
 
 
-# A balloon whose two films are unlike: each with its thickness and modulus, bonded at one rim.
+# A balloon of two unlike films: each with its thickness and modulus, bonded at one rim.
 #
-# Both films at once. They share the rim, which moves to where both pull alike
-# and tilts as they wring it: as a ring whose section turns. Units as there.
+# Both films are solved at once. They share the rim, which moves to where their pulls are equal and
+# tilts as they twist it: as a ring whose section turns.
 
 
 COUPLED = 5

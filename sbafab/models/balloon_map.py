@@ -426,7 +426,7 @@ def stretch(kind: Balloon, shape: Shapes) -> Array:
     return np.asarray(lengths.sum(-1) / (kind.pocket - kind.neck) - 1)
 
 
-# The nearest point to another that keeps linear limits: a convex quadratic program.
+# Projection onto linear limits: a convex quadratic program.
 
 
 QP_STEPS = 80

@@ -101,7 +101,7 @@ def _films(laminate: Laminate, factors: Factors | None) -> list[list[tuple[float
     return [row[i : i + 2] for i in range(0, len(row), 2)]
 
 
-# A balloon asked the other way round: at a volume, or under a force; and what its film bears.
+# One balloon at a volume or under a force, and the stress of its film.
 
 
 LEAST_KPA, FIRST_KPA, WIDER_BRACKET = 1e-3, 1.0, 4.0

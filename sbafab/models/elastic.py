@@ -397,11 +397,11 @@ def _poses(
     return poses
 
 
-# Where an inflated stack touches itself, and how much room is left where it does not.
+# Clearances of an inflated stack.
 #
 # Balloons on each other meet at the plate between them, which the elastic balloon has; levels that
-# lean meet at their rims, which the stack has. Balloons side by side never do where the room below
-# is more than 0. Lengths mm.
+# lean meet at their rims, which the stack has. Balloons side by side do not touch where the
+# clearance below is more than 0. Lengths mm.
 
 
 LEAST_GAP = 0.02

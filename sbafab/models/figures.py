@@ -350,7 +350,7 @@ def _rounded(value: float) -> float:
     return 0.0 if abs(value) < 1e-9 else round(float(value), digits)
 
 
-# The lines that a prediction opens with: what it reaches, how sure that is, what is left out.
+# The verdict: the first lines of a prediction.
 
 
 LEFT_OUT = "left out"
@@ -449,7 +449,7 @@ def eq_4_ratios() -> tuple[float, float]:
     return min(ratios), max(ratios)
 
 
-# Which figure to design with where several models give one quantity.
+# Choice of the figure to design with where several models give one quantity.
 
 
 STACK = "elastic stack"

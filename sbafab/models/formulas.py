@@ -104,7 +104,7 @@ def folded_diameter(width: float, thickness: float) -> float:
     return 2 * math.hypot(inside + thickness, width / 2)
 
 
-# Force of a chamber that is held at a height: virtual work, F dh = p dv (paper, Sec. 4.3).
+# Blocked force of a chamber at a height: virtual work, F dh = p dv (paper, Sec. 4.3).
 
 
 def force(pressure_kpa: ArrayLike, rate: ArrayLike) -> NDArray[np.float64]:
@@ -129,7 +129,7 @@ def work_uj(pressure_kpa: float, volume_ul: float) -> float:
     return pressure_kpa * volume_ul
 
 
-# Which tube goes into an inlet strip.
+# Tubes of inlet strips.
 
 
 def largest_tube(width: float, strip: float = 0.0) -> float:
@@ -141,7 +141,7 @@ def largest_tube(width: float, strip: float = 0.0) -> float:
     return 2 * width / math.pi - strip
 
 
-# The cantilever formula E = F l^3 / (3 delta I) (paper, Sec. 4.4), and the I it takes.
+# The cantilever formula E = F l^3 / (3 delta I) (paper, Sec. 4.4), and its I.
 
 
 SAGITTA = 1e-4
@@ -175,7 +175,7 @@ def second_moments(region: Region) -> tuple[float, float]:
     return middle - half, middle + half
 
 
-# Overall sizes in closed form, each with the paper's figure it answers to.
+# Overall sizes, each with the paper's figure.
 
 
 def sizes(design: Design, laminate: Laminate) -> dict[str, float]:

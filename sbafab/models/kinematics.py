@@ -166,7 +166,7 @@ def _eq_4_trust(radius: float) -> str:
     return f"geometric regime only: {', '.join(limits)} (measured{origin})"
 
 
-# What the models need of a design: its stacks of balloons, and how they stand to each other.
+# The actuator of a design, as the models take it.
 
 
 NOT_MEASURED = (

@@ -88,7 +88,7 @@ def equilibrium(problem: Potential, x: Array) -> Array:
         still = np.abs(state.gradient).max(0) <= problem.close[live]
         still |= (np.abs(falls) <= ROUNDING * (np.abs(energy) + scale)) & (damping == 0.0)
         still &= good
-        # No element is stretched, turned or shortened by more than its own length: none collapses.
+        # No element is stretched, turned or shortened by more than its length: none collapses.
         full = np.minimum(1.0, LONGEST_STEP / np.maximum(problem.change(x, step), 1e-300))
         halved = np.where(good, 0, halved + 1)
         less = np.where(halved < HALVINGS, share / 2, 0.0)
@@ -107,7 +107,7 @@ def equilibrium(problem: Potential, x: Array) -> Array:
     raise NoEquilibrium
 
 
-# Many small symmetric systems at once whose matrices are narrow bands.
+# Banded symmetric systems, many small ones at once.
 
 
 def solve(band: Array, right_side: Array) -> Array:
@@ -172,7 +172,7 @@ def solve_positive(band: Array, right_side: Array) -> Array | None:
     right[:, :size, 0] = right_side.T
     right = right.reshape(rows, count, width, 1)
     turned = np.ascontiguousarray(beside.swapaxes(2, 3))
-    # Of each block what it hands on, and its own part of the answer.
+    # Each block's coupling to the next, and its part of the solution.
     both = np.concatenate([beside, right], 3)
     for k in range(count):
         if k:
@@ -242,7 +242,7 @@ def dense(band: Array) -> Array:
     return whole
 
 
-# Steps of Newton's method towards the least of an energy.
+# Safeguarded Newton steps of a stack's levels.
 
 
 LARGEST_MOVE = np.array([0.4, 0.15, 0.15])

@@ -86,11 +86,11 @@ FULL_SHARE = FULL_HEIGHT.value / BALLOONS / 2.5
 """Stroke of a full balloon over its pocket's radius: 17.5 mm of 15 balloons of radius 2.5."""
 
 
-# What the paper measured beside figures that are off by more than a quarter of it.
+# Measured counterparts of figures that are off by more than a quarter of them.
 #
 # One table for all who show such figures: predictions, searches, sweeps, pictures, pages and the
-# studio. A row holds for every design whose figure comes from the row's model: nobody measured the
-# others, and a model that is off on the paper's actuators is not better on theirs.
+# studio. A row holds for every design whose figure comes from the row's model: the others were not
+# measured, and a model that is off on the paper's actuators is not better on theirs.
 
 
 MISFIT = 0.25

@@ -57,8 +57,6 @@ def inverse(
     return np.where(targets == 0, 0.0, high)
 
 
-# The paper's geometric model, Eqs. 1 to 3 solved numerically (paper, Sec. 3.1).
-#
 # The meridian of one half of a balloon is the parabola y = h - a x^2 down to y = 0 at x = rho; its
 # arc keeps the length l of the flat pocket's radius. Eq. 1 prints an upper limit of infinity where
 # rho is meant, Eq. 3 a rho under the root where x is meant. Lengths mm, volumes ul.

@@ -106,7 +106,7 @@ class Line:
         return volume * (1 + pressure / ATMOSPHERE_KPA) if self.fluid.is_gas else volume
 
 
-# Time to put a volume in at a steady flow (paper, Sec. 4.5 and 7).
+# Filling time at a steady flow (paper, Sec. 4.5 and 7).
 
 
 ATMOSPHERE_KPA = 101.325

@@ -419,7 +419,7 @@ def _chambers(number: int) -> str:
     return "one chamber" if number == 1 else f"{number} chambers"
 
 
-# All that the models say of one design, put together.
+# The whole prediction of one design.
 
 
 GROUPS = ("size", "inlet", "stroke", "force", "actuation", "bending", "stiffness")

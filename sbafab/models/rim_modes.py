@@ -120,7 +120,7 @@ class Waving:
         mask[:, Z] = film
         waves = film & (number > balloon.neck_edge) & (balloon.nodes >= SMOOTH * balloon.pocket)
         mask[:, 2:] = waves[:, None]
-        # Half a wave further on and upside down the rim is what it is here.
+        # The rim is antisymmetric under a half-wave shift: only even harmonics lie in its plane.
         for k in range(2, OVERTONES + 1, 2):
             mask[balloon.edge :, first_of(k)] = mask[balloon.edge :, first_of(k) + 2] = True
         mask[balloon.edge, [EDGE, UP]] = True
@@ -297,11 +297,7 @@ class Sums:
         return slopes, band
 
 
-# The energy of a round balloon whose films wave in step with its rim (``waving``).
-#
-# Films are membranes of Saint Venant and Kirchhoff's law; they bend along the meridian slice by
-# slice, as in ``film_elements``, and round the hoop wave by wave. One film and its share of the rim
-# are computed. Lengths mm, pressures kPa, energies uJ, air ul.
+# The energy of one film and its share of the rim.
 
 
 RESIDUAL = 1e-6

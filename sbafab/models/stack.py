@@ -436,7 +436,7 @@ def _mapped(kind: Balloon, most_pressure: float) -> BalloonMap:
     raise AssertionError
 
 
-# A stack in time: chambers that fill through their lines, in balance at every instant.
+# A stack in time: chambers that fill through their lines, in equilibrium at every instant.
 
 
 MOST_STEPS = 40

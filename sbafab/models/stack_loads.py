@@ -165,7 +165,7 @@ def level_motions(at: Chain) -> Array:
     return motions
 
 
-# What the levels of a stack do on their own: energy of balloons and of rims that meet.
+# Springs of the levels: energy of balloons and of rims that meet.
 #
 # Arrays have a row a level, or a row a kind of balloon; lengths mm, energies uJ, volumes ul.
 
@@ -292,7 +292,7 @@ class Springs:
         return volumes.reshape(len(volumes), -1, RING_POINTS).sum(-1), stored.sum(-1)
 
 
-# What acts on a stack from outside, and what the stack's energy then does.
+# External loads, and the energy of a stack under them.
 
 
 WALL_STIFFNESS = 1e6
