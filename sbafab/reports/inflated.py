@@ -147,7 +147,7 @@ def _meridians(stack: Stack, pose: Pose) -> list[list[FilmMeridian]]:
 
 def _films(balloon: Balloon, p: Array, gap: Array) -> list[FilmMeridian]:
     found = inflate(balloon, p, gap, tied=True)
-    part = slice(balloon.held, balloon.edge + 1)
+    part = slice(balloon.neck_edge, balloon.edge + 1)
     shares = np.clip(found.z[:, part] / (gap[:, None] / 2), 0.0, 1.0)
     drawn = balloon.pocket - found.r[:, balloon.edge]
     return [

@@ -25,6 +25,7 @@ from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
+from sbafab.models.elastic import blocked_force
 from sbafab.models.figures import Factors
 from sbafab.models.formulas import force, sizes
 from sbafab.models.kinematics import NO_OUTLINE, Actuator, actuator
@@ -33,7 +34,6 @@ from sbafab.models.paper import FLAT_HEIGHT_OF_FILMS, HEIGHTS, Counterpart, coun
 from sbafab.models.paper import STACK as ELASTIC_STACK
 from sbafab.models.rippled import pressed, risen
 from sbafab.models.stack import Stack, stack
-from sbafab.models.stacked import blocked
 from sbafab.search.quantity_names import QUANTITIES
 
 SHARES = np.linspace(0.1, 1.0, 10)
@@ -290,7 +290,7 @@ class Subject:
                 return first.largest_stroke - stroke
             return form.pushing * float(force(kpa, first.rate(stroke)))
         kinds = balloons_of(self.design, self.laminate)
-        push = float(blocked(self._stack, kpa, stroke))
+        push = float(blocked_force(self._stack, kpa, stroke))
         if push <= 0:
             maps = self._stack.maps
             free = sum(float(maps[level].free_height(kpa)) for level in self._stack.levels)
