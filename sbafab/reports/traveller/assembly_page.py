@@ -156,7 +156,7 @@ def _parts(job: AssemblyJob) -> list[tuple[str, str, str, str]]:
     for placed in job.assembled.parts:
         what = placed.part.kind if placed.made is None else f"SBA {placed.made.design.name}"
         on = placed.part.on
-        where = "everything else is fixed on it" if on is None else f"{on}, {placed.part.at}"
+        where = "first part" if on is None else f"{on}, {placed.part.at}"
         rows.append((placed.name, what, where, f"#{bytes(paints[placed.name]).hex()}"))
     return rows
 
@@ -165,9 +165,7 @@ def _cautions(job: AssemblyJob) -> list[tuple[str, str]]:
     found: list[tuple[str, str]] = []
     if job.waived:
         said = " / ".join(finding.message for finding in job.findings if finding.by_user)
-        words = (
-            f"made although the assembly waives {', '.join(job.waived)}. What they found: {said}"
-        )
+        words = f"made although the assembly waives {', '.join(job.waived)}. Findings: {said}"
         found.append(("Waived checks", words))
     if job.lowered:
         found.append(("Lowered limits", f"{CHECKED_AGAINST}{', '.join(job.lowered)}."))
@@ -176,7 +174,10 @@ def _cautions(job: AssemblyJob) -> list[tuple[str, str]]:
             is_own = title.startswith(("Press", "Waived", "Lowered"))
             found.append((f"{title} ({one.name})" if is_own else title, text))
     if any(placed.part.kind == "magnet" for placed in job.assembled.parts):
-        words = "small and brittle, they snap together; keep them from what a magnet harms."
+        words = (
+            "small and brittle; they snap together. Keep them away from anything that a magnet "
+            "harms."
+        )
         found.append(("Magnets", words))
     every = [*job.findings, *(finding for one in job.works for finding in one.work.job.findings)]
     return list(dict.fromkeys([*found, *for_the_designer(every)]))
@@ -199,9 +200,7 @@ def _is_elsewhere(item: bill.Item) -> bool:
 
 
 def _named(item: bill.Item, one: DesignWork) -> bill.Item:
-    """A design's item with its name."""
-    if item.name == "Release film":
-        return item
+    """Return a design's item under its name."""
     return bill.Item(f"{item.name} ({one.name})", item.what, item.quantity)
 
 
@@ -278,7 +277,7 @@ def _times(job: AssemblyJob) -> list[times.Time]:
         total = None if total is None or whole is None else total + whole
         made_of = (
             f"{say.count(runs.count, 'lamination')} of {say.plain(plan.total_press_minutes)} min; "
-            f"{handled:g} min to cut, lay up, pin and fit tubes"
+            f"{handled:g} min of handling: cutting, lay-up, pins, tubes"
         )
         rows.append(times.Time(f"Making {one.name}", say.minutes(whole), made_of))
     laser = say.minutes(times.laser_minutes(job.works[0].work))
@@ -288,8 +287,8 @@ def _times(job: AssemblyJob) -> list[times.Time]:
         times.Time(
             "Total, without joining",
             say.whole_minutes(total),
-            "without heating the press up, leak tests, gluing and curing, of which the paper gives "
-            "no times",
+            "not included: heating the press, warming the plate, leak and proof tests, gluing and "
+            "curing, for which the paper gives no times",
         )
     )
     return rows
@@ -380,11 +379,12 @@ def _ready(placed: PlacedPart) -> Iterator[Action]:
     elif isinstance(part, Magnet):
         yield Action(
             f"Measure {part.part}: {say.millimetres(part.diameter)} across, "
-            f"{say.millimetres(part.thickness)} thick. If it differs, change the file and check."
+            f"{say.millimetres(part.thickness)} thick. If it differs, change the assembly's file "
+            "and generate again."
         )
         yield Action(
-            "Hold it to the magnet that will hold it through the wall, and mark the face that is "
-            "drawn to it: that face goes outward."
+            "Bring it near the outer magnet, which will hold it through the wall, and mark the "
+            "face that is attracted: that face goes outward."
         )
     elif isinstance(part, Cup):
         yield Action(
@@ -396,11 +396,11 @@ def _ready(placed: PlacedPart) -> Iterator[Action]:
     elif isinstance(part, Line):
         yield Action(
             f"Cut {part.tubing}, outer diameter {say.millimetres(part.outer_diameter)}, square and "
-            f"without burr; {say.millimetres(part.length)} are drawn, your rig may need more."
+            f"without burr; the design has {say.millimetres(part.length)}, your rig may need more."
         )
     else:
         yield Action(
-            f"Take a {_what(placed)} that has passed its leak test; its inlet tubes stay open."
+            f"Take a {_what(placed)} that has passed its tests; its inlet tubes stay open."
         )
 
 
@@ -530,7 +530,9 @@ def _thread(placed: PlacedPart, line: Line, other: PlacedPart) -> Iterator[Actio
         )
         return
     if other.part.on is not None and other.made is not None:
-        yield Action(f"Take {other.name}, not fixed yet: a {_what(other)} without leaks.")
+        yield Action(
+            f"Take {other.name}, not yet fixed: a {_what(other)} that has passed its tests."
+        )
     past = line.along + line.length - other.height
     face = "top" if other.made is not None else "end"
     side = f"{say.millimetres(abs(past))} {'past' if past >= 0 else 'short of'} its {face}"
@@ -541,7 +543,9 @@ def _glue(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
     glue = _adhesive(placed)
     if glue is None:
         if placed.part.at == "outside" or not isinstance(placed.part, Line):
-            yield Action("No adhesive is named for this joint: say how it holds, or it is loose.")
+            yield Action(
+                "No adhesive is named for this joint: write here how it is fixed, ________."
+            )
         return
     how = (
         "a small drop"
@@ -607,7 +611,7 @@ def final_checks(assembled: Assembled) -> list[Action]:
     if any(isinstance(placed.part, Line) for placed in assembled.parts):
         actions.append(Action("Draw air through every line: it is open from end to end."))
     if any(isinstance(placed.part, Cup) for placed in assembled.parts):
-        actions.append(Action("Press the cup on glass and draw vacuum: it holds on."))
+        actions.append(Action("Press the cup on glass and draw vacuum: the cup holds."))
     if deploy.aperture_diameter is not None:
         hole = say.millimetres(deploy.aperture_diameter)
         actions.append(Action(f"Deflated and folded, it goes through a hole of {hole}."))
@@ -623,7 +627,7 @@ def final_checks(assembled: Assembled) -> list[Action]:
             if (across := _across(placed)) is not None
         ]
     if any(isinstance(placed.part, Magnet) for placed in assembled.parts):
-        actions.append(Action("The outer magnet draws and holds the base through the wall."))
+        actions.append(Action("The outer magnet attracts and holds the base through the wall."))
     return actions
 
 

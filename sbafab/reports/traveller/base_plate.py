@@ -110,17 +110,18 @@ def plate_notes(work: Work) -> tuple[str, ...]:
     made = (
         "Base plate, as large as the platen. Each hole: drill it through at the push-out diameter; "
         "widen it from above down to the depth, flat at the bottom: on that shoulder the pin "
-        f"stands. {fit}. Take off the burr, no more: it lifts films. The file has nominal edges."
+        f"stands. {fit}. Deburr, no more: a burr lifts films. The file has nominal edges."
     )
     if not several:
         return made, (
-            "All layers hang on this one pin, so that its place on the plate counts for nothing: a "
-            f"drill press does, marked out to 0.2 mm. The rules count {counted:g} mm for its play."
+            "All layers register on this one pin, so its place on the plate does not matter: a "
+            "drill press is good enough, marked out to 0.2 mm. The rules count "
+            f"{counted:g} mm for its play."
         )
     return made, (
         f"Each hole within {making.position:g} mm of its place in the table, in any direction: "
-        f"that is {making.words} (registration.plate_made_by). A pin has up to {play:g} mm of play "
-        f"in its hole. The rules count {counted:g} mm for both."
+        f"which takes {making.words} (registration.plate_made_by). A pin has up to {play:g} mm of "
+        f"play in its hole. The rules count {counted:g} mm for both."
     )
 
 
@@ -131,11 +132,12 @@ def _underlay_words(work: Work) -> str:
         return ""
     which = listed([str(number) for number in steps])
     thick = say.millimetres(work.design.press.underlay_thickness)
+    pins = ", which the pin heights allow for" if work.laminate.pins else ""
     return (
         f" In step{'s' if len(steps) > 1 else ''} {which} a fresh print of the underlay, cut out "
         f"along its dotted line, lies between plate and release film while the press is closed: "
-        f"{thick} of paper, which the heights of the pins count. As large as the plate, it changes "
-        f"no pressure. Its left and right edge are taped down with {TAPE}, off the films."
+        f"{thick} of paper{pins}. As large as the plate, it does not change the pressure. Its left "
+        f"and right edges are taped down with {TAPE}, off the films."
     )
 
 
@@ -148,6 +150,19 @@ def hot_prints(work: Work) -> int:
     return work.runs.count * sum(_has_underlay(step) for step in work.schedule.steps)
 
 
+def prints(work: Work) -> int:
+    """Return the prints of the underlay that are needed: one a hot closing, one for the tray."""
+    return hot_prints(work) + (work.runs.together > 1)
+
+
+def release_films(work: Work) -> int:
+    """Return the release films that all cycles need: two new ones each time the press closes on a
+    step, and two that serve all tacks of a batch of registered sheets.
+    """
+    panel, steps = work.laminate.panel, len(work.schedule.steps)
+    return 2 * work.runs.count * steps if panel is None else 2 * panel.batches * (steps + 1)
+
+
 def build_up_notes(work: Work) -> tuple[str, ...]:
     """The one build-up of all steps, and what its force means."""
     step = work.schedule.steps[-1]
@@ -158,6 +173,7 @@ def build_up_notes(work: Work) -> tuple[str, ...]:
     together = work.runs.together
     alone = together * work.laminate.layers[-1].profile.area
     what = "laminate" if together == 1 else f"{together} laminates"
+    holes = "has no holes, pins press into it, and it " if work.laminate.pins else ""
     return (
         "Every step has the same build-up, from the lower platen up: base plate "
         f"({plate.material}, {say.millimetres(plate.thickness_mm)}, {size}, as large as the "
@@ -169,9 +185,9 @@ def build_up_notes(work: Work) -> tuple[str, ...]:
         f"would be {step.force_n / alone:.1f} MPa. What the paper laid between platen and films is "
         "not known. The pressures at each step are estimates that no press has confirmed: check "
         "them once, cold, with pressure-indicating film.",
-        "The pad has no holes: pins press into it. It keeps heat back: films are "
-        "heated from below, through the base plate. Lay up on the plate while it is cold, out of "
-        "the press; it warms with the films on it, and each step counts from when it is hot.",
+        f"The pad {holes}insulates: films are heated from below, through the base plate. Lay up on "
+        "the plate while it is cold, out of the press; it warms with the films on it, and each "
+        "step's clock starts when it is hot.",
     )
 
 
@@ -182,7 +198,7 @@ def build_up_again(work: Work) -> tuple[str, ...]:
     return (
         "Build-up, force and heating are those of the first Press section, with a press pad of "
         f"{say.millimetres(pad.thickness_mm)} ({pad.material}) and a base plate of "
-        f"{say.millimetres(plate.thickness_mm)}; what reaches the films stands at each step.",
+        f"{say.millimetres(plate.thickness_mm)}; each step states the pressure on the films.",
     )
 
 
@@ -213,12 +229,12 @@ def items(work: Work) -> list[tuple[str, str, str]]:
             "Release film",
             f"{release.material}, {say.millimetres(release.thickness_mm)}, {size}; TPE must not "
             "stick to it at press temperature (our advice; the paper names none)",
-            f"{2 * len(plan.steps)}",
+            str(release_films(work)),
         ),
         (
             "Press pad",
             f"{pad.material}, {say.millimetres(pad.thickness_mm)}{piled}, {size}, for "
-            f"{first.temperature_c:g} °C in lasting use (our advice; the paper names none)",
+            f"{first.temperature_c:g} °C in continuous use (our advice; the paper names none)",
             str(sheets),
         ),
     ]

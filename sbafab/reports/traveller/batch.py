@@ -181,12 +181,12 @@ def _plan_basis(work: Work) -> str:
         f"One person, one press, shifts of {hours:g} h (order.shift_hours); a cycle takes no more "
         f"copies than such a shift makes (the plate has room for {holds}), and its press steps end "
         "on the day on which they begin, where they fit into one. The minutes are estimates: "
-        f"{by_hand:g} by hand for each copy, as the paper's total leaves them; that "
-        f"{CUT_SHARE:.0%} of these go to cutting, {FINISH_SHARE:.0%} to the tubes, and the rest to "
-        "the steps by the number of parts that each lays, is ours. Warming and cooling of the "
-        "plate come on top of every press step (blanks in Before the day): the fullest day with a "
-        f"press step has {say.clock(max(0.0, left))} left for them. So do curing and leak tests. "
-        "Write beside the rows what they took."
+        f"{by_hand:g} of handling for each copy, the paper's total less its time in the press; of "
+        f"these {CUT_SHARE:.0%} for cutting, {FINISH_SHARE:.0%} for the tubes and the rest for the "
+        "steps, in proportion to the parts that each lays (ours). Not included: warming and "
+        "cooling the plate in every press step (blanks in Before the day), for which the fullest "
+        f"day with a press step has {say.clock(max(0.0, left))} left, curing, leak and proof "
+        "tests. Write the actual minutes beside each row."
     )
 
 
@@ -194,28 +194,26 @@ def _identity(work: Work) -> tuple[Action, ...]:
     """How a laminate is told from the others from one step to the next."""
     lining = "a drawing of the places above, with their numbers"
     if work.job.underlay is not None:
-        lining = f"a second print of {work.job.underlay}, which has the places' numbers"
+        lining = f"one more print of {work.job.underlay}, which has the places' numbers"
     return (
         Action(
-            "A laminate is known by its cycle and its place; the table below has its copy number. "
-            "Nothing that is pressed carries a label: at the press temperature ink and paper would "
-            "go into the bond."
+            "A laminate is identified by its cycle and its place; the table below gives its copy "
+            "number. Nothing that is pressed carries a label: at the press temperature ink and "
+            "paper would go into the bond."
         ),
         Action(
             f"Line a flat tray with {lining}. After every step take the laminates off the plate "
             "one at a time, each straight to its number in the tray, the same side up. Stacks of "
-            "the same number that are not yet bonded to each other lie on each other with paper "
-            "between."
+            "one number that are not yet bonded lie on each other with paper between."
         ),
         Action(
-            "In the next step each goes back to the place of its number. One that has lost its "
-            "number may be pressed with the others, for all are alike: write “place lost” in its "
-            "row."
+            "In the next step each goes back to the place of its number. One whose number is lost "
+            "may be pressed with the others, as all are equal: write “place lost” in its row."
         ),
         Action(
             "After the last step they stay in the tray until their tubes are fitted. Then put a "
-            "flag of tape with the copy number round a tube, and write the serial number beside it "
-            "in the table."
+            "flag of tape with the copy number round a tube, and write the serial number in the "
+            "table."
         ),
     )
 

@@ -109,7 +109,7 @@ def after_cutting(works: Sequence[Work]) -> list[Action]:
     actions = [
         Action(
             "Wipe the soot off both faces of every part with isopropanol, let it dry: soot in a "
-            "bond is a leak."
+            "bond leaks."
         )
     ]
     actions += _threading(works)
@@ -139,8 +139,8 @@ def _threading(works: Sequence[Work]) -> list[Action]:
     return [
         Action(
             "Try one part of every pattern on its pins before you lay up. With edges off by "
-            f"{error}, the worst that is reckoned with, a film must stretch by {stretch:.0%} over "
-            f"its pin ({allowed:.0%} is allowed; nobody has tried it), and up to "
+            f"{error}, the worst case, a film must stretch by {stretch:.0%} over its pin "
+            f"({allowed:.0%} is allowed; nobody has tried it), and up to "
             f"{say.count(most_on_a_pin(work.laminate), 'film')} go on one pin. If one tears or "
             "wrinkles, stop: the designer takes a thinner pin or a wider bore."
         )
@@ -173,7 +173,7 @@ def underlay(work: Work, part: AssemblyStep) -> list[Action]:
     return [
         Action(
             f"Tape a fresh print of {work.job.underlay} to the plate, {over}, cut corner at the "
-            f"back right; over it {film}. It has the edges of {listed(patterns)}{eye}."
+            f"back right; over it {film}. The print shows the edges of {listed(patterns)}{eye}."
         )
     ]
 
@@ -213,57 +213,64 @@ class HeatBlank(NamedTuple):
     id: str
 
 
-def line(step: Step) -> list[HeatBlank]:
+def heat_blanks(step: Step, heating: Heating) -> list[HeatBlank]:
     """Return the line of a step, from the melting point to the end of its clock."""
     return [
-        HeatBlank(point.point, _said(point, step), f"heat-{step.step}-{number}")
+        HeatBlank(point.point, _heat_words(point, step, heating), f"heat-{step.step}-{number}")
         for number, point in enumerate(step.time_temperature, 1)
     ]
 
 
-def _said(point: HeatPoint, step: Step) -> str:
-    """The point as short as one line of the page asks for three of them."""
+def _heat_words(point: HeatPoint, step: Step, heating: Heating) -> str:
+    """Return the point so short that three of them fit on one line of the page."""
     if point.point == END:
         return f"end ({say.minutes(step.minutes)} later)"
     what = "melting" if point.point == MELTING else point.point
     minutes = point.after_minutes
-    after = f"{point.after_constants:.2f} τ" if minutes is None else say.minutes(minutes)
+    after = _constants(point, heating) if minutes is None else say.minutes(minutes)
     return f"{point.edge_c:g} °C ({what}, {after})"
+
+
+def _constants(point: HeatPoint, heating: Heating) -> str:
+    """Return the time constants to a point of known temperature, in words."""
+    assert point.edge_c is not None
+    return f"{heating.constants_to(point.edge_c):.2f} τ"
 
 
 def note(work: Work) -> str:
     """Return what the paper says of time, what we add, and the line that all steps share."""
-    found = work.schedule.heating
-    platens, warms = found.platen_c, found.platen_c - found.start_c
+    heating = work.schedule.heating
+    platens, warms = heating.platen_c, heating.platen_c - heating.start_c
     points = work.schedule.steps[0].time_temperature
     [start] = [point for point in points if point.point == START]
     words = (
-        "Time. The paper says 135 °C and minutes for each step; it does not say when its clock "
+        "Time. The paper gives 135 °C and minutes for each step; it does not say when its clock "
         "starts. Ours: plate and films go in cold, and the clock starts when a thermocouple taped "
-        f"to the plate's edge reads {found.clock_c:g} °C, not before. A first-order estimate of "
-        f"that edge is T = {platens:g} - {warms:g} exp(-t/τ) °C from {found.start_c:g} °C, τ of "
-        f"this bench {say.plain(found.time_constant_minutes)} min (Before the day says how it is "
-        "measured). After closing, "
+        f"to the plate's edge reads {heating.clock_c:g} °C, not before. A first-order estimate of "
+        f"that edge is T = {platens:g} - {warms:g} exp(-t/τ) °C from {heating.start_c:g} °C, τ of "
+        f"this bench {say.plain(heating.time_constant_minutes)} min (measured as in Before the "
+        "day). After closing, "
     )
-    starts = f"the clock starts after {_after(start)}"
-    if found.melting_c is None:
+    starts = f"the clock starts after {_after(start, heating)}"
+    if heating.melting_c is None:
         words += f"{starts}; the films' melting point is not known."
     else:
         [melting] = [point for point in points if point.point == MELTING]
-        apart = (start.after_constants or 0.0) - (melting.after_constants or 0.0)
+        molten = (start.after_constants or 0.0) - (melting.after_constants or 0.0)
         words += (
-            f"the films' melting point, {found.melting_c:g} °C, is reached after "
-            f"{_after(melting)}, and {starts}: for {apart:.2f} τ they melt beside the minutes."
+            f"the films' melting point, {heating.melting_c:g} °C, is reached after "
+            f"{_after(melting, heating)}, and {starts}: the films are above it for {molten:.2f} τ "
+            "before the clock starts."
         )
     return words + (
-        f" Where the edge does not read {found.clock_c:g} °C within {PATIENCE:g} τ "
-        f"({_patience(found)}): do not start the clock; open, set these films aside as a sample, "
-        "for nobody knows how long they were pressed, and find the cause as under Before the day."
+        f" Where the edge does not read {heating.clock_c:g} °C within {PATIENCE:g} τ "
+        f"({_patience(heating)}): do not start the clock. Open the press, set these films aside as "
+        "a sample (how long they were hot is not known) and find the cause as in Before the day."
     )
 
 
-def _after(point: HeatPoint) -> str:
-    return f"{point.after_constants:.2f} τ = {say.minutes(point.after_minutes)}"
+def _after(point: HeatPoint, heating: Heating) -> str:
+    return f"{_constants(point, heating)} = {say.minutes(point.after_minutes)}"
 
 
 def closing_words(step: Step, heating: Heating) -> str:
@@ -286,18 +293,18 @@ def before_the_day(heating: Heating, steps: int) -> Iterator[str]:
     yield (
         "Time constant τ of the plate, once for a bench: lay the whole build-up without films, "
         f"plate at {heating.start_c:g} °C, a thermocouple taped to its edge; close it between "
-        f"platens at {hot} and write the reading every half minute. τ is the time to {reach:.0f} "
-        "°C, 63 % of the way: ________ min. Give it to press.time_constant. "
-        f"{heating.constants_to(heating.clock_c):.2f} τ come on top of each of the "
+        f"platens at {hot} and log the reading every half minute. τ is the time to {reach:.0f} "
+        "°C, 63 % of the way: ________ min. Set press.time_constant to it. Add "
+        f"{heating.constants_to(heating.clock_c):.2f} τ to each of the "
         f"{say.count(steps, 'press step')}."
     )
     yield (
-        f"Where the edge ends after {PATIENCE:g} τ: ________ °C. It must be {ready} or more. If it "
-        "is less: is the thermocouple right (100 °C in boiling water at sea level) and taped down; "
-        "do both platens read what they are set to, with the same thermocouple; does the plate lie "
-        "flat and the pad cover it? Then set the platens hotter by what is missing, by "
-        f"{MOST_RAISED:g} °C at most, here: ________ °C, and measure again. More is missing: do "
-        "not press."
+        f"Edge temperature after {PATIENCE:g} τ: ________ °C. It must be {ready} or more. If it is "
+        "less, check that the thermocouple reads 100 °C in boiling water (at sea level) and is "
+        "taped down, that both platens reach their set temperature by the same thermocouple, that "
+        "the plate lies flat and that the pad covers it. Then set the platens hotter by the "
+        f"difference, {MOST_RAISED:g} °C at most: ________ °C, and measure again. If more is "
+        "missing, do not press."
     )
 
 
@@ -320,7 +327,7 @@ FILM_CLASSES = (
 )
 """Two-sheet films of Fujifilm Prescale, by the ranges that its maker lists as far as we know: the
 list was not opened, so the page has them compared with the box."""
-COLD = "once, cold, to find the pressure; compare its range with the box"
+COLD = "checks the pressure once, cold; compare this range with its box"
 WANTED = 0.05
 """Share to which a gauge should set the pressure: ours."""
 
@@ -357,9 +364,9 @@ def notes(work: Work) -> tuple[str, ...]:
     pound = step.pressure_kpa / step.force_n * say.NEWTONS_PER_POUND
     finest = 2 * WANTED * step.pressure_kpa / pound
     return (
-        f"The gauge: {say.force(step.force_n)} is the reading, 1 lbf of it {pound:.2g} kPa. Read "
-        f"to half a division, a gauge sets {step.pressure_kpa:g} kPa to {WANTED:.0%} if it has a "
-        f"division every {finest:.0f} lbf ({finest * say.NEWTONS_PER_POUND:.0f} N) or finer; what "
-        "the gauge of the paper's press (Carver 5420) has, we do not know. A coarser one: set the "
+        f"The gauge must read {say.force(step.force_n)}; 1 lbf is {pound:.2g} kPa. Read to half a "
+        f"division, a gauge sets {step.pressure_kpa:g} kPa to {WANTED:.0%} if it has a division "
+        f"every {finest:.0f} lbf ({finest * say.NEWTONS_PER_POUND:.0f} N) or finer; the divisions "
+        "of the paper's press (Carver 5420) are not known to us. With a coarser gauge, set the "
         "force by a load cell between the platens, cold, and mark the gauge.",
     )

@@ -76,13 +76,14 @@ def _underlay(work: Work, path: str) -> Item:
         paper = f"at least {say.size(math.ceil(width), math.ceil(height))}"
     join = "; cut out along their dotted frames and laid edge to edge" if len(spread) > 1 else ""
     thick = say.millimetres(work.design.press.underlay_thickness)
-    closings = base_plate.hot_prints(work)
+    closings, prints = base_plate.hot_prints(work), base_plate.prints(work)
+    tray = ", and one to line the tray" if prints > closings else ""
     what = (
         f"{path} printed at 100 % on plain paper {thick} thick, {paper}; its bars must measure 100 "
-        f"mm{join}. A fresh print for each of {say.count(closings, 'time', 'times')} that it lies "
-        "in the closed press: paper dries there and shrinks"
+        f"mm{join}. A fresh print for each of {say.count(closings, 'closing')} of the press, as "
+        f"paper dries there and shrinks{tray}"
     )
-    return Item("Underlay", what, say.count(len(spread) * closings, "page"))
+    return Item("Underlay", what, say.count(len(spread) * prints, "page"))
 
 
 def _films(work: Work) -> list[Item]:
@@ -233,16 +234,16 @@ PROGRAMS = (
         "from its documentation, not tried",
         (
             "Open the .lbrn2 beside each DXF: layers, order and a frame without output are set, "
-            "all powers are 0. Set power and speed of each layer. The rest of this list is for "
-            "whoever opens the DXF.",
+            "all powers are 0. Set power and speed of each layer. The rest of this list is only "
+            "for the DXF.",
             "Each colour becomes a layer of its own in the Cuts / Layers window. By default layers "
             "run in the order of that window, from the top: bring them into the order above.",
             "Switch Output off for the layer of the grey REFERENCE lines.",
             "Set every cut layer to Line mode, Kerf Offset 0.",
             "Optimization Settings count only while Optimize Cut Path is on: keep Order by Layer "
             "first and Cut inner shapes first on, as they are by default.",
-            "What it asks or assumes about the units of a DXF is not known to us: compare the "
-            "overall size above before you cut.",
+            "We do not know which units it assumes for a DXF: compare the overall size above "
+            "before you cut.",
             "Run Preview and watch the order of the holes and outlines.",
         ),
     ),
@@ -255,17 +256,17 @@ PROGRAMS = (
             "is then right.",
             "Do not choose “Automatic scaling to size A4”: it enlarges the drawing.",
             "Circles and arcs stay true arcs, layer colours are kept.",
-            "It measures with the width of the line unless its preferences say geometric bounding "
-            "box.",
+            "Sizes include the width of the line unless its preferences are set to the geometric "
+            "bounding box.",
         ),
     ),
     Program(
         "LibreCAD",
         "tried: 2.2.0",
         (
-            "Opens the DXF as it is: layers, colours and arcs are right. Printed at scale 1:1 the "
-            "parts measure what they should, to 0.1 mm.",
-            "REFERENCE does not print: the frame is missing on paper, which is right.",
+            "Opens the DXF correctly: layers, colours and arcs are right. Printed at scale 1:1 the "
+            "parts have their size, to 0.1 mm.",
+            "REFERENCE does not print: no frame on paper is right.",
         ),
     ),
 )
@@ -303,9 +304,9 @@ def kerf_notes(work: Work) -> list[str]:
     return [
         f"{material}: {words}. "
         + (
-            "The paths hold the kerf already: kerf offset 0 in the laser's program."
+            "The paths are compensated already: set kerf offset 0 in the laser's program."
             if measured
-            else "No offset is known: kerf offset 0 in the laser's program, and calibrate."
+            else "No offset is known: set kerf offset 0 in the laser's program, and calibrate."
         )
         for material, words, measured in kerf_states(work.job, materials)
     ]

@@ -119,8 +119,8 @@ def plain(value: float | None) -> str:
 
 
 def clock(minutes: float) -> str:
-    """Hours and minutes: 0:05, 7:45."""
-    whole = round(minutes)
+    """Return hours and minutes: 0:05, 7:45."""
+    whole = round(round(minutes, 6))
     return f"{whole // 60}:{whole % 60:02d}"
 
 

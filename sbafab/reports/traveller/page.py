@@ -170,10 +170,10 @@ def _facts(work: Work) -> list[tuple[str, str]]:
     extras = "tabs and ears" if laminate.registration == "ears" else "tabs"
     names = {
         "thickness": "Thickness, flat (nominal films)",
-        "width": f"Width of all that is cut, with {extras}",
-        "length": f"Length of all that is cut, with {extras}",
-        "outline_diameter": f"Films without {extras} fit a circle round the axis of",
-        "overall_diameter": f"All that is cut, with {extras}, fits one of",
+        "width": f"Overall width, with {extras}",
+        "length": f"Overall length, with {extras}",
+        "outline_diameter": f"Diameter round the axis, without {extras}",
+        "overall_diameter": f"Diameter round the axis, with {extras}",
         "pitch": "Pitch round the tube",
         "deflated_diameter": "Diameter on its tube, deflated",
         "reached_diameter": "Diameter on its tube, inflated (computed)",
@@ -345,7 +345,7 @@ def for_the_designer(findings: Iterable[Finding]) -> list[tuple[str, str]]:
         return []
     words = (
         f"{say.count(len(rules), 'rule')} {'warns' if len(rules) == 1 else 'warn'}. findings.html "
-        "says of what, and what helps; at the press do as the steps say."
+        "gives places and remedies; at the press follow the steps."
     )
     return [("For the designer", words)]
 
@@ -361,14 +361,14 @@ def _all(work: Work) -> Iterator[tuple[str, str]]:
     if job.waived:
         yield (
             "Waived rules",
-            f"made although the design waives {', '.join(job.waived)}. What they found: "
+            f"made although the design waives {', '.join(job.waived)}. Findings: "
             + " / ".join(f.message for f in job.findings if f.by_user),
         )
     if job.lowered:
         yield (
             "Lowered limits",
-            f"{CHECKED_AGAINST}{', '.join(job.lowered)}. What holds here may fail the usual "
-            "limits: make sure that this is meant.",
+            f"{CHECKED_AGAINST}{', '.join(job.lowered)}. A pass here may be a failure at the usual "
+            "limits: ask the designer whether this is intended.",
         )
     nominal = [material for material, _, measured in kerf_states(job, materials) if not measured]
     if nominal:
@@ -399,6 +399,7 @@ def _is_in_step(warning: str) -> bool:
 
 
 UNKNOWN = "not known, the paper gives no time. Measure it once: ________ min."
+"""What stands for a time that the paper does not give."""
 LOUPE = "10x with a scale of 0.1 mm"
 """Half a division is read; unaided, one minute of arc is 0.09 mm at 300 mm."""
 
@@ -435,17 +436,18 @@ def _before(works: Sequence[Work]) -> Iterator[str]:
             "that edges are nominal (warning above)."
         )
     if any(film.warning for film in films):
-        yield "Leave to cut these films, from the laser's owner; exhaust tried (warning above)."
+        yield "Laser's owner permits these films; exhaust tested (warning above)."
     if any(work.laminate.pins for work in works):
         yield (
             "Base plate made and measured (table under Cut): place and depth of each hole; every "
             "pin goes down to its shoulder by hand or with light taps, and comes out by the punch "
             "from below. Where none does, lap the hole. The corner that is cut off is marked."
         )
-    release = sum(2 * len(work.schedule.steps) for work in works)
-    yield f"Cut to the size above: {release} release films and the press pad."
+    release = sum(base_plate.release_films(work) for work in works)
+    pads = "the press pad" if len(works) == 1 else "every press pad"
+    yield f"Cut to the size under Materials: {release} release films and {pads}."
     if any(work.job.underlay is not None for work in works):
-        prints = sum(base_plate.hot_prints(work) for work in works if work.job.underlay)
+        prints = sum(base_plate.prints(work) for work in works if work.job.underlay)
         yield (
             f"Underlay printed at 100 %, {say.count(prints, 'time', 'times')}, the bars of each "
             "print measured, each cut out along its dotted line."
@@ -454,16 +456,16 @@ def _before(works: Sequence[Work]) -> Iterator[str]:
     first = works[0].schedule.steps[0]
     hot = say.temperature(first.temperature_c)
     yield (
-        f"Pressure of {first.pressure_kpa:g} kPa found once, cold, with {bench.film_words(works)} "
-        f"in the whole build-up, at {say.force(first.force_n)}; division of the press's gauge: "
-        "________."
+        f"Pressure of {first.pressure_kpa:g} kPa checked once, cold, in the whole build-up, at "
+        f"{say.force(first.force_n)}, with {bench.film_words(works)}. Division of the press's "
+        "gauge: ________."
     )
     yield f"Warming the platens from cold to {hot}: {UNKNOWN}"
     steps = sum(work.runs.count * len(work.schedule.steps) for work in works)
     yield from bench.before_the_day(works[0].schedule.heating, steps)
     yield f"Cooling the plate until it can be touched: {UNKNOWN} It comes after each step."
     if any(work.laminate.inlets for work in works):
-        yield "Adhesive in date; how long it cures stands on its package: ________ h."
+        yield "Adhesive in date; curing time on its package: ________ h."
 
 
 def tools(works: Sequence[Work]) -> list[Tool]:
@@ -473,7 +475,7 @@ def tools(works: Sequence[Work]) -> list[Tool]:
     width, length = first.platen_mm
     found = [
         Tool("Laser or drag knife", "cuts the film sheets; exhaust on"),
-        Tool("Lint-free cloths, isopropanol, clean gloves", "films and parts, before they bond"),
+        Tool("Lint-free cloths, isopropanol, clean gloves", "clean films and parts before bonding"),
     ]
     masks = [layer for one in laminates for layer in one.layers if layer.is_mask]
     held = {
@@ -488,23 +490,27 @@ def tools(works: Sequence[Work]) -> list[Tool]:
     if sizes:
         said = listed([f"⌀{say.millimetres(size)}" for size in sizes])
         thin = listed([f"⌀{say.millimetres(punch(size))}" for size in sizes])
+        has_underlay = any(work.job.underlay is not None for work in works)
+        pricked = "release film and underlay" if has_underlay else "the release film"
         found += [
             Tool(f"Drills, flat cutters, reamers H7 {said}", "base plate, if you make it yourself"),
-            Tool("Depth gauge, small hammer", "pins to their shoulders, their heights checked"),
-            Tool(f"Pin punches {thin}, or shanks of drills", "pins out, from below"),
-            Tool("Flat tweezers, pliers", "to hold the films down and to draw the pins"),
-            Tool("Needle", "to prick what lies under the films over the pins"),
+            Tool("Depth gauge, small hammer", "seat the pins on their shoulders, check heights"),
+            Tool(f"Pin punches {thin}, or shanks of drills", "push the pins out, from below"),
+            Tool("Flat tweezers, pliers", "hold the films down and draw the pins"),
+            Tool("Needle", f"pricks {pricked} over the pins"),
         ]
     if any(work.job.underlay is not None for work in works):
-        found.append(Tool("Knife, steel rule, 100 mm at least", "underlay: its bars, its cut"))
+        found.append(
+            Tool("Knife, steel rule, 100 mm at least", "measure the underlay's bars, cut it out")
+        )
     hands = [w.design.registration for w in works if w.laminate.registration == "channel-pin"]
     if hands:
         finest = say.millimetres(min(hand.hand_placement for hand in hands))
         found.append(
             Tool(
                 f"Measuring loupe, {LOUPE}; bright light",
-                f"to lay by eye to {finest}, and to measure what came out (sbafab record "
-                "--offset): the bare eye tells about 0.1 mm",
+                f"lay by eye to {finest} and measure the result (sbafab record --offset); the "
+                "unaided eye resolves about 0.1 mm",
             )
         )
     found += [
@@ -512,14 +518,14 @@ def tools(works: Sequence[Work]) -> list[Tool]:
             f"Heat press, {say.size(width, length)}",
             f"both platens to {say.temperature(first.temperature_c)}, {say.force(first.force_n)}",
         ),
-        Tool("Thermocouple with a reader, clock", "edge of the base plate: when a step begins"),
+        Tool("Thermocouple with a reader, clock", "on the plate's edge: starts each step's clock"),
         Tool(f"{bench.film_words(works)[:1].upper()}{bench.film_words(works)[1:]}", bench.COLD),
-        Tool("Heat-proof gloves", "the plate comes out as hot as the platens"),
+        Tool("Heat-proof gloves", "take the plate out, as hot as the platens"),
     ]
     if any(one.inlets for one in laminates):
         ears = "ears, " if any(one.registration == "ears" for one in laminates) else ""
         found += [
-            Tool("Fine scissors, razor blade, pen", f"{ears}strips, tubes; marks on tabs"),
+            Tool("Fine scissors, razor blade, pen", f"cut {ears}strips and tubes; mark tabs"),
             Tool(
                 "Regulator or syringe with a gauge, water or soapy water, eye protection",
                 "leak and proof test",

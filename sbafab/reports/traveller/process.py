@@ -80,8 +80,8 @@ def step_pages(work: Work) -> list[StepPage]:
             StepPage(
                 step,
                 BONDS[step.bond],
-                _dials(step),
-                tuple(bench.line(step)),
+                _dials(step, runs.together),
+                tuple(bench.heat_blanks(step, work.schedule.heating)),
                 build_up_svg(step, f"build-up-{step.step}"),
                 pin_lines(step),
                 _place_notes(runs),
@@ -95,7 +95,7 @@ def step_pages(work: Work) -> list[StepPage]:
     return found
 
 
-def _dials(step: Step) -> tuple[tuple[str, str], ...]:
+def _dials(step: Step, together: int) -> tuple[tuple[str, str], ...]:
     width, length = step.platen_mm
     return (
         ("Both platens", say.temperature(step.temperature_c)),
@@ -103,8 +103,15 @@ def _dials(step: Step) -> tuple[tuple[str, str], ...]:
         (f"Pressure on {say.size(width, length)}", say.pressure(step.pressure_kpa)),
         ("On the films (estimate)", f"about {step.film_kpa:.0f} kPa"),
         ("Clock", say.minutes(step.minutes)),
-        ("Pins", f"{len(step.pins)} in" if step.pins else "none"),
+        ("Pins", _pin_count(step, together)),
     )
+
+
+def _pin_count(step: Step, together: int) -> str:
+    """Return the pins that stand in the plate, at each of the places pressed together."""
+    if not step.pins:
+        return "none"
+    return f"{len(step.pins)} in" if together == 1 else f"{len(step.pins)} at each place"
 
 
 def _height(laminate: Laminate, part: AssemblyStep) -> str:
@@ -302,7 +309,7 @@ def tubing(work: Work) -> list[Action]:
     return [
         *_each_copy(work, "Fit the tubes"),
         Action(
-            f"Mark {first} with a pen, on the side that lay up in the press: the base is below."
+            f"Mark {first} with a pen, on the side that faced up in the press: the base is below."
         ),
         Action(
             f"Cut {say.count(len(inlets), 'piece')} of {tube_name(work.design)}, outer diameter "
@@ -312,12 +319,12 @@ def tubing(work: Work) -> list[Action]:
             f"Part the two films at the tab's end; the {strip} strip lies between them.", (), names
         ),
         Action(
-            f"Push the tube in beside the strip, up to {straight} deep: so long is the straight "
-            "run of the tab.",
+            f"Push the tube in beside the strip, up to {straight} deep: the length of the tab's "
+            "straight run.",
             (),
             names,
         ),
-        Action("Snip off what of the strip stands out of the tab, flush with its end.", (), names),
+        Action("Snip the strip off flush with the tab's end.", (), names),
         Action(
             f"Seal the mouth all round with a small drop of {work.design.inlet.adhesive}; keep it "
             "out of the tube.",
@@ -374,7 +381,7 @@ def leak_test(work: Work) -> list[Action]:
         Action("All balloons open evenly. One that stays shut was over-melted."),
         Action(f"No stream of bubbles anywhere; look at {places}."),
         *several,
-        Action("Let the pressure out, dry it."),
+        Action("Release the pressure; dry the actuator."),
         *proof_test(work, names, where),
     ]
 
@@ -410,14 +417,16 @@ def order_of(steps: Sequence[Step]) -> TakingDown:
         "Pad off first, straight up. The upper release film stays on until the plate is as cool as "
         "your hand: hot films still flow.",
         "Upper release film: hold the films down with a fingertip and fold the release film back "
-        "on itself, low, away from the finger. Pins may have pierced it: a new one for each step.",
+        "on itself, low, away from the finger. "
+        + ("Pins may have pierced it: take" if pinned else "Take")
+        + " a new one for each step.",
     ]
     if pinned:
         lines += [
-            "Pins, if there are any: turn plate and films over, films down, onto something soft, "
-            "cool, with a clean release film on it. It holds the films against the plate while the "
+            "In steps with pins: turn plate and films over, films down, onto something soft and "
+            "cool with a clean release film on it. It holds the films against the plate while the "
             "punch pushes each pin down through its push-out hole, until its seat is free. Turn "
-            "all of it back.",
+            "everything back.",
             "Every pin now stands high. Hold the films down on both sides of it with flat tweezers "
             "and draw it straight up with pliers: the way in which the films went on, so that no "
             "edge of a hole folds back.",
@@ -437,15 +446,15 @@ def taking_down(step: Step, product: str, is_pinned: bool) -> Iterator[Action]:
     """
     last = 5 if is_pinned else 3
     yield Action(
-        "Plate, films and pad out together, level, all hot. Pad off, cool it (1). Upper release "
-        "film off (2)."
+        "Take plate, films and pad out together, level; all are hot. Pad off (1). Let the plate "
+        "cool. Upper release film off (2)."
     )
     if step.pin_settings:
         yield Action(
-            f"Turned over onto {_soft(step)}, push the pins out of their seats (3): "
-            f"{_punches(step)}. Turned back, hold the films down and draw the pins (4)."
+            f"Turn over onto {_soft(step)} and push the pins out of their seats (3): "
+            f"{_punches(step)}. Turn back, hold the films down and draw the pins (4)."
         )
-    away = "; underlay off the plate and away" if _has_underlay(step) else ""
+    away = "; underlay off the plate, discard it" if _has_underlay(step) else ""
     yield Action(f"Lower release film off ({last}){away}. You now hold {product}.")
 
 
@@ -606,16 +615,16 @@ def proof(work: Work) -> Proof:
     if burst is None:
         return Proof(
             None,
-            f"{forces}; nobody burst this film or this pocket. Burst one actuator, write down the "
-            f"pressure, ________ kPa, and prove the others at {SHARE:.0%} of it",
+            f"{forces}; nobody has burst this film or this pocket. Burst one actuator, write down "
+            f"the pressure, ________ kPa, and proof test the others at {SHARE:.0%} of it",
         )
     most = math.floor(SHARE * burst / STEP) * STEP
     if asked <= most:
-        return Proof(asked, f"{forces}; about {burst:.0f} kPa are estimated for this one")
+        return Proof(asked, f"{forces}; this one is estimated to burst at about {burst:.0f} kPa")
     return Proof(
         most,
         f"{forces}; this one is estimated to burst at about {burst:.0f} kPa (film stress in "
-        f"proportion, ours), so it is proved at {SHARE:.0%} of that and not at {asked:g} kPa"
+        f"proportion, ours), so its proof pressure is {SHARE:.0%} of that and not {asked:g} kPa"
         + ("" if most >= FORCE_KPA else f"; do not count on forces at {FORCE_KPA:g} kPa"),
     )
 
@@ -653,7 +662,7 @@ def proof_test(work: Work, names: tuple[str, ...], where: str) -> list[Action]:
             (),
             names,
         ),
-        Action("It holds: no bang, no hiss, no balloon that swells more than its neighbours."),
+        Action("Passed: no bang, no hiss, no balloon that swells more than its neighbours."),
         Action(
             f"Leak test again, as above, at {work.design.acceptance.leak_pressure_kpa:g} kPa: a "
             "bond that began to peel shows now.",
@@ -662,6 +671,6 @@ def proof_test(work: Work, names: tuple[str, ...], where: str) -> list[Action]:
         ),
         Action(
             f"Accepted: no leak at {leak_words(work)}, {proof_words(work)} held, no leak after "
-            f"it. Write both results {where}; what fails one is not handed on."
+            f"it. Write both results {where}; reject an actuator that fails either."
         ),
     ]

@@ -31,7 +31,7 @@ def laser_basis(work: Work) -> str:
     return (
         f"{cut / 1000:.2f} m of cut at {laser.cut_speed:g} mm/s, {travel / 1000:.2f} m of travel "
         f"at {laser.travel_speed:g} mm/s, {say.count(contours, 'contour')} with "
-        f"{laser.pierce_seconds:g} s each to begin, labels left out; no setting of your machine"
+        f"{laser.pierce_seconds:g} s each to pierce, without labels; not a setting of your machine"
     )
 
 
@@ -43,7 +43,7 @@ def _batch(work: Work) -> list[Time]:
     took = batch_times(runs, plan)
     made_of = (
         f"{say.count(runs.count, 'press cycle')} of {say.plain(plan.total_press_minutes)} min, "
-        f"{runs.copies} times the handling below, one after the other; one by one "
+        f"{runs.copies} times the handling below, one after the other; copies pressed singly: "
         f"{say.minutes(say.product(runs.copies, plan.estimated_build_minutes))}"
     )
     row = f"All {runs.copies} copies"
@@ -73,14 +73,14 @@ def times(work: Work) -> list[Time]:
         Time(
             "Handling",
             say.minutes(handling),
-            "cutting, laying up, pins, tubes; the paper's total less its 45 min in the press, "
-            "assumed the same for every design",
+            "cutting, lay-up, pins, tubes: the paper's total less its 45 min in the press, assumed "
+            "equal for every design",
         ),
         Time(
             "Total, one actuator",
             say.whole_minutes(plan.estimated_build_minutes),
-            "without heating the press up, warming the plate before each clock starts, curing of "
-            "the adhesive and the leak test",
+            "not included: heating the press, warming the plate before each clock starts, curing "
+            "the adhesive, leak and proof tests",
         ),
         Time("The paper", f"{PAPER_MINUTES:g} min = {say.hours(PAPER_MINUTES)}", "1-DoF or 3-DoF"),
     ]
