@@ -10,7 +10,7 @@ from sbafab.actuators import build, load_design
 from sbafab.as_built.check import check_folder
 from sbafab.geometry.region import Region, disc
 from sbafab.output.run import generate
-from sbafab.reports.traveller.step_pictures import over_tab
+from sbafab.reports.traveller.lay_up import over_tab
 from sbafab.rules.finding import Finding
 from tests.as_built.doctoring import Doctor
 

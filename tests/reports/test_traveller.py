@@ -25,7 +25,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.drawing import TIMES
-from sbafab.reports.traveller import job as say
+from sbafab.reports.traveller import units
 from sbafab.reports.traveller.bill import cut_list
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import traveller_html
@@ -111,10 +111,12 @@ def test_the_page_is_whole_in_itself(sheet_files: Any, given: tuple[str, ...]) -
 
 
 def test_dials_are_the_papers() -> None:
-    assert say.temperature(135.0) == "135 °C (275 °F)"
-    assert say.force(110.0 * 152.4**2 / 1000) == "2555 N = 2.555 kN = 574 lbf"
+    assert units.temperature(135.0) == "135 °C (275 °F)"
+    assert units.force(110.0 * 152.4**2 / 1000) == "2555 N = 2.555 kN = 574 lbf"
     # 1 psi is the weight of 0.45359237 kg on a square inch.
-    assert say.pressure(110.0) == f"110 kPa ({110e3 * 0.0254**2 / (0.45359237 * 9.80665):.1f} psi)"
+    assert (
+        units.pressure(110.0) == f"110 kPa ({110e3 * 0.0254**2 / (0.45359237 * 9.80665):.1f} psi)"
+    )
 
 
 def test_each_step_shows_its_dials(sheet_files: Any) -> None:

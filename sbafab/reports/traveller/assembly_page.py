@@ -19,12 +19,11 @@ from sbafab.laminate.films import Film
 from sbafab.models.formulas import inflated_diameter, reached_diameter
 from sbafab.pressing.cycles import Runs
 from sbafab.pressing.schedule import listed
-from sbafab.reports.traveller import base_plate, bench, bill, times
-from sbafab.reports.traveller import job as say
+from sbafab.reports.traveller import base_plate, bench, bill, units
+from sbafab.reports.traveller.bench import before_the_day, tools
 from sbafab.reports.traveller.bill import Item
 from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.traveller.page import (
-    before_the_day,
     cautions,
     code_svg,
     context,
@@ -33,7 +32,6 @@ from sbafab.reports.traveller.page import (
     frame,
     record_text,
     sheet_rows,
-    tools,
 )
 from sbafab.reports.traveller.shapes import definitions, pattern_regions
 from sbafab.reports.traveller.sheet_map import part_regions
@@ -106,8 +104,8 @@ def assembly_html(job: AssemblyJob) -> str:
             before_cutting=bench.before_cutting(works),
             after_cutting=bench.after_cutting(works),
             sheet_rows=sheet_rows(works[0].design, job.sheets, _marks(job)),
-            laser_minutes=times.laser_minutes(works[0]),
-            laser_basis=times.laser_basis(works[0]),
+            laser_minutes=bill.laser_minutes(works[0]),
+            laser_basis=bill.laser_basis(works[0]),
             press_plan=[_press_words(one) for one in job.works],
             not_together=_not_together(job),
             marks=_marks(job),
@@ -215,10 +213,10 @@ def _films(job: AssemblyJob) -> list[bill.Item]:
         sheets = [sheet for sheet in job.sheets if sheet.material == film.material]
         sizes: dict[str, int] = {}
         for sheet in sheets:
-            size = say.size(sheet.width, sheet.length)
+            size = units.size(sheet.width, sheet.length)
             sizes[size] = sizes.get(size, 0) + 1
-        needed = ", ".join(f"{say.count(n, 'sheet')} {size}" for size, n in sizes.items())
-        what = f"{film.product}, {say.millimetres(film.thickness)} thick; {area:.1f} cm² of parts"
+        needed = ", ".join(f"{units.count(n, 'sheet')} {size}" for size, n in sizes.items())
+        what = f"{film.product}, {units.millimetres(film.thickness)} thick; {area:.1f} cm² of parts"
         items.append(bill.Item(f"{film.material} film", what, needed))
     return items
 
@@ -227,21 +225,21 @@ def _press_words(one: DesignWork) -> str:
     """How often the press closes on a design, and why that is enough."""
     runs, minutes = one.runs, one.work.schedule.total_press_minutes
     design = one.work.design
-    copies = say.count(runs.copies, "copy", "copies")
+    copies = units.count(runs.copies, "copy", "copies")
     words = f"{design.name}, {copies}: "
     if runs.together > 1:
         width, length = design.press.platen_width, design.press.platen_length
         at_once = "all at once" if runs.count == 1 else f"{runs.together} at a time"
         words += (
-            f"{say.count(runs.count, 'lamination')}, {at_once}, side by side within the heated "
-            f"{say.size(width, length)}: copies are alike layer by layer, so they share the "
+            f"{units.count(runs.count, 'lamination')}, {at_once}, side by side within the heated "
+            f"{units.size(width, length)}: copies are alike layer by layer, so they share the "
             f"pressure evenly (ours: the paper does not say how many it pressed at once). "
-            f"{say.plain(say.product(runs.count, minutes))} min in the press instead of "
-            f"{say.plain(say.product(runs.copies, minutes))}"
+            f"{units.plain(units.product(runs.count, minutes))} min in the press instead of "
+            f"{units.plain(units.product(runs.copies, minutes))}"
         )
     else:
-        pressed = say.plain(say.product(runs.count, minutes))
-        words += f"{say.count(runs.count, 'lamination')}, {pressed} min in the press"
+        pressed = units.plain(units.product(runs.count, minutes))
+        words += f"{units.count(runs.count, 'lamination')}, {pressed} min in the press"
     if design.form.wrap is not None and design.form.stacks > 1:
         words += f". Its {design.form.stacks} SBAs lie on one sheet and are laminated at once"
         words += ", as in the paper"
@@ -258,7 +256,7 @@ def _not_together(job: AssemblyJob) -> str:
     """Why unlike designs do not share the press; empty where there is only one."""
     if len(job.works) < 2:
         return ""
-    sizes = [f"{one.name} {say.millimetres(one.work.laminate.thickness)}" for one in job.works]
+    sizes = [f"{one.name} {units.millimetres(one.work.laminate.thickness)}" for one in job.works]
     return (
         f"Not pressed together: {listed([one.name for one in job.works])}. Their stacks differ "
         f"in height ({listed(sizes)}) and steps; the paper presses only like patterns at once, "
@@ -266,27 +264,27 @@ def _not_together(job: AssemblyJob) -> str:
     )
 
 
-def _times(job: AssemblyJob) -> list[times.Time]:
-    rows: list[times.Time] = []
+def _times(job: AssemblyJob) -> list[bill.Time]:
+    rows: list[bill.Time] = []
     total: float | None = 0.0
     for one in job.works:
         plan, runs = one.work.schedule, one.runs
-        pressed = say.product(runs.count, plan.total_press_minutes)
+        pressed = units.product(runs.count, plan.total_press_minutes)
         handled = runs.copies * plan.hands_minutes
         whole = None if pressed is None else pressed + handled
         total = None if total is None or whole is None else total + whole
         made_of = (
-            f"{say.count(runs.count, 'lamination')} of {say.plain(plan.total_press_minutes)} min; "
-            f"{handled:g} min of handling: cutting, lay-up, pins, tubes"
+            f"{units.count(runs.count, 'lamination')} of {units.plain(plan.total_press_minutes)} "
+            f"min; {handled:g} min of handling: cutting, lay-up, pins, tubes"
         )
-        rows.append(times.Time(f"Making {one.name}", say.minutes(whole), made_of))
-    laser = say.minutes(times.laser_minutes(job.works[0].work))
-    basis = times.laser_basis(job.works[0].work)
-    rows.append(times.Time("Laser (within making)", laser, f"{basis}; all sheets"))
+        rows.append(bill.Time(f"Making {one.name}", units.minutes(whole), made_of))
+    laser = units.minutes(bill.laser_minutes(job.works[0].work))
+    basis = bill.laser_basis(job.works[0].work)
+    rows.append(bill.Time("Laser (within making)", laser, f"{basis}; all sheets"))
     rows.append(
-        times.Time(
+        bill.Time(
             "Total, without joining",
-            say.whole_minutes(total),
+            units.whole_minutes(total),
             "not included: heating the press, warming the plate, leak and proof tests, gluing and "
             "curing, for which the paper gives no times",
         )
@@ -365,21 +363,21 @@ def _ready(placed: PlacedPart) -> Iterator[Action]:
     part = placed.part
     if isinstance(part, Tube):
         yield Action(
-            f"Cut {say.millimetres(part.length)} of {part.material} tube, outer diameter "
-            f"{say.millimetres(part.outer_diameter)}, inner "
-            f"{say.millimetres(part.inner_diameter)}, square. Mark its start, and a straight line "
-            "along it: that is angle 0."
+            f"Cut {units.millimetres(part.length)} of {part.material} tube, outer diameter "
+            f"{units.millimetres(part.outer_diameter)}, inner "
+            f"{units.millimetres(part.inner_diameter)}, square. Mark its start, and a straight "
+            "line along it: that is angle 0."
         )
     elif isinstance(part, Base):
         yield Action(
-            f"Have a {part.kind} of {part.material} ready, {say.size(part.width, part.length)}, "
-            f"{say.millimetres(part.thickness)} thick. Mark its top, and on both faces an arrow "
-            f"along the {say.millimetres(part.width)}, the same way."
+            f"Have a {part.kind} of {part.material} ready, {units.size(part.width, part.length)}, "
+            f"{units.millimetres(part.thickness)} thick. Mark its top, and on both faces an arrow "
+            f"along the {units.millimetres(part.width)}, the same way."
         )
     elif isinstance(part, Magnet):
         yield Action(
-            f"Measure {part.part}: {say.millimetres(part.diameter)} across, "
-            f"{say.millimetres(part.thickness)} thick. If it differs, change the assembly's file "
+            f"Measure {part.part}: {units.millimetres(part.diameter)} across, "
+            f"{units.millimetres(part.thickness)} thick. If it differs, change the assembly's file "
             "and generate again."
         )
         yield Action(
@@ -389,14 +387,15 @@ def _ready(placed: PlacedPart) -> Iterator[Action]:
     elif isinstance(part, Cup):
         yield Action(
             f"Cast the cup in {part.material} as its package says: rim "
-            f"{say.millimetres(part.diameter)}, neck {say.millimetres(part.neck)}, height "
-            f"{say.millimetres(part.height)}, wall {say.millimetres(part.wall)}, hole for the line "
-            f"{say.millimetres(part.bore)}."
+            f"{units.millimetres(part.diameter)}, neck {units.millimetres(part.neck)}, height "
+            f"{units.millimetres(part.height)}, wall {units.millimetres(part.wall)}, hole for the "
+            f"line {units.millimetres(part.bore)}."
         )
     elif isinstance(part, Line):
         yield Action(
-            f"Cut {part.tubing}, outer diameter {say.millimetres(part.outer_diameter)}, square and "
-            f"without burr; the design has {say.millimetres(part.length)}, your rig may need more."
+            f"Cut {part.tubing}, outer diameter {units.millimetres(part.outer_diameter)}, square "
+            f"and without burr; the design has {units.millimetres(part.length)}, your rig may need "
+            "more."
         )
     else:
         yield Action(
@@ -422,7 +421,7 @@ def _spot(placed: PlacedPart, other: PlacedPart) -> str:
     part = placed.part
     x, y = part.offset
     if part.at == "outside":
-        spot = f"{_round(part.angle)}, {say.millimetres(part.along)} from the tube's start"
+        spot = f"{_round(part.angle)}, {units.millimetres(part.along)} from the tube's start"
         return spot if not part.turn else f"{spot}, turned {part.turn:g} degrees anti-clockwise"
     has_mark = isinstance(part, Sba | Tube | Base)
     words = [f"looking at that face, with {_mark(other)} to the right"]
@@ -446,7 +445,7 @@ def _is_below(placed: PlacedPart) -> bool:
 
 
 def _aside(value: float, plus: str, minus: str) -> str:
-    return f"{say.millimetres(abs(value))} {plus if value > 0 else minus}" if value else ""
+    return f"{units.millimetres(abs(value))} {plus if value > 0 else minus}" if value else ""
 
 
 def _mark(placed: PlacedPart) -> str:
@@ -486,7 +485,7 @@ def _round(angle: float) -> str:
 def _bend(placed: PlacedSba, other: PlacedPart) -> Iterator[Action]:
     part = placed.part
     form = placed.made.design.form
-    middle = say.millimetres(part.along)
+    middle = units.millimetres(part.along)
     if form.wrap is None:
         yield Action(
             f"Bend it round {other.name}, base inward: its lumen {_round(part.angle)}, {middle} "
@@ -501,7 +500,8 @@ def _bend(placed: PlacedSba, other: PlacedPart) -> Iterator[Action]:
     )
     yield Action(
         f"Check: the edges of the sheet meet, and the {form.stacks} SBAs lie {360 / form.stacks:g} "
-        f"degrees apart ({say.millimetres(form.wrap.pitch)} round the tube, measured on the sheet)."
+        f"degrees apart ({units.millimetres(form.wrap.pitch)} round the tube, measured on the "
+        "sheet)."
     )
 
 
@@ -535,7 +535,7 @@ def _thread(placed: PlacedPart, line: Line, other: PlacedPart) -> Iterator[Actio
         )
     past = line.along + line.length - other.height
     face = "top" if other.made is not None else "end"
-    side = f"{say.millimetres(abs(past))} {'past' if past >= 0 else 'short of'} its {face}"
+    side = f"{units.millimetres(abs(past))} {'past' if past >= 0 else 'short of'} its {face}"
     yield Action(f"Thread it through the lumen of {other.name} until it ends {side}.")
 
 
@@ -613,10 +613,10 @@ def final_checks(assembled: Assembled) -> list[Action]:
     if any(isinstance(placed.part, Cup) for placed in assembled.parts):
         actions.append(Action("Press the cup on glass and draw vacuum: the cup holds."))
     if deploy.aperture_diameter is not None:
-        hole = say.millimetres(deploy.aperture_diameter)
+        hole = units.millimetres(deploy.aperture_diameter)
         actions.append(Action(f"Deflated and folded, it goes through a hole of {hole}."))
     if deploy.lumen_diameter is not None:
-        lumen = say.millimetres(deploy.lumen_diameter)
+        lumen = units.millimetres(deploy.lumen_diameter)
         actions.append(Action(f"Deflated, it slides through a tube of inner diameter {lumen}."))
         actions += [
             Action(
@@ -653,22 +653,22 @@ def _item(placed: PlacedPart, copies: int) -> Item:
     part, name = placed.part, f"{placed.part.kind.capitalize()} “{placed.name}”"
     if isinstance(part, Tube):
         size = (
-            f"{part.material}, outer diameter {say.millimetres(part.outer_diameter)}, inner "
-            f"{say.millimetres(part.inner_diameter)}, {say.millimetres(part.length)} long"
+            f"{part.material}, outer diameter {units.millimetres(part.outer_diameter)}, inner "
+            f"{units.millimetres(part.inner_diameter)}, {units.millimetres(part.length)} long"
         )
     elif isinstance(part, Magnet):
         size = (
-            f"{part.part}, {say.millimetres(part.diameter)} across, "
-            f"{say.millimetres(part.thickness)} thick"
+            f"{part.part}, {units.millimetres(part.diameter)} across, "
+            f"{units.millimetres(part.thickness)} thick"
         )
     elif isinstance(part, Cup):
-        size = f"cast from {part.material}, rim {say.millimetres(part.diameter)}"
+        size = f"cast from {part.material}, rim {units.millimetres(part.diameter)}"
     elif isinstance(part, Line):
         size = (
-            f"{part.tubing}, outer diameter {say.millimetres(part.outer_diameter)}, "
-            f"{say.millimetres(part.length)}"
+            f"{part.tubing}, outer diameter {units.millimetres(part.outer_diameter)}, "
+            f"{units.millimetres(part.length)}"
         )
     else:
         assert isinstance(part, Base)
-        size = f"{part.material}, {say.size(part.width, part.length)}"
+        size = f"{part.material}, {units.size(part.width, part.length)}"
     return Item(name, size, str(copies))

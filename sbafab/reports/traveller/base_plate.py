@@ -9,10 +9,13 @@ from sbafab.cutting.fixture import plate_corner
 from sbafab.laminate.base_plate import MAKINGS, most_play
 from sbafab.laminate.laminate import Pin
 from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, RELEASE, UNDERLAY, pieces
-from sbafab.pressing.dowels import PinHole, pin_holes
-from sbafab.pressing.schedule import Schedule, Step, listed
-from sbafab.reports.traveller import job as say
-from sbafab.reports.traveller.bench import TAPE
+from sbafab.pressing.dowels import PinHole, pin_holes, push_out
+from sbafab.pressing.schedule import (
+    Schedule,
+    Step,
+    listed,
+)
+from sbafab.reports.traveller import units
 from sbafab.reports.traveller.job import Work
 
 MOST_LISTED = 9
@@ -131,7 +134,7 @@ def _underlay_words(work: Work) -> str:
     if not steps:
         return ""
     which = listed([str(number) for number in steps])
-    thick = say.millimetres(work.design.press.underlay_thickness)
+    thick = units.millimetres(work.design.press.underlay_thickness)
     pins = ", which the pin heights allow for" if work.laminate.pins else ""
     return (
         f" In step{'s' if len(steps) > 1 else ''} {which} a fresh print of the underlay, cut out "
@@ -168,7 +171,7 @@ def build_up_notes(work: Work) -> tuple[str, ...]:
     step = work.schedule.steps[-1]
     thick = {item.part: item for item in step.build_up}
     newtons, kilopascals = f"{step.force_n:.0f} N", f"{step.pressure_kpa:g} kPa"
-    size = say.size(*step.platen_mm)
+    size = units.size(*step.platen_mm)
     plate, pad, release = thick[BASE_PLATE], thick[PAD], thick[RELEASE]
     together = work.runs.together
     alone = together * work.laminate.layers[-1].profile.area
@@ -176,9 +179,9 @@ def build_up_notes(work: Work) -> tuple[str, ...]:
     holes = "has no holes, pins press into it, and it " if work.laminate.pins else ""
     return (
         "Every step has the same build-up, from the lower platen up: base plate "
-        f"({plate.material}, {say.millimetres(plate.thickness_mm)}, {size}, as large as the "
+        f"({plate.material}, {units.millimetres(plate.thickness_mm)}, {size}, as large as the "
         f"platen), release film ({release.material}), {LAMINATE}, release film, press pad "
-        f"({pad.material}, {say.millimetres(pad.thickness_mm)}, as large as the platen), upper "
+        f"({pad.material}, {units.millimetres(pad.thickness_mm)}, as large as the platen), upper "
         f"platen. Nothing rigid lies on the films: no second plate.{_underlay_words(work)}",
         f"{newtons} is {kilopascals} on the whole platen of {size}; the paper gives no force. The "
         f"pad brings it to the films; without it {newtons} on the {what} alone ({alone:.0f} mm²) "
@@ -197,8 +200,8 @@ def build_up_again(work: Work) -> tuple[str, ...]:
     plate, pad = thick[BASE_PLATE], thick[PAD]
     return (
         "Build-up, force and heating are those of the first Press section, with a press pad of "
-        f"{say.millimetres(pad.thickness_mm)} ({pad.material}) and a base plate of "
-        f"{say.millimetres(plate.thickness_mm)}; each step states the pressure on the films.",
+        f"{units.millimetres(pad.thickness_mm)} ({pad.material}) and a base plate of "
+        f"{units.millimetres(plate.thickness_mm)}; each step states the pressure on the films.",
     )
 
 
@@ -207,7 +210,7 @@ def items(work: Work) -> list[tuple[str, str, str]]:
     laminate, plan = work.laminate, work.schedule
     first = plan.steps[0]
     thick = {item.part: item for item in first.build_up}
-    size = say.size(*first.platen_mm)
+    size = units.size(*first.platen_mm)
     plate, pad, release = thick[BASE_PLATE], thick[PAD], thick[RELEASE]
     sheets = pieces(pad.thickness_mm)
     piled = f", a pile of {sheets} sheets" if sheets > 1 else ""
@@ -222,18 +225,18 @@ def items(work: Work) -> list[tuple[str, str, str]]:
         ),
         (
             "Base plate",
-            f"{plate.material}, {say.millimetres(plate.thickness_mm)}, {size}{holes}",
+            f"{plate.material}, {units.millimetres(plate.thickness_mm)}, {size}{holes}",
             "1",
         ),
         (
             "Release film",
-            f"{release.material}, {say.millimetres(release.thickness_mm)}, {size}; TPE must not "
+            f"{release.material}, {units.millimetres(release.thickness_mm)}, {size}; TPE must not "
             "stick to it at press temperature (our advice; the paper names none)",
             str(release_films(work)),
         ),
         (
             "Press pad",
-            f"{pad.material}, {say.millimetres(pad.thickness_mm)}{piled}, {size}, for "
+            f"{pad.material}, {units.millimetres(pad.thickness_mm)}{piled}, {size}, for "
             f"{first.temperature_c:g} °C in continuous use (our advice; the paper names none)",
             str(sheets),
         ),
@@ -251,9 +254,21 @@ def _pin_items(pins: tuple[Pin, ...], plan: Schedule, standard: str) -> list[tup
     return [
         (
             "Dowel pins",
-            f"{standard}, ⌀{say.millimetres(diameter)} m6, {say.millimetres(length)} long; spares "
-            "to choose from",
+            f"{standard}, ⌀{units.millimetres(diameter)} m6, {units.millimetres(length)} long; "
+            "spares to choose from",
             f"{number} + {max(2, number // 2)} spare",
         )
         for (diameter, length), number in sorted(sizes.items())
     ]
+
+
+TAPE = "polyimide tape (silicone adhesive, rated 260 °C)"
+
+
+PUNCH_PLAY = 0.1
+"""mm by which the punch is thinner than the push-out hole."""
+
+
+def punch(diameter: float) -> float:
+    """Return the diameter of the punch for pins of a diameter, mm."""
+    return round(push_out(diameter) - PUNCH_PLAY, 2)

@@ -16,7 +16,7 @@ from sbafab.pressing.cycles import (
     working_days,
 )
 from sbafab.reports import drawing as draw
-from sbafab.reports.traveller import job as say
+from sbafab.reports.traveller import units
 from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.traveller.shapes import Picture, flat, label, pattern_id
 
@@ -123,12 +123,12 @@ def batch_page(work: Work) -> BatchPage | None:
 
 def _said(work: Work, runs: Runs) -> str:
     times, one = batch_times(runs, work.schedule), work.schedule.total_press_minutes
-    cycles = say.count(runs.count, "press cycle")
+    cycles = units.count(runs.count, "press cycle")
     sizes = ", ".join(str(size) for size in dict.fromkeys(runs.cycles))
     why = f" {work.design.order.why}" if work.design.order.why else ""
     return (
-        f"{runs.copies} copies in {cycles} of {sizes} at once: {say.plain(times.press)} min in the "
-        f"press instead of {say.plain(say.product(runs.copies, one))}.{why}"
+        f"{runs.copies} copies in {cycles} of {sizes} at once: {units.plain(times.press)} min in "
+        f"the press instead of {units.plain(units.product(runs.copies, one))}.{why}"
     )
 
 
@@ -140,8 +140,8 @@ def _plan(work: Work) -> tuple[PlanRow, ...]:
         PlanRow(
             entry.day,
             days.count(entry.day) if number == days.index(entry.day) else 0,
-            say.clock(entry.start),
-            say.clock(entry.start + entry.minutes),
+            units.clock(entry.start),
+            units.clock(entry.start + entry.minutes),
             _task(work, entry),
             _copies(entry),
             f"{entry.minutes:.0f}",
@@ -185,7 +185,7 @@ def _plan_basis(work: Work) -> str:
         f"these {CUT_SHARE:.0%} for cutting, {FINISH_SHARE:.0%} for the tubes and the rest for the "
         "steps, in proportion to the parts that each lays (ours). Not included: warming and "
         "cooling the plate in every press step (blanks in Before the day), for which the fullest "
-        f"day with a press step has {say.clock(max(0.0, left))} left, curing, leak and proof "
+        f"day with a press step has {units.clock(max(0.0, left))} left, curing, leak and proof "
         "tests. Write the actual minutes beside each row."
     )
 

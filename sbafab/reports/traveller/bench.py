@@ -10,8 +10,19 @@ from sbafab.design.records import HoldDown
 from sbafab.laminate.assembly import AssemblyStep, distinct_layers
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.schedule import END, MELTING, PATIENCE, START, Heating, HeatPoint, Step, listed
-from sbafab.reports.traveller import job as say
+from sbafab.pressing.schedule import (
+    END,
+    MELTING,
+    PATIENCE,
+    START,
+    Heating,
+    HeatPoint,
+    Step,
+    listed,
+)
+from sbafab.reports.traveller import base_plate, units
+from sbafab.reports.traveller.base_plate import punch
+from sbafab.reports.traveller.bill import kerf_states
 from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.underlay import guides
 from sbafab.rules.pin_fit import NAME as PIN_FIT
@@ -46,7 +57,6 @@ HOLDING: Mapping[HoldDown, str] = {
 SILICONE = " PTFE hardly sticks to acrylic or rubber adhesives: the carrier's must be silicone."
 RIM = 10.0
 """mm of film round a registered sheet, by which it is held down."""
-TAPE = "polyimide tape (silicone adhesive, rated 260 °C)"
 
 
 def before_first_cut() -> list[Action]:
@@ -95,7 +105,7 @@ def _held(works: Sequence[Work], film: Film) -> Action:
     weight = ""
     if film.density is not None:
         weight = f", the lightest of {lightest * film.thickness * film.density / 1000:.2g} mg"
-    thin = say.millimetres(film.thickness)
+    thin = units.millimetres(film.thickness)
     how = HOLDING[hold_down(works[0], film)]
     sticks = SILICONE if film.is_mask and hold_down(works[0], film) == "carrier" else ""
     return Action(
@@ -117,8 +127,8 @@ def after_cutting(works: Sequence[Work]) -> list[Action]:
     if loose:
         actions.append(
             Action(
-                f"{say.count(loose, 'loose mask piece')}: pick them up with antistatic tweezers on "
-                "an earthed mat, keep them in a dish with a lid. PTFE charges itself and flies."
+                f"{units.count(loose, 'loose mask piece')}: pick them up with antistatic tweezers "
+                "on an earthed mat, keep them in a dish with a lid. PTFE charges itself and flies."
             )
         )
     return actions
@@ -135,13 +145,13 @@ def _threading(works: Sequence[Work]) -> list[Action]:
     if not tight:
         return []
     stretch, allowed, work = max(tight, key=lambda one: one[0])
-    error = say.millimetres(work.design.registration.cutting_error)
+    error = units.millimetres(work.design.registration.cutting_error)
     return [
         Action(
             "Try one part of every pattern on its pins before you lay up. With edges off by "
             f"{error}, the worst case, a film must stretch by {stretch:.0%} over its pin "
             f"({allowed:.0%} is allowed; nobody has tried it), and up to "
-            f"{say.count(most_on_a_pin(work.laminate), 'film')} go on one pin. If one tears or "
+            f"{units.count(most_on_a_pin(work.laminate), 'film')} go on one pin. If one tears or "
             "wrinkles, stop: the designer takes a thinner pin or a wider bore."
         )
     ]
@@ -224,10 +234,10 @@ def heat_blanks(step: Step, heating: Heating) -> list[HeatBlank]:
 def _heat_words(point: HeatPoint, step: Step, heating: Heating) -> str:
     """Return the point so short that three of them fit on one line of the page."""
     if point.point == END:
-        return f"end ({say.minutes(step.minutes)} later)"
+        return f"end ({units.minutes(step.minutes)} later)"
     what = "melting" if point.point == MELTING else point.point
     minutes = point.after_minutes
-    after = _constants(point, heating) if minutes is None else say.minutes(minutes)
+    after = _constants(point, heating) if minutes is None else units.minutes(minutes)
     return f"{point.edge_c:g} °C ({what}, {after})"
 
 
@@ -248,7 +258,7 @@ def note(work: Work) -> str:
         "starts. Ours: plate and films go in cold, and the clock starts when a thermocouple taped "
         f"to the plate's edge reads {heating.clock_c:g} °C, not before. A first-order estimate of "
         f"that edge is T = {platens:g} - {warms:g} exp(-t/τ) °C from {heating.start_c:g} °C, τ of "
-        f"this bench {say.plain(heating.time_constant_minutes)} min (measured as in Before the "
+        f"this bench {units.plain(heating.time_constant_minutes)} min (measured as in Before the "
         "day). After closing, "
     )
     starts = f"the clock starts after {_after(start, heating)}"
@@ -270,25 +280,25 @@ def note(work: Work) -> str:
 
 
 def _after(point: HeatPoint, heating: Heating) -> str:
-    return f"{_constants(point, heating)} = {say.minutes(point.after_minutes)}"
+    return f"{_constants(point, heating)} = {units.minutes(point.after_minutes)}"
 
 
 def closing_words(step: Step, heating: Heating) -> str:
     """Return when the clock of a step starts; one line of the page."""
     return (
-        f"Close the press. Start the clock, {say.minutes(step.minutes)}, only when the plate's "
+        f"Close the press. Start the clock, {units.minutes(step.minutes)}, only when the plate's "
         f"edge reads {heating.clock_c:g} °C (see Time, above)."
     )
 
 
 def _patience(heating: Heating) -> str:
     tau = heating.time_constant_minutes
-    return say.minutes(None if tau is None else PATIENCE * tau)
+    return units.minutes(None if tau is None else PATIENCE * tau)
 
 
-def before_the_day(heating: Heating, steps: int) -> Iterator[str]:
+def heating_lines(heating: Heating, steps: int) -> Iterator[str]:
     """Yield how τ is measured, and what to do where the plate's edge stays too cold."""
-    hot, ready = say.temperature(heating.platen_c), say.temperature(heating.clock_c)
+    hot, ready = units.temperature(heating.platen_c), units.temperature(heating.clock_c)
     reach = heating.platen_c - (heating.platen_c - heating.start_c) * math.exp(-1)
     yield (
         "Time constant τ of the plate, once for a bench: lay the whole build-up without films, "
@@ -296,7 +306,7 @@ def before_the_day(heating: Heating, steps: int) -> Iterator[str]:
         f"platens at {hot} and log the reading every half minute. τ is the time to {reach:.0f} "
         "°C, 63 % of the way: ________ min. Set press.time_constant to it. Add "
         f"{heating.constants_to(heating.clock_c):.2f} τ to each of the "
-        f"{say.count(steps, 'press step')}."
+        f"{units.count(steps, 'press step')}."
     )
     yield (
         f"Edge temperature after {PATIENCE:g} τ: ________ °C. It must be {ready} or more. If it is "
@@ -361,12 +371,152 @@ def film_words(works: Sequence[Work]) -> str:
 def notes(work: Work) -> tuple[str, ...]:
     """Return what a reading of the press's gauge is worth on the platen."""
     step = work.schedule.steps[0]
-    pound = step.pressure_kpa / step.force_n * say.NEWTONS_PER_POUND
+    pound = step.pressure_kpa / step.force_n * units.NEWTONS_PER_POUND
     finest = 2 * WANTED * step.pressure_kpa / pound
     return (
-        f"The gauge must read {say.force(step.force_n)}; 1 lbf is {pound:.2g} kPa. Read to half a "
-        f"division, a gauge sets {step.pressure_kpa:g} kPa to {WANTED:.0%} if it has a division "
-        f"every {finest:.0f} lbf ({finest * say.NEWTONS_PER_POUND:.0f} N) or finer; the divisions "
-        "of the paper's press (Carver 5420) are not known to us. With a coarser gauge, set the "
-        "force by a load cell between the platens, cold, and mark the gauge.",
+        f"The gauge must read {units.force(step.force_n)}; 1 lbf is {pound:.2g} kPa. Read to half "
+        f"a division, a gauge sets {step.pressure_kpa:g} kPa to {WANTED:.0%} if it has a division "
+        f"every {finest:.0f} lbf ({finest * units.NEWTONS_PER_POUND:.0f} N) or finer; the "
+        "divisions of the paper's press (Carver 5420) are not known to us. With a coarser gauge, "
+        "set the force by a load cell between the platens, cold, and mark the gauge.",
     )
+
+
+UNKNOWN = "not known, the paper gives no time. Measure it once: ________ min."
+"""What stands for a time that the paper does not give."""
+
+
+LOUPE = "10x with a scale of 0.1 mm"
+"""Half a division is read; unaided, one minute of arc is 0.09 mm at 300 mm."""
+
+
+class Tool(NamedTuple):
+    """A row of the list of tools."""
+
+    name: str
+    use: str
+
+
+HOLDERS: Mapping[HoldDown, Tool] = {
+    "border": Tool("Smooth card; tape or magnets", "hold thin film flat under the beam"),
+    "carrier": Tool(
+        "Carrier sheet of low tack, silicone adhesive",
+        "holds masks and their parts under the beam: one as large as each sheet",
+    ),
+    "vacuum": Tool("Vacuum bed, porous sheet", "holds film and parts under the beam"),
+}
+
+
+def before_the_day(works: Sequence[Work]) -> list[Action]:
+    """What must be at hand, cut, dry and measured before the press is switched on."""
+    return [Action(text) for text in _before(works)]
+
+
+def _before(works: Sequence[Work]) -> Iterator[str]:
+    films = dict.fromkeys(layer.film for work in works for layer in work.laminate.layers)
+    materials = list(dict.fromkeys(film.material for film in films))
+    unknown = [name for name, _, known in kerf_states(works[0].job, materials) if not known]
+    if unknown:
+        yield (
+            f"Kerf of {listed(unknown)} measured and the files generated again; or it is accepted "
+            "that edges are nominal (warning above)."
+        )
+    if any(film.warning for film in films):
+        yield "Laser's owner permits these films; exhaust tested (warning above)."
+    if any(work.laminate.pins for work in works):
+        yield (
+            "Base plate made and measured (table under Cut): place and depth of each hole; every "
+            "pin goes down to its shoulder by hand or with light taps, and comes out by the punch "
+            "from below. Where none does, lap the hole. The corner that is cut off is marked."
+        )
+    release = sum(base_plate.release_films(work) for work in works)
+    pads = "the press pad" if len(works) == 1 else "every press pad"
+    yield f"Cut to the size under Materials: {release} release films and {pads}."
+    if any(work.job.underlay is not None for work in works):
+        prints = sum(base_plate.prints(work) for work in works if work.job.underlay)
+        yield (
+            f"Underlay printed at 100 %, {units.count(prints, 'time', 'times')}, the bars of each "
+            "print measured, each cut out along its dotted line."
+        )
+    yield "Clean and dry: base plate, pad, release films, film as it comes off the roll."
+    first = works[0].schedule.steps[0]
+    hot = units.temperature(first.temperature_c)
+    yield (
+        f"Pressure of {first.pressure_kpa:g} kPa checked once, cold, in the whole build-up, at "
+        f"{units.force(first.force_n)}, with {film_words(works)}. Division of the press's "
+        "gauge: ________."
+    )
+    yield f"Warming the platens from cold to {hot}: {UNKNOWN}"
+    steps = sum(work.runs.count * len(work.schedule.steps) for work in works)
+    yield from heating_lines(works[0].schedule.heating, steps)
+    yield f"Cooling the plate until it can be touched: {UNKNOWN} It comes after each step."
+    if any(work.laminate.inlets for work in works):
+        yield "Adhesive in date; curing time on its package: ________ h."
+
+
+def tools(works: Sequence[Work]) -> list[Tool]:
+    """What is worked with, but for what is used up."""
+    laminates = [work.laminate for work in works]
+    first = works[0].schedule.steps[0]
+    width, length = first.platen_mm
+    found = [
+        Tool("Laser or drag knife", "cuts the film sheets; exhaust on"),
+        Tool("Lint-free cloths, isopropanol, clean gloves", "clean films and parts before bonding"),
+    ]
+    masks = [layer for one in laminates for layer in one.layers if layer.is_mask]
+    held = {
+        "border" if work.laminate.panel is not None else hold_down(work, layer.film)
+        for work in works
+        for layer in work.laminate.layers
+    }
+    found += [tool for hold, tool in HOLDERS.items() if hold in held]
+    if any(len(layer.profile.pieces) > 1 for layer in masks):
+        found.append(Tool("Antistatic tweezers, earthed mat, dish with a lid", "loose mask pieces"))
+    sizes = sorted({pin.diameter for one in laminates for pin in one.pins})
+    if sizes:
+        said = listed([f"⌀{units.millimetres(size)}" for size in sizes])
+        thin = listed([f"⌀{units.millimetres(punch(size))}" for size in sizes])
+        has_underlay = any(work.job.underlay is not None for work in works)
+        pricked = "release film and underlay" if has_underlay else "the release film"
+        found += [
+            Tool(f"Drills, flat cutters, reamers H7 {said}", "base plate, if you make it yourself"),
+            Tool("Depth gauge, small hammer", "seat the pins on their shoulders, check heights"),
+            Tool(f"Pin punches {thin}, or shanks of drills", "push the pins out, from below"),
+            Tool("Flat tweezers, pliers", "hold the films down and draw the pins"),
+            Tool("Needle", f"pricks {pricked} over the pins"),
+        ]
+    if any(work.job.underlay is not None for work in works):
+        found.append(
+            Tool("Knife, steel rule, 100 mm at least", "measure the underlay's bars, cut it out")
+        )
+    hands = [w.design.registration for w in works if w.laminate.registration == "channel-pin"]
+    if hands:
+        finest = units.millimetres(min(hand.hand_placement for hand in hands))
+        found.append(
+            Tool(
+                f"Measuring loupe, {LOUPE}; bright light",
+                f"lay by eye to {finest} and measure the result (sbafab record --offset); the "
+                "unaided eye resolves about 0.1 mm",
+            )
+        )
+    found += [
+        Tool(
+            f"Heat press, {units.size(width, length)}",
+            f"both platens to {units.temperature(first.temperature_c)}, "
+            f"{units.force(first.force_n)}",
+        ),
+        Tool("Thermocouple with a reader, clock", "on the plate's edge: starts each step's clock"),
+        Tool(f"{film_words(works)[:1].upper()}{film_words(works)[1:]}", COLD),
+        Tool("Heat-proof gloves", "take the plate out, as hot as the platens"),
+    ]
+    if any(one.inlets for one in laminates):
+        ears = "ears, " if any(one.registration == "ears" for one in laminates) else ""
+        found += [
+            Tool("Fine scissors, razor blade, pen", f"cut {ears}strips and tubes; mark tabs"),
+            Tool(
+                "Regulator or syringe with a gauge, water or soapy water, eye protection",
+                "leak and proof test",
+            ),
+            Tool(works[0].design.acceptance.fitting, "joins each tube to the supply"),
+        ]
+    return found

@@ -20,9 +20,9 @@ from sbafab.cutting.properties import (
 )
 from sbafab.design.kits import tube_name
 from sbafab.laminate.laminate import Layer
+from sbafab.pressing.cycles import batch_times
 from sbafab.reports.drawing import layer_numbers
-from sbafab.reports.traveller import base_plate, bench
-from sbafab.reports.traveller import job as say
+from sbafab.reports.traveller import base_plate, units
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.shapes import thumbnail
 from sbafab.reports.underlay import PAPER, leaves
@@ -43,14 +43,16 @@ def bill(work: Work) -> list[Item]:
     items = [*_films(work)]
     if laminate.inlets:
         number = len(laminate.inlets) * job.copies
-        diameter = say.millimetres(laminate.inlets[0].tube_diameter)
+        diameter = units.millimetres(laminate.inlets[0].tube_diameter)
         tube = tube_name(work.design)
-        items.append(Item("Tube", f"{tube}, outer diameter {diameter}", say.count(number, "piece")))
-        drops = say.count(number, "small drop")
+        items.append(
+            Item("Tube", f"{tube}, outer diameter {diameter}", units.count(number, "piece"))
+        )
+        drops = units.count(number, "small drop")
         items.append(Item("Adhesive", work.design.inlet.adhesive, drops))
     wrap = work.design.form.wrap
     if wrap is not None:
-        diameter = say.millimetres(wrap.tube_diameter)
+        diameter = units.millimetres(wrap.tube_diameter)
         what = f"to wrap the sheet round, outer diameter {diameter}"
         items.append(Item("Tube to wrap", what, str(job.copies)))
         what = f"{wrap.glue}, between sheet and tube (ours: the paper does not say what holds it)"
@@ -58,7 +60,9 @@ def bill(work: Work) -> list[Item]:
     items += [Item(*row) for row in base_plate.items(work)]
     if job.underlay is not None:
         items.append(_underlay(work, job.underlay))
-        what = f"{bench.TAPE}, 0.06 mm thick, 10 mm wide: along the plate's edges, off the films"
+        what = (
+            f"{base_plate.TAPE}, 0.06 mm thick, 10 mm wide: along the plate's edges, off the films"
+        )
         items.append(Item("Tape", what, "as needed"))
     if work.runs.together > 1:
         what = "flat, with a lid, lined as section Batch says; tape for flags round the tubes"
@@ -73,17 +77,17 @@ def _underlay(work: Work, path: str) -> Item:
     width, height = (max(leaf.size[axis] for leaf in spread) for axis in (0, 1))
     paper = "A4 or Letter"
     if (width, height) != PAPER:
-        paper = f"at least {say.size(math.ceil(width), math.ceil(height))}"
+        paper = f"at least {units.size(math.ceil(width), math.ceil(height))}"
     join = "; cut out along their dotted frames and laid edge to edge" if len(spread) > 1 else ""
-    thick = say.millimetres(work.design.press.underlay_thickness)
+    thick = units.millimetres(work.design.press.underlay_thickness)
     closings, prints = base_plate.hot_prints(work), base_plate.prints(work)
     tray = ", and one to line the tray" if prints > closings else ""
     what = (
         f"{path} printed at 100 % on plain paper {thick} thick, {paper}; its bars must measure 100 "
-        f"mm{join}. A fresh print for each of {say.count(closings, 'closing')} of the press, as "
+        f"mm{join}. A fresh print for each of {units.count(closings, 'closing')} of the press, as "
         f"paper dries there and shrinks{tray}"
     )
-    return Item("Underlay", what, say.count(len(spread) * prints, "page"))
+    return Item("Underlay", what, units.count(len(spread) * prints, "page"))
 
 
 def _films(work: Work) -> list[Item]:
@@ -92,13 +96,13 @@ def _films(work: Work) -> list[Item]:
         layers = [layer for layer in work.laminate.layers if layer.film == film]
         area = sum(layer.profile.area for layer in layers) * work.job.copies / 100
         sheets = [sheet for sheet in work.sheets if sheet.material == film.material]
-        sizes = Counter(say.size(sheet.width, sheet.length) for sheet in sheets)
-        needed = [f"{say.count(number, 'sheet')} {size}" for size, number in sizes.items()]
+        sizes = Counter(units.size(sheet.width, sheet.length) for sheet in sheets)
+        needed = [f"{units.count(number, 'sheet')} {size}" for size, number in sizes.items()]
         items.append(
             Item(
                 f"{film.material} film",
-                f"{film.product}, {say.millimetres(film.thickness)} thick; {area:.1f} cm² of parts "
-                f"in {len(layers) * work.job.copies} layers",
+                f"{film.product}, {units.millimetres(film.thickness)} thick; {area:.1f} cm² of "
+                f"parts in {len(layers) * work.job.copies} layers",
                 ", ".join(needed) or "see the cut files",
             )
         )
@@ -288,13 +292,13 @@ def cut_layers() -> list[CutLayer]:
 
 def expected_sizes(work: Work) -> list[tuple[str, str]]:
     """For every sheet and the base plate: file, and how large it must be after opening."""
-    found = [(sheet.path, say.size(sheet.width, sheet.length)) for sheet in work.sheets]
+    found = [(sheet.path, units.size(sheet.width, sheet.length)) for sheet in work.sheets]
     press = work.design.press
     platen = press.platen_width, press.platen_length
     plate = fixture(work.laminate, platen, work.runs.places)
     if work.job.fixture is not None and plate is not None:
         low_x, low_y, high_x, high_y = plate.bounds
-        found.append((work.job.fixture, say.size(high_x - low_x, high_y - low_y)))
+        found.append((work.job.fixture, units.size(high_x - low_x, high_y - low_y)))
     return found
 
 
@@ -309,4 +313,87 @@ def kerf_notes(work: Work) -> list[str]:
             else "No offset is known: set kerf offset 0 in the laser's program, and calibrate."
         )
         for material, words, measured in kerf_states(work.job, materials)
+    ]
+
+
+# How long it takes, next to the paper's figure, and what that is made of.
+
+
+PAPER_MINUTES = 105.0
+"""1.75 h for a 1-DoF or 3-DoF actuator (paper Sec. 4)."""
+
+
+class Time(NamedTuple):
+    what: str
+    took: str
+    made_of: str
+
+
+def laser_minutes(work: Work) -> float:
+    return sum(sheet.minutes for sheet in work.sheets)
+
+
+def laser_basis(work: Work) -> str:
+    """The speeds that the estimate of the laser's time assumes."""
+    laser = work.design.laser
+    cut = sum(sheet.cut_length for sheet in work.sheets)
+    travel = sum(sheet.travel for sheet in work.sheets)
+    contours = sum(sheet.contours for sheet in work.sheets)
+    return (
+        f"{cut / 1000:.2f} m of cut at {laser.cut_speed:g} mm/s, {travel / 1000:.2f} m of travel "
+        f"at {laser.travel_speed:g} mm/s, {units.count(contours, 'contour')} with "
+        f"{laser.pierce_seconds:g} s each to pierce, without labels; not a setting of your machine"
+    )
+
+
+def _batch(work: Work) -> list[Time]:
+    """The whole batch, for a design of several copies."""
+    runs, plan = work.runs, work.schedule
+    if runs.copies == 1:
+        return []
+    took = batch_times(runs, plan)
+    made_of = (
+        f"{units.count(runs.count, 'press cycle')} of {units.plain(plan.total_press_minutes)} min, "
+        f"{runs.copies} times the handling below, one after the other; copies pressed singly: "
+        f"{units.minutes(units.product(runs.copies, plan.estimated_build_minutes))}"
+    )
+    row = f"All {runs.copies} copies"
+    return [Time(row, units.whole_minutes(took.total), made_of)]
+
+
+def times(work: Work) -> list[Time]:
+    """Rows of the time table, the total last but for the paper's."""
+    plan = work.schedule
+    handling = plan.hands_minutes
+    steps = " + ".join(units.plain(step.minutes) for step in plan.steps)
+    rows = [
+        Time("In the press", units.minutes(plan.total_press_minutes), f"{steps} min, one actuator")
+    ]
+    if work.sheets:
+        copies = units.count(work.job.copies, "copy", "copies")
+        rows.append(
+            Time(
+                "Laser (within handling)",
+                units.minutes(laser_minutes(work)),
+                f"{laser_basis(work)}; all sheets, {copies}",
+            )
+        )
+    return [
+        *rows,
+        *_batch(work),
+        Time(
+            "Handling",
+            units.minutes(handling),
+            "cutting, lay-up, pins, tubes: the paper's total less its 45 min in the press, assumed "
+            "equal for every design",
+        ),
+        Time(
+            "Total, one actuator",
+            units.whole_minutes(plan.estimated_build_minutes),
+            "not included: heating the press, warming the plate before each clock starts, curing "
+            "the adhesive, leak and proof tests",
+        ),
+        Time(
+            "The paper", f"{PAPER_MINUTES:g} min = {units.hours(PAPER_MINUTES)}", "1-DoF or 3-DoF"
+        ),
     ]

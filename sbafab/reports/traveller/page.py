@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from string import ascii_uppercase
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.kits import cited, departures, tube_name
-from sbafab.design.records import Design, HoldDown
+from sbafab.design.records import Design
 from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.films import Film, Material
 from sbafab.laminate.laminate import Laminate, Layer
@@ -26,13 +26,12 @@ from sbafab.models.formulas import sizes
 from sbafab.pressing.schedule import Schedule, listed
 from sbafab.reports.canvas import COLOURS, KEY
 from sbafab.reports.drawing import TIMES, balloons, layer_numbers
-from sbafab.reports.traveller import base_plate, bench, bill, panel, process, times
-from sbafab.reports.traveller import job as say
+from sbafab.reports.traveller import base_plate, bench, bill, panel, process, units
 from sbafab.reports.traveller.batch import batch_page
-from sbafab.reports.traveller.bench import hold_down
+from sbafab.reports.traveller.bench import before_the_day, tools
 from sbafab.reports.traveller.bill import kerf_states
-from sbafab.reports.traveller.job import Action, Job, Work
-from sbafab.reports.traveller.process import order_of, punch
+from sbafab.reports.traveller.job import Job, Work
+from sbafab.reports.traveller.process import order_of, wrapping
 from sbafab.reports.traveller.shapes import Round, definitions, pattern_regions, rounds
 from sbafab.reports.traveller.sheet_map import marked, part_regions, rows_said, sheet_map
 from sbafab.rules.finding import Finding
@@ -105,8 +104,8 @@ def context(work: Work) -> dict[str, Any]:
         "others": others,
         "sheet_rows": sheet_rows(work.design, work.sheets, {work.design.name: "", **others}),
         "cuts": bill.cut_list(work),
-        "laser_minutes": times.laser_minutes(work),
-        "laser_basis": times.laser_basis(work),
+        "laser_minutes": bill.laser_minutes(work),
+        "laser_basis": bill.laser_basis(work),
         "lay_up": _lay_up(work),
         "force_notes": (*base_plate.build_up_notes(work), *bench.notes(work), bench.note(work)),
         "plate_holes": base_plate.holes(work),
@@ -122,7 +121,7 @@ def context(work: Work) -> dict[str, Any]:
         "wrapping": wrapping(work),
         "leak_words": process.leak_words(work),
         "proof_words": process.proof_words(work),
-        "times": times.times(work),
+        "times": bill.times(work),
         "kerf_notes": bill.kerf_notes(work),
         "expected_sizes": bill.expected_sizes(work),
         **panel.chapter(work),
@@ -152,7 +151,7 @@ def frame(title: str, sha256: str, generator: str) -> dict[str, Any]:
         "generator": generator,
         "running_head": css_string(f"{title}  {short}"),
         "style": (HERE / STYLE).read_text(encoding="utf-8"),
-        "say": say,
+        "units": units,
         "notes": bill,
     }
 
@@ -185,7 +184,7 @@ def _facts(work: Work) -> list[tuple[str, str]]:
         ("Chambers", str(len(laminate.chambers))),
         ("Layers", f"{len(laminate.layers)} of {len(laminate.patterns)} patterns"),
         *(
-            (names.get(name, name.replace("_", " ")), say.millimetres(value))
+            (names.get(name, name.replace("_", " ")), units.millimetres(value))
             for name, value in sizes(work.design, laminate).items()
         ),
         ("Inlets", str(len(laminate.inlets))),
@@ -221,8 +220,8 @@ def sheet_rows(
                 sheet,
                 sheet_map(sheet, films[sheet.material], marks, f"sheet-{number}"),
                 ", ".join(counts),
-                say.size(sheet.width, sheet.length),
-                say.minutes(sheet.minutes),
+                units.size(sheet.width, sheet.length),
+                units.minutes(sheet.minutes),
                 rows_said(sheet),
             )
         )
@@ -344,8 +343,8 @@ def for_the_designer(findings: Iterable[Finding]) -> list[tuple[str, str]]:
     if not rules:
         return []
     words = (
-        f"{say.count(len(rules), 'rule')} {'warns' if len(rules) == 1 else 'warn'}. findings.html "
-        "gives places and remedies; at the press follow the steps."
+        f"{units.count(len(rules), 'rule')} {'warns' if len(rules) == 1 else 'warn'}. "
+        "findings.html gives places and remedies; at the press follow the steps."
     )
     return [("For the designer", words)]
 
@@ -398,177 +397,4 @@ def _is_in_step(warning: str) -> bool:
 # Before the day: what must be ready, and the tools. The paper gives times of the press alone.
 
 
-UNKNOWN = "not known, the paper gives no time. Measure it once: ________ min."
-"""What stands for a time that the paper does not give."""
-LOUPE = "10x with a scale of 0.1 mm"
-"""Half a division is read; unaided, one minute of arc is 0.09 mm at 300 mm."""
-
-
-class Tool(NamedTuple):
-    """A row of the list of tools."""
-
-    name: str
-    use: str
-
-
-HOLDERS: Mapping[HoldDown, Tool] = {
-    "border": Tool("Smooth card; tape or magnets", "hold thin film flat under the beam"),
-    "carrier": Tool(
-        "Carrier sheet of low tack, silicone adhesive",
-        "holds masks and their parts under the beam: one as large as each sheet",
-    ),
-    "vacuum": Tool("Vacuum bed, porous sheet", "holds film and parts under the beam"),
-}
-
-
-def before_the_day(works: Sequence[Work]) -> list[Action]:
-    """What must be at hand, cut, dry and measured before the press is switched on."""
-    return [Action(text) for text in _before(works)]
-
-
-def _before(works: Sequence[Work]) -> Iterator[str]:
-    films = dict.fromkeys(layer.film for work in works for layer in work.laminate.layers)
-    materials = list(dict.fromkeys(film.material for film in films))
-    unknown = [name for name, _, known in kerf_states(works[0].job, materials) if not known]
-    if unknown:
-        yield (
-            f"Kerf of {listed(unknown)} measured and the files generated again; or it is accepted "
-            "that edges are nominal (warning above)."
-        )
-    if any(film.warning for film in films):
-        yield "Laser's owner permits these films; exhaust tested (warning above)."
-    if any(work.laminate.pins for work in works):
-        yield (
-            "Base plate made and measured (table under Cut): place and depth of each hole; every "
-            "pin goes down to its shoulder by hand or with light taps, and comes out by the punch "
-            "from below. Where none does, lap the hole. The corner that is cut off is marked."
-        )
-    release = sum(base_plate.release_films(work) for work in works)
-    pads = "the press pad" if len(works) == 1 else "every press pad"
-    yield f"Cut to the size under Materials: {release} release films and {pads}."
-    if any(work.job.underlay is not None for work in works):
-        prints = sum(base_plate.prints(work) for work in works if work.job.underlay)
-        yield (
-            f"Underlay printed at 100 %, {say.count(prints, 'time', 'times')}, the bars of each "
-            "print measured, each cut out along its dotted line."
-        )
-    yield "Clean and dry: base plate, pad, release films, film as it comes off the roll."
-    first = works[0].schedule.steps[0]
-    hot = say.temperature(first.temperature_c)
-    yield (
-        f"Pressure of {first.pressure_kpa:g} kPa checked once, cold, in the whole build-up, at "
-        f"{say.force(first.force_n)}, with {bench.film_words(works)}. Division of the press's "
-        "gauge: ________."
-    )
-    yield f"Warming the platens from cold to {hot}: {UNKNOWN}"
-    steps = sum(work.runs.count * len(work.schedule.steps) for work in works)
-    yield from bench.before_the_day(works[0].schedule.heating, steps)
-    yield f"Cooling the plate until it can be touched: {UNKNOWN} It comes after each step."
-    if any(work.laminate.inlets for work in works):
-        yield "Adhesive in date; curing time on its package: ________ h."
-
-
-def tools(works: Sequence[Work]) -> list[Tool]:
-    """What is worked with, but for what is used up."""
-    laminates = [work.laminate for work in works]
-    first = works[0].schedule.steps[0]
-    width, length = first.platen_mm
-    found = [
-        Tool("Laser or drag knife", "cuts the film sheets; exhaust on"),
-        Tool("Lint-free cloths, isopropanol, clean gloves", "clean films and parts before bonding"),
-    ]
-    masks = [layer for one in laminates for layer in one.layers if layer.is_mask]
-    held = {
-        "border" if work.laminate.panel is not None else hold_down(work, layer.film)
-        for work in works
-        for layer in work.laminate.layers
-    }
-    found += [tool for hold, tool in HOLDERS.items() if hold in held]
-    if any(len(layer.profile.pieces) > 1 for layer in masks):
-        found.append(Tool("Antistatic tweezers, earthed mat, dish with a lid", "loose mask pieces"))
-    sizes = sorted({pin.diameter for one in laminates for pin in one.pins})
-    if sizes:
-        said = listed([f"⌀{say.millimetres(size)}" for size in sizes])
-        thin = listed([f"⌀{say.millimetres(punch(size))}" for size in sizes])
-        has_underlay = any(work.job.underlay is not None for work in works)
-        pricked = "release film and underlay" if has_underlay else "the release film"
-        found += [
-            Tool(f"Drills, flat cutters, reamers H7 {said}", "base plate, if you make it yourself"),
-            Tool("Depth gauge, small hammer", "seat the pins on their shoulders, check heights"),
-            Tool(f"Pin punches {thin}, or shanks of drills", "push the pins out, from below"),
-            Tool("Flat tweezers, pliers", "hold the films down and draw the pins"),
-            Tool("Needle", f"pricks {pricked} over the pins"),
-        ]
-    if any(work.job.underlay is not None for work in works):
-        found.append(
-            Tool("Knife, steel rule, 100 mm at least", "measure the underlay's bars, cut it out")
-        )
-    hands = [w.design.registration for w in works if w.laminate.registration == "channel-pin"]
-    if hands:
-        finest = say.millimetres(min(hand.hand_placement for hand in hands))
-        found.append(
-            Tool(
-                f"Measuring loupe, {LOUPE}; bright light",
-                f"lay by eye to {finest} and measure the result (sbafab record --offset); the "
-                "unaided eye resolves about 0.1 mm",
-            )
-        )
-    found += [
-        Tool(
-            f"Heat press, {say.size(width, length)}",
-            f"both platens to {say.temperature(first.temperature_c)}, {say.force(first.force_n)}",
-        ),
-        Tool("Thermocouple with a reader, clock", "on the plate's edge: starts each step's clock"),
-        Tool(f"{bench.film_words(works)[:1].upper()}{bench.film_words(works)[1:]}", bench.COLD),
-        Tool("Heat-proof gloves", "take the plate out, as hot as the platens"),
-    ]
-    if any(one.inlets for one in laminates):
-        ears = "ears, " if any(one.registration == "ears" for one in laminates) else ""
-        found += [
-            Tool("Fine scissors, razor blade, pen", f"cut {ears}strips and tubes; mark tabs"),
-            Tool(
-                "Regulator or syringe with a gauge, water or soapy water, eye protection",
-                "leak and proof test",
-            ),
-            Tool(works[0].design.acceptance.fitting, "joins each tube to the supply"),
-        ]
-    return found
-
-
 # How a laminate that goes round a tube is fixed there, with its supply tubes.
-
-
-def wrapping(work: Work) -> list[Action]:
-    """Some laminates go round a tube in the end; empty for others."""
-    wrap = work.design.form.wrap
-    if wrap is None:
-        return []
-    closed = (
-        f"overlapping by {say.millimetres(wrap.overlap)}"
-        if wrap.overlap
-        else "meeting edge to edge"
-    )
-    return [
-        Action("Wipe the tube and the sheet's under side with isopropanol, let them dry."),
-        Action(
-            f"Try it dry. Wrap the sheet round its tube, outer diameter "
-            f"{say.millimetres(wrap.tube_diameter)}, balloons outward, its straight edges "
-            f"along the tube, {closed}."
-        ),
-        Action(
-            f"Glue: {wrap.glue}, a thin, even film on the tube below the sheet. Keep it off "
-            "inlets, tabs and balloons. What holds the sheet is ours: the paper does not say."
-        ),
-        Action(
-            "Wrap it again, stroke it on from the middle to both edges, and bind it with tape over "
-            "release film, the balloons empty, until the adhesive has cured as its package says."
-        ),
-        Action(
-            "Lead the supply tubes along the tube, the way the tabs point, and tie them to it with "
-            "a turn of thread behind the tabs, so that no pull reaches them."
-        ),
-        Action(
-            f"Raise each chamber to {work.design.acceptance.leak_pressure_kpa:g} kPa once more: "
-            "balloons open evenly round the tube, and no edge of the sheet lifts."
-        ),
-    ]

@@ -13,13 +13,19 @@ from sbafab.laminate.films import ink
 from sbafab.laminate.laminate import Laminate, Layer, Pin, SheetPanel
 from sbafab.pressing.schedule import listed
 from sbafab.reports import drawing as draw
-from sbafab.reports.traveller import bench, process
-from sbafab.reports.traveller import job as say
-from sbafab.reports.traveller.bill import Cut, Item, bill, cut_list, expected_sizes
+from sbafab.reports.traveller import bench, process, units
+from sbafab.reports.traveller.bill import (
+    PAPER_MINUTES,
+    Cut,
+    Item,
+    Time,
+    bill,
+    cut_list,
+    expected_sizes,
+)
 from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.traveller.process import COVER, StepPage
 from sbafab.reports.traveller.shapes import Picture, label
-from sbafab.reports.traveller.times import PAPER_MINUTES, Time
 
 WIDEST, TALLEST = 62.0, 74.0
 EDGE, FOOT = 3.0, 5.0
@@ -37,7 +43,7 @@ def chapter(work: Work) -> dict[str, Any]:
         return {"panel": None}
     return {
         "panel": panel,
-        "panel_size": say.size(*panel.size),
+        "panel_size": units.size(*panel.size),
         "panel_untried": UNTRIED,
         "panel_pictures": _pictures(work.laminate, panel),
         "panel_actions": _preparing(work, panel),
@@ -51,8 +57,8 @@ def chapter(work: Work) -> dict[str, Any]:
         "cuts": _cuts(work, panel),
         "times": _times(work, panel),
         "expected_sizes": [
-            ("every file in layers/", say.size(*panel.size)),
-            (f"{SECOND_CUT}, with its frame", say.size(*panel.size)),
+            ("every file in layers/", units.size(*panel.size)),
+            (f"{SECOND_CUT}, with its frame", units.size(*panel.size)),
             *expected_sizes(work),
         ],
     }
@@ -64,8 +70,8 @@ def _force_notes(work: Work, panel: SheetPanel) -> tuple[str, ...]:
     step = work.schedule.steps[0]
     return (
         f"{step.force_n:.0f} N is {step.pressure_kpa:g} kPa on the whole platen of "
-        f"{say.size(*step.platen_mm)}, as the paper gives it. The sheets take "
-        f"{say.size(*panel.size)}; through the press pad, which fills the platen, up to about "
+        f"{units.size(*step.platen_mm)}, as the paper gives it. The sheets take "
+        f"{units.size(*panel.size)}; through the press pad, which fills the platen, up to about "
         f"{highest:.0f} kPa reach them. That is an estimate, which no press has confirmed.",
         "Sheets of every film lie round the parts at every height, so that these share the "
         "pressure; what each part gets of it nobody has measured.",
@@ -91,7 +97,7 @@ def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
     ticks = tuple(
         f"{listed([str(mask.index) for mask in masks])} on {film.index}" for film, masks in pairs
     )
-    tack = say.minutes(design.panel.tack_minutes)
+    tack = units.minutes(design.panel.tack_minutes)
     return [
         *bench.before_first_cut(),
         Action(_carrier(work)),
@@ -119,9 +125,9 @@ def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
             "film over them. Tack the masks, a film at a time: the film sheet on the pins, cut "
             "corner over the plate's, its mask sheet face down on it, a release film and the press "
             f"pad on top. The plate goes in cold each time: press for {tack} at "
-            f"{say.temperature(design.press.temperature_c)} (ours), counted from when the plate is "
-            "hot, let it cool until it can be touched, peel off the transfer film flat and slowly. "
-            "Masks and PTFE sheet stay on the film.",
+            f"{units.temperature(design.press.temperature_c)} (ours), counted from when the plate "
+            "is hot, let it cool until it can be touched, peel off the transfer film flat and "
+            "slowly. Masks and PTFE sheet stay on the film.",
             tuple(mask.index for _, masks in pairs for mask in masks),
             ticks,
         ),
@@ -186,8 +192,8 @@ def _pressing(work: Work, page: StepPage, last: bool) -> list[Action]:
         ]
     return [
         Action(
-            f"Heat both platens to {say.temperature(step.temperature_c)}; set the force to "
-            f"{say.force(step.force_n)}."
+            f"Heat both platens to {units.temperature(step.temperature_c)}; set the force to "
+            f"{units.force(step.force_n)}."
         ),
         *start,
         Action(lay, tuple(i for i in step.adds), ticks if len(ticks) > 1 else ()),
@@ -203,7 +209,7 @@ def _pressing(work: Work, page: StepPage, last: bool) -> list[Action]:
 
 
 def _cut_free(panel: SheetPanel) -> list[Action]:
-    many = say.count(len(panel.places), "actuator")
+    many = units.count(len(panel.places), "actuator")
     return [
         Action(
             "Fix the stack flat on the laser's bed, the cap up, by tape or magnets all along its "
@@ -250,8 +256,8 @@ def _bill(work: Work, panel: SheetPanel) -> list[Item]:
                 for pattern in dict.fromkeys(layer.pattern for layer in own)
             )
             rim = 2 * bench.RIM
-            least = say.size(panel.size[0] + rim, panel.size[1] + rim)
-            needed = f"{say.count(number_of, 'sheet')} of at least {least}"
+            least = units.size(panel.size[0] + rim, panel.size[1] + rim)
+            needed = f"{units.count(number_of, 'sheet')} of at least {least}"
             items.append(replace(item, quantity=needed))
         else:
             items.append(item)
@@ -261,7 +267,7 @@ def _bill(work: Work, panel: SheetPanel) -> list[Item]:
         if layers[0].is_mask
     )
     what = f"{work.design.panel.carrier}; carries the masks of one sheet each, off in the end"
-    return [*items, Item("Carrier", what, say.count(masks, "piece"))]
+    return [*items, Item("Carrier", what, units.count(masks, "piece"))]
 
 
 def _cuts(work: Work, panel: SheetPanel) -> list[Cut]:
@@ -292,17 +298,17 @@ def _spare_sheets(work: Work, panel: SheetPanel, pattern: str) -> int:
 def _times(work: Work, panel: SheetPanel) -> list[Time]:
     """How long a batch takes; the paper's handling is of one actuator, and is not known of many."""
     plan, copies = work.schedule, len(panel.places)
-    steps = " + ".join(say.plain(step.minutes) for step in plan.steps)
+    steps = " + ".join(units.plain(step.minutes) for step in plan.steps)
     tacking, pressed = plan.tacking, plan.total_press_minutes
     assert tacking is not None
     total = None if pressed is None else pressed + tacking.total_minutes
     each = None if total is None else total / copies
-    many = say.count(copies, "actuator")
+    many = units.count(copies, "actuator")
     return [
-        Time("In the press", say.minutes(plan.total_press_minutes), f"{steps} min, one batch"),
+        Time("In the press", units.minutes(plan.total_press_minutes), f"{steps} min, one batch"),
         Time(
             "Tacking, from cold to cold",
-            f"{tacking.total_minutes:.0f} min = {say.hours(tacking.total_minutes)}",
+            f"{tacking.total_minutes:.0f} min = {units.hours(tacking.total_minutes)}",
             f"{tacking.sheets} mask sheets, each {tacking.warm_minutes:g} min to warm the plate, "
             f"{tacking.press_minutes:g} min pressed and {tacking.cool_minutes:g} min to cool it, "
             f"one after the other on one plate; {tacking.basis}. Several plates in turn, or one "
@@ -310,8 +316,8 @@ def _times(work: Work, panel: SheetPanel) -> list[Time]:
         ),
         Time(
             "Both, one batch",
-            say.whole_minutes(total),
-            f"{many}, {say.minutes(each)} each",
+            units.whole_minutes(total),
+            f"{many}, {units.minutes(each)} each",
         ),
         Time(
             "Handling",
@@ -330,7 +336,7 @@ def _carrier(work: Work) -> str:
     return (
         f"What carries the masks: {design.carrier}, product ________________, adhesive {adhesive}, "
         f"rated for {limit} by its maker. It goes into the press at "
-        f"{say.temperature(work.design.press.temperature_c)}: without a rating above that it is "
+        f"{units.temperature(work.design.press.temperature_c)}: without a rating above that it is "
         "not used. Acrylic and rubber adhesives hardly hold PTFE; silicone adhesives on polyester "
         "or polyimide are sold for such temperatures. Which of them holds the masks, and lets them "
         "go after the tack, nobody has tried: try one sheet first."
@@ -341,13 +347,13 @@ def _tack_pins(work: Work) -> str:
     """How high the corner pins stand for the tacks: far lower than for the whole stack."""
     tacking = work.schedule.tacking
     assert tacking is not None
-    stands = listed(list(dict.fromkeys(say.millimetres(pin.stands_mm) for pin in tacking.pins)))
-    lengths = listed(list(dict.fromkeys(say.millimetres(pin.length_mm) for pin in tacking.pins)))
+    stands = listed(list(dict.fromkeys(units.millimetres(pin.stands_mm) for pin in tacking.pins)))
+    lengths = listed(list(dict.fromkeys(units.millimetres(pin.length_mm) for pin in tacking.pins)))
     beneath = tacking.stack_mm + work.design.press.release_thickness
-    out = say.millimetres(max(pin.stands_mm for pin in tacking.pins) - beneath)
+    out = units.millimetres(max(pin.stands_mm for pin in tacking.pins) - beneath)
     return (
         f"pins of {lengths} stand {stands} over the plate (one film with its masks is "
-        f"{say.millimetres(tacking.stack_mm)} high; the pins press {out} into the pad, those for "
+        f"{units.millimetres(tacking.stack_mm)} high; the pins press {out} into the pad, those for "
         "the whole stack would more)"
     )
 

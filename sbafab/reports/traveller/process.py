@@ -16,18 +16,23 @@ from sbafab.models.formulas import burst_pressure
 from sbafab.models.paper import BURST, FORCE_KPA
 from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, UNDERLAY
 from sbafab.pressing.cycles import Runs
-from sbafab.pressing.dowels import push_out
 from sbafab.pressing.schedule import Step, listed
 from sbafab.reports import drawing as draw
 from sbafab.reports.drawing import layer_numbers
-from sbafab.reports.traveller import bench
-from sbafab.reports.traveller import job as say
+from sbafab.reports.traveller import bench, units
+from sbafab.reports.traveller.base_plate import punch
 from sbafab.reports.traveller.bench import HeatBlank, closing, reseat, underlay
-from sbafab.reports.traveller.build_up_svg import INKS, build_up_svg, pin_lines
-from sbafab.reports.traveller.exploded import exploded
 from sbafab.reports.traveller.job import Action, Work
-from sbafab.reports.traveller.shapes import Bed, Picture, Round, beds, inlets_in, rounds
-from sbafab.reports.traveller.step_pictures import PiecePlace, Things, over_tab, pitch, places, plan
+from sbafab.reports.traveller.lay_up import PiecePlace, Things, over_tab, pitch, places
+from sbafab.reports.traveller.shapes import (
+    Bed,
+    Picture,
+    Round,
+    beds,
+    inlets_in,
+    rounds,
+)
+from sbafab.reports.traveller.step_pictures import INKS, build_up_svg, exploded, pin_lines, plan
 
 COVER = (
     "Cover with a release film and the press pad, flush with the platen all round. No second plate "
@@ -98,11 +103,11 @@ def step_pages(work: Work) -> list[StepPage]:
 def _dials(step: Step, together: int) -> tuple[tuple[str, str], ...]:
     width, length = step.platen_mm
     return (
-        ("Both platens", say.temperature(step.temperature_c)),
-        ("Force on the whole platen", say.force(step.force_n)),
-        (f"Pressure on {say.size(width, length)}", say.pressure(step.pressure_kpa)),
+        ("Both platens", units.temperature(step.temperature_c)),
+        ("Force on the whole platen", units.force(step.force_n)),
+        (f"Pressure on {units.size(width, length)}", units.pressure(step.pressure_kpa)),
         ("On the films (estimate)", f"about {step.film_kpa:.0f} kPa"),
-        ("Clock", say.minutes(step.minutes)),
+        ("Clock", units.minutes(step.minutes)),
         ("Pins", _pin_count(step, together)),
     )
 
@@ -115,7 +120,7 @@ def _pin_count(step: Step, together: int) -> str:
 
 
 def _height(laminate: Laminate, part: AssemblyStep) -> str:
-    return say.millimetres(sum(laminate.layer(index).film.thickness for index in part.layers))
+    return units.millimetres(sum(laminate.layer(index).film.thickness for index in part.layers))
 
 
 def _place_notes(runs: Runs) -> tuple[str, ...]:
@@ -160,8 +165,8 @@ def _actions(
     laminate = work.laminate
     things = Things(laminate, lying)
     yield Action(
-        f"Heat both platens to {say.temperature(step.temperature_c)}; set the force to "
-        f"{say.force(step.force_n)}."
+        f"Heat both platens to {units.temperature(step.temperature_c)}; set the force to "
+        f"{units.force(step.force_n)}."
     )
     for bed in lying:
         yield from _lay(things, bed, part.pins)
@@ -183,7 +188,7 @@ def _lay(things: Things, bed: Bed, pins: Sequence[Pin]) -> Iterator[Action]:
     if bed.made_in is not None:
         numbers = layer_numbers(bed.layers)
         lowest = laminate.layer(bed.layers[0])
-        many = say.stacks(stack_count(laminate, bed.layers))
+        many = units.stacks(stack_count(laminate, bed.layers))
         yield Action(
             f"Lay the {many} from step {bed.made_in} (layers {numbers}), layer {lowest.index}, the "
             f"{lowest.film.material} {lowest.role.replace('-', ' ')}, down."
@@ -271,7 +276,7 @@ def _tabs(laminate: Laminate, layers: Sequence[int]) -> str:
     there = inlets_in(laminate, layers)
     if not there:
         return ""
-    points = listed([f"{inlet.chamber} {say.toward(inlet)}" for inlet in there])
+    points = listed([f"{inlet.chamber} {units.toward(inlet)}" for inlet in there])
     return f"inlet tabs point as in the picture ({points}), "
 
 
@@ -281,7 +286,7 @@ def _product(laminate: Laminate, part: AssemblyStep) -> str:
     numbers = layer_numbers(part.layers)
     many = stack_count(laminate, part.layers)
     keep = "keep it" if many == 1 else "keep them"
-    made = f"the {say.stacks(many)} from step {part.number}, layers {numbers}"
+    made = f"the {units.stacks(many)} from step {part.number}, layers {numbers}"
     return f"{made}; {keep} this side up"
 
 
@@ -302,8 +307,8 @@ def tubing(work: Work) -> list[Action]:
     if not inlets:
         return []
     names = _apart([inlet.chamber for inlet in inlets])
-    diameter = say.millimetres(inlets[0].tube_diameter)
-    straight = say.millimetres(min(inlet.length for inlet in inlets))
+    diameter = units.millimetres(inlets[0].tube_diameter)
+    straight = units.millimetres(min(inlet.length for inlet in inlets))
     strip = work.laminate.interfaces[-1].masks[0].film.material
     first = f"the tab of {inlets[0].chamber}" if len(inlets) > 1 else "the tab"
     return [
@@ -312,7 +317,7 @@ def tubing(work: Work) -> list[Action]:
             f"Mark {first} with a pen, on the side that faced up in the press: the base is below."
         ),
         Action(
-            f"Cut {say.count(len(inlets), 'piece')} of {tube_name(work.design)}, outer diameter "
+            f"Cut {units.count(len(inlets), 'piece')} of {tube_name(work.design)}, outer diameter "
             f"{diameter}, square and without burr, as long as your rig needs."
         ),
         Action(
@@ -391,15 +396,8 @@ def leak_test(work: Work) -> list[Action]:
 # The order is ours; the paper gives none.
 
 
-PUNCH_PLAY = 0.1
-"""mm by which the punch is thinner than the push-out hole."""
 CELL, HIGH, WORDS = 35.0, 24.0, 2.2
 PIN = "#6d737c"
-
-
-def punch(diameter: float) -> float:
-    """Return the diameter of the punch for pins of a diameter, mm."""
-    return round(push_out(diameter) - PUNCH_PLAY, 2)
 
 
 @dataclass(frozen=True)
@@ -462,7 +460,8 @@ def _punches(step: Step) -> str:
     sizes = sorted({(pin.diameter_mm, pin.seat_mm) for pin in step.pin_settings})
     return listed(
         [
-            f"⌀{diameter:g} by {say.millimetres(seat)}, punch ⌀{say.millimetres(punch(diameter))}"
+            f"⌀{diameter:g} by {units.millimetres(seat)}, punch "
+            f"⌀{units.millimetres(punch(diameter))}"
             for diameter, seat in sizes
         ]
     )
@@ -475,7 +474,7 @@ def _soft(step: Step) -> str:
     pad = next(item.thickness_mm for item in step.build_up if item.part == PAD)
     if pad > out:
         return "the press pad"
-    return f"soft foam at least {say.millimetres(out + 1)} thick"
+    return f"soft foam at least {units.millimetres(out + 1)} thick"
 
 
 def _has_underlay(step: Step) -> bool:
@@ -636,9 +635,9 @@ def leak_words(work: Work) -> str:
 
 
 def proof_words(work: Work) -> str:
-    """Return pressure and time of the proof test, a blank where nobody can say."""
+    """Return pressure and time of the proof test, a blank where nobody can units."""
     return (
-        f"{say.plain(proof(work).kilopascals)} kPa for {work.design.acceptance.proof_seconds:g} s"
+        f"{units.plain(proof(work).kilopascals)} kPa for {work.design.acceptance.proof_seconds:g} s"
     )
 
 
@@ -646,7 +645,7 @@ def fitting(work: Work) -> str:
     """Return what joins tube and supply, with the bore of the tube where the kit knows it."""
     tube = kit_of(work.design).tubes.get(work.design.inlet.tube)
     bore = None if tube is None else tube.inner_diameter
-    of = "" if bore is None else f" of {say.millimetres(bore)}"
+    of = "" if bore is None else f" of {units.millimetres(bore)}"
     return f"{work.design.acceptance.fitting}, in the tube's bore{of}"
 
 
@@ -657,7 +656,7 @@ def proof_test(work: Work, names: tuple[str, ...], where: str) -> list[Action]:
     return [
         Action(
             "Proof test, behind a shield, the actuator free to move and dry or full of water: "
-            f"raise each chamber in {RAMP} s to {say.plain(found.kilopascals)} kPa, hold for "
+            f"raise each chamber in {RAMP} s to {units.plain(found.kilopascals)} kPa, hold for "
             f"{seconds:g} s, the other chambers open ({found.basis}).",
             (),
             names,
@@ -672,5 +671,41 @@ def proof_test(work: Work, names: tuple[str, ...], where: str) -> list[Action]:
         Action(
             f"Accepted: no leak at {leak_words(work)}, {proof_words(work)} held, no leak after "
             f"it. Write both results {where}; reject an actuator that fails either."
+        ),
+    ]
+
+
+def wrapping(work: Work) -> list[Action]:
+    """Some laminates go round a tube in the end; empty for others."""
+    wrap = work.design.form.wrap
+    if wrap is None:
+        return []
+    closed = (
+        f"overlapping by {units.millimetres(wrap.overlap)}"
+        if wrap.overlap
+        else "meeting edge to edge"
+    )
+    return [
+        Action("Wipe the tube and the sheet's under side with isopropanol, let them dry."),
+        Action(
+            f"Try it dry. Wrap the sheet round its tube, outer diameter "
+            f"{units.millimetres(wrap.tube_diameter)}, balloons outward, its straight edges "
+            f"along the tube, {closed}."
+        ),
+        Action(
+            f"Glue: {wrap.glue}, a thin, even film on the tube below the sheet. Keep it off "
+            "inlets, tabs and balloons. What holds the sheet is ours: the paper does not units."
+        ),
+        Action(
+            "Wrap it again, stroke it on from the middle to both edges, and bind it with tape over "
+            "release film, the balloons empty, until the adhesive has cured as its package says."
+        ),
+        Action(
+            "Lead the supply tubes along the tube, the way the tabs point, and tie them to it with "
+            "a turn of thread behind the tabs, so that no pull reaches them."
+        ),
+        Action(
+            f"Raise each chamber to {work.design.acceptance.leak_pressure_kpa:g} kPa once more: "
+            "balloons open evenly round the tube, and no edge of the sheet lifts."
         ),
     ]
