@@ -1,4 +1,4 @@
-"""traveller.html of an assembly: cut once, make each design, put them together."""
+"""traveller.html of an assembly: cut once, make each design, join the parts."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class AssemblyJob:
 
 
 def assembly_html(job: AssemblyJob) -> str:
-    """The whole page."""
+    """Return the whole page."""
     name = job.assembled.assembly.name
     text = record_text(name, job.sha256, job.generator)
     works = [one.work for one in job.works]
@@ -96,7 +96,7 @@ def assembly_html(job: AssemblyJob) -> str:
             code_text=text,
             picture=b64encode(job.picture).decode("ascii"),
             parts=_parts(job),
-            tested=[name for made in job.assembled.designs for name in made.parts],
+            tested=[name for build in job.assembled.designs for name in build.parts],
             cautions=_cautions(job),
             bill=_bill(job),
             before_the_day=before_the_day(works),
@@ -122,19 +122,19 @@ def assembly_html(job: AssemblyJob) -> str:
     )
 
 
-def _chapter(one: DesignWork, number: int, mark: str) -> str:
-    """The making of one design, with ids that no other chapter has."""
-    said: dict[str, Any] = context(one.work)
-    said["shapes"] = definitions(pattern_regions(one.work.laminate))
+def _chapter(design: DesignWork, number: int, mark: str) -> str:
+    """Return the chapter on one design, with ids that no other chapter has."""
+    page: dict[str, Any] = context(design.work)
+    page["shapes"] = definitions(pattern_regions(design.work.laminate))
     # The sheet goes round its tube when the assembly is put together.
-    said["wrapping"] = []
+    page["wrapping"] = []
     html = (
         environment()
         .get_template(CHAPTER)
         .render(
-            **said | _again(one, number),
-            runs=one.runs,
-            press_words=_press_words(one),
+            **page | _again(design, number),
+            runs=design.runs,
+            press_words=_press_words(design),
             number=number,
             mark=mark,
         )
@@ -142,71 +142,78 @@ def _chapter(one: DesignWork, number: int, mark: str) -> str:
     return _NAMES.sub(rf"\g<1>d{number}-", html)
 
 
-def _again(one: DesignWork, number: int) -> dict[str, tuple[str, ...]]:
-    """What the first chapter has said of the build-up, in short in those that follow."""
-    return {} if number == 1 else {"force_notes": base_plate.build_up_again(one.work)}
+def _again(design: DesignWork, number: int) -> dict[str, tuple[str, ...]]:
+    """Return the build-up in short, as the first chapter has given it in full."""
+    return {} if number == 1 else {"force_notes": base_plate.build_up_again(design.work)}
 
 
 def _parts(job: AssemblyJob) -> list[tuple[str, str, str, str]]:
-    """Name, what it is, where it goes, and its colour in the picture, of each part."""
+    """Return name, kind, place and colour in the picture of each part."""
     rows = []
     paints = colours(job.assembled)
     for placed in job.assembled.parts:
-        what = placed.part.kind if placed.made is None else f"SBA {placed.made.design.name}"
+        kind = placed.part.kind if placed.made is None else f"SBA {placed.made.design.name}"
         on = placed.part.on
         where = "first part" if on is None else f"{on}, {placed.part.at}"
-        rows.append((placed.name, what, where, f"#{bytes(paints[placed.name]).hex()}"))
+        rows.append((placed.name, kind, where, f"#{bytes(paints[placed.name]).hex()}"))
     return rows
 
 
 def _cautions(job: AssemblyJob) -> list[tuple[str, str]]:
-    found: list[tuple[str, str]] = []
+    warnings: list[tuple[str, str]] = []
     if job.waived:
-        said = " / ".join(finding.message for finding in job.findings if finding.by_user)
-        words = f"made although the assembly waives {', '.join(job.waived)}. Findings: {said}"
-        found.append(("Waived checks", words))
+        messages = " / ".join(finding.message for finding in job.findings if finding.by_user)
+        words = f"made although the assembly waives {', '.join(job.waived)}. Findings: {messages}"
+        warnings.append(("Waived checks", words))
     if job.lowered:
-        found.append(("Lowered limits", f"{CHECKED_AGAINST}{', '.join(job.lowered)}."))
-    for one in job.works:
-        for title, text in cautions(one.work):
+        warnings.append(("Lowered limits", f"{CHECKED_AGAINST}{', '.join(job.lowered)}."))
+    for design in job.works:
+        for title, text in cautions(design.work):
             is_own = title.startswith(("Press", "Waived", "Lowered"))
-            found.append((f"{title} ({one.name})" if is_own else title, text))
+            warnings.append((f"{title} ({design.name})" if is_own else title, text))
     if any(placed.part.kind == "magnet" for placed in job.assembled.parts):
         words = (
             "small and brittle; they snap together. Keep them away from anything that a magnet "
             "harms."
         )
-        found.append(("Magnets", words))
-    every = [*job.findings, *(finding for one in job.works for finding in one.work.job.findings)]
-    return list(dict.fromkeys([*found, *for_the_designer(every)]))
+        warnings.append(("Magnets", words))
+    every = [
+        *job.findings,
+        *(finding for design in job.works for finding in design.work.job.findings),
+    ]
+    return list(dict.fromkeys([*warnings, *for_the_designer(every)]))
 
 
 def _bill(job: AssemblyJob) -> list[bill.Item]:
-    """Films of all designs together, what each design needs beside them, what is bought."""
+    """Return films of all designs together, each design's other items, and what is bought."""
     items = _films(job)
-    for one in job.works:
-        items += [_named(item, one) for item in bill.bill(one.work) if not _is_elsewhere(item)]
+    for design in job.works:
+        items += [
+            _named(item, design) for item in bill.bill(design.work) if not _is_elsewhere(item)
+        ]
     items += bought(job.assembled, job.copies)
     return list(dict.fromkeys(items))
 
 
 def _is_elsewhere(item: bill.Item) -> bool:
-    """Films are summed over the designs, and the tube to wrap is a part of the assembly."""
+    """Return True for films, which are summed over the designs, and for the tube to wrap, a part
+    here.
+    """
     name, _, rest = item.name.partition(" ")
     is_film = name.isupper() and rest == "film"
     return is_film or item.name in ("Tube to wrap", "Adhesive of the wrap")
 
 
-def _named(item: bill.Item, one: DesignWork) -> bill.Item:
+def _named(item: bill.Item, design: DesignWork) -> bill.Item:
     """Return a design's item under its name."""
-    return bill.Item(f"{item.name} ({one.name})", item.what, item.quantity)
+    return bill.Item(f"{item.name} ({design.name})", item.what, item.quantity)
 
 
 def _films(job: AssemblyJob) -> list[bill.Item]:
     areas: dict[Film, float] = {}
-    for one in job.works:
-        for layer in one.work.laminate.layers:
-            area = layer.profile.area * one.work.job.copies / 100
+    for design in job.works:
+        for layer in design.work.laminate.layers:
+            area = layer.profile.area * design.work.job.copies / 100
             areas[layer.film] = areas.get(layer.film, 0.0) + area
     items = []
     for film, area in areas.items():
@@ -216,13 +223,15 @@ def _films(job: AssemblyJob) -> list[bill.Item]:
             size = units.size(sheet.width, sheet.length)
             sizes[size] = sizes.get(size, 0) + 1
         needed = ", ".join(f"{units.count(n, 'sheet')} {size}" for size, n in sizes.items())
-        what = f"{film.product}, {units.millimetres(film.thickness)} thick; {area:.1f} cm² of parts"
-        items.append(bill.Item(f"{film.material} film", what, needed))
+        product = (
+            f"{film.product}, {units.millimetres(film.thickness)} thick; {area:.1f} cm² of parts"
+        )
+        items.append(bill.Item(f"{film.material} film", product, needed))
     return items
 
 
 def _press_words(one: DesignWork) -> str:
-    """How often the press closes on a design, and why that is enough."""
+    """Return the laminations of a design, and why they are enough."""
     runs, minutes = one.runs, one.work.schedule.total_press_minutes
     design = one.work.design
     copies = units.count(runs.copies, "copy", "copies")
@@ -247,28 +256,30 @@ def _press_words(one: DesignWork) -> str:
 
 
 def _marks(job: AssemblyJob) -> dict[str, str]:
-    """A letter for each of several designs, so that labels stay short."""
-    names = [one.name for one in job.works]
+    """Return a letter for each of several designs, so that labels stay short."""
+    names = [design.name for design in job.works]
     return {name: ascii_uppercase[i % 26] if names[1:] else "" for i, name in enumerate(names)}
 
 
 def _not_together(job: AssemblyJob) -> str:
-    """Why unlike designs do not share the press; empty where there is only one."""
+    """Return why unlike designs do not share the press; empty where there is only one."""
     if len(job.works) < 2:
         return ""
-    sizes = [f"{one.name} {units.millimetres(one.work.laminate.thickness)}" for one in job.works]
+    sizes = [
+        f"{design.name} {units.millimetres(design.work.laminate.thickness)}" for design in job.works
+    ]
     return (
-        f"Not pressed together: {listed([one.name for one in job.works])}. Their stacks differ "
-        f"in height ({listed(sizes)}) and steps; the paper presses only like patterns at once, "
-        "and glues these parts to each other."
+        f"Not pressed together: {listed([design.name for design in job.works])}. Their stacks "
+        f"differ in height ({listed(sizes)}) and steps; the paper presses only like patterns at "
+        "once, and glues these parts to each other."
     )
 
 
 def _times(job: AssemblyJob) -> list[bill.Time]:
     rows: list[bill.Time] = []
     total: float | None = 0.0
-    for one in job.works:
-        plan, runs = one.work.schedule, one.runs
+    for design in job.works:
+        plan, runs = design.work.schedule, design.runs
         pressed = units.product(runs.count, plan.total_press_minutes)
         handled = runs.copies * plan.hands_minutes
         whole = None if pressed is None else pressed + handled
@@ -277,7 +288,7 @@ def _times(job: AssemblyJob) -> list[bill.Time]:
             f"{units.count(runs.count, 'lamination')} of {units.plain(plan.total_press_minutes)} "
             f"min; {handled:g} min of handling: cutting, lay-up, pins, tubes"
         )
-        rows.append(bill.Time(f"Making {one.name}", units.minutes(whole), made_of))
+        rows.append(bill.Time(f"Making {design.name}", units.minutes(whole), made_of))
     laser = units.minutes(bill.laser_minutes(job.works[0].work))
     basis = bill.laser_basis(job.works[0].work)
     rows.append(bill.Time("Laser (within making)", laser, f"{basis}; all sheets"))
@@ -297,30 +308,30 @@ def _times(job: AssemblyJob) -> list[bill.Time]:
 
 @dataclass(frozen=True)
 class JoinPage:
-    """One part's step."""
+    """The joining step of one part."""
 
     title: str
     actions: tuple[Action, ...]
 
 
 def join_pages(assembled: Assembled) -> list[JoinPage]:
-    """A step for each part: make it ready, then fix it."""
+    """Return a step for each part: make it ready, then fix it."""
     pages = []
     for placed in _in_order(assembled):
-        other = assembled.on(placed)
-        what = _what(placed)
-        title = placed.name if what == placed.name else f"{placed.name} ({what})"
+        carrier = assembled.on(placed)
+        kind = _kind(placed)
+        title = placed.name if kind == placed.name else f"{placed.name} ({kind})"
         lines = [line.name for line in _lines_through(assembled, placed)]
-        early = bool(lines) and other is not None
+        early = bool(lines) and carrier is not None
         actions = list(_ready(placed))
         if early:
             actions = [Action(f"Take {placed.name} with {listed(lines)} in it.")]
-        if other is not None:
-            title += f", {_where(placed)} of {other.name}"
-            if early and isinstance(other.part, Tube):
-                actions.append(Action(f"Lead {listed(lines)} through {other.name}."))
-            actions += _fix(placed, other)
-        actions += _supply(placed, other, assembled)
+        if carrier is not None:
+            title += f", {_where(placed)} of {carrier.name}"
+            if early and isinstance(carrier.part, Tube):
+                actions.append(Action(f"Lead {listed(lines)} through {carrier.name}."))
+            actions += _fix(placed, carrier)
+        actions += _supply(placed, carrier, assembled)
         if placed.part.note:
             actions.append(Action(placed.part.note))
         if actions:
@@ -329,14 +340,14 @@ def join_pages(assembled: Assembled) -> list[JoinPage]:
 
 
 def _in_order(assembled: Assembled) -> Iterator[PlacedPart]:
-    """Building order, but a line goes through a lumen while both its ends can still be reached."""
+    """Yield the parts in building order; a line goes in while both ends of its lumen are in reach."""
     parts = assembled.parts
     for placed in parts:
         if placed.made is not None and placed.part.on is not None:
             yield from _lines_through(assembled, placed)
-        other = assembled.on(placed)
-        early = placed.part.at == "lumen" and other is not None and other.made is not None
-        if not (early and other is not None and other.part.on is not None):
+        carrier = assembled.on(placed)
+        early = placed.part.at == "lumen" and carrier is not None and carrier.made is not None
+        if not (early and carrier is not None and carrier.part.on is not None):
             yield placed
 
 
@@ -346,7 +357,7 @@ def _lines_through(assembled: Assembled, placed: PlacedPart) -> list[PlacedPart]
     ]
 
 
-def _what(placed: PlacedPart) -> str:
+def _kind(placed: PlacedPart) -> str:
     if placed.made is not None:
         return placed.made.design.name
     names = {"line": "vacuum or fluid line", "cup": "suction cup"}
@@ -399,32 +410,32 @@ def _ready(placed: PlacedPart) -> Iterator[Action]:
         )
     else:
         yield Action(
-            f"Take a {_what(placed)} that has passed its tests; its inlet tubes stay open."
+            f"Take a {_kind(placed)} that has passed its tests; its inlet tubes stay open."
         )
 
 
-def _fix(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
+def _fix(placed: PlacedPart, carrier: PlacedPart) -> Iterator[Action]:
     part = placed.part
     if isinstance(part, Line):
-        yield from _thread(placed, part, other)
+        yield from _thread(placed, part, carrier)
     elif isinstance(placed, PlacedSba) and placed.radius is not None:
-        yield from _bend(placed, other)
+        yield from _bend(placed, carrier)
     else:
         yield Action(
-            f"Lay it {_where(placed)} of {other.name}: {_spot(placed, other)}. Try it dry."
+            f"Lay it {_where(placed)} of {carrier.name}: {_spot(placed, carrier)}. Try it dry."
         )
-    yield from _glue(placed, other)
+    yield from _glue(placed, carrier)
 
 
-def _spot(placed: PlacedPart, other: PlacedPart) -> str:
-    """Where the middle of a part lies, and which way the part is turned."""
+def _spot(placed: PlacedPart, carrier: PlacedPart) -> str:
+    """Return the place of a part's middle and the way the part is turned."""
     part = placed.part
     x, y = part.offset
     if part.at == "outside":
         spot = f"{_round(part.angle)}, {units.millimetres(part.along)} from the tube's start"
         return spot if not part.turn else f"{spot}, turned {part.turn:g} degrees anti-clockwise"
     has_mark = isinstance(part, Sba | Tube | Base)
-    words = [f"looking at that face, with {_mark(other)} to the right"]
+    words = [f"looking at that face, with {_mark(carrier)} to the right"]
     if not (x or y or has_mark):
         return "axis on axis"
     if x or y:
@@ -435,12 +446,12 @@ def _spot(placed: PlacedPart, other: PlacedPart) -> str:
     else:
         words.append("axis on axis")
     if has_mark:
-        words.append(_heading(placed, other))
+        words.append(_heading(placed, carrier))
     return ", ".join(words)
 
 
 def _is_below(placed: PlacedPart) -> bool:
-    """Whether a part is fixed on a lower face, upside down."""
+    """Return True if a part is fixed on a lower face, upside down."""
     return placed.part.at in ("bottom", "start")
 
 
@@ -449,26 +460,26 @@ def _aside(value: float, plus: str, minus: str) -> str:
 
 
 def _mark(placed: PlacedPart) -> str:
-    """What shows a part's direction x."""
+    """Return the mark that shows a part's direction x."""
     if placed.made is not None:
         return f"the tab of {placed.made.laminate.inlets[0].chamber}"
     marks = {"tube": "the marked line", "base": "the arrow", "sheet": "the arrow"}
     return marks.get(placed.part.kind, "any side")
 
 
-def _heading(placed: PlacedPart, other: PlacedPart) -> str:
-    """Which face of a part is glued, and which way its mark points: an SBA bends by its tabs."""
+def _heading(placed: PlacedPart, carrier: PlacedPart) -> str:
+    """Return the glued face of a part and the way its mark points: an SBA bends by its tabs."""
     face = {"sba": "base", "tube": "start"}.get(placed.part.kind, "underside")
     # On a lower face the part lies upside down, and is looked at from below.
     turn = _angle(placed) + placed.turn
-    turn += _angle(other) - 180 if _is_below(placed) else -_angle(other)
+    turn += _angle(carrier) - 180 if _is_below(placed) else -_angle(carrier)
     turn = round(turn, 6) % 360
-    way = f"over {_mark(other)}" if turn == 0 else f"{turn:g} degrees anti-clockwise from there"
+    way = f"over {_mark(carrier)}" if turn == 0 else f"{turn:g} degrees anti-clockwise from there"
     return f"its {face} glued, {_mark(placed)} {way}"
 
 
 def _angle(placed: PlacedPart) -> float:
-    """Degrees from a part's x to its mark."""
+    """Return the degrees from a part's x to its mark."""
     if placed.made is None:
         return 0.0
     x, y = placed.made.laminate.inlets[0].direction
@@ -482,21 +493,21 @@ def _round(angle: float) -> str:
     return f"{abs(angle):g} degrees {way} from the marked line, looking at the tube's end"
 
 
-def _bend(placed: PlacedSba, other: PlacedPart) -> Iterator[Action]:
+def _bend(placed: PlacedSba, carrier: PlacedPart) -> Iterator[Action]:
     part = placed.part
     form = placed.made.design.form
     middle = units.millimetres(part.along)
     if form.wrap is None:
         yield Action(
-            f"Bend it round {other.name}, base inward: its lumen {_round(part.angle)}, {middle} "
+            f"Bend it round {carrier.name}, base inward: its lumen {_round(part.angle)}, {middle} "
             f"from the tube's start; {_tab(placed)}. Try it dry."
         )
         return
     end = "start" if part.turn % 360 == 180 else "end"
     yield Action(
-        f"Wrap the sheet round {other.name}, balloons outward, its straight edges along the tube: "
-        f"the middle of the SBAs {middle} from the tube's start, tabs toward its {end}, the middle "
-        f"SBA {_round(part.angle)}. Try it dry."
+        f"Wrap the sheet round {carrier.name}, balloons outward, its straight edges along the "
+        f"tube: the middle of the SBAs {middle} from the tube's start, tabs toward its {end}, the "
+        f"middle SBA {_round(part.angle)}. Try it dry."
     )
     yield Action(
         f"Check: the edges of the sheet meet, and the {form.stacks} SBAs lie {360 / form.stacks:g} "
@@ -506,7 +517,9 @@ def _bend(placed: PlacedSba, other: PlacedPart) -> Iterator[Action]:
 
 
 def _tab(placed: PlacedPart) -> str:
-    """Where chamber1's tab points: at no turn round the tube, then on toward the tube's end."""
+    """Return the direction of chamber1's tab: at no turn round the tube, then on toward the tube's
+    end.
+    """
     turn = placed.part.turn % 360
     plain = {
         0: "round the tube, anti-clockwise as you look at its end",
@@ -522,24 +535,24 @@ def _tab(placed: PlacedPart) -> str:
     )
 
 
-def _thread(placed: PlacedPart, line: Line, other: PlacedPart) -> Iterator[Action]:
+def _thread(placed: PlacedPart, line: Line, carrier: PlacedPart) -> Iterator[Action]:
     if line.at == "inlet":
         yield Action(
-            f"Push it into the inlet of {line.chamber} of {other.name}, beside the PTFE strip, in "
-            "place of a tube fitted earlier."
+            f"Push it into the inlet of {line.chamber} of {carrier.name}, beside the PTFE strip, "
+            "in place of a tube fitted earlier."
         )
         return
-    if other.part.on is not None and other.made is not None:
+    if carrier.part.on is not None and carrier.made is not None:
         yield Action(
-            f"Take {other.name}, not yet fixed: a {_what(other)} that has passed its tests."
+            f"Take {carrier.name}, not yet fixed: a {_kind(carrier)} that has passed its tests."
         )
-    past = line.along + line.length - other.height
-    face = "top" if other.made is not None else "end"
+    past = line.along + line.length - carrier.height
+    face = "top" if carrier.made is not None else "end"
     side = f"{units.millimetres(abs(past))} {'past' if past >= 0 else 'short of'} its {face}"
-    yield Action(f"Thread it through the lumen of {other.name} until it ends {side}.")
+    yield Action(f"Thread it through the lumen of {carrier.name} until it ends {side}.")
 
 
-def _glue(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
+def _glue(placed: PlacedPart, carrier: PlacedPart) -> Iterator[Action]:
     glue = _adhesive(placed)
     if glue is None:
         if placed.part.at == "outside" or not isinstance(placed.part, Line):
@@ -560,29 +573,31 @@ def _glue(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
 
 
 def _adhesive(placed: PlacedPart) -> str | None:
-    """The part's own; a sheet that is wrapped round its tube has its design's else."""
+    """Return the adhesive of a part; a sheet wrapped round its tube falls back on its design's."""
     wrap = None if placed.made is None else placed.made.design.form.wrap
     return placed.part.glue or (wrap.glue if wrap is not None else None)
 
 
-def _supply(placed: PlacedPart, other: PlacedPart | None, assembled: Assembled) -> Iterator[Action]:
-    """Where an actuator's tubes run, and how its tabs are folded."""
+def _supply(
+    placed: PlacedPart, carrier: PlacedPart | None, assembled: Assembled
+) -> Iterator[Action]:
+    """Yield the run of an actuator's tubes and the folding of its tabs."""
     if placed.made is None or not placed.made.laminate.inlets:
         return
     tie = "tie them there with a turn of thread, loose enough for tubes to slide"
-    own = runs(placed, assembled)
-    if other is not None and own:
+    tube_runs = runs(placed, assembled)
+    if carrier is not None and tube_runs:
         away = "start" if placed.part.at == "end" else "end"
-        over = listed(list(dict.fromkeys(name for run in own for name in run.over)))
+        over = listed(list(dict.fromkeys(name for run in tube_runs for name in run.over)))
         past = f"; where one crosses {over}, leave it slack" if over else ""
-        places = listed([f"{run.chamber} at {round(run.angle, 1) % 360:g}" for run in own])
+        places = listed([f"{run.chamber} at {round(run.angle, 1) % 360:g}" for run in tube_runs])
         yield Action(
             f"Fold each tab back over the rim, round its tube and not flat, and lead the tubes "
-            f"along the outside of {other.name} toward its {away}: {places} degrees{past}; {tie}."
+            f"along the outside of {carrier.name} toward its {away}: {places} degrees{past}; {tie}."
         )
-    elif other is not None and placed.radius is not None:
+    elif carrier is not None and placed.radius is not None:
         yield Action(
-            f"Lead its tubes along {other.name}, the way the tabs point, off all balloons; {tie}."
+            f"Lead its tubes along {carrier.name}, the way the tabs point, off all balloons; {tie}."
         )
     else:
         yield Action(
@@ -591,21 +606,22 @@ def _supply(placed: PlacedPart, other: PlacedPart | None, assembled: Assembled) 
         )
 
 
-def _leak_pressures(made: Sequence[PlacedSba]) -> str:
-    """The leak tests' pressures, one number where the designs agree."""
-    pressures = {one.made.design.acceptance.leak_pressure_kpa for one in made}
+def _leak_pressures(actuators: Sequence[PlacedSba]) -> str:
+    """Return the leak tests' pressures, one number where the designs agree."""
+    pressures = {actuator.made.design.acceptance.leak_pressure_kpa for actuator in actuators}
     return " or ".join(f"{pressure:g}" for pressure in sorted(pressures))
 
 
 def final_checks(assembled: Assembled) -> list[Action]:
-    """What the finished assembly must do; figures are predictions."""
-    made = [placed for placed in assembled.parts if isinstance(placed, PlacedSba)]
+    """Return the tests of the finished assembly; figures are predictions."""
+    actuators = [placed for placed in assembled.parts if isinstance(placed, PlacedSba)]
     deploy = assembled.assembly.deploy
     actions = [
         Action(
-            f"Raise each actuator to {_leak_pressures(made)} kPa again: no leak, no joint opens.",
+            f"Raise each actuator to {_leak_pressures(actuators)} kPa again: no leak, no joint "
+            "opens.",
             (),
-            tuple(placed.name for placed in made) if len(made) > 1 else (),
+            tuple(placed.name for placed in actuators) if len(actuators) > 1 else (),
         )
     ]
     if any(isinstance(placed.part, Line) for placed in assembled.parts):
@@ -623,7 +639,7 @@ def final_checks(assembled: Assembled) -> list[Action]:
                 f"Inflated in the open until its films are taut, {placed.name} measures about "
                 f"{across}; in the tube of {lumen} it holds against a pull."
             )
-            for placed in made
+            for placed in actuators
             if (across := _across(placed)) is not None
         ]
     if any(isinstance(placed.part, Magnet) for placed in assembled.parts):
@@ -640,7 +656,7 @@ def _across(placed: PlacedSba) -> str | None:
 
 
 def bought(assembled: Assembled, copies: int) -> list[Item]:
-    """Rows of the bill of materials for what is not cut from film."""
+    """Return rows of the bill of materials for what is not cut from film."""
     items = [_item(placed, copies) for placed in assembled.parts if placed.made is None]
     glues = dict.fromkeys(filter(None, map(_adhesive, assembled.parts)))
     for glue in glues:

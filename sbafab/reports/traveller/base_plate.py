@@ -1,4 +1,4 @@
-"""The base plate and what goes with it: its holes, its pins, the pad and the release films."""
+"""The base plate and what goes with it: its holes, its pins, the build-up, pad and release films."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class PlateHole(NamedTuple):
 
 
 class PlatePlace(NamedTuple):
-    """Where a further place has its holes, mm from those of the first."""
+    """A further place of the plate: the shift of its holes from those of the first, mm."""
 
     place: int
     x: float
@@ -45,12 +45,14 @@ class PlatePlace(NamedTuple):
 
 
 def places(work: Work) -> list[PlatePlace]:
-    """All places of the plate but the first."""
+    """Return all places of the plate but the first."""
     return [PlatePlace(n, x, y) for n, (x, y) in enumerate(work.runs.places[1:], 2)]
 
 
 def grid(work: Work) -> str:
-    """The places of a full plate in one sentence, where a list of them is too long to use."""
+    """Return the places of a full plate in one sentence; empty where a list of them is short
+    enough.
+    """
     every = work.runs.places
     if len(every) <= MOST_LISTED:
         return ""
@@ -64,11 +66,11 @@ def grid(work: Work) -> str:
 
 
 def holes(work: Work) -> list[PlateHole]:
-    """Every hole of the plate's first place; films have the diameter ``films`` there."""
+    """Return every hole of the plate's first place; films have the diameter ``films`` there."""
     laminate, press = work.laminate, work.design.press
     platen = press.platen_width, press.platen_length
     corner_x, corner_y = plate_corner(laminate, platen, work.runs.places)
-    found = _pin_holes(work.schedule)
+    pins = _pin_holes(work.schedule)
     return [
         PlateHole(
             pin.name,
@@ -77,14 +79,14 @@ def holes(work: Work) -> list[PlateHole]:
             pin.centre[1] - corner_y,
             pin.centre,
             pin.hole,
-            *_sizes(found.get(pin.name)),
+            *_sizes(pins.get(pin.name)),
         )
         for pin in laminate.pins
     ]
 
 
 def _sizes(hole: PinHole | None) -> tuple[str, str, str]:
-    """Depth, push-out hole and pins of a hole, as the table has them."""
+    """Return depth, push-out hole and pins of a hole, as the table has them."""
     if hole is None:
         return "not used", "", ""
     lengths = listed([f"{length:g}" for length in hole.lengths])
@@ -97,31 +99,31 @@ def _pin_holes(plan: Schedule) -> dict[str, PinHole]:
 
 
 def plate_notes(work: Work) -> tuple[str, ...]:
-    """How the plate's holes are made, how true, and what the rules count for it."""
+    """Return how the plate's holes are made, how true they are, and what the rules count for it."""
     design = work.design
-    own = design.registration
-    making = MAKINGS[own.plate_made_by]
+    registration = design.registration
+    making = MAKINGS[registration.plate_made_by]
     several = len(work.laminate.pins) > 1
     counted = design.pin_error if several else design.lone_pin_error
-    play = most_play(design.thickest_pin, own.plate_made_by)
+    play = most_play(design.thickest_pin, registration.plate_made_by)
     fit = (
         "Bore it 0.005 to 0.01 too narrow and lap it to its own pins, until they go in by hand "
         "without shake; mark which pins are whose"
         if making.is_lapped and several
         else "Ream it H7; choose pins of the pack that go in by hand or with light taps"
     )
-    made = (
+    how = (
         "Base plate, as large as the platen. Each hole: drill it through at the push-out diameter; "
         "widen it from above down to the depth, flat at the bottom: on that shoulder the pin "
         f"stands. {fit}. Deburr, no more: a burr lifts films. The file has nominal edges."
     )
     if not several:
-        return made, (
+        return how, (
             "All layers register on this one pin, so its place on the plate does not matter: a "
             "drill press is good enough, marked out to 0.2 mm. The rules count "
             f"{counted:g} mm for its play."
         )
-    return made, (
+    return how, (
         f"Each hole within {making.position:g} mm of its place in the table, in any direction: "
         f"which takes {making.words} (registration.plate_made_by). A pin has up to {play:g} mm of "
         f"play in its hole. The rules count {counted:g} mm for both."
@@ -129,7 +131,7 @@ def plate_notes(work: Work) -> tuple[str, ...]:
 
 
 def _underlay_words(work: Work) -> str:
-    """What is said of the underlay where some step has one."""
+    """Return the sentences on the underlay; empty where no step has one."""
     steps = [step.step for step in work.schedule.steps if _has_underlay(step)]
     if not steps:
         return ""
@@ -149,7 +151,7 @@ def _has_underlay(step: Step) -> bool:
 
 
 def hot_prints(work: Work) -> int:
-    """Return how often a print of the underlay lies in the closed press, all cycles counted."""
+    """Return the prints of the underlay that lie in the closed press, all cycles counted."""
     return work.runs.count * sum(_has_underlay(step) for step in work.schedule.steps)
 
 
@@ -167,7 +169,7 @@ def release_films(work: Work) -> int:
 
 
 def build_up_notes(work: Work) -> tuple[str, ...]:
-    """The one build-up of all steps, and what its force means."""
+    """Return the one build-up of all steps, and what its force means."""
     step = work.schedule.steps[-1]
     thick = {item.part: item for item in step.build_up}
     newtons, kilopascals = f"{step.force_n:.0f} N", f"{step.pressure_kpa:g} kPa"
@@ -175,7 +177,7 @@ def build_up_notes(work: Work) -> tuple[str, ...]:
     plate, pad, release = thick[BASE_PLATE], thick[PAD], thick[RELEASE]
     together = work.runs.together
     alone = together * work.laminate.layers[-1].profile.area
-    what = "laminate" if together == 1 else f"{together} laminates"
+    laminates = "laminate" if together == 1 else f"{together} laminates"
     holes = "has no holes, pins press into it, and it " if work.laminate.pins else ""
     return (
         "Every step has the same build-up, from the lower platen up: base plate "
@@ -184,10 +186,10 @@ def build_up_notes(work: Work) -> tuple[str, ...]:
         f"({pad.material}, {units.millimetres(pad.thickness_mm)}, as large as the platen), upper "
         f"platen. Nothing rigid lies on the films: no second plate.{_underlay_words(work)}",
         f"{newtons} is {kilopascals} on the whole platen of {size}; the paper gives no force. The "
-        f"pad brings it to the films; without it {newtons} on the {what} alone ({alone:.0f} mm²) "
-        f"would be {step.force_n / alone:.1f} MPa. What the paper laid between platen and films is "
-        "not known. The pressures at each step are estimates that no press has confirmed: check "
-        "them once, cold, with pressure-indicating film.",
+        f"pad brings it to the films; without it {newtons} on the {laminates} alone ({alone:.0f} "
+        f"mm²) would be {step.force_n / alone:.1f} MPa. What the paper laid between platen and "
+        "films is not known. The pressures at each step are estimates that no press has confirmed: "
+        "check them once, cold, with pressure-indicating film.",
         f"The pad {holes}insulates: films are heated from below, through the base plate. Lay up on "
         "the plate while it is cold, out of the press; it warms with the films on it, and each "
         "step's clock starts when it is hot.",
@@ -195,7 +197,7 @@ def build_up_notes(work: Work) -> tuple[str, ...]:
 
 
 def build_up_again(work: Work) -> tuple[str, ...]:
-    """The same where another design's page has said it: only what is this design's own."""
+    """Return the build-up in short, where another design's page has given it in full."""
     thick = {item.part: item for item in work.schedule.steps[-1].build_up}
     plate, pad = thick[BASE_PLATE], thick[PAD]
     return (
@@ -206,7 +208,7 @@ def build_up_again(work: Work) -> tuple[str, ...]:
 
 
 def items(work: Work) -> list[tuple[str, str, str]]:
-    """Rows of the bill of materials: what, which, how many."""
+    """Return rows of the bill of materials: name, specification, quantity."""
     laminate, plan = work.laminate, work.schedule
     first = plan.steps[0]
     thick = {item.part: item for item in first.build_up}

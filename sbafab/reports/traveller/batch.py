@@ -1,4 +1,4 @@
-"""Several copies on one traveller: the press cycles by day, the plate's places, a serial each."""
+"""Several copies on one traveller: the press cycles by day, the plate's places, a serial for each."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ PAUSES = (
 
 @dataclass(frozen=True)
 class PatternRow:
-    """How many of a pattern one place takes, and each kind of cycle."""
+    """The count of a pattern at one place, and in each kind of cycle."""
 
     pattern: str
     material: str
@@ -44,7 +44,7 @@ class PatternRow:
 
 @dataclass(frozen=True)
 class CopyRow:
-    """Where a copy is pressed; all numbers count from 1."""
+    """The cycle and the place in which a copy is pressed; all numbers count from 1."""
 
     copy: int
     cycle: int
@@ -66,11 +66,11 @@ class PlanRow:
 
 @dataclass(frozen=True)
 class BatchPage:
-    """What the page says of a batch. Cycles of one size share a column of the counts."""
+    """The section on a batch. Cycles of one size share a column of the counts."""
 
     at_once: int
     cycles: int
-    said: str
+    summary: str
     why: str
     picture: str
     plan: tuple[PlanRow, ...]
@@ -83,7 +83,7 @@ class BatchPage:
 
 
 def batch_page(work: Work) -> BatchPage | None:
-    """The batch of a design; None for a single copy."""
+    """Return the batch of a design; None for a single copy."""
     runs = work.runs
     if runs.copies == 1:
         return None
@@ -96,7 +96,7 @@ def batch_page(work: Work) -> BatchPage | None:
     return BatchPage(
         runs.together,
         runs.count,
-        _said(work, runs),
+        _summary(work, runs),
         "Copies are alike layer by layer and share the pressure evenly (ours: the paper does not "
         f"say how many it pressed at once).{lesser}",
         _picture(work, runs),
@@ -121,19 +121,19 @@ def batch_page(work: Work) -> BatchPage | None:
     )
 
 
-def _said(work: Work, runs: Runs) -> str:
-    times, one = batch_times(runs, work.schedule), work.schedule.total_press_minutes
+def _summary(work: Work, runs: Runs) -> str:
+    times, single = batch_times(runs, work.schedule), work.schedule.total_press_minutes
     cycles = units.count(runs.count, "press cycle")
     sizes = ", ".join(str(size) for size in dict.fromkeys(runs.cycles))
     why = f" {work.design.order.why}" if work.design.order.why else ""
     return (
         f"{runs.copies} copies in {cycles} of {sizes} at once: {units.plain(times.press)} min in "
-        f"the press instead of {units.plain(units.product(runs.copies, one))}.{why}"
+        f"the press instead of {units.plain(units.product(runs.copies, single))}.{why}"
     )
 
 
 def _plan(work: Work) -> tuple[PlanRow, ...]:
-    """The work of every day, in its order."""
+    """Return the work of every day, in its order."""
     entries = working_days(work.design, work.laminate, work.schedule, work.job.copies)
     days = [entry.day for entry in entries]
     return tuple(
@@ -176,7 +176,7 @@ def _plan_basis(work: Work) -> str:
     holds = most_together(work.laminate, platen)
     entries = working_days(work.design, work.laminate, work.schedule, work.job.copies)
     pressing = {entry.day for entry in entries if entry.task == "press"}
-    left = 60 * hours - max(e.start + e.minutes for e in entries if e.day in pressing)
+    spare = 60 * hours - max(e.start + e.minutes for e in entries if e.day in pressing)
     return (
         f"One person, one press, shifts of {hours:g} h (order.shift_hours); a cycle takes no more "
         f"copies than such a shift makes (the plate has room for {holds}), and its press steps end "
@@ -185,13 +185,13 @@ def _plan_basis(work: Work) -> str:
         f"these {CUT_SHARE:.0%} for cutting, {FINISH_SHARE:.0%} for the tubes and the rest for the "
         "steps, in proportion to the parts that each lays (ours). Not included: warming and "
         "cooling the plate in every press step (blanks in Before the day), for which the fullest "
-        f"day with a press step has {units.clock(max(0.0, left))} left, curing, leak and proof "
+        f"day with a press step has {units.clock(max(0.0, spare))} left, curing, leak and proof "
         "tests. Write the actual minutes beside each row."
     )
 
 
 def _identity(work: Work) -> tuple[Action, ...]:
-    """How a laminate is told from the others from one step to the next."""
+    """Return how each laminate is identified from one step to the next."""
     lining = "a drawing of the places above, with their numbers"
     if work.job.underlay is not None:
         lining = f"one more print of {work.job.underlay}, which has the places' numbers"
@@ -219,14 +219,14 @@ def _identity(work: Work) -> tuple[Action, ...]:
 
 
 def _name(runs: Runs, size: int) -> str:
-    numbers = [n for n, own in enumerate(runs.cycles, 1) if own == size]
+    numbers = [n for n, copies in enumerate(runs.cycles, 1) if copies == size]
     if len(numbers) == 1:
         return f"Cycle {numbers[0]} ({size})"
     return f"Cycles {numbers[0]} to {numbers[-1]}, each ({size})"
 
 
 def _picture(work: Work, runs: Runs) -> str:
-    """The places on the base plate, numbered as they are laid."""
+    """Return the places on the base plate, numbered as they are laid."""
     laminate = work.laminate
     plate = whole_plate(laminate, work.schedule.steps[0].platen_mm, runs.places)
     low_x, low_y, high_x, high_y = plate.bounds
@@ -251,7 +251,9 @@ def _picture(work: Work, runs: Runs) -> str:
         middle = (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
         spot = moved[0] + scale * middle[0], moved[1] - scale * middle[1] + size / 3
         picture.add(label(spot, str(place), size))
-    size_said = f"{coord(round(wide, 6))} x {coord(round(high, 6))} mm"
-    said = f"base plate and heated area, {size_said}, from above; the cut corner at the back right"
-    picture.add(draw.text((1.0, scale * high + 6), said, size=2.2))
+    size_words = f"{coord(round(wide, 6))} x {coord(round(high, 6))} mm"
+    caption = (
+        f"base plate and heated area, {size_words}, from above; the cut corner at the back right"
+    )
+    picture.add(draw.text((1.0, scale * high + 6), caption, size=2.2))
     return picture.svg()

@@ -1,4 +1,7 @@
-"""What good hands know: one line each where it happens. All of it is ours; the paper gives none."""
+"""Practice at the bench: cutting and laying films, heating the plate, pressure, preparation, tools.
+
+All of it is ours; the paper gives none.
+"""
 
 from __future__ import annotations
 
@@ -60,7 +63,9 @@ RIM = 10.0
 
 
 def before_first_cut() -> list[Action]:
-    """The same of registered sheets, whose parts hang on bridges or lie on the transfer film."""
+    """Return the actions before registered sheets are cut: bridges or the transfer film hold their
+    parts.
+    """
     return [
         Action(WIPE),
         Action(
@@ -75,11 +80,12 @@ def before_first_cut() -> list[Action]:
 
 
 def before_cutting(works: Sequence[Work]) -> list[Action]:
-    """How films come clean and flat under the beam, and what holds their parts once they are cut.
+    """Return the actions before cutting: films come clean and flat under the beam, their parts are
+    held.
 
     None of it was tried, and the actions say so.
     """
-    return [Action(WIPE), *(_held(works, film) for film in _films(works)), Action(AIR)]
+    return [Action(WIPE), *(_holding(works, film) for film in _films(works)), Action(AIR)]
 
 
 def _films(works: Sequence[Work]) -> list[Film]:
@@ -92,8 +98,10 @@ def hold_down(work: Work, film: Film) -> HoldDown:
     return laser.hold_ptfe if film.is_mask else laser.hold_tpe
 
 
-def _held(works: Sequence[Work], film: Film) -> Action:
-    """How one film is held: on sheets of which each part comes free, for nothing bridges it."""
+def _holding(works: Sequence[Work], film: Film) -> Action:
+    """Return the holding of one film on sheets of which each part comes free, as nothing bridges
+    it.
+    """
     count, lightest = 0, math.inf
     for work in works:
         for layers in work.laminate.patterns.values():
@@ -115,7 +123,7 @@ def _held(works: Sequence[Work], film: Film) -> Action:
 
 
 def after_cutting(works: Sequence[Work]) -> list[Action]:
-    """How parts leave the sheet: clean, and none lost."""
+    """Return the actions by which parts leave the sheet clean, and none is lost."""
     actions = [
         Action(
             "Wipe the soot off both faces of every part with isopropanol, let it dry: soot in a "
@@ -135,7 +143,9 @@ def after_cutting(works: Sequence[Work]) -> list[Action]:
 
 
 def _threading(works: Sequence[Work]) -> list[Action]:
-    """What the rule pin-fit means at the bench, for the design whose films stretch most."""
+    """Return the trial on the pins that the rule pin-fit asks for; of the design that stretches
+    most.
+    """
     tight = [
         (finding.measured, finding.limit or 0.0, work)
         for work in works
@@ -144,7 +154,7 @@ def _threading(works: Sequence[Work]) -> list[Action]:
     ]
     if not tight:
         return []
-    stretch, allowed, work = max(tight, key=lambda one: one[0])
+    stretch, allowed, work = max(tight, key=lambda stretched: stretched[0])
     error = units.millimetres(work.design.registration.cutting_error)
     return [
         Action(
@@ -158,13 +168,13 @@ def _threading(works: Sequence[Work]) -> list[Action]:
 
 
 def _loose(laminate: Laminate) -> int:
-    """Pieces of masks that fall into several."""
+    """Return the number of pieces of masks that fall into several."""
     pieces = (len(layer.profile.pieces) for layer in laminate.layers if layer.is_mask)
     return sum(count for count in pieces if count > 1)
 
 
 def underlay(work: Work, part: AssemblyStep) -> list[Action]:
-    """The printed page below the release film, in steps in which it has a line to lay by.
+    """Return the printed page below the release film, in steps in which it has a line to lay by.
 
     One print lies in one hot cycle: paper dries and shrinks, and a worn line is no line.
     """
@@ -189,7 +199,7 @@ def underlay(work: Work, part: AssemblyStep) -> list[Action]:
 
 
 def reseat(laminate: Laminate, adds: Sequence[int], pinned: bool) -> list[Action]:
-    """What to do with a mask that has slipped; empty for a step that lays none."""
+    """Return the remedy for a mask that has slipped; empty for a step that lays none."""
     if not any(layer.is_mask for layer in distinct_layers(laminate, adds)):
         return []
     home = "down on its pin" if pinned else "to its edge"
@@ -202,7 +212,7 @@ def reseat(laminate: Laminate, adds: Sequence[int], pinned: bool) -> list[Action
 
 
 def closing(step: Step, heating: Heating, cycles: tuple[str, ...] = ()) -> Action:
-    """When the clock starts, as the plate goes in cold; a box for each of the ``cycles``."""
+    """Return the start of the clock, as the plate goes in cold; a box for each of the ``cycles``."""
     return Action(closing_words(step, heating), (), cycles)
 
 
@@ -219,12 +229,12 @@ class HeatBlank(NamedTuple):
     """
 
     point: str
-    said: str
+    words: str
     id: str
 
 
 def heat_blanks(step: Step, heating: Heating) -> list[HeatBlank]:
-    """Return the line of a step, from the melting point to the end of its clock."""
+    """Return the time-temperature line of a step, from the melting point to the end of its clock."""
     return [
         HeatBlank(point.point, _heat_words(point, step, heating), f"heat-{step.step}-{number}")
         for number, point in enumerate(step.time_temperature, 1)
@@ -235,10 +245,10 @@ def _heat_words(point: HeatPoint, step: Step, heating: Heating) -> str:
     """Return the point so short that three of them fit on one line of the page."""
     if point.point == END:
         return f"end ({units.minutes(step.minutes)} later)"
-    what = "melting" if point.point == MELTING else point.point
+    name = "melting" if point.point == MELTING else point.point
     minutes = point.after_minutes
     after = _constants(point, heating) if minutes is None else units.minutes(minutes)
-    return f"{point.edge_c:g} °C ({what}, {after})"
+    return f"{point.edge_c:g} °C ({name}, {after})"
 
 
 def _constants(point: HeatPoint, heating: Heating) -> str:
@@ -248,7 +258,7 @@ def _constants(point: HeatPoint, heating: Heating) -> str:
 
 
 def note(work: Work) -> str:
-    """Return what the paper says of time, what we add, and the line that all steps share."""
+    """Return what the paper states of time, what we add, and the line that all steps share."""
     heating = work.schedule.heating
     platens, warms = heating.platen_c, heating.platen_c - heating.start_c
     points = work.schedule.steps[0].time_temperature
@@ -351,19 +361,19 @@ def pressure_range(works: Sequence[Work]) -> tuple[float, float]:
 
 def film_classes(low: float, high: float) -> list[FilmClass]:
     """Return the fewest classes that cover a range in kPa, as far as classes do."""
-    return [one for one in FILM_CLASSES if one.low < high and one.high > low]
+    return [film for film in FILM_CLASSES if film.low < high and film.high > low]
 
 
 def film_words(works: Sequence[Work]) -> str:
     """Return which pressure-indicating film covers what the films get."""
     low, high = pressure_range(works)
-    found = film_classes(low, high)
+    classes = film_classes(low, high)
     names = listed(
-        [f"{one.name} ({one.product}, {one.low:g} to {one.high:g} kPa)" for one in found]
+        [f"{film.name} ({film.product}, {film.low:g} to {film.high:g} kPa)" for film in classes]
     )
     return (
         f"pressure-indicating film for {low:.0f} to {high:.0f} kPa: Fujifilm Prescale, {names}"
-        if found
+        if classes
         else f"pressure-indicating film for {low:.0f} to {high:.0f} kPa"
     )
 
@@ -408,17 +418,17 @@ HOLDERS: Mapping[HoldDown, Tool] = {
 
 
 def before_the_day(works: Sequence[Work]) -> list[Action]:
-    """What must be at hand, cut, dry and measured before the press is switched on."""
+    """Return all that must be at hand, cut, dry and measured before the press is switched on."""
     return [Action(text) for text in _before(works)]
 
 
 def _before(works: Sequence[Work]) -> Iterator[str]:
     films = dict.fromkeys(layer.film for work in works for layer in work.laminate.layers)
     materials = list(dict.fromkeys(film.material for film in films))
-    unknown = [name for name, _, known in kerf_states(works[0].job, materials) if not known]
-    if unknown:
+    nominal = [name for name, _, measured in kerf_states(works[0].job, materials) if not measured]
+    if nominal:
         yield (
-            f"Kerf of {listed(unknown)} measured and the files generated again; or it is accepted "
+            f"Kerf of {listed(nominal)} measured and the files generated again; or it is accepted "
             "that edges are nominal (warning above)."
         )
     if any(film.warning for film in films):
@@ -455,51 +465,54 @@ def _before(works: Sequence[Work]) -> Iterator[str]:
 
 
 def tools(works: Sequence[Work]) -> list[Tool]:
-    """What is worked with, but for what is used up."""
+    """Return the tools, without what is used up."""
     laminates = [work.laminate for work in works]
     first = works[0].schedule.steps[0]
     width, length = first.platen_mm
-    found = [
+    rows = [
         Tool("Laser or drag knife", "cuts the film sheets; exhaust on"),
         Tool("Lint-free cloths, isopropanol, clean gloves", "clean films and parts before bonding"),
     ]
-    masks = [layer for one in laminates for layer in one.layers if layer.is_mask]
-    held = {
+    masks = [layer for laminate in laminates for layer in laminate.layers if layer.is_mask]
+    holds = {
         "border" if work.laminate.panel is not None else hold_down(work, layer.film)
         for work in works
         for layer in work.laminate.layers
     }
-    found += [tool for hold, tool in HOLDERS.items() if hold in held]
+    rows += [tool for hold, tool in HOLDERS.items() if hold in holds]
     if any(len(layer.profile.pieces) > 1 for layer in masks):
-        found.append(Tool("Antistatic tweezers, earthed mat, dish with a lid", "loose mask pieces"))
-    sizes = sorted({pin.diameter for one in laminates for pin in one.pins})
+        rows.append(Tool("Antistatic tweezers, earthed mat, dish with a lid", "loose mask pieces"))
+    sizes = sorted({pin.diameter for laminate in laminates for pin in laminate.pins})
     if sizes:
-        said = listed([f"⌀{units.millimetres(size)}" for size in sizes])
+        diameters = listed([f"⌀{units.millimetres(size)}" for size in sizes])
         thin = listed([f"⌀{units.millimetres(punch(size))}" for size in sizes])
         has_underlay = any(work.job.underlay is not None for work in works)
         pricked = "release film and underlay" if has_underlay else "the release film"
-        found += [
-            Tool(f"Drills, flat cutters, reamers H7 {said}", "base plate, if you make it yourself"),
+        rows += [
+            Tool(
+                f"Drills, flat cutters, reamers H7 {diameters}",
+                "base plate, if you make it yourself",
+            ),
             Tool("Depth gauge, small hammer", "seat the pins on their shoulders, check heights"),
             Tool(f"Pin punches {thin}, or shanks of drills", "push the pins out, from below"),
             Tool("Flat tweezers, pliers", "hold the films down and draw the pins"),
             Tool("Needle", f"pricks {pricked} over the pins"),
         ]
     if any(work.job.underlay is not None for work in works):
-        found.append(
+        rows.append(
             Tool("Knife, steel rule, 100 mm at least", "measure the underlay's bars, cut it out")
         )
     hands = [w.design.registration for w in works if w.laminate.registration == "channel-pin"]
     if hands:
         finest = units.millimetres(min(hand.hand_placement for hand in hands))
-        found.append(
+        rows.append(
             Tool(
                 f"Measuring loupe, {LOUPE}; bright light",
                 f"lay by eye to {finest} and measure the result (sbafab record --offset); the "
                 "unaided eye resolves about 0.1 mm",
             )
         )
-    found += [
+    rows += [
         Tool(
             f"Heat press, {units.size(width, length)}",
             f"both platens to {units.temperature(first.temperature_c)}, "
@@ -509,9 +522,9 @@ def tools(works: Sequence[Work]) -> list[Tool]:
         Tool(f"{film_words(works)[:1].upper()}{film_words(works)[1:]}", COLD),
         Tool("Heat-proof gloves", "take the plate out, as hot as the platens"),
     ]
-    if any(one.inlets for one in laminates):
-        ears = "ears, " if any(one.registration == "ears" for one in laminates) else ""
-        found += [
+    if any(laminate.inlets for laminate in laminates):
+        ears = "ears, " if any(laminate.registration == "ears" for laminate in laminates) else ""
+        rows += [
             Tool("Fine scissors, razor blade, pen", f"cut {ears}strips and tubes; mark tabs"),
             Tool(
                 "Regulator or syringe with a gauge, water or soapy water, eye protection",
@@ -519,4 +532,4 @@ def tools(works: Sequence[Work]) -> list[Tool]:
             ),
             Tool(works[0].design.acceptance.fitting, "joins each tube to the supply"),
         ]
-    return found
+    return rows

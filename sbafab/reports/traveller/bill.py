@@ -1,4 +1,4 @@
-"""The bill of materials and the cut list."""
+"""What a job takes: the bill of materials, the cut list, the minutes, and notes on the cut files."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Item:
 
 
 def bill(work: Work) -> list[Item]:
-    """All that must be at hand before the work starts, for all copies."""
+    """Return all that must be at hand before the work starts, for all copies."""
     job, laminate = work.job, work.laminate
     items = [*_films(work)]
     if laminate.inlets:
@@ -53,26 +53,26 @@ def bill(work: Work) -> list[Item]:
     wrap = work.design.form.wrap
     if wrap is not None:
         diameter = units.millimetres(wrap.tube_diameter)
-        what = f"to wrap the sheet round, outer diameter {diameter}"
-        items.append(Item("Tube to wrap", what, str(job.copies)))
-        what = f"{wrap.glue}, between sheet and tube (ours: the paper does not say what holds it)"
-        items.append(Item("Adhesive of the wrap", what, "as needed"))
+        words = f"to wrap the sheet round, outer diameter {diameter}"
+        items.append(Item("Tube to wrap", words, str(job.copies)))
+        words = f"{wrap.glue}, between sheet and tube (ours: the paper does not say what holds it)"
+        items.append(Item("Adhesive of the wrap", words, "as needed"))
     items += [Item(*row) for row in base_plate.items(work)]
     if job.underlay is not None:
         items.append(_underlay(work, job.underlay))
-        what = (
+        words = (
             f"{base_plate.TAPE}, 0.06 mm thick, 10 mm wide: along the plate's edges, off the films"
         )
-        items.append(Item("Tape", what, "as needed"))
+        items.append(Item("Tape", words, "as needed"))
     if work.runs.together > 1:
-        what = "flat, with a lid, lined as section Batch says; tape for flags round the tubes"
-        items.append(Item("Tray", what, "1"))
+        words = "flat, with a lid, lined as section Batch says; tape for flags round the tubes"
+        items.append(Item("Tray", words, "1"))
     items += [Item(name, "", quantity) for name, quantity in job.extras]
     return items
 
 
 def _underlay(work: Work, path: str) -> Item:
-    """The pages to print, and on what paper where A4 and Letter are too small."""
+    """Return the pages to print, and the paper where A4 and Letter are too small."""
     spread = leaves(work.laminate, work.runs.places, work.schedule.steps[0].platen_mm)
     width, height = (max(leaf.size[axis] for leaf in spread) for axis in (0, 1))
     paper = "A4 or Letter"
@@ -82,12 +82,12 @@ def _underlay(work: Work, path: str) -> Item:
     thick = units.millimetres(work.design.press.underlay_thickness)
     closings, prints = base_plate.hot_prints(work), base_plate.prints(work)
     tray = ", and one to line the tray" if prints > closings else ""
-    what = (
+    words = (
         f"{path} printed at 100 % on plain paper {thick} thick, {paper}; its bars must measure 100 "
         f"mm{join}. A fresh print for each of {units.count(closings, 'closing')} of the press, as "
         f"paper dries there and shrinks{tray}"
     )
-    return Item("Underlay", what, units.count(len(spread) * prints, "page"))
+    return Item("Underlay", words, units.count(len(spread) * prints, "page"))
 
 
 def _films(work: Work) -> list[Item]:
@@ -126,7 +126,7 @@ class Cut:
 
 
 def cut_list(work: Work) -> list[Cut]:
-    """Every pattern once, in the order of its first layer."""
+    """Return every pattern once, in the order of its first layer."""
     return [_cut(work, layers) for layers in work.laminate.patterns.values()]
 
 
@@ -154,9 +154,9 @@ def _cut(work: Work, layers: tuple[Layer, ...]) -> Cut:
 
 
 def _cut_length(work: Work, layer: Layer) -> float:
-    """Length of the beam's path round a layer, mm; of its edges where it is on no sheet.
+    """Return the length of the beam's path round a layer, mm; of its edges where it is on no sheet.
 
-    Pieces that are alike are one part of a nest, cut as many times more.
+    Equal pieces are one part of a nest, cut as many times more.
     """
     profile = layer.profile
     parts = {
@@ -172,20 +172,20 @@ def _cut_length(work: Work, layer: Layer) -> float:
 
 
 def _spares(work: Work, layers: Sequence[Layer]) -> int:
-    """How many more of a pattern lie on the sheets than its layers take."""
-    own = work.design.name, layers[0].pattern
+    """Return the number of a pattern's spares on the sheets."""
+    key = work.design.name, layers[0].pattern
     cut = sum(
         count
         for sheet in work.sheets
         for design, pattern, count in sheet.counts
-        if (design, pattern) == own
+        if (design, pattern) == key
     )
     needed = len(layers) * work.job.copies
     return max(0, cut // len(layers[0].profile.pieces) - needed)
 
 
 def kerf_states(job: Job, materials: Sequence[str]) -> list[tuple[str, str, bool]]:
-    """For every material: what the cut files say of its kerf, and whether it was measured."""
+    """Return each material, the words on the kerf of its cut files, and True if it was measured."""
     states = []
     for material in materials:
         kerf = job.kerf.get(material)
@@ -225,10 +225,10 @@ class CutLayer(NamedTuple):
 
 
 class Program(NamedTuple):
-    """A program and what is known of it; ``known`` says how."""
+    """A laser or drawing program, what is known of it, and how (``evidence``)."""
 
     name: str
-    known: str
+    evidence: str
     notes: tuple[str, ...]
 
 
@@ -277,7 +277,7 @@ PROGRAMS = (
 
 
 def cut_layers() -> list[CutLayer]:
-    """The layers in cutting order, what is not cut last."""
+    """Return the layers in cutting order, what is not cut last."""
     numbered = {name: str(place) for place, name in enumerate(CUT_SEQUENCE, 1)}
     return [
         CutLayer(
@@ -291,19 +291,19 @@ def cut_layers() -> list[CutLayer]:
 
 
 def expected_sizes(work: Work) -> list[tuple[str, str]]:
-    """For every sheet and the base plate: file, and how large it must be after opening."""
-    found = [(sheet.path, units.size(sheet.width, sheet.length)) for sheet in work.sheets]
+    """Return file and overall size after opening, for every sheet and the base plate."""
+    expected = [(sheet.path, units.size(sheet.width, sheet.length)) for sheet in work.sheets]
     press = work.design.press
     platen = press.platen_width, press.platen_length
     plate = fixture(work.laminate, platen, work.runs.places)
     if work.job.fixture is not None and plate is not None:
         low_x, low_y, high_x, high_y = plate.bounds
-        found.append((work.job.fixture, units.size(high_x - low_x, high_y - low_y)))
-    return found
+        expected.append((work.job.fixture, units.size(high_x - low_x, high_y - low_y)))
+    return expected
 
 
 def kerf_notes(work: Work) -> list[str]:
-    """What to do about the kerf in the laser's own program, by material."""
+    """Return the kerf setting of the laser's program, a line for each material."""
     materials = list(dict.fromkeys(layer.film.material for layer in work.laminate.layers))
     return [
         f"{material}: {words}. "
@@ -324,17 +324,20 @@ PAPER_MINUTES = 105.0
 
 
 class Time(NamedTuple):
+    """A row of the time table: the work, its estimate, and what that is made of."""
+
     what: str
     took: str
     made_of: str
 
 
 def laser_minutes(work: Work) -> float:
+    """Return the minutes of laser of all sheets."""
     return sum(sheet.minutes for sheet in work.sheets)
 
 
 def laser_basis(work: Work) -> str:
-    """The speeds that the estimate of the laser's time assumes."""
+    """Return lengths and speeds that the estimate of the laser's time assumes."""
     laser = work.design.laser
     cut = sum(sheet.cut_length for sheet in work.sheets)
     travel = sum(sheet.travel for sheet in work.sheets)
@@ -347,7 +350,7 @@ def laser_basis(work: Work) -> str:
 
 
 def _batch(work: Work) -> list[Time]:
-    """The whole batch, for a design of several copies."""
+    """Return the row of the whole batch; empty for a single copy."""
     runs, plan = work.runs, work.schedule
     if runs.copies == 1:
         return []
@@ -362,7 +365,7 @@ def _batch(work: Work) -> list[Time]:
 
 
 def times(work: Work) -> list[Time]:
-    """Rows of the time table, the total last but for the paper's."""
+    """Return the rows of the time table, the total last but for the paper's."""
     plan = work.schedule
     handling = plan.hands_minutes
     steps = " + ".join(units.plain(step.minutes) for step in plan.steps)

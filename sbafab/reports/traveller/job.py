@@ -1,4 +1,4 @@
-"""What a traveller is written from, beside the pictures that it draws itself."""
+"""The order behind a traveller, what its pages are made from, and a box to tick."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Work:
-    """All that the pages are made from."""
+    """A design with its laminate, schedule, sheets and order: all that its pages are made from."""
 
     design: Design
     laminate: Laminate
@@ -51,7 +51,7 @@ class Work:
 
     @property
     def runs(self) -> Runs:
-        """How all copies are pressed."""
+        """The press runs of all copies."""
         return design_runs(self.design, self.laminate, self.job.copies)
 
 

@@ -1,4 +1,4 @@
-"""TODO."""
+"""Alignment of what is laid by hand: along which edge, or at which place of its sheet."""
 
 from __future__ import annotations
 
@@ -25,7 +25,9 @@ ALIKE = 0.02
 
 
 class Lip(NamedTuple):
-    """How far an edge lies outside another in mm, below 0 inside; ``all_round`` without breaks."""
+    """Distance in mm by which an edge lies outside another, below 0 inside; ``all_round`` without
+    breaks.
+    """
 
     outside: float
     all_round: bool
@@ -33,7 +35,7 @@ class Lip(NamedTuple):
 
 @dataclass(frozen=True)
 class PiecePlace:
-    """Where a piece lies: mm from the lower left corner of its sheet.
+    """The place of a piece: mm from the lower left corner of its sheet.
 
     ``x`` and ``y`` are those of the balloon's middle, ``left`` and ``low`` of the piece's edges.
     """
@@ -47,7 +49,9 @@ class PiecePlace:
 
 
 class Things:
-    """What a step lays, lowest first: single layers, and stacks from earlier steps as one."""
+    """The things that a step lays, lowest first: single layers, and stacks of earlier steps as one
+    each.
+    """
 
     def __init__(self, laminate: Laminate, lying: Sequence[Bed]) -> None:
         self.laminate = laminate
@@ -56,11 +60,12 @@ class Things:
             self.things += [(i,) for i in bed.layers] if bed.made_in is None else [bed.layers]
 
     def is_lowest(self, index: int) -> bool:
-        """Whether nothing lies under this layer in the step."""
+        """Return True if nothing lies under this layer in the step."""
         return self.things[0][0] == index
 
     def line_up(self, index: int, numbered: bool = True) -> str:
-        """Along what the edge of a layer, or of the stack that it begins, is laid.
+        """Return along what the edge of a layer, or of the stack that it begins, is laid; empty for
+        none.
 
         It is what lies below, or above the lowest; a sheet's edges are too far off.
         """
@@ -68,24 +73,24 @@ class Things:
         if len(self.things) < 2:
             return ""
         side, beside = ("below", place - 1) if place else ("above", 1)
-        own = _widest(self.laminate, self.things[place], highest=False)
-        other = _widest(self.laminate, self.things[beside], highest=place > 0)
-        each = "each" if len(own.profile.pieces) > 1 else "its"
-        found = lip(own.profile, other.profile)
-        if found is None:
-            return f"{each} piece at its place in the table" if other.role == "sheet" else ""
+        layer = _widest(self.laminate, self.things[place], highest=False)
+        neighbour = _widest(self.laminate, self.things[beside], highest=place > 0)
+        each = "each" if len(layer.profile.pieces) > 1 else "its"
+        edge_lip = lip(layer.profile, neighbour.profile)
+        if edge_lip is None:
+            return f"{each} piece at its place in the table" if neighbour.role == "sheet" else ""
         alone = len(self.things[place]) == 1
-        words = [f"{each} edge" + ("" if alone else f" (layer {own.index})")]
-        upper = self._top_film(self.things[beside]) if place else other
-        if upper is not other and lip(own.profile, upper.profile) == (0.0, True):
-            words.append(f"on that of {_seen(upper, side, numbered)},")
-        if abs(found.outside) < ALIKE:
+        words = [f"{each} edge" + ("" if alone else f" (layer {layer.index})")]
+        upper = self._top_film(self.things[beside]) if place else neighbour
+        if upper is not neighbour and lip(layer.profile, upper.profile) == (0.0, True):
+            words.append(f"on that of {_neighbour_words(upper, side, numbered)},")
+        if abs(edge_lip.outside) < ALIKE:
             words.append("on")
         else:
-            way = "outside" if found.outside > 0 else "inside"
-            words.append(f"{units.millimetres(abs(found.outside))} {way}")
-        words.append(f"that of {_seen(other, side, numbered)},")
-        words.append("all round" if found.all_round else "all round but for the tabs")
+            way = "outside" if edge_lip.outside > 0 else "inside"
+            words.append(f"{units.millimetres(abs(edge_lip.outside))} {way}")
+        words.append(f"that of {_neighbour_words(neighbour, side, numbered)},")
+        words.append("all round" if edge_lip.all_round else "all round but for the tabs")
         return " ".join(words)
 
     def _top_film(self, thing: Sequence[int]) -> Layer:
@@ -94,9 +99,9 @@ class Things:
 
 
 def over_tab(laminate: Laminate, layers: Sequence[int]) -> Layer | None:
-    """The lowest separator mask among layers round one axis that reaches out to one side.
+    """Return the lowest separator mask among layers round one axis that reaches out to one side.
 
-    It does so over the inlet tab, under a balloon larger than those between.
+    It does so over the inlet tab, under a balloon larger than those between. None without one.
     """
     if len(laminate.chambers) > 1 or len(laminate.chambers[0].centres) > 1:
         return None
@@ -111,27 +116,27 @@ def over_tab(laminate: Laminate, layers: Sequence[int]) -> Layer | None:
 
 
 @cached
-def lip(region: Region, other: Region) -> Lip | None:
-    """How the outline of a region follows another's; None where it mostly does not."""
-    outline = Region(other.outers)
-    found = []
+def lip(region: Region, reference: Region) -> Lip | None:
+    """Return the distance between the outlines of two regions; None where it mostly varies."""
+    outline = Region(reference.outers)
+    distances = []
     for contour in region.outers:
         for edge in contour.edges:
             count = math.ceil(edge.length / APART)
             for i in range(count):
                 p = edge.at((i + 0.5) / count)
                 distance = outline.distance_to_edge(p)
-                found.append(-distance if outline.contains(p) else distance)
-    found.sort()
-    usual = found[len(found) // 2]
-    alike = sum(abs(distance - usual) < ALIKE for distance in found)
-    if 2 * alike < len(found):
+                distances.append(-distance if outline.contains(p) else distance)
+    distances.sort()
+    usual = distances[len(distances) // 2]
+    near = sum(abs(distance - usual) < ALIKE for distance in distances)
+    if 2 * near < len(distances):
         return None
-    return Lip(round(usual, 2) + 0.0, alike == len(found))
+    return Lip(round(usual, 2) + 0.0, near == len(distances))
 
 
 def places(laminate: Laminate, step: AssemblyStep, lying: Sequence[Bed]) -> tuple[PiecePlace, ...]:
-    """Places of all that is laid on a sheet by hand; empty for steps without a sheet."""
+    """Return the places of all that is laid on a sheet by hand; empty for steps without a sheet."""
     sheet = laminate.layers[0]
     if step.pins or sheet.role != "sheet" or sheet.index not in step.layers:
         return ()
@@ -139,25 +144,34 @@ def places(laminate: Laminate, step: AssemblyStep, lying: Sequence[Bed]) -> tupl
     return tuple(place for thing in things[1:] for place in _piece_places(laminate, sheet, thing))
 
 
-def pitch(found: Sequence[PiecePlace]) -> float | None:
-    """From one piece to the next along x; None for a single piece."""
-    first, second = (next((p for p in found if p.piece == number), None) for number in (1, 2))
+def pitch(piece_places: Sequence[PiecePlace]) -> float | None:
+    """Return the distance from one piece to the next along x; None for a single piece."""
+    first, second = (
+        next((p for p in piece_places if p.piece == number), None) for number in (1, 2)
+    )
     return second.x - first.x if first and second else None
 
 
 def _piece_places(laminate: Laminate, sheet: Layer, thing: Sequence[int]) -> Iterator[PiecePlace]:
     layer = _widest(laminate, thing, highest=False)
-    left, low = sheet.profile.bounds[:2]
-    named = f"layer {layer.index}, {_name(layer)}"
-    what = named if len(thing) == 1 else f"stack of layers {layer_numbers(thing)}"
+    sheet_left, sheet_low = sheet.profile.bounds[:2]
+    single = f"layer {layer.index}, {_name(layer)}"
+    words = single if len(thing) == 1 else f"stack of layers {layer_numbers(thing)}"
     centres = [centre for chamber in laminate.chambers for centre in chamber.centres]
     pieces = sorted(layer.profile.pieces, key=lambda piece: piece.bounds)
     for number, piece in enumerate(pieces, 1):
         outline = Region(piece.outers)
-        own = [centre for centre in centres if outline.contains(centre)] or [_middle(piece.bounds)]
-        x, y = (sum(values) / len(own) for values in zip(*own, strict=True))
+        inside = [centre for centre in centres if outline.contains(centre)] or [
+            _middle(piece.bounds)
+        ]
+        x, y = (sum(values) / len(inside) for values in zip(*inside, strict=True))
         yield PiecePlace(
-            what, number, x - left, y - low, piece.bounds[0] - left, piece.bounds[1] - low
+            words,
+            number,
+            x - sheet_left,
+            y - sheet_low,
+            piece.bounds[0] - sheet_left,
+            piece.bounds[1] - sheet_low,
         )
 
 
@@ -166,7 +180,9 @@ def _middle(bounds: Bounds) -> Point:
 
 
 def _widest(laminate: Laminate, layers: Sequence[int], highest: bool) -> Layer:
-    """The layer whose outline is seen round all others, of several the highest or the lowest."""
+    """Return the layer whose outline is seen round all others, of several the highest or the
+    lowest.
+    """
     reach = {
         layer.pattern: round(sum(contour.area for contour in layer.profile.outers), 6)
         for layer in distinct_layers(laminate, layers)
@@ -176,7 +192,7 @@ def _widest(laminate: Laminate, layers: Sequence[int], highest: bool) -> Layer:
     return laminate.layer(wide[-1] if highest else wide[0])
 
 
-def _seen(layer: Layer, side: str, numbered: bool) -> str:
+def _neighbour_words(layer: Layer, side: str, numbered: bool) -> str:
     return f"the {_name(layer)} {side}" + (f" (layer {layer.index})" if numbered else "")
 
 

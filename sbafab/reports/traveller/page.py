@@ -33,7 +33,7 @@ from sbafab.reports.traveller.bill import kerf_states
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.process import order_of, wrapping
 from sbafab.reports.traveller.shapes import Round, definitions, pattern_regions, rounds
-from sbafab.reports.traveller.sheet_map import marked, part_regions, rows_said, sheet_map
+from sbafab.reports.traveller.sheet_map import marked, part_regions, picture_note, sheet_map
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import CHECKED_AGAINST
 
@@ -54,13 +54,13 @@ def traveller_html(
     sheets: Sequence[SheetFile],
     job: Job,
 ) -> str:
-    """The whole page. ``schedule`` is this laminate's, ``sheets`` hold all its copies."""
+    """Return the whole page. ``schedule`` is this laminate's, ``sheets`` hold all its copies."""
     work = Work(design, laminate, schedule, sheets, job)
     return environment().get_template(TEMPLATE).render(context(work))
 
 
 def environment() -> Environment:
-    """The templates of this folder; what they are not given is an error."""
+    """Return the environment of this folder's templates; an undefined name is an error."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     return Environment(
@@ -75,10 +75,10 @@ def environment() -> Environment:
 
 
 def context(work: Work) -> dict[str, Any]:
-    """What the templates say of one design."""
+    """Return the values that the templates print of one design."""
     laminate, job = work.laminate, work.job
     text = record_text(laminate.name, job.design_sha256, job.generator)
-    others = _others(work)
+    other_marks = _other_marks(work)
     return {
         **frame(laminate.name, job.design_sha256, job.generator),
         "work": work,
@@ -101,8 +101,8 @@ def context(work: Work) -> dict[str, Any]:
         "bill": bill.bill(work),
         "before_the_day": before_the_day([work]),
         "tools": tools([work]),
-        "others": others,
-        "sheet_rows": sheet_rows(work.design, work.sheets, {work.design.name: "", **others}),
+        "others": other_marks,
+        "sheet_rows": sheet_rows(work.design, work.sheets, {work.design.name: "", **other_marks}),
         "cuts": bill.cut_list(work),
         "laser_minutes": bill.laser_minutes(work),
         "laser_basis": bill.laser_basis(work),
@@ -129,21 +129,25 @@ def context(work: Work) -> dict[str, Any]:
 
 
 def _legend(laminate: Laminate) -> list[tuple[str, str]]:
-    """What the solid's colours are, each with its colour."""
-    own = ", ".join(dict.fromkeys(film.material for film in films(laminate) if not film.is_mask))
-    said = [(own if tone == "film" else words, tone) for tone, words in KEY]
-    return [(words, f"#{bytes(COLOURS[tone]).hex()}") for words, tone in said]
+    """Return the words and the hex code of each colour of the solid."""
+    structural = ", ".join(
+        dict.fromkeys(film.material for film in films(laminate) if not film.is_mask)
+    )
+    tones = [(structural if tone == "film" else words, tone) for tone, words in KEY]
+    return [(words, f"#{bytes(COLOURS[tone]).hex()}") for words, tone in tones]
 
 
-def _others(work: Work) -> dict[str, str]:
-    """A letter for each other design that lies on the same sheets, so that labels stay short."""
+def _other_marks(work: Work) -> dict[str, str]:
+    """Return a letter for each other design that lies on the same sheets, so that labels stay
+    short.
+    """
     designs = {design for sheet in work.sheets for design, _, _ in sheet.counts}
     names = sorted(designs - {work.design.name})
     return {name: ascii_uppercase[i % 26] for i, name in enumerate(names, 1)}
 
 
 def frame(title: str, sha256: str, generator: str) -> dict[str, Any]:
-    """What every page has: its style, and what stands at the head and foot of each sheet."""
+    """Return the values that every page prints: style, head and foot."""
     short = sha256[:SHORT_HASH]
     return {
         "title": title,
@@ -194,7 +198,7 @@ def _facts(work: Work) -> list[tuple[str, str]]:
 
 @dataclass(frozen=True)
 class SheetRow:
-    """A sheet as it stands in the cut list; ``said`` tells how a long one is drawn."""
+    """A sheet as it stands in the cut list; ``note`` tells how a long one is drawn."""
 
     sheet: SheetFile
     picture: str
@@ -207,7 +211,7 @@ class SheetRow:
 def sheet_rows(
     design: Design, sheets: Sequence[SheetFile], marks: Mapping[str, str]
 ) -> list[SheetRow]:
-    """The film sheets of a design; patterns go with the mark or the name of theirs."""
+    """Return the film sheets of a design; patterns go with the mark or the name of theirs."""
     films = {film.material: film for film in design.films.stock.values()}
     rows = []
     for number, sheet in enumerate(sheets, 1):
@@ -222,7 +226,7 @@ def sheet_rows(
                 ", ".join(counts),
                 units.size(sheet.width, sheet.length),
                 units.minutes(sheet.minutes),
-                rows_said(sheet),
+                picture_note(sheet),
             )
         )
     return rows
@@ -241,15 +245,15 @@ class LayUpRow:
 
 
 def _lay_up(work: Work) -> list[LayUpRow]:
-    """The layers bottom to top, rounds named once."""
-    held = {
+    """Return the layers bottom to top, rounds once."""
+    pins_of = {
         index: listed([pin.name for pin in pins]) if pins else BY_HAND
         for index, pins in pins_when_added(work.laminate).items()
     }
-    return [row for turn in rounds(work.laminate.layers) for row in _round_rows(held, turn)]
+    return [row for turn in rounds(work.laminate.layers) for row in _round_rows(pins_of, turn)]
 
 
-def _round_rows(held: Mapping[int, str], turn: Round) -> list[LayUpRow]:
+def _round_rows(pins_of: Mapping[int, str], turn: Round) -> list[LayUpRow]:
     rows = []
     for place, layers in enumerate(turn.places):
         repeat = "once"
@@ -262,7 +266,7 @@ def _round_rows(held: Mapping[int, str], turn: Round) -> list[LayUpRow]:
                 layer_numbers([layer.index for layer in layers]),
                 layers[0],
                 len(layers[0].profile.pieces),
-                "; ".join(dict.fromkeys(held[layer.index] for layer in layers)),
+                "; ".join(dict.fromkeys(pins_of[layer.index] for layer in layers)),
                 repeat,
                 len(turn.places) if place == 0 else 0,
             )
@@ -271,7 +275,7 @@ def _round_rows(held: Mapping[int, str], turn: Round) -> list[LayUpRow]:
 
 
 def css_string(words: str) -> str:
-    """Words as a CSS string that can neither end early nor leave the style element."""
+    """Return words as a CSS string that can neither end early nor leave the style element."""
     return '"' + "".join(c if c.isalnum() or c in " .-_" else f"\\{ord(c):x} " for c in words) + '"'
 
 
@@ -279,10 +283,10 @@ def css_string(words: str) -> str:
 
 
 def compiled_beside(folder: Path) -> BytecodeCache:
-    """What reads them in ``__pycache__``, and writes them there where Python may write.
+    """Return the cache of compiled templates in ``__pycache__``, filled where Python may write.
 
-    Each is kept with its source's checksum and is made anew when that changed. Where the folder
-    cannot be read or written, nothing is kept.
+    Each template is kept with its source's checksum and compiled again when that changes. Where the
+    folder cannot be read or written, nothing is kept.
     """
     from jinja2 import FileSystemBytecodeCache
     from jinja2.bccache import Bucket
@@ -311,18 +315,20 @@ QUIET = 4
 
 
 def code_text(name: str, design_sha256: str, generator: str) -> str:
-    """What the code says, a line each; plain text, for there is nothing to look up anywhere."""
+    """Return the code's plain text, a line each: name, checksum, generator; it links to nothing."""
     return f"{name}\nsha256 {design_sha256}\n{generator}"
 
 
 def record_text(name: str, design_sha256: str, generator: str) -> str:
-    """The same for a design that is built, and the command that shows what came out of it."""
-    told = code_text(name, design_sha256, generator)
-    return f"{told}\nsbafab record --find {design_sha256[:12]}"
+    """Return the code's text for a design that is built, with the command that finds its build
+    records.
+    """
+    text = code_text(name, design_sha256, generator)
+    return f"{text}\nsbafab record --find {design_sha256[:12]}"
 
 
 def code_svg(text: str) -> str:
-    """The text as a QR code, inline SVG without a size of its own."""
+    """Return the text as a QR code, inline SVG without a size of its own."""
     import segno
 
     code = segno.make(text, error="m", micro=False)
@@ -333,12 +339,14 @@ def code_svg(text: str) -> str:
 
 
 def cautions(work: Work) -> list[tuple[str, str]]:
-    """Every warning once: a short title and what it says."""
+    """Return every warning once: a short title and its text."""
     return list(dict.fromkeys(_all(work)))
 
 
 def for_the_designer(findings: Iterable[Finding]) -> list[tuple[str, str]]:
-    """Where the rules' warnings stand: nobody at the press can mend them; empty without any."""
+    """Return a pointer to the rules' warnings, which nobody at the press can mend; empty without
+    any.
+    """
     rules = {finding.rule for finding in findings if finding.verdict == "warn"}
     if not rules:
         return []
@@ -390,7 +398,7 @@ def _all(work: Work) -> Iterator[tuple[str, str]]:
 
 
 def _is_in_step(warning: str) -> bool:
-    """Whether the press step itself says it where the layer is laid."""
+    """Return True if the press step itself gives the warning where the layer is laid."""
     return warning.endswith("align by hand")
 
 

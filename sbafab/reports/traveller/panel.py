@@ -1,4 +1,4 @@
-"""What the page says of registered sheets: cut, weed, tack, stack, press, cut free."""
+"""The section on registered sheets: cut, weed, tack, stack, press, cut free."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ UNTRIED = (
 
 
 def chapter(work: Work) -> dict[str, Any]:
-    """What ``panel.html.j2`` prints, and what stands instead of the pages for single parts."""
+    """Return the values of ``panel.html.j2``, and those that replace the pages for single parts."""
     panel = work.laminate.panel
     if panel is None:
         return {"panel": None}
@@ -65,7 +65,7 @@ def chapter(work: Work) -> dict[str, Any]:
 
 
 def _force_notes(work: Work, panel: SheetPanel) -> tuple[str, ...]:
-    """What the force means on sheets that are smaller than the platen."""
+    """Return the meaning of the force on sheets that are smaller than the platen."""
     highest = max(step.film_kpa for step in work.schedule.steps)
     step = work.schedule.steps[0]
     return (
@@ -79,19 +79,19 @@ def _force_notes(work: Work, panel: SheetPanel) -> tuple[str, ...]:
 
 
 def _pairs(laminate: Laminate) -> list[tuple[Layer, tuple[Layer, ...]]]:
-    """Every film with the masks that lie on it."""
-    found: list[tuple[Layer, tuple[Layer, ...]]] = []
+    """Return every film with the masks that lie on it."""
+    pairs: list[tuple[Layer, tuple[Layer, ...]]] = []
     for layer in laminate.layers:
-        if layer.is_mask and found:
-            film, masks = found[-1]
-            found[-1] = film, (*masks, layer)
+        if layer.is_mask and pairs:
+            film, masks = pairs[-1]
+            pairs[-1] = film, (*masks, layer)
         elif not layer.is_mask:
-            found.append((layer, ()))
-    return found
+            pairs.append((layer, ()))
+    return pairs
 
 
 def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
-    """All that is done to the sheets before the first press step."""
+    """Return all that is done to the sheets before the first press step."""
     design, laminate = work.design, work.laminate
     pairs = [(film, masks) for film, masks in _pairs(laminate) if masks]
     ticks = tuple(
@@ -139,9 +139,9 @@ def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
 
 
 def _step_pages(work: Work, panel: SheetPanel) -> list[StepPage]:
-    """The press steps with what is done to sheets, and the panel in place of one copy."""
+    """Return the press steps with the actions on sheets, and the panel in place of one copy."""
     pages = process.step_pages(work)
-    found = []
+    panel_pages = []
     for page in pages:
         last = page is pages[-1]
         plan = _picture(
@@ -152,8 +152,8 @@ def _step_pages(work: Work, panel: SheetPanel) -> list[StepPage]:
             "the sheets from above on their pins",
         )
         actions = tuple(_pressing(work, page, last))
-        found.append(replace(page, plan=plan, actions=actions))
-    return found
+        panel_pages.append(replace(page, plan=plan, actions=actions))
+    return panel_pages
 
 
 def _pressing(work: Work, page: StepPage, last: bool) -> list[Action]:
@@ -233,27 +233,29 @@ def _cut_free(panel: SheetPanel) -> list[Action]:
     ]
 
 
-def _each(panel: SheetPanel, what: str) -> list[Action]:
-    """What is done once for every actuator of a batch says so, with a box for each."""
+def _each(panel: SheetPanel, task: str) -> list[Action]:
+    """Return a task that is done for each actuator of a batch, with a box for each; empty for one."""
     count = len(panel.places)
     if count == 1:
         return []
     numbers = tuple(str(number) for number in range(1, count + 1))
-    text = f"{what} one actuator after the other, numbered by its place in the sheet, row by row:"
+    text = f"{task} one actuator after the other, numbered by its place in the sheet, row by row:"
     return [Action(text, (), numbers)]
 
 
 def _bill(work: Work, panel: SheetPanel) -> list[Item]:
-    """The bill with sheets in place of parts, and what carries the masks."""
+    """Return the bill with sheets in place of parts, and the film that carries the masks."""
     items = []
     for item in bill(work):
         material = item.name.removesuffix(" film")
-        own = [layer for layer in work.laminate.layers if layer.film.material == material]
-        if own:
-            number_of = len(own) * panel.batches
+        material_layers = [
+            layer for layer in work.laminate.layers if layer.film.material == material
+        ]
+        if material_layers:
+            number_of = len(material_layers) * panel.batches
             number_of += sum(
                 _spare_sheets(work, panel, pattern)
-                for pattern in dict.fromkeys(layer.pattern for layer in own)
+                for pattern in dict.fromkeys(layer.pattern for layer in material_layers)
             )
             rim = 2 * bench.RIM
             least = units.size(panel.size[0] + rim, panel.size[1] + rim)
@@ -266,18 +268,18 @@ def _bill(work: Work, panel: SheetPanel) -> list[Item]:
         for pattern, layers in work.laminate.patterns.items()
         if layers[0].is_mask
     )
-    what = f"{work.design.panel.carrier}; carries the masks of one sheet each, off in the end"
-    return [*items, Item("Carrier", what, units.count(masks, "piece"))]
+    words = f"{work.design.panel.carrier}; carries the masks of one sheet each, off in the end"
+    return [*items, Item("Carrier", words, units.count(masks, "piece"))]
 
 
 def _cuts(work: Work, panel: SheetPanel) -> list[Cut]:
-    """The cut list: a sheet for every layer of a pattern and every batch."""
-    found = []
+    """Return the cut list: a sheet for every layer of a pattern and every batch."""
+    rows = []
     for row in cut_list(work):
         layers = work.laminate.patterns[row.pattern]
         sheet = work.laminate.first_cut(layers[0])
         length = sum(contour.length for contour in sheet.contours)
-        found.append(
+        rows.append(
             replace(
                 row,
                 count=len(layers) * panel.batches,
@@ -286,17 +288,19 @@ def _cuts(work: Work, panel: SheetPanel) -> list[Cut]:
                 cut_length=length,
             )
         )
-    return found
+    return rows
 
 
 def _spare_sheets(work: Work, panel: SheetPanel, pattern: str) -> int:
-    """Number of spare sheets of a pattern, for all batches together."""
+    """Return the number of spare sheets of a pattern, for all batches together."""
     layers = work.laminate.patterns[pattern]
     return work.design.order.spare_parts(len(layers) * panel.batches)
 
 
 def _times(work: Work, panel: SheetPanel) -> list[Time]:
-    """How long a batch takes; the paper's handling is of one actuator, and is not known of many."""
+    """Return the times of a batch; the paper's handling is of one actuator, and is not known of
+    many.
+    """
     plan, copies = work.schedule, len(panel.places)
     steps = " + ".join(units.plain(step.minutes) for step in plan.steps)
     tacking, pressed = plan.tacking, plan.total_press_minutes
@@ -329,7 +333,9 @@ def _times(work: Work, panel: SheetPanel) -> list[Time]:
 
 
 def _carrier(work: Work) -> str:
-    """What must be known of the transfer film before it is pressed, blanks for what is not."""
+    """Return the properties of the transfer film to be known before it is pressed, blanks for
+    unknown.
+    """
     design = work.design.panel
     adhesive = design.carrier_adhesive or "________________"
     limit = "________ °C" if design.carrier_limit_c is None else f"{design.carrier_limit_c:g} °C"
@@ -344,7 +350,7 @@ def _carrier(work: Work) -> str:
 
 
 def _tack_pins(work: Work) -> str:
-    """How high the corner pins stand for the tacks: far lower than for the whole stack."""
+    """Return the height of the corner pins for the tacks: far lower than for the whole stack."""
     tacking = work.schedule.tacking
     assert tacking is not None
     stands = listed(list(dict.fromkeys(units.millimetres(pin.stands_mm) for pin in tacking.pins)))
@@ -359,7 +365,7 @@ def _tack_pins(work: Work) -> str:
 
 
 def _pictures(laminate: Laminate, panel: SheetPanel) -> list[tuple[str, str]]:
-    """One film sheet and one mask sheet as they come from the laser, with what they are."""
+    """Return one film sheet and one mask sheet as they come from the laser, with captions."""
     film = laminate.layers[0]
     mask = next(layer for layer in laminate.layers if layer.is_mask)
     return [
@@ -377,7 +383,7 @@ def _pictures(laminate: Laminate, panel: SheetPanel) -> list[tuple[str, str]]:
 
 
 def _picture(laminate: Laminate, panel: SheetPanel, layer: Layer, name: str, words: str) -> str:
-    """A sheet from above, its pins filled, crosses in its fiducials, its slots pink."""
+    """Return a sheet from above, its pins filled, crosses in its fiducials, its slots pink."""
     width, length = panel.size
     scale = min(WIDEST / width, TALLEST / length)
     x0, _, _, y1 = panel.outline.bounds

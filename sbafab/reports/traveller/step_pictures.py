@@ -1,4 +1,4 @@
-"""Names beside the places of a picture, where they cover neither each other nor what they name."""
+"""The pictures of a press step: from above, taken apart, and as a section from platen to platen."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class PlanName(NamedTuple):
 
 
 def named(names: list[PlanName], size: float, room: Bounds, taken: list[Bounds]) -> list[str]:
-    """The names as SVG, each where it covers least of ``taken`` and of those before it."""
+    """Return the names as SVG, each where it covers least of ``taken`` and of those before it."""
     taken, drawn = list(taken), []
     for name in names:
         half = draw.text_width(name.words, size) / 2, size / 2
@@ -66,7 +66,7 @@ def named(names: list[PlanName], size: float, room: Bounds, taken: list[Bounds])
 def _best(
     name: PlanName, half: Point, room: Bounds, taken: Sequence[Bounds]
 ) -> tuple[Point, float]:
-    """The middle of the place that costs least, and how far it stands off; the first of several.
+    """Return the middle of the cheapest place and its distance; the first of several.
 
     ``half`` of the name's width and height.
     """
@@ -83,7 +83,7 @@ def _best(
 
 
 def _places(name: PlanName, half: Point, away: float) -> Iterator[Point]:
-    """Middles of the name that stand so far off, from its own direction round."""
+    """Yield middles of the name at a distance, from its preferred direction round."""
     reach = name.clear + away
     for step in range(DIRECTIONS):
         turn = 2 * math.pi * step / DIRECTIONS + math.atan2(name.out[1], name.out[0])
@@ -99,9 +99,9 @@ def _box(middle: Point, half: Point) -> Bounds:
 def _cost(
     name: PlanName, middle: Point, half: Point, room: Bounds, taken: Sequence[Bounds]
 ) -> float:
-    """What a place costs but for its distance."""
+    """Return the cost of a place without that of its distance, mm2."""
     box = _box(middle, half)
-    covered = sum([_shared(box, other) for other in taken])
+    covered = sum([_shared(box, neighbour) for neighbour in taken])
     outside = _area(box) - _shared(box, room)
     u, v = middle[0] - name.at[0], middle[1] - name.at[1]
     along = (u * name.out[0] + v * name.out[1]) / (math.hypot(u, v) or 1.0)
@@ -139,7 +139,7 @@ _section = cached(section)
 
 
 class _View(NamedTuple):
-    """Where the step's frame (mm of the laminate) lands on the page."""
+    """The scale and the bounds (mm of the laminate) of a step seen from above."""
 
     bounds: Bounds
     scale: float
@@ -167,7 +167,7 @@ def _view(bounds: Bounds) -> _View:
 
 
 def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: str) -> str:
-    """The step from above; earlier stacks grey, what joins in its own colour."""
+    """Return the step from above; earlier stacks grey, what joins in its film's colour."""
     plate = shown(laminate)
     view = _view(plate.bounds if plate is not None else _widened(laminate.bounds))
     state = "pins in" if step.pins else "no pins"
@@ -186,13 +186,13 @@ def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: s
             )
     inlets = inlets_in(laminate, step.layers)
     # An arrow at its tab names the pin of a chamber, too.
-    told = {inlet.chamber for inlet in inlets}
+    arrow_names = {inlet.chamber for inlet in inlets}
     names, taken = [], []
     for pin in laminate.pins:
         at, r = view.at(pin.centre), _radius(pin, view)
         picture.add(_pin(at, r, pin in step.pins))
         taken.append((at[0] - r, at[1] - r, at[0] + r, at[1] + r))
-        if pin in step.pins and pin.name not in told:
+        if pin in step.pins and pin.name not in arrow_names:
             names.append(PlanName(pin.name, at, r + 0.6, _outward(pin)))
     arrows = []
     for inlet in inlets:
@@ -231,13 +231,15 @@ def _radius(pin: Pin, view: _View) -> float:
 
 
 def _outward(pin: Pin) -> Point:
-    """On the page, from the datum to the pin; upward for the pin that stands there."""
+    """Return the direction on the page from the datum to a pin; upward for the pin that stands
+    there.
+    """
     far = math.hypot(*pin.centre)
     return (pin.centre[0] / far, -pin.centre[1] / far) if far > AT_DATUM else (0.0, -1.0)
 
 
 def _pin(at: Point, r: float, is_in: bool) -> str:
-    """A pin that is in: filled; out: hollow."""
+    """Return a pin that is in as a filled circle, one that is out as a hollow one."""
     x, y = at
     fill = draw.DARK if is_in else "#ffffff"
     return (
@@ -247,21 +249,21 @@ def _pin(at: Point, r: float, is_in: bool) -> str:
 
 
 def _reach(laminate: Laminate, inlet: Inlet) -> float:
-    """How far past its mouth an inlet's strip goes at most, mm."""
+    """Return the distance in mm by which an inlet's strip passes its mouth at most."""
     shapes = (layers[0].profile for layers in laminate.patterns.values())
     spans = [span for shape in shapes for span in _section(shape, inlet.mouth, inlet.direction)]
     return max((end for _, end in spans), default=0.0)
 
 
 def _arrow(inlet: Inlet, reach: float, view: _View) -> tuple[Point, Point]:
-    """Start and tip of an arrow outward from the end of the tab and its strip."""
+    """Return start and tip of an arrow outward from the end of the tab and its strip."""
     u, v = inlet.direction
     (x, y), v = view.at((inlet.mouth[0] + reach * u, inlet.mouth[1] + reach * v)), -v
     return (x + 0.8 * u, y + 0.8 * v), (x + 4.0 * u, y + 4.0 * v)
 
 
 def _datum(view: _View) -> list[str]:
-    """The cross that every cut file carries at the actuator's axis."""
+    """Return the cross that every cut file carries at the actuator's axis."""
     x, y = view.origin
     return [
         draw.line([(x - 1.6, y), (x + 1.6, y)], width=0.2),
@@ -270,7 +272,7 @@ def _datum(view: _View) -> list[str]:
 
 
 def _captions(view: _View, plate: bool, pinned: bool, datum: str) -> list[str]:
-    """What the marks mean, under the picture, and the plate's corner, above it."""
+    """Return the key of the marks under the picture, and the words on the plate above it."""
     y = view.height - 4.6
     parts = [draw.text((EDGE, view.height - 1.2), f"seen from above; {datum}", size=2.2)]
     if not plate:
@@ -316,7 +318,7 @@ STANDS_OUT = 4.0
 
 @dataclass(frozen=True)
 class Level:
-    """What lies at one height: layers drawn on each other, and what to call them.
+    """The layers at one height, drawn on each other, and their label.
 
     ``made`` says that an earlier step has bonded them, ``round`` that they are laid repeatedly.
     """
@@ -330,7 +332,7 @@ class Level:
 
 @dataclass(frozen=True)
 class _Tilted:
-    """Where the laminate's frame lands on the page: its origin at ``middle`` and ``ground``."""
+    """The view of a step taken apart: the laminate's origin lands at ``middle`` and ``ground``."""
 
     scale: float
     middle: float
@@ -340,16 +342,23 @@ class _Tilted:
     plate: bool
 
     def matrix(self, height: float) -> tuple[float, ...]:
-        """From the plan of a layer to the page, the layer's origin at a page height."""
+        """Return the matrix from a layer's plan to the page, its origin at a page height."""
         return self.scale, 0.0, 0.0, -self.scale * TILT, self.middle, height
 
     def level(self, place: int) -> float:
-        """Page height of a level, counted from the lowest; the plate lies under them all."""
+        """Return the page height of a level, counted from the lowest; the plate lies under them
+        all.
+        """
         return self.ground - self.gap * (place + self.plate)
 
 
 def exploded(laminate: Laminate, step: AssemblyStep, lying: Sequence[Bed], name: str) -> str:
-    """The step's layers one over another, lowest first, with numbers and patterns beside them."""
+    """Return the step's layers one over another, lowest first, with numbers and patterns beside
+    them.
+
+    They are drawn from the front and above, so that outlines and tabs show which way round each
+    goes.
+    """
     levels = _shortened([level for bed in lying for level in _levels(laminate, bed)])
     plate = shown(laminate) if step.pins else None
     view = _tilted(plate.bounds if plate is not None else laminate.bounds, len(levels), bool(plate))
@@ -412,7 +421,7 @@ def _levels(laminate: Laminate, bed: Bed) -> Iterator[Level]:
 
 
 def _shortened(levels: list[Level]) -> list[Level]:
-    """Few enough levels to draw; the lay-up table has them all."""
+    """Return few enough levels to draw; the lay-up table has them all."""
     if len(levels) <= MOST:
         return levels
     hidden = levels[MOST - 5 : -4]
@@ -422,7 +431,7 @@ def _shortened(levels: list[Level]) -> list[Level]:
 
 
 def _labels(levels: Sequence[Level], gap: float) -> float:
-    """Room beside the layers for the longest label and the bracket behind it, mm."""
+    """Return the room beside the layers for the longest label and the bracket behind it, mm."""
     if gap >= TWO_LINES:
         return LABELS
     longest = max((_one_line(level.words, level.detail) for level in levels), default=0.0)
@@ -430,12 +439,12 @@ def _labels(levels: Sequence[Level], gap: float) -> float:
 
 
 def _one_line(words: str, detail: str) -> float:
-    """How long a label is whose detail follows on the same line."""
+    """Return the length of a label with its detail on the same line, mm."""
     return BOLD * draw.text_width(words, 2.5) + 1.2 + draw.text_width(detail, 2.2)
 
 
 def _beside(edge: Point, words: str, detail: str, gap: float) -> list[str]:
-    """Words with a leader to what they name; on one line where the next are near."""
+    """Return words with a leader to what they name; on one line where the next are near."""
     x, y = edge
     column = WIDE + COLUMN
     leader = draw.line([(min(x, WIDE) + 0.4, y), (column - 0.8, y)], colour=draw.GREY, width=0.12)
@@ -454,7 +463,7 @@ def _beside(edge: Point, words: str, detail: str, gap: float) -> list[str]:
 
 
 def _pin_stretches(pins: Sequence[Pin], view: _Tilted, under: float, over: float) -> list[str]:
-    """The stretch of every pin between two levels, rear pins first."""
+    """Return the stretch of every pin between two levels, rear pins first."""
     parts = []
     for pin in sorted(pins, key=lambda pin: (-pin.centre[1], pin.centre[0])):
         x = view.middle + pin.centre[0] * view.scale
@@ -468,11 +477,11 @@ def _pin_stretches(pins: Sequence[Pin], view: _Tilted, under: float, over: float
 
 
 def _brackets(levels: Sequence[Level], view: _Tilted, width: float) -> list[str]:
-    """A bracket beside the levels of a round, with how often they are laid."""
+    """Return a bracket beside the levels of a round, with their count."""
     parts: list[str] = []
     marked = [(i, level.round) for i, level in enumerate(levels) if level.round is not None]
     for turn in {id(turn): turn for _, turn in marked}.values():
-        places = [i for i, other in marked if other is turn]
+        places = [i for i, level_turn in marked if level_turn is turn]
         low, high = view.level(places[0]) + 3.2, view.level(places[-1]) - 2.4
         x = width - BRACKET
         parts.append(draw.line([(x - 1.2, low), (x, low), (x, high), (x - 1.2, high)], width=0.3))
@@ -512,19 +521,21 @@ INKS = {
 
 
 def factor(step: Step) -> int:
-    """By how much films are enlarged: pins that stand over the stack must end inside the pad."""
+    """Return the enlargement of films: pins that stand over the stack must end inside the pad."""
     pad = next(item.thickness_mm for item in step.build_up if item.part == PAD) * THICK
     over = max((pin.stands_mm for pin in step.pin_settings), default=step.top_mm) - step.top_mm
     paper = sum(item.thickness_mm for item in step.build_up if item.part == UNDERLAY)
     films = step.stack_mm + paper
-    fits = (
-        one for one in FACTORS if films * one <= TALLEST_LAMINATE and over * one <= PIN_REACH * pad
-    )
+    fits = (by for by in FACTORS if films * by <= TALLEST_LAMINATE and over * by <= PIN_REACH * pad)
     return next(fits, FACTORS[-1])
 
 
 def build_up_svg(step: Step, name: str) -> str:
-    """The section of one step, platen to platen, each part with its thickness beside it."""
+    """Return the section of one step, platen to platen, each part with its thickness beside it.
+
+    Base plate and press pad stand 1:2; films, laminate and what of the pins stands over the plate
+    are enlarged by a factor that the picture names. Widths are not to scale.
+    """
     thick = {item.part: item for item in step.build_up}
     by = factor(step)
     plate, pad = thick[BASE_PLATE].thickness_mm * THICK, thick[PAD].thickness_mm * THICK
@@ -562,7 +573,7 @@ def build_up_svg(step: Step, name: str) -> str:
         draw.box((low, upper), (high, lower), fill=INKS[LAMINATE], stroke=draw.DARK),
         *_section_pins(step.pin_settings, face, bottom, by, low, high),
     )
-    said = [
+    labels = [
         (start + PLATEN / 2, f"upper platen, {units.temperature(step.temperature_c)}"),
         (
             top + pad / 2,
@@ -578,8 +589,8 @@ def build_up_svg(step: Step, name: str) -> str:
         (face + plate / 2, _plate_words(step, thick[BASE_PLATE].thickness_mm)),
         (bottom + PLATEN / 2, f"lower platen, {units.temperature(step.temperature_c)}"),
     ]
-    rows = draw.spread([y for y, _ in said], GAP, SECTION_EDGE + 2.0, end)
-    for (y, text), row in zip(said, rows, strict=True):
+    rows = draw.spread([y for y, _ in labels], GAP, SECTION_EDGE + 2.0, end)
+    for (y, text), row in zip(labels, rows, strict=True):
         x = high - 1.5 if "laminate" in text else SECTION_WIDE - 1.5
         picture.add(*draw.leader((x, y), (SECTION_WIDE + 2.0, row), (SECTION_WIDE + 3.5, row)))
         picture.add(draw.text((SECTION_WIDE + 4.2, row + 0.8), text, size=2.3))
@@ -589,7 +600,7 @@ def build_up_svg(step: Step, name: str) -> str:
 
 
 def _underlay(top: float, bottom: float) -> list[str]:
-    """The printed paper between plate and release film; nothing where there is none."""
+    """Return the printed paper between plate and release film; empty where there is none."""
     if top == bottom:
         return []
     return [
@@ -619,7 +630,7 @@ def _plate_words(step: Step, plate: float) -> str:
 
 
 def _pad(top: float, over: float, beside: float, low: float, high: float) -> str:
-    """The pad, pressed together over the laminate; beside it, it comes down on the plate."""
+    """Return the pad, pressed together over the laminate; beside it, it comes down on the plate."""
     slope = min(4.0, beside - over)
     path = (
         f"M{SECTION_EDGE} {top}H{SECTION_WIDE}V{beside:.3f}H{high + slope:.3f}L{high} {over:.3f}"
@@ -629,7 +640,7 @@ def _pad(top: float, over: float, beside: float, low: float, high: float) -> str
 
 
 def _release(upper: float, bed: float, release: float, low: float, high: float) -> list[str]:
-    """The lower film lies flat; the upper one goes up over the laminate."""
+    """Return the flat lower film and the upper one, which goes up over the laminate."""
     slope = min(4.0, bed - 2 * release - (upper - release))
     beside, over = bed - 1.5 * release, upper - release / 2
     ends = [(SECTION_EDGE, beside), (low - slope, beside), (low, over), (high, over)]
@@ -669,18 +680,18 @@ def _section_pins(
 
 
 def pin_lines(step: Step) -> str:
-    """Pins that are alike once: names, size, depth of the hole, height over plate and stack."""
+    """Return names, size, depth of hole and heights over plate and stack, equal pins together."""
     return "; ".join(
         f"{listed(names)}: ⌀{pin.diameter_mm:g} {draw.TIMES} {pin.length_mm:g} mm, "
         f"{pin.seat_mm:.2f} mm in the plate, {pin.stands_mm - pin.tolerance_mm:.2f} to "
         f"{pin.stands_mm + pin.tolerance_mm:.2f} mm over it, "
         f"{pin.stands_mm - pin.tolerance_mm - step.top_mm:.2f} mm or more over the stack"
-        for names, pin in _alike(step)
+        for names, pin in _equal_pins(step)
     )
 
 
-def _alike(step: Step) -> list[tuple[list[str], PinSetting]]:
-    """Names of pins that are alike, and one of them."""
+def _equal_pins(step: Step) -> list[tuple[list[str], PinSetting]]:
+    """Return the names of equal pins, and one pin of each kind."""
     groups: dict[PinSetting, list[str]] = {}
     for pin in sorted(step.pin_settings, key=lambda pin: (pin.diameter_mm, pin.length_mm)):
         groups.setdefault(replace(pin, pin=""), []).append(pin.pin)

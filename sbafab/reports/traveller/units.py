@@ -1,4 +1,4 @@
-"""TODO."""
+"""Quantities as text, in the units of the bench's dials and rulers."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ def force(newtons: float) -> str:
 
 
 def minutes(value: float | None) -> str:
-    """Minutes to the tenth below ten, whole ones above: 3 min, 2.4 min, 47 min; a blank for None,
-    which nobody stated.
+    """Return minutes to the tenth below ten, whole ones above: 3 min, 2.4 min, 47 min; a blank for
+    None.
     """
     if value is None:
         return f"{BLANK} min"
@@ -65,6 +65,7 @@ def clock(minutes: float) -> str:
 
 
 def hours(value: float | None) -> str:
+    """Return minutes as hours, "1.75 h"; a blank for None."""
     return f"{BLANK} h" if value is None else f"{value / 60:.2f} h"
 
 
@@ -91,11 +92,11 @@ def count(number: int, noun: str, plural: str = "") -> str:
 
 
 def stacks(number: int) -> str:
-    """After the definite article: the stack, the 3 stacks."""
+    """Return what follows the definite article: stack, 3 stacks."""
     return "stack" if number == 1 else f"{number} stacks"
 
 
 def toward(inlet: Inlet) -> str:
-    """Where an inlet tab points on the bench: x goes to the right, y to the back."""
+    """Return the bench direction in which an inlet tab points: x to the right, y to the back."""
     u, v = inlet.direction
     return DIRECTIONS[round(math.atan2(v, u) / (math.pi / 4)) % 8]
