@@ -303,7 +303,7 @@ def _times(job: AssemblyJob) -> list[bill.Time]:
     return rows
 
 
-# What the technician does to put an assembly together, part by part, each with a box to tick.
+# Joining, part by part.
 
 
 @dataclass(frozen=True)
@@ -340,7 +340,7 @@ def join_pages(assembled: Assembled) -> list[JoinPage]:
 
 
 def _in_order(assembled: Assembled) -> Iterator[PlacedPart]:
-    """Yield the parts in building order; a line goes in while both ends of its lumen are in reach."""
+    """Yield parts in building order; a line goes in while both ends of its lumen are in reach."""
     parts = assembled.parts
     for placed in parts:
         if placed.made is not None and placed.part.on is not None:

@@ -1,4 +1,4 @@
-"""The base plate and what goes with it: its holes, its pins, the build-up, pad and release films."""
+"""The base plate and what goes with it: holes, pins, build-up, pad and release films."""
 
 from __future__ import annotations
 

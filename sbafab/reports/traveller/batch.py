@@ -1,11 +1,11 @@
-"""Several copies on one traveller: the press cycles by day, the plate's places, a serial for each."""
+"""Several copies on one traveller: the press cycles by day, the plate's places, serials."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from sbafab.cutting.fixture import whole_plate
-from sbafab.geometry.region import coord, path_data
+from sbafab.geometry.region import coord
 from sbafab.pressing.cycles import (
     CUT_SHARE,
     FINISH_SHARE,
@@ -22,7 +22,6 @@ from sbafab.reports.traveller.shapes import Picture, flat, label, pattern_id
 
 WIDEST = 110.0
 """mm of the page that the platen takes."""
-PLATE = "#f1f1ef"
 
 
 PAUSES = (
@@ -235,13 +234,7 @@ def _picture(work: Work, runs: Runs) -> str:
     at = 1 - scale * low_x, 1 + scale * high_y
     words = f"{runs.together} places on the base plate, from above"
     picture = Picture("batch-plan", scale * wide + 2, scale * high + 8, words)
-    shape = path_data(
-        plate.mapped(lambda p: (at[0] + scale * p[0], at[1] - scale * p[1]), scale, mirror=True)
-    )
-    picture.add(
-        f'<path d="{shape}" fill="{PLATE}" fill-rule="evenodd" stroke="{draw.GREY}" '
-        'stroke-width="0.25"/>'
-    )
+    picture.plate(plate, flat(scale, at))
     widest = max(laminate.layers, key=lambda layer: layer.profile.area)
     box = laminate.bounds
     for place, (x, y) in enumerate(runs.places, 1):

@@ -212,11 +212,11 @@ def reseat(laminate: Laminate, adds: Sequence[int], pinned: bool) -> list[Action
 
 
 def closing(step: Step, heating: Heating, cycles: tuple[str, ...] = ()) -> Action:
-    """Return the start of the clock, as the plate goes in cold; a box for each of the ``cycles``."""
+    """Return start of the clock, as the plate goes in cold; a box for each of the ``cycles``."""
     return Action(closing_words(step, heating), (), cycles)
 
 
-# How the plate warms, as the bench reads it: the time-temperature line and its blanks.
+# Warming of the plate: the time-temperature line and its blanks.
 
 
 MOST_RAISED = 5.0
@@ -234,7 +234,7 @@ class HeatBlank(NamedTuple):
 
 
 def heat_blanks(step: Step, heating: Heating) -> list[HeatBlank]:
-    """Return the time-temperature line of a step, from the melting point to the end of its clock."""
+    """Return time-temperature line of a step, from the melting point to the end of its clock."""
     return [
         HeatBlank(point.point, _heat_words(point, step, heating), f"heat-{step.step}-{number}")
         for number, point in enumerate(step.time_temperature, 1)
@@ -328,7 +328,7 @@ def heating_lines(heating: Heating, steps: int) -> Iterator[str]:
     )
 
 
-# What the press's gauge and a pressure-indicating film must resolve.
+# Resolution of the press's gauge and of a pressure-indicating film.
 
 
 class FilmClass(NamedTuple):

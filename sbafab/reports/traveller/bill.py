@@ -1,4 +1,4 @@
-"""What a job takes: the bill of materials, the cut list, the minutes, and notes on the cut files."""
+"""What a job takes: bill of materials, cut list, minutes, and notes on the cut files."""
 
 from __future__ import annotations
 
@@ -199,7 +199,7 @@ def kerf_states(job: Job, materials: Sequence[str]) -> list[tuple[str, str, bool
     return states
 
 
-# Notes for whoever opens the cut files in another program: only what was tried or is documented.
+# Notes on opening the cut files in other programs: only what was tried or is documented.
 #
 # Tried with sheets and layer files of this program: LibreCAD 2.2.0 (``librecad dxf2pdf``) and
 # Inkscape 1.2.2 (its DXF import, and ``--query-all``). LightBurn: from its documentation only.
@@ -316,7 +316,7 @@ def kerf_notes(work: Work) -> list[str]:
     ]
 
 
-# How long it takes, next to the paper's figure, and what that is made of.
+# Times, next to the paper's.
 
 
 PAPER_MINUTES = 105.0

@@ -58,7 +58,7 @@ def _hand(places: Measures, limits: Limits) -> Hand:
 
 
 TEMPLATE = "findings.html.j2"
-YIELD, WORST = "registration-yield", "registration-worst-case"
+YIELD = "registration-yield"
 
 
 @dataclass(frozen=True)

@@ -55,9 +55,6 @@ class Work:
         return design_runs(self.design, self.laminate, self.job.copies)
 
 
-# One thing to do, with its box to tick.
-
-
 @dataclass(frozen=True)
 class Action:
     """One thing to do. ``layers`` are laid in it; ``ticks`` label one box each, or there is one."""
@@ -65,6 +62,3 @@ class Action:
     text: str
     layers: tuple[int, ...] = ()
     ticks: tuple[str, ...] = ()
-
-
-# Quantities in the words and units that stand on dials and rulers.

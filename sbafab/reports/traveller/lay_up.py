@@ -16,11 +16,11 @@ from sbafab.reports.drawing import layer_numbers
 from sbafab.reports.traveller import units
 from sbafab.reports.traveller.shapes import Bed
 
-APART = 0.25
+STATION = 0.25
 """mm between the points at which two edges are compared."""
 
 
-ALIKE = 0.02
+EQUAL = 0.02
 """mm by which a distance may differ and still be the same to a hand."""
 
 
@@ -84,7 +84,7 @@ class Things:
         upper = self._top_film(self.things[beside]) if place else neighbour
         if upper is not neighbour and lip(layer.profile, upper.profile) == (0.0, True):
             words.append(f"on that of {_neighbour_words(upper, side, numbered)},")
-        if abs(edge_lip.outside) < ALIKE:
+        if abs(edge_lip.outside) < EQUAL:
             words.append("on")
         else:
             way = "outside" if edge_lip.outside > 0 else "inside"
@@ -110,7 +110,7 @@ def over_tab(laminate: Laminate, layers: Sequence[int]) -> Layer | None:
     masks = [layer for layer in map(laminate.layer, layers) if layer.role == "separator-mask"]
     for mask in masks:
         low_x, _, high_x, _ = mask.profile.moved(-x, -y).turned(turn).bounds
-        if high_x + low_x > ALIKE:
+        if high_x + low_x > EQUAL:
             return mask
     return None
 
@@ -122,14 +122,14 @@ def lip(region: Region, reference: Region) -> Lip | None:
     distances = []
     for contour in region.outers:
         for edge in contour.edges:
-            count = math.ceil(edge.length / APART)
+            count = math.ceil(edge.length / STATION)
             for i in range(count):
                 p = edge.at((i + 0.5) / count)
                 distance = outline.distance_to_edge(p)
                 distances.append(-distance if outline.contains(p) else distance)
     distances.sort()
     usual = distances[len(distances) // 2]
-    near = sum(abs(distance - usual) < ALIKE for distance in distances)
+    near = sum(abs(distance - usual) < EQUAL for distance in distances)
     if 2 * near < len(distances):
         return None
     return Lip(round(usual, 2) + 0.0, near == len(distances))

@@ -279,7 +279,7 @@ def css_string(words: str) -> str:
     return '"' + "".join(c if c.isalnum() or c in " .-_" else f"\\{ord(c):x} " for c in words) + '"'
 
 
-# Templates compiled once, not in every run: kept beside them, as Python keeps its modules.
+# Compiled templates, cached beside them as Python caches its modules.
 
 
 def compiled_beside(folder: Path) -> BytecodeCache:
@@ -307,7 +307,7 @@ def compiled_beside(folder: Path) -> BytecodeCache:
     return Compiled(str(place), f"%s.{sys.implementation.cache_tag}.jinja")
 
 
-# The code that a phone reads: which design this sheet of paper belongs to.
+# The QR code: which design this sheet of paper belongs to.
 
 
 QUIET = 4
@@ -335,7 +335,7 @@ def code_svg(text: str) -> str:
     return code.svg_inline(border=QUIET, omitsize=True, light="white", svgclass="code")
 
 
-# What the technician must know before starting; the rules' findings have their own page.
+# Warnings; the rules' findings have their own page.
 
 
 def cautions(work: Work) -> list[tuple[str, str]]:
@@ -400,9 +400,3 @@ def _all(work: Work) -> Iterator[tuple[str, str]]:
 def _is_in_step(warning: str) -> bool:
     """Return True if the press step itself gives the warning where the layer is laid."""
     return warning.endswith("align by hand")
-
-
-# Before the day: what must be ready, and the tools. The paper gives times of the press alone.
-
-
-# How a laminate that goes round a tube is fixed there, with its supply tubes.

@@ -234,7 +234,7 @@ def _cut_free(panel: SheetPanel) -> list[Action]:
 
 
 def _each(panel: SheetPanel, task: str) -> list[Action]:
-    """Return a task that is done for each actuator of a batch, with a box for each; empty for one."""
+    """Return a task done for each actuator of a batch, with a box for each; empty for one."""
     count = len(panel.places)
     if count == 1:
         return []

@@ -1,4 +1,4 @@
-"""The technician's actions in order, each with a box to tick: press steps, tubes, tests, wrapping."""
+"""The technician's actions in order, with boxes to tick: press steps, tubes, tests, wrapping."""
 
 from __future__ import annotations
 
@@ -397,9 +397,7 @@ def leak_test(work: Work) -> list[Action]:
     ]
 
 
-# After the press has opened: what comes off first, which side is held, how pins leave the films.
-#
-# The order is ours; the paper gives none.
+# Taking down, after the press has opened. The order is ours; the paper gives none.
 
 
 CELL, HIGH, WORDS = 35.0, 24.0, 2.2
@@ -415,7 +413,7 @@ class TakingDown:
 
 
 def order_of(steps: Sequence[Step]) -> TakingDown:
-    """Return the order of taking down after every press step, by the numbers that the steps name."""
+    """Return order of taking down after every press step, by the numbers that the steps name."""
     pinned = any(step.pin_settings for step in steps)
     lines = [
         "Pad off first, straight up. The upper release film stays on until the plate is as cool as "
@@ -588,7 +586,7 @@ def _peeled(x0: float, is_pinned: bool) -> list[str]:
     ]
 
 
-# What an actuator must stand before it is handed on, and what the tests are made with.
+# Acceptance: leak test and proof test.
 #
 # The paper looks for leaks under water and bursts three actuators (Sec. 2, 7). Pressures, times and
 # fitting are ours: keys of ``acceptance``, which a kit gives.

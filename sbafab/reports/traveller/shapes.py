@@ -22,6 +22,7 @@ LINE = 0.22
 """Width in mm on the page of the outline of a part."""
 THUMB = (24.0, 12.5)
 HATCH_STEP = 1.3
+PLATE = "#f1f1ef"
 
 
 def definitions(regions: Iterable[tuple[str, Region]]) -> str:
@@ -70,6 +71,16 @@ class Picture:
         self.add(
             f'<use href="#{shape}" transform="matrix({moved})" fill="{fill}"{opacity} '
             f'stroke="{ink(film).line}" stroke-width="{coord(LINE / scale)}"/>'
+        )
+
+    def plate(self, plate: Region, matrix: tuple[float, ...], is_used: bool = True) -> None:
+        """Add the base plate; dashed where it is not used, as it still shows the way round."""
+        scale, moved = matrix[0], " ".join(map(coord, matrix))
+        dash = "" if is_used else f' stroke-dasharray="{coord(1.6 / scale)} {coord(1.2 / scale)}"'
+        self.add(
+            f'<path d="{path_data(plate)}" fill="{PLATE if is_used else "none"}" '
+            f'fill-rule="evenodd" stroke="{draw.GREY}" stroke-width="{coord(0.25 / scale)}"{dash} '
+            f'transform="matrix({moved})"/>'
         )
 
     def _fill(self, film: Film, scale: float) -> str:
@@ -129,7 +140,7 @@ def thumbnail(name: str, pattern: str, film: Film, bounds: Bounds) -> str:
     return picture.svg()
 
 
-# Long stacks in few words: what repeats is a round, named once and counted.
+# Rounds: layers that repeat, named once and counted.
 
 
 LONGEST_ROUND = 12
@@ -184,7 +195,7 @@ def rounds(layers: Sequence[Layer]) -> tuple[Round, ...]:
 
 
 def _repetition(keys: Sequence[object]) -> tuple[int, int]:
-    """Return period and count of the repetition at the start that covers most; (1, 1) without one."""
+    """Return period and count of the longest repetition at the start; (1, 1) without one."""
     best = 1, 1
     for period in range(1, min(LONGEST_ROUND, len(keys) // 2) + 1):
         count = 1

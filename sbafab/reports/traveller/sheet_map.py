@@ -60,7 +60,7 @@ class _Strip(NamedTuple):
         return x + (p[0] - self.bounds[0]) * self.scale, y + (self.bounds[3] - p[1]) * self.scale
 
     def matrix(self, placement: Placement) -> tuple[float, ...]:
-        """Return the matrix of a quarter turn and a shift in the sheet's frame, then to the page."""
+        """Return matrix of a quarter turn and a shift in the sheet's frame, then to the page."""
         u, v = QUARTERS[placement.turn]
         s = self.scale
         # The columns are where the part's axes go.
@@ -192,7 +192,7 @@ def _label(
     marks: Mapping[str, str],
     visible: Sequence[tuple[Placement, Region]],
 ) -> None:
-    """Label every part; equal parts have their labels in the same place unless labels would meet."""
+    """Label every part; equal parts are labelled equally unless labels would meet."""
     by_placement: dict[tuple[int, int], tuple[Bounds, Iterator[PlacedLabel]]] = {}
     taken: list[Bounds] = []
     page = (*strip.corner, *_far(strip))
@@ -228,7 +228,7 @@ def marked(design: str, pattern: str, marks: Mapping[str, str]) -> str:
     return f"{marks.get(design, design)} {pattern}".lstrip()
 
 
-# Where the label of a part stands: on the part, off its holes and off other labels.
+# Places for labels: on the part, off its holes and off other labels.
 
 
 LEGIBLE = 1.5
@@ -348,7 +348,7 @@ def _placed_label(em: float, middle: Point, size: float) -> PlacedLabel:
 
 
 def _middles(bounds: Bounds) -> Iterator[tuple[float, Point]]:
-    """Yield the distance from the middle, 0 to 1, and the point, over a part's box; nearest first."""
+    """Yield distance from the middle, 0 to 1, and point, over a part's box; nearest first."""
     low_x, low_y, high_x, high_y = bounds
     x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
     for off, u, v in _grid():

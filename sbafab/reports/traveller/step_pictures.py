@@ -10,7 +10,7 @@ from typing import NamedTuple
 from sbafab.cutting.fixture import shown
 from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Region, coord, path_data, section
+from sbafab.geometry.region import coord, section
 from sbafab.laminate.assembly import AssemblyStep, distinct_layers, stack_count
 from sbafab.laminate.laminate import Inlet, Laminate, Layer, Pin
 from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, UNDERLAY, BuildUpPart
@@ -39,6 +39,9 @@ ASIDE, FAR = 0.4, 0.25
 """What a name out of its direction costs, and a mm of distance, in mm2 of covering."""
 ROUNDED = 1e-6
 """mm2, far more than sums of costs are off."""
+
+
+# Names beside the places of a picture, where they cover neither each other nor what they name.
 
 
 class PlanName(NamedTuple):
@@ -118,7 +121,7 @@ def _shared(a: Bounds, b: Bounds) -> float:
     return width * height if width > 0 and height > 0 else 0.0
 
 
-# A press step seen from above: plate, layers, pins in or out, inlet tabs.
+# The step seen from above: plate, layers, pins in or out, inlet tabs.
 
 
 WIDEST, TALLEST = 64.0, 36.0
@@ -129,7 +132,7 @@ NAMES = 2.0
 """Height of the names of pins and chambers, mm."""
 FREE = 6.0
 """mm of air round a laminate that has no base plate."""
-PLATE = "#f1f1ef"
+
 AT_DATUM = 1e-3
 """mm from the datum within which a pin hides it."""
 
@@ -174,7 +177,7 @@ def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: s
     words = f"step {step.number} from above, {state}; the text beside it says the same"
     picture = Picture(name, view.width, view.height, words)
     if plate is not None:
-        picture.add(_plate(plate, bool(step.pins), view))
+        picture.plate(plate, flat(view.scale, view.origin), bool(step.pins))
     for bed in lying:
         for layer in distinct_layers(laminate, bed.layers):
             look = "made" if bed.made_in else "clear"
@@ -209,16 +212,6 @@ def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: s
     datum = "+ datum" if at_datum is None else f"the datum is the middle of pin {at_datum}"
     picture.add(*_captions(view, plate is not None, bool(step.pins), datum))
     return picture.svg()
-
-
-def _plate(plate: Region, used: bool, view: _View) -> str:
-    """The base plate, dashed where it is not used: it still tells which way round things go."""
-    shape = path_data(plate.mapped(view.at, view.scale, mirror=True))
-    dash = "" if used else ' stroke-dasharray="1.6 1.2"'
-    return (
-        f'<path d="{shape}" fill="{PLATE if used else "none"}" fill-rule="evenodd" '
-        f'stroke="{draw.GREY}" stroke-width="0.25"{dash}/>'
-    )
 
 
 def _widened(bounds: Bounds) -> Bounds:
@@ -289,12 +282,7 @@ def _captions(view: _View, plate: bool, pinned: bool, datum: str) -> list[str]:
     return parts
 
 
-# How parts are laid that no pin holds: along which edge, or where on their sheet.
-
-
-# A press step taken apart: every layer or finished stack in its place over the plate.
-#
-# Drawn from the front and above, so that outlines and tabs show which way round each layer goes.
+# The step taken apart: every layer or finished stack in its place over the plate.
 
 
 WIDE = 58.0
@@ -366,7 +354,9 @@ def exploded(laminate: Laminate, step: AssemblyStep, lying: Sequence[Bed], name:
     width = WIDE + _labels(levels, view.gap)
     picture = Picture(name, width, view.height, f"step {step.number} taken apart: {words}")
     if plate is not None:
-        picture.add(*_tilted_plate(plate, view))
+        picture.plate(plate, view.matrix(view.ground))
+        edge = view.middle + plate.bounds[2] * view.scale, view.ground
+        picture.add(*_beside(edge, "base plate", "cut corner: back right", view.gap))
     under = view.ground
     for place, level in enumerate(levels):
         here = view.level(place)
@@ -393,16 +383,6 @@ def _tilted(bounds: Bounds, levels: int, plate: bool) -> _Tilted:
     height = TOP + depth + gap * between + STACK_FOOT
     middle = WIDE / 2 - (low_x + high_x) / 2 * scale
     return _Tilted(scale, middle, height - STACK_FOOT + low_y * scale * TILT, gap, height, plate)
-
-
-def _tilted_plate(plate: Region, view: _Tilted) -> list[str]:
-    moved = " ".join(map(coord, view.matrix(view.ground)))
-    shape = (
-        f'<path d="{path_data(plate)}" fill="#f1f1ef" fill-rule="evenodd" stroke="{draw.GREY}" '
-        f'stroke-width="{coord(0.25 / view.scale)}" transform="matrix({moved})"/>'
-    )
-    edge = view.middle + plate.bounds[2] * view.scale, view.ground
-    return [shape, *_beside(edge, "base plate", "cut corner: back right", view.gap)]
 
 
 def _levels(laminate: Laminate, bed: Bed) -> Iterator[Level]:
@@ -490,10 +470,7 @@ def _brackets(levels: Sequence[Level], view: _Tilted, width: float) -> list[str]
     return parts
 
 
-# What lies between the platens in a step: a section, to scale in two classes of thickness.
-#
-# Base plate and press pad stand 1:2; films, laminate and what of the pins stands over the plate are
-# enlarged by a factor that the picture names. Widths are not to scale.
+# The section between the platens, to scale in two classes of thickness.
 
 
 SECTION_WIDE, SECTION_LABELS, SECTION_EDGE = 26.0, 43.0, 1.0
@@ -594,7 +571,7 @@ def build_up_svg(step: Step, name: str) -> str:
         x = high - 1.5 if "laminate" in text else SECTION_WIDE - 1.5
         picture.add(*draw.leader((x, y), (SECTION_WIDE + 2.0, row), (SECTION_WIDE + 3.5, row)))
         picture.add(draw.text((SECTION_WIDE + 4.2, row + 0.8), text, size=2.3))
-    scale = f"plate and pad 1:2; what lies between {by}:1; widths not"
+    scale = f"plate and pad 1:2; what lies between {by}:1; widths not to scale"
     picture.add(draw.text((SECTION_EDGE, end + 3.6), scale, size=2.2))
     return picture.svg()
 
