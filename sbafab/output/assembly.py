@@ -16,7 +16,7 @@ from sbafab.assemblies.writing import DESIGN_FILE, assembly_sha256, assembly_tom
 from sbafab.cutting.properties import TRUE_ARCS, Curves
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DesignError, GeometryError
-from sbafab.meshing.write_glb import Node, write_scene
+from sbafab.meshing.formats.glb import Node, write_scene
 from sbafab.output.batch import (
     TRAVELLER,
     Batch,

@@ -16,7 +16,7 @@ import numpy as np
 
 from sbafab.errors import OutputError
 from sbafab.meshing.conforming.layup import FormedFilm, Layup
-from sbafab.meshing.conforming.sweep import TRIANGLE_PARTS
+from sbafab.meshing.conforming.mesh import TRIANGLE_PARTS
 
 if TYPE_CHECKING:
     from matplotlib.tri import TriFinder

@@ -11,15 +11,16 @@ import numpy as np
 
 from sbafab.errors import OutputError
 from sbafab.meshing.conforming.crossing import check_apart
-from sbafab.meshing.conforming.elements import (
+from sbafab.meshing.conforming.layup import FormedFilm, Layup, MeshedVoid
+from sbafab.meshing.conforming.mesh import (
     CORNERS,
     FACES,
     ElementKind,
+    Mesh,
     scaled_jacobians,
+    tetrahedra,
     volumes,
 )
-from sbafab.meshing.conforming.layup import FormedFilm, Layup, MeshedVoid
-from sbafab.meshing.conforming.model import Mesh
 from sbafab.meshing.conforming.round_tube import round_tube
 from sbafab.meshing.conforming.sweep import (
     NONE,
@@ -31,7 +32,6 @@ from sbafab.meshing.conforming.sweep import (
     neighbours,
     open_sides,
     sweep,
-    tetrahedra,
     wedges,
     wetted,
 )

@@ -13,8 +13,8 @@ from sbafab.errors import DesignError
 from sbafab.geometry.edges import Arc, Point
 from sbafab.laminate.laminate import Interface
 from sbafab.meshing.conforming.crossing import crossing, said
-from sbafab.meshing.conforming.elements import integrals
 from sbafab.meshing.conforming.layup import FormedFilm, Layup, bodies, flat
+from sbafab.meshing.conforming.mesh import integrals
 from sbafab.meshing.conforming.plane import MISSING, Plane
 from sbafab.models.lens import fullest as fullest_slot
 from sbafab.models.parabola import fullest

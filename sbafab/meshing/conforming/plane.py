@@ -13,7 +13,7 @@ from sbafab.geometry.arrangement import Arrangement, by_owner
 from sbafab.geometry.boolean import arranged
 from sbafab.geometry.edges import Arc, Edge, Point, edge_from_bulge
 from sbafab.geometry.region import Region
-from sbafab.meshing.conforming.elements import scaled_jacobians, volumes
+from sbafab.meshing.conforming.mesh import scaled_jacobians, volumes
 
 if TYPE_CHECKING:
     import numpy as np

@@ -10,22 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sbafab.errors import OutputError
-from sbafab.meshing.conforming.elements import EDGES, FACES, ElementKind
 from sbafab.meshing.conforming.layup import FormedFilm, Layup, MeshedVoid
+from sbafab.meshing.conforming.mesh import FACES, TRIANGLE_PARTS, ElementKind
 from sbafab.meshing.conforming.plane import Plane
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 NONE = -1
-TETRAHEDRA = (
-    ((0, 0), (1, 0), (2, 0), (2, 2)),
-    ((0, 0), (1, 2), (1, 0), (2, 2)),
-    ((0, 0), (0, 2), (1, 2), (2, 2)),
-)
-"""Corners of the tetrahedra in a prism: its columns by rank, and the level (0 below, 2 above)."""
-SIDE = np.array([NONE, 3, 5, 4])
-"""The mid-edge node between two corners of a triangle, by the sum of their places."""
 
 
 @dataclass(frozen=True)
@@ -114,40 +106,6 @@ def _prisms(triangles: NDArray[np.int64], *levels: NDArray[np.int64]) -> NDArray
 def wedges(prisms: NDArray[np.int64]) -> NDArray[np.int64]:
     """The prisms as wedges (m, 15) of second order."""
     return prisms[:, [0, 1, 2, 12, 13, 14, 3, 4, 5, 15, 16, 17, 6, 7, 8]]
-
-
-def tetrahedra(prisms: NDArray[np.int64], corners: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Three tetrahedra (3 x m, 10) of second order for each prism, in its order.
-
-    ``corners`` (m, 3) are the plane's nodes under each prism: the diagonal of a side starts below
-    the smaller number of two, so that neighbours agree.
-    """
-    ranked = np.argsort(corners, axis=1)
-    is_even = (ranked[:, 1] - ranked[:, 0]) % 3 == 1
-    cells = np.empty((len(prisms), 3, 10), dtype=np.int64)
-    rows = np.arange(len(prisms))
-    for number, tetra in enumerate(TETRAHEDRA):
-        # A mirrored prism takes its first two corners the other way round.
-        for turned, chosen in (((0, 1, 2, 3), is_even), ((1, 0, 2, 3), ~is_even)):
-            ends = [tetra[place] for place in turned]
-            pairs = [(end, end) for end in ends]
-            pairs += [(ends[a], ends[b]) for a, b in EDGES["tetra10"]]
-            for node, ((column, level), (other, other_level)) in enumerate(pairs):
-                i, j = ranked[chosen, column], ranked[chosen, other]
-                local = i if column == other else SIDE[i + j]
-                height = 3 * (level + other_level)
-                cells[rows[chosen], number, node] = prisms[rows[chosen], height + local]
-    return cells.reshape(-1, 10)
-
-
-def split_wedges(corners: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Three tetrahedra (3 x m, 4) of first order for each wedge (m, 6), in its order.
-
-    Which way a side is cut hangs on the lower nodes' numbers, so that neighbours agree.
-    """
-    prisms = np.repeat(corners, 3, axis=1)
-    prisms[:, :3], prisms[:, 12:15] = corners[:, :3], corners[:, 3:]
-    return tetrahedra(prisms, corners[:, :3])[:, :4]
 
 
 # Cavities: the faces of a mesh that the air of a chamber presses on, and a closed surface.
@@ -249,7 +207,6 @@ def mouth_patch(
     return np.array(triangles, dtype=np.int64).reshape(-1, 3)
 
 
-TRIANGLE_PARTS = ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))
 SQUARE_PARTS = ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7), (4, 5, 6), (4, 6, 7))
 
 
