@@ -75,11 +75,11 @@ class ConformingMeshes:
 
     @property
     def has_air(self) -> bool:
-        """Whether any film stands off another."""
+        """True if any film stands off another."""
         return any(self.holds_air(chamber) for chamber in self.volume.cavities)
 
     def holds_air(self, chamber: str) -> bool:
-        """Whether the pockets of a chamber are open: filled, or kept so by gaps."""
+        """Return True if the pockets of a chamber are open: filled, or kept open by gaps."""
         return self.settings.gaps or (self.fill is not None and self.fill.ul[chamber] > 0)
 
     @cached_property
@@ -126,12 +126,12 @@ def conforming_meshes(laminate: Laminate, settings: MeshSettings | None = None) 
 
 def _filled(stack: Layup, fill: Fill, make: Callable[[Layup, Sequence[FormedFilm]], Mesh]) -> Mesh:
     """The mesh whose balloons hold a fill, round a tube as well as flat."""
-    held = pockets(stack)
-    mesh = make(stack, formed(stack, fill, held))
+    all_pockets = pockets(stack)
+    mesh = make(stack, formed(stack, fill, all_pockets))
     if stack.laminate.tube is None or not stack.settings.wrapped or stack.sector is not None:
         return mesh
     # Bent round the tube balloons hold a little more than flat.
-    given, sizes = dict(fill.ul), stack.plane.areas()
+    amounts, sizes = dict(fill.ul), stack.plane.areas()
     for _ in range(ROUNDS):
         for chamber in stack.laminate.chambers:
             name = chamber.name
@@ -139,9 +139,9 @@ def _filled(stack: Layup, fill: Fill, make: Callable[[Layup, Sequence[FormedFilm
                 films = stack.voids[name].in_films.items() if stack.is_thick else ()
                 bores = sum(sizes[cells].sum() * stack.plies[k].thickness for k, cells in films)
                 balloons = stack.laminate.balloons * len(chamber.centres)
-                found = (mesh.cavity(name)[0].volume - bores) / balloons
-                given[name] *= fill.ul[name] / found
-        mesh = make(stack, formed(stack, Fill(given), held))
+                volume = (mesh.cavity(name)[0].volume - bores) / balloons
+                amounts[name] *= fill.ul[name] / volume
+        mesh = make(stack, formed(stack, Fill(amounts), all_pockets))
     return mesh
 
 
@@ -169,7 +169,7 @@ def write_conforming(
 
     ``folder`` is the output folder, ``formats`` the file endings wanted. Models of a part by
     symmetry have no closed cavities: their cavity walls are face sets of the meshes. ``progress``
-    is told how many of how many files are done.
+    is called with the numbers of files done and of all files.
     """
     (folder / "mesh").mkdir(parents=True, exist_ok=True)
     jobs = [job for job in _jobs(meshes) if Path(job[0].file).suffix[1:] in formats]
@@ -219,7 +219,7 @@ def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path],
 
 
 class Statistics(TypedDict):
-    """How large and how good a mesh is. Aspect is longest edge over shortest.
+    """Size and quality of a mesh. Aspect is longest edge over shortest.
 
     ``thinnest_film_mm`` is the least thickness of a film that air has lifted.
     """
@@ -245,7 +245,7 @@ class Thinning(NamedTuple):
 
 
 def thinning(shell: Mesh, flat: Mesh) -> Thinning:
-    """How much thinner the films of a shell are than in the same shell when flat."""
+    """Return the thinning of a shell's films against the same shell when flat."""
     pockets = np.unique(np.concatenate([faces[:, 0] for faces in shell.face_sets.values()]))
     thickness = np.zeros(len(shell.cells))
     for name, value in shell.thickness.items():
@@ -253,10 +253,10 @@ def thinning(shell: Mesh, flat: Mesh) -> Thinning:
 
     def areas(mesh: Mesh) -> NDArray[np.float64]:
         slopes = jacobians(mesh.kind, mesh.points, mesh.cells[pockets], integration=True)
-        found: NDArray[np.float64] = np.linalg.norm(
+        sizes: NDArray[np.float64] = np.linalg.norm(
             np.cross(slopes[..., 0], slopes[..., 1]), axis=2
         )
-        return found
+        return sizes
 
     raised, before = areas(shell), areas(flat)
     growth = np.maximum((raised / before).max(axis=1), 1.0)
