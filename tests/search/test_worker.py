@@ -34,7 +34,7 @@ for line in sys.stdin:
 def puppet(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A process that does what its job says, in place of the one that measures."""
     monkeypatch.setattr(pool, "COMMAND", (sys.executable, "-S", "-c", PUPPET))
-    monkeypatch.setattr(pool, "_own", threading.local())
+    monkeypatch.setattr(pool, "_thread", threading.local())
     open_all()
     yield
     close_all()
