@@ -390,7 +390,7 @@ def test_keys_are_freed_and_fixed_by_name() -> None:
     for free, fixed, said in (
         (["inlet.tab_length=3:5"], [], "LOW:HIGH:STEP"),
         (["inlet.tab=3:5:1"], [], "inlet.tab_length"),
-        ([], ["order.copies"], "changes only"),
+        ([], ["order.copies"], "by default"),
     ):
         with pytest.raises(DesignError, match=said):
             read_free(design, free, fixed)

@@ -47,7 +47,7 @@ def test_a_quantity_is_read(text: str, found: AskedQuantity) -> None:
         ("mass@50kPa", "only stroke, bend and force"),
         ("bend@5mm", "only a force takes one"),
         ("force@50kPa", "a force needs a stroke"),
-        ("stroke@5mm@50kPa", "a stroke is not"),
+        ("stroke@5mm@50kPa", "only a force takes one"),
         ("stroke@50 apples", "neither a pressure nor a length"),
         ("stroke@500kPa", "367"),
     ],
