@@ -64,7 +64,7 @@ def families(schema: JsonSchema) -> dict[str, list[Field]]:
 def assembly(schema: JsonSchema) -> dict[str, Any]:
     """The fields of an assembly, and by kind those of a part, whose keys start at its table."""
     table = _named("Assembly", schema)
-    fields = sorted(_fields(table, schema, ""), key=_rank)
+    assembly_fields = sorted(_fields(table, schema, ""), key=_rank)
     (parts,) = table["properties"]["parts"]["patternProperties"].values()
     kinds = {}
     for kind, reference in parts["discriminator"]["mapping"].items():
@@ -76,7 +76,7 @@ def assembly(schema: JsonSchema) -> dict[str, Any]:
             "fields": sorted(fields, key=lambda field: field["key"] in PLACING),
             "needs": [field["key"] for field in fields if field["key"] in needed],
         }
-    return {"fields": fields, "kinds": kinds}
+    return {"fields": assembly_fields, "kinds": kinds}
 
 
 def keys(schema: JsonSchema) -> set[str]:

@@ -36,7 +36,7 @@ function partSection(studio, name, part, present) {
   const head = el("div", { class: "part-head" },
     part.kind === "sba" ? el("button", { type: "button", "aria-label": `Open ${part.design}, the design of ${name}`, onclick: () => openPart(studio, name) }, "Open its design") : null,
     el("button", { type: "button", "aria-label": `Show ${name}`, onclick: () => studio.pickParts([name]) }, "Show"),
-    el("button", { type: "button", class: "quiet", "aria-label": `Remove ${name}`, onclick: () => studio.edit([[`parts.${name}`, null]]) }, "Take out"),
+    el("button", { type: "button", class: "quiet", "aria-label": `Take ${name} out`, onclick: () => studio.edit([[`parts.${name}`, null]]) }, "Take out"),
     made ? setKey(studio, name, made, known.filter((field) => !present.has(prefix + field.key))) : null);
   return { table: `parts.${name}`, words: name, small: part.kind === "sba" ? part.design : part.kind, fields: [...set, ...fields], head, open: part.kind === "sba" };
 }
@@ -47,7 +47,7 @@ function setKey(studio, name, made, fields) {
     const field = fields.find(({ key }) => key === event.target.value);
     const value = field?.key.split(".").reduce((inner, part) => inner?.[part], made.values) ?? field?.default ?? "";
     if (field) studio.edit([[`parts.${name}.set.${field.key}`, JSON.stringify(value)]]);
-  } }, el("option", { value: "" }, "Set a key of its design …"), ...fields.filter(({ key }) => key !== "name").map(({ key }) => el("option", { value: key }, key)));
+  } }, el("option", { value: "" }, "Set a key of it …"), ...fields.filter(({ key }) => key !== "name").map(({ key }) => el("option", { value: key }, key)));
 }
 
 function addPart(studio) {

@@ -21,7 +21,7 @@ export class Make {
       ? "Cut runs the rules, then writes the cut files and film sheets that sbafab cut writes. A design that breaks a rule gets its findings and no cut file. Press schedule, traveller and meshes: sbafab generate, on a computer."
       : "Generate runs the rules, then writes cut files, film sheets, press schedule, traveller, meshes and pictures: the same bytes as sbafab generate. A design that breaks a rule gets its findings and no cut file."));
     this.element = el("div", { class: "view" }, el("div", { class: "make" },
-      el("div", { class: "head" }, this.go, this.stop, withoutServer ? null : el("label", {}, this.keep, " save to out/ in the folder"), this.bar, this.said, el("span", { class: "grow" }), this.zip),
+      el("div", { class: "head" }, this.go, this.stop, withoutServer ? null : el("label", {}, this.keep, " into out/ of the folder"), this.bar, this.said, el("span", { class: "grow" }), this.zip),
       el("div", { class: "body" }, this.list, this.stage)));
     studio.on("text", () => { if (this.made && this.madeText !== studio.text) this.said.textContent = "The files are from an earlier state of the design; generate again."; });
     studio.on("opened", () => { this.made = null; this.list.replaceChildren(); this.zip.hidden = true; this.said.textContent = ""; });
