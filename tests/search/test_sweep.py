@@ -209,6 +209,6 @@ def test_a_table_that_no_sweep_wrote_is_left_alone(
     folder = tmp_path / "1dof-5mm-sweep"
     folder.mkdir()
     (folder / "sweep.csv").write_text("mine")
-    with pytest.raises(OutputError, match="the table of no sweep"):
+    with pytest.raises(OutputError, match="not written by sbafab sweep"):
         _swept(tmp_path)
     assert (folder / "sweep.csv").read_text() == "mine"

@@ -15,7 +15,7 @@ from sbafab.actuators import build, load_design
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.layup import MeshSettings, Symmetry
-from sbafab.meshing.conforming.model import Mesh
+from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.simulators.calculix.deck import DeckSettings
 from sbafab.simulators.calculix.results import (
     Frame,
