@@ -92,6 +92,16 @@ def test_the_examples_for_assistants_pass(tmp_path: Path) -> None:
         assert sbafab.check(path).failed == ()
 
 
+def test_readme_is_short_and_begins_with_its_two_commands() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 120
+    (block, *_) = re.findall(r"^```\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    assert block.splitlines() == [
+        "python -m pip install . && sbafab generate 3dof-15mm",
+        'python -m pip install -e ".[dev]" && python -m tests',
+    ]
+
+
 def test_readme_is_published_with_absolute_links() -> None:
     hook = runpy.run_path(str(ROOT / ".ci" / "metadata.py"))
     text = "![a](docs/images/x.png) [b](docs/y.md) [c](https://d.org/z) [e](#f)"
