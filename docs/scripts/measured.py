@@ -21,7 +21,7 @@ from docs.scripts.tables import SUMMARIES, Table
 DOCS = Path(__file__).parents[1]
 README = DOCS.parent / "README.md"
 FOLDER = DOCS / "measured"
-BLOCK = re.compile(r"(<!-- measured: (\w+) ([\w-]+) -->\n).*?(\n<!-- end -->)", re.DOTALL)
+BLOCK = re.compile(r"(<!-- measured: (\w+) ([\w-]+) -->)(?:(?!<!--).)*(<!-- end -->)", re.DOTALL)
 SPLIT = re.compile(r",\s*\n\s*")
 HOW = "how"
 
@@ -70,7 +70,7 @@ def pages() -> Iterator[Path]:
 
 def filled(text: str) -> str:
     """A page's text with every block as the records have it."""
-    return BLOCK.sub(lambda m: f"{m[1]}{_said(m[2], m[3])}{m[4]}", text)
+    return BLOCK.sub(lambda m: f"{m[1]}\n{_said(m[2], m[3])}\n{m[4]}", text)
 
 
 def _said(name: str, table: str) -> str:
