@@ -160,10 +160,22 @@ def balloons_summary() -> Table:
     return Table(["pocket", "rim", "stroke within", "air within"], rows)
 
 
+def faults_summary() -> Table:
+    """Return the number of faults and of faulty folders by kind."""
+    every = table("faults").rows
+    rows = []
+    for kind in [*dict.fromkeys(row[0] for row in every), "in all"]:
+        mine = [row for row in every if kind in (row[0], "in all")]
+        folders = sum(not cell.startswith("n/a") for row in mine for cell in row[4:])
+        rows.append([kind, str(len(mine)), str(folders)])
+    return Table(["kind", "faults", "faulty folders"], rows)
+
+
 SUMMARIES: Mapping[tuple[str, str], Callable[[], Table]] = {
     ("validation", "summary"): validation_summary,
     ("validation", "calibrated"): calibrated_summary,
     ("balloons", "summary"): balloons_summary,
+    ("faults", "summary"): faults_summary,
 }
 """What a page may name in ``<!-- measured: NAME TABLE -->`` beside the tables of the records."""
 
@@ -181,9 +193,11 @@ def write(folder: Path) -> None:
         shown = table(name)
         parts = [f"---\norphan: true\n---\n\n# {title}\n\nExplained in [{page}](../{page}.md).\n"]
         if shown.columns[0] == "section":
-            for section in dict.fromkeys(row[0] for row in shown.rows):
-                rows = [row[1:] for row in shown.rows if row[0] == section]
-                parts.append(f"## {section}\n\n{Table(shown.columns[1:], rows).markdown}\n")
+            first = 2 if shown.columns[1] == "note" else 1
+            for heading in dict.fromkeys(tuple(row[:first]) for row in shown.rows):
+                rows = [row[first:] for row in shown.rows if tuple(row[:first]) == heading]
+                said = "\n\n".join(heading)
+                parts.append(f"## {said}\n\n{Table(shown.columns[first:], rows).markdown}\n")
         else:
             parts.append(shown.markdown + "\n")
         (folder / f"{name}-table.md").write_text("\n".join(parts), encoding="utf-8")
