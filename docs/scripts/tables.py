@@ -70,7 +70,6 @@ def markdown_rows(text: str, heading: str = "") -> Iterator[list[str]]:
 
 SHOWN = (
     # Figure, model and section of the CSV, and the figure's name in the summary.
-    ("1-DoF, 100 kPa, flat", "virtual work on Eq. 4", "blocked force, 1-DoF, flat"),
     (
         "1-DoF, 100 kPa, at 75 % of full stroke",
         "virtual work on Eq. 4",
@@ -94,7 +93,6 @@ SHOWN = (
         "elastic stack, 10 kPa in the chambers",
         "height of the 3-DoF",
     ),
-    ("largest bend", "constant curvature", "largest bend"),
     ("largest bend", "elastic stack, 10 kPa in one chamber", "largest bend"),
     ("largest bend", "elastic stack, 10 kPa in 2 chambers", "largest bend"),
     (
@@ -108,7 +106,7 @@ SHOWN = (
         "E = F l^3 / (3 delta I), elastic stack at 10 kPa, chambers shut",
         "lateral modulus, 3-DoF",
     ),
-    ("3-DoF of 15 balloons, deflated", "sum of the films", "height of the 3-DoF, deflated"),
+    ("3-DoF of 15 balloons, deflated", "sum of the films", "deflated height of the 3-DoF"),
 )
 
 
@@ -125,22 +123,6 @@ def validation_summary() -> Table:
         brief = model.replace("E = F l^3 / (3 delta I), ", "").split(", three chambers")[0]
         rows.append([name, cells[at("paper")], cells[at("predicted")], f"{share} %", brief])
     return Table(["figure", "paper", "predicted", "residual", "model"], rows)
-
-
-def calibrated_summary() -> Table:
-    """Return the fitted and the held-out figures of the calibrated stack."""
-    every = table("validation")
-    at = list(every.columns).index
-    rows = []
-    for row in every.rows:
-        if row[at("section")].startswith("Calibrated"):
-            name, _, role = row[at("figure")].rpartition(" (")
-            share = re.findall(r"([+-][\d.]+)%", row[at("residual")])[0]
-            chambers = re.findall(r"10 kPa in (.*chambers?)$", row[at("model")])
-            named = f"{name}, {chambers[0]}" if name == "largest bend" else name
-            cells = [named, row[at("paper")], row[at("predicted")], f"{share} %", role.rstrip(")")]
-            rows.append(cells)
-    return Table(["figure", "paper", "predicted", "residual", "role"], rows)
 
 
 def balloons_summary() -> Table:
@@ -173,7 +155,6 @@ def faults_summary() -> Table:
 
 SUMMARIES: Mapping[tuple[str, str], Callable[[], Table]] = {
     ("validation", "summary"): validation_summary,
-    ("validation", "calibrated"): calibrated_summary,
     ("balloons", "summary"): balloons_summary,
     ("faults", "summary"): faults_summary,
 }
