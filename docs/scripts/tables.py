@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -130,8 +131,8 @@ def balloons_summary() -> Table:
     every = table("balloons")
     largest: dict[tuple[str, str], list[float]] = {}
     for name, *cells in every.rows:
-        size, place, rim = name.split(", ", 2)
-        rim = "even ripples" if "ripples" in rim else f"{rim}, {place}"
+        size, _, rim = name.split(", ", 2)
+        rim = "even ripples" if "ripples" in rim else rim
         off = [max(abs(float(value)) for value in cells[k].split(",")) for k in (3, 6)]
         before = largest.get((rim, size), [0.0, 0.0])
         largest[rim, size] = [max(pair) for pair in zip(before, off, strict=True)]
@@ -143,20 +144,26 @@ def balloons_summary() -> Table:
 
 
 def faults_summary() -> Table:
-    """Return the number of faults and of faulty folders by kind."""
-    every = table("faults").rows
-    rows = []
-    for kind in [*dict.fromkeys(row[0] for row in every), "in all"]:
-        mine = [row for row in every if kind in (row[0], "in all")]
-        folders = sum(not cell.startswith("n/a") for row in mine for cell in row[4:])
-        rows.append([kind, str(len(mine)), str(folders)])
-    return Table(["kind", "faults", "faulty folders"], rows)
+    """Return the number of kinds, of faults and of faulty folders."""
+    rows = table("faults").rows
+    folders = sum(not cell.startswith("n/a") for row in rows for cell in row[4:])
+    counts = (len({row[0] for row in rows}), len(rows), folders)
+    return Table(["kinds", "faults", "faulty folders"], [[str(count) for count in counts]])
+
+
+def sofa_summary() -> Table:
+    """Return height in mm and tilt in degrees of SOFA's scenes at 5 kPa, and their steps a second."""
+    columns, rows = json.loads((FOLDER / "sofa.json").read_text(encoding="utf-8"))["tables"][
+        "pressures"
+    ].values()
+    return Table(columns, [row for row in rows if row[0].startswith(("5, ", "steps"))])
 
 
 SUMMARIES: Mapping[tuple[str, str], Callable[[], Table]] = {
     ("validation", "summary"): validation_summary,
     ("balloons", "summary"): balloons_summary,
     ("faults", "summary"): faults_summary,
+    ("sofa", "summary"): sofa_summary,
 }
 """What a page may name in ``<!-- measured: NAME TABLE -->`` beside the tables of the records."""
 
