@@ -11,7 +11,7 @@ import pytest
 import sbafab
 from docs.scripts import reference_cli, reference_keys
 from docs.scripts.offline import complaints
-from docs.scripts.rule_pictures import CHOSEN, OTHERS, pair
+from docs.scripts.rule_pictures import CHOSEN, PICTURED, pair
 from sbafab.cli import COMMANDS
 from sbafab.rules.deck import rule_names
 from tests.rules.test_deck import FAULTS
@@ -40,8 +40,8 @@ def test_the_page_of_keys_has_every_key_of_every_family() -> None:
         assert [path for path in paths if path not in tables and f"`{path}`" not in page] == []
 
 
-def test_every_rule_has_its_picture() -> None:
-    assert CHOSEN.keys() | OTHERS.keys() == set(rule_names())
+def test_a_picture_shows_its_rule_s_fault() -> None:
+    assert set(rule_names()) >= PICTURED
     assert all(FAULTS[name].rule == rule for rule, name in CHOSEN.items())
     for rule in ("film-limits", "bridges"):
         drawn = pair(rule)
