@@ -98,14 +98,12 @@ def _card(source: str, target: Path) -> str:
         assembled = sbafab.assemble(source)
         numbers = list(_counts(found, assembled))
         every = ", ".join(found.parts)
-    rows = "\n".join(f"| {value} | {name} |" for name, value in numbers)
+    rows = "\n".join(f"* **{value}** {name}{aside}" for name, value, aside in numbers)
     return f""":::{{container}} card
 ![{found.name}, flat](gallery/{picture})
 
 **{found.name}**. {_first_sentence(text)}
 
-| | |
-|---|---|
 {rows}
 
 {{download}}`{path.name} <gallery/{path.name}>`
@@ -119,7 +117,7 @@ def _card(source: str, target: Path) -> str:
 """
 
 
-def _numbers(prediction: Prediction) -> Iterator[tuple[str, str]]:
+def _numbers(prediction: Prediction) -> Iterator[tuple[str, str, str]]:
     """Yield the three numbers of an actuator, each with its interval or the model's known error."""
     known = {figure.name: figure for figure in prediction.figures}
     called = {name: (words, digits) for name, words, digits in FIGURES}
@@ -132,16 +130,15 @@ def _numbers(prediction: Prediction) -> Iterator[tuple[str, str]]:
         if figure.between is not None:
             low, high = figure.between
             value += f" ({low:.{digits}f} to {high:.{digits}f})"
-        if figure.measured is not None:
-            value += f" (model / paper {figure.measured.ratio:.2f})"
-        yield words, value
+        aside = "" if figure.measured is None else f" (model / paper {figure.measured.ratio:.2f})"
+        yield words, value, aside
 
 
-def _counts(found: Assembly, assembled: Assembled) -> Iterator[tuple[str, str]]:
+def _counts(found: Assembly, assembled: Assembled) -> Iterator[tuple[str, str, str]]:
     actuators = [part for part in found.parts.values() if part.kind == "sba"]
-    yield "parts", str(len(found.parts))
-    yield "actuators", str(len(actuators))
-    yield "designs", str(len(assembled.designs))
+    yield "parts", str(len(found.parts)), ""
+    yield "actuators", str(len(actuators)), ""
+    yield "designs", str(len(assembled.designs)), ""
 
 
 def _first_sentence(text: str) -> str:
