@@ -12,6 +12,7 @@ import sbafab
 from docs.scripts import reference_cli, reference_keys
 from docs.scripts.offline import complaints
 from docs.scripts.rule_pictures import OTHERS, pair
+from docs.scripts.rule_pictures import CHOSEN, PICTURED, pair
 from sbafab.cli import COMMANDS
 from tests.rules.test_deck import TESTED_APART
 
@@ -88,6 +89,16 @@ def test_the_examples_for_assistants_pass(tmp_path: Path) -> None:
         path = tmp_path / f"{number}.toml"
         path.write_text(example)
         assert sbafab.check(path).failed == ()
+
+
+def test_readme_is_short_and_begins_with_its_two_commands() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 120
+    (block, *_) = re.findall(r"^```\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    assert block.splitlines() == [
+        "python -m pip install . && sbafab generate 3dof-15mm",
+        'python -m pip install -e ".[dev]" && python -m tests',
+    ]
 
 
 def test_readme_is_published_with_absolute_links() -> None:
