@@ -12,7 +12,6 @@ import sbafab
 from docs.scripts import reference_cli, reference_keys
 from docs.scripts.offline import complaints
 from docs.scripts.rule_pictures import OTHERS, pair
-from docs.scripts.rule_pictures import CHOSEN, PICTURED, pair
 from sbafab.cli import COMMANDS
 from tests.rules.test_deck import TESTED_APART
 
