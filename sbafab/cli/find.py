@@ -101,36 +101,37 @@ def _with_quantities(command: Callable[..., None]) -> Callable[..., None]:
 @set_option
 @json_option
 @_with_quantities
-def find(source: str | None, **asked: Any) -> None:
-    from sbafab.cli.exit import say
-    from sbafab.cli.printing import print_json, shown_progress
+def find(source: str | None, **options: Any) -> None:
+    from sbafab.cli.exit import print_error
+    from sbafab.cli.printing import print_json
+    from sbafab.cli.progress import shown_progress
     from sbafab.design.files import name_of
     from sbafab.search.find import found_file, found_toml, write_found
 
-    if asked["storage"] is not None and not asked["optuna"]:
+    if options["storage"] is not None and not options["optuna"]:
         raise click.UsageError("--storage goes with --optuna; add it")
-    requests = _requests(source, asked)
-    target = found_file(asked["out"])
+    requests = _requests(source, options)
+    target = found_file(options["out"])
     try:
-        with shown_progress(asked["as_json"]) as tell:
-            started, found = _found(requests, tell)
+        with shown_progress(options["as_json"]) as progress:
+            origin, result = _best_result(requests, progress)
     except KeyboardInterrupt:
-        kept = "; the same command goes on in its storage" if asked["storage"] else ""
-        say(f"the search was stopped, and no file was written{kept}")
+        resume = "; the same command goes on in its storage" if options["storage"] else ""
+        print_error(f"the search was stopped, and no file was written{resume}")
         raise
-    if found.holds:
+    if result.holds:
         write_found(
-            found_toml(started, asked["assignments"], name_of(target) or started, found), target
+            found_toml(origin, options["assignments"], name_of(target) or origin, result), target
         )
-    if asked["as_json"]:
-        print_json(as_json(found, started, target))
+    if options["as_json"]:
+        print_json(as_json(result, origin, target))
     else:
-        print_found(found, started, target)
-    if not found.holds:
+        print_result(result, origin, target)
+    if not result.holds:
         click.get_current_context().exit(RULE_FAILED)
 
 
-def _requests(source: str | None, asked: dict[str, Any]) -> dict[str, FindRequest]:
+def _requests(source: str | None, options: dict[str, Any]) -> dict[str, FindRequest]:
     """What is looked for, by the design to start from: the one that is named, or one a family.
 
     A family that cannot be asked for it is left out. Raises DesignError where none can.
@@ -138,38 +139,38 @@ def _requests(source: str | None, asked: dict[str, Any]) -> dict[str, FindReques
     from sbafab.errors import DesignError
     from sbafab.search.trial import read_all
 
-    requirements, goal = read_all(asked["least"], asked["most"], asked["best"])
-    found: dict[str, FindRequest] = {}
+    requirements, goal = read_all(options["least"], options["most"], options["best"])
+    requests: dict[str, FindRequest] = {}
     problems: list[str] = []
-    for name in [source] if source else _one_of_each_family():
+    for name in [source] if source else _family_templates():
         try:
-            found[name] = _request(name, requirements, goal, asked)
+            requests[name] = _request(name, requirements, goal, options)
         except DesignError as error:
             problems.append(str(error))
-    if not found:
+    if not requests:
         raise DesignError("; ".join(dict.fromkeys(problems)))
-    return found
+    return requests
 
 
 def _request(
-    name: str, requirements: tuple[Requirement, ...], goal: Goal, asked: dict[str, Any]
+    name: str, requirements: tuple[Requirement, ...], goal: Goal, options: dict[str, Any]
 ) -> FindRequest:
     from sbafab.actuators import load_design
     from sbafab.design.files import changed_keys
     from sbafab.search.find import FindRequest, free_keys
     from sbafab.search.vary import read_free
 
-    assignments = asked["assignments"]
+    assignments = options["assignments"]
     design = load_design(name, assignments)
-    free = read_free(design, asked["free"], asked["fixed"], tuple(changed_keys(assignments)))
+    free = read_free(design, options["free"], options["fixed"], tuple(changed_keys(assignments)))
     request = FindRequest(
-        design, requirements, goal, free, asked["tries"], asked["optuna"], asked["storage"]
+        design, requirements, goal, free, options["tries"], options["optuna"], options["storage"]
     )
     free_keys(request)
     return request
 
 
-def _found(requests: dict[str, FindRequest], tell: Progress) -> tuple[str, FoundDesign]:
+def _best_result(requests: dict[str, FindRequest], progress: Progress) -> tuple[str, FoundDesign]:
     """The best of what is found, and the name of the design that it started from."""
     from sbafab.errors import DesignError
     from sbafab.search.find import find as search
@@ -178,11 +179,11 @@ def _found(requests: dict[str, FindRequest], tell: Progress) -> tuple[str, Found
     problems = []
     for number, (name, request) in enumerate(requests.items()):
 
-        def told(what: str, done: int, total: int, before: int = number) -> None:
-            tell(what, before * total + done, len(requests) * total)
+        def report(what: str, done: int, total: int, before: int = number) -> None:
+            progress(what, before * total + done, len(requests) * total)
 
         try:
-            results.append((name, search(request, told)))
+            results.append((name, search(request, report)))
         except DesignError as error:
             problems.append(str(error))
     if not results:
@@ -190,30 +191,30 @@ def _found(requests: dict[str, FindRequest], tell: Progress) -> tuple[str, Found
     return min(results, key=lambda result: result[1].best.rank)
 
 
-def _one_of_each_family() -> list[str]:
+def _family_templates() -> list[str]:
     from sbafab.actuators import load_design
     from sbafab.design.files import template_names
     from sbafab.errors import DesignError
 
-    found: dict[type, str] = {}
+    templates: dict[type, str] = {}
     for name in template_names():
         try:
-            found.setdefault(type(load_design(name)), name)
+            templates.setdefault(type(load_design(name)), name)
         except DesignError:
             continue
-    return list(found.values())
+    return list(templates.values())
 
 
 # How the end of a search is told: for people, and for programs.
 
 
-TABS = (
+TABS_HINT = (
     "overall_diameter counts the inlet tabs: ask for outline_diameter where they may stand out, or "
     "add --free inlet.tab_length=3:5:0.5"
 )
 
 
-def as_json(found: FoundDesign, started: str, target: Path) -> dict[str, Any]:
+def as_json(result: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
     """What ``find --json`` prints."""
 
     def shown(trial: Trial) -> dict[str, Any]:
@@ -221,118 +222,122 @@ def as_json(found: FoundDesign, started: str, target: Path) -> dict[str, Any]:
 
     return {
         "schema": FIND_SCHEMA,
-        "holds": found.holds,
-        "file": str(target) if found.holds else None,
-        "started_from": started,
-        "tries": found.tries,
-        "is_cut_short": found.is_cut_short,
-        "best": shown(found.best),
-        "full_stroke": found.full_stroke,
-        "measured": {name: one.as_dict() for name, one in found.measured.items()},
-        "missed": found.missed,
-        "binds": [{"key": b.key, "value": b.value, "breaks": b.breaks} for b in found.binds],
+        "holds": result.holds,
+        "file": str(target) if result.holds else None,
+        "started_from": origin,
+        "tries": result.tries,
+        "is_cut_short": result.is_cut_short,
+        "best": shown(result.best),
+        "full_stroke": result.full_stroke,
+        "measured": {name: one.as_dict() for name, one in result.measured.items()},
+        "missed": result.missed,
+        "binds": [{"key": b.key, "value": b.value, "breaks": b.breaks} for b in result.binds],
         "range_ends": [
             {"key": one.key, "value": one.value, "low": one.low, "high": one.high}
-            for one in found.ends
+            for one in result.ends
         ],
         "without_room": [
             {"rule": s.rule, "measured": s.measured, "unit": s.unit, "place": s.place}
-            for s in found.without_room
+            for s in result.without_room
         ],
-        "front": [shown(trial) for trial in found.front],
-        "on_front": found.on_front,
+        "front": [shown(trial) for trial in result.front],
+        "on_front": result.on_front,
     }
 
 
-def print_found(found: FoundDesign, started: str, target: Path) -> None:
+def print_result(result: FoundDesign, origin: str, target: Path) -> None:
     """The design with its figures, what binds and the front; or the nearest miss."""
-    keys = keys_said(found.best.values)
-    if found.holds:
-        print_line(f"{target}: {keys}, from {started}", "bold")
+    keys = keys_said(result.best.values)
+    if result.holds:
+        print_line(f"{target}: {keys}, from {origin}", "bold")
     else:
-        print_line(f"Nearest miss: {keys}, from {started}", "bold red")
-    for one in found.wanted.requirements:
-        value = found.best.value(one)
+        print_line(f"Nearest miss: {keys}, from {origin}", "bold red")
+    for one in result.wanted.requirements:
+        value = result.best.value(one)
         said = f"  {one.quantity.said} {shown_value(one.quantity, value)}"
         print_line(
             f"{said}; {one.bound}" if one.holds(value) else f"{said}, not {one.bound}  MISSED"
         )
-        _print_measured(found, one.quantity)
-    goal = found.wanted.goal
-    value = found.best.value(goal)
-    said = goal.said if found.holds else goal.quantity.said
+        _print_measured(result, one.quantity)
+    goal = result.wanted.goal
+    value = result.best.value(goal)
+    said = goal.said if result.holds else goal.quantity.said
     print_line(f"  {said}: {shown_value(goal.quantity, value)}")
-    if goal.quantity.said not in [one.quantity.said for one in found.wanted.requirements]:
-        _print_measured(found, goal.quantity)
-    asked = found.wanted.quantities
+    if goal.quantity.said not in [one.quantity.said for one in result.wanted.requirements]:
+        _print_measured(result, goal.quantity)
+    asked = result.wanted.quantities
     is_told = any(one.is_full_stroke for one in asked)
-    if any(one.name == "stroke" for one in asked) and not is_told and found.full_stroke is not None:
-        print_line(f"  full stroke {found.full_stroke:.4g} mm, as the paper's in proportion")
-    for said in found.broken_rules:
+    if (
+        any(one.name == "stroke" for one in asked)
+        and not is_told
+        and result.full_stroke is not None
+    ):
+        print_line(f"  full stroke {result.full_stroke:.4g} mm, as the paper's in proportion")
+    for said in result.broken_rules:
         print_line(f"  {said}")
-    told = found.binds or found.ends or (found.holds and found.without_room)
+    told = result.binds or result.ends or (result.holds and result.without_room)
     if told:
-        print_line("What binds" if found.holds else "What stops it there", "bold")
-    for bind in found.binds:
+        print_line("What binds" if result.holds else "What stops it there", "bold")
+    for bind in result.binds:
         print_line(f"  {bind.key} = {value_said(bind.value)}: {bind.breaks}")
-    _print_ends(found)
-    if not found.holds:
-        _print_miss(found)
+    _print_ends(result)
+    if not result.holds:
+        _print_miss(result)
         return
-    for spare in found.without_room:
+    for spare in result.without_room:
         print_line(
             f"  {spare.rule} {spare.place}: {spare.measured:g} {spare.unit}, nothing to spare"
         )
-    _print_front(found)
-    _print_cut(found)
+    _print_front(result)
+    _print_more_tries(result)
     print_line(f"Next: sbafab generate {shlex.quote(str(target))}")
 
 
-def _print_measured(found: FoundDesign, quantity: AskedQuantity) -> None:
-    measured = found.measured.get(quantity.said)
+def _print_measured(result: FoundDesign, quantity: AskedQuantity) -> None:
+    measured = result.measured.get(quantity.said)
     if measured is not None:
         print_wrapped(f"({measured.sentence()})", indent="    ")
 
 
-def _print_cut(found: FoundDesign) -> None:
-    if found.is_cut_short:
-        more = 2 * found.tries
-        print_line(f"All {found.tries} tries are used up; --tries {more} may lead to a better one")
+def _print_more_tries(result: FoundDesign) -> None:
+    if result.is_cut_short:
+        more = 2 * result.tries
+        print_line(f"All {result.tries} tries are used up; --tries {more} may lead to a better one")
 
 
-def _print_ends(found: FoundDesign) -> None:
-    for one in found.ends:
-        span = one.high - one.low
-        low, high = one.low, one.high + span
-        if one.value <= one.low:
-            low, high = max(one.step, one.low - span), one.high
+def _print_ends(result: FoundDesign) -> None:
+    for end in result.ends:
+        span = end.high - end.low
+        low, high = end.low, end.high + span
+        if end.value <= end.low:
+            low, high = max(end.step, end.low - span), end.high
         print_line(
-            f"  {one.key} = {one.value:g} is the end of its range, {one.low:g} to {one.high:g}; "
-            f"--free {one.key}={low:g}:{high:g}:{one.step:g} lets it go further"
+            f"  {end.key} = {end.value:g} is the end of its range, {end.low:g} to {end.high:g}; "
+            f"--free {end.key}={low:g}:{high:g}:{end.step:g} lets it go further"
         )
 
 
-def _print_miss(found: FoundDesign) -> None:
+def _print_miss(result: FoundDesign) -> None:
     missed = {
         one.quantity.name
-        for one in found.wanted.requirements
-        if not one.holds(found.best.value(one))
+        for one in result.wanted.requirements
+        if not one.holds(result.best.value(one))
     }
-    is_free = any(one.key == "inlet.tab_length" for one in found.free)
+    is_free = any(one.key == "inlet.tab_length" for one in result.free)
     if "overall_diameter" in missed and not is_free:
-        print_line(TABS)
-    _print_cut(found)
-    words = f"None of {found.tries} designs meets all, and nothing was written: ask for less, "
+        print_line(TABS_HINT)
+    _print_more_tries(result)
+    words = f"None of {result.tries} designs meets all, and nothing was written: ask for less, "
     print_line(words + "or free more with --free KEY=LOW:HIGH:STEP")
 
 
-def _print_front(found: FoundDesign) -> None:
-    if len(found.front) < 2:
+def _print_front(result: FoundDesign) -> None:
+    if len(result.front) < 2:
         return
-    some = f"{len(found.front)} of " if found.on_front > len(found.front) else ""
-    print_line(f"Pareto front, {some}{found.on_front} of the {found.tries} designs tried", "bold")
-    for trial in found.front:
+    some = f"{len(result.front)} of " if result.on_front > len(result.front) else ""
+    print_line(f"Pareto front, {some}{result.on_front} of the {result.tries} designs tried", "bold")
+    for trial in result.front:
         figures = ", ".join(f"{name} {value:.4g}" for name, value in trial.figures.items())
         print_line(f"  {keys_said(trial.values)}: {figures}")
-    for name, measured in found.measured.items():
+    for name, measured in result.measured.items():
         print_wrapped(f"({name}: {measured.sentence()})", indent="    ")

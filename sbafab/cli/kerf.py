@@ -64,31 +64,41 @@ def kerf(
     from sbafab.output.schema_ids import KERF_SCHEMA
 
     sizes = read_measurements(measurements, instrument or "")
-    found = calibrated(sizes, resolution)
-    if split_xy and (found.x is None or found.y is None):
+    calibration = calibrated(sizes, resolution)
+    if split_xy and (calibration.x is None or calibration.y is None):
         raise DesignError("--split-xy needs two sizes along x and two along y; fill in more rows")
-    widths = _widths(found, split_xy)
-    warnings = _warnings(found, widths)
-    remarks = [_remark(found, widths), *_readings(found.overall), *_touched(sizes)]
-    block = _to_paste(*_place_in_design(material), widths, warnings)
+    widths = _widths(calibration, split_xy)
+    warnings = _warnings(calibration, widths)
+    remarks = [
+        _remark(calibration, widths),
+        *_offset_remarks(calibration.overall),
+        *_contact_remark(sizes),
+    ]
+    block = _toml_block(*_place_in_design(material), widths, warnings)
     if as_json:
         print_json(
             {
                 "schema": KERF_SCHEMA,
-                "all": _as_dict(found.overall),
-                "x": _as_dict(found.x),
-                "y": _as_dict(found.y),
-                "difference": found.difference and found.difference._asdict(),
-                "differs": found.differs,
+                "all": _as_dict(calibration.overall),
+                "x": _as_dict(calibration.x),
+                "y": _as_dict(calibration.y),
+                "difference": calibration.difference and calibration.difference._asdict(),
+                "differs": calibration.differs,
                 "warnings": warnings,
                 "remarks": remarks,
                 "toml": block,
             }
         )
         return
-    for name, estimate in (("all", found.overall), ("along x", found.x), ("along y", found.y)):
+    for name, estimate in (
+        ("all", calibration.overall),
+        ("along x", calibration.x),
+        ("along y", calibration.y),
+    ):
         if estimate is not None:
-            click.echo(f"{name:8} kerf {_told(estimate.kerf)}, from {estimate.count} sizes")
+            click.echo(
+                f"{name:8} kerf {_with_interval(estimate.kerf)}, from {estimate.count} sizes"
+            )
     for remark in remarks:
         click.echo(remark)
     for warning in warnings:
@@ -128,15 +138,15 @@ Widths = tuple["Estimate"] | tuple["Estimate", "Estimate"]
 """What is pasted: the kerf, or those along x and along y."""
 
 
-def _widths(found: Calibration, split_xy: bool | None) -> Widths:
+def _widths(calibration: Calibration, split_xy: bool | None) -> Widths:
     """A pair where it was asked for, or where x and y differ and nothing was asked."""
-    is_split = found.differs if split_xy is None else split_xy
-    if is_split and found.x is not None and found.y is not None:
-        return found.x, found.y
-    return (found.overall,)
+    is_split = calibration.differs if split_xy is None else split_xy
+    if is_split and calibration.x is not None and calibration.y is not None:
+        return calibration.x, calibration.y
+    return (calibration.overall,)
 
 
-def _to_paste(table: str, key: str, widths: Widths, warnings: list[str]) -> str:
+def _toml_block(table: str, key: str, widths: Widths, warnings: list[str]) -> str:
     """The lines for the design file; doubt goes with them, so that no bare value is pasted."""
     values = [f"{estimate.kerf.value:.3f}" for estimate in widths]
     value = values[0] if len(values) == 1 else f"[{', '.join(values)}]"
@@ -144,7 +154,7 @@ def _to_paste(table: str, key: str, widths: Widths, warnings: list[str]) -> str:
     return f"{table}\n{doubts}{key} = {value}\n"
 
 
-def _told(value: Value, unit: str = " mm") -> str:
+def _with_interval(value: Value, unit: str = " mm") -> str:
     low, high = value.interval
     return (
         f"{value.value:.4f}{unit}, standard uncertainty {value.uncertainty:.4f}, "
@@ -152,34 +162,34 @@ def _told(value: Value, unit: str = " mm") -> str:
     )
 
 
-def _remark(found: Calibration, widths: Widths) -> str:
-    if found.difference is None:
+def _remark(calibration: Calibration, widths: Widths) -> str:
+    if calibration.difference is None:
         return "x and y cannot be told apart: measure two sizes along each"
-    if not found.differs:
+    if not calibration.differs:
         return "x and y do not differ significantly"
     advice = "" if len(widths) == 2 else ", which one kerf for both does not correct"
-    return f"x and y differ by {_told(found.difference)}{advice}"
+    return f"x and y differ by {_with_interval(calibration.difference)}{advice}"
 
 
-def _warnings(found: Calibration, widths: Widths) -> list[str]:
+def _warnings(calibration: Calibration, widths: Widths) -> list[str]:
     """What speaks against cutting with these widths, a sentence each."""
     from sbafab.design.films import is_kerf
 
     places = ("",) if len(widths) == 1 else (" along x", " along y")
-    told = [
-        _vague(estimate, place)
+    warnings = [
+        _interval_warning(estimate, place)
         for estimate, place in zip(widths, places, strict=True)
         if estimate.is_vague
     ]
     if not is_kerf(widths[0].kerf.value, widths[-1].kerf.value):
-        told.append(
+        warnings.append(
             "a design takes no pair of which one is over ten times the other; measure again, or "
             "take --no-split-xy"
         )
-    return [*told, *_not_told(found, widths), *_off_scale(found)]
+    return [*warnings, *_offset_warning(calibration, widths), *_scale_warnings(calibration)]
 
 
-def _vague(estimate: Estimate, place: str) -> str:
+def _interval_warning(estimate: Estimate, place: str) -> str:
     low, high = estimate.kerf.interval
     why = "may be none" if low <= 0 else "is not known well enough"
     return (
@@ -188,7 +198,7 @@ def _vague(estimate: Estimate, place: str) -> str:
     )
 
 
-def _not_told(found: Calibration, widths: Widths) -> list[str]:
+def _offset_warning(calibration: Calibration, widths: Widths) -> list[str]:
     """What these sizes cannot tell from kerf."""
     if all(estimate.offsets for estimate in widths):
         return []
@@ -199,18 +209,20 @@ def _not_told(found: Calibration, widths: Widths) -> list[str]:
     ]
 
 
-def _off_scale(found: Calibration) -> list[str]:
+def _scale_warnings(calibration: Calibration) -> list[str]:
     """What sizes that scale may come of: along x or y where one of them tells, else both."""
-    axes = [(" along x", found.x), (" along y", found.y)]
+    axes = [(" along x", calibration.x), (" along y", calibration.y)]
     along = [
-        _scaled(estimate, where) for where, estimate in axes if estimate and estimate.is_scaled
+        _scale_warning(estimate, where)
+        for where, estimate in axes
+        if estimate and estimate.is_scaled
     ]
-    if along or not found.overall.is_scaled:
+    if along or not calibration.overall.is_scaled:
         return along
-    return [_scaled(found.overall, "")]
+    return [_scale_warning(calibration.overall, "")]
 
 
-def _scaled(estimate: Estimate, where: str) -> str:
+def _scale_warning(estimate: Estimate, where: str) -> str:
     assert estimate.scale is not None
     scale = estimate.scale.value
     low, high = estimate.scale.interval
@@ -222,7 +234,7 @@ def _scaled(estimate: Estimate, where: str) -> str:
     )
 
 
-def _readings(estimate: Estimate) -> list[str]:
+def _offset_remarks(estimate: Estimate) -> list[str]:
     """What each instrument reads too much or too little, where that is sure."""
     return [
         f"the {name or 'instrument'} reads {abs(offset.value):.4f} mm too "
@@ -233,7 +245,7 @@ def _readings(estimate: Estimate) -> list[str]:
     ]
 
 
-def _touched(sizes: Sequence[Measurement]) -> list[str]:
+def _contact_remark(sizes: Sequence[Measurement]) -> list[str]:
     """What jaws do to film that no fit can see."""
     if not {size.instrument for size in sizes} & {"", "calliper"}:
         return []

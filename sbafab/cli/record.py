@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Wrapped = Callable[..., Any]
 
 
-def _measured(command: Wrapped) -> Wrapped:
+def _measurement_options(command: Wrapped) -> Wrapped:
     """Options for what was measured, in the order of the help."""
     options = (
         click.option(
@@ -70,7 +70,7 @@ def _measured(command: Wrapped) -> Wrapped:
 @click.command()
 @click.argument("design", metavar="[DESIGN]", required=False)
 @click.option("--serial", default="", metavar="NAME", help="Which actuator; see its traveller.")
-@_measured
+@_measurement_options
 @click.option(
     "--table",
     type=click.Path(path_type=Path),
@@ -97,7 +97,7 @@ def _measured(command: Wrapped) -> Wrapped:
 @set_option
 @json_option
 def record(
-    design: str | None, lab: Path, assignments: tuple[str, ...], as_json: bool, **said: Any
+    design: str | None, lab: Path, assignments: tuple[str, ...], as_json: bool, **values: Any
 ) -> None:
     """Record what came out, and see what all records say.
 
@@ -115,84 +115,86 @@ def record(
     from sbafab.results.store import Lab
 
     store = Lab(lab)
-    _one_task(design, said)
-    if said["report"]:
+    _one_task(design, values)
+    if values["report"]:
         print_report(report(*store.contents()), as_json)
-    elif said["find"] is not None:
+    elif values["find"] is not None:
         records, builds = store.contents()
-        found = found_by(said["find"], said["serial"], records, builds)
-        print_records(found, records, builds, as_json)
+        matches = found_by(values["find"], values["serial"], records, builds)
+        print_records(matches, records, builds, as_json)
     else:
-        if said["correct"] is not None:
-            added = [store.correct(said["correct"], _change(said))]
+        if values["correct"] is not None:
+            added = [store.correct(values["correct"], _change(values))]
         else:
-            added = _recorded(store, str(design), assignments, said)
+            added = _add_records(store, str(design), assignments, values)
         print_records(added, added, store.contents()[1], as_json, f"recorded in {lab}")
 
 
-def _one_task(design: str | None, said: Mapping[str, Any]) -> None:
+def _one_task(design: str | None, values: Mapping[str, Any]) -> None:
     """Raises UsageError unless exactly one thing is asked for."""
-    asked = [name for name in ("report", "find", "correct") if said[name] not in (None, False)]
-    if len(asked) > 1 or (asked and (design or said["table"])):
+    tasks = [name for name in ("report", "find", "correct") if values[name] not in (None, False)]
+    if len(tasks) > 1 or (tasks and (design or values["table"])):
         raise click.UsageError("give either DESIGN, --correct, --find or --report")
-    if not asked and design is None:
+    if not tasks and design is None:
         raise click.UsageError("name the DESIGN that was built, or give --find or --report")
-    if said["again"] and asked:
+    if values["again"] and tasks:
         raise click.UsageError("--again goes with DESIGN, --serial and what came out this time")
-    if said["withdraw"] and said["correct"] is None:
+    if values["withdraw"] and values["correct"] is None:
         raise click.UsageError("--withdraw goes with --correct N")
-    is_said = not _result(said).is_empty or said["operator"] or said["kit"]
-    if (is_said or (said["serial"] and said["report"])) and asked not in ([], ["correct"]):
-        raise click.UsageError(f"--{asked[0]} only shows records; leave out what was measured")
-    if said["table"] and (is_said or said["serial"]):
+    has_result = not _result(values).is_empty or values["operator"] or values["kit"]
+    if (has_result or (values["serial"] and values["report"])) and tasks not in ([], ["correct"]):
+        raise click.UsageError(f"--{tasks[0]} only shows records; leave out what was measured")
+    if values["table"] and (has_result or values["serial"]):
         raise click.UsageError("--table holds serials and what was measured; leave those out")
 
 
-def _result(said: Mapping[str, Any]) -> LabResult:
+def _result(values: Mapping[str, Any]) -> LabResult:
     from sbafab.results.records import ERRORS, NUMBERS, LabResult
 
-    given = {name.replace("-", "_"): value for name, value in said.items()}
+    options = {name.replace("-", "_"): value for name, value in values.items()}
     return LabResult(
-        serial=said["serial"],
-        leak=said["leak"] or "",
-        operator=said["operator"],
-        kit=said["kit"],
-        note=said["note"],
-        numbers={q.name: given[q.option] for q in NUMBERS if given[q.option] is not None},
+        serial=values["serial"],
+        leak=values["leak"] or "",
+        operator=values["operator"],
+        kit=values["kit"],
+        note=values["note"],
+        numbers={q.name: options[q.option] for q in NUMBERS if options[q.option] is not None},
         errors={
-            q.name: given[q.option.replace("-", "_")]
+            q.name: options[q.option.replace("-", "_")]
             for q in ERRORS
-            if given[q.option.replace("-", "_")]
+            if options[q.option.replace("-", "_")]
         },
     )
 
 
-def _change(said: Mapping[str, Any]) -> LabResult:
+def _change(values: Mapping[str, Any]) -> LabResult:
     from dataclasses import replace
 
-    change = _result(said)
-    if change.is_empty and not (change.serial or change.operator or change.kit or said["withdraw"]):
+    change = _result(values)
+    if change.is_empty and not (
+        change.serial or change.operator or change.kit or values["withdraw"]
+    ):
         raise click.UsageError("say what is right instead, such as --leak fail, or --withdraw")
-    return replace(change, withdrawn=said["withdraw"])
+    return replace(change, withdrawn=values["withdraw"])
 
 
-def _recorded(
-    store: Lab, source: str, assignments: tuple[str, ...], said: Mapping[str, Any]
+def _add_records(
+    store: Lab, source: str, assignments: tuple[str, ...], values: Mapping[str, Any]
 ) -> list[Any]:
     """Loads what was built, reads what came out and stores both."""
     from sbafab.results.recording import built_from, read_batch
     from sbafab.results.recording import record as record_results
     from sbafab.results.records import checked
 
-    if said["table"] is not None:
-        results = read_batch(said["table"])
+    if values["table"] is not None:
+        results = read_batch(values["table"])
     else:
-        results = [checked(_result(said))]
+        results = [checked(_result(values))]
         if not results[0].serial:
             raise click.UsageError("give --serial, the actuator's number on its traveller")
         if results[0].is_empty:
             raise click.UsageError("say what came out, such as --leak pass or --note TEXT")
-    return record_results(store, built_from(source, assignments), results, said["again"])
+    return record_results(store, built_from(source, assignments), results, values["again"])
 
 
 # What ``sbafab record`` prints: records as rows, and the report's four tables.
@@ -212,13 +214,13 @@ def print_records(
     """Records a line each, with what they correct and what corrects them."""
     newer = {record.corrects: record.id for record in every if record.corrects is not None}
     if as_json:
-        told = [
+        rows = [
             {**record.as_dict(), "design": builds[record.design_sha256].name}
             | {"corrected_by": newer.get(record.id)}
             | {"actuator_sha256": builds[record.design_sha256].actuator}
             for record in shown
         ]
-        print_json({"schema": RECORDS_SCHEMA, "records": told})
+        print_json({"schema": RECORDS_SCHEMA, "records": rows})
         return
     for record in shown:
         click.echo(_line(record, builds[record.design_sha256].name, newer.get(record.id)))
@@ -227,16 +229,18 @@ def print_records(
 
 
 def _line(record: Record, design: str, newer: int | None) -> str:
-    told = [f"{name} {value}" for name, value in record.once.items()]
-    told += [f"{name} {' '.join(f'{v:g}' for v in found)}" for name, found in record.errors.items()]
-    told += [record.note] if record.note else []
-    told += [f"attempt {record.attempt}"] if record.attempt > 1 else []
-    told += [f"corrects {record.corrects}"] if record.corrects is not None else []
-    told += ["withdrawn"] if record.withdrawn else []
-    told += [f"corrected by {newer}"] if newer is not None else []
+    parts = [f"{name} {value}" for name, value in record.once.items()]
+    parts += [
+        f"{name} {' '.join(f'{v:g}' for v in errors)}" for name, errors in record.errors.items()
+    ]
+    parts += [record.note] if record.note else []
+    parts += [f"attempt {record.attempt}"] if record.attempt > 1 else []
+    parts += [f"corrects {record.corrects}"] if record.corrects is not None else []
+    parts += ["withdrawn"] if record.withdrawn else []
+    parts += [f"corrected by {newer}"] if newer is not None else []
     name = f"{design} {record.design_sha256[:8]}"
     return (
-        f"record {record.id}, {record.recorded}: {name}, serial {record.serial}: {', '.join(told)}"
+        f"record {record.id}, {record.recorded}: {name}, serial {record.serial}: {', '.join(parts)}"
     )
 
 
@@ -291,7 +295,7 @@ def print_report(report: Report, as_json: bool) -> None:
         (
             (
                 *(p.design, f"{p.success.good} of {p.success.builds}"),
-                *(_range(p.success), f"{p.promised:.1%}", _measured_beside(p), p.verdict),
+                *(_range(p.success), f"{p.promised:.1%}", _measured_range(p), p.verdict),
             )
             for p in report.promises
         ),
@@ -307,33 +311,35 @@ def _range(share: Share) -> str:
     return f"{low:.1%} to {high:.1%}"
 
 
-def _measured_beside(promise: Promise) -> str:
+def _measured_range(promise: Promise) -> str:
     if promise.measured is None:
         return ""
     return f"{promise.measured.low:.1%} to {promise.measured.high:.1%}"
 
 
-def _mean(found: Comparison) -> str:
-    if found.low is None or found.high is None:
-        return f"{found.mean:.4g} {found.unit}"
-    return f"{found.mean:.4g} ({found.low:.4g} to {found.high:.4g}) {found.unit}"
+def _mean(comparison: Comparison) -> str:
+    if comparison.low is None or comparison.high is None:
+        return f"{comparison.mean:.4g} {comparison.unit}"
+    return (
+        f"{comparison.mean:.4g} ({comparison.low:.4g} to {comparison.high:.4g}) {comparison.unit}"
+    )
 
 
 def _advice(report: Report) -> Iterable[str]:
     for tolerance in report.tolerances:
-        found = tolerance.found
+        errors = tolerance.found
         whose = f"with kit {tolerance.kit}"
         whose += f" by {tolerance.operator}" if tolerance.operator else ""
         if tolerance.verdict == "too small":
             yield (
                 f"{tolerance.key} = {tolerance.stated:g} does not describe what came out "
-                f"{whose}: {found.largest:g} {tolerance.unit} was measured; set it to "
-                f"{found.highest:.3g} at most, or find what went wrong there"
+                f"{whose}: {errors.largest:g} {tolerance.unit} was measured; set it to "
+                f"{errors.highest:.3g} at most, or find what went wrong there"
             )
         elif tolerance.verdict == "wider than needed":
             yield (
                 f"{tolerance.key} = {tolerance.stated:g} is wider than needed {whose}: "
-                f"{found.highest:.3g} {tolerance.unit} describes {found.errors} measurements"
+                f"{errors.highest:.3g} {tolerance.unit} describes {errors.errors} measurements"
             )
     for compared in report.comparisons:
         factor, most = FACTORS.get(compared.quantity, ("", 0.0))

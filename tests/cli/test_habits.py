@@ -14,8 +14,8 @@ from click.shell_completion import ShellComplete
 import sbafab
 from sbafab.assemblies.checks import CHECKS
 from sbafab.cli import app, main
-from sbafab.cli.check import repeated, stamps
-from sbafab.cli.printing import limit_said
+from sbafab.cli.check import file_states, watch_source
+from sbafab.cli.printing import limit_text
 from sbafab.rules.deck import rule_names
 from sbafab.rules.explained import AS_BUILT, BETWEEN_PARTS, DECK, EXPLAINED
 from sbafab.rules.finding import Finding, Place
@@ -60,7 +60,7 @@ def test_limits_say_whether_they_are_the_least_or_the_most(
                 continue
             assert one["rule"] in {*rule_names(), *CHECKS}
             finding = Finding(one["rule"], "pass", one["limit"], None, "", Place(), "")
-            is_most = limit_said(finding).startswith("<= ")
+            is_most = limit_text(finding).startswith("<= ")
             good = one["verdict"] == "pass"
             off = one["measured"] - one["limit"]
             assert abs(off) <= 1e-3 or (off < 0) == (good == is_most), one
@@ -232,7 +232,7 @@ def test_waive_speaks_of_its_command(
 def test_watching_looks_again_at_what_changed_only(tmp_path: Path) -> None:
     design = tmp_path / "mine.toml"
     design.write_text("a = 1\n")
-    assert list(stamps(design)) == [design]
+    assert list(file_states(design)) == [design]
     seen: list[str] = []
 
     def once() -> None:
@@ -240,7 +240,7 @@ def test_watching_looks_again_at_what_changed_only(tmp_path: Path) -> None:
         if len(seen) == 1:
             design.write_text("a = 22\n")
 
-    repeated(once, design, looks=3)
+    watch_source(once, design, polls=3)
     assert seen == ["a = 1\n", "a = 22\n"]
 
 
