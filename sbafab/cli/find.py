@@ -1,4 +1,4 @@
-"""``sbafab find``: requirements in, a design file out that generates and passes."""
+"""``sbafab find``: the search for a design that meets requirements."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sbafab.cli.exit import RULE_FAILED
-from sbafab.cli.options import json_option, set_option
-from sbafab.cli.printing import print_line, print_wrapped
+from sbafab.cli.exit import RULE_FAILED, print_error
+from sbafab.cli.options import json_option, refuse_options, set_option
+from sbafab.cli.printing import print_json, print_line, print_verdict, print_wrapped
+from sbafab.cli.progress import shown_progress
+from sbafab.errors import DesignError
 from sbafab.output.schemas import FIND_SCHEMA
 from sbafab.search.find import FoundDesign
 from sbafab.search.quantities import AskedQuantity, shown_value
@@ -26,9 +28,9 @@ if TYPE_CHECKING:
 
 HELP = """Find the best design that meets requirements.
 
-Without DESIGN it starts from every family. Exit code 1 where nothing meets all: then the nearest
-miss is shown and no file written. A quantity may name its pressure P and height H with units, such
-as force@12.5mm@50kPa:
+Without DESIGN the search starts from every family. If no design meets all requirements, the nearest
+miss is shown, no file is written, and the exit code is 1. A quantity may name its pressure P and
+height H with units, such as force@12.5mm@50kPa:
 
 \b
 {quantities}
@@ -36,7 +38,7 @@ as force@12.5mm@50kPa:
 
 
 def _with_quantities(command: Callable[..., None]) -> Callable[..., None]:
-    """Gives a command its help, which lists every quantity with its unit."""
+    """Set the help text of a command, with all quantities and their units."""
     command.__doc__ = HELP.format(quantities=quantity_lines())
     return command
 
@@ -62,31 +64,31 @@ def _with_quantities(command: Callable[..., None]) -> Callable[..., None]:
     default="mass",
     show_default=True,
     metavar="QUANTITY",
-    help="Of what meets all: the most stroke, bend, force, yield or lumen, or the least of "
-    "another.",
+    help="Goal among the designs that meet all: largest stroke, bend, force, yield or lumen, or "
+    "smallest of another quantity.",
 )
 @click.option(
     "--free",
     metavar="KEY=LOW:HIGH:STEP",
     multiple=True,
-    help="Let this key change, beside those of its family, or in this range. Repeatable.",
+    help="Vary this key as well as those of the family, or set its range. Repeatable.",
 )
 @click.option(
     "--fix",
     "fixed",
     metavar="KEY",
     multiple=True,
-    help="Leave this key as it is, like one named by --set. Repeatable.",
+    help="Do not vary this key; keys of --set are not varied either. Repeatable.",
 )
 @click.option(
     "--tries", type=click.IntRange(4, 100_000), default=240, show_default=True, metavar="N",
-    help="Designs that are tried at most, of each family.",
+    help="Largest number of designs to try, for each family.",
 )  # fmt: skip
 @click.option("--optuna", is_flag=True, help='Search with Optuna (pip install "sbafab[optuna]").')
 @click.option(
     "--storage",
     metavar="URL",
-    help="Optuna's database, in which the search goes on, e.g. sqlite:///search.db.",
+    help="Database of Optuna, to resume the search from, e.g. sqlite:///search.db.",
 )
 @click.option(
     "-o",
@@ -95,28 +97,30 @@ def _with_quantities(command: Callable[..., None]) -> Callable[..., None]:
     default=Path(),
     show_default="this folder",
     metavar="OUT",
-    help="Folder that receives found.toml, or a file that ends in .toml; its stem names the "
-    "design.",
+    help="Folder in which found.toml is written.",
+)
+@click.option(
+    "--to",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Write FILE, which ends in .toml, instead of found.toml; its stem names the design.",
 )
 @set_option
 @json_option
 @_with_quantities
 def find(source: str | None, **options: Any) -> None:
-    from sbafab.cli.exit import print_error
-    from sbafab.cli.printing import print_json
-    from sbafab.cli.progress import shown_progress
     from sbafab.design.files import name_of
     from sbafab.search.find import found_file, found_toml, write_found
 
     if options["storage"] is not None and not options["optuna"]:
         raise click.UsageError("--storage goes with --optuna; add it")
     requests = _requests(source, options)
-    target = found_file(options["out"])
+    target = found_file(_file_or_folder(options["to"], options["out"]))
     try:
         with shown_progress(options["as_json"]) as progress:
             origin, result = _best_result(requests, progress)
     except KeyboardInterrupt:
-        resume = "; the same command goes on in its storage" if options["storage"] else ""
+        resume = "; run the same command again to resume it" if options["storage"] else ""
         print_error(f"the search was stopped, and no file was written{resume}")
         raise
     if result.holds:
@@ -131,12 +135,21 @@ def find(source: str | None, **options: Any) -> None:
         click.get_current_context().exit(RULE_FAILED)
 
 
-def _requests(source: str | None, options: dict[str, Any]) -> dict[str, FindRequest]:
-    """What is looked for, by the design to start from: the one that is named, or one a family.
+def _file_or_folder(to: Path | None, out: Path) -> Path:
+    """Return the file of --to, or -o, which until version 0.2 may still be a file."""
+    if to is None:
+        return out
+    refuse_options("names a folder and --to a file; leave one out", "out")
+    if to.suffix.lower() != ".toml":
+        raise click.BadParameter(f"{to} must end in .toml", param_hint="--to")
+    return to
 
-    A family that cannot be asked for it is left out. Raises DesignError where none can.
+
+def _requests(source: str | None, options: dict[str, Any]) -> dict[str, FindRequest]:
+    """Return the searches by the design to start from: ``source``, or a template of each family.
+
+    Families without the requested quantities are left out. Raises DesignError if none remains.
     """
-    from sbafab.errors import DesignError
     from sbafab.search.trial import read_all
 
     requirements, goal = read_all(options["least"], options["most"], options["best"])
@@ -166,21 +179,20 @@ def _request(
     request = FindRequest(
         design, requirements, goal, free, options["tries"], options["optuna"], options["storage"]
     )
-    free_keys(request)
+    free_keys(request)  # raises DesignError for keys that cannot vary
     return request
 
 
 def _best_result(requests: dict[str, FindRequest], progress: Progress) -> tuple[str, FoundDesign]:
-    """The best of what is found, and the name of the design that it started from."""
-    from sbafab.errors import DesignError
+    """Run the searches; return the best result and the design that it started from."""
     from sbafab.search.find import find as search
 
     results: list[tuple[str, FoundDesign]] = []
     problems = []
     for number, (name, request) in enumerate(requests.items()):
 
-        def report(what: str, done: int, total: int, before: int = number) -> None:
-            progress(what, before * total + done, len(requests) * total)
+        def report(stage: str, done: int, total: int, searched: int = number) -> None:
+            progress(stage, searched * total + done, len(requests) * total)
 
         try:
             results.append((name, search(request, report)))
@@ -192,9 +204,9 @@ def _best_result(requests: dict[str, FindRequest], progress: Progress) -> tuple[
 
 
 def _family_templates() -> list[str]:
+    """Return the first template of each family."""
     from sbafab.actuators import load_design
     from sbafab.design.files import template_names
-    from sbafab.errors import DesignError
 
     templates: dict[type, str] = {}
     for name in template_names():
@@ -205,19 +217,19 @@ def _family_templates() -> list[str]:
     return list(templates.values())
 
 
-# How the end of a search is told: for people, and for programs.
+# Printing of a result, and its JSON.
 
 
 TABS_HINT = (
-    "overall_diameter counts the inlet tabs: ask for outline_diameter where they may stand out, or "
-    "add --free inlet.tab_length=3:5:0.5"
+    "overall_diameter includes the inlet tabs: use outline_diameter if they may stand out, or add "
+    "--free inlet.tab_length=3:5:0.5"
 )
 
 
 def as_json(result: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
-    """What ``find --json`` prints."""
+    """Return a result as JSON."""
 
-    def shown(trial: Trial) -> dict[str, Any]:
+    def trial_json(trial: Trial) -> dict[str, Any]:
         return {"keys": dict(trial.values), "figures": dict(trial.figures)}
 
     return {
@@ -227,57 +239,34 @@ def as_json(result: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
         "started_from": origin,
         "tries": result.tries,
         "is_cut_short": result.is_cut_short,
-        "best": shown(result.best),
+        "best": trial_json(result.best),
         "full_stroke": result.full_stroke,
-        "measured": {name: one.as_dict() for name, one in result.measured.items()},
+        "measured": {name: row.as_dict() for name, row in result.measured.items()},
         "missed": result.missed,
         "binds": [{"key": b.key, "value": b.value, "breaks": b.breaks} for b in result.binds],
         "range_ends": [
-            {"key": one.key, "value": one.value, "low": one.low, "high": one.high}
-            for one in result.ends
+            {"key": end.key, "value": end.value, "low": end.low, "high": end.high}
+            for end in result.ends
         ],
         "without_room": [
             {"rule": s.rule, "measured": s.measured, "unit": s.unit, "place": s.place}
             for s in result.without_room
         ],
-        "front": [shown(trial) for trial in result.front],
+        "front": [trial_json(trial) for trial in result.front],
         "on_front": result.on_front,
     }
 
 
 def print_result(result: FoundDesign, origin: str, target: Path) -> None:
-    """The design with its figures, what binds and the front; or the nearest miss."""
+    """Print the design with its figures, what binds and the front; or the nearest miss."""
     keys = keys_said(result.best.values)
-    if result.holds:
-        print_line(f"{target}: {keys}, from {origin}", "bold")
-    else:
-        print_line(f"Nearest miss: {keys}, from {origin}", "bold red")
-    for one in result.wanted.requirements:
-        value = result.best.value(one)
-        said = f"  {one.quantity.said} {shown_value(one.quantity, value)}"
-        print_line(
-            f"{said}; {one.bound}" if one.holds(value) else f"{said}, not {one.bound}  MISSED"
-        )
-        _print_measured(result, one.quantity)
-    goal = result.wanted.goal
-    value = result.best.value(goal)
-    said = goal.said if result.holds else goal.quantity.said
-    print_line(f"  {said}: {shown_value(goal.quantity, value)}")
-    if goal.quantity.said not in [one.quantity.said for one in result.wanted.requirements]:
-        _print_measured(result, goal.quantity)
-    asked = result.wanted.quantities
-    is_told = any(one.is_full_stroke for one in asked)
-    if (
-        any(one.name == "stroke" for one in asked)
-        and not is_told
-        and result.full_stroke is not None
-    ):
-        print_line(f"  full stroke {result.full_stroke:.4g} mm, as the paper's in proportion")
-    for said in result.broken_rules:
-        print_line(f"  {said}")
-    told = result.binds or result.ends or (result.holds and result.without_room)
-    if told:
-        print_line("What binds" if result.holds else "What stops it there", "bold")
+    title = "Best design" if result.holds else "Nearest miss"
+    print_line(f"{title}: {keys}, from {origin}", "bold" if result.holds else "bold red")
+    _print_quantities(result)
+    for rule in result.broken_rules:
+        print_line(f"  {rule}")
+    if result.binds or result.ends or (result.holds and result.without_room):
+        print_line("Binding limits", "bold")
     for bind in result.binds:
         print_line(f"  {bind.key} = {value_said(bind.value)}: {bind.breaks}")
     _print_ends(result)
@@ -285,12 +274,38 @@ def print_result(result: FoundDesign, origin: str, target: Path) -> None:
         _print_miss(result)
         return
     for spare in result.without_room:
-        print_line(
-            f"  {spare.rule} {spare.place}: {spare.measured:g} {spare.unit}, nothing to spare"
-        )
+        print_line(f"  {spare.rule} {spare.place}: {spare.measured:g} {spare.unit}, at its limit")
     _print_front(result)
     _print_more_tries(result)
-    print_line(f"Next: sbafab generate {shlex.quote(str(target))}")
+    count = _counted_requirements(result)
+    print_verdict(f"{target} meets {count}. Next: sbafab generate {shlex.quote(str(target))}")
+
+
+def _counted_requirements(result: FoundDesign) -> str:
+    count = len(result.wanted.requirements)
+    return (
+        "the requirement" if count == 1 else f"all {count} requirements" if count else "all rules"
+    )
+
+
+def _print_quantities(result: FoundDesign) -> None:
+    """Print the required quantities and the goal of the best design."""
+    requirements = result.wanted.requirements
+    for requirement in requirements:
+        value = result.best.value(requirement)
+        figure = f"  {requirement.quantity.said} {shown_value(requirement.quantity, value)}"
+        is_met = requirement.holds(value)
+        print_line(f"{figure}; {requirement.bound}{'' if is_met else ': MISSED'}")
+        _print_measured(result, requirement.quantity)
+    goal = result.wanted.goal
+    label = goal.said if result.holds else goal.quantity.said
+    print_line(f"  {label}: {shown_value(goal.quantity, result.best.value(goal))}")
+    if goal.quantity.said not in [requirement.quantity.said for requirement in requirements]:
+        _print_measured(result, goal.quantity)
+    strokes = [quantity for quantity in result.wanted.quantities if quantity.name == "stroke"]
+    is_full = any(quantity.is_full_stroke for quantity in strokes)
+    if strokes and not is_full and result.full_stroke is not None:
+        print_line(f"  full stroke {result.full_stroke:.4g} mm, scaled from the paper's")
 
 
 def _print_measured(result: FoundDesign, quantity: AskedQuantity) -> None:
@@ -302,7 +317,7 @@ def _print_measured(result: FoundDesign, quantity: AskedQuantity) -> None:
 def _print_more_tries(result: FoundDesign) -> None:
     if result.is_cut_short:
         more = 2 * result.tries
-        print_line(f"All {result.tries} tries are used up; --tries {more} may lead to a better one")
+        print_line(f"All {result.tries} tries were used; --tries {more} may find a better design")
 
 
 def _print_ends(result: FoundDesign) -> None:
@@ -312,30 +327,34 @@ def _print_ends(result: FoundDesign) -> None:
         if end.value <= end.low:
             low, high = max(end.step, end.low - span), end.high
         print_line(
-            f"  {end.key} = {end.value:g} is the end of its range, {end.low:g} to {end.high:g}; "
-            f"--free {end.key}={low:g}:{high:g}:{end.step:g} lets it go further"
+            f"  {end.key} = {end.value:g} is at the end of its range, {end.low:g} to {end.high:g}; "
+            f"widen it with --free {end.key}={low:g}:{high:g}:{end.step:g}"
         )
 
 
 def _print_miss(result: FoundDesign) -> None:
+    """Print hints and the verdict of a search without success."""
     missed = {
-        one.quantity.name
-        for one in result.wanted.requirements
-        if not one.holds(result.best.value(one))
+        requirement.quantity.name
+        for requirement in result.wanted.requirements
+        if not requirement.holds(result.best.value(requirement))
     }
-    is_free = any(one.key == "inlet.tab_length" for one in result.free)
+    is_free = any(free.key == "inlet.tab_length" for free in result.free)
     if "overall_diameter" in missed and not is_free:
         print_line(TABS_HINT)
     _print_more_tries(result)
-    words = f"None of {result.tries} designs meets all, and nothing was written: ask for less, "
-    print_line(words + "or free more with --free KEY=LOW:HIGH:STEP")
+    print_line(
+        f"Search failed: none of {result.tries} designs meets all requirements; nothing was "
+        "written. Relax a requirement, or vary more keys with --free KEY=LOW:HIGH:STEP",
+        "bold red",
+    )
 
 
 def _print_front(result: FoundDesign) -> None:
     if len(result.front) < 2:
         return
-    some = f"{len(result.front)} of " if result.on_front > len(result.front) else ""
-    print_line(f"Pareto front, {some}{result.on_front} of the {result.tries} designs tried", "bold")
+    part = f"{len(result.front)} of " if result.on_front > len(result.front) else ""
+    print_line(f"Pareto front, {part}{result.on_front} of the {result.tries} designs tried", "bold")
     for trial in result.front:
         figures = ", ".join(f"{name} {value:.4g}" for name, value in trial.figures.items())
         print_line(f"  {keys_said(trial.values)}: {figures}")

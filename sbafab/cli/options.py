@@ -187,7 +187,7 @@ def calibration_options(command: Command) -> Command:
         type=LENGTH.read,
         default="0 mm",
         metavar="L",
-        help="Measured loss of pocket radius against the drawing, mm or with a unit; for the elastic "
+        help="Measured loss of pocket radius against the drawing, mm or with a unit; for elastic "
         "models.  [default: 0]",
     )
     modulus = click.option(
@@ -330,7 +330,8 @@ def dxf_options(command: Command) -> Command:
         type=click.FloatRange(0.0001, 0.1),
         callback=finite,
         metavar="MM",
-        help="Largest distance of a chord from its arc, for --dxf-profile chords.  [default: 0.005]",
+        help="Largest distance of a chord from its arc, with --dxf-profile chords.  "
+        "[default: 0.005]",
     )
     profile = click.option(
         "--dxf-profile",

@@ -51,8 +51,8 @@ if TYPE_CHECKING:
     "path",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
-    help="A .png picture, a .gif or .webp animation, or a .glb scene.  [default: NAME-inflated.png; "
-    "NAME-flat.png if no model inflates it]",
+    help="A .png picture, a .gif or .webp animation, or a .glb scene.  [default: "
+    "NAME-inflated.png; NAME-flat.png if no model inflates it]",
 )
 @click.option(
     "--motion",

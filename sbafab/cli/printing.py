@@ -148,7 +148,7 @@ def groups_of(
 
 
 def print_findings(groups: Sequence[Group], verbose: bool = False) -> None:
-    """Print a line for every rule of a single group, or of all groups if ``verbose``; then remedies."""
+    """Print a line for every rule (of several groups only if ``verbose``), and the remedies."""
     out = console()
     for group in groups:
         if len(groups) > 1:

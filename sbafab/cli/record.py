@@ -1,15 +1,15 @@
-"""``sbafab record``: what came out, kept in the lab's own file, and what it says together."""
+"""``sbafab record``: results of builds in the lab's file, and a report on all of them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from sbafab.cli.options import LENGTH, PRESSURE, json_option, set_option
-from sbafab.cli.printing import console, print_json
+from sbafab.cli.options import LENGTH, PRESSURE, Command, json_option, set_option
+from sbafab.cli.printing import console, print_json, print_verdict
 from sbafab.output.schema_ids import RECORDS_SCHEMA, REPORT_SCHEMA
 
 if TYPE_CHECKING:
@@ -18,49 +18,45 @@ if TYPE_CHECKING:
     from sbafab.results.store import Lab
     from sbafab.rules.registration_yield import Share
 
-Wrapped = Callable[..., Any]
 
-
-def _measurement_options(command: Wrapped) -> Wrapped:
-    """Options for what was measured, in the order of the help."""
+def _measurement_options(command: Command) -> Command:
+    """Add the options of measurements, in the order of the help."""
     options = (
         click.option(
             "--leak", type=click.Choice(["pass", "fail"]), help="Result of the leak test."
         ),
-        click.option(
-            "--burst", type=PRESSURE.read, metavar="P", help="Pressure at which it burst, kPa."
-        ),
+        click.option("--burst", type=PRESSURE.read, metavar="P", help="Burst pressure, kPa."),
         click.option(
             "--proof", type=PRESSURE.read, metavar="P", help="Pressure held in the proof test, kPa."
         ),
         click.option("--stroke", type=LENGTH.read, metavar="MM", help="Full stroke."),
         click.option("--force", type=float, metavar="N", help="Blocked force at 100 kPa, flat."),
-        click.option("--height", type=LENGTH.read, metavar="MM", help="Height pressed, deflated."),
+        click.option("--height", type=LENGTH.read, metavar="MM", help="Pressed height, deflated."),
         click.option("--mass", type=float, metavar="G", help="Mass without tubes."),
         click.option(
             "--offset",
             type=LENGTH.read,
             multiple=True,
             metavar="MM",
-            help="How far a layer laid by hand lies off. Repeatable.",
+            help="Placement error of a layer laid by hand. Repeatable.",
         ),
         click.option(
             "--turn",
             type=float,
             multiple=True,
             metavar="DEG",
-            help="How far a layer laid by hand is turned. Repeatable.",
+            help="Angle error of a layer laid by hand. Repeatable.",
         ),
         click.option(
             "--cut-error",
             type=LENGTH.read,
             multiple=True,
             metavar="MM",
-            help="How far a cut edge lies off its place. Repeatable.",
+            help="Position error of a cut edge. Repeatable.",
         ),
-        click.option("--operator", default="", metavar="NAME", help="Who built it."),
-        click.option("--kit", default="", metavar="NAME", help="What it was built with."),
-        click.option("--note", default="", metavar="TEXT", help="Anything else."),
+        click.option("--operator", default="", metavar="NAME", help="Name of the builder."),
+        click.option("--kit", default="", metavar="NAME", help="Kit that it was built with."),
+        click.option("--note", default="", metavar="TEXT", help="Free text."),
     )
     for option in reversed(options):
         command = option(command)
@@ -69,21 +65,23 @@ def _measurement_options(command: Wrapped) -> Wrapped:
 
 @click.command()
 @click.argument("design", metavar="[DESIGN]", required=False)
-@click.option("--serial", default="", metavar="NAME", help="Which actuator; see its traveller.")
+@click.option(
+    "--serial", default="", metavar="NAME", help="Serial of the actuator, on its traveller."
+)
 @_measurement_options
 @click.option(
     "--table",
     type=click.Path(path_type=Path),
     metavar="CSV",
-    help="A row an actuator, instead of --serial and what follows it.",
+    help="Table with a row for each actuator, instead of --serial and measurements.",
 )
-@click.option(
-    "--again", is_flag=True, help="A new attempt: the actuator was mended and tested again."
-)
+@click.option("--again", is_flag=True, help="A new attempt, after a repair.")
 @click.option("--correct", type=int, metavar="N", help="Add a record that corrects record N.")
-@click.option("--withdraw", is_flag=True, help="With --correct: record N should not be there.")
-@click.option("--find", metavar="TEXT", help="Show records: a serial, a design, a scanned code.")
-@click.option("--report", is_flag=True, help="What all records say together.")
+@click.option("--withdraw", is_flag=True, help="With --correct: withdraw record N.")
+@click.option(
+    "--find", metavar="TEXT", help="Show the records of a serial, a design or a scanned code."
+)
+@click.option("--report", is_flag=True, help="Report on all records.")
 @click.option(
     "--lab",
     type=click.Path(path_type=Path, dir_okay=False),
@@ -92,18 +90,18 @@ def _measurement_options(command: Wrapped) -> Wrapped:
     show_default=True,
     show_envvar=True,
     metavar="FILE",
-    help="The lab's file of records.",
+    help="File of the lab's records.",
 )
 @set_option
 @json_option
 def record(
     design: str | None, lab: Path, assignments: tuple[str, ...], as_json: bool, **values: Any
 ) -> None:
-    """Record what came out, and see what all records say.
+    """Record the results of builds, and report on them.
 
-    DESIGN is a template's name, a TOML file or the folder that was built from, an assembly's
-    likewise. Records are only added: --correct adds one that names the record it corrects. Nothing
-    leaves this machine.
+    DESIGN is the name of a template, a TOML file or the output folder of the build, of an assembly
+    too. Records are never changed: --correct adds a record that replaces another. No data leaves
+    this computer.
 
     \b
     sbafab record 3dof-15mm --serial A1 --leak pass --stroke 16.8
@@ -121,31 +119,31 @@ def record(
     elif values["find"] is not None:
         records, builds = store.contents()
         matches = found_by(values["find"], values["serial"], records, builds)
-        print_records(matches, records, builds, as_json)
+        print_records(matches, records, builds, as_json, f"found in {lab}")
     else:
         if values["correct"] is not None:
             added = [store.correct(values["correct"], _change(values))]
         else:
             added = _add_records(store, str(design), assignments, values)
-        print_records(added, added, store.contents()[1], as_json, f"recorded in {lab}")
+        print_records(added, added, store.contents()[1], as_json, f"added to {lab}")
 
 
 def _one_task(design: str | None, values: Mapping[str, Any]) -> None:
-    """Raises UsageError unless exactly one thing is asked for."""
+    """Raise UsageError unless the options name exactly one task."""
     tasks = [name for name in ("report", "find", "correct") if values[name] not in (None, False)]
     if len(tasks) > 1 or (tasks and (design or values["table"])):
-        raise click.UsageError("give either DESIGN, --correct, --find or --report")
+        raise click.UsageError("give only one of DESIGN, --correct, --find and --report")
     if not tasks and design is None:
-        raise click.UsageError("name the DESIGN that was built, or give --find or --report")
+        raise click.UsageError("give the DESIGN that was built, --find or --report")
     if values["again"] and tasks:
-        raise click.UsageError("--again goes with DESIGN, --serial and what came out this time")
+        raise click.UsageError("--again goes with DESIGN, --serial and results")
     if values["withdraw"] and values["correct"] is None:
         raise click.UsageError("--withdraw goes with --correct N")
     has_result = not _result(values).is_empty or values["operator"] or values["kit"]
     if (has_result or (values["serial"] and values["report"])) and tasks not in ([], ["correct"]):
-        raise click.UsageError(f"--{tasks[0]} only shows records; leave out what was measured")
+        raise click.UsageError(f"--{tasks[0]} only shows records; leave out the measurements")
     if values["table"] and (has_result or values["serial"]):
-        raise click.UsageError("--table holds serials and what was measured; leave those out")
+        raise click.UsageError("--table holds serials and measurements; leave out their options")
 
 
 def _result(values: Mapping[str, Any]) -> LabResult:
@@ -174,14 +172,14 @@ def _change(values: Mapping[str, Any]) -> LabResult:
     if change.is_empty and not (
         change.serial or change.operator or change.kit or values["withdraw"]
     ):
-        raise click.UsageError("say what is right instead, such as --leak fail, or --withdraw")
+        raise click.UsageError("give the correct result, such as --leak fail, or --withdraw")
     return replace(change, withdrawn=values["withdraw"])
 
 
 def _add_records(
     store: Lab, source: str, assignments: tuple[str, ...], values: Mapping[str, Any]
 ) -> list[Any]:
-    """Loads what was built, reads what came out and stores both."""
+    """Load the design that was built, read the results and store both."""
     from sbafab.results.recording import built_from, read_batch
     from sbafab.results.recording import record as record_results
     from sbafab.results.records import checked
@@ -193,15 +191,15 @@ def _add_records(
         if not results[0].serial:
             raise click.UsageError("give --serial, the actuator's number on its traveller")
         if results[0].is_empty:
-            raise click.UsageError("say what came out, such as --leak pass or --note TEXT")
+            raise click.UsageError("give a result, such as --leak pass or --note TEXT")
     return record_results(store, built_from(source, assignments), results, values["again"])
 
 
-# What ``sbafab record`` prints: records as rows, and the report's four tables.
+# Printing: records as lines, the four tables of the report.
 
 
 FACTORS = {"height_mm": ("--press-factor", 1.0), "force_n": ("--contact-factor", 10.0)}
-"""Options of ``sbafab predict`` that take a measured ratio, and the most they take."""
+"""Options of ``sbafab predict`` for a measured ratio, and its largest value."""
 
 
 def print_records(
@@ -209,9 +207,9 @@ def print_records(
     every: Sequence[Record],
     builds: Mapping[str, Build],
     as_json: bool,
-    ending: str = "",
+    action: str,
 ) -> None:
-    """Records a line each, with what they correct and what corrects them."""
+    """Print a line for each record, with its corrections, and their count with ``action``."""
     newer = {record.corrects: record.id for record in every if record.corrects is not None}
     if as_json:
         rows = [
@@ -224,8 +222,8 @@ def print_records(
         return
     for record in shown:
         click.echo(_line(record, builds[record.design_sha256].name, newer.get(record.id)))
-    if ending:
-        click.echo(ending)
+    count = "1 record" if len(shown) == 1 else f"{len(shown)} records"
+    print_verdict(f"{count} {action}")
 
 
 def _line(record: Record, design: str, newer: int | None) -> str:
@@ -245,13 +243,12 @@ def _line(record: Record, design: str, newer: int | None) -> str:
 
 
 def print_report(report: Report, as_json: bool) -> None:
-    """Success, measured against predicted, tolerances, and what to do about them."""
+    """Print success, measured against predicted values, tolerances, advice, and last the counts."""
     if as_json:
         print_json({"schema": REPORT_SCHEMA, **report.as_dict()})
         return
-    click.echo(f"actuators: {report.items}, records: {report.records}")
     _print_table(
-        "Success: leak test passed at the first attempt, with Wilson's interval of 95 %",
+        "Success: leak test passed at the first attempt, with 95 % Wilson interval",
         ("by", "", "passed", "share", "interval", "passed later"),
         (
             (
@@ -266,7 +263,7 @@ def print_report(report: Report, as_json: bool) -> None:
         ),
     )
     _print_table(
-        "Measured, mean with its interval of 95 %, against predicted",
+        "Measured mean with 95 % interval, against predicted",
         ("design", "quantity", "n", "measured", "predicted", "ratio", ""),
         (
             (
@@ -279,7 +276,7 @@ def print_report(report: Report, as_json: bool) -> None:
         ),
     )
     _print_table(
-        "Tolerances: the largest error measured, and the most that it leaves room for (95 %)",
+        "Tolerances: largest measured error, and upper limit (95 %)",
         ("kit", "hand", "key", "stated", "n", "largest", "at most", ""),
         (
             (
@@ -290,7 +287,7 @@ def print_report(report: Report, as_json: bool) -> None:
         ),
     )
     _print_table(
-        "Success against registration-yield, the share of builds that keep every limit",
+        "Success against registration-yield, the share of builds within all limits",
         ("design", "passed", "interval", "as stated", "as measured", ""),
         (
             (
@@ -304,6 +301,11 @@ def print_report(report: Report, as_json: bool) -> None:
         click.echo(f"\nwarning: {sentence}")
     for advice in _advice(report):
         click.echo(f"\n{advice}")
+    count = len(report.contradictions)
+    warned = f", {count} warning{'s' if count > 1 else ''}" if count else ""
+    actuators = "1 actuator" if report.items == 1 else f"{report.items} actuators"
+    records = "1 record" if report.records == 1 else f"{report.records} records"
+    print_verdict(f"\nReport on {actuators}, {records}{warned}")
 
 
 def _range(share: Share) -> str:
@@ -332,22 +334,22 @@ def _advice(report: Report) -> Iterable[str]:
         whose += f" by {tolerance.operator}" if tolerance.operator else ""
         if tolerance.verdict == "too small":
             yield (
-                f"{tolerance.key} = {tolerance.stated:g} does not describe what came out "
-                f"{whose}: {errors.largest:g} {tolerance.unit} was measured; set it to "
-                f"{errors.highest:.3g} at most, or find what went wrong there"
+                f"{tolerance.key} = {tolerance.stated:g} is too small {whose}: an error of "
+                f"{errors.largest:g} {tolerance.unit} was measured; set it to "
+                f"{errors.highest:.3g} at most, or find the cause"
             )
         elif tolerance.verdict == "wider than needed":
             yield (
                 f"{tolerance.key} = {tolerance.stated:g} is wider than needed {whose}: "
-                f"{errors.highest:.3g} {tolerance.unit} describes {errors.errors} measurements"
+                f"{errors.highest:.3g} {tolerance.unit} covers {errors.errors} measurements"
             )
     for compared in report.comparisons:
         factor, most = FACTORS.get(compared.quantity, ("", 0.0))
         ratio = compared.ratio
         if factor and ratio and ratio <= most and compared.verdict == "differs":
             yield (
-                f"{compared.design}: sbafab predict {factor} {ratio:.3f} takes the measured "
-                f"{compared.quantity} into account"
+                f"{compared.design}: sbafab predict {factor} {ratio:.3f} uses the measured "
+                f"{compared.quantity}"
             )
 
 

@@ -240,7 +240,7 @@ def _simulation_rows(run: Run) -> Iterator[tuple[str, str]]:
 
 
 def film_text(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], copies: int) -> str:
-    """Return the use of a film in words: sheets, size, density, waste and estimated cutting time."""
+    """Return the use of a film in words: sheets, size, density, waste and cutting time."""
     film_sheets = [sheet for sheet in sheets if sheet["material"] == film["material"]]
     count = f"{len(film_sheets)} sheet{'s' if len(film_sheets) > 1 else ''}"
     sizes = dict.fromkeys(f"{sheet['width']:g} x {sheet['length']:g}" for sheet in film_sheets)

@@ -38,7 +38,8 @@ MOST_MINUTES = 10_000
     "--pressure",
     type=PRESSURE.read,
     metavar="P",
-    help='Pressure in all chambers, kPa or with a unit ("60 mbar").  [default: calculix 6, others 5]',
+    help='Pressure in all chambers, kPa or with a unit ("60 mbar").  '
+    "[default: calculix 6, others 5]",
 )
 @click.option(
     "--chamber",

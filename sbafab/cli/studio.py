@@ -75,7 +75,7 @@ def _write(folder: Path, pyodide: Path | None) -> None:
     for name in page.lacks:
         click.echo(
             f"Without {name} the page has no prediction, motion, registration rules and cut files; "
-            f"put the wheel of {name} from Pyodide's distribution beside Pyodide, and write it again"
+            f"put the wheel of {name} from Pyodide's distribution beside Pyodide and write again"
         )
     click.echo("Any web server can serve the page, for example:")
     click.echo(f"    python -m http.server --bind 127.0.0.1 --directory {page.folder}")

@@ -94,8 +94,8 @@ def sweep(
             designs = search.sweep(sweep_request, request.out, progress)
     except search.SweepStopped as stop:
         print_error(
-            f"{stop.measured} of {stop.designs} designs are computed; run the same command again to "
-            "resume"
+            f"{stop.measured} of {stop.designs} designs are computed; run the same command again "
+            "to resume"
         )
         raise
     if request.as_json:

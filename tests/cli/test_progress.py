@@ -18,7 +18,9 @@ def test_time_left_is_that_of_the_pace_so_far() -> None:
     assert Pace("designs", 25, 100, 60.0, 50.0).remaining == 150.0
     said = "designs: 25 of 100, 30 per minute, 1 min 00 s elapsed, about 2 min 30 s left"
     assert Pace("designs", 25, 100, 60.0, 50.0).text == said
-    assert Pace("designs", 100, 200, 50.0, 50.0).text.startswith("designs: 100 of 200, 2 per second")
+    assert Pace("designs", 100, 200, 50.0, 50.0).text.startswith(
+        "designs: 100 of 200, 2 per second"
+    )
     assert Pace("designs", 100, 400, 5000.0, 5000.0).text.endswith("about 4 h 10 min left")
     # Nothing done yet, too early to tell, or nobody knows of how many.
     for done, total, in_stage in ((0, 100, 50.0), (3, 100, 0.5), (0, 0, 50.0)):
@@ -27,7 +29,9 @@ def test_time_left_is_that_of_the_pace_so_far() -> None:
 
 
 def test_quick_work_shows_no_line_on_a_terminal() -> None:
-    assert [Pace("bond-width", 0, 16, elapsed, elapsed).is_shown for elapsed in (0.0, 0.9, 1.0)] == [
+    assert [
+        Pace("bond-width", 0, 16, elapsed, elapsed).is_shown for elapsed in (0.0, 0.9, 1.0)
+    ] == [
         False,
         False,
         True,
