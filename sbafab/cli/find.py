@@ -13,7 +13,6 @@ from sbafab.cli.options import json_option, refuse_options, set_option
 from sbafab.cli.printing import print_json, print_line, print_verdict, print_wrapped
 from sbafab.cli.progress import shown_progress
 from sbafab.errors import DesignError
-from sbafab.output.schemas import FIND_SCHEMA
 from sbafab.search.find import FoundDesign
 from sbafab.search.quantities import AskedQuantity, shown_value
 from sbafab.search.quantity_names import quantity_lines
@@ -228,6 +227,7 @@ TABS_HINT = (
 
 def as_json(result: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
     """Return a result as JSON."""
+    from sbafab.output.schemas import FIND_SCHEMA
 
     def trial_json(trial: Trial) -> dict[str, Any]:
         return {"keys": dict(trial.values), "figures": dict(trial.figures)}

@@ -106,8 +106,9 @@ def kerf(
     read_first = "Read the warnings before you paste" if warnings else "Paste into the design file"
     click.echo(f"\n{read_first}:\n\n{block}")
     values = ", ".join(f"{estimate.kerf.value:.3f}" for estimate in widths)
-    count = "1 warning" if len(warnings) == 1 else f"{len(warnings) or 'no'} warnings"
-    print_verdict(f"{material} kerf {values} mm from {calibration.overall.count} sizes, {count}")
+    count = f", {len(warnings)} warning{'s' if len(warnings) > 1 else ''}" if warnings else ""
+    # A comment, so that all from the table on may be pasted.
+    print_verdict(f"# {material} kerf: {values} mm from {calibration.overall.count} sizes{count}")
 
 
 def _film(name: str) -> str:

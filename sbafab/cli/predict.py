@@ -29,7 +29,6 @@ from sbafab.cli.printing import (
     wrapped,
 )
 from sbafab.cli.progress import shown_progress
-from sbafab.models.figures import LEFT_OUT
 
 if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
@@ -219,6 +218,8 @@ ALTERNATIVES_TITLE = "Alternative models: design with the figures above"
 
 def print_prediction(prediction: Prediction, verbose: bool = False) -> None:
     """Print the main figures; ``verbose`` also all figures and the validity of their models."""
+    from sbafab.models.figures import LEFT_OUT
+
     width = console().width
     label = max((len(line.quantity) for line in prediction.verdict), default=0) + 2
     previous = ""

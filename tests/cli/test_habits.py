@@ -40,7 +40,7 @@ def test_check_fits_a_screen_and_sums_up_last(
     for rule in rule_names():
         assert sum(line.startswith(f"{rule} ") for line in lines) == 1, rule
     assert "registration-worst-case: align layers 2 to 3 in step 2 with care" in out
-    assert lines[-1] == "3dof-15mm holds: 15 rules pass, 1 warns. Details: -v"
+    assert lines[-1] == "3dof-15mm passed: 16 rules, 1 warning. Details: -v"
     _, out, _ = run(["check", "3dof-15mm", "--set", "mask.overhang=0.3"], capsys)
     assert max(map(len, out.splitlines())) <= 80
     _, said, _ = run(["check", "3dof-15mm", "-v"], capsys)
@@ -216,10 +216,10 @@ def test_a_shell_gets_its_script() -> None:
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        ("check", "cut files would say so"),
-        ("cut", "Let cut files be written"),
-        ("press", "Let the schedule be written"),
-        ("predict", "Let the prediction be written"),
+        ("check", "cut files would state it"),
+        ("cut", "Write the cut files"),
+        ("press", "Write the schedule"),
+        ("predict", "Write the prediction"),
     ],
 )
 def test_waive_speaks_of_its_command(
@@ -247,7 +247,7 @@ def test_watching_looks_again_at_what_changed_only(tmp_path: Path) -> None:
 def test_watch_is_for_people(capsys: pytest.CaptureFixture[str]) -> None:
     code, _, err = run(["check", "1dof-5mm", "--watch", "--json"], capsys)
     assert code == 2
-    assert "--watch is for people" in err
+    assert "--watch and --json exclude each other" in err
 
 
 def test_help_cuts_no_command_short(
@@ -263,7 +263,7 @@ def test_help_cuts_no_command_short(
 
 def test_python_counts_rules_as_the_command_does(capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = run(["check", "1dof-5mm"], capsys)
-    said = out.splitlines()[-1].partition("holds: ")[2].partition(".")[0]
+    said = out.splitlines()[-1].partition("passed: ")[2].partition(".")[0]
     assert repr(sbafab.check("1dof-5mm")) == f"Findings({said})"
 
 
@@ -271,8 +271,8 @@ def test_python_counts_rules_as_the_command_does(capsys: pytest.CaptureFixture[s
     ("command", "words"),
     [
         ("record", "Result of the leak test."),
-        ("sweep", "Take this rule's failure as accepted in every design"),
-        ("find", "Folder that receives found.toml"),
+        ("sweep", "Accept the failure of this rule in every design"),
+        ("find", "Folder in which found.toml is written"),
         ("picture", "NAME-flat.png"),
     ],
 )

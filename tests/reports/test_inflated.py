@@ -185,7 +185,7 @@ def test_what_no_model_inflates_is_drawn_flat_and_said_to_be(
         path = tmp_path / f"shown{ending}"
         result = CliRunner().invoke(app, [*arguments, str(path), *wide])
         assert result.exit_code == 0, result.output
-        assert f"{name}, flat, not inflated: no model inflates pockets" in result.output
+        assert f"{name} drawn flat, since no model inflates pockets" in result.output
     with Image.open(tmp_path / "shown.png") as image:
         assert image.size == (160, 128)
     # Unnamed, it is named as what it is.
