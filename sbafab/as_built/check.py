@@ -16,9 +16,9 @@ from sbafab.as_built.claims import (
     order_problems,
     property_problems,
 )
-from sbafab.as_built.cut_files import CutPart, LayerFile, inside, read_layers
-from sbafab.as_built.expected import Meant, RunWork, departure, meant_by
-from sbafab.as_built.kerf_removed import chorded_place
+from sbafab.as_built.cut_files import CutPart, LayerFile, path_in_folder, read_layers
+from sbafab.as_built.expected import Meant, RunWork, departure, expected_laminate
+from sbafab.as_built.kerf_removed import chords_for_arc
 from sbafab.as_built.measures import (
     batch_problems,
     fixture_problems,
@@ -36,12 +36,12 @@ from sbafab.as_built.records import (
     Problem,
     findings_of,
     is_job,
-    is_joined,
+    is_assembly,
     read_claims,
     read_job,
-    read_joined,
+    read_assembly,
 )
-from sbafab.as_built.sheets import Lot, SheetOrder, read_panel, sheet_problems
+from sbafab.as_built.sheets import DesignLot, SheetOrder, read_panel, sheet_problems
 from sbafab.as_built.stack import laminate_of, stacked_layers
 from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
@@ -66,7 +66,7 @@ AS_DESIGNED = "all that lies here is what design.toml makes"
 
 
 @dataclass(frozen=True)
-class AsBuilt:
+class AsBuiltFolder:
     """A folder read back: ``laminate`` is None where a layer's file could not be read.
 
     ``meant`` is what the design makes, if it can be made; ``is_meant``: every layer's file cuts
@@ -101,7 +101,7 @@ def check_folder(folder: Path) -> tuple[Finding, ...]:
     if is_job(folder):
         return _check_job(folder)
     built = read_folder(folder)
-    measured = _deck(built)
+    measured = _run_deck(built)
     problems = design_problems_of(folder, built, measured)
     return (*_findings(built, measured), *findings_of(DESIGNED, problems, AS_DESIGNED))
 
@@ -117,10 +117,10 @@ def check_written(folder: Path, works: Mapping[str, RunWork]) -> tuple[Finding, 
         return _check_job(folder, works)
     built = read_folder(folder, work=next(iter(works.values())))
     problems = _layer_problems(built)
-    return (*_findings(built, _deck(built)), *findings_of(DESIGNED, problems, AS_DESIGNED))
+    return (*_findings(built, _run_deck(built)), *findings_of(DESIGNED, problems, AS_DESIGNED))
 
 
-def _deck(built: AsBuilt) -> tuple[Finding, ...]:
+def _run_deck(built: AsBuiltFolder) -> tuple[Finding, ...]:
     """What the rules find in the layers as they are cut."""
     if built.laminate is None:
         return rules_by_layer(built.files, built.claims, built.design, built.limits)
@@ -130,8 +130,8 @@ def _deck(built: AsBuilt) -> tuple[Finding, ...]:
     return tuple(finding for rule in RULES for finding in findings_as_built(rule, measures))
 
 
-def _findings(built: AsBuilt, measured: Sequence[Finding]) -> tuple[Finding, ...]:
-    problems = [*built.problems, *_unsaid_waivers(measured, built.claims)]
+def _findings(built: AsBuiltFolder, measured: Sequence[Finding]) -> tuple[Finding, ...]:
+    problems = [*built.problems, *_unlisted_waivers(measured, built.claims)]
     count = len(built.files)
     return (
         *findings_of(
@@ -150,23 +150,23 @@ def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tupl
     """
     job = read_job(folder)
     found: list[Finding] = []
-    lots: list[Lot] = []
+    lots: list[DesignLot] = []
     problems: list[Problem] = []
     weak: list[str] = []
-    folders: list[AsBuilt] = []
+    folders: list[AsBuiltFolder] = []
     checked: list[Checked | None] = []
     for told in job.designs:
         work = works.get(told.name) if works is not None else None
-        built = read_folder(inside(folder, told.folder), of_job=True, work=work)
+        built = read_folder(path_in_folder(folder, told.folder), of_job=True, work=work)
         folders.append(built)
         weak += lowered(limits_of(built.design))
-        measured = _deck(built)
+        measured = _run_deck(built)
         named = [*_findings(built, measured)]
         layers = _layer_problems(built)
         named += findings_of(DESIGNED, layers, AS_DESIGNED) if layers else []
         found += [replace(f, message=f"{told.name}: {f.message}") for f in named]
-        checked.append(_as_designed(built, measured) if works is None else None)
-        lots.append(Lot(told.name, told.copies, built.files, built.design.order.spare_parts))
+        checked.append(_checked_design(built, measured) if works is None else None)
+        lots.append(DesignLot(told.name, told.copies, built.files, built.design.order.spare_parts))
         own = (built.claims.name, built.claims.copies, built.claims.design_sha256)
         if own != (told.name, told.copies, told.design_sha256):
             message = f"{told.folder}: name, copies or design_sha256 are not those of its manifest"
@@ -175,9 +175,9 @@ def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tupl
     problems += file_problems(folder, job)
     order = SheetOrder(job, first.design, first.claims.kerf, lots)
     problems += sheet_problems(folder, order)
-    if is_joined(job):
+    if is_assembly(job):
         weak += lowered_between(folder)
-        between, wrong = joined_findings(folder)
+        between, wrong = assembly_findings(folder)
         found += between
         problems += wrong
     problems += lowered_problems(job.lowered_limits, weak)
@@ -195,7 +195,7 @@ def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tupl
     )
 
 
-def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None) -> AsBuilt:
+def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None) -> AsBuiltFolder:
     """The laminate that a folder's cut files make, and what is wrong with files and claims.
 
     The folder of a design ``of_job`` has no film sheets of its own. ``work``: what the run that has
@@ -208,7 +208,7 @@ def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None)
     if work is not None:
         meant: Meant | None = work.meant
     else:
-        meant = meant_by(design, claims.curves) if is_own else None
+        meant = expected_laminate(design, claims.curves) if is_own else None
     problems += order_problems(claims, design)
     try:
         problems += file_problems(folder, claims)
@@ -226,7 +226,7 @@ def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None)
     problems += layer_problems(files, claims)
     problems += pattern_problems(layers, claims)
     if not of_job and panel is None:
-        problems += _own_sheet_problems(folder, claims, design, files)
+        problems += _design_sheet_problems(folder, claims, design, files)
     laminate: Laminate | None = None
     parts = [file.part for file in files if file.part is not None]
     chord_error = max((part.chord_error for part in parts), default=0.0)
@@ -245,7 +245,7 @@ def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None)
             problems.append(Problem(INTEGRITY, message))
     known = work.findings if work is not None else None
     limits = limits_of(design)
-    return AsBuilt(claims, design, limits, tuple(files), laminate, tuple(problems), meant, known)
+    return AsBuiltFolder(claims, design, limits, tuple(files), laminate, tuple(problems), meant, known)
 
 
 def _laminate(
@@ -270,10 +270,10 @@ def _laminate(
     return replace(meant.laminate, layers=cut, panel=panel)
 
 
-def design_problems_of(folder: Path, built: AsBuilt, measured: Sequence[Finding]) -> list[Problem]:
+def design_problems_of(folder: Path, built: AsBuiltFolder, measured: Sequence[Finding]) -> list[Problem]:
     """Layers, and all that lies beside them, that are not what the folder's design makes."""
     problems = _layer_problems(built)
-    checked = _as_designed(built, measured)
+    checked = _checked_design(built, measured)
     if checked is not None and built.meant is not None:
         from sbafab.as_built.derived import derived_problems
 
@@ -282,7 +282,7 @@ def design_problems_of(folder: Path, built: AsBuilt, measured: Sequence[Finding]
     return problems
 
 
-def _layer_problems(built: AsBuilt) -> list[Problem]:
+def _layer_problems(built: AsBuiltFolder) -> list[Problem]:
     """Layers whose files cut something else than the design makes there."""
     if built.meant is None:
         return [Problem(DESIGNED, "design.toml makes no laminate to hold the cut files against")]
@@ -302,7 +302,7 @@ def _layer_problems(built: AsBuilt) -> list[Problem]:
     return problems
 
 
-def _as_designed(built: AsBuilt, measured: Sequence[Finding]) -> Checked | None:
+def _checked_design(built: AsBuiltFolder, measured: Sequence[Finding]) -> Checked | None:
     """The folder's design with what the rules find in it; None where it makes no laminate."""
     if built.meant is None:
         return None
@@ -313,13 +313,13 @@ def _as_designed(built: AsBuilt, measured: Sequence[Finding]) -> Checked | None:
     return Checked(built.design, laminate, findings)
 
 
-def _own_sheet_problems(
+def _design_sheet_problems(
     folder: Path, claims: Manifest, design: Design, files: Sequence[LayerFile]
 ) -> list[Problem]:
     if not claims.sheets and is_job(folder.absolute().parent):
         message = "the film sheets are those of the job, and were not looked at; check the folder "
         return [Problem(CLAIMS, f"{message}above this one", verdict="warn")]
-    lots = [Lot(claims.name, claims.copies, files, design.order.spare_parts)]
+    lots = [DesignLot(claims.name, claims.copies, files, design.order.spare_parts)]
     return sheet_problems(folder, SheetOrder(claims, design, claims.kerf, lots))
 
 
@@ -360,12 +360,12 @@ def _drawn_in_chords(design: Design) -> bool:
     from sbafab.design.outline import read_outline
 
     try:
-        return chorded_place(read_outline(design.drawing)) is not None
+        return chords_for_arc(read_outline(design.drawing)) is not None
     except (DesignError, OSError):
         return False
 
 
-def _unsaid_waivers(measured: Sequence[Finding], claims: Manifest) -> list[Problem]:
+def _unlisted_waivers(measured: Sequence[Finding], claims: Manifest) -> list[Problem]:
     """Rules that the design waives, that fail as built, and that no cut file names as waived."""
     rules = dict.fromkeys(finding.rule for finding in measured if finding.by_user)
     return [
@@ -426,12 +426,12 @@ def rules_by_layer(
 # The assembly of a folder: its parts as design.toml puts them together, and what is claimed.
 
 
-def joined_findings(folder: Path) -> tuple[tuple[Finding, ...], list[Problem]]:
+def assembly_findings(folder: Path) -> tuple[tuple[Finding, ...], list[Problem]]:
     """What is found between the parts, and where the manifest says otherwise than design.toml.
 
     Parts are as their designs make them: how films were cut is checked design by design.
     """
-    claims = read_joined(folder)
+    claims = read_assembly(folder)
     try:
         assembled = assemble(load_assembly(folder / DESIGN_FILE))
     except (DesignError, OSError) as error:
@@ -439,7 +439,7 @@ def joined_findings(folder: Path) -> tuple[tuple[Finding, ...], list[Problem]]:
     between = run_checks(assembled)
     return between, [
         *_assembly_problems(claims, assembled),
-        *_unsaid_assembly_waivers(claims, between),
+        *_unlisted_assembly_waivers(claims, between),
     ]
 
 
@@ -469,7 +469,7 @@ def _assembly_problems(claims: AssemblyManifest, assembled: Assembled) -> list[P
     return problems
 
 
-def _unsaid_assembly_waivers(
+def _unlisted_assembly_waivers(
     claims: AssemblyManifest, between: tuple[Finding, ...]
 ) -> list[Problem]:
     waived = dict.fromkeys(finding.rule for finding in between if finding.by_user)

@@ -239,7 +239,7 @@ def property_problems(
         if file.part is None or file in bare:
             continue
         found = file.part.properties
-        for name, said in _properties(file.claim, claims, dangers).items():
+        for name, said in _expected_properties(file.claim, claims, dangers).items():
             if found.get(name) != said:
                 message = f"custom property {name} is {found.get(name)!r}, not {said!r}"
                 where.setdefault(message, []).append(file.position)
@@ -266,7 +266,7 @@ def bare_problem(files: str, has_units: bool, *layers: int) -> Problem:
     return Problem(CLAIMS, message, layers, verdict="warn")
 
 
-def _properties(
+def _expected_properties(
     layer: LayerClaim, claims: Manifest, dangers: Mapping[str, str]
 ) -> dict[str, str | None]:
     kerf = claims.kerf.get(layer.material)

@@ -10,7 +10,7 @@ from itertools import pairwise
 from pathlib import Path, PurePosixPath
 
 from sbafab.as_built.expected import Expected, departure, in_agreement, with_circles, without_specks
-from sbafab.as_built.kerf_removed import chorded_place, uncut
+from sbafab.as_built.kerf_removed import chords_for_arc, remove_kerf
 from sbafab.as_built.records import INTEGRITY, Problem
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.properties import (
@@ -30,8 +30,8 @@ from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
 from sbafab.output.manifest_records import LayerClaim, Manifest
 
-MOST_BYTES = 20_000_000
-MOST_MARKS = 300_000
+MAX_BYTES = 20_000_000
+MAX_ENTITIES = 300_000
 """Entities and points a cut file may be drawn with: more would take minutes to be kept apart."""
 MARK = re.compile(rb"\n *1?0\r?\n")
 DATUM = "LINE"
@@ -88,10 +88,10 @@ def read_layers(
     for position, (claim, own) in enumerate(zip(claims.layers, expected, strict=True), start=1):
         part: CutPart | None = None
         try:
-            path = inside(folder, claim.file)
+            path = path_in_folder(folder, claim.file)
             key = sound_digest(path), claim.material, own.profile.key if own is not None else ""
             if key not in known:
-                told = told_of(claims, claim.material)
+                told = claimed_properties(claims, claim.material)
                 known[key] = read_part(path, chords_drawn, told, own)
             part = known[key]
         except OutputError as error:
@@ -103,7 +103,7 @@ def read_layers(
     return _in_agreement(files), problems
 
 
-def told_of(claims: Manifest, material: str) -> dict[str, str]:
+def claimed_properties(claims: Manifest, material: str) -> dict[str, str]:
     """The properties that the manifest tells of the cut files of a material."""
     kerf = next((kerf.width for name, kerf in claims.kerf.items() if name == material), None)
     return {**kerf_properties(kerf), **curves_property(claims.curves)}
@@ -121,7 +121,7 @@ def _in_agreement(files: Sequence[LayerFile]) -> list[LayerFile]:
     return [replace(file, part=agreed.get(id(file.part))) for file in files]
 
 
-def inside(folder: Path, file: str | None) -> Path:
+def path_in_folder(folder: Path, file: str | None) -> Path:
     """Where a file of the manifest lies. Raises OutputError where that is not in the folder."""
     if file is None:
         raise OutputError("the manifest names no cut file for it; regenerate the folder")
@@ -137,15 +137,15 @@ def sound_digest(path: Path) -> str:
         # A pipe or a device would be read for ever.
         if path.exists() and not path.is_file():
             raise OutputError("no plain file; regenerate it")
-        if path.stat().st_size > MOST_BYTES:
-            raise OutputError(f"larger than {MOST_BYTES:,} bytes; regenerate it")
+        if path.stat().st_size > MAX_BYTES:
+            raise OutputError(f"larger than {MAX_BYTES:,} bytes; regenerate it")
         data = path.read_bytes()
         # A mark has a line of its own, and lines are counted in a moment.
-        is_long = data.count(b"\n") > MOST_MARKS
+        is_long = data.count(b"\n") > MAX_ENTITIES
         marks = sum(1 for _ in MARK.finditer(data)) if is_long else 0
-        if marks > MOST_MARKS:
+        if marks > MAX_ENTITIES:
             raise OutputError(
-                f"drawn with {marks:,} entities and points, where at most {MOST_MARKS:,} may be"
+                f"drawn with {marks:,} entities and points, where at most {MAX_ENTITIES:,} may be"
             )
         return hashlib.sha256(data).hexdigest()
     except (FileNotFoundError, NotADirectoryError):
@@ -171,7 +171,7 @@ def read_part(
     try:
         found = read_profile(path)
         if noted:
-            found = _without_notes(found)
+            found = _without_letters(found)
         return _part(found, chords_drawn, found.properties or told or {}, expected)
     except OutputError:
         raise
@@ -191,7 +191,7 @@ def _part(
     if chord_error and isinstance(kerf, tuple):
         raise OutputError("its chords do not tell how its kerf was compensated; regenerate it")
     if not chord_error and not chords_drawn:
-        place = chorded_place(found.region)
+        place = chords_for_arc(found.region)
         if place is not None:
             raise OutputError(
                 f"an arc is drawn as chords at x {place[0]:.3f}, y {place[1]:.3f}, and the file "
@@ -208,7 +208,7 @@ def _part(
             found.units,
             is_meant=True,
         )
-    region, corner_room = uncut(with_circles(found.region), kerf)
+    region, corner_room = remove_kerf(with_circles(found.region), kerf)
     if region.is_empty:
         raise OutputError(f"nothing is left inside a kerf of {kerf_text(kerf)} mm; regenerate it")
     return CutPart(
@@ -225,7 +225,7 @@ LETTERS = ("LWPOLYLINE", "POLYLINE")
 """Types of the strokes of letters, the latter before R2000."""
 
 
-def _without_notes(found: ReadBack) -> ReadBack:
+def _without_letters(found: ReadBack) -> ReadBack:
     """The same without polylines on REFERENCE, which are letters: the datum cross is two lines."""
     kept = [
         (kind, stroke)

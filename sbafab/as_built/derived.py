@@ -25,7 +25,7 @@ from pydantic import BaseModel
 from sbafab.as_built.claims import CUT_ENDINGS, could_be_cut
 from sbafab.as_built.cut_files import sound_digest
 from sbafab.as_built.expected import drawn_settings
-from sbafab.as_built.records import DESIGNED, Problem, is_joined
+from sbafab.as_built.records import DESIGNED, Problem, is_assembly
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.lightburn import ENDING
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 INDEX = "manifest.json"
-UNMADE = (DesignError, OutputError, GeometryError, ArithmeticError, LookupError)
+DESIGN_ERRORS = (DesignError, OutputError, GeometryError, ArithmeticError, LookupError)
 """What a doctored design can raise where a sound one is made."""
 BY_OTHER_COMMANDS = (*MESH, *PREDICTION, *SIMULATORS)
 """Folders and files of an earlier run that lie beside what is made again."""
@@ -76,15 +76,15 @@ def derived_problems(
 
     ``paths`` holds the beam's path for every pattern of the design's laminate.
     """
-    with _made_anew(folder) as (fresh, problems):
+    with _temporary_folder(folder) as (fresh, problems):
         order = checked.design.order
         parts = parts_of(checked.laminate, paths, order.quantity, order.spare_parts)
-        index = _write_anew(folder, fresh, claims, checked, paths, None if of_job else parts)
+        index = _regenerate(folder, fresh, claims, checked, paths, None if of_job else parts)
         made = {*file_names(fresh), *(layer["file"] for layer in index["layers"])}
         # The pages of a job's design show the sheets of the job, and are compared there.
         others = (*BY_OTHER_COMMANDS, TRAVELLER, FINDINGS) if of_job else BY_OTHER_COMMANDS
         problems.extend(_foreign_problems(claims, made, others))
-        problems.extend(_differences(folder, fresh, claims.files, claims.generator))
+        problems.extend(_file_problems(folder, fresh, claims.files, claims.generator))
         problems.extend(_index_problems(folder, index, of_job))
         problems.extend(_prediction_problems(folder, fresh, claims, checked))
     return problems
@@ -97,8 +97,8 @@ def derived_job_problems(
 
     ``curves`` is what the manifests of the designs say of their chords.
     """
-    with _made_anew(folder) as (fresh, problems):
-        if is_joined(job):
+    with _temporary_folder(folder) as (fresh, problems):
+        if is_assembly(job):
             # An assembly's run checks what it has written, and so imports this module.
             from sbafab.output.assembly import checked_again, plan_assembly, write_assembly
 
@@ -110,7 +110,7 @@ def derived_job_problems(
             batch = plan_batch(job.schema_name, job.name, planned, folder, unheard)
             write_batch(batch, fresh, unheard)
         problems.extend(_foreign_problems(job, file_names(fresh)))
-        problems.extend(_differences(folder, fresh, job.files, job.generator))
+        problems.extend(_file_problems(folder, fresh, job.files, job.generator))
     return problems
 
 
@@ -123,7 +123,7 @@ def _foreign_problems(
     theirs either.
     """
     return [
-        _other(
+        _problem(
             f"{path} is listed and is no file of this design",
             claims.generator,
             is_done=path.lower().endswith(CUT_ENDINGS),
@@ -134,18 +134,18 @@ def _foreign_problems(
 
 
 @contextmanager
-def _made_anew(folder: Path) -> Iterator[tuple[Path, list[Problem]]]:
+def _temporary_folder(folder: Path) -> Iterator[tuple[Path, list[Problem]]]:
     """An empty folder, and problems to be added to: also that the design could not be made."""
     problems: list[Problem] = []
     with TemporaryDirectory() as name:
         try:
             yield Path(name), problems
-        except UNMADE as error:
+        except DESIGN_ERRORS as error:
             message = f"{folder.name} could not be made again to be compared: {error}"
             problems.append(Problem(DESIGNED, message))
 
 
-def _write_anew(
+def _regenerate(
     folder: Path,
     fresh: Path,
     claims: Manifest,
@@ -187,7 +187,7 @@ def _parts(files: Collection[str]) -> set[RunPart]:
     return parts
 
 
-def _differences(
+def _file_problems(
     folder: Path, fresh: Path, listed: Collection[str], generator: str
 ) -> list[Problem]:
     """Files that are not as they are made again.
@@ -203,24 +203,24 @@ def _differences(
         if name not in listed or not (folder / name).is_file():
             said = f"{name} is missing"
         elif name.endswith(f"/{INDEX}"):
-            said = index_difference(_index(folder / name), _index(path), ("files",))
+            said = index_difference(_read_index(folder / name), _read_index(path), ("files",))
             said = f"{name}: {said}" if said else ""
         else:
             said = file_difference(folder / name, path, name)
         if said:
             is_done = name.endswith((*PRESS, *CUT_ENDINGS))
-            problems.append(_other(said, generator, is_done))
+            problems.append(_problem(said, generator, is_done))
     return problems
 
 
-def _other(said: str, generator: str, is_done: bool) -> Problem:
+def _problem(said: str, generator: str, is_done: bool) -> Problem:
     if generator == GENERATOR or is_done:
         return Problem(DESIGNED, f"{said}; regenerate the folder")
     said = f"{said}, but it was made by {generator}, and this is {GENERATOR}; regenerate the folder"
     return Problem(DESIGNED, said, verdict="warn")
 
 
-def _index(path: Path) -> dict[str, Any]:
+def _read_index(path: Path) -> dict[str, Any]:
     found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return found
 
@@ -228,7 +228,7 @@ def _index(path: Path) -> dict[str, Any]:
 def _index_problems(folder: Path, index: dict[str, Any], of_job: bool) -> list[Problem]:
     """Where the manifest is not the design's; sheets of a job are claimed by the job."""
     left_out = (*NOT_COMPARED, "sheets", "films") if of_job else NOT_COMPARED
-    found, wanted = _index(folder / INDEX), json.loads(as_json(index))
+    found, wanted = _read_index(folder / INDEX), json.loads(as_json(index))
     said = index_difference(found, wanted, left_out) or _mesh_difference(folder, found, wanted)
     return [Problem(DESIGNED, f"manifest.json: {said}; regenerate the folder")] if said else []
 
@@ -250,7 +250,7 @@ def _mesh_difference(folder: Path, found: dict[str, Any], wanted: dict[str, Any]
     return ""
 
 
-class _Wish(BaseModel):
+class _PredictionRequest(BaseModel):
     pressures_kpa: tuple[float, ...]
     flow_ml_min: float
     volumes_ul: tuple[float, ...]
@@ -260,10 +260,10 @@ class _Wish(BaseModel):
     modulus_mpa: float | None
 
 
-class _Predicted(BaseModel):
+class _PredictionFile(BaseModel):
     """What of ``predict.json`` says what was asked for."""
 
-    asked: _Wish
+    asked: _PredictionRequest
 
 
 def _prediction_problems(
@@ -277,7 +277,7 @@ def _prediction_problems(
     from sbafab.output.run import FOLDER, with_prediction
 
     try:
-        told = _Predicted.model_validate_json((folder / "predict.json").read_bytes()).asked
+        told = _PredictionFile.model_validate_json((folder / "predict.json").read_bytes()).asked
         measured = told.pocket_loss, told.modulus_mpa
         factors = Factors(told.press_factor, told.contact_factor, *measured)
         wish = Asked(told.pressures_kpa, told.flow_ml_min, told.volumes_ul, factors)
@@ -286,8 +286,8 @@ def _prediction_problems(
         with_prediction(checked.design, predict(checked.design, wish))(checked.laminate, apart)
     except (ValueError, OSError) as error:
         said = f"predict.json does not say what was asked for ({error})"
-        return [_other(said, claims.generator, is_done=False)]
-    return _differences(folder, apart, claims.files, claims.generator)
+        return [_problem(said, claims.generator, is_done=False)]
+    return _file_problems(folder, apart, claims.files, claims.generator)
 
 
 # Whether two files hold the same: bytes first, then what a reader takes from them.
@@ -296,11 +296,11 @@ def _prediction_problems(
 # made a mesh or a picture, and nothing differs that is cut, pressed or read.
 
 
-SHARE, LEAST = 1e-6, 1e-6
+RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-6, 1e-6
 """Numbers that differ by less, relatively or at all, say the same: libraries round otherwise."""
 GREY = 1.0
 """Mean difference of two pictures, of 255 levels, that antialiasing may make."""
-SEEN, FEW = 48, 2e-4
+VISIBLE, VISIBLE_SHARE = 48, 2e-4
 """A pixel that differs by as much is seen; that share of them may be."""
 UNREADABLE = (ValueError, LookupError, ArithmeticError, RecursionError, csv.Error)
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
@@ -401,7 +401,7 @@ def _value_difference(found: Any, meant: Any, where: str) -> str:
         told = (_value_difference(*pair, f"{where}{n}.") for n, pair in enumerate(pairs, start=1))
         return next(filter(None, told), "")
     if _is_number(meant) and _is_number(found):
-        same = _alike(float(found), float(meant))
+        same = _is_close(float(found), float(meant))
     elif isinstance(meant, str) and isinstance(found, str):
         same = not _words_difference(found, meant)
     else:
@@ -413,8 +413,8 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _alike(one: float, other: float) -> bool:
-    return math.isclose(one, other, rel_tol=SHARE, abs_tol=LEAST)
+def _is_close(one: float, other: float) -> bool:
+    return math.isclose(one, other, rel_tol=RELATIVE_TOLERANCE, abs_tol=ABSOLUTE_TOLERANCE)
 
 
 def _shown(value: object) -> str:
@@ -439,7 +439,7 @@ def _words_difference(found: str, meant: str) -> str:
     own, wanted = [*_tokens(found)], [*_tokens(meant)]
     for one, other in zip(own, wanted, strict=False):
         if one != other and not (
-            NUMBER.fullmatch(one) and NUMBER.fullmatch(other) and _alike(float(one), float(other))
+            NUMBER.fullmatch(one) and NUMBER.fullmatch(other) and _is_close(float(one), float(other))
         ):
             return f"{_shown(one)} stands where {_shown(other)} should"
     if len(own) != len(wanted):
@@ -471,8 +471,8 @@ def _picture_difference(found: bytes, meant: bytes) -> str:
     if own.shape != wanted.shape:
         return f"it measures {own.shape[1]} x {own.shape[0]} pixels"
     off = np.abs(own - wanted).max(axis=2)
-    seen = np.argwhere(off >= SEEN)
-    if off.mean() > GREY or len(seen) > FEW * off.size:
+    seen = np.argwhere(off >= VISIBLE)
+    if off.mean() > GREY or len(seen) > VISIBLE_SHARE * off.size:
         y, x = seen[0] if len(seen) else np.unravel_index(int(off.argmax()), off.shape)
         return f"pixels differ, as at {x}, {y}"
     return ""
@@ -498,7 +498,7 @@ def _stroke_difference(own: ReadBack, wanted: ReadBack) -> str:
     left = [*wanted.strokes]
     for layer, edges in own.strokes:
         points = [edges[0].start, *(edge.end for edge in edges)]
-        match = next((one for one in left if one[0] == layer and _follows(points, one[1])), None)
+        match = next((one for one in left if one[0] == layer and _same_points(points, one[1])), None)
         if match is None:
             x, y = points[0]
             return f"the stroke on {layer} at x {x:.3f}, y {y:.3f} should not be there"
@@ -509,7 +509,7 @@ def _stroke_difference(own: ReadBack, wanted: ReadBack) -> str:
     return ""
 
 
-def _follows(points: list[tuple[float, float]], edges: Any) -> bool:
+def _same_points(points: list[tuple[float, float]], edges: Any) -> bool:
     wanted = [edges[0].start, *(edge.end for edge in edges)]
     return len(wanted) == len(points) and any(
         all(math.dist(p, q) <= TOLERANCE for p, q in zip(points, run, strict=True))
@@ -520,19 +520,19 @@ def _follows(points: list[tuple[float, float]], edges: Any) -> bool:
 # Surfaces read back from STL, 3MF and GLB files, and compared.
 
 
-NEAR = 2e-5
+POINT_TOLERANCE = 2e-5
 """mm by which a point stored in single precision, or to 6 decimals, may be off."""
 MESH_SHARE = 1e-5
 """Share of a volume by which two triangulations of one solid may differ."""
-MOST_BYTES = 500_000_000
-MOST_SIZE = 1e5
+MAX_MESH_BYTES = 500_000_000
+MAX_COORDINATE = 1e5
 """mm from the origin."""
 MODEL = "3D/3dmodel.model"
 VERTEX = re.compile(r'<vertex x="([^"]*)" y="([^"]*)" z="([^"]*)" */>')
 TRIANGLE = re.compile(r'<triangle v1="([^"]*)" v2="([^"]*)" v3="([^"]*)" */>')
 
 
-class Body(NamedTuple):
+class MeshBody(NamedTuple):
     """A surface, and what its file says of it beside points and faces."""
 
     surface: Surface
@@ -549,13 +549,13 @@ def mesh_difference(found: Path, meant: Path) -> str:
     if len(own) != len(wanted):
         return f"it holds {len(own)} bodies, not {len(wanted)}"
     pairs = zip(own, wanted, strict=True)
-    return next(filter(None, (_difference(one, other) for one, other in pairs)), "")
+    return next(filter(None, (_body_difference(one, other) for one, other in pairs)), "")
 
 
-def bodies(path: Path) -> list[Body]:
+def bodies(path: Path) -> list[MeshBody]:
     """The bodies of a mesh file, in mm. Raises OutputError for what is none."""
-    if path.stat().st_size > MOST_BYTES:
-        raise OutputError(f"larger than {MOST_BYTES:,} bytes")
+    if path.stat().st_size > MAX_MESH_BYTES:
+        raise OutputError(f"larger than {MAX_MESH_BYTES:,} bytes")
     readers = {".stl": _stl, ".3mf": _3mf, ".glb": _glb}
     try:
         return readers[path.suffix](path)
@@ -563,7 +563,7 @@ def bodies(path: Path) -> list[Body]:
         raise OutputError(f"no sound mesh: {error}") from error
 
 
-def _difference(own: Body, wanted: Body) -> str:
+def _body_difference(own: MeshBody, wanted: MeshBody) -> str:
     if own.said != wanted.said:
         return "names, materials or scales of its bodies are others"
     surface, meant = own.surface, wanted.surface
@@ -571,7 +571,7 @@ def _difference(own: Body, wanted: Body) -> str:
     if said:
         return said
     for one, other, what in ((surface, meant, "too many"), (meant, surface, "missing")):
-        stray = _stray(one.points, other.points)
+        stray = _unmatched_point(one.points, other.points)
         if stray is not None:
             x, y, z = stray
             return f"the point at x {x:.3f}, y {y:.3f}, z {z:.3f} is {what}"
@@ -588,7 +588,7 @@ def _unsound(surface: Surface) -> str:
     points, faces = surface.points, surface.faces
     if not len(points) or not len(faces):
         return "it is empty"
-    if not np.isfinite(points).all() or float(np.abs(points).max()) > MOST_SIZE:
+    if not np.isfinite(points).all() or float(np.abs(points).max()) > MAX_COORDINATE:
         return "it has a point that is nowhere"
     if int(faces.min()) < 0 or int(faces.max()) >= len(points):
         return "it has a face of a point that is not there"
@@ -602,12 +602,12 @@ def _area(surface: Surface) -> float:
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
-def _stray(points: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _unmatched_point(points: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """A point with none of the others nearer than NEAR."""
     import numpy as np
 
     def cells(of: NDArray[np.float64], shift: NDArray[np.float64]) -> NDArray[np.int64]:
-        return np.floor(of / (4 * NEAR) + shift).astype(np.int64)
+        return np.floor(of / (4 * POINT_TOLERANCE) + shift).astype(np.int64)
 
     # A point and its like share a cell of one grid or of another one shifted by half a cell.
     left = np.unique(points, axis=0)
@@ -622,7 +622,7 @@ def _stray(points: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[
     return stray
 
 
-def _stl(path: Path) -> list[Body]:
+def _stl(path: Path) -> list[MeshBody]:
     import numpy as np
 
     data = path.read_bytes()
@@ -638,24 +638,24 @@ def _stl(path: Path) -> list[Body]:
     against = np.einsum("ij,ij->i", normal, rows["normal"].astype(np.float64))
     if (against < 0).any():
         raise OutputError("a triangle's normal points inward")
-    return [Body(surface, "")]
+    return [MeshBody(surface, "")]
 
 
-def _3mf(path: Path) -> list[Body]:
+def _3mf(path: Path) -> list[MeshBody]:
     import numpy as np
 
     with ZipFile(path) as archive:
-        if sum(info.file_size for info in archive.infolist()) > MOST_BYTES:
-            raise OutputError(f"holds more than {MOST_BYTES:,} bytes")
+        if sum(info.file_size for info in archive.infolist()) > MAX_MESH_BYTES:
+            raise OutputError(f"holds more than {MAX_MESH_BYTES:,} bytes")
         parts = {name: archive.read(name).decode() for name in sorted(archive.namelist())}
     model = parts.pop(MODEL)
     points = np.array(VERTEX.findall(model), dtype=np.float64).reshape(-1, 3)
     faces = np.array(TRIANGLE.findall(model), dtype=np.int64).reshape(-1, 3)
     frame = TRIANGLE.sub("", VERTEX.sub("", model)).split()
-    return [Body(Surface(points, faces), json.dumps([parts, frame]))]
+    return [MeshBody(Surface(points, faces), json.dumps([parts, frame]))]
 
 
-def _glb(path: Path) -> list[Body]:
+def _glb(path: Path) -> list[MeshBody]:
     import numpy as np
 
     data = path.read_bytes()
@@ -681,5 +681,5 @@ def _glb(path: Path) -> list[Body]:
         material = document["materials"][primitive["material"]]
         surface = Surface(arrays[0].astype(np.float64), arrays[1].astype(np.int64))
         own = {key: value for key, value in node.items() if key != "mesh"}
-        found.append(Body(surface, json.dumps([own, material, document["scenes"]])))
+        found.append(MeshBody(surface, json.dumps([own, material, document["scenes"]])))
     return found

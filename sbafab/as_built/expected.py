@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 from sbafab.actuators import build
-from sbafab.as_built.kerf_removed import uncut
+from sbafab.as_built.kerf_removed import remove_kerf
 from sbafab.cutting.chaining import check_clear
 from sbafab.cutting.files import compensated_paths
 from sbafab.cutting.properties import CutSettings, curves_of
@@ -30,7 +30,7 @@ from sbafab.rules.finding import Finding
 from sbafab.rules.limits import TOLERANCE, Limits
 from sbafab.rules.measures import Measures
 
-AGREED = 2 * TOLERANCE
+AGREEMENT = 2 * TOLERANCE
 """mm between two contours that are each within TOLERANCE of the one that was meant."""
 SAME = 1e-8
 """mm: coordinates that differ by less were written as one."""
@@ -43,7 +43,7 @@ def with_circles(region: Region) -> Region:
 
 def _rounded(contour: Contour) -> Contour:
     low_x, low_y, high_x, high_y = contour.bounds
-    if contour.circle is not None or abs(high_x - low_x - high_y + low_y) > 2 * AGREED:
+    if contour.circle is not None or abs(high_x - low_x - high_y + low_y) > 2 * AGREEMENT:
         return contour
     centre = centroid(Region((contour,)))
     least = min(math.dist(edge.nearest(centre), centre) for edge in contour.edges)
@@ -56,11 +56,11 @@ def _rounded(contour: Contour) -> Contour:
 
 def without_specks(region: Region) -> Region:
     """The region without edges shorter than AGREED, which rounded corners leave when uncut."""
-    return Region(tuple(map(_unspecked, region.contours)))
+    return Region(tuple(map(_without_specks, region.contours)))
 
 
-def _unspecked(contour: Contour) -> Contour:
-    kept = [edge for edge in contour.edges if math.dist(edge.start, edge.end) >= AGREED]
+def _without_specks(contour: Contour) -> Contour:
+    kept = [edge for edge in contour.edges if math.dist(edge.start, edge.end) >= AGREEMENT]
     if len(kept) == len(contour.edges) or len(kept) < 3:
         return contour
     ends = [edge.start for edge in (*kept[1:], kept[0])]
@@ -73,7 +73,7 @@ def _unspecked(contour: Contour) -> Contour:
 
 
 @dataclass
-class _Alike:
+class _ContourGroup:
     """Contours that agree with the ``first``; ``members`` are drawn like it, edge by edge."""
 
     first: Contour
@@ -82,9 +82,9 @@ class _Alike:
     def takes(self, contour: Contour) -> bool:
         """Whether a contour agrees; it is then counted."""
         apart = zip(contour.bounds, self.first.bounds, strict=True)
-        if contour.is_hole != self.first.is_hole or any(abs(a - b) > 2 * AGREED for a, b in apart):
+        if contour.is_hole != self.first.is_hole or any(abs(a - b) > 2 * AGREEMENT for a, b in apart):
             return False
-        member = _drawn_like(self.first, contour)
+        member = _matching_edges(self.first, contour)
         if member is not None:
             self.members.append(member)
         return member is not None or _lies_on(self.first, contour)
@@ -98,7 +98,7 @@ class _Alike:
             whole = circle((x, y), radius)
             return whole.reversed() if self.first.is_hole else whole
         rows = [contour.vertices for contour in self.members]
-        if max(_off(rows[0], row) for row in rows) < SAME:
+        if max(_largest_difference(rows[0], row) for row in rows) < SAME:
             return self.first
         corners = [
             tuple(_median([row[i][j] for row in rows]) for j in range(3))
@@ -119,7 +119,7 @@ def _median(values: Sequence[float]) -> float:
     return median(values)
 
 
-def _off(
+def _largest_difference(
     one: Sequence[tuple[float, float, float]], other: Sequence[tuple[float, float, float]]
 ) -> float:
     return max(
@@ -127,11 +127,11 @@ def _off(
     )
 
 
-def _drawn_like(first: Contour, other: Contour) -> Contour | None:
+def _matching_edges(first: Contour, other: Contour) -> Contour | None:
     """The other contour from where the first one starts, if each of its edges agrees with one."""
     if first.circle is not None and other.circle is not None:
         (p, r), (q, s) = first.circle, other.circle
-        return other if math.dist(p, q) + abs(r - s) <= AGREED else None
+        return other if math.dist(p, q) + abs(r - s) <= AGREEMENT else None
     if len(first.edges) != len(other.edges):
         return None
     start = first.edges[0].start
@@ -139,7 +139,7 @@ def _drawn_like(first: Contour, other: Contour) -> Contour | None:
     offset = ways.index(min(ways))
     edges = (*other.edges[offset:], *other.edges[:offset])
     agree = all(
-        math.dist(a.start, b.start) <= AGREED and math.dist(a.at(0.5), b.at(0.5)) <= AGREED
+        math.dist(a.start, b.start) <= AGREEMENT and math.dist(a.at(0.5), b.at(0.5)) <= AGREEMENT
         for a, b in zip(first.edges, edges, strict=True)
     )
     return Contour(edges) if agree else None
@@ -148,7 +148,7 @@ def _drawn_like(first: Contour, other: Contour) -> Contour | None:
 def _lies_on(first: Contour, other: Contour) -> bool:
     """Whether two contours that are drawn by other edges run along each other."""
     try:
-        check_contours(Region((other,)), Region((first,)), AGREED)
+        check_contours(Region((other,)), Region((first,)), AGREEMENT)
     except OutputError:
         return False
     return True
@@ -156,14 +156,14 @@ def _lies_on(first: Contour, other: Contour) -> bool:
 
 def in_agreement(regions: Sequence[Region]) -> list[Region]:
     """The regions with all contours that agree, within AGREED mm, replaced by their median."""
-    groups: list[_Alike] = []
-    homes: list[list[_Alike]] = []
+    groups: list[_ContourGroup] = []
+    homes: list[list[_ContourGroup]] = []
     for region in regions:
         own = []
         for contour in region.contours:
             home = next((group for group in groups if group.takes(contour)), None)
             if home is None:
-                home = _Alike(contour, [contour])
+                home = _ContourGroup(contour, [contour])
                 groups.append(home)
             own.append(home)
         homes.append(own)
@@ -181,12 +181,12 @@ def refuse_coarse(
     try:
         found = _first_failure(as_cut(laminate, paths, settings), limits)
     except (OutputError, GeometryError) as failure:
-        raise DesignError(_refused(error, f"leave no sound contours: {failure}")) from failure
+        raise DesignError(_refusal(error, f"leave no sound contours: {failure}")) from failure
     if found is not None:
-        raise DesignError(_refused(error, f"break {found.rule}: {found.message}"))
+        raise DesignError(_refusal(error, f"break {found.rule}: {found.message}"))
 
 
-def _refused(error: float, why: str) -> str:
+def _refusal(error: float, why: str) -> str:
     return (
         f"chords within {error:g} mm {why}; take a smaller --chord-error, or true arcs with "
         "--dxf-profile bulges or arcs"
@@ -199,7 +199,7 @@ def as_cut(laminate: Laminate, paths: Mapping[str, Region], settings: CutSetting
     for pattern, path in paths.items():
         check_clear(path.contours)
         material = laminate.patterns[pattern][0].film.material
-        part = uncut(with_circles(path), settings.kerf_width(material) or 0.0)
+        part = remove_kerf(with_circles(path), settings.kerf_width(material) or 0.0)
         cut.append(with_circles(part.region))
     profiles = dict(zip(paths, in_agreement(cut), strict=True))
     return replace(
@@ -257,7 +257,7 @@ class RunWork(NamedTuple):
     findings: tuple[Finding, ...]
 
 
-def meant_by(design: Design, curves: str | None) -> Meant | None:
+def expected_laminate(design: Design, curves: str | None) -> Meant | None:
     """The laminate of a design, drawn with such ``curves``; None where it cannot be built or cut.
 
     Of one in chords, the laminate that these cut.

@@ -18,20 +18,20 @@ KINK = 0.05
 """Radians: arcs along one curve turn less where they join, corners of a path more."""
 STEP = math.radians(5)
 """Most that a chord turns round a corner."""
-SHARPEST = math.radians(88)
+MAX_HALF_TURN = math.radians(88)
 """Half the turn of the sharpest corner whose rounding is reckoned with."""
-STILL = 0.15
+CORNER_SHARE = 0.15
 """Share of its way on the path that the part's edge covers less of, where it has a corner."""
 
 
-class UncutPart(NamedTuple):
+class CutResult(NamedTuple):
     """What is left, and the most area that corners lose or gain because the beam rounds them."""
 
     region: Region
     corner_room: float
 
 
-def uncut(path: Region, kerf: Kerf) -> UncutPart:
+def remove_kerf(path: Region, kerf: Kerf) -> CutResult:
     """The part inside a path; empty or OutputError where such a beam cannot have left one."""
     a, b = (width / 2 for width in widths(kerf))
     if a == b:
@@ -39,14 +39,14 @@ def uncut(path: Region, kerf: Kerf) -> UncutPart:
         rounded = sum(
             isinstance(e, Arc) and not e.ccw and abs(e.radius - a) < 5e-5 for e in region.edges
         )
-        return UncutPart(region, rounded * a * a)
-    region = Region(tuple(_inside(contour, a, b) for contour in path.contours))
+        return CutResult(region, rounded * a * a)
+    region = Region(tuple(_part_contour(contour, a, b) for contour in path.contours))
     check_clear(region.contours)
     joints = [joint for contour in path.contours for joint in _joints(contour)]
-    return UncutPart(region, sum(_corner_room(*joint, a, b) for joint in joints))
+    return CutResult(region, sum(_corner_room(*joint, a, b) for joint in joints))
 
 
-class _Spot(NamedTuple):
+class _Vertex(NamedTuple):
     """A point of the path and of the part; whether a straight edge ends there, or starts."""
 
     path: Point
@@ -55,17 +55,17 @@ class _Spot(NamedTuple):
     goes_straight: bool
 
 
-def _inside(contour: Contour, a: float, b: float) -> Contour:
+def _part_contour(contour: Contour, a: float, b: float) -> Contour:
     """The contour of the part: each vertex of the path lies on the exact curve."""
-    kept: list[_Spot] = []
-    for spot in (spot for joint in _joints(contour) for spot in _spots(*joint, a, b)):
-        if kept and _at_one_corner(kept[-1], spot):
+    kept: list[_Vertex] = []
+    for spot in (spot for joint in _joints(contour) for spot in _vertices(*joint, a, b)):
+        if kept and _share_corner(kept[-1], spot):
             # The ends of straight edges tell the corner best.
             best = spot if spot.is_straight else kept[-1]
             kept[-1] = best._replace(path=spot.path, goes_straight=spot.goes_straight)
         else:
             kept.append(spot)
-    if len(kept) > 1 and _at_one_corner(kept[-1], kept[0]):
+    if len(kept) > 1 and _share_corner(kept[-1], kept[0]):
         kept.pop() if kept[0].is_straight else kept.pop(0)
     inside = tidy(with_arcs(_chords(kept)).edges) if _is_sound(kept) else None
     if inside is None or inside.is_hole != contour.is_hole:
@@ -74,7 +74,7 @@ def _inside(contour: Contour, a: float, b: float) -> Contour:
     return inside
 
 
-def _chords(spots: Sequence[_Spot]) -> Contour:
+def _chords(spots: Sequence[_Vertex]) -> Contour:
     """Lines from spot to spot; a straight edge is two, so that it is no chord of any circle."""
     points: list[Point] = []
     for spot, after in zip(spots, (*spots[1:], spots[0]), strict=True):
@@ -83,7 +83,7 @@ def _chords(spots: Sequence[_Spot]) -> Contour:
     return Contour(tuple(map(Line, points, (*points[1:], points[0]))))
 
 
-def _is_sound(spots: Sequence[_Spot]) -> bool:
+def _is_sound(spots: Sequence[_Vertex]) -> bool:
     """Whether the part's edge runs the way its path does."""
     return len(spots) > 2 and all(
         (q.part[0] - p.part[0]) * (q.path[0] - p.path[0])
@@ -93,8 +93,8 @@ def _is_sound(spots: Sequence[_Spot]) -> bool:
     )
 
 
-def _at_one_corner(one: _Spot, other: _Spot) -> bool:
-    return math.dist(one.part, other.part) < STILL * math.dist(one.path, other.path)
+def _share_corner(one: _Vertex, other: _Vertex) -> bool:
+    return math.dist(one.part, other.part) < CORNER_SHARE * math.dist(one.path, other.path)
 
 
 def _joints(contour: Contour) -> Iterator[tuple[Edge, Edge]]:
@@ -112,10 +112,10 @@ def _corner_room(before: Edge, after: Edge, a: float, b: float) -> float:
         return 0.0
     (ux, uy), (vx, vy) = before.direction(after.start), after.direction(after.start)
     turn = math.atan2((ux * vy - uy * vx) * a * b, ux * vx * b * b + uy * vy * a * a)
-    return a * b * math.tan(min(abs(turn) / 2, SHARPEST))
+    return a * b * math.tan(min(abs(turn) / 2, MAX_HALF_TURN))
 
 
-def _spots(before: Edge, after: Edge, a: float, b: float) -> Iterator[_Spot]:
+def _vertices(before: Edge, after: Edge, a: float, b: float) -> Iterator[_Vertex]:
     """A vertex of the path; a corner to the right is rounded by the beam, and makes many spots."""
     q, turn = after.start, _turn(before, after)
     if turn > KINK:
@@ -136,7 +136,7 @@ def _spots(before: Edge, after: Edge, a: float, b: float) -> Iterator[_Spot]:
     for more in turns:
         x, y = rim(a, b, first + more)
         last = more == turns[-1] and isinstance(after, Line)
-        yield _Spot(q, (q[0] - x, q[1] - y), straight, last)
+        yield _Vertex(q, (q[0] - x, q[1] - y), straight, last)
 
 
 # Runs of chords that are meant as an arc: found where none should be, and made one again.
@@ -144,8 +144,8 @@ def _spots(before: Edge, after: Edge, a: float, b: float) -> Iterator[_Spot]:
 
 ON_CIRCLE = 1e-5
 """mm by which the ends of chords may miss their circle."""
-LEAST_CHORDS = 5
-WIDEST_STEP = math.radians(20)
+MIN_CHORDS = 5
+MAX_STEP = math.radians(20)
 """So many chords, each turning less than this on one circle, are meant as an arc."""
 
 
@@ -157,18 +157,18 @@ class ChordRun(NamedTuple):
     radius: float
 
 
-def chorded_place(region: Region) -> Point | None:
+def chords_for_arc(region: Region) -> Point | None:
     """Where a run of chords stands in for an arc; None if there is none."""
     for contour in region.contours:
-        for run in _runs(_ends(contour)):
-            if len(run.points) > LEAST_CHORDS:
+        for run in _runs(_line_starts(contour)):
+            if len(run.points) > MIN_CHORDS:
                 return run.points[0]
     return None
 
 
 def with_arcs(contour: Contour) -> Contour:
     """The contour of lines with arcs through every run of chords that are meant as one."""
-    points = _ends(contour)
+    points = _line_starts(contour)
     if len(points) != len(contour.edges):
         return contour
     runs = list(_runs(points))
@@ -186,7 +186,7 @@ def with_arcs(contour: Contour) -> Contour:
     return Contour(tuple(rebuilt))
 
 
-def _ends(contour: Contour) -> list[Point]:
+def _line_starts(contour: Contour) -> list[Point]:
     """Where the contour's lines start; arcs leave a point that lies on no circle."""
     points: list[Point] = []
     for edge in contour.edges:
@@ -215,7 +215,7 @@ def _runs(points: list[Point]) -> Iterator[ChordRun]:
     count = len(points)
     if count < 4:
         return
-    first = next((i for i in range(count) if not _is_run(points, i - 1)), None)
+    first = next((i for i in range(count) if not _on_one_circle(points, i - 1)), None)
     if first is None:
         found = _circle(points[0], points[count // 3], points[2 * count // 3])
         if found is not None:
@@ -226,7 +226,7 @@ def _runs(points: list[Point]) -> Iterator[ChordRun]:
     start, last = 0, count + 1
     while start + 2 <= last:
         end = start + 2
-        while end + 1 <= last and _is_run(ring, end - 2):
+        while end + 1 <= last and _on_one_circle(ring, end - 2):
             end += 1
         run = tuple(ring[start : end + 1])
         found = _circle(run[0], run[len(run) // 2], run[-1])
@@ -239,7 +239,7 @@ def _runs(points: list[Point]) -> Iterator[ChordRun]:
         start = end
 
 
-def _is_run(points: list[Point], first: int) -> bool:
+def _on_one_circle(points: list[Point], first: int) -> bool:
     """Whether four points from ``first`` on lie on one circle, near each other, turning one way."""
     a, b, c, d = (points[(first + i) % len(points)] for i in range(4))
     found = _circle(a, b, c)
@@ -247,12 +247,12 @@ def _is_run(points: list[Point], first: int) -> bool:
         return False
     centre, radius = found
     longest = max(math.dist(a, b), math.dist(b, c), math.dist(c, d))
-    return abs(math.dist(d, centre) - radius) < ON_CIRCLE and _narrow(longest, radius)
+    return abs(math.dist(d, centre) - radius) < ON_CIRCLE and _is_short(longest, radius)
 
 
-def _narrow(length: float, radius: float) -> bool:
+def _is_short(length: float, radius: float) -> bool:
     """Whether a chord is short enough, beside its circle, to stand for an arc."""
-    return length < 2 * math.sin(WIDEST_STEP / 2) * radius
+    return length < 2 * math.sin(MAX_STEP / 2) * radius
 
 
 def _angle_between(a: Point, b: Point, c: Point) -> float:

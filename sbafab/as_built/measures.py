@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from sbafab.as_built.claims import claim, waiver_properties
-from sbafab.as_built.cut_files import CutPart, LayerFile, read_part, told_of
+from sbafab.as_built.cut_files import CutPart, LayerFile, read_part, claimed_properties
 from sbafab.as_built.records import CLAIMS, INTEGRITY, Problem
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
@@ -222,7 +222,7 @@ def fixture_problems(folder: Path, laminate: Laminate, claims: Manifest) -> list
     if claims.fixture not in claims.files:
         return [claim(f"the fixture {claims.fixture!r} is not among the manifest's files")]
     try:
-        part = read_part(folder / claims.fixture, told=told_of(claims, "plate"), noted=True)
+        part = read_part(folder / claims.fixture, told=claimed_properties(claims, "plate"), noted=True)
     except OutputError as error:
         name = Path(claims.fixture).name
         said = str(error).removeprefix(f"{name}: ")

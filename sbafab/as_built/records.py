@@ -27,10 +27,10 @@ CLAIMS = "manifest-claims"
 DESIGNED = "as-designed"
 
 
-MOST_BYTES = 50_000_000
+MAX_MANIFEST_BYTES = 50_000_000
 
 
-MOST_SHOWN = 12
+MAX_SHOWN = 12
 """Problems of one rule that are reported one by one."""
 
 
@@ -47,7 +47,7 @@ def is_job(folder: Path) -> bool:
     """Whether a folder is one of several designs, of a job or an assembly."""
     path = folder / "manifest.json"
     try:
-        is_small = path.is_file() and path.stat().st_size <= MOST_BYTES
+        is_small = path.is_file() and path.stat().st_size <= MAX_MANIFEST_BYTES
     except OSError:
         return False
     return is_small and (read_manifest(folder) or {}).get("schema") in (JOB_SCHEMA, ASSEMBLY_SCHEMA)
@@ -58,12 +58,12 @@ def read_job(folder: Path) -> JobManifest:
     return _read(folder, JobManifest, JOB_SCHEMA)
 
 
-def is_joined(job: JobManifest) -> bool:
+def is_assembly(job: JobManifest) -> bool:
     """Whether a job's designs are the parts of an assembly."""
     return job.schema_name == ASSEMBLY_SCHEMA
 
 
-def read_joined(folder: Path) -> AssemblyManifest:
+def read_assembly(folder: Path) -> AssemblyManifest:
     """The manifest of an assembly's folder. Raises OutputError as ``read_claims`` does."""
     return _read(folder, AssemblyManifest, ASSEMBLY_SCHEMA)
 
@@ -77,8 +77,8 @@ def _read(folder: Path, kind: type[Read], schema: str) -> Read:
         # A pipe or a device would be read for ever.
         if path.exists() and not path.is_file():
             raise OutputError(f"{path} is no plain file; regenerate the folder")
-        if path.stat().st_size > MOST_BYTES:
-            raise OutputError(f"{path} is larger than {MOST_BYTES:,} bytes; regenerate the folder")
+        if path.stat().st_size > MAX_MANIFEST_BYTES:
+            raise OutputError(f"{path} is larger than {MAX_MANIFEST_BYTES:,} bytes; regenerate the folder")
         data = path.read_bytes()
     except (FileNotFoundError, NotADirectoryError):
         raise OutputError(
@@ -118,7 +118,7 @@ def findings_of(rule: str, problems: list[Problem], passed: str) -> list[Finding
     own = [problem for problem in problems if problem.rule == rule]
     if not any(problem.verdict == "fail" for problem in own):
         own.append(Problem(rule, passed, verdict="pass"))
-    shown, rest = own[:MOST_SHOWN], own[MOST_SHOWN:]
+    shown, rest = own[:MAX_SHOWN], own[MAX_SHOWN:]
     if rest:
         layers = tuple(dict.fromkeys(index for problem in rest for index in problem.layers))
         message = f"and {len(rest)} more like these"

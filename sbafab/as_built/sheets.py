@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
 from sbafab.as_built.claims import bare_problem, claim
-from sbafab.as_built.cut_files import LayerFile, check_sequence, inside, sound_digest
-from sbafab.as_built.expected import AGREED, Meant, departure
-from sbafab.as_built.kerf_removed import uncut
+from sbafab.as_built.cut_files import LayerFile, check_sequence, path_in_folder, sound_digest
+from sbafab.as_built.expected import AGREEMENT, Meant, departure
+from sbafab.as_built.kerf_removed import remove_kerf
 from sbafab.as_built.measures import SHARE
 from sbafab.as_built.records import CLAIMS, INTEGRITY, Problem
 from sbafab.cutting.dxf_read import ReadBack, read_profile
@@ -61,7 +61,7 @@ class CutSheet:
 
 
 @dataclass(frozen=True)
-class Lot:
+class DesignLot:
     """The layers' files of a design, of which ``copies`` are cut, and ``spares`` by the number."""
 
     design: str
@@ -76,7 +76,7 @@ _Pattern = tuple[str, str]
 
 
 @dataclass(frozen=True)
-class _Kind:
+class _PieceKind:
     """Pieces that a layer file cuts, alike up to a turn: ``wanted`` counts them by pattern."""
 
     forms: tuple[Region, ...]
@@ -91,16 +91,16 @@ def _names(patterns: Iterable[_Pattern]) -> str:
     return ", ".join(f"{design} {pattern}" for design, pattern in patterns)
 
 
-class _Kinds:
+class _PieceKinds:
     """The kinds of one material, found by shape; whether two shapes agree is asked once."""
 
     def __init__(self, turns: Sequence[Turn], room: float) -> None:
-        self.all: list[_Kind] = []
+        self.all: list[_PieceKind] = []
         self._turns = turns
         self._room = room
-        self._known: dict[_Outline, _Kind] = {}
+        self._known: dict[_Outline, _PieceKind] = {}
 
-    def find(self, piece: Region) -> _Kind | None:
+    def find(self, piece: Region) -> _PieceKind | None:
         """The kind that a piece is of, wherever it lies and however it may be turned."""
         outline = _outline(piece)
         known = self._known.get(outline)
@@ -110,7 +110,7 @@ class _Kinds:
                 (
                     kind
                     for kind in self.all
-                    if any(_alike(lying, form, self._room) for form in kind.forms)
+                    if any(_agree(lying, form, self._room) for form in kind.forms)
                 ),
                 None,
             )
@@ -118,16 +118,16 @@ class _Kinds:
                 self._known[outline] = known
         return known
 
-    def add(self, piece: Region) -> _Kind:
+    def add(self, piece: Region) -> _PieceKind:
         forms = (_at_origin(piece.turned(90.0 * turn)) for turn in self._turns)
-        kind = _Kind(tuple({form.key: form for form in forms}.values()))
+        kind = _PieceKind(tuple({form.key: form for form in forms}.values()))
         self.all.append(kind)
         return kind
 
 
 def piece_problems(
     sheets: Sequence[CutSheet],
-    lots: Sequence[Lot],
+    lots: Sequence[DesignLot],
     turns: Mapping[Material, Sequence[Turn]],
 ) -> list[Problem]:
     """Pieces on the sheets that no layer has, or not as often as layers and copies ask for."""
@@ -136,10 +136,10 @@ def piece_problems(
     drawn = {file.claim.material for lot in lots for file in lot.files}
     for material in in_order(told | drawn):
         own = [sheet for sheet in sheets if sheet.told.material == material]
-        kinds = _kinds_of(lots, material, turns.get(material, TURNS), AGREED)
+        kinds = _kinds_of(lots, material, turns.get(material, TURNS), AGREEMENT)
         cut: Counter[int] = Counter()
         for sheet in own:
-            found, strangers = _sorted_out(sheet, kinds)
+            found, strangers = _counted_pieces(sheet, kinds)
             problems += strangers
             problems += _count_problems(sheet, kinds.all, found)
             cut += found
@@ -155,9 +155,9 @@ def piece_problems(
 
 
 def _kinds_of(
-    lots: Sequence[Lot], material: Material, turns: Sequence[Turn], room: float
-) -> _Kinds:
-    kinds = _Kinds(turns, room)
+    lots: Sequence[DesignLot], material: Material, turns: Sequence[Turn], room: float
+) -> _PieceKinds:
+    kinds = _PieceKinds(turns, room)
     for lot in lots:
         drawn = Counter(
             (file.part.path, file.claim.pattern)
@@ -177,7 +177,7 @@ def _kinds_of(
     return kinds
 
 
-def _sorted_out(sheet: CutSheet, kinds: _Kinds) -> tuple[Counter[int], list[Problem]]:
+def _counted_pieces(sheet: CutSheet, kinds: _PieceKinds) -> tuple[Counter[int], list[Problem]]:
     """How many pieces of each kind a sheet holds, and those that are of none."""
     found: Counter[int] = Counter()
     strangers = []
@@ -195,7 +195,7 @@ def _sorted_out(sheet: CutSheet, kinds: _Kinds) -> tuple[Counter[int], list[Prob
     return found, strangers
 
 
-def _count_problems(sheet: CutSheet, kinds: Sequence[_Kind], found: Counter[int]) -> list[Problem]:
+def _count_problems(sheet: CutSheet, kinds: Sequence[_PieceKind], found: Counter[int]) -> list[Problem]:
     """Counts by pattern that a sheet claims; patterns that share a piece are counted as one."""
     told: Counter[_Pattern] = Counter()
     for part in sheet.told.parts:
@@ -216,7 +216,7 @@ def _count_problems(sheet: CutSheet, kinds: Sequence[_Kind], found: Counter[int]
     return problems
 
 
-def _groups(kinds: Sequence[_Kind]) -> dict[_Pattern, _Pattern]:
+def _groups(kinds: Sequence[_PieceKind]) -> dict[_Pattern, _Pattern]:
     """Every pattern's group, by its first pattern: one pattern, or those that share pieces."""
     groups: dict[_Pattern, _Pattern] = {}
     for kind in kinds:
@@ -244,7 +244,7 @@ def _at_origin(piece: Region) -> Region:
     return piece.moved(-x, -y)
 
 
-def _alike(piece: Region, form: Region, room: float) -> bool:
+def _agree(piece: Region, form: Region, room: float) -> bool:
     """Whether two regions at the origin agree within ``room`` mm."""
     if len(piece.contours) != len(form.contours):
         return False
@@ -271,7 +271,7 @@ class SheetOrder:
     claims: Manifest | JobManifest
     design: Design
     kerf: Mapping[Material, KerfClaim]
-    lots: Sequence[Lot]
+    lots: Sequence[DesignLot]
 
     @property
     def sha256(self) -> str:
@@ -298,7 +298,7 @@ def sheet_problems(folder: Path, order: SheetOrder) -> list[Problem]:
         try:
             found = _read(folder, told)
         except OutputError as error:
-            problems.append(_unsound(told, error))
+            problems.append(_integrity_problem(told, error))
             continue
         sheets.append(CutSheet(told, found.region))
         if found.properties:
@@ -318,7 +318,7 @@ def sheet_problems(folder: Path, order: SheetOrder) -> list[Problem]:
 
 def _read(folder: Path, told: SheetClaim) -> ReadBack:
     """What a sheet's file holds. Raises OutputError where it is not sound."""
-    path = inside(folder, told.file)
+    path = path_in_folder(folder, told.file)
     sound_digest(path)
     try:
         found = read_profile(path)
@@ -332,7 +332,7 @@ def _read(folder: Path, told: SheetClaim) -> ReadBack:
         raise OutputError(f"holds no sound contours ({error}); regenerate it") from error
 
 
-def _unsound(told: SheetClaim, error: OutputError, place: Point | None = None) -> Problem:
+def _integrity_problem(told: SheetClaim, error: OutputError, place: Point | None = None) -> Problem:
     said = str(error).removeprefix(f"{PurePosixPath(told.file).name}: ")
     x, y = place or (None, None)
     return Problem(INTEGRITY, f"{told.file}: {said}", x=x, y=y)
@@ -456,18 +456,18 @@ def _layout_problems(told: SheetClaim, found: ReadBack, stock: Stock) -> list[Pr
     pieces = [(_placed_piece(piece.bounds), piece) for piece in found.region.pieces]
     try:
         check_surroundings(replace(found, strokes=beside), around)
-        check_placed(pieces, laid, AGREED)
+        check_placed(pieces, laid, AGREEMENT)
     except OutputError as error:
-        problems.append(_unsound(told, error))
+        problems.append(_integrity_problem(told, error))
     top = found.region.bounds[3] + told.border
     if stock.roll and abs(told.length - top) > TOLERANCE:
         message = f"{told.file}: is {told.length:g} mm long, and its parts and border {top:g}"
         problems.append(claim(message))
-    bad = _badly_engraved(found, told)
+    bad = _engraving_off_waste(found, told)
     if bad is not None:
         x, y = bad
         message = f"engraving at x {x:.3f}, y {y:.3f} is not in the waste; regenerate it"
-        problems.append(_unsound(told, OutputError(message), bad))
+        problems.append(_integrity_problem(told, OutputError(message), bad))
     return problems
 
 
@@ -475,7 +475,7 @@ def _placed_piece(box: tuple[float, float, float, float]) -> str:
     return f"the piece about x {(box[0] + box[2]) / 2:.1f}, y {(box[1] + box[3]) / 2:.1f}"
 
 
-def _badly_engraved(found: ReadBack, told: SheetClaim) -> Point | None:
+def _engraving_off_waste(found: ReadBack, told: SheetClaim) -> Point | None:
     """Where engraving crosses a part's edge, lies in a part or leaves the sheet."""
     strokes = [edge for layer, edges in found.strokes if layer == ENGRAVE for edge in edges]
     return next((edge.start for edge in strokes if not _in_waste(edge, found, told)), None)
@@ -529,12 +529,12 @@ def read_panel(
         return panel, list(files), []
     kerfs = {material: kerf.width for material, kerf in claims.kerf.items()}
     kerf = stack_kerf(kerfs, severed(meant.laminate))
-    second, problems = _second(folder, kerf or 0.0, panel)
+    second, problems = _second_cut(folder, kerf or 0.0, panel)
     parts = [file.part for file in files]
     if second is panel.second and all(part is None or part.is_meant for part in parts):
         return panel, list(files), problems
     sheets = tuple(
-        own if part is None or part.is_meant else _upward(part.region, layer)
+        own if part is None or part.is_meant else _seen_from_above(part.region, layer)
         for own, part, layer in zip(panel.sheets, parts, meant.laminate.layers, strict=True)
     )
     found = replace(panel, sheets=sheets, second=second)
@@ -546,7 +546,7 @@ def read_panel(
     )
 
 
-def _upward(sheet: Region, layer: Layer) -> Region:
+def _seen_from_above(sheet: Region, layer: Layer) -> Region:
     """A sheet as it is seen from above: those of masks are cut turned over."""
     return sheet.mirrored() if layer.is_mask else sheet
 
@@ -560,7 +560,7 @@ def _with_part(file: LayerFile, panel: SheetPanel, layer: Layer) -> LayerFile:
     return replace(file, part=replace(file.part, region=region))
 
 
-def _second(folder: Path, width: Kerf, panel: SheetPanel) -> tuple[Region, list[Problem]]:
+def _second_cut(folder: Path, width: Kerf, panel: SheetPanel) -> tuple[Region, list[Problem]]:
     """The slots of the second cut's file, the panel's own where they agree."""
     try:
         sound_digest(folder / PATH)
@@ -572,12 +572,12 @@ def _second(folder: Path, width: Kerf, panel: SheetPanel) -> tuple[Region, list[
         return panel.second, [Problem(INTEGRITY, f"{PATH}: {said}")]
     if not departure(found.region, second_path(panel, width)):
         return panel.second, []
-    return _slots(found.region, width), []
+    return _cut_slots(found.region, width), []
 
 
-def _slots(path: Region, kerf: Kerf) -> Region:
+def _cut_slots(path: Region, kerf: Kerf) -> Region:
     """What a beam takes out that is led round inside slots."""
     x0, y0, x1, y1 = widened(path.bounds, ROOM)
     inner = [contour.reversed() for contour in path.contours]
-    left = uncut(Region((*rectangle((x0, y0), (x1, y1)).contours, *inner)), kerf).region
+    left = remove_kerf(Region((*rectangle((x0, y0), (x1, y1)).contours, *inner)), kerf).region
     return Region(tuple(hole.reversed() for hole in left.holes))

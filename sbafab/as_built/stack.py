@@ -55,15 +55,15 @@ def laminate_of(files: Sequence[LayerFile], claims: Manifest, design: Design) ->
         key=lambda place: _nearest_claim(place, claims),
     )
     pins = _tooling_pins(bare, drilled, claims, design)
-    first, ends = _tabbed(layers, [pin.centre for pin in pins])
+    first, ends = _tabbed_interface(layers, [pin.centre for pin in pins])
     if first is None:
-        return replace(bare, bores=_nameless(drilled, design), pins=pins)
+        return replace(bare, bores=_unnamed_bores(drilled, design), pins=pins)
     names = _chamber_names(ends, claims)
     known = [inlet.chamber for inlet in claims.inlets]
     centres: dict[str, list[Point]] = {name: [] for name in (*known, *names) if name in names}
     named: list[Bore] = []
     for place in drilled:
-        name = names[feeding(ends, place, first)]
+        name = names[feeding_tab(ends, place, first)]
         centres[name].append(place)
         named.append(Bore(name, place, design.bore.diameter))
     for tab, name in zip(ends, names, strict=True):
@@ -133,7 +133,7 @@ def _pieces(layer: Layer, has_lumen: bool, chambers: int, places: int) -> int:
     return chambers if is_bottom else places
 
 
-def _tabbed(layers: Sequence[Layer], ears: Sequence[Point]) -> tuple[Interface | None, list[Tab]]:
+def _tabbed_interface(layers: Sequence[Layer], ears: Sequence[Point]) -> tuple[Interface | None, list[Tab]]:
     """The lowest chamber interface with inlet tabs, and those."""
     seen: set[tuple[str, ...]] = set()
     for below, mask, above in zip(layers, layers[1:], layers[2:], strict=False):
@@ -175,7 +175,7 @@ def _chamber_names(ends: Sequence[Tab], claims: Manifest) -> list[str]:
     return names
 
 
-def _nameless(places: Sequence[Point], design: Design) -> tuple[Bore, ...]:
+def _unnamed_bores(places: Sequence[Point], design: Design) -> tuple[Bore, ...]:
     diameter = design.bore.diameter
     return tuple(Bore(f"channel{n}", p, diameter) for n, p in enumerate(places, start=1))
 
@@ -314,16 +314,16 @@ def _mouth(tab: Tab, interface: Interface) -> tuple[float, float] | None:
     return (min(offsets), max(offsets)) if offsets else None
 
 
-def feeding(tabs: Sequence[Tab], place: Point, interface: Interface) -> int:
+def feeding_tab(tabs: Sequence[Tab], place: Point, interface: Interface) -> int:
     """Which tab feeds the channel or pocket at ``place``.
 
     The nearest of those whose strip opens into the same pocket; else of those whose strip opens
     into none; else of all.
     """
     pockets = interface.unbonded.pieces if not interface.unbonded.is_empty else ()
-    holding = [piece for piece in pockets if _holds(piece, place)]
+    holding = [piece for piece in pockets if _contains(piece, place)]
     opens = [
-        [piece for piece in pockets if tab.mouth and _holds(piece, _just_inside(tab))]
+        [piece for piece in pockets if tab.mouth and _contains(piece, _just_inside(tab))]
         for tab in tabs
     ]
     own = [n for n, into in enumerate(opens) if any(piece in holding for piece in into)]
@@ -348,7 +348,7 @@ def _just_inside(tab: Tab) -> Point:
     return tab.at(10 * TOLERANCE, tab.offset(tab.middle))
 
 
-def _holds(piece: Region, p: Point) -> bool:
+def _contains(piece: Region, p: Point) -> bool:
     return any(outer.winding(p) != 0 for outer in piece.outers)
 
 
@@ -380,7 +380,7 @@ def bores(layers: Sequence[Layer], stated: float, lumen: float | None) -> list[O
         opening
         for opening in openings(bored, stated / 2)
         if 2 * opening.layers > len(bored)
-        and 2 * _near(opening.centre, masks, stated / 2) >= len(masks)
+        and 2 * _hole_count(opening.centre, masks, stated / 2) >= len(masks)
     ]
     if lumen is None:
         return found
@@ -436,7 +436,7 @@ def openings(
     ]
 
 
-def _near(place: Point, layers: Iterable[Layer], nearness: float) -> int:
+def _hole_count(place: Point, layers: Iterable[Layer], nearness: float) -> int:
     """How many layers have a hole at the place."""
     return sum(
         any(math.dist(_place(hole)[0], place) < 2 * nearness for hole in layer.profile.holes)

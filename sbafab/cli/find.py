@@ -13,17 +13,15 @@ from sbafab.cli.options import json_option, refuse_options, set_option
 from sbafab.cli.printing import print_json, print_line, print_verdict, print_wrapped
 from sbafab.cli.progress import shown_progress
 from sbafab.errors import DesignError
-from sbafab.search.find import FoundDesign
-from sbafab.search.quantities import AskedQuantity, shown_value
 from sbafab.search.quantity_names import quantity_lines
-from sbafab.search.trial import Trial, keys_said, value_said
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from sbafab.process import Progress
-    from sbafab.search.find import FindRequest
-    from sbafab.search.trial import Goal, Requirement
+    from sbafab.search.find import FindRequest, FoundDesign
+    from sbafab.search.quantities import AskedQuantity
+    from sbafab.search.trial import Goal, Requirement, Trial
 
 HELP = """Find the best design that meets requirements.
 
@@ -259,6 +257,8 @@ def as_json(result: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
 
 def print_result(result: FoundDesign, origin: str, target: Path) -> None:
     """Print the design with its figures, what binds and the front; or the nearest miss."""
+    from sbafab.search.trial import keys_said, value_said
+
     keys = keys_said(result.best.values)
     title = "Best design" if result.holds else "Nearest miss"
     print_line(f"{title}: {keys}, from {origin}", "bold" if result.holds else "bold red")
@@ -290,6 +290,8 @@ def _counted_requirements(result: FoundDesign) -> str:
 
 def _print_quantities(result: FoundDesign) -> None:
     """Print the required quantities and the goal of the best design."""
+    from sbafab.search.quantities import shown_value
+
     requirements = result.wanted.requirements
     for requirement in requirements:
         value = result.best.value(requirement)
@@ -351,6 +353,9 @@ def _print_miss(result: FoundDesign) -> None:
 
 
 def _print_front(result: FoundDesign) -> None:
+    """Print the Pareto front, if it has several designs."""
+    from sbafab.search.trial import keys_said
+
     if len(result.front) < 2:
         return
     part = f"{len(result.front)} of " if result.on_front > len(result.front) else ""
