@@ -1,4 +1,4 @@
-"""The rule deck on the cut files of an output folder as they lie on disk (``as-built``)."""
+"""Checks of an output folder as it is on disk: file integrity, claims, rules, design."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ from sbafab.as_built.records import (
     INTEGRITY,
     Problem,
     findings_of,
-    is_job,
     is_assembly,
+    is_job,
+    read_assembly,
     read_claims,
     read_job,
-    read_assembly,
 )
 from sbafab.as_built.sheets import DesignLot, SheetOrder, read_panel, sheet_problems
 from sbafab.as_built.stack import laminate_of, stacked_layers
@@ -67,10 +67,9 @@ AS_DESIGNED = "all that lies here is what design.toml makes"
 
 @dataclass(frozen=True)
 class AsBuiltFolder:
-    """A folder read back: ``laminate`` is None where a layer's file could not be read.
+    """A folder read back; ``laminate`` is None if the file of a layer could not be read.
 
-    ``meant`` is what the design makes, if it can be made; ``is_meant``: every layer's file cuts
-    just that, so that ``laminate`` is the design's own.
+    ``expected`` is the laminate of the design, None if it cannot be built.
     """
 
     claims: Manifest
@@ -79,24 +78,25 @@ class AsBuiltFolder:
     files: tuple[LayerFile, ...]
     laminate: Laminate | None
     problems: tuple[Problem, ...]
-    meant: Meant | None
-    known: tuple[Finding, ...] | None = None
-    """What the rules found in ``meant``, where a run has just measured it."""
+    expected: Meant | None
+    design_findings: tuple[Finding, ...] | None = None
+    """The findings of the design check of a run that has just written the folder."""
 
     @property
-    def is_meant(self) -> bool:
-        own, meant = self.laminate, self.meant
-        if own is not None and meant is not None and own.panel is not meant.laminate.panel:
-            return False
-        return all(file.part is not None and file.part.is_meant for file in self.files)
+    def is_expected(self) -> bool:
+        """True if every layer file cuts the design's own layer: ``laminate`` is then the design's."""
+        laminate, expected = self.laminate, self.expected
+        if laminate is not None and expected is not None:
+            if laminate.panel is not expected.laminate.panel:
+                return False
+        return all(file.part is not None and file.part.is_expected for file in self.files)
 
 
 def check_folder(folder: Path) -> tuple[Finding, ...]:
-    """Everything found in an output folder: file integrity, the manifest's claims, the deck, and
-    whether all that lies in it is what its design makes.
+    """Return the findings on an output folder: integrity, claims, rules, and agreement with its design.
 
-    Of a job's folder, that of every design, and of the film sheets they share. Raises OutputError
-    with one sentence for a folder that holds no sound manifest or no cut files.
+    Of a job or an assembly: those of every design and of the shared film sheets. Raises OutputError for
+    a folder without a sound manifest or without cut files.
     """
     if is_job(folder):
         return _check_job(folder)
@@ -107,11 +107,10 @@ def check_folder(folder: Path) -> tuple[Finding, ...]:
 
 
 def check_written(folder: Path, works: Mapping[str, RunWork]) -> tuple[Finding, ...]:
-    """What is found in a folder that has just been written, of ``works`` by their designs' names.
+    """Return the findings on a folder just written from ``works``, by names of their designs.
 
-    Everything is read from the disk. Where every layer's file cuts what the design check measured,
-    its findings hold and are not measured again; what was written beside the cut files is not made
-    a second time to be compared with itself.
+    Everything is read from the disk. If every layer file cuts the layer that the design check measured,
+    its findings are used; files beside the cut files are not made again.
     """
     if is_job(folder):
         return _check_job(folder, works)
@@ -121,11 +120,11 @@ def check_written(folder: Path, works: Mapping[str, RunWork]) -> tuple[Finding, 
 
 
 def _run_deck(built: AsBuiltFolder) -> tuple[Finding, ...]:
-    """What the rules find in the layers as they are cut."""
+    """Return the findings of the rules on the layers as cut."""
     if built.laminate is None:
         return rules_by_layer(built.files, built.claims, built.design, built.limits)
-    if built.is_meant and built.known is not None:
-        return built.known
+    if built.is_expected and built.design_findings is not None:
+        return built.design_findings
     measures = Measures(built.laminate, built.limits)
     return tuple(finding for rule in RULES for finding in findings_as_built(rule, measures))
 
@@ -143,52 +142,53 @@ def _findings(built: AsBuiltFolder, measured: Sequence[Finding]) -> tuple[Findin
 
 
 def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tuple[Finding, ...]:
-    """What is found in every design of a job, its name before it, and on the job's sheets.
+    """Return the findings on every design of a job, on its sheets, and between parts of an assembly.
 
-    In an assembly's folder, also what is found between its parts. ``works``: what the run that has
-    just written the folder knows of its designs.
+    ``works``: the designs of a run that has just written the folder.
     """
     job = read_job(folder)
-    found: list[Finding] = []
+    findings: list[Finding] = []
     lots: list[DesignLot] = []
     problems: list[Problem] = []
-    weak: list[str] = []
+    lowered_limits: list[str] = []
     folders: list[AsBuiltFolder] = []
     checked: list[Checked | None] = []
-    for told in job.designs:
-        work = works.get(told.name) if works is not None else None
-        built = read_folder(path_in_folder(folder, told.folder), of_job=True, work=work)
+    for entry in job.designs:
+        work = works.get(entry.name) if works is not None else None
+        built = read_folder(path_in_folder(folder, entry.folder), of_job=True, work=work)
         folders.append(built)
-        weak += lowered(limits_of(built.design))
+        lowered_limits += lowered(limits_of(built.design))
         measured = _run_deck(built)
-        named = [*_findings(built, measured)]
+        design_findings = [*_findings(built, measured)]
         layers = _layer_problems(built)
-        named += findings_of(DESIGNED, layers, AS_DESIGNED) if layers else []
-        found += [replace(f, message=f"{told.name}: {f.message}") for f in named]
+        design_findings += findings_of(DESIGNED, layers, AS_DESIGNED) if layers else []
+        findings += [replace(f, message=f"{entry.name}: {f.message}") for f in design_findings]
         checked.append(_checked_design(built, measured) if works is None else None)
-        lots.append(DesignLot(told.name, told.copies, built.files, built.design.order.spare_parts))
-        own = (built.claims.name, built.claims.copies, built.claims.design_sha256)
-        if own != (told.name, told.copies, told.design_sha256):
-            message = f"{told.folder}: name, copies or design_sha256 are not those of its manifest"
+        lots.append(
+            DesignLot(entry.name, entry.copies, built.files, built.design.order.spare_parts)
+        )
+        identity = (built.claims.name, built.claims.copies, built.claims.design_sha256)
+        if identity != (entry.name, entry.copies, entry.design_sha256):
+            message = f"{entry.folder}: name, copies or design_sha256 are not those of its manifest"
             problems.append(claim(message))
     first = folders[0]
     problems += file_problems(folder, job)
     order = SheetOrder(job, first.design, first.claims.kerf, lots)
     problems += sheet_problems(folder, order)
     if is_assembly(job):
-        weak += lowered_between(folder)
-        between, wrong = assembly_findings(folder)
-        found += between
-        problems += wrong
-    problems += lowered_problems(job.lowered_limits, weak)
-    whole = [one for one in checked if one is not None]
+        lowered_limits += lowered_between(folder)
+        between, between_problems = assembly_findings(folder)
+        findings += between
+        problems += between_problems
+    problems += lowered_problems(job.lowered_limits, lowered_limits)
+    whole = [design for design in checked if design is not None]
     if works is None and len(whole) == len(checked):
         from sbafab.as_built.derived import derived_job_problems
 
         problems += derived_job_problems(folder, job, whole, folders[0].claims.curves)
     count = len(job.sheets)
     return (
-        *found,
+        *findings,
         *findings_of(INTEGRITY, problems, f"{count} sheets read back: closed contours, no overlap"),
         *findings_of(CLAIMS, problems, "the sheets hold what the job's designs are made of"),
         *findings_of(DESIGNED, problems, AS_DESIGNED),
@@ -196,30 +196,30 @@ def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tupl
 
 
 def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None) -> AsBuiltFolder:
-    """The laminate that a folder's cut files make, and what is wrong with files and claims.
+    """Read the laminate of a folder's cut files, with the problems of files and claims.
 
-    The folder of a design ``of_job`` has no film sheets of its own. ``work``: what the run that has
-    just written it knows. Raises OutputError as ``check_folder`` does.
+    The folder of a design ``of_job`` has no film sheets of its own. ``work``: the design of a run that
+    has just written the folder. Raises OutputError as ``check_folder`` does.
     """
     claims = read_claims(folder)
     if all(layer.file is None for layer in claims.layers):
         raise OutputError(f"{folder} holds no cut files; write them with sbafab cut or generate")
-    design, is_own, problems = _design(folder, claims)
+    design, is_readable, problems = _design(folder, claims)
     if work is not None:
-        meant: Meant | None = work.meant
+        expected: Meant | None = work.expected
     else:
-        meant = expected_laminate(design, claims.curves) if is_own else None
+        expected = expected_laminate(design, claims.curves) if is_readable else None
     problems += order_problems(claims, design)
     try:
         problems += file_problems(folder, claims)
     except OSError as error:
         raise OutputError(f"{folder} cannot be read: {error.strerror or error}") from None
     count = len(claims.layers)
-    expected = meant.layers(count) if meant is not None else [None] * count
-    files, unread = read_layers(folder, claims, _drawn_in_chords(design), expected)
-    problems += unread
-    panel, files, unread = read_panel(folder, claims, files, meant)
-    problems += unread
+    layers_expected = expected.layers(count) if expected is not None else [None] * count
+    files, file_errors = read_layers(folder, claims, _drawn_in_chords(design), layers_expected)
+    problems += file_errors
+    panel, files, file_errors = read_panel(folder, claims, files, expected)
+    problems += file_errors
     layers = stacked_layers(files, design)
     problems += height_problems(claims, layers, design)
     problems += property_problems(files, claims, design)
@@ -232,10 +232,10 @@ def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None)
     chord_error = max((part.chord_error for part in parts), default=0.0)
     if len(parts) == len(files):
         try:
-            laminate = _laminate(files, claims, design, meant, panel)
+            laminate = _laminate(files, claims, design, expected, panel)
             problems += _laminate_problems(folder, laminate, claims, parts, design)
             room = 2 * (TOLERANCE + chord_error)
-            outline = meant.laminate.outline if meant is not None else Region()
+            outline = expected.laminate.outline if expected is not None else Region()
             outlined = replace(laminate, outline=outline)
             problems += size_problems(claims, sizes(design, outlined), room)
             laminate = with_plate_pins(folder, laminate, claims)
@@ -243,72 +243,78 @@ def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None)
             laminate = None
             message = f"the layers do not lie over each other as films of one stack ({error})"
             problems.append(Problem(INTEGRITY, message))
-    known = work.findings if work is not None else None
+    design_findings = work.findings if work is not None else None
     limits = limits_of(design)
-    return AsBuiltFolder(claims, design, limits, tuple(files), laminate, tuple(problems), meant, known)
+    return AsBuiltFolder(
+        claims, design, limits, tuple(files), laminate, tuple(problems), expected, design_findings
+    )
 
 
 def _laminate(
     files: Sequence[LayerFile],
     claims: Manifest,
     design: Design,
-    meant: Meant | None,
+    expected: Meant | None,
     panel: SheetPanel | None,
 ) -> Laminate:
-    """The layers as they are cut, with bores, inlets and pins where the design wants them.
+    """Return the laminate as cut, with bores, inlets and pins of the design.
 
-    What an opening is for cannot be told from its shape alone: a window may look like a tooling
-    hole, and an ear like a tab. Only where no design tells are they guessed from the profiles.
+    The purpose of an opening does not follow from its shape: a window may look like a tooling hole, and
+    an ear like a tab. Only without a usable design are they inferred from the profiles.
     """
-    if meant is None or len(meant.laminate.layers) != len(files):
+    if expected is None or len(expected.laminate.layers) != len(files):
         return laminate_of(files, claims, design)
-    if all(file.part is not None and file.part.is_meant for file in files):
-        own = meant.laminate
-        return own if panel is own.panel else replace(own, panel=panel)
-    layers = zip(stacked_layers(files, design), meant.laminate.layers, strict=True)
-    cut = tuple(replace(layer, pieces=wanted.pieces) for layer, wanted in layers)
-    return replace(meant.laminate, layers=cut, panel=panel)
+    if all(file.part is not None and file.part.is_expected for file in files):
+        laminate = expected.laminate
+        return laminate if panel is laminate.panel else replace(laminate, panel=panel)
+    layers = zip(stacked_layers(files, design), expected.laminate.layers, strict=True)
+    cut = tuple(replace(layer, pieces=layer_expected.pieces) for layer, layer_expected in layers)
+    return replace(expected.laminate, layers=cut, panel=panel)
 
 
-def design_problems_of(folder: Path, built: AsBuiltFolder, measured: Sequence[Finding]) -> list[Problem]:
-    """Layers, and all that lies beside them, that are not what the folder's design makes."""
+def design_problems_of(
+    folder: Path, built: AsBuiltFolder, measured: Sequence[Finding]
+) -> list[Problem]:
+    """Return the differences of layers, and of all other files, from the folder's design."""
     problems = _layer_problems(built)
     checked = _checked_design(built, measured)
-    if checked is not None and built.meant is not None:
+    if checked is not None and built.expected is not None:
         from sbafab.as_built.derived import derived_problems
 
         of_job = is_job(folder.absolute().parent)
-        problems += derived_problems(folder, built.claims, checked, built.meant.paths, of_job)
+        problems += derived_problems(folder, built.claims, checked, built.expected.paths, of_job)
     return problems
 
 
 def _layer_problems(built: AsBuiltFolder) -> list[Problem]:
-    """Layers whose files cut something else than the design makes there."""
-    if built.meant is None:
+    """Return the layers whose files differ from the design."""
+    if built.expected is None:
         return [Problem(DESIGNED, "design.toml makes no laminate to hold the cut files against")]
     problems = []
-    expected = built.meant.layers(len(built.files))
-    for file, own in zip(built.files, expected, strict=True):
-        if file.part is None or file.part.is_meant or own is None:
+    expected = built.expected.layers(len(built.files))
+    for file, layer in zip(built.files, expected, strict=True):
+        if file.part is None or file.part.is_expected or layer is None:
             continue
-        off = departure(file.part.path, own.path)
-        if off:
-            message = f"{file.label} is not what design.toml makes: {off}; regenerate the folder"
+        difference = departure(file.part.path, layer.path)
+        if difference:
+            message = (
+                f"{file.label} is not what design.toml makes: {difference}; regenerate the folder"
+            )
             problems.append(Problem(DESIGNED, message, (file.position,)))
     if built.files and expected[0] is None:
-        count = len(built.meant.laminate.layers)
+        count = len(built.expected.laminate.layers)
         message = f"design.toml makes {count} layers, and the manifest lists {len(built.files)}"
         problems.append(Problem(DESIGNED, message))
     return problems
 
 
 def _checked_design(built: AsBuiltFolder, measured: Sequence[Finding]) -> Checked | None:
-    """The folder's design with what the rules find in it; None where it makes no laminate."""
-    if built.meant is None:
+    """Return the folder's design with its findings; None if it cannot be built."""
+    if built.expected is None:
         return None
     in_chords = built.claims.curves is not None
-    laminate = build(built.design) if in_chords else built.meant.laminate
-    is_known = built.is_meant and not in_chords
+    laminate = build(built.design) if in_chords else built.expected.laminate
+    is_known = built.is_expected and not in_chords
     findings = tuple(measured) if is_known else run_deck(laminate, limits_of(built.design))
     return Checked(built.design, laminate, findings)
 
@@ -339,22 +345,22 @@ def _laminate_problems(
 
 
 def _design(folder: Path, claims: Manifest) -> tuple[Design, bool, list[Problem]]:
-    """The folder's design, and whether it could be read; else the family's defaults."""
+    """Return the folder's design and True; if unreadable, the family's defaults and False; and problems."""
     try:
         design = load_design(folder / "design.toml")
         digest = design_sha256(design)
     except (DesignError, OSError) as error:
-        said = str(error) or type(error).__name__
+        reason = str(error) or type(error).__name__
         try:
             design = validated({"name": "unknown", "family": claims.family}, records(), folder)
         except DesignError as unknown:
             raise OutputError(f"manifest.json: {unknown}") from None
-        return design, False, [claim(f"checked against default limits, for {said}")]
+        return design, False, [claim(f"checked against default limits, for {reason}")]
     return design, True, design_problems(claims, design, digest)
 
 
 def _drawn_in_chords(design: Design) -> bool:
-    """Whether the user drew the outline itself with chords for arcs."""
+    """Return True if the user's outline has chords in place of arcs."""
     if design.drawing is None:
         return False
     from sbafab.design.outline import read_outline
@@ -366,7 +372,7 @@ def _drawn_in_chords(design: Design) -> bool:
 
 
 def _unlisted_waivers(measured: Sequence[Finding], claims: Manifest) -> list[Problem]:
-    """Rules that the design waives, that fail as built, and that no cut file names as waived."""
+    """Return the waived rules that fail as built and are not in the manifest."""
     rules = dict.fromkeys(finding.rule for finding in measured if finding.by_user)
     return [
         claim(f"{rule} fails and is waived by design.toml, which the manifest does not say")
@@ -375,17 +381,17 @@ def _unlisted_waivers(measured: Sequence[Finding], claims: Manifest) -> list[Pro
     ]
 
 
-# What rules find on files as they lie: on a whole stack, or on the layers that can be read.
+# Rules as built: on a whole stack, or on the layers that could be read.
 
 
 BY_LAYER = (film_limits.NAME,)
-"""Rules that need no layer but the one they look at."""
+"""Rules that measure single layers."""
 UNMEASURED = (ArithmeticError, ValueError, LookupError, StopIteration)
-"""What shapes that no rule foresees can raise; a mistake of the program's own is not among them."""
+"""Errors of rules on shapes that no design makes; a programming error is not among them."""
 
 
 def findings_as_built(rule: Rule, measures: Measures) -> list[Finding]:
-    """What a rule finds; doctored files can make shapes that no rule can measure, which fails."""
+    """Return the findings of a rule; a shape that the rule cannot measure fails it."""
     try:
         return run_rule(rule, measures.laminate, measures.limits, measures)
     except UNMEASURED as error:
@@ -396,7 +402,7 @@ def findings_as_built(rule: Rule, measures: Measures) -> list[Finding]:
 def rules_by_layer(
     files: Sequence[LayerFile], claims: Manifest, design: Design, limits: Limits
 ) -> tuple[Finding, ...]:
-    """The rules that can run on the layers that could be read; the others say that they did not."""
+    """Return the findings of rules on single layers; every other rule fails as not run."""
     layers = stacked_layers(files, design)
     lost = tuple(file.position for file in files if file.part is None)
     some = Laminate(
@@ -412,24 +418,24 @@ def rules_by_layer(
         registration=design.registration.method,
     )
     why = "it needs every layer, and not all could be read" if lost else "there is no whole stack"
-    found: list[Finding] = []
+    findings: list[Finding] = []
     measures = Measures(some, limits)
     for rule in RULES:
         if layers and rule.name in BY_LAYER:
-            found += findings_as_built(rule, measures)
+            findings += findings_as_built(rule, measures)
         else:
             message = f"not run: {why}"
-            found.append(Finding(rule.name, "warn", None, None, "", Place(None, lost), message))
-    return tuple(found)
+            findings.append(Finding(rule.name, "warn", None, None, "", Place(None, lost), message))
+    return tuple(findings)
 
 
 # The assembly of a folder: its parts as design.toml puts them together, and what is claimed.
 
 
 def assembly_findings(folder: Path) -> tuple[tuple[Finding, ...], list[Problem]]:
-    """What is found between the parts, and where the manifest says otherwise than design.toml.
+    """Return the findings between parts of an assembly, and differences of manifest and design.toml.
 
-    Parts are as their designs make them: how films were cut is checked design by design.
+    Parts are taken as designed: their films are checked design by design.
     """
     claims = read_assembly(folder)
     try:
@@ -444,7 +450,7 @@ def assembly_findings(folder: Path) -> tuple[tuple[Finding, ...], list[Problem]]
 
 
 def lowered_between(folder: Path) -> tuple[str, ...]:
-    """The limits between parts that the assembly in a folder weakens; none if it is unreadable."""
+    """Return the lowered limits between parts of the assembly in a folder; () if it is unreadable."""
     try:
         return lowered_checks(load_assembly(folder / DESIGN_FILE).rules)
     except (DesignError, OSError):
@@ -457,12 +463,12 @@ def _assembly_problems(claims: AssemblyManifest, assembled: Assembled) -> list[P
         problems.append(claim(f"design.toml names the assembly {assembled.assembly.name}"))
     if claims.design_sha256 != assembly_sha256(assembled):
         problems.append(claim("design_sha256 is not that of design.toml and its parts' designs"))
-    told = [(one.name, one.copies, one.design_sha256) for one in claims.designs]
-    own = [
-        (one.design.name, one.design.order.quantity, design_sha256(one.design))
-        for one in assembled.designs
+    claimed = [(entry.name, entry.copies, entry.design_sha256) for entry in claims.designs]
+    designed = [
+        (part.design.name, part.design.order.quantity, design_sha256(part.design))
+        for part in assembled.designs
     ]
-    if told != own:
+    if claimed != designed:
         problems.append(claim("designs or their copies are not those that the parts ask for"))
     if list(claims.parts) != [part_entry(placed) for placed in assembled.parts]:
         problems.append(claim("parts or their places are not those of design.toml"))

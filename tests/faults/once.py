@@ -44,7 +44,7 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
     @contextmanager
     def context() -> Iterator[None]:
         with (
-            patch.object(as_built, "_run_deck", lambda b: (measured if b.is_meant else deck)(b)),
+            patch.object(as_built, "_run_deck", lambda b: (measured if b.is_expected else deck)(b)),
             patch.object(as_built, "expected_laminate", meant_by),
             patch.object(as_built, "run_deck", run_deck),
             patch.object(derived, "_regenerate", write_once),
@@ -57,7 +57,7 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
 def _asked_of_deck(built: as_built.AsBuiltFolder) -> str:
     """Design, limits, and the rules that are run: some checks leave out all or some."""
     names = [rule.name for rule in as_built.RULES]
-    return design_sha256(built.design) + repr((built.limits, built.known, names))
+    return design_sha256(built.design) + repr((built.limits, built.design_findings, names))
 
 
 def _remembered(work: Callable[..., Any], key: Callable[..., str]) -> Callable[..., Any]:
