@@ -84,19 +84,21 @@ class AsBuiltFolder:
 
     @property
     def is_expected(self) -> bool:
-        """True if every layer file cuts the design's own layer: ``laminate`` is then the design's."""
+        """True if every layer file cuts the design's layer; ``laminate`` is then the design's."""
         laminate, expected = self.laminate, self.expected
-        if laminate is not None and expected is not None:
-            if laminate.panel is not expected.laminate.panel:
-                return False
-        return all(file.part is not None and file.part.is_expected for file in self.files)
+        is_same_panel = (
+            laminate is None or expected is None or laminate.panel is expected.laminate.panel
+        )
+        return is_same_panel and all(
+            file.part is not None and file.part.is_expected for file in self.files
+        )
 
 
 def check_folder(folder: Path) -> tuple[Finding, ...]:
-    """Return the findings on an output folder: integrity, claims, rules, and agreement with its design.
+    """Return the findings on an output folder: integrity, claims, rules, agreement with its design.
 
-    Of a job or an assembly: those of every design and of the shared film sheets. Raises OutputError for
-    a folder without a sound manifest or without cut files.
+    Of a job or an assembly: those of every design and of the shared film sheets. Raises OutputError
+    for a folder without a sound manifest or without cut files.
     """
     if is_job(folder):
         return _check_job(folder)
@@ -109,8 +111,8 @@ def check_folder(folder: Path) -> tuple[Finding, ...]:
 def check_written(folder: Path, works: Mapping[str, RunWork]) -> tuple[Finding, ...]:
     """Return the findings on a folder just written from ``works``, by names of their designs.
 
-    Everything is read from the disk. If every layer file cuts the layer that the design check measured,
-    its findings are used; files beside the cut files are not made again.
+    Everything is read from the disk. If every layer file cuts the layer that the design check
+    measured, its findings are used; files beside the cut files are not made again.
     """
     if is_job(folder):
         return _check_job(folder, works)
@@ -142,7 +144,7 @@ def _findings(built: AsBuiltFolder, measured: Sequence[Finding]) -> tuple[Findin
 
 
 def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tuple[Finding, ...]:
-    """Return the findings on every design of a job, on its sheets, and between parts of an assembly.
+    """Return the findings on the designs of a job, on its sheets, and between parts of an assembly.
 
     ``works``: the designs of a run that has just written the folder.
     """
@@ -198,8 +200,8 @@ def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tupl
 def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None) -> AsBuiltFolder:
     """Read the laminate of a folder's cut files, with the problems of files and claims.
 
-    The folder of a design ``of_job`` has no film sheets of its own. ``work``: the design of a run that
-    has just written the folder. Raises OutputError as ``check_folder`` does.
+    The folder of a design ``of_job`` has no film sheets of its own. ``work``: the design of a run
+    that has just written the folder. Raises OutputError as ``check_folder`` does.
     """
     claims = read_claims(folder)
     if all(layer.file is None for layer in claims.layers):
@@ -259,8 +261,8 @@ def _laminate(
 ) -> Laminate:
     """Return the laminate as cut, with bores, inlets and pins of the design.
 
-    The purpose of an opening does not follow from its shape: a window may look like a tooling hole, and
-    an ear like a tab. Only without a usable design are they inferred from the profiles.
+    The purpose of an opening does not follow from its shape: a window may look like a tooling hole,
+    and an ear like a tab. Only without a usable design are they inferred from the profiles.
     """
     if expected is None or len(expected.laminate.layers) != len(files):
         return laminate_of(files, claims, design)
@@ -345,7 +347,7 @@ def _laminate_problems(
 
 
 def _design(folder: Path, claims: Manifest) -> tuple[Design, bool, list[Problem]]:
-    """Return the folder's design and True; if unreadable, the family's defaults and False; and problems."""
+    """Return the folder's design, True and problems; if unreadable, default values and False."""
     try:
         design = load_design(folder / "design.toml")
         digest = design_sha256(design)
@@ -433,7 +435,7 @@ def rules_by_layer(
 
 
 def assembly_findings(folder: Path) -> tuple[tuple[Finding, ...], list[Problem]]:
-    """Return the findings between parts of an assembly, and differences of manifest and design.toml.
+    """Return the findings between parts of an assembly, and differences of its manifest.
 
     Parts are taken as designed: their films are checked design by design.
     """
@@ -450,7 +452,7 @@ def assembly_findings(folder: Path) -> tuple[tuple[Finding, ...], list[Problem]]
 
 
 def lowered_between(folder: Path) -> tuple[str, ...]:
-    """Return the lowered limits between parts of the assembly in a folder; () if it is unreadable."""
+    """Return the lowered limits between parts of the assembly in a folder; () if unreadable."""
     try:
         return lowered_checks(load_assembly(folder / DESIGN_FILE).rules)
     except (DesignError, OSError):

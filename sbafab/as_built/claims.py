@@ -33,9 +33,9 @@ CUT_ENDINGS = (
     *(".dxf", ".dwg", ".ai", ".cdr", ".eps", ".lbrn", ENDING),
     *(".rd", ".plt", ".hpgl", ".gcode", ".nc", ".ngc", ".tap"),
 )
-"""Of files that CAD draws and that a laser cuts; pictures and pages may lie about as notes."""
+"""Suffixes of CAD and laser files; pictures and pages are not cut by mistake."""
 HEIGHT = 1e-6
-"""mm to which heights and thicknesses agree."""
+"""Tolerance of heights and thicknesses, mm."""
 
 
 def claim(message: str, *layers: int) -> Problem:
@@ -133,7 +133,7 @@ def _roles(roles: Sequence[str]) -> list[str]:
 
 
 def height_problems(claims: Manifest, layers: Sequence[Layer], design: Design) -> list[Problem]:
-    """Return differences of thicknesses from the films, of heights from their sums, of balloon numbers."""
+    """Return differences of thicknesses, heights and balloon numbers from the design."""
     problems = []
     stock = {film.material: film.thickness for film in design.films.stock.values()}
     placed = {layer.index: layer for layer in layers}
@@ -239,7 +239,7 @@ def _kerf(kerf: KerfClaim | None) -> str:
 def property_problems(
     files: Iterable[LayerFile], claims: Manifest, design: Design
 ) -> list[Problem]:
-    """Return custom properties of the cut files that differ from the manifest, equal ones joined."""
+    """Return custom properties of the cut files that differ from the manifest, joined by value."""
     layers_of: dict[str, list[int]] = {}
     bare = [file for file in files if file.part is not None and not file.part.properties]
     dangers = warnings(design)
@@ -294,7 +294,7 @@ def _expected_properties(
 
 
 def waiver_properties(claims: Manifest) -> dict[str, str | None]:
-    """Return the properties of every cut file on waived rules and lowered limits; None: no property."""
+    """Return the properties of every cut file on waived rules and lowered limits."""
     return {
         "WAIVED": ", ".join(claims.waived) or "none",
         LIMITS: limit_properties(claims.lowered_limits).get(LIMITS),

@@ -32,10 +32,10 @@ from sbafab.output.manifest_records import LayerClaim, Manifest
 
 MAX_BYTES = 20_000_000
 MAX_ENTITIES = 300_000
-"""Entities and points a cut file may be drawn with: more would take minutes to be kept apart."""
+"""Entities and points of a cut file: more would take minutes to check."""
 MARK = re.compile(rb"\n *1?0\r?\n")
 DATUM = "LINE"
-"""What the datum cross is drawn with: all that a layer file holds beside its contours."""
+"""Entity of the datum cross, the only one in a layer file beside its contours."""
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,9 @@ class CutPart:
     """The part that a cut file cuts: ``region`` without the kerf, round contours as circles.
 
     ``path`` is the beam's path as drawn. ``chord_error``: as the file claims, mm, 0 for true arcs.
-    ``corner_room``: mm2 by which the area may differ since the beam rounds corners. ``properties`` and
-    ``units`` are empty if the file has none. ``is_expected``: the path agrees with the design's layer,
-    and ``region`` is that layer.
+    ``corner_room``: mm2 by which the area may differ since the beam rounds corners. ``properties``
+    and ``units`` are empty if the file has none. ``is_expected``: the path agrees with the design's
+    layer, and ``region`` is that layer.
     """
 
     region: Region
@@ -120,7 +120,7 @@ def _in_agreement(files: Sequence[LayerFile]) -> list[LayerFile]:
 
 
 def path_in_folder(folder: Path, file: str | None) -> Path:
-    """Return the path of a file of the manifest. Raises OutputError if it leads out of the folder."""
+    """Return the path of a file of the manifest. Raises OutputError if it is outside the folder."""
     if file is None:
         raise OutputError("the manifest names no cut file for it; regenerate the folder")
     pure = PurePosixPath(file)
@@ -163,8 +163,8 @@ def read_part(
 ) -> CutPart:
     """Read the part that a cut file cuts. Raises OutputError if the file is not sound.
 
-    ``properties`` replace those of a file that has none. ``expected``: the design's layer, if known.
-    ``has_letters``: letters on REFERENCE are permitted, as on a base plate.
+    ``properties`` replace those of a file that has none. ``expected``: the design's layer, if
+    known. ``has_letters``: letters on REFERENCE are permitted, as on a base plate.
     """
     try:
         drawing = read_profile(path)
@@ -224,7 +224,7 @@ LETTERS = ("LWPOLYLINE", "POLYLINE")
 
 
 def _without_letters(drawing: ReadBack) -> ReadBack:
-    """Return the drawing without polylines on REFERENCE, which are letters: the datum is two lines."""
+    """Return the drawing without polylines on REFERENCE, which are letters; the datum is lines."""
     remaining = [
         (kind, stroke)
         for kind, stroke in zip(drawing.other, drawing.strokes, strict=True)

@@ -62,17 +62,17 @@ if TYPE_CHECKING:
 
 INDEX = "manifest.json"
 DESIGN_ERRORS = (DesignError, OutputError, GeometryError, ArithmeticError, LookupError)
-"""What a doctored design can raise where a sound one is made."""
+"""Errors of a doctored design."""
 BY_OTHER_COMMANDS = (*MESH, *PREDICTION, *SIMULATORS)
-"""Folders and files of an earlier run that lie beside what is made again."""
+"""Folders and files of other commands, which are not made again."""
 NOT_COMPARED = ("files", "mesh_statistics", "meshes")
-"""Keys of a manifest with hashes, and with meshes of more than one command."""
+"""Keys of a manifest that hold hashes, or meshes of several commands."""
 
 
 def derived_problems(
     folder: Path, claims: Manifest, checked: Checked, paths: Mapping[str, Region], of_job: bool
 ) -> list[Problem]:
-    """Return the files of a design that differ from those made again; of a job's design, not its sheets.
+    """Return the files of a design that differ from those made again; no sheets of a job's design.
 
     ``paths`` holds the beam's path for every pattern of the laminate.
     """
@@ -135,7 +135,7 @@ def _foreign_problems(
 
 @contextmanager
 def _temporary_folder(folder: Path) -> Iterator[tuple[Path, list[Problem]]]:
-    """Yield an empty folder and a list of problems, which receives the error of a design not made."""
+    """Yield an empty folder and a list of problems; an error of the design is added to it."""
     problems: list[Problem] = []
     with TemporaryDirectory() as name:
         try:
@@ -229,7 +229,7 @@ def _read_index(path: Path) -> dict[str, Any]:
 
 
 def _index_problems(folder: Path, index: dict[str, Any], of_job: bool) -> list[Problem]:
-    """Return the differences of the manifest from the design's; the job claims the sheets of a job."""
+    """Return the differences of the manifest from the design's, without sheets of a job."""
     left_out = (*NOT_COMPARED, "sheets", "films") if of_job else NOT_COMPARED
     actual, expected = _read_index(folder / INDEX), json.loads(as_json(index))
     difference = index_difference(actual, expected, left_out) or _mesh_difference(
@@ -299,18 +299,16 @@ def _prediction_problems(
     return _file_problems(folder, written, claims.files, claims.generator)
 
 
-# Whether two files hold the same: bytes first, then what a reader takes from them.
-#
-# Bytes may differ where another program has saved a drawing, or another version of a library has
-# made a mesh or a picture, and nothing differs that is cut, pressed or read.
+# Comparison of two files: bytes first, then contents, since another program or another version of a
+# library may write the same contents in other bytes.
 
 
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-6, 1e-6
-"""Numbers that differ by less, relatively or at all, say the same: libraries round otherwise."""
+"""Tolerances of numbers, since libraries round differently."""
 GREY = 1.0
-"""Mean difference of two pictures, of 255 levels, that antialiasing may make."""
+"""Mean difference of two pictures by antialiasing, of 255 levels."""
 VISIBLE, VISIBLE_SHARE = 48, 2e-4
-"""A pixel that differs by as much is seen; that share of them may be."""
+"""Visible difference of a pixel, of 255 levels, and permitted share of such pixels."""
 UNREADABLE = (ValueError, LookupError, ArithmeticError, RecursionError, csv.Error)
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 PICTURE = re.compile(r"data:image/png;base64,([A-Za-z0-9+/=\s]+)")
@@ -318,7 +316,10 @@ LONGEST_SHOWN = 40
 
 
 def file_difference(actual: Path, expected: Path, name: str) -> str:
-    """Return the difference of a file from the expected one in a sentence with ``name``; "" if none."""
+    """Return the difference of a file from the expected one in a sentence; "" if none.
+
+    ``name``: the file's name in the sentence.
+    """
     data, expected_data = actual.read_bytes(), expected.read_bytes()
     if data == expected_data:
         return ""
@@ -520,7 +521,7 @@ def _drawing_difference(actual: Path, expected: Path) -> str:
 
 
 def _stroke_difference(drawing: ReadBack, expected: ReadBack) -> str:
-    """Return a stroke (engraving, parting cut, frame or datum) that only one drawing has; "" if none."""
+    """Return a stroke (engraving, cut, frame or datum) that only one drawing has; "" if none."""
     missing = [*expected.strokes]
     for layer, edges in drawing.strokes:
         points = [edges[0].start, *(edge.end for edge in edges)]
@@ -554,12 +555,12 @@ def _same_points(points: list[tuple[float, float]], edges: Any) -> bool:
 
 
 POINT_TOLERANCE = 2e-5
-"""mm by which a point stored in single precision, or to 6 decimals, may be off."""
+"""Rounding error of points in single precision or with 6 decimals, mm."""
 MESH_SHARE = 1e-5
-"""Share of a volume by which two triangulations of one solid may differ."""
+"""Relative difference of volume between triangulations of one solid."""
 MAX_MESH_BYTES = 500_000_000
 MAX_COORDINATE = 1e5
-"""mm from the origin."""
+"""Largest coordinate, mm."""
 MODEL = "3D/3dmodel.model"
 VERTEX = re.compile(r'<vertex x="([^"]*)" y="([^"]*)" z="([^"]*)" */>')
 TRIANGLE = re.compile(r'<triangle v1="([^"]*)" v2="([^"]*)" v3="([^"]*)" */>')

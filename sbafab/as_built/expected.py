@@ -1,7 +1,8 @@
-"""Contours that files draw alike made one: what lies within 1 um of what was meant is as meant.
+"""The expected laminate of a folder, and agreement of contours with it.
 
-Programs that save a file anew round its coordinates, and not alike in every layer. Rules would
-take what is left between two such edges for a bond, or for a leak.
+Contours within 1 um of each other become one: programs that save a file again round its coordinates
+differently in every layer, and rules would take the gap between two such edges for a bond or a
+leak.
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ from sbafab.rules.limits import TOLERANCE, Limits
 from sbafab.rules.measures import Measures
 
 AGREEMENT = 2 * TOLERANCE
-"""mm between two contours that are each within TOLERANCE of the one that was meant."""
+"""Largest distance of two contours that are each within TOLERANCE of the expected one, mm."""
 SAME = 1e-8
-"""mm: coordinates that differ by less were written as one."""
+"""Coordinates that differ by less are equal, mm."""
 
 
 def with_circles(region: Region) -> Region:
-    """Return the region with contours that stay within TOLERANCE of a circle replaced by circles."""
+    """Return the region with circles for contours that stay within TOLERANCE of one."""
     return Region(tuple(map(_rounded, region.contours)))
 
 
@@ -130,7 +131,7 @@ def _largest_difference(
 
 
 def _matching_edges(first: Contour, contour: Contour) -> Contour | None:
-    """Return the contour from the first one's start if all edges agree with its edges; else None."""
+    """Return the contour from the first one's start if all edges agree, else None."""
     if first.circle is not None and contour.circle is not None:
         (p, r), (q, s) = first.circle, contour.circle
         return contour if math.dist(p, q) + abs(r - s) <= AGREEMENT else None
@@ -172,7 +173,7 @@ def in_agreement(regions: Sequence[Region]) -> list[Region]:
     return [Region(tuple(home.agreed for home in region_groups)) for region_groups in homes]
 
 
-# Whether a laminate still holds its limits where chords stand for its arcs.
+# Check of laminates cut in chords against their limits.
 
 
 def refuse_coarse(
@@ -225,7 +226,7 @@ def _first_failure(laminate: Laminate, limits: Limits) -> Finding | None:
     )
 
 
-# What a folder's design makes: the laminate that every cut file is held against.
+# The expected laminate of a folder's design.
 
 
 class Expected(NamedTuple):
@@ -242,7 +243,7 @@ class Meant(NamedTuple):
     paths: Mapping[str, Region]
 
     def layers(self, count: int) -> Sequence[Expected | None]:
-        """Return the expected ``count`` layers, bottom to top; all None if the design has another number.
+        """Return the expected ``count`` layers, bottom to top; all None if the count differs.
 
         A surplus or missing layer may be anywhere, so that no layer has a certain place.
         """

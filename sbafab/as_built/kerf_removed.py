@@ -15,13 +15,13 @@ from sbafab.geometry.offset import Kerf, rim, shrink, widths
 from sbafab.geometry.region import Contour, Region, circle
 
 KINK = 0.05
-"""Radians: arcs along one curve turn less where they join, corners of a path more."""
+"""Smallest turn of a corner, radians; arcs along one curve turn less where they join."""
 STEP = math.radians(5)
-"""Most that a chord turns round a corner."""
+"""Largest turn of a chord round a corner."""
 MAX_HALF_TURN = math.radians(88)
-"""Half the turn of the sharpest corner whose rounding is reckoned with."""
+"""Half the turn of the sharpest corner in `_corner_room`."""
 CORNER_SHARE = 0.15
-"""Share of its way on the path that the part's edge covers less of, where it has a corner."""
+"""At a corner, the part's edge is shorter than this share of the path's."""
 
 
 class CutResult(NamedTuple):
@@ -75,7 +75,7 @@ def _part_contour(contour: Contour, a: float, b: float) -> Contour:
 
 
 def _chords(vertices: Sequence[_Vertex]) -> Contour:
-    """Return lines between the vertices; a straight edge is two, so that it is no chord of a circle."""
+    """Return lines between the vertices; a straight edge is two, and so no chord of a circle."""
     points: list[Point] = []
     for spot, after in zip(vertices, (*vertices[1:], vertices[0]), strict=True):
         (x, y), (u, v) = spot.part, after.part
@@ -145,10 +145,10 @@ def _vertices(before: Edge, after: Edge, a: float, b: float) -> Iterator[_Vertex
 
 
 ON_CIRCLE = 1e-5
-"""mm by which the ends of chords may miss their circle."""
+"""Largest distance of the ends of chords from their circle, mm."""
 MIN_CHORDS = 5
 MAX_STEP = math.radians(20)
-"""So many chords, each turning less than this on one circle, are meant as an arc."""
+"""As many chords on one circle, each turning less than this, replace an arc."""
 
 
 class ChordRun(NamedTuple):
@@ -242,7 +242,7 @@ def _runs(points: list[Point]) -> Iterator[ChordRun]:
 
 
 def _on_one_circle(points: list[Point], first: int) -> bool:
-    """Return True if four points from ``first`` on lie on one circle, turning one way in short chords."""
+    """Return True if four points from ``first`` on are ends of short chords of one circle."""
     a, b, c, d = (points[(first + i) % len(points)] for i in range(4))
     fitted = _circle(a, b, c)
     if fitted is None or _angle_between(a, b, c) * _angle_between(b, c, d) <= 0:

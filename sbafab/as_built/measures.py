@@ -21,7 +21,7 @@ from sbafab.pressing.cycles import APART, are_apart
 from sbafab.rules.limits import TOLERANCE, at
 
 SHARE = 1e-4
-"""Share of an area by which a claim may be off (0.01 %)."""
+"""Relative tolerance of areas."""
 
 
 def layer_problems(files: Iterable[LayerFile], claims: Manifest) -> list[Problem]:

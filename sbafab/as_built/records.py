@@ -19,19 +19,11 @@ from sbafab.output.swap import (
 from sbafab.rules.finding import Finding, Place, Verdict
 
 INTEGRITY = "file-integrity"
-
-
 CLAIMS = "manifest-claims"
-
-
 DESIGNED = "as-designed"
-
-
 MAX_MANIFEST_BYTES = 50_000_000
-
-
 MAX_SHOWN = 12
-"""Problems of one rule that are reported one by one."""
+"""Problems of a rule that are reported one by one."""
 
 
 def read_claims(folder: Path) -> Manifest:
@@ -92,9 +84,9 @@ def _read(folder: Path, kind: type[Read], schema: str) -> Read:
         first = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in first["loc"])
         reason = first["msg"][:1].lower() + first["msg"][1:]
-        reason_at = f"{where}: {reason}" if where else reason
+        fault = f"{where}: {reason}" if where else reason
         raise OutputError(
-            f"{path} is not a sound {schema}: {reason_at}; regenerate the folder with sbafab generate"
+            f"{path} is not a sound {schema}: {fault}; regenerate the folder with sbafab generate"
         ) from None
 
 
@@ -112,7 +104,7 @@ class Problem:
 
 
 def findings_of(rule: str, problems: list[Problem], passed: str) -> list[Finding]:
-    """Return the findings of a rule: its problems, at most MAX_SHOWN in full, or one that passes."""
+    """Return the findings of a rule: at most MAX_SHOWN problems in full, or one that passes."""
     rule_problems = [problem for problem in problems if problem.rule == rule]
     if not any(problem.verdict == "fail" for problem in rule_problems):
         rule_problems.append(Problem(rule, passed, verdict="pass"))

@@ -178,7 +178,7 @@ def _kinds_of(
 
 
 def _counted_pieces(sheet: CutSheet, kinds: _PieceKinds) -> tuple[Counter[int], list[Problem]]:
-    """Return the counts of a sheet's pieces by id of their kind, and problems of pieces of no kind."""
+    """Return the counts of a sheet's pieces by id of kind, and problems of pieces of no kind."""
     counts: Counter[int] = Counter()
     problems = []
     for piece in sheet.path.pieces:
@@ -198,7 +198,7 @@ def _counted_pieces(sheet: CutSheet, kinds: _PieceKinds) -> tuple[Counter[int], 
 def _count_problems(
     sheet: CutSheet, kinds: Sequence[_PieceKind], counts: Counter[int]
 ) -> list[Problem]:
-    """Return wrong counts by pattern of a sheet; patterns that share a piece are counted together."""
+    """Return wrong counts by pattern of a sheet; patterns that share a piece count together."""
     claimed: Counter[_Pattern] = Counter()
     for part in sheet.claim.parts:
         claimed[part.design, part.pattern] += part.count
@@ -219,7 +219,7 @@ def _count_problems(
 
 
 def _groups(kinds: Sequence[_PieceKind]) -> dict[_Pattern, _Pattern]:
-    """Return the group of every pattern, named by its first: one pattern, or those that share pieces."""
+    """Return the group of every pattern, named by its first: patterns that share pieces."""
     groups: dict[_Pattern, _Pattern] = {}
     for kind in kinds:
         joined = {groups.get(pattern, pattern) for pattern in kind.needed}
@@ -263,7 +263,7 @@ def _agree(piece: Region, form: Region, room: float) -> bool:
 
 
 ROUNDED = 2e-3
-"""mm, mm2 or share by which a rounded claim may be off beside its share."""
+"""Rounding error of a claim, mm, mm2 or share."""
 
 
 @dataclass(frozen=True)
@@ -348,7 +348,7 @@ def _integrity_problem(
 
 
 def _order_problems(order: SheetOrder) -> list[Problem]:
-    """Return differences of sheets from the design (number, name, stock) and of films from sheets."""
+    """Return differences of sheets from the design, and of films from sheets."""
     problems = []
     for material, stock in stocks(order.design).items():
         sheets = [sheet for sheet in order.claims.sheets if sheet.material == material]
@@ -433,7 +433,7 @@ def _film_problems(film: FilmUseClaim, sheets: Sequence[SheetClaim]) -> list[Pro
 def _property_problems(
     sheet_claim: SheetClaim, drawing: ReadBack, order: SheetOrder, curves: str | None
 ) -> list[Problem]:
-    """Return custom properties that differ from the manifest, or curves that differ from the layers'."""
+    """Return custom properties that differ from the manifest, or curves from the layers'."""
     of = sum(sheet.material == sheet_claim.material for sheet in order.claims.sheets)
     expected: dict[str, str | None] = {
         "DESIGN": order.claims.name,
@@ -451,7 +451,8 @@ def _property_problems(
     }
     return [
         claim(
-            f"{sheet_claim.file}: custom property {name} is {drawing.properties.get(name)!r}, not {value!r}"
+            f"{sheet_claim.file}: custom property {name} is {drawing.properties.get(name)!r}, "
+            f"not {value!r}"
         )
         for name, value in expected.items()
         if drawing.properties.get(name) != value
@@ -480,7 +481,8 @@ def _layout_problems(sheet_claim: SheetClaim, drawing: ReadBack, stock: Stock) -
         problems.append(_integrity_problem(sheet_claim, error))
     top = drawing.region.bounds[3] + sheet_claim.border
     if stock.roll and abs(sheet_claim.length - top) > TOLERANCE:
-        message = f"{sheet_claim.file}: is {sheet_claim.length:g} mm long, and its parts and border {top:g}"
+        length = f"is {sheet_claim.length:g} mm long, and its parts and border {top:g}"
+        message = f"{sheet_claim.file}: {length}"
         problems.append(claim(message))
     off_waste = _engraving_off_waste(drawing, sheet_claim)
     if off_waste is not None:
@@ -543,7 +545,7 @@ def _number_problems(sheet: CutSheet, drawing: ReadBack) -> list[Problem]:
 def read_panel(
     folder: Path, claims: Manifest, files: Sequence[LayerFile], expected: Meant | None
 ) -> tuple[SheetPanel | None, list[LayerFile], list[Problem]]:
-    """Return the panel of a folder's files, the layer files with the parts that it frees, and problems.
+    """Return the panel of a folder's files, the layer files that it frees, and problems.
 
     The panel is the design's own if all files agree with it. Of copies that differ, the one that
     departs most from the design represents its layer.
@@ -585,7 +587,7 @@ def _with_part(file: LayerFile, layer: Layer, panel: SheetPanel) -> LayerFile:
 
 
 def _second_cut(folder: Path, width: Kerf, panel: SheetPanel) -> tuple[Region, list[Problem]]:
-    """Return the slots in the file of the second cut, or the panel's own if they agree; and problems."""
+    """Return the slots in the file of the second cut, the panel's if they agree; and problems."""
     try:
         sound_digest(folder / PATH)
         drawing = read_profile(folder / PATH)

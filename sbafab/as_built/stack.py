@@ -33,8 +33,8 @@ from sbafab.rules.limits import TOLERANCE
 def laminate_of(files: Sequence[LayerFile], claims: Manifest, design: Design) -> Laminate:
     """Return the laminate of readable files.
 
-    Order, roles and films come from the manifest; tube, bore, lumen and pin diameters from the design;
-    names from the nearest claim of the manifest.
+    Order, roles and films come from the manifest; tube, bore, lumen and pin diameters from the
+    design; names from the nearest claim of the manifest.
     """
     layers = stacked_layers(files, design)
     bare = Laminate(
@@ -84,7 +84,7 @@ def laminate_of(files: Sequence[LayerFile], claims: Manifest, design: Design) ->
 
 
 def stacked_layers(files: Sequence[LayerFile], design: Design) -> tuple[Layer, ...]:
-    """Return the layers of readable files in the manifest's order; equal profiles are one pattern."""
+    """Return the layers of readable files in order; equal profiles share a pattern."""
     patterns: dict[tuple[str, str], str] = {}
     layers = []
     z, balloon = 0.0, 0
@@ -119,7 +119,7 @@ def _film(claim: LayerClaim, design: Design) -> Film:
 
 
 def _pieces(layer: Layer, has_lumen: bool, chambers: int, places: int) -> int:
-    """Return the number of pieces of a layer by its role: one round a lumen, else one for each body.
+    """Return the number of pieces of a layer by its role: one round a lumen, else one a body.
 
     In the bottom balloon, where inlets may be shared, one for each chamber.
     """
@@ -222,16 +222,17 @@ def _pin_name(place: Point, name: str, claims: Manifest) -> str:
 
 
 SQUARE = 0.1
-"""Cosine up to which a tab's corner counts as square: a turned layer still has its tabs."""
+"""Cosine of the largest error of a right angle at a tab: layers may be turned."""
 ROUNDED_OFF = 0.9
-"""The same where a large fillet takes all of a short tab's sides, and comes aslant to its end."""
+"""As SQUARE, for short tabs whose large fillets meet the end at an angle."""
 STEP = 0.05
 
 
 class Tab(NamedTuple):
     """A square-ended tab: the middle of its end, unit vector outward, width and straight run, mm.
 
-    ``mouth``: the ends of the strip at the tab's end, as offsets from the middle; None without strip.
+    ``mouth``: the ends of the strip at the tab's end, as offsets from the middle; None without
+    strip.
     """
 
     end: Point
@@ -318,8 +319,8 @@ def _mouth(tab: Tab, interface: Interface) -> tuple[float, float] | None:
 def feeding_tab(tabs: Sequence[Tab], place: Point, interface: Interface) -> int:
     """Return the index of the tab that feeds the channel or pocket at ``place``.
 
-    The nearest of those whose strip opens into the same pocket; else of those whose strip opens into
-    none; else of all.
+    The nearest of those whose strip opens into the same pocket; else of those whose strip opens
+    into none; else of all.
     """
     pockets = interface.unbonded.pieces if not interface.unbonded.is_empty else ()
     holding = [piece for piece in pockets if _contains(piece, place)]
@@ -334,7 +335,7 @@ def feeding_tab(tabs: Sequence[Tab], place: Point, interface: Interface) -> int:
 
 
 def inner_point(tab: Tab, interface: Interface) -> Point:
-    """Return a point of the pocket behind a tab, half way through the region beyond the tab's run."""
+    """Return a point of the pocket behind a tab, half way through the region beyond its run."""
     for region in (interface.unbonded, interface.contact):
         depth = tab.run + STEP
         offset = tab.offset(tab.middle)

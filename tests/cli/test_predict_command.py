@@ -67,7 +67,7 @@ def _table_reads_well(out: str) -> None:
     assert first == "blocked force at 10 kPa, flat 0.3927 N"
     assert second.startswith("at 25 % of full stroke")
     # Above the heading of other models each quantity stands once.
-    others = lines.index("Other models of the same: design with the figures above")
+    others = lines.index("Alternative models: design with the figures above")
     assert heads[1] < others < heads[2]
     above = [line[:58] for line in lines[:others] if line.startswith("  ")]
     assert sum("10 kPa, flat" in line for line in above) == 1

@@ -65,11 +65,15 @@ def test_from_the_first_record_to_the_report(
     # The code on the traveller finds the record, and with the serial the one actuator.
     scanned = record_text("1dof-5mm", new["design_sha256"], "sbafab 1.0.0")
     _, out, _ = run(["record", "--find", scanned, "--serial", "A2"], capsys)
-    assert [line.split(",")[0] for line in out.splitlines()] == ["record 2", "record 4"]
+    assert [line.split(",")[0] for line in out.splitlines()] == [
+        "record 2",
+        "record 4",
+        "2 records found in lab.sqlite",
+    ]
     assert "corrected by 4" in out
     # As its last line says, to be typed by hand.
     arguments = scanned.splitlines()[-1].split()[1:]
-    assert len(run(arguments, capsys)[1].splitlines()) == 4
+    assert len(run(arguments, capsys)[1].splitlines()) == 5
 
     monkeypatch.setenv("SBAFAB_LAB", str(Path("lab.sqlite").resolve()))
     _, out, _ = run(["record", "--report", "--json"], capsys)
