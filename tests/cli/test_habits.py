@@ -313,3 +313,35 @@ def test_mesh_formats_are_called_as_they_are_written() -> None:
     ]
     assert named
     assert set(named) == {version}
+
+
+@pytest.mark.parametrize(
+    ("typed", "hint"),
+    [
+        ("gen", "did you mean generate?"),
+        ("chekc", "did you mean check?"),
+        ("pre", "did you mean press or predict?"),
+        ("xyzzy", "'xyzzy' is not a command; see sbafab --help"),
+    ],
+)
+def test_an_unknown_command_is_answered_with_the_nearest(
+    typed: str, hint: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, err = run([typed, "3dof-15mm"], capsys)
+    assert (code, out) == (2, "")
+    assert hint in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["--to", "tip.txt"], "tip.txt must end in .toml"),
+        (["--to", "tip.toml", "-o", "out"], "--out names a folder and --to a file"),
+    ],
+)
+def test_a_found_design_goes_to_a_folder_or_a_toml_file(
+    arguments: list[str], reason: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, err = run(["find", "1dof-5mm", "--max", "mass=1", *arguments], capsys)
+    assert (code, out) == (2, "")
+    assert reason in err

@@ -150,7 +150,7 @@ def test_where_nothing_meets_all_the_nearest_miss_is_said(tmp_path: Path) -> Non
     target.write_text("mine")
     ended = CliRunner().invoke(app, asked)
     assert ended.exit_code == 2
-    assert "exists; name another file" in ended.output
+    assert "exists and is not overwritten" in ended.output
     assert target.read_text() == "mine"
 
 
@@ -199,6 +199,9 @@ def test_a_folder_gets_found_toml(tmp_path: Path) -> None:
     assert ended.exit_code == 0, ended.output
     assert sbafab.load(tmp_path / "new" / "found.toml").name == "found"
     assert CliRunner().invoke(app, asked).exit_code == 2
+    named = [*asked[:-2], "--to", str(tmp_path / "tip.toml")]
+    assert CliRunner().invoke(app, named).exit_code == 0
+    assert sbafab.load(tmp_path / "tip.toml").name == "tip"
     (tmp_path / "file").write_text("mine")
     ended = CliRunner().invoke(app, [*asked[:-1], str(tmp_path / "file")])
     assert ended.exit_code == 2
